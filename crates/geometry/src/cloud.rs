@@ -1,0 +1,403 @@
+//! `PointCloud`: distinct finite points in single precision about a double-precision origin.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::{Aabb, Frame};
+
+/// Fewer distinct points than this define no surface worth asking about.
+const LEAST_POINTS: usize = 8;
+
+/// Beyond this a squared distance leaves the range of double precision.
+const FARTHEST: f64 = 1e150;
+
+mod sealed {
+    #[expect(unnameable_types, reason = "that is what seals `Coordinate`")]
+    pub trait Sealed: Copy {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
+}
+
+/// A number that a cloud can be built from: `f32` or `f64`.
+pub trait Coordinate: sealed::Sealed + Into<f64> {}
+impl Coordinate for f32 {}
+impl Coordinate for f64 {}
+
+/// Why points do not make a cloud.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CloudError {
+    /// A coordinate is NaN or infinite.
+    #[error(
+        "point {index} has a coordinate that is not finite; use `PointCloud::cleaned` to drop such points"
+    )]
+    NotFinite {
+        /// Index of the first such point.
+        index: usize,
+    },
+    /// A coordinate is so large that squared distances overflow.
+    #[error("point {index} has a coordinate beyond ±1e150; scale the input down")]
+    TooLarge {
+        /// Index of the first such point.
+        index: usize,
+    },
+    /// Too few distinct finite points.
+    #[error("{distinct} distinct finite points of {given} given; at least 8 are needed")]
+    TooFew {
+        /// How many distinct finite points there are.
+        distinct: usize,
+        /// How many were given.
+        given: usize,
+    },
+    /// More points than a 32-bit id can name.
+    #[error("{given} points; at most 4294967295 can be told apart by a 32-bit id")]
+    TooMany {
+        /// How many were given.
+        given: usize,
+    },
+    /// Normals or colours that do not belong to the points given.
+    #[error("{given} normals or colours for {points} points; give one for each point of the input")]
+    AttributeCount {
+        /// How many attributes were given.
+        given: usize,
+        /// How many points the cloud was made from.
+        points: usize,
+    },
+}
+
+/// How many points were left out, and why.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Dropped {
+    /// Points with a NaN or infinite coordinate.
+    pub not_finite: usize,
+    /// Points at the very place of an earlier one.
+    pub duplicate: usize,
+}
+
+/// Samples of a surface: finite, distinct, at least eight, in the order given.
+///
+/// Positions are `f32` in a local [`Frame`] whose origin is `f64`, so a cloud in geographic coordinates keeps
+/// its detail; [`PointCloud::step`] says what rounding costs. A point that rounds onto an earlier one is a
+/// duplicate and dropped: it would say nothing new about the surface. [`PointCloud::source`] leads from a
+/// kept point to its index in the input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointCloud {
+    frame: Frame,
+    positions: Vec<[f32; 3]>,
+    source: Vec<u32>,
+    given: usize,
+    dropped: Dropped,
+    step: f64,
+    normals: Option<Vec<[f32; 3]>>,
+    colours: Option<Vec<[u8; 3]>>,
+}
+
+impl PointCloud {
+    /// A cloud of all `positions`, each of which must be finite. Exact duplicates are dropped and counted.
+    ///
+    /// Costs a sort, O(n log n).
+    ///
+    /// # Errors
+    /// Names the first point that is not finite or too large; fails on fewer than 8 distinct points.
+    pub fn from_positions<T: Coordinate>(positions: &[[T; 3]]) -> Result<Self, CloudError> {
+        match positions.iter().position(|p| !is_finite(*p)) {
+            Some(index) => Err(CloudError::NotFinite { index }),
+            None => Self::cleaned(positions),
+        }
+    }
+
+    /// A cloud of the finite ones of `positions`; the others, and exact duplicates, are dropped and counted.
+    ///
+    /// # Errors
+    /// Names the first point that is too large; fails on fewer than 8 distinct points.
+    pub fn cleaned<T: Coordinate>(positions: &[[T; 3]]) -> Result<Self, CloudError> {
+        let given = positions.len();
+        if u32::try_from(given).is_err() {
+            return Err(CloudError::TooMany { given });
+        }
+        let bounds = Aabb::of(
+            positions
+                .iter()
+                .filter(|p| is_finite(**p))
+                .map(|p| p.map(Into::into)),
+        );
+        if bounds
+            .min
+            .iter()
+            .chain(&bounds.max)
+            .any(|x| x.is_finite() && x.abs() > FARTHEST)
+        {
+            let far = |p: &[T; 3]| is_finite(*p) && p.iter().any(|x| (*x).into().abs() > FARTHEST);
+            let index = positions.iter().position(far).unwrap_or_default();
+            return Err(CloudError::TooLarge { index });
+        }
+        let frame = Frame::around(bounds.min, bounds.max);
+        let mut kept = Vec::with_capacity(given);
+        let mut step = 0.0_f64;
+        for (index, p) in (0_u32..).zip(positions) {
+            if is_finite(*p) {
+                let world = (*p).map(Into::into);
+                let local = frame.to_local(world);
+                let back = frame.to_world(local);
+                step = (0..3).fold(step, |s, k| s.max((world[k] - back[k]).abs()));
+                kept.push((local, index));
+            }
+        }
+        let not_finite = given - kept.len();
+        let finite = kept.len();
+        let kept = distinct(kept);
+        let dropped = Dropped {
+            not_finite,
+            duplicate: finite - kept.len(),
+        };
+        if kept.len() < LEAST_POINTS {
+            return Err(CloudError::TooFew {
+                distinct: kept.len(),
+                given,
+            });
+        }
+        let (positions, source) = kept.into_iter().unzip();
+        Ok(Self {
+            frame,
+            positions,
+            source,
+            given,
+            dropped,
+            step,
+            normals: None,
+            colours: None,
+        })
+    }
+
+    /// The same cloud with a normal for each point; `normals` are indexed like the input.
+    ///
+    /// # Errors
+    /// When there is not one normal for each point of the input.
+    pub fn with_normals(mut self, normals: &[[f32; 3]]) -> Result<Self, CloudError> {
+        self.normals = Some(self.gathered(normals)?);
+        Ok(self)
+    }
+
+    /// The same cloud with a colour for each point; `colours` are indexed like the input.
+    ///
+    /// # Errors
+    /// When there is not one colour for each point of the input.
+    pub fn with_colours(mut self, colours: &[[u8; 3]]) -> Result<Self, CloudError> {
+        self.colours = Some(self.gathered(colours)?);
+        Ok(self)
+    }
+
+    fn gathered<V: Copy>(&self, values: &[V]) -> Result<Vec<V>, CloudError> {
+        if values.len() != self.given {
+            return Err(CloudError::AttributeCount {
+                given: values.len(),
+                points: self.given,
+            });
+        }
+        Ok(self.source.iter().map(|&i| values[i as usize]).collect())
+    }
+
+    /// How many points there are.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "a cloud has at least eight points")]
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Positions in the local frame.
+    #[must_use]
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions
+    }
+
+    /// Position of the `i`-th kept point in the caller's frame.
+    ///
+    /// # Panics
+    /// When `i` is not below [`PointCloud::len`].
+    #[must_use]
+    pub fn point(&self, i: usize) -> [f64; 3] {
+        self.frame.to_world(self.positions[i])
+    }
+
+    /// For each kept point its index in the input.
+    #[must_use]
+    pub fn source(&self) -> &[u32] {
+        &self.source
+    }
+
+    /// The frame of the stored positions.
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
+    /// What was left out of the input.
+    #[must_use]
+    pub fn dropped(&self) -> Dropped {
+        self.dropped
+    }
+
+    /// Greatest change of a coordinate by rounding to `f32`, in the caller's units.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// Normals as the input had them, if any; neither unit nor consistent unless the input's are.
+    #[must_use]
+    pub fn normals(&self) -> Option<&[[f32; 3]]> {
+        self.normals.as_deref()
+    }
+
+    /// Colours, red green blue, if any.
+    #[must_use]
+    pub fn colours(&self) -> Option<&[[u8; 3]]> {
+        self.colours.as_deref()
+    }
+
+    /// Bounds in the caller's frame.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of(self.positions.iter().map(|&p| self.frame.to_world(p)))
+    }
+}
+
+fn is_finite<T: Coordinate>(p: [T; 3]) -> bool {
+    p.iter().all(|x| (*x).into().is_finite())
+}
+
+/// The first of each group of equal positions, in the order given. O(n log n), 16 bytes a point.
+fn distinct(points: Vec<([f32; 3], u32)>) -> Vec<([f32; 3], u32)> {
+    let mut keys: Vec<u128> = (0_u128..)
+        .zip(&points)
+        .map(|(i, (p, _))| p.iter().fold(0, |key, x| key << 32 | u128::from(x.to_bits())) << 32 | i)
+        .collect();
+    keys.sort_unstable();
+    let repeats = keys.windows(2).filter(|w| w[0] >> 32 == w[1] >> 32);
+    let mut repeated: Vec<u32> = repeats
+        .map(|w| {
+            #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
+            let index = w[1] as u32;
+            index
+        })
+        .collect();
+    if repeated.is_empty() {
+        return points;
+    }
+    drop(keys);
+    repeated.sort_unstable();
+    let mut next = repeated.into_iter().peekable();
+    (0_u32..)
+        .zip(points)
+        .filter(|(i, _)| next.next_if_eq(i).is_none())
+        .map(|(_, p)| p)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(n: u16) -> Vec<[f64; 3]> {
+        (0..n)
+            .map(|i| [f64::from(i % 4), f64::from(i / 4), 0.5])
+            .collect()
+    }
+
+    #[test]
+    fn the_first_of_equal_points_stays_and_source_leads_back() {
+        let mut points = grid(12);
+        points.insert(3, points[0]);
+        points.push(points[5]);
+        points.insert(0, [f64::INFINITY, 0.0, 0.0]);
+        let cloud = PointCloud::cleaned(&points).unwrap();
+        assert_eq!(cloud.len(), 12);
+        assert_eq!(
+            cloud.dropped(),
+            Dropped {
+                not_finite: 1,
+                duplicate: 2
+            }
+        );
+        for i in 0..cloud.len() {
+            assert_eq!(cloud.point(i), points[cloud.source()[i] as usize], "point {i}");
+        }
+        assert_eq!(cloud.source()[..4], [1, 2, 3, 5], "index 4 repeats index 1");
+        let numbers: Vec<[f32; 3]> = (0_u8..15).map(|i| [f32::from(i); 3]).collect();
+        let cloud = cloud.with_normals(&numbers).unwrap();
+        assert_eq!(
+            cloud.normals().unwrap()[3],
+            [5.0; 3],
+            "attributes follow their points"
+        );
+        let count = cloud.with_normals(&numbers[1..]).unwrap_err();
+        assert_eq!(
+            count,
+            CloudError::AttributeCount {
+                given: 14,
+                points: 15
+            }
+        );
+    }
+
+    #[test]
+    fn negative_zero_is_zero() {
+        let mut points = grid(12);
+        points.push([-0.0, -0.0, 0.5]);
+        assert_eq!(
+            PointCloud::from_positions(&points).unwrap().dropped().duplicate,
+            1
+        );
+    }
+
+    #[test]
+    fn refusals_name_the_place() {
+        let mut points = grid(12);
+        points[7][1] = f64::NAN;
+        assert_eq!(
+            PointCloud::from_positions(&points),
+            Err(CloudError::NotFinite { index: 7 })
+        );
+        points[7][1] = -1e200;
+        assert_eq!(
+            PointCloud::cleaned(&points),
+            Err(CloudError::TooLarge { index: 7 })
+        );
+        let few = vec![[1.0_f32; 3]; 100];
+        assert_eq!(
+            PointCloud::cleaned(&few),
+            Err(CloudError::TooFew {
+                distinct: 1,
+                given: 100
+            })
+        );
+        assert_eq!(
+            PointCloud::cleaned::<f32>(&[]),
+            Err(CloudError::TooFew {
+                distinct: 0,
+                given: 0
+            })
+        );
+    }
+
+    #[test]
+    fn step_bounds_what_rounding_loses() {
+        let points: Vec<[f64; 3]> = grid(16).iter().map(|p| p.map(|x| 1e6 + x / 3.0)).collect();
+        let cloud = PointCloud::from_positions(&points).unwrap();
+        for i in 0..16 {
+            for k in 0..3 {
+                assert!(
+                    (cloud.point(i)[k] - points[i][k]).abs() <= cloud.step(),
+                    "point {i}"
+                );
+            }
+        }
+        assert!(cloud.step() > 0.0 && cloud.step() < 2e-7, "{}", cloud.step());
+        let exact: Vec<[f32; 3]> = (0_u8..9).map(|i| [f32::from(i) / 3.0, 0.1, 0.2]).collect();
+        assert_eq!(
+            PointCloud::from_positions(&exact).unwrap().step().to_bits(),
+            0,
+            "f32 stays as it is"
+        );
+    }
+}

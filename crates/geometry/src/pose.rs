@@ -1,0 +1,316 @@
+//! Where an object is: rotation, translation and uniform scale, object → world.
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::Aabb;
+
+/// Why a 4×4 matrix is not a pose.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// An entry is NaN or infinite.
+    #[error("entry {index} of the pose (row-major) is not finite")]
+    NotFinite {
+        /// Index of the entry, 0 to 15.
+        index: usize,
+    },
+    /// The last row is not 0 0 0 1.
+    #[error(
+        "the last row of the pose is not 0 0 0 1; matrices are row-major, translation in the last column"
+    )]
+    NotAffine,
+    /// The linear part mirrors, or flattens space.
+    #[error("the pose has determinant {determinant}; a rotation with uniform scale has a positive one")]
+    NotProper {
+        /// Determinant of the linear part.
+        determinant: f64,
+    },
+    /// The matrix shears or scales unevenly.
+    #[error(
+        "the pose is not a rotation with uniform scale: the nearest one moves the object's bounds by {moved}, \
+         more than {tolerance} (a tenth of the sampling radius)"
+    )]
+    NotRigid {
+        /// Greatest move of a corner of the object's bounds, in world units.
+        moved: f64,
+        /// What was allowed, in world units.
+        tolerance: f64,
+    },
+}
+
+/// world = scale · rotation · object + translation, in double precision.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pose {
+    rotation: Matrix3<f64>,
+    translation: Vector3<f64>,
+    scale: f64,
+}
+
+impl Default for Pose {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+impl Pose {
+    /// The pose that moves nothing.
+    pub const IDENTITY: Self = Self {
+        rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        translation: Vector3::new(0.0, 0.0, 0.0),
+        scale: 1.0,
+    };
+
+    /// A shift by `t`.
+    #[must_use]
+    pub fn from_translation(t: [f64; 3]) -> Self {
+        Self {
+            translation: t.into(),
+            ..Self::IDENTITY
+        }
+    }
+
+    /// A turn by `angle` radians about `axis`, which needs no unit length; no turn when it has none at all.
+    #[must_use]
+    pub fn from_axis_angle(axis: [f64; 3], angle: f64) -> Self {
+        let axis = nalgebra::Unit::try_new(Vector3::from(axis), 0.0);
+        let rotation = axis.map_or_else(nalgebra::Rotation3::identity, |axis| {
+            nalgebra::Rotation3::from_axis_angle(&axis, angle)
+        });
+        Self {
+            rotation: rotation.into_inner(),
+            ..Self::IDENTITY
+        }
+    }
+
+    /// The turn of a quaternion (x, y, z, w) of any length but zero; no turn for zero.
+    #[must_use]
+    pub fn from_quaternion(q: [f64; 4]) -> Self {
+        let q = nalgebra::Quaternion::from(q);
+        let unit = nalgebra::Unit::try_new(q, 0.0).unwrap_or_default();
+        Self {
+            rotation: unit.to_rotation_matrix().into_inner(),
+            ..Self::IDENTITY
+        }
+    }
+
+    /// The pose of a row-major 4×4 matrix: the nearest rotation and uniform scale, in the sense of the polar
+    /// decomposition, provided it moves no corner of `bounds` by more than `tolerance` (world units).
+    ///
+    /// # Errors
+    /// When the matrix is not finite, not affine, mirrors, or differs too much from a pose.
+    pub fn from_row_major(m: &[f64; 16], bounds: &Aabb, tolerance: f64) -> Result<Self, PoseError> {
+        if let Some(index) = m.iter().position(|x| !x.is_finite()) {
+            return Err(PoseError::NotFinite { index });
+        }
+        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+            return Err(PoseError::NotAffine);
+        }
+        let linear = Matrix3::from_fn(|i, j| m[4 * i + j]);
+        let translation = Vector3::new(m[3], m[7], m[11]);
+        let determinant = linear.determinant();
+        let scale = determinant.cbrt();
+        let rotation = if scale.is_normal() && scale > 0.0 {
+            nearest_rotation(linear / scale)
+        } else {
+            None
+        };
+        let Some(rotation) = rotation else {
+            return Err(PoseError::NotProper { determinant });
+        };
+        let pose = Self {
+            rotation,
+            translation,
+            scale,
+        };
+        let moved = bounds
+            .corners()
+            .map(|c| {
+                let c = Vector3::from(c);
+                (linear * c - scale * rotation * c).norm()
+            })
+            .into_iter()
+            .fold(0.0, f64::max);
+        // Written so that a NaN is refused.
+        if moved <= tolerance {
+            Ok(pose)
+        } else {
+            Err(PoseError::NotRigid { moved, tolerance })
+        }
+    }
+
+    /// The row-major 4×4 matrix.
+    #[must_use]
+    pub fn to_row_major(&self) -> [f64; 16] {
+        let mut m = [0.0; 16];
+        m[15] = 1.0;
+        for i in 0..3 {
+            for j in 0..3 {
+                m[4 * i + j] = self.scale * self.rotation[(i, j)];
+            }
+            m[4 * i + 3] = self.translation[i];
+        }
+        m
+    }
+
+    /// The same pose about another scale of the object.
+    #[must_use]
+    pub fn with_scale(self, scale: f64) -> Self {
+        Self { scale, ..self }
+    }
+
+    /// The same pose, moved to `t`.
+    #[must_use]
+    pub fn with_translation(self, t: [f64; 3]) -> Self {
+        Self {
+            translation: t.into(),
+            ..self
+        }
+    }
+
+    /// The rotation.
+    #[must_use]
+    pub fn rotation(&self) -> &Matrix3<f64> {
+        &self.rotation
+    }
+
+    /// Where the object's zero lies in the world.
+    #[must_use]
+    pub fn translation(&self) -> [f64; 3] {
+        self.translation.into()
+    }
+
+    /// The uniform scale, positive.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// A point of the object in the world.
+    #[must_use]
+    pub fn apply(&self, p: [f64; 3]) -> [f64; 3] {
+        (self.scale * (self.rotation * Vector3::from(p)) + self.translation).into()
+    }
+
+    /// A point of the world in the object.
+    #[must_use]
+    pub fn apply_inverse(&self, p: [f64; 3]) -> [f64; 3] {
+        (self.rotation.tr_mul(&(Vector3::from(p) - self.translation)) / self.scale).into()
+    }
+
+    /// A direction of the object in the world, of the same length.
+    #[must_use]
+    pub fn rotate(&self, v: [f64; 3]) -> [f64; 3] {
+        (self.rotation * Vector3::from(v)).into()
+    }
+
+    /// A direction of the world in the object, of the same length.
+    #[must_use]
+    pub fn rotate_inverse(&self, v: [f64; 3]) -> [f64; 3] {
+        self.rotation.tr_mul(&Vector3::from(v)).into()
+    }
+
+    /// `self` after `inner`: x ↦ self(inner(x)).
+    #[must_use]
+    pub fn after(&self, inner: &Self) -> Self {
+        Self {
+            rotation: self.rotation * inner.rotation,
+            translation: self.scale * (self.rotation * inner.translation) + self.translation,
+            scale: self.scale * inner.scale,
+        }
+    }
+
+    /// The pose that undoes this one.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let rotation = self.rotation.transpose();
+        let translation = -(rotation * self.translation) / self.scale;
+        Self {
+            rotation,
+            translation,
+            scale: 1.0 / self.scale,
+        }
+    }
+}
+
+/// The orthogonal factor of the polar decomposition, by Newton's iteration R ← (R + R⁻ᵀ)/2, which converges
+/// quadratically for any regular matrix. `None` when an iterate cannot be inverted.
+fn nearest_rotation(m: Matrix3<f64>) -> Option<Matrix3<f64>> {
+    /// From a condition number of 1e6 the iteration halves the gap to 1 some twenty times before it converges.
+    const STEPS: usize = 40;
+    let mut r = m;
+    for _ in 0..STEPS {
+        let next = 0.5 * (r + r.try_inverse()?.transpose());
+        let change = (next - r).amax();
+        r = next;
+        if change <= 1e-15 {
+            break;
+        }
+    }
+    r.iter().all(|x| x.is_finite()).then_some(r)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOX: Aabb = Aabb {
+        min: [-1.0; 3],
+        max: [1.0, 2.0, 3.0],
+    };
+
+    #[test]
+    fn matrices_round_trip() {
+        let pose = Pose::from_axis_angle([1.0, -2.0, 0.5], 0.7)
+            .with_scale(2.5)
+            .with_translation([3.0, 4.0, 5.0]);
+        let back = Pose::from_row_major(&pose.to_row_major(), &BOX, 1e-12).unwrap();
+        for c in BOX.corners() {
+            for k in 0..3 {
+                assert!(
+                    (pose.apply(c)[k] - back.apply(c)[k]).abs() < 1e-14,
+                    "corner {c:?}"
+                );
+                assert!(
+                    (pose.apply_inverse(pose.apply(c))[k] - c[k]).abs() < 1e-14,
+                    "inverse of {c:?}"
+                );
+                assert!(
+                    (pose.inverse().apply(c)[k] - pose.apply_inverse(c)[k]).abs() < 1e-14,
+                    "inverse pose"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_pose_is_refused() {
+        let identity = Pose::IDENTITY.to_row_major();
+        let with = |i: usize, x: f64| {
+            let mut m = identity;
+            m[i] = x;
+            Pose::from_row_major(&m, &BOX, 1e-3)
+        };
+        assert_eq!(with(5, f64::NAN), Err(PoseError::NotFinite { index: 5 }));
+        assert_eq!(with(12, 0.5), Err(PoseError::NotAffine));
+        assert!(
+            matches!(with(0, -1.0), Err(PoseError::NotProper { determinant: -1.0 })),
+            "a mirror"
+        );
+        assert!(
+            matches!(with(0, 0.0), Err(PoseError::NotProper { .. })),
+            "a flattening"
+        );
+        assert!(matches!(with(1, 0.1), Err(PoseError::NotRigid { .. })), "a shear");
+        assert!(with(1, 1e-4).is_ok(), "a shear within the tolerance is mended");
+    }
+
+    #[test]
+    fn composition_applies_the_inner_pose_first() {
+        let turn = Pose::from_quaternion([0.0, 0.0, 1.0, 1.0]);
+        let shift = Pose::from_translation([1.0, 0.0, 0.0]);
+        let p = turn.after(&shift).apply([0.0; 3]);
+        assert!((p[0]).abs() < 1e-15 && (p[1] - 1.0).abs() < 1e-15, "{p:?}");
+    }
+}

@@ -1,0 +1,121 @@
+//! f(x) = n(x)·(a(x) − x), and whether x lies where that means something.
+//!
+//! Klein & Zachmann 2004, eq. 1–4: a(x) is the weighted mean of the points, n(x) the eigenvector of the least
+//! eigenvalue of their weighted covariance about a(x). We differ in three ways. Each point weighs with its own
+//! bandwidth. The domain is narrower than eq. 6: beside enough support it asks that x be near a(x), which ends
+//! the surface where its samples end, and that the points about x look like one sheet (docs/theory). The
+//! sign of n is fixed by its largest component, until a graph orients normals.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::{Neighbourhood, SurfacePlan, symmetric_eigen};
+
+/// On a half plane the weighted mean is h/√π = 0.564 h away from the border; beyond the border it is further.
+pub(crate) const BORDER: f64 = 0.56;
+
+/// The least eigenvalue over h²/2: about 0 on a clean sheet, 0.14 on either of two sheets 2h apart, 1 between
+/// them, where n turns tangential and f vanishes in a whole slab.
+const SHEET_RATIO: f64 = 0.3;
+
+/// (λ2 − λ1)/(λ1 + λ2 + λ3): 0.5 on a sheet, 0 where n is any direction.
+const EIGENVALUE_GAP: f64 = 0.1;
+
+/// Whether f(x) means something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum Status {
+    /// It does.
+    Ok,
+    /// Too few points reach x.
+    Outside,
+    /// x is further from a(x) than 0.56 h: beyond the border of the surface, or far off it.
+    Border,
+    /// The points about x do not look like one sheet.
+    Ambiguous,
+}
+
+/// The implicit function at a point; lengths and directions in the frame of the scan's stored positions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evaluation {
+    /// n·(a − x); NaN-free, and 0 when nothing reaches x.
+    pub f: f64,
+    /// n, unit, its largest component positive.
+    pub normal: [f64; 3],
+    /// a(x).
+    pub centroid: [f64; 3],
+    /// How many points reach x.
+    pub support: u32,
+    /// h(x), the weighted mean of the points' bandwidths.
+    pub bandwidth: f64,
+    /// Eigenvalues of the covariance, ascending.
+    pub eigenvalues: [f64; 3],
+    /// Whether the above is to be trusted.
+    pub status: Status,
+}
+
+impl Neighbourhood {
+    /// f at `x`, about which this neighbourhood was gathered. Costs about 150 ns and 1.5 ns a point.
+    pub fn evaluate(&mut self, plan: &SurfacePlan, x: [f64; 3]) -> Evaluation {
+        let support = u32::try_from(self.len()).unwrap_or(u32::MAX);
+        let m = self.moments(plan);
+        if m.weight <= 0.0 {
+            return Evaluation {
+                f: 0.0,
+                normal: [0.0, 0.0, 1.0],
+                centroid: x,
+                support,
+                bandwidth: 0.0,
+                eigenvalues: [0.0; 3],
+                status: Status::Outside,
+            };
+        }
+        let mean = m.first.map(|s| s / m.weight);
+        let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s / m.weight);
+        let [ax, ay, az] = mean;
+        let covariance = [
+            xx - ax * ax,
+            xy - ax * ay,
+            xz - ax * az,
+            yy - ay * ay,
+            yz - ay * az,
+            zz - az * az,
+        ];
+        let eigen = symmetric_eigen(covariance);
+        let normal = with_positive_largest(eigen.vectors[0]);
+        let f = Vector3::from(normal).dot(&Vector3::from(mean));
+        let bandwidth = m.bandwidth / m.weight;
+        let status = if support < plan.options().support_min {
+            Status::Outside
+        } else if Vector3::from(mean).norm() > BORDER * bandwidth {
+            Status::Border
+        } else if !is_one_sheet(eigen.values, bandwidth) {
+            Status::Ambiguous
+        } else {
+            Status::Ok
+        };
+        let centroid = [0, 1, 2].map(|k| x[k] + mean[k]);
+        Evaluation {
+            f,
+            normal,
+            centroid,
+            support,
+            bandwidth,
+            eigenvalues: eigen.values,
+            status,
+        }
+    }
+}
+
+fn is_one_sheet([l1, l2, l3]: [f64; 3], h: f64) -> bool {
+    l1 < SHEET_RATIO * 0.5 * h * h && l2 - l1 > EIGENVALUE_GAP * (l1 + l2 + l3)
+}
+
+/// `v` or −`v`: the one whose component of largest magnitude (the first of equals) is positive.
+pub(crate) fn with_positive_largest(v: [f64; 3]) -> [f64; 3] {
+    let largest = v
+        .iter()
+        .fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
+    if largest < 0.0 { v.map(|x| -x) } else { v }
+}
