@@ -26,10 +26,10 @@ pub struct SurfaceOptions {
     pub kernel: Kernel,
     /// Width of the kernel. Default: local.
     pub bandwidth: Bandwidth,
-    /// m, the horizon in sampling radii (S0 eq. 9): 1 to 16, default 3.5. Larger smooths noise away, rounds
+    /// m, the horizon in sampling radii (S0 eq. 9): 1 to 16, default 3. Larger smooths noise away, rounds
     /// edges, merges sheets that are close, and costs with its square.
     pub horizon: f64,
-    /// θ_ε, the weight at the horizon, 1e-12 to 0.5, default 1e-3. Smaller narrows the kernel in the same
+    /// θ_ε, the weight at the horizon, 1e-12 to 0.5, default 1e-4. Smaller narrows the kernel in the same
     /// horizon. The Gaussian's alone.
     pub threshold: f64,
     /// Least number of points in whose horizon a surface point must lie, at least 3, default 6.
@@ -41,8 +41,8 @@ impl Default for SurfaceOptions {
         Self {
             kernel: Kernel::Gaussian,
             bandwidth: Bandwidth::Local,
-            horizon: 3.5,
-            threshold: 1e-3,
+            horizon: 3.0,
+            threshold: 1e-4,
             support_min: 6,
         }
     }
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn bandwidths_follow_equation_nine() {
         let local = SurfacePlan::new(&SurfaceOptions::default(), 2.0, 1.0).unwrap();
-        let h = 3.5 * 0.5 / (-(1e-3_f64).ln()).sqrt();
+        let h = 3.0 * 0.5 / (-(1e-4_f64).ln()).sqrt();
         assert!(
             (f64::from(local.bandwidth(0.5)) - h).abs() < 1e-6,
             "local follows the point"

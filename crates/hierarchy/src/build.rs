@@ -1,0 +1,329 @@
+//! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
+
+use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
+use nearmiss_store::Array;
+use nearmiss_surface::{Evaluation, SurfacePlan};
+
+use crate::boxes::OrientedBox;
+use crate::gather::{GatherScratch, Index};
+use crate::options::{BuildError, BuildOptions};
+use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
+use crate::split::{Item, id32, split};
+use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, surfel};
+use crate::topology::Node;
+
+/// Share of the points whose local radius is at most the scan's sampling radius.
+const SAMPLING_QUANTILE: f64 = 0.9;
+
+/// Leaves that a thread fits at once: enough to hide the hand-over.
+const LEAVES_A_TASK: usize = 16;
+
+/// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
+///
+/// All lengths and directions are in the frame of the stored positions ([`PointHierarchy::frame`]). Arrays
+/// stand apart from each other, so that a moving scan can replace its bounds and keep its topology.
+#[derive(Debug, Clone)]
+pub struct PointHierarchy {
+    pub(crate) frame: Frame,
+    pub(crate) bounds: Aabb,
+    pub(crate) dropped: Dropped,
+    pub(crate) step: f64,
+    pub(crate) sampling_radius: f32,
+    pub(crate) leaf_size: u32,
+    pub(crate) radius_neighbours: u32,
+    pub(crate) plan: SurfacePlan,
+    pub(crate) positions: Array<[f32; 3]>,
+    pub(crate) normals: Array<[f32; 3]>,
+    pub(crate) radii: Array<f32>,
+    pub(crate) discs: Array<f32>,
+    pub(crate) kinds: Array<u8>,
+    pub(crate) source: Array<u32>,
+    pub(crate) nodes: Array<Node>,
+    pub(crate) boxes: Array<OrientedBox>,
+    pub(crate) reaches: Array<f32>,
+    pub(crate) cones: Array<NormalCone>,
+}
+
+impl PointHierarchy {
+    /// Prepares `cloud`. O(n log n), on all cores unless told otherwise; the result does not depend on them.
+    ///
+    /// # Errors
+    /// Names the option that is out of range.
+    pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
+        options.check()?;
+        #[cfg(feature = "rayon")]
+        if options.threads > 0 {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(options.threads)
+                .build();
+            let pool = pool.or(Err(BuildError::Threads(options.threads)))?;
+            return pool.install(|| build(cloud, options));
+        }
+        build(cloud, options)
+    }
+
+    /// f at `x`, in the stored frame.
+    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        self.index().gather(x, &mut scratch.near);
+        scratch.near.evaluate(&self.plan, x)
+    }
+
+    /// f at `x`, in the stored frame; allocates a scratch of its own.
+    #[must_use]
+    pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
+        self.evaluate_with(x, &mut GatherScratch::default())
+    }
+
+    fn index(&self) -> Index<'_> {
+        Index {
+            nodes: &self.nodes,
+            boxes: &self.boxes,
+            reaches: &self.reaches,
+            positions: &self.positions,
+            radii: &self.radii,
+            plan: &self.plan,
+        }
+    }
+
+    /// Number of points.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "a cloud has at least eight points")]
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// The frame of the stored positions in the caller's.
+    #[must_use]
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Bounds of the points in the caller's frame.
+    #[must_use]
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
+    /// What was left out of the input.
+    #[must_use]
+    pub fn dropped(&self) -> Dropped {
+        self.dropped
+    }
+
+    /// Greatest change of a coordinate by rounding to `f32`, in the caller's units.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// The 0.9-quantile of the local radii, in the caller's units.
+    #[must_use]
+    pub fn sampling_radius(&self) -> f64 {
+        f64::from(self.sampling_radius) * self.frame.scale
+    }
+
+    /// What defines the surface.
+    #[must_use]
+    pub fn plan(&self) -> &SurfacePlan {
+        &self.plan
+    }
+
+    /// Points of a full leaf.
+    #[must_use]
+    pub fn leaf_size(&self) -> u32 {
+        self.leaf_size
+    }
+
+    /// K of the local radii.
+    #[must_use]
+    pub fn radius_neighbours(&self) -> u32 {
+        self.radius_neighbours
+    }
+
+    /// Positions in leaf order.
+    #[must_use]
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions
+    }
+
+    /// Unit normals; within a leaf all on the side of its cone's axis.
+    #[must_use]
+    pub fn normals(&self) -> &[[f32; 3]] {
+        &self.normals
+    }
+
+    /// Local sampling radii r_i.
+    #[must_use]
+    pub fn radii(&self) -> &[f32] {
+        &self.radii
+    }
+
+    /// Radii of the points' tangent discs.
+    #[must_use]
+    pub fn discs(&self) -> &[f32] {
+        &self.discs
+    }
+
+    /// What the neighbourhood of the `i`-th stored point looks like.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[must_use]
+    pub fn kind(&self, i: usize) -> PointKind {
+        PointKind::from_code(self.kinds[i])
+    }
+
+    /// Share of the points at which the surface is defined.
+    #[must_use]
+    pub fn usable(&self) -> f64 {
+        self.share(PointKind::Surface) + self.share(PointKind::Border)
+    }
+
+    /// Share of the points of this kind.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+    pub fn share(&self, kind: PointKind) -> f64 {
+        let count = self.kinds.iter().filter(|&&code| code == kind.code()).count();
+        count as f64 / self.len() as f64
+    }
+
+    /// For each stored point its index in the caller's input.
+    #[must_use]
+    pub fn source(&self) -> &[u32] {
+        &self.source
+    }
+
+    /// The caller's id of the `i`-th stored point.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[must_use]
+    pub fn id(&self, i: usize) -> PointId {
+        PointId(self.source[i])
+    }
+
+    /// The nodes, in preorder.
+    #[must_use]
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// A box about the discs of each node's points.
+    #[must_use]
+    pub fn boxes(&self) -> &[OrientedBox] {
+        &self.boxes
+    }
+
+    /// The directions of a leaf's normals. Leaves are numbered in the order of their points.
+    #[must_use]
+    pub fn cones(&self) -> &[NormalCone] {
+        &self.cones
+    }
+}
+
+fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, BuildError> {
+    let leaf_size = options.leaf_size as usize;
+    let mut items: Vec<Item> = (0..)
+        .zip(cloud.positions())
+        .map(|(index, &position)| Item { position, index })
+        .collect();
+    let (nodes, mut boxes) = split(&mut items, leaf_size);
+    let positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
+    let source: Vec<u32> = items
+        .iter()
+        .map(|item| cloud.source()[item.index as usize])
+        .collect();
+    drop(items);
+
+    let spacings = spacings(&positions, options.radius_neighbours as usize);
+    let rough: Vec<f32> = spacings.iter().map(|s| s.radius).collect();
+    let radii = smooth(&positions, &rough, &nodes, &boxes);
+    drop(rough);
+    let sampling_radius = quantile(&radii);
+    let unit = 1.0 / cloud.frame().scale;
+    let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
+    let reaches = fold_nodes(
+        &nodes,
+        |range| radii[range].iter().copied().fold(0.0, f32::max),
+        f32::max,
+    );
+
+    let index = Index {
+        nodes: &nodes,
+        boxes: &boxes,
+        reaches: &reaches,
+        positions: &positions,
+        radii: &radii,
+        plan: &plan,
+    };
+    let surfels = surfels(&index, &spacings, leaf_size);
+    drop(spacings);
+    let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
+    let discs: Vec<f32> = surfels.iter().map(|s| s.disc).collect();
+    let kinds: Vec<u8> = surfels.iter().map(|s| s.kind.code()).collect();
+    drop(surfels);
+    let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
+    let ids: Vec<u32> = (0..id32(nodes.len())).collect();
+    boxes = map(&ids, |&i| {
+        box_of_discs(
+            &nodes[i as usize],
+            &boxes[i as usize],
+            &positions,
+            &normals,
+            &discs,
+        )
+    });
+
+    Ok(PointHierarchy {
+        frame: cloud.frame(),
+        bounds: cloud.bounds(),
+        dropped: cloud.dropped(),
+        step: cloud.step(),
+        sampling_radius,
+        leaf_size: options.leaf_size,
+        radius_neighbours: options.radius_neighbours,
+        plan,
+        positions: positions.into(),
+        normals: normals.into(),
+        radii: radii.into(),
+        discs: discs.into(),
+        kinds: kinds.into(),
+        source: source.into(),
+        nodes: nodes.into(),
+        boxes: boxes.into(),
+        reaches: reaches.into(),
+        cones: cones.into(),
+    })
+}
+
+/// The discs of all points, leaf by leaf.
+fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<Surfel> {
+    let task = leaf_size * LEAVES_A_TASK;
+    let starts: Vec<usize> = (0..spacings.len()).step_by(task).collect();
+    let fit = |&start: &usize| -> Vec<Surfel> {
+        let mut scratch = GatherScratch::default();
+        let end = spacings.len().min(start + task);
+        (start..end)
+            .map(|i| surfel(index, i, spacings[i], &mut scratch.near))
+            .collect()
+    };
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        starts.par_iter().flat_map_iter(fit).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    starts.iter().flat_map(fit).collect()
+}
+
+fn quantile(radii: &[f32]) -> f32 {
+    let mut sorted = radii.to_vec();
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an index below 2^32"
+    )]
+    let rank = ((sorted.len() - 1) as f64 * SAMPLING_QUANTILE).round() as usize;
+    *sorted.select_nth_unstable_by(rank, f32::total_cmp).1
+}

@@ -1,0 +1,69 @@
+//! The points that f(x) needs: those whose horizon reaches x, by a short descent in canonical order.
+
+use nearmiss_surface::{Centre, Neighbourhood, SurfacePlan};
+
+use crate::boxes::OrientedBox;
+use crate::split::id32;
+use crate::topology::Node;
+
+/// Room for a descent that keeps at most one sibling a level: trees of 2³² points have 31 levels at most.
+pub(crate) const TREE_STACK: usize = 64;
+
+/// Reused between evaluations; never influences a result.
+#[derive(Debug, Clone, Default)]
+pub struct GatherScratch {
+    pub(crate) near: Neighbourhood,
+}
+
+/// What a descent to neighbours reads.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Index<'a> {
+    pub(crate) nodes: &'a [Node],
+    pub(crate) boxes: &'a [OrientedBox],
+    /// Greatest radius under each node.
+    pub(crate) reaches: &'a [f32],
+    pub(crate) positions: &'a [[f32; 3]],
+    pub(crate) radii: &'a [f32],
+    pub(crate) plan: &'a SurfacePlan,
+}
+
+impl Index<'_> {
+    /// Fills `near` with the points whose horizon reaches `x`, in canonical order.
+    pub(crate) fn gather(&self, x: [f64; 3], near: &mut Neighbourhood) {
+        near.clear();
+        let centre = Centre::new(x);
+        let rounded = centre.rounded();
+        self.descend(
+            |id| {
+                let horizon = self.plan.horizon(self.reaches[id]);
+                self.boxes[id].distance_sq(rounded) < horizon * horizon
+            },
+            |node| {
+                for i in node.points() {
+                    near.offer(self.plan, &centre, self.positions[i], self.radii[i]);
+                }
+            },
+        );
+    }
+
+    /// Calls `visit` for every leaf that `admit` lets through together with all its ancestors, in order.
+    pub(crate) fn descend(&self, admit: impl Fn(usize) -> bool, mut visit: impl FnMut(&Node)) {
+        let mut stack = [0_u32; TREE_STACK];
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let id = stack[top] as usize;
+            if !admit(id) {
+                continue;
+            }
+            let node = &self.nodes[id];
+            if node.is_leaf() {
+                visit(node);
+            } else if top + 2 <= TREE_STACK {
+                stack[top] = node.right;
+                stack[top + 1] = id32(id) + 1;
+                top += 2;
+            }
+        }
+    }
+}

@@ -1,0 +1,24 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod boxes;
+mod build;
+mod descend;
+mod gather;
+mod options;
+mod sanity;
+mod sections;
+mod spacing;
+mod split;
+mod surfels;
+mod topology;
+
+pub use boxes::{OrientedBox, Relative};
+pub use build::PointHierarchy;
+pub use descend::{Frontier, NodePair, Stack, Visitor, descend};
+pub use gather::GatherScratch;
+pub use options::{BuildError, BuildOptions};
+pub use sanity::Flaw;
+pub use sections::{HierarchyMeta, LoadError};
+pub use surfels::{NormalCone, PointKind};
+pub use topology::Node;

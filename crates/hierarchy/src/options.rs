@@ -1,0 +1,87 @@
+//! How a hierarchy is built.
+
+use nearmiss_surface::{SurfaceError, SurfaceOptions};
+use thiserror::Error;
+
+/// How a hierarchy is built. Plain numbers, checked by the build.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct BuildOptions {
+    /// What defines the surface.
+    pub surface: SurfaceOptions,
+    /// K: a point's spacing is the distance to its K-th neighbour, more where the first K look like a line.
+    /// 3 to 32, default 6. Larger bridges wider gaps between samples and blurs more detail.
+    pub radius_neighbours: u32,
+    /// Points in a leaf, 4 to 64, default 16. Larger leaves make fewer nodes and dearer leaf tests.
+    pub leaf_size: u32,
+    /// Threads to build on; 0, the default, takes what the process's pool has. Never changes the result.
+    pub threads: usize,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self {
+            surface: SurfaceOptions::default(),
+            radius_neighbours: 6,
+            leaf_size: 16,
+            threads: 0,
+        }
+    }
+}
+
+impl BuildOptions {
+    /// The same options with this surface.
+    #[must_use]
+    pub const fn with_surface(self, surface: SurfaceOptions) -> Self {
+        Self { surface, ..self }
+    }
+
+    /// The same options with this K for local sampling radii.
+    #[must_use]
+    pub const fn with_radius_neighbours(self, radius_neighbours: u32) -> Self {
+        Self {
+            radius_neighbours,
+            ..self
+        }
+    }
+
+    /// The same options with this many points in a leaf.
+    #[must_use]
+    pub const fn with_leaf_size(self, leaf_size: u32) -> Self {
+        Self { leaf_size, ..self }
+    }
+
+    /// The same options on this many threads.
+    #[must_use]
+    pub const fn with_threads(self, threads: usize) -> Self {
+        Self { threads, ..self }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), BuildError> {
+        if !(4..=64).contains(&self.leaf_size) {
+            return Err(BuildError::LeafSize(self.leaf_size));
+        }
+        if !(3..=32).contains(&self.radius_neighbours) {
+            return Err(BuildError::RadiusNeighbours(self.radius_neighbours));
+        }
+        Ok(())
+    }
+}
+
+/// Why a hierarchy cannot be built.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// An option of the surface is out of range.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// Leaves too small or too large.
+    #[error("leaves of {0} points; 4 to 64 are possible")]
+    LeafSize(u32),
+    /// Too few or too many neighbours for a radius.
+    #[error("a local radius from {0} neighbours; 3 to 32 are possible")]
+    RadiusNeighbours(u32),
+    /// The threads could not be started.
+    #[error("cannot start {0} threads")]
+    Threads(usize),
+}

@@ -1,0 +1,140 @@
+//! The hierarchy in a container: one section an array, the rest in the metadata.
+
+use nearmiss_geometry::{Aabb, Dropped, Frame};
+use nearmiss_store::{File, OpenError, WriteError, Writer};
+use nearmiss_surface::SurfacePlan;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::build::PointHierarchy;
+use crate::sanity::{Flaw, check_topology};
+
+const POSITIONS: [u8; 4] = *b"PNTS";
+const NORMALS: [u8; 4] = *b"NRML";
+const RADII: [u8; 4] = *b"RADI";
+const DISCS: [u8; 4] = *b"DISC";
+const KINDS: [u8; 4] = *b"KIND";
+const SOURCE: [u8; 4] = *b"SRCE";
+const NODES: [u8; 4] = *b"NODE";
+const BOXES: [u8; 4] = *b"BOXS";
+const REACHES: [u8; 4] = *b"REAC";
+const CONES: [u8; 4] = *b"CONE";
+
+/// What a hierarchy stores beside its arrays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HierarchyMeta {
+    frame: Frame,
+    bounds: Aabb,
+    dropped: Dropped,
+    step: f64,
+    sampling_radius: f32,
+    leaf_size: u32,
+    radius_neighbours: u32,
+    plan: SurfacePlan,
+}
+
+/// Why a container does not hold a hierarchy.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// A section is missing or damaged.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// The sections contradict each other.
+    #[error(transparent)]
+    Flaw(#[from] Flaw),
+}
+
+impl PointHierarchy {
+    /// What is stored beside the arrays.
+    #[must_use]
+    pub fn meta(&self) -> HierarchyMeta {
+        HierarchyMeta {
+            frame: self.frame,
+            bounds: self.bounds,
+            dropped: self.dropped,
+            step: self.step,
+            sampling_radius: self.sampling_radius,
+            leaf_size: self.leaf_size,
+            radius_neighbours: self.radius_neighbours,
+            plan: self.plan,
+        }
+    }
+
+    /// Adds the arrays to a container.
+    ///
+    /// # Errors
+    /// When the container has sections of these names already.
+    pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
+        writer
+            .section(NODES, 0, &self.nodes)?
+            .section(BOXES, 0, &self.boxes)?
+            .section(REACHES, 0, &self.reaches)?
+            .section(CONES, 0, &self.cones)?
+            .section(POSITIONS, 0, &self.positions)?
+            .section(NORMALS, 0, &self.normals)?
+            .section(RADII, 0, &self.radii)?
+            .section(DISCS, 0, &self.discs)?
+            .section(KINDS, 0, &self.kinds)?
+            .section(SOURCE, 0, &self.source)?;
+        Ok(())
+    }
+
+    /// The hierarchy in `file`, its arrays in place. The structure is checked: lengths agree, and every node's
+    /// children and points are there.
+    ///
+    /// # Errors
+    /// When a section is missing or the sections contradict each other.
+    pub fn load(file: &File, meta: HierarchyMeta) -> Result<Self, LoadError> {
+        let hierarchy = Self {
+            frame: meta.frame,
+            bounds: meta.bounds,
+            dropped: meta.dropped,
+            step: meta.step,
+            sampling_radius: meta.sampling_radius,
+            leaf_size: meta.leaf_size,
+            radius_neighbours: meta.radius_neighbours,
+            plan: meta.plan,
+            positions: file.array(POSITIONS, 0)?,
+            normals: file.array(NORMALS, 0)?,
+            radii: file.array(RADII, 0)?,
+            discs: file.array(DISCS, 0)?,
+            kinds: file.array(KINDS, 0)?,
+            source: file.array(SOURCE, 0)?,
+            nodes: file.array(NODES, 0)?,
+            boxes: file.array(BOXES, 0)?,
+            reaches: file.array(REACHES, 0)?,
+            cones: file.array(CONES, 0)?,
+        };
+        hierarchy.check_lengths()?;
+        check_topology(&hierarchy.nodes, hierarchy.len(), hierarchy.leaf_size)?;
+        Ok(hierarchy)
+    }
+
+    fn check_lengths(&self) -> Result<(), Flaw> {
+        let points = self.positions.len();
+        let leaves = points.div_ceil(self.leaf_size.max(1) as usize);
+        let nodes = self.nodes.len();
+        let expected = [
+            ("normals", self.normals.len(), points),
+            ("radii", self.radii.len(), points),
+            ("discs", self.discs.len(), points),
+            ("kinds", self.kinds.len(), points),
+            ("source", self.source.len(), points),
+            ("boxes", self.boxes.len(), nodes),
+            ("reaches", self.reaches.len(), nodes),
+            ("cones", self.cones.len(), leaves),
+        ];
+        match expected
+            .into_iter()
+            .find(|(_, found, expected)| found != expected)
+        {
+            Some((array, found, expected)) => Err(Flaw::Length {
+                array,
+                found,
+                expected,
+            }),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Local sampling radii.
+//!
+//! A point's spacing is the distance to its K-th nearest neighbour, with K growing up to 32 while those
+//! neighbours look like a line, as the returns of one LiDAR ring do. It is then made smooth,
+//! r_i := min_j (r_j + 0.3 ‖p_i − p_j‖), so that a lone point cannot bleed over a dense region.
+
+use std::num::NonZero;
+
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nearmiss_surface::symmetric_eigen;
+
+use crate::boxes::OrientedBox;
+use crate::gather::TREE_STACK;
+use crate::split::id32;
+use crate::topology::Node;
+
+/// More neighbours than this say more about the shape than about the spacing.
+const MOST_NEIGHBOURS: usize = 32;
+
+/// λ2 < 0.05 λ3 is what a line of points with noise looks like.
+const LINE: f64 = 0.05;
+
+/// How fast radii may grow with distance. 0.3 lets them double over some three spacings.
+const GROWTH: f32 = 0.3;
+
+/// A spacing, and whether the neighbours still looked like a line when their number ran out.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Spacing {
+    pub(crate) radius: f32,
+    pub(crate) is_line: bool,
+}
+
+/// The spacing of every one of the distinct `points`.
+pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Vec<Spacing> {
+    let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(points) else {
+        // Only an input that is not finite or empty is refused, and a cloud is neither.
+        return vec![Spacing::default(); points.len()];
+    };
+    let spacing = |p: &[f32; 3]| {
+        let near = nearest(&tree, p, neighbours);
+        if near.len() < neighbours || !is_line(points, &near) {
+            return Spacing {
+                radius: near.last().map_or(0.0, |n| n.0.sqrt()),
+                is_line: false,
+            };
+        }
+        let near = nearest(&tree, p, MOST_NEIGHBOURS);
+        let grown = (neighbours..=near.len()).find(|&k| !is_line(points, &near[..=k.min(near.len() - 1)]));
+        let last = grown.unwrap_or(near.len() - 1).min(near.len() - 1);
+        Spacing {
+            radius: near[last].0.sqrt(),
+            is_line: grown.is_none(),
+        }
+    };
+    map(points, spacing)
+}
+
+/// `f` of every item, in order, on all cores where there are several.
+pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        items.par_iter().with_min_len(1024).map(f).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    items.iter().map(f).collect()
+}
+
+/// Squared distance and index of the nearest `count` other points and `p` itself, which stands first.
+fn nearest(tree: &ImmutableKdTree<f32, 3>, p: &[f32; 3], count: usize) -> Vec<(f32, usize)> {
+    let wanted = NonZero::new(count + 1).unwrap_or(NonZero::<usize>::MIN);
+    let found = tree.query(p).nearest_n::<SquaredEuclidean<f32>>(wanted).execute();
+    found
+        .into_iter()
+        .map(|n| (n.distance, usize::try_from(n.item).unwrap_or_default()))
+        .collect()
+}
+
+/// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
+fn is_line(points: &[[f32; 3]], near: &[(f32, usize)]) -> bool {
+    let origin = points[near[0].1];
+    let mut s = [0.0_f64; 9];
+    for &(_, i) in near {
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(points[i][k] - origin[k]));
+        for (sum, v) in s
+            .iter_mut()
+            .zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z])
+        {
+            *sum += v;
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "at most 33")]
+    let n = near.len() as f64;
+    let [x, y, z, xx, xy, xz, yy, yz, zz] = s.map(|sum| sum / n);
+    let [_, l2, l3] = symmetric_eigen([
+        xx - x * x,
+        xy - x * y,
+        xz - x * z,
+        yy - y * y,
+        yz - y * z,
+        zz - z * z,
+    ])
+    .values;
+    l2 < LINE * l3
+}
+
+/// r_i := min_j (r_j + 0.3 ‖p_i − p_j‖) over all j, by branch and bound on the tree.
+pub(crate) fn smooth(points: &[[f32; 3]], radii: &[f32], nodes: &[Node], boxes: &[OrientedBox]) -> Vec<f32> {
+    let least = fold_nodes(
+        nodes,
+        |range| radii[range].iter().copied().fold(f32::INFINITY, f32::min),
+        f32::min,
+    );
+    let ids: Vec<u32> = (0..id32(points.len())).collect();
+    map(&ids, |&i| {
+        let p = points[i as usize];
+        let mut best = radii[i as usize];
+        let mut stack = [0_u32; TREE_STACK];
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let id = stack[top] as usize;
+            let margin = best - least[id];
+            if margin <= 0.0 || GROWTH * GROWTH * boxes[id].distance_sq(p) >= margin * margin {
+                continue;
+            }
+            let node = nodes[id];
+            if node.is_leaf() {
+                for j in node.points() {
+                    let d = crate::boxes::sub(points[j], p);
+                    best = best.min(radii[j] + GROWTH * crate::boxes::dot(d, d).sqrt());
+                }
+            } else {
+                stack[top] = node.right;
+                stack[top + 1] = id32(id) + 1;
+                top += 2;
+            }
+        }
+        best
+    })
+}
+
+/// A value for each node from its points, leaves first: `leaf` of a leaf's range, `join` of two children's.
+pub(crate) fn fold_nodes<T: Copy + Default>(
+    nodes: &[Node],
+    leaf: impl Fn(std::ops::Range<usize>) -> T,
+    join: impl Fn(T, T) -> T,
+) -> Vec<T> {
+    let mut values = vec![T::default(); nodes.len()];
+    // Children come after their parent.
+    for id in (0..nodes.len()).rev() {
+        let node = nodes[id];
+        values[id] = if node.is_leaf() {
+            leaf(node.points())
+        } else {
+            join(values[id + 1], values[node.right as usize])
+        };
+    }
+    values
+}

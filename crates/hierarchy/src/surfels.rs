@@ -1,0 +1,169 @@
+//! Tangent discs ("surfels"): what each point says of the surface to first order.
+//!
+//! A point's normal is that of the weighted least-squares fit at the point itself. Its disc is as wide as it
+//! must be for the discs of neighbours to close the surface, and no wider: at a border, where the weighted
+//! mean lies to one side, it shrinks, so that the discs do not reach beyond the samples by more than half a
+//! sampling radius.
+
+use bytemuck::{Pod, Zeroable};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_surface::{Evaluation, Neighbourhood, Status, symmetric_eigen};
+use serde::{Deserialize, Serialize};
+
+use crate::boxes::{OrientedBox, dot};
+use crate::gather::Index;
+use crate::spacing::Spacing;
+use crate::topology::Node;
+
+/// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a square
+/// lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
+const DISC: f32 = 0.65;
+
+/// Disc radius over local sampling radius at a border.
+const DISC_AT_BORDER: f32 = 0.4;
+
+/// ‖a(p) − p‖ over h along the surface for a point on a straight border: 1/√π.
+const BORDER_OFFSET: f64 = 0.564;
+
+/// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
+const LINE: f64 = 0.05;
+
+/// What the neighbourhood of a point looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[repr(u8)]
+#[non_exhaustive]
+pub enum PointKind {
+    /// One sheet: the disc is to be trusted.
+    Surface = 0,
+    /// At or beyond the border of its surface.
+    Border = 1,
+    /// No single plane fits: two sheets, an edge of several, or a blob.
+    Ambiguous = 2,
+    /// A line, as along one LiDAR ring.
+    Line = 3,
+    /// Too few neighbours.
+    Isolated = 4,
+}
+
+impl PointKind {
+    /// The kind stored as `code`; anything unknown is ambiguous.
+    #[must_use]
+    pub const fn from_code(code: u8) -> Self {
+        match code {
+            0 => Self::Surface,
+            1 => Self::Border,
+            3 => Self::Line,
+            4 => Self::Isolated,
+            _ => Self::Ambiguous,
+        }
+    }
+
+    /// The number it is stored as.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+}
+
+/// The directions of a leaf's normals, up to sign: all within the angle of `cosine` of `axis` or of −`axis`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct NormalCone {
+    /// Unit; its largest component is positive.
+    pub axis: [f32; 3],
+    /// Cosine of the half angle, 0 to 1.
+    pub cosine: f32,
+}
+
+/// A point's disc.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surfel {
+    pub(crate) normal: [f32; 3],
+    pub(crate) disc: f32,
+    pub(crate) kind: PointKind,
+}
+
+/// The disc of point `i`.
+pub(crate) fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, near: &mut Neighbourhood) -> Surfel {
+    let x = index.positions[i].map(f64::from);
+    index.gather(x, near);
+    let at = near.evaluate(index.plan, x);
+    let n = Vector3::from(at.normal);
+    let mean = Vector3::from(at.centroid) - Vector3::from(x);
+    let aside = if at.bandwidth > 0.0 {
+        (mean - n * mean.dot(&n)).norm() / at.bandwidth
+    } else {
+        1.0
+    };
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    let (inward, normal) = (
+        (aside / BORDER_OFFSET).min(1.0) as f32,
+        n.map(|c| c as f32).into(),
+    );
+    let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * inward);
+    Surfel {
+        normal,
+        disc,
+        kind: kind(&at, spacing.is_line),
+    }
+}
+
+fn kind(at: &Evaluation, is_line: bool) -> PointKind {
+    let [_, l2, l3] = at.eigenvalues;
+    match at.status {
+        Status::Outside => PointKind::Isolated,
+        _ if is_line || l2 < LINE * l3 => PointKind::Line,
+        Status::Ok => PointKind::Surface,
+        Status::Border => PointKind::Border,
+        _ => PointKind::Ambiguous,
+    }
+}
+
+/// The cone of a leaf's `normals`, each of which is turned to the axis' side.
+pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
+    let mut s = [0.0_f64; 6];
+    for n in &*normals {
+        let [x, y, z] = n.map(f64::from);
+        for (sum, v) in s.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
+            *sum += v;
+        }
+    }
+    let main = Vector3::from(symmetric_eigen(s).vectors[2]);
+    let largest = main
+        .iter()
+        .fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    let axis: [f32; 3] = (main * largest.signum()).map(|c| c as f32).into();
+    let mut cosine = 1.0_f32;
+    for n in normals {
+        let c = dot(*n, axis);
+        if c < 0.0 {
+            *n = n.map(|x| -x);
+        }
+        cosine = cosine.min(c.abs());
+    }
+    NormalCone { axis, cosine }
+}
+
+/// The least box along the axes of `about` that contains the discs of the node's points.
+pub(crate) fn box_of_discs(
+    node: &Node,
+    about: &OrientedBox,
+    positions: &[[f32; 3]],
+    normals: &[[f32; 3]],
+    discs: &[f32],
+) -> OrientedBox {
+    let mut low = [f32::INFINITY; 3];
+    let mut high = [f32::NEG_INFINITY; 3];
+    for i in node.points() {
+        for k in 0..3 {
+            let axis = about.axes[k];
+            let c = dot(axis, positions[i]);
+            let tilt = dot(axis, normals[i]);
+            let spread = discs[i] * (1.0 - tilt * tilt).max(0.0).sqrt();
+            low[k] = low[k].min(c - spread);
+            high[k] = high[k].max(c + spread);
+        }
+    }
+    OrientedBox::spanned(about.axes, low, high)
+}

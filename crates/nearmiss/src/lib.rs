@@ -1,0 +1,22 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod scan;
+
+pub use nearmiss_geometry as geometry;
+pub use nearmiss_hierarchy as hierarchy;
+#[cfg(feature = "io")]
+pub use nearmiss_io as io;
+pub use nearmiss_query as query;
+pub use nearmiss_store as store;
+pub use nearmiss_surface as surface;
+
+pub use nearmiss_geometry::{Aabb, CloudError, PointCloud, PointId, Pose, PoseError, TriangleMesh};
+pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
+pub use nearmiss_query::{
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Contact, Deadline, Detail, Evidence, PlanError,
+    Reason, ScanView, Semantics, Statistics, Verdict, collide, collide_with,
+};
+pub use nearmiss_store::Check;
+pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Status, SurfaceOptions};
+pub use scan::{LoadError, SaveError, Scan};

@@ -1,0 +1,18 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod budget;
+mod collide;
+mod crossing;
+mod options;
+mod surface;
+mod thickened;
+mod verdict;
+mod view;
+
+pub use budget::{Budget, Deadline};
+pub use collide::{CollideScratch, collide, collide_with};
+pub use crossing::{Disc, crossing};
+pub use options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
+pub use verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
+pub use view::ScanView;

@@ -1,0 +1,191 @@
+//! `Semantics::Surface`: the tangent discs of one scan against those of the other.
+//!
+//! Boxes hold the discs of their points, so a pair of disjoint boxes hides no crossing, and the descent finds
+//! a crossing exactly if there is one. Where two discs cross, Newton's method looks for a point on both
+//! implicit surfaces; it adds a witness and certainty, and does not overrule: the weighted fit rounds off tips
+//! and ends early at borders, where discs of points still tell (docs/decisions).
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{NodePair, PointHierarchy, PointKind, Relative, Visitor};
+use nearmiss_surface::meet;
+
+use crate::budget::Meter;
+use crate::collide::CollideScratch;
+use crate::crossing::{Disc, Lanes};
+use crate::options::Detail;
+use crate::verdict::{Contact, Evidence, Reason};
+use crate::view::ScanView;
+
+/// A witness is tried for at so many crossings before the first stands as estimated.
+const TRIES: u32 = 4;
+
+/// A verified point further than this from the crossing, in disc radii, is some other place.
+const NEARBY: f64 = 4.0;
+
+/// The search for a crossing.
+#[derive(Debug)]
+pub(crate) struct Surfaces<'a> {
+    views: [&'a ScanView<'a>; 2],
+    a: &'a PointHierarchy,
+    b: &'a PointHierarchy,
+    relative: Relative,
+    detail: Detail,
+    pub(crate) meter: Meter,
+    lanes: &'a mut Lanes,
+    gathers: &'a mut [nearmiss_hierarchy::GatherScratch; 2],
+    tries: u32,
+    /// The best contact so far.
+    pub(crate) found: Option<(Contact, Evidence)>,
+    /// A crossing of discs that are not to be trusted, and why.
+    pub(crate) doubt: Option<Reason>,
+}
+
+impl<'a> Surfaces<'a> {
+    pub(crate) fn new(
+        views: [&'a ScanView<'a>; 2],
+        relative: Relative,
+        detail: Detail,
+        meter: Meter,
+        scratch: (&'a mut Lanes, &'a mut [nearmiss_hierarchy::GatherScratch; 2]),
+    ) -> Self {
+        let [a, b] = views.map(ScanView::scan);
+        let (lanes, gathers) = scratch;
+        Self {
+            views,
+            a,
+            b,
+            relative,
+            detail,
+            meter,
+            lanes,
+            gathers,
+            tries: 0,
+            found: None,
+            doubt: None,
+        }
+    }
+
+    fn disc_a(&self, i: usize) -> Disc {
+        Disc {
+            centre: self.a.positions()[i],
+            normal: self.a.normals()[i],
+            radius: self.a.discs()[i],
+        }
+    }
+
+    fn disc_b(&self, j: usize) -> Disc {
+        Disc {
+            centre: self.relative.point(self.b.positions()[j]),
+            normal: self.relative.direction(self.b.normals()[j]),
+            radius: self.b.discs()[j] * self.relative.scale(),
+        }
+    }
+
+    /// Points `i` and `j` have crossing discs.
+    fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
+        let contact = self.estimate(i, j);
+        if self.detail == Detail::Verdict {
+            self.found = Some((contact, Evidence::Estimated));
+            return ControlFlow::Break(());
+        }
+        let refined = self.refine(&contact, i);
+        self.tries += 1;
+        match refined {
+            Some(contact) => {
+                self.found = Some((contact, Evidence::Certified));
+                return ControlFlow::Break(());
+            }
+            None if self.found.is_none() => self.found = Some((contact, Evidence::Estimated)),
+            None => {}
+        }
+        if self.tries >= TRIES {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// The middle of the common chord of the discs, in the world.
+    fn estimate(&self, i: usize, j: usize) -> Contact {
+        let [va, vb] = self.views;
+        let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
+        let na = Vector3::from(va.placed().rotate(self.a.normals()[i].map(f64::from)));
+        let nb = Vector3::from(vb.placed().rotate(self.b.normals()[j].map(f64::from)));
+        let middle = 0.5 * (pa + pb);
+        let (fa, fb) = (na.dot(&(pa - middle)), nb.dot(&(pb - middle)));
+        let c = na.dot(&nb);
+        let gram = 1.0 - c * c;
+        let step = if gram < 1e-3 {
+            0.5 * (fa * na + fb * nb)
+        } else {
+            ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
+        };
+        let residual = nb.dot(&(pa - pb)).abs().min(na.dot(&(pa - pb)).abs());
+        Contact {
+            point: (middle + step).into(),
+            normals: Some([na.into(), nb.into()]),
+            residual,
+            sources: [self.a.id(i), self.b.id(j)],
+        }
+    }
+
+    /// A verified point on both surfaces near `contact`.
+    fn refine(&mut self, contact: &Contact, i: usize) -> Option<Contact> {
+        let [va, vb] = self.views;
+        let [scratch_a, scratch_b] = &mut *self.gathers;
+        let meeting = meet(contact.point, |x| {
+            [va.evaluate_with(x, scratch_a), vb.evaluate_with(x, scratch_b)]
+        });
+        self.meter.spent.evaluations += 2 * u64::from(meeting.rounds);
+        let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
+        let nearby = NEARBY * f64::from(self.a.radii()[i]) * va.placed().scale();
+        (meeting.verified && moved <= nearby).then(|| Contact {
+            point: meeting.point,
+            normals: Some(meeting.at.map(|e| e.normal)),
+            residual: meeting.residual(),
+            ..*contact
+        })
+    }
+}
+
+impl Visitor for Surfaces<'_> {
+    #[inline]
+    fn admit(&mut self, pair: NodePair) -> Option<f32> {
+        self.meter.spent.node_pairs += 1;
+        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
+        let gap = self.relative.gap(a, b);
+        (gap <= self.relative.slack()).then_some(-gap)
+    }
+
+    #[inline]
+    fn split_first(&self, pair: NodePair) -> bool {
+        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
+        a.half[0] >= b.half[0] * self.relative.scale()
+    }
+
+    #[inline]
+    fn go_on(&mut self) -> ControlFlow<()> {
+        self.meter.go_on()
+    }
+
+    fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
+        self.meter.spent.leaf_pairs += 1;
+        let node_b = self.b.nodes()[pair.b.index()];
+        for (lane, j) in node_b.points().enumerate() {
+            let disc = self.disc_b(j);
+            self.lanes.set(lane, &disc);
+        }
+        self.lanes.close(node_b.count as usize);
+        for i in self.a.nodes()[pair.a.index()].points() {
+            let mut bits = self.lanes.crossings(&self.disc_a(i));
+            while bits != 0 {
+                let j = node_b.first as usize + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                self.crossed(i, j)?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,96 @@
+//! `Semantics::Thickened`: balls about the points, decided exactly.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{NodePair, PointHierarchy, Relative, Visitor};
+
+use crate::budget::Meter;
+use crate::verdict::Contact;
+use crate::view::ScanView;
+
+/// The search for two points within twice the radius of each other.
+#[derive(Debug)]
+pub(crate) struct Balls<'a> {
+    views: [&'a ScanView<'a>; 2],
+    a: &'a PointHierarchy,
+    b: &'a PointHierarchy,
+    relative: Relative,
+    /// 2R in the world, and a little more in a's stored frame.
+    reach: f64,
+    reach_stored: f32,
+    pub(crate) meter: Meter,
+    /// The first such pair.
+    pub(crate) found: Option<Contact>,
+    /// A lower bound of the distance of all points looked at or excluded, in the world.
+    pub(crate) apart: f64,
+}
+
+impl<'a> Balls<'a> {
+    pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, radius: f64, meter: Meter) -> Self {
+        let [a, b] = views.map(ScanView::scan);
+        let reach = 2.0 * radius;
+        #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
+        let reach_stored = (reach / views[0].placed().scale()) as f32 * (1.0 + 1e-6) + relative.slack();
+        Self {
+            views,
+            a,
+            b,
+            relative,
+            reach,
+            reach_stored,
+            meter,
+            found: None,
+            apart: f64::INFINITY,
+        }
+    }
+}
+
+impl Visitor for Balls<'_> {
+    #[inline]
+    fn admit(&mut self, pair: NodePair) -> Option<f32> {
+        self.meter.spent.node_pairs += 1;
+        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
+        let gap = self.relative.gap(a, b);
+        if gap <= self.reach_stored {
+            return Some(-gap);
+        }
+        let bound = f64::from(gap - self.relative.slack()) * self.views[0].placed().scale();
+        self.apart = self.apart.min(bound);
+        None
+    }
+
+    #[inline]
+    fn split_first(&self, pair: NodePair) -> bool {
+        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
+        a.half[0] >= b.half[0] * self.relative.scale()
+    }
+
+    #[inline]
+    fn go_on(&mut self) -> ControlFlow<()> {
+        self.meter.go_on()
+    }
+
+    fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
+        self.meter.spent.leaf_pairs += 1;
+        let [va, vb] = self.views;
+        for i in self.a.nodes()[pair.a.index()].points() {
+            let p = Vector3::from(va.point(i));
+            for j in self.b.nodes()[pair.b.index()].points() {
+                let q = Vector3::from(vb.point(j));
+                let distance = (p - q).norm();
+                self.apart = self.apart.min(distance);
+                if distance <= self.reach {
+                    self.found = Some(Contact {
+                        point: (0.5 * (p + q)).into(),
+                        normals: None,
+                        residual: 0.5 * distance,
+                        sources: [self.a.id(i), self.b.id(j)],
+                    });
+                    return ControlFlow::Break(());
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,97 @@
+//! What a query answers.
+
+use nearmiss_geometry::PointId;
+use serde::{Deserialize, Serialize};
+
+/// Whether two scans meet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Verdict {
+    /// They do, and this is where.
+    Intersecting {
+        /// A place where they meet.
+        contact: Contact,
+        /// How sure that is.
+        evidence: Evidence,
+    },
+    /// They do not.
+    Separated {
+        /// A lower bound of their distance in world units if certified, else 0.
+        gap: f64,
+        /// How sure that is.
+        evidence: Evidence,
+    },
+    /// That cannot be told.
+    Undecided(Reason),
+}
+
+impl Verdict {
+    /// Whether the verdict is that they meet.
+    #[must_use]
+    pub const fn is_intersecting(&self) -> bool {
+        matches!(self, Self::Intersecting { .. })
+    }
+
+    /// Whether the verdict is that they are apart.
+    #[must_use]
+    pub const fn is_separated(&self) -> bool {
+        matches!(self, Self::Separated { .. })
+    }
+}
+
+/// How sure a verdict is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Evidence {
+    /// Separated: volumes that contain the surfaces are disjoint, rounding included. Intersecting: a verified
+    /// point on both surfaces.
+    Certified,
+    /// The search was exhaustive, or found the surfaces crossing to first order, but proves nothing.
+    Estimated,
+}
+
+/// Why there is no verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The budget was spent first.
+    Budget {
+        /// An estimate of the probability that they meet, 0 to 1, from how deeply the volumes still open overlap.
+        likelihood: f64,
+    },
+    /// They come near each other only where a scan's points lie on lines or too sparsely.
+    Undersampled,
+    /// They come near each other only where a scan's points do not look like one sheet.
+    Ambiguous,
+}
+
+/// A place where two scans meet, in the world.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Contact {
+    /// The place.
+    pub point: [f64; 3],
+    /// Unit normals of both surfaces there, of arbitrary sign; none where points are compared, not surfaces.
+    pub normals: Option<[[f64; 3]; 2]>,
+    /// Greatest distance of the place from either surface, as far as known; see [`Evidence`].
+    pub residual: f64,
+    /// The points whose discs (or balls) meet there, as the caller numbered them.
+    pub sources: [PointId; 2],
+}
+
+/// What a query cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Statistics {
+    /// Evaluations of an implicit function.
+    pub evaluations: u64,
+    /// Node pairs whose boxes were compared.
+    pub node_pairs: u64,
+    /// Pairs of leaves whose points were compared.
+    pub leaf_pairs: u64,
+}
+
+/// A verdict and what it cost.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// Whether they meet.
+    pub verdict: Verdict,
+    /// What that cost.
+    pub statistics: Statistics,
+}

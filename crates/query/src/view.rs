@@ -1,0 +1,64 @@
+//! A prepared scan somewhere in the world.
+
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::{GatherScratch, PointHierarchy};
+use nearmiss_surface::Evaluation;
+
+/// A scan in a pose: what queries look at. Cheap to make, cheap to copy.
+#[derive(Debug, Clone, Copy)]
+pub struct ScanView<'a> {
+    scan: &'a PointHierarchy,
+    /// Stored frame → world.
+    placed: Pose,
+}
+
+impl<'a> ScanView<'a> {
+    /// `scan` in `pose`, which leads from the frame of its input to the world. Lengths of the scan, its radii
+    /// and bandwidths among them, scale with the pose.
+    #[must_use]
+    pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
+        let frame = scan.frame();
+        let stored = Pose::IDENTITY
+            .with_scale(frame.scale)
+            .with_translation(frame.origin);
+        Self {
+            scan,
+            placed: pose.after(&stored),
+        }
+    }
+
+    /// The scan.
+    #[must_use]
+    pub fn scan(&self) -> &'a PointHierarchy {
+        self.scan
+    }
+
+    /// The pose of the scan's stored frame.
+    #[must_use]
+    pub fn placed(&self) -> &Pose {
+        &self.placed
+    }
+
+    /// The `i`-th stored point in the world.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[must_use]
+    pub fn point(&self, i: usize) -> [f64; 3] {
+        self.placed.apply(self.scan.positions()[i].map(f64::from))
+    }
+
+    /// The implicit function at `x`, all in the world.
+    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        let at = self.scan.evaluate_with(self.placed.apply_inverse(x), scratch);
+        let scale = self.placed.scale();
+        Evaluation {
+            f: at.f * scale,
+            normal: self.placed.rotate(at.normal),
+            centroid: self.placed.apply(at.centroid),
+            bandwidth: at.bandwidth * scale,
+            eigenvalues: at.eigenvalues.map(|l| l * scale * scale),
+            ..at
+        }
+    }
+}
