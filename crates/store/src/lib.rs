@@ -1,0 +1,33 @@
+#![doc = include_str!("../README.md")]
+
+#[cfg(target_endian = "big")]
+compile_error!(
+    "nearmiss-store uses arrays in place from a little-endian file; big-endian targets are not supported"
+);
+
+// In reading order: the bytes on disk, what holds them, how they are read, how they are written.
+mod header;
+mod section;
+
+mod array;
+mod bytes;
+mod map;
+
+mod file;
+mod metadata;
+mod sniff;
+
+mod atomic;
+mod writer;
+
+mod error;
+
+pub use array::Array;
+pub use bytes::Bytes;
+pub use error::{Fault, OpenError, WriteError, WriteStep};
+pub use file::{Check, File};
+pub use header::LAYOUT;
+pub use metadata::METADATA_LIMIT;
+pub use section::{Section, SectionId};
+pub use sniff::Looks;
+pub use writer::Writer;

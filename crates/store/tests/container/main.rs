@@ -1,0 +1,10 @@
+//! The container as its users see it, through the public interface only.
+
+#![cfg(test)]
+
+mod attacks;
+mod common;
+mod damage;
+mod golden;
+mod round_trip;
+mod saving;
