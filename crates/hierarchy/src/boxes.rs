@@ -10,9 +10,9 @@ use nearmiss_geometry::nalgebra::Vector3;
 
 type Axes = [[f32; 3]; 3];
 
-/// A box about `centre` with half edge lengths `half` along the orthonormal `axes`.
+/// A box about `centre` with half edge lengths `half` along the orthonormal `axes`. One cache line.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-#[repr(C)]
+#[repr(C, align(64))]
 pub struct OrientedBox {
     /// The middle.
     pub centre: [f32; 3],
@@ -20,6 +20,8 @@ pub struct OrientedBox {
     pub half: [f32; 3],
     /// Unit directions of the edges, a right-handed frame.
     pub axes: Axes,
+    /// Greatest local sampling radius of the points inside.
+    pub reach: f32,
 }
 
 /// What rounding can do to a coordinate of a box, relative to the largest number involved.
@@ -28,13 +30,13 @@ const ROUNDING: f32 = 1e-6;
 impl OrientedBox {
     /// The least box along `axes` that contains all `intervals`, given per axis; grown by what rounding may
     /// have cost.
-    pub(crate) fn spanned(axes: Axes, low: [f32; 3], high: [f32; 3]) -> Self {
+    pub(crate) fn spanned(axes: Axes, low: [f32; 3], high: [f32; 3], reach: f32) -> Self {
         let middle = [0, 1, 2].map(|k| 0.5 * low[k] + 0.5 * high[k]);
-        let reach = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
+        let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
         let centre =
             [0, 1, 2].map(|k| middle[0] * axes[0][k] + middle[1] * axes[1][k] + middle[2] * axes[2][k]);
-        let half = [0, 1, 2].map(|k| 0.5 * high[k] - 0.5 * low[k] + ROUNDING * reach);
-        Self { centre, half, axes }
+        let half = [0, 1, 2].map(|k| 0.5 * high[k] - 0.5 * low[k] + ROUNDING * far);
+        Self { centre, half, axes, reach }
     }
 
     /// Squared distance of `p` from the box, 0 inside.
@@ -42,8 +44,9 @@ impl OrientedBox {
     #[must_use]
     pub fn distance_sq(&self, p: [f32; 3]) -> f32 {
         let d = sub(p, self.centre);
-        let beyond = [0, 1, 2].map(|k| (dot(self.axes[k], d).abs() - self.half[k]).max(0.0));
-        dot(beyond, beyond)
+        let beyond = |k: usize| (dot(self.axes[k], d).abs() - self.half[k]).max(0.0);
+        let (x, y, z) = (beyond(0), beyond(1), beyond(2));
+        x * x + y * y + z * z
     }
 
     /// Distance from the centre to a corner.
@@ -87,14 +90,17 @@ impl Relative {
     #[inline]
     #[must_use]
     pub fn point(&self, p: [f32; 3]) -> [f32; 3] {
-        [0, 1, 2].map(|i| dot(self.linear[i], p) + self.translation[i])
+        let [rx, ry, rz] = self.linear;
+        let [tx, ty, tz] = self.translation;
+        [dot(rx, p) + tx, dot(ry, p) + ty, dot(rz, p) + tz]
     }
 
     /// A direction of b's frame in a's.
     #[inline]
     #[must_use]
     pub fn direction(&self, v: [f32; 3]) -> [f32; 3] {
-        self.rotation.map(|row| dot(row, v))
+        let [rx, ry, rz] = self.rotation;
+        [dot(rx, v), dot(ry, v), dot(rz, v)]
     }
 
     /// Length in a's frame of a unit of b's.
@@ -111,38 +117,110 @@ impl Relative {
         self.slack
     }
 
-    /// How far the boxes `a` and `b` are apart along the face normal that parts them most; negative when they
-    /// overlap along all six. A positive value, less [`Relative::slack`], is a lower bound of their distance.
+    /// How far two boxes of a and two of b are apart, each pair along the face normal that parts it most: the
+    /// pairs (0, 0), (0, 1), (1, 0), (1, 1). Negative when they overlap along all six. A positive value, less
+    /// [`Relative::slack`], is a lower bound of their distance.
+    ///
+    /// Four pairs at once fill the lanes of a vector register; plain arrays compile to them.
     #[inline]
     #[must_use]
-    pub fn gap(&self, a: &OrientedBox, b: &OrientedBox) -> f32 {
-        let d = sub(self.point(b.centre), a.centre);
-        let half_b = b.half.map(|h| h * self.scale);
-        let axes_b = b.axes.map(|e| self.direction(e));
-        let mut gap = f32::MIN;
-        let mut spread_b = [0.0_f32; 3];
+    pub fn gaps(&self, a: [&OrientedBox; 2], b: [&OrientedBox; 2]) -> [f32; 4] {
+        let a = Quads::new([a[0], a[0], a[1], a[1]]);
+        let (b0, b1) = (self.moved(b[0]), self.moved(b[1]));
+        let b = Quads::new([&b0, &b1, &b0, &b1]);
+        let mut d = [[0.0; 4]; 3];
+        for k in 0..3 {
+            d[k] = minus(b.centre[k], a.centre[k]);
+        }
+        let mut gap = [f32::MIN; 4];
+        let mut reach_b = b.half;
         for i in 0..3 {
-            let cosines = axes_b.map(|e| dot(a.axes[i], e).abs());
-            let reach = dot(half_b, cosines);
-            gap = gap.max(dot(a.axes[i], d).abs() - a.half[i] - reach);
+            let mut reach_a = a.half[i];
             for j in 0..3 {
-                spread_b[j] += a.half[i] * cosines[j];
+                let cosine = magnitude(product(&a.axes[i], &b.axes[j]));
+                reach_a = plus(reach_a, times(b.half[j], cosine));
+                reach_b[j] = plus(reach_b[j], times(a.half[i], cosine));
             }
+            gap = greater(gap, minus(magnitude(product(&a.axes[i], &d)), reach_a));
         }
         for j in 0..3 {
-            gap = gap.max(dot(axes_b[j], d).abs() - half_b[j] - spread_b[j]);
+            gap = greater(gap, minus(magnitude(product(&b.axes[j], &d)), reach_b[j]));
         }
         gap
     }
+
+    /// A box of b's frame in a's.
+    #[inline]
+    fn moved(&self, b: &OrientedBox) -> OrientedBox {
+        let [hx, hy, hz] = b.half;
+        let [ex, ey, ez] = b.axes;
+        OrientedBox {
+            centre: self.point(b.centre),
+            half: [hx * self.scale, hy * self.scale, hz * self.scale],
+            axes: [self.direction(ex), self.direction(ey), self.direction(ez)],
+            reach: b.reach,
+        }
+    }
 }
 
-/// The stored frame of a scan in the world, as a pose.
-pub(crate) fn placed(frame: &nearmiss_geometry::Frame, pose: &Pose) -> Pose {
-    pose.after(
-        &Pose::IDENTITY
-            .with_scale(frame.scale)
-            .with_translation(frame.origin),
-    )
+/// Four lanes.
+type Quad = [f32; 4];
+
+/// Four boxes, a lane each.
+struct Quads {
+    centre: [Quad; 3],
+    half: [Quad; 3],
+    axes: [[Quad; 3]; 3],
+}
+
+impl Quads {
+    #[inline]
+    fn new(boxes: [&OrientedBox; 4]) -> Self {
+        let mut quads = Self { centre: [[0.0; 4]; 3], half: [[0.0; 4]; 3], axes: [[[0.0; 4]; 3]; 3] };
+        for k in 0..3 {
+            quads.centre[k] = lanes(|i| boxes[i].centre[k]);
+            quads.half[k] = lanes(|i| boxes[i].half[k]);
+            for j in 0..3 {
+                quads.axes[k][j] = lanes(|i| boxes[i].axes[k][j]);
+            }
+        }
+        quads
+    }
+}
+
+#[inline]
+fn lanes(f: impl Fn(usize) -> f32) -> Quad {
+    [f(0), f(1), f(2), f(3)]
+}
+
+#[inline]
+fn plus(x: Quad, y: Quad) -> Quad {
+    lanes(|i| x[i] + y[i])
+}
+
+#[inline]
+fn minus(x: Quad, y: Quad) -> Quad {
+    lanes(|i| x[i] - y[i])
+}
+
+#[inline]
+fn times(x: Quad, y: Quad) -> Quad {
+    lanes(|i| x[i] * y[i])
+}
+
+#[inline]
+fn magnitude(x: Quad) -> Quad {
+    lanes(|i| x[i].abs())
+}
+
+#[inline]
+fn greater(x: Quad, y: Quad) -> Quad {
+    lanes(|i| if x[i] > y[i] { x[i] } else { y[i] })
+}
+
+#[inline]
+fn product(x: &[Quad; 3], y: &[Quad; 3]) -> Quad {
+    plus(plus(times(x[0], y[0]), times(x[1], y[1])), times(x[2], y[2]))
 }
 
 #[inline]

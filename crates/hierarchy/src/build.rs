@@ -40,8 +40,25 @@ pub struct PointHierarchy {
     pub(crate) source: Array<u32>,
     pub(crate) nodes: Array<Node>,
     pub(crate) boxes: Array<OrientedBox>,
-    pub(crate) reaches: Array<f32>,
     pub(crate) cones: Array<NormalCone>,
+}
+
+/// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not at every
+/// access.
+#[derive(Debug, Clone, Copy)]
+pub struct Slices<'a> {
+    /// Positions in leaf order.
+    pub positions: &'a [[f32; 3]],
+    /// Unit normals.
+    pub normals: &'a [[f32; 3]],
+    /// Local sampling radii.
+    pub radii: &'a [f32],
+    /// Radii of the tangent discs.
+    pub discs: &'a [f32],
+    /// The tree.
+    pub nodes: &'a [Node],
+    /// A box about the discs of each node's points.
+    pub boxes: &'a [OrientedBox],
 }
 
 impl PointHierarchy {
@@ -53,9 +70,7 @@ impl PointHierarchy {
         options.check()?;
         #[cfg(feature = "rayon")]
         if options.threads > 0 {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(options.threads)
-                .build();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build();
             let pool = pool.or(Err(BuildError::Threads(options.threads)))?;
             return pool.install(|| build(cloud, options));
         }
@@ -74,11 +89,23 @@ impl PointHierarchy {
         self.evaluate_with(x, &mut GatherScratch::default())
     }
 
+    /// The arrays that a query reads.
+    #[must_use]
+    pub fn slices(&self) -> Slices<'_> {
+        Slices {
+            positions: &self.positions,
+            normals: &self.normals,
+            radii: &self.radii,
+            discs: &self.discs,
+            nodes: &self.nodes,
+            boxes: &self.boxes,
+        }
+    }
+
     fn index(&self) -> Index<'_> {
         Index {
             nodes: &self.nodes,
             boxes: &self.boxes,
-            reaches: &self.reaches,
             positions: &self.positions,
             radii: &self.radii,
             plan: &self.plan,
@@ -223,16 +250,11 @@ impl PointHierarchy {
 
 fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, BuildError> {
     let leaf_size = options.leaf_size as usize;
-    let mut items: Vec<Item> = (0..)
-        .zip(cloud.positions())
-        .map(|(index, &position)| Item { position, index })
-        .collect();
+    let mut items: Vec<Item> =
+        (0..).zip(cloud.positions()).map(|(index, &position)| Item { position, index }).collect();
     let (nodes, mut boxes) = split(&mut items, leaf_size);
     let positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
-    let source: Vec<u32> = items
-        .iter()
-        .map(|item| cloud.source()[item.index as usize])
-        .collect();
+    let source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
     drop(items);
 
     let spacings = spacings(&positions, options.radius_neighbours as usize);
@@ -242,20 +264,12 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let sampling_radius = quantile(&radii);
     let unit = 1.0 / cloud.frame().scale;
     let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
-    let reaches = fold_nodes(
-        &nodes,
-        |range| radii[range].iter().copied().fold(0.0, f32::max),
-        f32::max,
-    );
+    let reaches = fold_nodes(&nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
+    for (bounds, reach) in boxes.iter_mut().zip(reaches) {
+        bounds.reach = reach;
+    }
 
-    let index = Index {
-        nodes: &nodes,
-        boxes: &boxes,
-        reaches: &reaches,
-        positions: &positions,
-        radii: &radii,
-        plan: &plan,
-    };
+    let index = Index { nodes: &nodes, boxes: &boxes, positions: &positions, radii: &radii, plan: &plan };
     let surfels = surfels(&index, &spacings, leaf_size);
     drop(spacings);
     let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
@@ -264,15 +278,8 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     drop(surfels);
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
-    boxes = map(&ids, |&i| {
-        box_of_discs(
-            &nodes[i as usize],
-            &boxes[i as usize],
-            &positions,
-            &normals,
-            &discs,
-        )
-    });
+    boxes =
+        map(&ids, |&i| box_of_discs(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &discs));
 
     Ok(PointHierarchy {
         frame: cloud.frame(),
@@ -291,7 +298,6 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         source: source.into(),
         nodes: nodes.into(),
         boxes: boxes.into(),
-        reaches: reaches.into(),
         cones: cones.into(),
     })
 }
@@ -303,9 +309,7 @@ fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<Sur
     let fit = |&start: &usize| -> Vec<Surfel> {
         let mut scratch = GatherScratch::default();
         let end = spacings.len().min(start + task);
-        (start..end)
-            .map(|i| surfel(index, i, spacings[i], &mut scratch.near))
-            .collect()
+        (start..end).map(|i| surfel(index, i, spacings[i], &mut scratch.near)).collect()
     };
     #[cfg(feature = "rayon")]
     {

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
 
-use crate::split::id32;
 use crate::topology::Node;
 
 /// A node of either tree, still to be looked at together.
@@ -16,16 +15,29 @@ pub struct NodePair {
     pub b: NodeId,
 }
 
+/// Which node of a pair to replace by its children.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Split {
+    /// The first tree's.
+    First,
+    /// The second tree's.
+    Second,
+    /// Both.
+    Both,
+}
+
 /// What a query does with node pairs.
 pub trait Visitor {
-    /// How urgent the pair is, greater first; `None` when nothing below it can matter.
-    fn admit(&mut self, pair: NodePair) -> Option<f32>;
+    /// How urgent each pair of one of `a` with one of `b` is, greater first: (0, 0), (0, 1), (1, 0), (1, 1).
+    /// `None` when nothing below the pair can matter. A node that is not split stands there twice; `count`
+    /// pairs are meant (the doubles are ignored).
+    fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4];
 
     /// Two leaves that were admitted.
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()>;
 
-    /// Whether to split the first tree's node, given that either could be.
-    fn split_first(&self, pair: NodePair) -> bool;
+    /// Which node to split, given that neither is a leaf.
+    fn split(&self, pair: NodePair) -> Split;
 
     /// Called before each admitted pair is looked at; may end the descent.
     fn go_on(&mut self) -> ControlFlow<()>;
@@ -36,17 +48,17 @@ pub trait Frontier {
     /// Forgets all pairs.
     fn clear(&mut self);
 
-    /// Adds the two pairs that a split gave and that were admitted, with their urgency.
-    fn push(&mut self, pairs: [Option<(f32, NodePair)>; 2]);
+    /// Adds the pairs that a split gave, with the urgency of those that were admitted.
+    fn push(&mut self, pairs: [(Option<f32>, NodePair); 4]);
 
     /// The pair to look at next.
     fn pop(&mut self) -> Option<NodePair>;
 
-    /// The pairs still there with their urgency, most urgent first.
+    /// The pairs still there with their urgency.
     fn open(&self) -> impl Iterator<Item = (f32, NodePair)>;
 }
 
-/// Depth first, the more urgent of two siblings first: for boolean questions and all hits.
+/// Depth first, of siblings the most urgent first: for boolean questions and all hits.
 #[derive(Debug, Clone, Default)]
 pub struct Stack {
     pairs: Vec<(f32, NodePair)>,
@@ -58,11 +70,20 @@ impl Frontier for Stack {
     }
 
     #[inline]
-    fn push(&mut self, pairs: [Option<(f32, NodePair)>; 2]) {
-        match pairs {
-            [Some(l), Some(r)] if l.0 >= r.0 => self.pairs.extend([r, l]),
-            [l, r] => self.pairs.extend(l.into_iter().chain(r)),
+    fn push(&mut self, pairs: [(Option<f32>, NodePair); 4]) {
+        // Sorting the others would cost what it saves.
+        let mut most = (f32::NEG_INFINITY, None);
+        for (urgency, pair) in pairs {
+            let Some(urgency) = urgency else { continue };
+            let entry = Some((urgency, pair));
+            let below = if urgency > most.0 || most.1.is_none() {
+                std::mem::replace(&mut most, (urgency, entry)).1
+            } else {
+                entry
+            };
+            self.pairs.extend(below);
         }
+        self.pairs.extend(most.1);
     }
 
     #[inline]
@@ -86,35 +107,44 @@ pub fn descend<V: Visitor, F: Frontier>(
     frontier: &mut F,
 ) -> ControlFlow<()> {
     frontier.clear();
-    let root = NodePair {
-        a: NodeId::ROOT,
-        b: NodeId::ROOT,
-    };
-    frontier.push([visitor.admit(root).map(|urgency| (urgency, root)), None]);
+    push(visitor, frontier, [NodeId::ROOT; 2], [NodeId::ROOT; 2]);
     while let Some(pair) = frontier.pop() {
         visitor.go_on()?;
         let (node_a, node_b) = (&a[pair.a.index()], &b[pair.b.index()]);
-        let children = match (node_a.is_leaf(), node_b.is_leaf()) {
+        let split = match (node_a.is_leaf(), node_b.is_leaf()) {
             (true, true) => {
                 visitor.leaves(pair)?;
                 continue;
             }
-            (true, false) => split_second(pair, node_b),
-            (false, true) => split_first(pair, node_a),
-            (false, false) if visitor.split_first(pair) => split_first(pair, node_a),
-            (false, false) => split_second(pair, node_b),
+            (true, false) => Split::Second,
+            (false, true) => Split::First,
+            (false, false) => visitor.split(pair),
         };
-        frontier.push(children.map(|child| visitor.admit(child).map(|urgency| (urgency, child))));
+        let children_a = if split == Split::Second { [pair.a; 2] } else { children(pair.a, node_a) };
+        let children_b = if split == Split::First { [pair.b; 2] } else { children(pair.b, node_b) };
+        push(visitor, frontier, children_a, children_b);
     }
     ControlFlow::Continue(())
 }
 
+/// Puts those of the four combinations into the frontier that differ and are admitted.
 #[inline]
-fn split_first(pair: NodePair, node: &Node) -> [NodePair; 2] {
-    [NodeId(id32(pair.a.index()) + 1), NodeId(node.right)].map(|a| NodePair { a, ..pair })
+fn push<V: Visitor, F: Frontier>(visitor: &mut V, frontier: &mut F, a: [NodeId; 2], b: [NodeId; 2]) {
+    let whole = [a[0] == a[1], b[0] == b[1]];
+    let count = if whole[0] { 1 } else { 2 } * if whole[1] { 1 } else { 2 };
+    let mut urgencies = visitor.admit(a, b, count);
+    if whole[0] {
+        urgencies[2..].fill(None);
+    }
+    if whole[1] {
+        urgencies[1] = None;
+        urgencies[3] = None;
+    }
+    let pair = |i: usize| (urgencies[i], NodePair { a: a[i >> 1], b: b[i & 1] });
+    frontier.push([pair(0), pair(1), pair(2), pair(3)]);
 }
 
 #[inline]
-fn split_second(pair: NodePair, node: &Node) -> [NodePair; 2] {
-    [NodeId(id32(pair.b.index()) + 1), NodeId(node.right)].map(|b| NodePair { b, ..pair })
+fn children(id: NodeId, node: &Node) -> [NodeId; 2] {
+    [NodeId(id.0 + 1), NodeId(node.right)]
 }

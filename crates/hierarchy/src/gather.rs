@@ -20,8 +20,6 @@ pub struct GatherScratch {
 pub(crate) struct Index<'a> {
     pub(crate) nodes: &'a [Node],
     pub(crate) boxes: &'a [OrientedBox],
-    /// Greatest radius under each node.
-    pub(crate) reaches: &'a [f32],
     pub(crate) positions: &'a [[f32; 3]],
     pub(crate) radii: &'a [f32],
     pub(crate) plan: &'a SurfacePlan,
@@ -35,7 +33,7 @@ impl Index<'_> {
         let rounded = centre.rounded();
         self.descend(
             |id| {
-                let horizon = self.plan.horizon(self.reaches[id]);
+                let horizon = self.plan.horizon(self.boxes[id].reach);
                 self.boxes[id].distance_sq(rounded) < horizon * horizon
             },
             |node| {

@@ -14,8 +14,8 @@ mod surfels;
 mod topology;
 
 pub use boxes::{OrientedBox, Relative};
-pub use build::PointHierarchy;
-pub use descend::{Frontier, NodePair, Stack, Visitor, descend};
+pub use build::{PointHierarchy, Slices};
+pub use descend::{Frontier, NodePair, Split, Stack, Visitor, descend};
 pub use gather::GatherScratch;
 pub use options::{BuildError, BuildOptions};
 pub use sanity::Flaw;

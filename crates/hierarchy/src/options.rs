@@ -20,12 +20,7 @@ pub struct BuildOptions {
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self {
-            surface: SurfaceOptions::default(),
-            radius_neighbours: 6,
-            leaf_size: 16,
-            threads: 0,
-        }
+        Self { surface: SurfaceOptions::default(), radius_neighbours: 6, leaf_size: 16, threads: 0 }
     }
 }
 
@@ -39,10 +34,7 @@ impl BuildOptions {
     /// The same options with this K for local sampling radii.
     #[must_use]
     pub const fn with_radius_neighbours(self, radius_neighbours: u32) -> Self {
-        Self {
-            radius_neighbours,
-            ..self
-        }
+        Self { radius_neighbours, ..self }
     }
 
     /// The same options with this many points in a leaf.

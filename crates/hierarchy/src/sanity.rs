@@ -59,11 +59,7 @@ pub(crate) fn check_topology(nodes: &[Node], points: usize, leaf_size: u32) -> R
                 return bad(id);
             }
             if depth == 0 {
-                return if id + 1 == nodes.len() {
-                    Ok(())
-                } else {
-                    bad(id + 1)
-                };
+                return if id + 1 == nodes.len() { Ok(()) } else { bad(id + 1) };
             }
             depth -= 1;
             let (right, first, count) = open[depth];
@@ -110,7 +106,7 @@ impl PointHierarchy {
         }
         for (id, node) in self.nodes.iter().enumerate() {
             for i in node.points() {
-                if self.reaches[id] < self.radii[i] {
+                if self.boxes[id].reach < self.radii[i] {
                     return wrong("reach", id);
                 }
                 if !self.box_holds_disc(id, i) {
@@ -139,30 +135,13 @@ mod tests {
 
     fn tree() -> Vec<Node> {
         let node = |first, count, right| Node { first, count, right };
-        vec![
-            node(0, 40, 4),
-            node(0, 32, 3),
-            node(0, 16, 0),
-            node(16, 16, 0),
-            node(32, 8, 0),
-        ]
+        vec![node(0, 40, 4), node(0, 32, 3), node(0, 16, 0), node(16, 16, 0), node(32, 8, 0)]
     }
 
     #[test]
     fn a_tree_over_all_points_is_accepted() {
         assert_eq!(check_topology(&tree(), 40, 16), Ok(()));
-        assert_eq!(
-            check_topology(
-                &[Node {
-                    first: 0,
-                    count: 9,
-                    right: 0
-                }],
-                9,
-                16
-            ),
-            Ok(())
-        );
+        assert_eq!(check_topology(&[Node { first: 0, count: 9, right: 0 }], 9, 16), Ok(()));
     }
 
     #[test]

@@ -17,7 +17,6 @@ const KINDS: [u8; 4] = *b"KIND";
 const SOURCE: [u8; 4] = *b"SRCE";
 const NODES: [u8; 4] = *b"NODE";
 const BOXES: [u8; 4] = *b"BOXS";
-const REACHES: [u8; 4] = *b"REAC";
 const CONES: [u8; 4] = *b"CONE";
 
 /// What a hierarchy stores beside its arrays.
@@ -69,7 +68,6 @@ impl PointHierarchy {
         writer
             .section(NODES, 0, &self.nodes)?
             .section(BOXES, 0, &self.boxes)?
-            .section(REACHES, 0, &self.reaches)?
             .section(CONES, 0, &self.cones)?
             .section(POSITIONS, 0, &self.positions)?
             .section(NORMALS, 0, &self.normals)?
@@ -103,7 +101,6 @@ impl PointHierarchy {
             source: file.array(SOURCE, 0)?,
             nodes: file.array(NODES, 0)?,
             boxes: file.array(BOXES, 0)?,
-            reaches: file.array(REACHES, 0)?,
             cones: file.array(CONES, 0)?,
         };
         hierarchy.check_lengths()?;
@@ -122,18 +119,10 @@ impl PointHierarchy {
             ("kinds", self.kinds.len(), points),
             ("source", self.source.len(), points),
             ("boxes", self.boxes.len(), nodes),
-            ("reaches", self.reaches.len(), nodes),
             ("cones", self.cones.len(), leaves),
         ];
-        match expected
-            .into_iter()
-            .find(|(_, found, expected)| found != expected)
-        {
-            Some((array, found, expected)) => Err(Flaw::Length {
-                array,
-                found,
-                expected,
-            }),
+        match expected.into_iter().find(|(_, found, expected)| found != expected) {
+            Some((array, found, expected)) => Err(Flaw::Length { array, found, expected }),
             None => Ok(()),
         }
     }

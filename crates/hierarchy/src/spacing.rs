@@ -39,18 +39,12 @@ pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Vec<Spacing> {
     let spacing = |p: &[f32; 3]| {
         let near = nearest(&tree, p, neighbours);
         if near.len() < neighbours || !is_line(points, &near) {
-            return Spacing {
-                radius: near.last().map_or(0.0, |n| n.0.sqrt()),
-                is_line: false,
-            };
+            return Spacing { radius: near.last().map_or(0.0, |n| n.0.sqrt()), is_line: false };
         }
         let near = nearest(&tree, p, MOST_NEIGHBOURS);
         let grown = (neighbours..=near.len()).find(|&k| !is_line(points, &near[..=k.min(near.len() - 1)]));
         let last = grown.unwrap_or(near.len() - 1).min(near.len() - 1);
-        Spacing {
-            radius: near[last].0.sqrt(),
-            is_line: grown.is_none(),
-        }
+        Spacing { radius: near[last].0.sqrt(), is_line: grown.is_none() }
     };
     map(points, spacing)
 }
@@ -70,10 +64,7 @@ pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Se
 fn nearest(tree: &ImmutableKdTree<f32, 3>, p: &[f32; 3], count: usize) -> Vec<(f32, usize)> {
     let wanted = NonZero::new(count + 1).unwrap_or(NonZero::<usize>::MIN);
     let found = tree.query(p).nearest_n::<SquaredEuclidean<f32>>(wanted).execute();
-    found
-        .into_iter()
-        .map(|n| (n.distance, usize::try_from(n.item).unwrap_or_default()))
-        .collect()
+    found.into_iter().map(|n| (n.distance, usize::try_from(n.item).unwrap_or_default())).collect()
 }
 
 /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
@@ -82,35 +73,22 @@ fn is_line(points: &[[f32; 3]], near: &[(f32, usize)]) -> bool {
     let mut s = [0.0_f64; 9];
     for &(_, i) in near {
         let [x, y, z] = [0, 1, 2].map(|k| f64::from(points[i][k] - origin[k]));
-        for (sum, v) in s
-            .iter_mut()
-            .zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z])
-        {
+        for (sum, v) in s.iter_mut().zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]) {
             *sum += v;
         }
     }
     #[expect(clippy::cast_precision_loss, reason = "at most 33")]
     let n = near.len() as f64;
     let [x, y, z, xx, xy, xz, yy, yz, zz] = s.map(|sum| sum / n);
-    let [_, l2, l3] = symmetric_eigen([
-        xx - x * x,
-        xy - x * y,
-        xz - x * z,
-        yy - y * y,
-        yz - y * z,
-        zz - z * z,
-    ])
-    .values;
+    let [_, l2, l3] =
+        symmetric_eigen([xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]).values;
     l2 < LINE * l3
 }
 
 /// r_i := min_j (r_j + 0.3 ‖p_i − p_j‖) over all j, by branch and bound on the tree.
 pub(crate) fn smooth(points: &[[f32; 3]], radii: &[f32], nodes: &[Node], boxes: &[OrientedBox]) -> Vec<f32> {
-    let least = fold_nodes(
-        nodes,
-        |range| radii[range].iter().copied().fold(f32::INFINITY, f32::min),
-        f32::min,
-    );
+    let least =
+        fold_nodes(nodes, |range| radii[range].iter().copied().fold(f32::INFINITY, f32::min), f32::min);
     let ids: Vec<u32> = (0..id32(points.len())).collect();
     map(&ids, |&i| {
         let p = points[i as usize];

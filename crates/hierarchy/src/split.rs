@@ -33,13 +33,7 @@ pub(crate) fn split(items: &mut [Item], leaf_size: usize) -> (Vec<Node>, Vec<Ori
     let count = node_count(items.len(), leaf_size);
     let mut nodes = vec![Node::default(); count];
     let mut boxes = vec![OrientedBox::default(); count];
-    let place = Place {
-        items,
-        nodes: &mut nodes,
-        boxes: &mut boxes,
-        first: 0,
-        id: 0,
-    };
+    let place = Place { items, nodes: &mut nodes, boxes: &mut boxes, first: 0, id: 0 };
     place.split(leaf_size);
     (nodes, boxes)
 }
@@ -55,45 +49,25 @@ struct Place<'a> {
 
 impl Place<'_> {
     fn split(self, leaf_size: usize) {
-        let Place {
-            items,
-            nodes,
-            boxes,
-            first,
-            id,
-        } = self;
+        let Place { items, nodes, boxes, first, id } = self;
         let count = items.len();
         let axes = principal_axes(items);
         let (low, high) = extents(items, &axes);
-        boxes[0] = OrientedBox::spanned(axes, low, high);
+        boxes[0] = OrientedBox::spanned(axes, low, high, 0.0);
         if count <= leaf_size {
             items.sort_unstable_by_key(|item| item.index);
-            nodes[0] = Node {
-                first: id32(first),
-                count: id32(count),
-                right: 0,
-            };
+            nodes[0] = Node { first: id32(first), count: id32(count), right: 0 };
             return;
         }
         let left = left_count(count, leaf_size);
         let axis = best_axis(items, &boxes[0], left);
         partition(items, axis, left);
         let left_nodes = node_count(left, leaf_size);
-        nodes[0] = Node {
-            first: id32(first),
-            count: id32(count),
-            right: id32(id + 1 + left_nodes),
-        };
+        nodes[0] = Node { first: id32(first), count: id32(count), right: id32(id + 1 + left_nodes) };
         let (items_l, items_r) = items.split_at_mut(left);
         let (nodes_l, nodes_r) = nodes[1..].split_at_mut(left_nodes);
         let (boxes_l, boxes_r) = boxes[1..].split_at_mut(left_nodes);
-        let l = Place {
-            items: items_l,
-            nodes: nodes_l,
-            boxes: boxes_l,
-            first,
-            id: id + 1,
-        };
+        let l = Place { items: items_l, nodes: nodes_l, boxes: boxes_l, first, id: id + 1 };
         let r = Place {
             items: items_r,
             nodes: nodes_r,
@@ -126,10 +100,7 @@ fn principal_axes(items: &[Item]) -> [[f32; 3]; 3] {
     for chunk in items.chunks(LANES) {
         for (lane, item) in chunk.iter().enumerate() {
             let [x, y, z] = [0, 1, 2].map(|k| f64::from(item.position[k] - origin[k]));
-            for (sum, v) in sums
-                .iter_mut()
-                .zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z])
-            {
+            for (sum, v) in sums.iter_mut().zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]) {
                 sum[lane] += v;
             }
         }
@@ -137,14 +108,7 @@ fn principal_axes(items: &[Item]) -> [[f32; 3]; 3] {
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     let n = items.len() as f64;
     let [x, y, z, xx, xy, xz, yy, yz, zz] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
-    let eigen = symmetric_eigen([
-        xx - x * x,
-        xy - x * y,
-        xz - x * z,
-        yy - y * y,
-        yz - y * z,
-        zz - z * z,
-    ]);
+    let eigen = symmetric_eigen([xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]);
     // Longest first; reversing two of three keeps the frame right-handed up to a sign, mended by the third.
     let [short, middle, long] = eigen.vectors;
     to_axes([long, middle, short.map(|c| -c)])

@@ -90,22 +90,11 @@ pub(crate) fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, near: &mut N
     let at = near.evaluate(index.plan, x);
     let n = Vector3::from(at.normal);
     let mean = Vector3::from(at.centroid) - Vector3::from(x);
-    let aside = if at.bandwidth > 0.0 {
-        (mean - n * mean.dot(&n)).norm() / at.bandwidth
-    } else {
-        1.0
-    };
+    let aside = if at.bandwidth > 0.0 { (mean - n * mean.dot(&n)).norm() / at.bandwidth } else { 1.0 };
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-    let (inward, normal) = (
-        (aside / BORDER_OFFSET).min(1.0) as f32,
-        n.map(|c| c as f32).into(),
-    );
+    let (inward, normal) = ((aside / BORDER_OFFSET).min(1.0) as f32, n.map(|c| c as f32).into());
     let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * inward);
-    Surfel {
-        normal,
-        disc,
-        kind: kind(&at, spacing.is_line),
-    }
+    Surfel { normal, disc, kind: kind(&at, spacing.is_line) }
 }
 
 fn kind(at: &Evaluation, is_line: bool) -> PointKind {
@@ -129,9 +118,7 @@ pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
         }
     }
     let main = Vector3::from(symmetric_eigen(s).vectors[2]);
-    let largest = main
-        .iter()
-        .fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
+    let largest = main.iter().fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
     let axis: [f32; 3] = (main * largest.signum()).map(|c| c as f32).into();
     let mut cosine = 1.0_f32;
@@ -165,5 +152,5 @@ pub(crate) fn box_of_discs(
             high[k] = high[k].max(c + spread);
         }
     }
-    OrientedBox::spanned(about.axes, low, high)
+    OrientedBox::spanned(about.axes, low, high, about.reach)
 }

@@ -19,10 +19,7 @@ impl Deadline {
     pub fn within(time: Duration) -> Self {
         let now = Instant::now();
         // A time too long to represent is as good as a year.
-        Self(
-            now.checked_add(time)
-                .unwrap_or(now + Duration::from_secs(31_536_000)),
-        )
+        Self(now.checked_add(time).unwrap_or(now + Duration::from_secs(31_536_000)))
     }
 
     /// At this instant.
@@ -49,27 +46,18 @@ pub struct Budget {
 
 impl Budget {
     /// No limit.
-    pub const UNLIMITED: Self = Self {
-        work: None,
-        deadline: None,
-    };
+    pub const UNLIMITED: Self = Self { work: None, deadline: None };
 
     /// The same budget with this many work units.
     #[must_use]
     pub const fn with_work(self, units: u64) -> Self {
-        Self {
-            work: Some(units),
-            ..self
-        }
+        Self { work: Some(units), ..self }
     }
 
     /// The same budget until `deadline`.
     #[must_use]
     pub const fn with_deadline(self, deadline: Deadline) -> Self {
-        Self {
-            deadline: Some(deadline),
-            ..self
-        }
+        Self { deadline: Some(deadline), ..self }
     }
 }
 
@@ -84,11 +72,7 @@ pub(crate) struct Meter {
 
 impl Meter {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self {
-            budget: *budget,
-            next_look: 0,
-            spent: Statistics::default(),
-        }
+        Self { budget: *budget, next_look: 0, spent: Statistics::default() }
     }
 
     /// Whether anything is left.

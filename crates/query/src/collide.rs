@@ -48,18 +48,11 @@ pub fn collide_with(
         Ok(relative) => relative,
         Err(gap) => {
             meter.spent.node_pairs = 1;
-            return Answer {
-                verdict: separated(plan, gap - reach),
-                statistics: meter.spent,
-            };
+            return Answer { verdict: separated(plan, gap - reach), statistics: meter.spent };
         }
     };
-    let nodes = (a.scan().nodes(), b.scan().nodes());
-    let CollideScratch {
-        stack,
-        lanes,
-        gathers,
-    } = scratch;
+    let nodes = (a.slices().nodes, b.slices().nodes);
+    let CollideScratch { stack, lanes, gathers } = scratch;
     let (found, ended, doubt, apart, statistics) = match plan.options().semantics {
         Semantics::Surface => {
             let mut search = Surfaces::new([a, b], relative, plan.options().detail, meter, (lanes, gathers));
@@ -75,9 +68,7 @@ pub fn collide_with(
     };
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
-        _ if ended => Verdict::Undecided(Reason::Budget {
-            likelihood: likelihood(a, b, &relative, stack),
-        }),
+        _ if ended => Verdict::Undecided(Reason::Budget { likelihood: likelihood(a, b, &relative, stack) }),
         (None, Some(reason)) => Verdict::Undecided(reason),
         (None, None) => separated(plan, apart),
     };
@@ -87,14 +78,8 @@ pub fn collide_with(
 /// Apart, by a `gap` that is proven only where points are compared.
 fn separated(plan: &CollidePlan, gap: f64) -> Verdict {
     match plan.options().semantics {
-        Semantics::Surface => Verdict::Separated {
-            gap: 0.0,
-            evidence: Evidence::Estimated,
-        },
-        Semantics::Thickened(_) => Verdict::Separated {
-            gap: gap.max(0.0),
-            evidence: Evidence::Certified,
-        },
+        Semantics::Surface => Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
+        Semantics::Thickened(_) => Verdict::Separated { gap: gap.max(0.0), evidence: Evidence::Certified },
     }
 }
 
@@ -104,10 +89,7 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, reach: f64) -> Result<Relative, 
     let [(ca, ra), (cb, rb)] = [a, b].map(|view| {
         let root = &view.scan().boxes()[0];
         let centre = view.placed().apply(root.centre.map(f64::from));
-        (
-            Vector3::from(centre),
-            f64::from(root.radius()) * view.placed().scale(),
-        )
+        (Vector3::from(centre), f64::from(root.radius()) * view.placed().scale())
     });
     let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6);
     if gap > reach {
@@ -128,11 +110,7 @@ fn likelihood(a: &ScanView<'_>, b: &ScanView<'_>, relative: &Relative, stack: &S
         let size_a = a.scan().boxes()[pair.a.index()].radius();
         let size_b = b.scan().boxes()[pair.b.index()].radius() * relative.scale();
         let size = size_a.min(size_b);
-        if size > 0.0 {
-            1.0 - f64::from((depth / size).clamp(0.0, 1.0))
-        } else {
-            1.0
-        }
+        if size > 0.0 { 1.0 - f64::from((depth / size).clamp(0.0, 1.0)) } else { 1.0 }
     };
     1.0 - stack.open().take(16).map(miss).product::<f64>()
 }

@@ -7,12 +7,12 @@
 
 use std::ops::ControlFlow;
 
+use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, PointHierarchy, PointKind, Relative, Visitor};
+use nearmiss_hierarchy::{NodePair, OrientedBox, PointKind, Relative, Slices, Split, Visitor};
 use nearmiss_surface::meet;
 
 use crate::budget::Meter;
-use crate::collide::CollideScratch;
 use crate::crossing::{Disc, Lanes};
 use crate::options::Detail;
 use crate::verdict::{Contact, Evidence, Reason};
@@ -28,8 +28,8 @@ const NEARBY: f64 = 4.0;
 #[derive(Debug)]
 pub(crate) struct Surfaces<'a> {
     views: [&'a ScanView<'a>; 2],
-    a: &'a PointHierarchy,
-    b: &'a PointHierarchy,
+    a: Slices<'a>,
+    b: Slices<'a>,
     relative: Relative,
     detail: Detail,
     pub(crate) meter: Meter,
@@ -50,41 +50,29 @@ impl<'a> Surfaces<'a> {
         meter: Meter,
         scratch: (&'a mut Lanes, &'a mut [nearmiss_hierarchy::GatherScratch; 2]),
     ) -> Self {
-        let [a, b] = views.map(ScanView::scan);
+        let [a, b] = views.map(|view| *view.slices());
         let (lanes, gathers) = scratch;
-        Self {
-            views,
-            a,
-            b,
-            relative,
-            detail,
-            meter,
-            lanes,
-            gathers,
-            tries: 0,
-            found: None,
-            doubt: None,
-        }
+        Self { views, a, b, relative, detail, meter, lanes, gathers, tries: 0, found: None, doubt: None }
     }
 
     fn disc_a(&self, i: usize) -> Disc {
-        Disc {
-            centre: self.a.positions()[i],
-            normal: self.a.normals()[i],
-            radius: self.a.discs()[i],
-        }
+        Disc { centre: self.a.positions[i], normal: self.a.normals[i], radius: self.a.discs[i] }
     }
 
     fn disc_b(&self, j: usize) -> Disc {
         Disc {
-            centre: self.relative.point(self.b.positions()[j]),
-            normal: self.relative.direction(self.b.normals()[j]),
-            radius: self.b.discs()[j] * self.relative.scale(),
+            centre: self.relative.point(self.b.positions[j]),
+            normal: self.relative.direction(self.b.normals[j]),
+            radius: self.b.discs[j] * self.relative.scale(),
         }
     }
 
     /// Points `i` and `j` have crossing discs.
     fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
+        if let Some(reason) = self.doubt_about(i, j) {
+            self.doubt.get_or_insert(reason);
+            return ControlFlow::Continue(());
+        }
         let contact = self.estimate(i, j);
         if self.detail == Detail::Verdict {
             self.found = Some((contact, Evidence::Estimated));
@@ -100,10 +88,20 @@ impl<'a> Surfaces<'a> {
             None if self.found.is_none() => self.found = Some((contact, Evidence::Estimated)),
             None => {}
         }
-        if self.tries >= TRIES {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
+        if self.tries >= TRIES { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    /// Why a crossing of the discs of points `i` and `j` says little, if it does.
+    fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
+        match self.views[0].scan().kind(i).max(self.views[1].scan().kind(j)) {
+            PointKind::Surface | PointKind::Border => None,
+            PointKind::Line | PointKind::Isolated => Some(Reason::Undersampled),
+            // Within a sampling radius of each other the points themselves say enough.
+            _ => {
+                let d = Vector3::from(self.disc_a(i).centre) - Vector3::from(self.disc_b(j).centre);
+                let radius = self.a.radii[i].min(self.b.radii[j] * self.relative.scale());
+                (d.norm() > radius).then_some(Reason::Ambiguous)
+            }
         }
     }
 
@@ -111,8 +109,8 @@ impl<'a> Surfaces<'a> {
     fn estimate(&self, i: usize, j: usize) -> Contact {
         let [va, vb] = self.views;
         let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
-        let na = Vector3::from(va.placed().rotate(self.a.normals()[i].map(f64::from)));
-        let nb = Vector3::from(vb.placed().rotate(self.b.normals()[j].map(f64::from)));
+        let na = Vector3::from(va.placed().rotate(self.a.normals[i].map(f64::from)));
+        let nb = Vector3::from(vb.placed().rotate(self.b.normals[j].map(f64::from)));
         let middle = 0.5 * (pa + pb);
         let (fa, fb) = (na.dot(&(pa - middle)), nb.dot(&(pb - middle)));
         let c = na.dot(&nb);
@@ -127,7 +125,7 @@ impl<'a> Surfaces<'a> {
             point: (middle + step).into(),
             normals: Some([na.into(), nb.into()]),
             residual,
-            sources: [self.a.id(i), self.b.id(j)],
+            sources: [va.scan().id(i), vb.scan().id(j)],
         }
     }
 
@@ -135,12 +133,11 @@ impl<'a> Surfaces<'a> {
     fn refine(&mut self, contact: &Contact, i: usize) -> Option<Contact> {
         let [va, vb] = self.views;
         let [scratch_a, scratch_b] = &mut *self.gathers;
-        let meeting = meet(contact.point, |x| {
-            [va.evaluate_with(x, scratch_a), vb.evaluate_with(x, scratch_b)]
-        });
+        let meeting =
+            meet(contact.point, |x| [va.evaluate_with(x, scratch_a), vb.evaluate_with(x, scratch_b)]);
         self.meter.spent.evaluations += 2 * u64::from(meeting.rounds);
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
-        let nearby = NEARBY * f64::from(self.a.radii()[i]) * va.placed().scale();
+        let nearby = NEARBY * f64::from(self.a.radii[i]) * va.placed().scale();
         (meeting.verified && moved <= nearby).then(|| Contact {
             point: meeting.point,
             normals: Some(meeting.at.map(|e| e.normal)),
@@ -152,17 +149,18 @@ impl<'a> Surfaces<'a> {
 
 impl Visitor for Surfaces<'_> {
     #[inline]
-    fn admit(&mut self, pair: NodePair) -> Option<f32> {
-        self.meter.spent.node_pairs += 1;
-        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
-        let gap = self.relative.gap(a, b);
-        (gap <= self.relative.slack()).then_some(-gap)
+    fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
+        self.meter.spent.node_pairs += u64::from(count);
+        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
+        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
+        let [p, q, r, s] = self.relative.gaps(boxes_a, boxes_b);
+        let admit = |gap: f32| (gap <= self.relative.slack()).then_some(-gap);
+        [admit(p), admit(q), admit(r), admit(s)]
     }
 
     #[inline]
-    fn split_first(&self, pair: NodePair) -> bool {
-        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
-        a.half[0] >= b.half[0] * self.relative.scale()
+    fn split(&self, pair: NodePair) -> Split {
+        larger(&self.a.boxes[pair.a.index()], &self.b.boxes[pair.b.index()], self.relative.scale())
     }
 
     #[inline]
@@ -172,13 +170,13 @@ impl Visitor for Surfaces<'_> {
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
         self.meter.spent.leaf_pairs += 1;
-        let node_b = self.b.nodes()[pair.b.index()];
+        let node_b = self.b.nodes[pair.b.index()];
         for (lane, j) in node_b.points().enumerate() {
             let disc = self.disc_b(j);
             self.lanes.set(lane, &disc);
         }
         self.lanes.close(node_b.count as usize);
-        for i in self.a.nodes()[pair.a.index()].points() {
+        for i in self.a.nodes[pair.a.index()].points() {
             let mut bits = self.lanes.crossings(&self.disc_a(i));
             while bits != 0 {
                 let j = node_b.first as usize + bits.trailing_zeros() as usize;
@@ -187,5 +185,18 @@ impl Visitor for Surfaces<'_> {
             }
         }
         ControlFlow::Continue(())
+    }
+}
+
+/// Both nodes, unless one is more than twice as long as the other: then that one.
+#[inline]
+pub(crate) fn larger(a: &OrientedBox, b: &OrientedBox, scale: f32) -> Split {
+    let (a, b) = (a.half[0], b.half[0] * scale);
+    if a > 2.0 * b {
+        Split::First
+    } else if b > 2.0 * a {
+        Split::Second
+    } else {
+        Split::Both
     }
 }

@@ -2,10 +2,12 @@
 
 use std::ops::ControlFlow;
 
+use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, PointHierarchy, Relative, Visitor};
+use nearmiss_hierarchy::{NodePair, Relative, Slices, Split, Visitor};
 
 use crate::budget::Meter;
+use crate::surface::larger;
 use crate::verdict::Contact;
 use crate::view::ScanView;
 
@@ -13,8 +15,8 @@ use crate::view::ScanView;
 #[derive(Debug)]
 pub(crate) struct Balls<'a> {
     views: [&'a ScanView<'a>; 2],
-    a: &'a PointHierarchy,
-    b: &'a PointHierarchy,
+    a: Slices<'a>,
+    b: Slices<'a>,
     relative: Relative,
     /// 2R in the world, and a little more in a's stored frame.
     reach: f64,
@@ -28,42 +30,34 @@ pub(crate) struct Balls<'a> {
 
 impl<'a> Balls<'a> {
     pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, radius: f64, meter: Meter) -> Self {
-        let [a, b] = views.map(ScanView::scan);
+        let [a, b] = views.map(|view| *view.slices());
         let reach = 2.0 * radius;
         #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
         let reach_stored = (reach / views[0].placed().scale()) as f32 * (1.0 + 1e-6) + relative.slack();
-        Self {
-            views,
-            a,
-            b,
-            relative,
-            reach,
-            reach_stored,
-            meter,
-            found: None,
-            apart: f64::INFINITY,
-        }
+        Self { views, a, b, relative, reach, reach_stored, meter, found: None, apart: f64::INFINITY }
     }
 }
 
 impl Visitor for Balls<'_> {
     #[inline]
-    fn admit(&mut self, pair: NodePair) -> Option<f32> {
-        self.meter.spent.node_pairs += 1;
-        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
-        let gap = self.relative.gap(a, b);
-        if gap <= self.reach_stored {
-            return Some(-gap);
-        }
-        let bound = f64::from(gap - self.relative.slack()) * self.views[0].placed().scale();
-        self.apart = self.apart.min(bound);
-        None
+    fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
+        self.meter.spent.node_pairs += u64::from(count);
+        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
+        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
+        let gaps = self.relative.gaps(boxes_a, boxes_b);
+        gaps.map(|gap| {
+            if gap <= self.reach_stored {
+                return Some(-gap);
+            }
+            let bound = f64::from(gap - self.relative.slack()) * self.views[0].placed().scale();
+            self.apart = self.apart.min(bound);
+            None
+        })
     }
 
     #[inline]
-    fn split_first(&self, pair: NodePair) -> bool {
-        let (a, b) = (&self.a.boxes()[pair.a.index()], &self.b.boxes()[pair.b.index()]);
-        a.half[0] >= b.half[0] * self.relative.scale()
+    fn split(&self, pair: NodePair) -> Split {
+        larger(&self.a.boxes[pair.a.index()], &self.b.boxes[pair.b.index()], self.relative.scale())
     }
 
     #[inline]
@@ -74,9 +68,9 @@ impl Visitor for Balls<'_> {
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
         self.meter.spent.leaf_pairs += 1;
         let [va, vb] = self.views;
-        for i in self.a.nodes()[pair.a.index()].points() {
+        for i in self.a.nodes[pair.a.index()].points() {
             let p = Vector3::from(va.point(i));
-            for j in self.b.nodes()[pair.b.index()].points() {
+            for j in self.b.nodes[pair.b.index()].points() {
                 let q = Vector3::from(vb.point(j));
                 let distance = (p - q).norm();
                 self.apart = self.apart.min(distance);
@@ -85,7 +79,7 @@ impl Visitor for Balls<'_> {
                         point: (0.5 * (p + q)).into(),
                         normals: None,
                         residual: 0.5 * distance,
-                        sources: [self.a.id(i), self.b.id(j)],
+                        sources: [va.scan().id(i), vb.scan().id(j)],
                     });
                     return ControlFlow::Break(());
                 }

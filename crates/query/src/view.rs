@@ -1,13 +1,14 @@
 //! A prepared scan somewhere in the world.
 
 use nearmiss_geometry::Pose;
-use nearmiss_hierarchy::{GatherScratch, PointHierarchy};
+use nearmiss_hierarchy::{GatherScratch, PointHierarchy, Slices};
 use nearmiss_surface::Evaluation;
 
 /// A scan in a pose: what queries look at. Cheap to make, cheap to copy.
 #[derive(Debug, Clone, Copy)]
 pub struct ScanView<'a> {
     scan: &'a PointHierarchy,
+    slices: Slices<'a>,
     /// Stored frame → world.
     placed: Pose,
 }
@@ -18,19 +19,20 @@ impl<'a> ScanView<'a> {
     #[must_use]
     pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
         let frame = scan.frame();
-        let stored = Pose::IDENTITY
-            .with_scale(frame.scale)
-            .with_translation(frame.origin);
-        Self {
-            scan,
-            placed: pose.after(&stored),
-        }
+        let stored = Pose::IDENTITY.with_scale(frame.scale).with_translation(frame.origin);
+        Self { slices: scan.slices(), scan, placed: pose.after(&stored) }
     }
 
     /// The scan.
     #[must_use]
     pub fn scan(&self) -> &'a PointHierarchy {
         self.scan
+    }
+
+    /// Its points and nodes.
+    #[must_use]
+    pub fn slices(&self) -> &Slices<'a> {
+        &self.slices
     }
 
     /// The pose of the scan's stored frame.
@@ -45,7 +47,7 @@ impl<'a> ScanView<'a> {
     /// When there is no such point.
     #[must_use]
     pub fn point(&self, i: usize) -> [f64; 3] {
-        self.placed.apply(self.scan.positions()[i].map(f64::from))
+        self.placed.apply(self.slices.positions[i].map(f64::from))
     }
 
     /// The implicit function at `x`, all in the world.

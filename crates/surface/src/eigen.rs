@@ -24,15 +24,10 @@ const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 pub fn symmetric_eigen([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Eigen3 {
     /// Convergence is quadratic: six sweeps reduce any off-diagonal part below rounding.
     const SWEEPS: usize = 8;
-    let largest = [xx, xy, xz, yy, yz, zz]
-        .iter()
-        .fold(0.0_f64, |m, x| m.max(x.abs()));
+    let largest = [xx, xy, xz, yy, yz, zz].iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     if !(largest > 0.0 && largest.is_finite()) {
-        return Eigen3 {
-            values: [largest; 3],
-            vectors: v,
-        };
+        return Eigen3 { values: [largest; 3], vectors: v };
     }
     let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| row.map(|x| x / largest));
     for _ in 0..SWEEPS {
@@ -48,15 +43,8 @@ pub fn symmetric_eigen([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Eigen3 {
     order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
     let mut vectors = order.map(|i| v[i]);
     let [x, y, _] = vectors;
-    vectors[2] = [
-        x[1] * y[2] - x[2] * y[1],
-        x[2] * y[0] - x[0] * y[2],
-        x[0] * y[1] - x[1] * y[0],
-    ];
-    Eigen3 {
-        values: order.map(|i| a[i][i] * largest),
-        vectors,
-    }
+    vectors[2] = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+    Eigen3 { values: order.map(|i| a[i][i] * largest), vectors }
 }
 
 /// One Jacobi rotation that makes `a[p][q]` zero; `v` holds the eigenvectors in its rows.
@@ -123,10 +111,7 @@ mod tests {
         for m in cases {
             let e = symmetric_eigen(m);
             assert!(residual(m, &e) < 1e-14, "{m:?}: {e:?}");
-            assert!(
-                e.values[0] <= e.values[1] && e.values[1] <= e.values[2],
-                "ascending: {e:?}"
-            );
+            assert!(e.values[0] <= e.values[1] && e.values[1] <= e.values[2], "ascending: {e:?}");
         }
     }
 

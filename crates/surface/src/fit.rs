@@ -74,14 +74,7 @@ impl Neighbourhood {
         let mean = m.first.map(|s| s / m.weight);
         let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s / m.weight);
         let [ax, ay, az] = mean;
-        let covariance = [
-            xx - ax * ax,
-            xy - ax * ay,
-            xz - ax * az,
-            yy - ay * ay,
-            yz - ay * az,
-            zz - az * az,
-        ];
+        let covariance = [xx - ax * ax, xy - ax * ay, xz - ax * az, yy - ay * ay, yz - ay * az, zz - az * az];
         let eigen = symmetric_eigen(covariance);
         let normal = with_positive_largest(eigen.vectors[0]);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
@@ -96,15 +89,7 @@ impl Neighbourhood {
             Status::Ok
         };
         let centroid = [0, 1, 2].map(|k| x[k] + mean[k]);
-        Evaluation {
-            f,
-            normal,
-            centroid,
-            support,
-            bandwidth,
-            eigenvalues: eigen.values,
-            status,
-        }
+        Evaluation { f, normal, centroid, support, bandwidth, eigenvalues: eigen.values, status }
     }
 }
 
@@ -114,8 +99,6 @@ fn is_one_sheet([l1, l2, l3]: [f64; 3], h: f64) -> bool {
 
 /// `v` or −`v`: the one whose component of largest magnitude (the first of equals) is positive.
 pub(crate) fn with_positive_largest(v: [f64; 3]) -> [f64; 3] {
-    let largest = v
-        .iter()
-        .fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
+    let largest = v.iter().fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
     if largest < 0.0 { v.map(|x| -x) } else { v }
 }

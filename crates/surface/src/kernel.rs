@@ -47,10 +47,7 @@ impl Kernel {
 }
 
 #[inline]
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a constant that f32 holds closely enough"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a constant that f32 holds closely enough")]
 fn wendland(t: f32) -> f32 {
     const INVERSE: f32 = (1.0 / WENDLAND_REACH_SQ) as f32;
     let q = (t * INVERSE).sqrt();
@@ -62,7 +59,7 @@ fn wendland(t: f32) -> f32 {
 /// so that it vectorises. Beyond 80 the value at 80.
 #[inline]
 #[must_use]
-pub fn exp_neg(t: f32) -> f32 {
+pub(crate) fn exp_neg(t: f32) -> f32 {
     /// Adding this to a number below 2²² rounds it to an integer, which then stands in the low bits.
     const ROUND: f32 = 12_582_912.0;
     /// ln 2 in two parts, the first of which times an integer below 256 is exact.
@@ -126,10 +123,6 @@ mod tests {
         let end = Kernel::Wendland.reach_sq(0.1) as f32;
         assert!(Kernel::Wendland.weight(end) < 1e-20, "zero at the horizon");
         assert!(Kernel::Wendland.weight(2.0 * end) < 1e-20, "and beyond");
-        assert_eq!(
-            Kernel::Wendland.weight(0.0).to_bits(),
-            1.0_f32.to_bits(),
-            "one at the point"
-        );
+        assert_eq!(Kernel::Wendland.weight(0.0).to_bits(), 1.0_f32.to_bits(), "one at the point");
     }
 }

@@ -42,12 +42,7 @@ pub fn meet(start: [f64; 3], mut evaluate: impl FnMut([f64; 3]) -> [Evaluation; 
         let lost = at.iter().any(|e| e.status == Status::Outside);
         if on || lost || rounds == ROUNDS {
             let verified = on && at.iter().all(|e| e.status == Status::Ok);
-            return Meeting {
-                point,
-                at,
-                rounds,
-                verified,
-            };
+            return Meeting { point, at, rounds, verified };
         }
         point = (Vector3::from(point) + step(&at)).into();
         at = evaluate(point);
@@ -67,9 +62,5 @@ fn step(at: &[Evaluation; 2]) -> Vector3<f64> {
     };
     let most = 0.5 * a.bandwidth.min(b.bandwidth);
     let length = step.norm();
-    if length > most {
-        step * (most / length)
-    } else {
-        step
-    }
+    if length > most { step * (most / length) } else { step }
 }

@@ -1,6 +1,6 @@
 //! The points that f(x) needs, relative to x, and their weighted moments.
 
-use crate::SurfacePlan;
+use crate::{Kernel, SurfacePlan};
 
 /// Lanes of the sums: enough for one AVX register, two of SSE2 or NEON. Their order is fixed, so the sums are
 /// the same whatever the machine.
@@ -41,7 +41,8 @@ impl Centre {
     #[inline]
     #[must_use]
     pub fn offset(&self, p: [f32; 3]) -> [f32; 3] {
-        [0, 1, 2].map(|k| (p[k] - self.high[k]) - self.low[k])
+        let ([x, y, z], [lx, ly, lz]) = (self.high, self.low);
+        [(p[0] - x) - lx, (p[1] - y) - ly, (p[2] - z) - lz]
     }
 
     /// x in single precision.
@@ -108,22 +109,13 @@ impl Neighbourhood {
     pub(crate) fn moments(&mut self, plan: &SurfacePlan) -> Moments {
         let count = self.len();
         let padded = count.next_multiple_of(LANES);
-        let Self {
-            offsets: [x, y, z],
-            exponents,
-            bandwidths,
-        } = self;
+        let Self { offsets: [x, y, z], exponents, bandwidths } = self;
         for list in [&mut *x, &mut *y, &mut *z, &mut *bandwidths] {
             list.resize(padded, 0.0);
         }
         exponents.resize(padded, f32::MAX);
         let mut sums = [[0.0_f32; LANES]; 11];
-        let blocks = x
-            .as_chunks::<LANES>()
-            .0
-            .iter()
-            .zip(y.as_chunks().0)
-            .zip(z.as_chunks().0);
+        let blocks = x.as_chunks::<LANES>().0.iter().zip(y.as_chunks().0).zip(z.as_chunks().0);
         let weights = exponents.as_chunks().0.iter().zip(bandwidths.as_chunks().0);
         for (((x, y), z), (t, h)) in blocks.zip(weights) {
             add_block(&mut sums, [x, y, z], t, h, plan);
@@ -151,16 +143,14 @@ fn add_block(
     plan: &SurfacePlan,
 ) {
     let end = plan.reach_sq();
-    let w: [f32; LANES] = match plan.kernel() {
-        crate::Kernel::Gaussian => std::array::from_fn(|i| {
-            if t[i] <= end {
-                crate::Kernel::Gaussian.weight(t[i])
-            } else {
-                0.0
-            }
-        }),
-        kernel => std::array::from_fn(|i| if t[i] <= end { kernel.weight(t[i]) } else { 0.0 }),
-    };
+    let mut w = [0.0_f32; LANES];
+    match plan.kernel() {
+        Kernel::Gaussian => (0..LANES).for_each(|i| w[i] = Kernel::Gaussian.weight(t[i])),
+        kernel => (0..LANES).for_each(|i| w[i] = kernel.weight(t[i])),
+    }
+    for i in 0..LANES {
+        w[i] = if t[i] <= end { w[i] } else { 0.0 };
+    }
     for i in 0..LANES {
         let (wx, wy, wz) = (w[i] * x[i], w[i] * y[i], w[i] * z[i]);
         sums[0][i] += w[i];

@@ -115,13 +115,7 @@ impl SurfacePlan {
     /// # Errors
     /// Names the option that is out of range.
     pub fn new(options: &SurfaceOptions, sampling_radius: f64, unit: f64) -> Result<Self, SurfaceError> {
-        let SurfaceOptions {
-            bandwidth,
-            horizon,
-            threshold,
-            support_min,
-            ..
-        } = *options;
+        let SurfaceOptions { bandwidth, horizon, threshold, support_min, .. } = *options;
         if !(1.0..=16.0).contains(&horizon) {
             return Err(SurfaceError::Horizon(horizon));
         }
@@ -138,16 +132,9 @@ impl SurfacePlan {
             Bandwidth::Fixed(h) if h > 0.0 && h.is_finite() => (0.0, h * unit * reach_sq.sqrt()),
             Bandwidth::Fixed(h) => return Err(SurfaceError::Bandwidth(h)),
         };
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "neighbour sums are single precision"
-        )]
-        let plan = Self {
-            options: *options,
-            slope: slope as f32,
-            level: level as f32,
-            reach_sq: reach_sq as f32,
-        };
+        #[expect(clippy::cast_possible_truncation, reason = "neighbour sums are single precision")]
+        let plan =
+            Self { options: *options, slope: slope as f32, level: level as f32, reach_sq: reach_sq as f32 };
         Ok(plan)
     }
 
@@ -193,37 +180,22 @@ mod tests {
         let bad = |o: SurfaceOptions| SurfacePlan::new(&o, 1.0, 1.0).unwrap_err();
         let d = SurfaceOptions::default;
         assert_eq!(bad(d().with_horizon(0.5)), SurfaceError::Horizon(0.5));
-        assert!(matches!(
-            bad(d().with_horizon(f64::NAN)),
-            SurfaceError::Horizon(_)
-        ));
+        assert!(matches!(bad(d().with_horizon(f64::NAN)), SurfaceError::Horizon(_)));
         assert_eq!(bad(d().with_threshold(0.0)), SurfaceError::Threshold(0.0));
         assert_eq!(bad(d().with_support_min(2)), SurfaceError::Support(2));
-        assert_eq!(
-            bad(d().with_bandwidth(Bandwidth::Fixed(-1.0))),
-            SurfaceError::Bandwidth(-1.0)
-        );
+        assert_eq!(bad(d().with_bandwidth(Bandwidth::Fixed(-1.0))), SurfaceError::Bandwidth(-1.0));
     }
 
     #[test]
     fn bandwidths_follow_equation_nine() {
         let local = SurfacePlan::new(&SurfaceOptions::default(), 2.0, 1.0).unwrap();
         let h = 3.0 * 0.5 / (-(1e-4_f64).ln()).sqrt();
-        assert!(
-            (f64::from(local.bandwidth(0.5)) - h).abs() < 1e-6,
-            "local follows the point"
-        );
+        assert!((f64::from(local.bandwidth(0.5)) - h).abs() < 1e-6, "local follows the point");
         let global = SurfaceOptions::default().with_bandwidth(Bandwidth::Global);
         let global = SurfacePlan::new(&global, 2.0, 1.0).unwrap();
-        assert!(
-            (f64::from(global.bandwidth(0.5)) - 4.0 * h).abs() < 1e-6,
-            "global follows the scan"
-        );
+        assert!((f64::from(global.bandwidth(0.5)) - 4.0 * h).abs() < 1e-6, "global follows the scan");
         let fixed = SurfaceOptions::default().with_bandwidth(Bandwidth::Fixed(0.25));
         let fixed = SurfacePlan::new(&fixed, 2.0, 8.0).unwrap();
-        assert!(
-            (fixed.bandwidth(0.5) - 2.0).abs() < 1e-6,
-            "fixed is in the caller's units"
-        );
+        assert!((fixed.bandwidth(0.5) - 2.0).abs() < 1e-6, "fixed is in the caller's units");
     }
 }

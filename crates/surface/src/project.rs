@@ -33,12 +33,7 @@ pub fn project(start: [f64; 3], mut evaluate: impl FnMut([f64; 3]) -> Evaluation
     loop {
         let on = at.f.abs() <= ON_SURFACE * at.bandwidth;
         if on || at.status == Status::Outside || evaluations == STEPS {
-            return Projection {
-                point,
-                at,
-                evaluations,
-                converged: on && at.status == Status::Ok,
-            };
+            return Projection { point, at, evaluations, converged: on && at.status == Status::Ok };
         }
         let n = Vector3::from(at.normal);
         point = (x0 + n * (Vector3::from(at.centroid) - x0).dot(&n)).into();

@@ -1,0 +1,161 @@
+//! The hierarchy against naive twins: radii, the implicit function everywhere, and its invariants.
+
+use nearmiss_geometry::PointCloud;
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_surface::{Bandwidth, Kernel, Status, SurfaceOptions};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
+
+const KINDS: [CloudKind; 14] = [
+    CloudKind::Random,
+    CloudKind::Clustered,
+    CloudKind::Lattice,
+    CloudKind::Rings,
+    CloudKind::Collinear,
+    CloudKind::Coplanar,
+    CloudKind::OneVoxel,
+    CloudKind::EqualX,
+    CloudKind::FarClusters,
+    CloudKind::Duplicates,
+    CloudKind::Huge,
+    CloudKind::Tiny,
+    CloudKind::Outlier,
+    CloudKind::Sphere,
+];
+
+fn prepared(points: &[[f64; 3]], options: &BuildOptions) -> PointHierarchy {
+    PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), options).unwrap()
+}
+
+fn stored(scan: &PointHierarchy) -> Vec<[f64; 3]> {
+    scan.positions().iter().map(|p| p.map(f64::from)).collect()
+}
+
+#[test]
+fn invariants_hold_for_every_kind_of_cloud_and_size() {
+    for kind in KINDS {
+        for n in [8, 9, 16, 17, 33, 100, 1000] {
+            let points = arbitrary::cloud(kind, n, u64::from(n));
+            let Ok(cloud) = PointCloud::from_positions(&points) else { continue };
+            for leaf_size in [4, 16, 64] {
+                let options = BuildOptions::default().with_leaf_size(leaf_size);
+                let scan = PointHierarchy::build(&cloud, &options).unwrap();
+                assert_eq!(scan.sanity_check(), Ok(()), "{kind:?}, {n} points, leaves of {leaf_size}");
+                let mut source = scan.source().to_vec();
+                source.sort_unstable();
+                assert_eq!(source, cloud.source(), "{kind:?}: a permutation of the cloud");
+            }
+        }
+    }
+}
+
+#[test]
+fn radii_equal_the_twin() {
+    for kind in KINDS {
+        let scan = prepared(&arbitrary::cloud(kind, 700, 3), &BuildOptions::default());
+        let expected = oracle::radii(&stored(&scan));
+        let mut differ = 0;
+        for (found, expected) in scan.radii().iter().zip(&expected) {
+            differ += u32::from((f64::from(*found) / expected - 1.0).abs() > 1e-5);
+        }
+        // Which of several equally near neighbours counts is open; it matters where they are judged as a line.
+        let most = if matches!(kind, CloudKind::Lattice | CloudKind::Rings) { 20 } else { 0 };
+        assert!(differ <= most, "{kind:?}: {differ} of {} radii differ", expected.len());
+    }
+}
+
+/// Compares f with the twin at points near the stored ones; returns how many were ok on both sides.
+fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
+    let points = stored(scan);
+    let radii: Vec<f64> = scan.radii().iter().map(|&r| f64::from(r)).collect();
+    let twin = SurfaceTwin::with_radii(&points, &radii, parameters);
+    let mut rng = arbitrary::rng(seed);
+    let mut compared = 0;
+    for i in (0..points.len()).step_by(points.len() / 200 + 1) {
+        for reach in [0.0, 0.2, 1.0, 3.0, 6.0] {
+            let offset = arbitrary::point_in(&mut rng, reach * radii[i]);
+            let x = [0, 1, 2].map(|k| points[i][k] + offset[k]);
+            let found = scan.evaluate(x);
+            let Some(expected) = twin.evaluate(x) else {
+                assert_eq!(found.status, Status::Outside, "nothing reaches {x:?}");
+                continue;
+            };
+            // A point whose horizon ends just here may fall on either side of it.
+            if found.support as usize != expected.support {
+                assert!(found.support.abs_diff(u32::try_from(expected.support).unwrap()) <= 2, "support at {x:?}");
+                continue;
+            }
+            let ok = expected.status == oracle::Status::Ok;
+            let gap = expected.eigenvalues[1] - expected.eigenvalues[0];
+            if ok && gap > 0.05 * expected.bandwidth.powi(2) {
+                let error = (found.f.abs() - expected.value.abs()).abs() / expected.bandwidth;
+                assert!(error < 1e-5, "f at {x:?}: {} for {}, off by {error} h", found.f, expected.value);
+                let twisted = (0..3).map(|k| (found.normal[k] - expected.normal[k]).abs()).fold(0.0, f64::max);
+                assert!(twisted < 1e-4 || twisted > 0.5, "normal at {x:?}: {twisted}");
+                compared += usize::from(found.status == Status::Ok);
+            }
+        }
+    }
+    compared
+}
+
+#[test]
+fn the_implicit_function_equals_the_twin() {
+    let dragon = nearmiss_testdata::dragon::dragon_mesh(nearmiss_testdata::dragon::Dragon::Points5k).unwrap();
+    let clouds =
+        KINDS.map(|kind| arbitrary::cloud(kind, 900, 5)).into_iter().chain([dragon.vertices().to_vec()]);
+    let mut compared = 0;
+    for points in clouds {
+        for (kernel, twin_kernel) in [
+            (Kernel::Gaussian, oracle::Kernel::Gaussian { theta: 1e-4 }),
+            (Kernel::Wendland, oracle::Kernel::Wendland),
+        ] {
+            for (bandwidth, twin_bandwidth) in
+                [(Bandwidth::Local, oracle::Bandwidth::Local), (Bandwidth::Global, oracle::Bandwidth::Global)]
+            {
+                let surface = SurfaceOptions::default().with_kernel(kernel).with_bandwidth(bandwidth);
+                let scan = prepared(&points, &BuildOptions::default().with_surface(surface));
+                let parameters = Parameters {
+                    reach: surface.horizon,
+                    kernel: twin_kernel,
+                    bandwidth: twin_bandwidth,
+                    least_support: surface.support_min as usize,
+                };
+                compared += compare(&scan, parameters, 7);
+            }
+        }
+    }
+    assert!(compared > 4000, "only {compared} points were ok on both sides");
+}
+
+#[test]
+fn near_an_interior_sheet_the_function_is_ok() {
+    let points: Vec<[f64; 3]> =
+        (0..2500_i32).map(|i| [f64::from(i % 50), f64::from(i / 50), 0.0]).collect();
+    let scan = prepared(&points, &BuildOptions::default());
+    let mut rng = arbitrary::rng(1);
+    let mut ok = 0;
+    for _ in 0..1000 {
+        let [x, y, z] = arbitrary::point_in(&mut rng, 1.0);
+        let h = f64::from(scan.plan().bandwidth(1.414));
+        let at = scan.evaluate([25.0 + 15.0 * x, 25.0 + 15.0 * y, 0.2 * h * z]);
+        ok += u32::from(at.status == Status::Ok);
+        assert!((at.f.abs() - (0.2 * h * z).abs()).abs() < 1e-5 * h, "f is the height");
+    }
+    assert!(ok >= 950, "{ok} of 1000");
+}
+
+#[test]
+fn threads_and_order_of_work_do_not_matter() {
+    let points = arbitrary::cloud(CloudKind::Clustered, 30_000, 9);
+    let cloud = PointCloud::from_positions(&points).unwrap();
+    let build = |threads| PointHierarchy::build(&cloud, &BuildOptions::default().with_threads(threads)).unwrap();
+    let (one, two, five) = (build(1), build(2), build(5));
+    for other in [two, five] {
+        assert_eq!(one.positions(), other.positions(), "order");
+        assert_eq!(one.normals(), other.normals(), "normals");
+        assert_eq!(one.radii(), other.radii(), "radii");
+        assert_eq!(one.boxes(), other.boxes(), "boxes");
+        assert_eq!(one.meta(), other.meta(), "the rest");
+    }
+}

@@ -1,0 +1,57 @@
+//! Which columns of a table are coordinates, normals and colours; the same words in every format.
+
+use crate::error::Fault;
+
+/// Values of a row that can mean something to us: x y z, normal x y z, red green blue.
+pub(crate) type Row = [f64; 9];
+
+/// Which of a row's values a column holds, by its name in any case.
+pub(crate) fn slot(name: &[u8]) -> Option<usize> {
+    const NAMES: [&[&str]; 9] = [
+        &["x"],
+        &["y"],
+        &["z"],
+        &["nx", "normal_x"],
+        &["ny", "normal_y"],
+        &["nz", "normal_z"],
+        &["red", "r"],
+        &["green", "g"],
+        &["blue", "b"],
+    ];
+    NAMES.iter().position(|names| names.iter().any(|known| name.eq_ignore_ascii_case(known.as_bytes())))
+}
+
+/// What the rows of a table hold besides coordinates.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Holds {
+    pub(crate) normals: bool,
+    pub(crate) colours: bool,
+}
+
+impl Holds {
+    /// From the slots that the columns fill; coordinates must be among them, the others count in threes.
+    pub(crate) fn among(slots: impl Iterator<Item = usize>) -> Result<Self, Fault> {
+        let mut filled = [false; 9];
+        slots.for_each(|slot| filled[slot] = true);
+        for (there, what) in filled.iter().zip(["a coordinate x", "a coordinate y", "a coordinate z"]) {
+            if !there {
+                return Err(Fault::Undeclared { what });
+            }
+        }
+        Ok(Self { normals: filled[3..6] == [true; 3], colours: filled[6..] == [true; 3] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_and_colours_count_in_threes() {
+        let of = |names: &str| Holds::among(names.split(' ').filter_map(|n| slot(n.as_bytes())));
+        let both = Holds { normals: true, colours: true };
+        assert_eq!(of("X Y Z intensity nx ny nz Red Green Blue"), Ok(both));
+        assert_eq!(of("x y z nx ny red green"), Ok(Holds::default()));
+        assert_eq!(of("x z nx"), Err(Fault::Undeclared { what: "a coordinate y" }));
+    }
+}

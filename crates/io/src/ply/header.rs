@@ -1,0 +1,186 @@
+//! The header: what elements there are, in what order, of what properties.
+
+use crate::columns::slot;
+use crate::error::{Broken, Fault};
+use crate::scalar::{Order, Scalar};
+use crate::text::{Lines, number, shown, whole, words};
+
+pub(super) struct Header {
+    pub(super) encoding: Encoding,
+    pub(super) elements: Vec<Element>,
+    /// The last line.
+    line: u64,
+}
+
+#[derive(Clone, Copy)]
+pub(super) enum Encoding {
+    Ascii,
+    Binary(Order),
+}
+
+pub(super) struct Element {
+    pub(super) name: Box<str>,
+    pub(super) count: u64,
+    pub(super) properties: Vec<Property>,
+    pub(super) role: Role,
+    /// Where it is declared.
+    pub(super) line: u64,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Vertex,
+    /// A polygon; some files have faces without corners.
+    Face {
+        corners: bool,
+    },
+    /// Triangle strips, divided by -1.
+    Strips,
+    Other,
+}
+
+pub(super) struct Property {
+    pub(super) name: Box<str>,
+    /// Type of a list's length.
+    pub(super) list: Option<Scalar>,
+    pub(super) scalar: Scalar,
+    pub(super) part: Part,
+}
+
+/// What a property means to us.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    Slot(usize),
+    Corners,
+    Nothing,
+}
+
+/// The header, and the lines after it.
+pub(super) fn parse(bytes: &[u8]) -> Result<(Header, Lines<'_>), Broken> {
+    let mut lines = Lines::new(bytes);
+    let mut encoding = None;
+    let mut elements = Vec::new();
+    let first = lines.next().map(|line| line.text).unwrap_or_default();
+    if first.trim_ascii() != b"ply" {
+        if words(first).next().is_some_and(|word| number(word).is_some()) {
+            return Err(Fault::NoHeader.on_line(1));
+        }
+        return Err(expected("`ply`, with which PLY files start", first).on_line(1));
+    }
+    loop {
+        let Some(line) = lines.next() else {
+            let keyword = "end_header";
+            return Err(Fault::HeaderNeverEnds { keyword }.on_line(lines.number()));
+        };
+        let mut words = line.words();
+        let mut next = || words.next().unwrap_or_default();
+        match next() {
+            b"end_header" => break,
+            b"" | b"comment" | b"obj_info" => Ok(()),
+            b"format" => format(next()).map(|e| encoding = Some(e)),
+            b"element" => element(&mut elements, line.number, next(), next()),
+            b"property" => property(elements.last_mut(), next),
+            other => Err(expected("`element`, `property`, `comment` or `end_header`", other)),
+        }
+        .map_err(|fault| fault.on_line(line.number))?;
+    }
+    let line = lines.number();
+    let what = "its encoding, `format ascii 1.0` or one of the binary ones";
+    let encoding = encoding.ok_or_else(|| Fault::Undeclared { what }.on_line(line))?;
+    let header = Header { encoding, elements, line };
+    Ok((header, lines))
+}
+
+impl Header {
+    pub(super) fn vertices(&self) -> Result<&Element, Broken> {
+        let what = "an element `vertex`";
+        let undeclared = || Fault::Undeclared { what }.on_line(self.line);
+        let vertex = self.elements.iter().find(|e| e.role == Role::Vertex);
+        vertex.ok_or_else(undeclared)
+    }
+}
+
+impl Element {
+    /// Slots of a row that the properties fill.
+    pub(super) fn slots(&self) -> impl Iterator<Item = usize> {
+        self.properties.iter().filter_map(|p| match p.part {
+            Part::Slot(slot) => Some(slot),
+            _ => None,
+        })
+    }
+}
+
+fn expected(expected: &'static str, found: &[u8]) -> Fault {
+    let found = shown(found);
+    Fault::Expected { expected, found }
+}
+
+fn format(word: &[u8]) -> Result<Encoding, Fault> {
+    match word {
+        b"ascii" => Ok(Encoding::Ascii),
+        b"binary_little_endian" => Ok(Encoding::Binary(Order::Little)),
+        b"binary_big_endian" => Ok(Encoding::Binary(Order::Big)),
+        _ => Err(expected("`ascii`, `binary_little_endian` or `binary_big_endian`", word)),
+    }
+}
+
+fn element(elements: &mut Vec<Element>, line: u64, name: &[u8], count: &[u8]) -> Result<(), Fault> {
+    let role = match name {
+        b"vertex" => Role::Vertex,
+        b"face" => Role::Face { corners: false },
+        b"tristrips" => Role::Strips,
+        _ => Role::Other,
+    };
+    if role == Role::Vertex && elements.iter().any(|e| e.role == role) {
+        return Err(Fault::Repeated { name: shown(name) });
+    }
+    elements.push(Element {
+        name: shown(name),
+        count: whole(count).ok_or_else(|| expected("how many there are of the element", count))?,
+        properties: Vec::new(),
+        role,
+        line,
+    });
+    Ok(())
+}
+
+fn property<'a>(element: Option<&mut Element>, mut next: impl FnMut() -> &'a [u8]) -> Result<(), Fault> {
+    let kind = next();
+    let list = if kind == b"list" { Some(scalar(next())?) } else { None };
+    let scalar = scalar(if list.is_some() { next() } else { kind })?;
+    let name = next();
+    let element = element.ok_or_else(|| expected("`element` before its first property", b"property"))?;
+    let part = match (element.role, list, name) {
+        (Role::Vertex, None, name) => slot(name)
+            // Colours of other types are in no agreed range.
+            .filter(|&slot| slot < 6 || scalar == Scalar::U8)
+            .map_or(Part::Nothing, Part::Slot),
+        (Role::Face { .. } | Role::Strips, Some(_), b"vertex_indices" | b"vertex_index") => Part::Corners,
+        _ => Part::Nothing,
+    };
+    // At most ten properties get past the first test, so the second costs little.
+    if part != Part::Nothing && element.properties.iter().any(|p| p.part == part) {
+        return Err(Fault::Repeated { name: shown(name) });
+    }
+    if let (Role::Face { corners }, Part::Corners) = (&mut element.role, part) {
+        *corners = true;
+    }
+    element.properties.push(Property { name: shown(name), list, scalar, part });
+    Ok(())
+}
+
+fn scalar(word: &[u8]) -> Result<Scalar, Fault> {
+    Ok(match word {
+        b"char" | b"int8" => Scalar::I8,
+        b"uchar" | b"uint8" => Scalar::U8,
+        b"short" | b"int16" => Scalar::I16,
+        b"ushort" | b"uint16" => Scalar::U16,
+        b"int" | b"int32" => Scalar::I32,
+        b"uint" | b"uint32" => Scalar::U32,
+        b"float" | b"float32" => Scalar::F32,
+        b"double" | b"float64" => Scalar::F64,
+        _ => {
+            return Err(expected("the type of a property, such as `float` or `uint8`", word));
+        }
+    })
+}

@@ -1,0 +1,143 @@
+//! Lines, words and numbers of a text that may be anything.
+
+/// Lines of a text with their numbers. They end with LF, CR LF or, where the first one does, CR alone.
+#[derive(Clone)]
+pub(crate) struct Lines<'a> {
+    bytes: &'a [u8],
+    offset: usize,
+    number: u64,
+    end: u8,
+}
+
+/// A line without its end.
+#[derive(Clone, Copy)]
+pub(crate) struct Line<'a> {
+    /// Counted from 1.
+    pub(crate) number: u64,
+    pub(crate) text: &'a [u8],
+}
+
+impl<'a> Lines<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'));
+        let end = match first.map(|i| &bytes[i..]) {
+            Some([b'\r', b'\n', ..]) | None => b'\n',
+            Some([end, ..]) => *end,
+            Some([]) => b'\n',
+        };
+        Self { bytes, offset: 0, number: 0, end }
+    }
+
+    /// Where the next line starts.
+    pub(crate) fn offset(&self) -> usize {
+        self.offset
+    }
+
+    /// Bytes from the next line to the end.
+    pub(crate) fn left(&self) -> usize {
+        self.bytes.len() - self.offset
+    }
+
+    /// Number of the line returned last.
+    pub(crate) fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// The next line that is not blank.
+    pub(crate) fn next_filled(&mut self) -> Option<Line<'a>> {
+        self.find(|line| !line.text.trim_ascii().is_empty())
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = Line<'a>;
+
+    fn next(&mut self) -> Option<Line<'a>> {
+        let rest = self.bytes.get(self.offset..).filter(|rest| !rest.is_empty())?;
+        let end = self.end;
+        let length = rest.iter().position(|&b| b == end).unwrap_or(rest.len());
+        self.offset += (length + 1).min(rest.len());
+        self.number += 1;
+        let text = &rest[..length];
+        Some(Line { number: self.number, text: text.strip_suffix(b"\r").unwrap_or(text) })
+    }
+}
+
+impl<'a> Line<'a> {
+    /// What stands between white space.
+    pub(crate) fn words(&self) -> impl Iterator<Item = &'a [u8]> + use<'a> {
+        words(self.text)
+    }
+}
+
+/// What stands between white space.
+pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// The number that a word spells, NaN and infinity in all their spellings included.
+pub(crate) fn number(word: &[u8]) -> Option<f64> {
+    let parsed = std::str::from_utf8(word).ok()?.parse().ok();
+    parsed.or_else(|| is_not_finite(word).then_some(f64::NAN))
+}
+
+/// What C libraries print for numbers that are not finite, as in `-nan(ind)` and `1.#QNAN`.
+fn is_not_finite(word: &[u8]) -> bool {
+    let word = word.strip_prefix(b"-").unwrap_or(word);
+    let starts_with = |start: &[u8]| word.get(..start.len()).is_some_and(|w| w.eq_ignore_ascii_case(start));
+    starts_with(b"nan(") || starts_with(b"1.#")
+}
+
+/// The whole number that a word spells.
+pub(crate) fn whole<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+/// Longer words are cut in messages.
+const SHOWN: usize = 40;
+
+/// A piece of the file fit for a message: short, and without control characters.
+pub(crate) fn shown(piece: &[u8]) -> Box<str> {
+    let start = &piece[..piece.len().min(4 * SHOWN)];
+    let text = String::from_utf8_lossy(start.trim_ascii());
+    let mut shown: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
+    if text.chars().nth(SHOWN).is_some() {
+        shown.push('…');
+    }
+    shown.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_in_three_ways() {
+        for text in ["a\n\nb c\n", "a\r\n\r\nb c", "a\r\rb c\r"] {
+            let lines: Vec<_> = Lines::new(text.as_bytes()).map(|l| (l.number, l.text)).collect();
+            assert_eq!(lines, [(1, &b"a"[..]), (2, b""), (3, b"b c")], "{text:?}");
+        }
+        assert!(Lines::new(b"").next().is_none(), "no line in no text");
+    }
+
+    #[test]
+    fn numbers_are_spelled_in_many_ways() {
+        for (word, value) in [("-1.5e3", -1500.0), ("+2", 2.0), (".5", 0.5), ("7.", 7.0)] {
+            assert_eq!(number(word.as_bytes()), Some(value), "{word}");
+        }
+        for word in ["nan", "-NaN", "-nan(ind)", "1.#QNAN", "-1.#IND00", "nan(0x8)"] {
+            assert!(number(word.as_bytes()).is_some_and(f64::is_nan), "{word}");
+        }
+        assert_eq!(number(b"-inf"), Some(f64::NEG_INFINITY), "infinity is a number");
+        for word in ["", "x", "1,5", "0x10", "1.2.3", "--1", "nano"] {
+            assert_eq!(number(word.as_bytes()), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn what_is_shown_is_short_and_printable() {
+        assert_eq!(&*shown(b" a\x1b[31mb "), "a\\u{1b}[31mb");
+        assert_eq!(shown(&[b'x'; 1000]).chars().count(), SHOWN + 1, "cut with an ellipsis");
+        assert_eq!(&*shown("Größe".as_bytes()), "Größe");
+    }
+}

@@ -1,0 +1,132 @@
+//! Points as lines of text: XYZ, CSV and their kin.
+//!
+//! The first line of values decides how all are divided: by semicolons if it has any, else by commas, else by
+//! white space. A line of column names may come before it, and a count of the points before that. Without
+//! names the first three columns are x, y and z. `#` and `//` start lines that say nothing.
+
+use crate::columns::{Holds, Row, slot};
+use crate::error::{Broken, Fault};
+use crate::sink::Sink;
+use crate::text::{Line, Lines, number, shown, whole};
+
+/// The content of a text file.
+pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
+    let mut lines = Lines::new(bytes);
+    let count = lines.clone().find(has_values).and_then(|line| {
+        let points: u64 = whole(line.text.trim_ascii())?;
+        lines.find(has_values);
+        Some((points, line.number))
+    });
+    let Some(first) = lines.clone().find(has_values) else {
+        return match count {
+            Some((promised, line)) if promised > 0 => Err(short(promised, 0, line)),
+            _ => Ok(Sink::default()),
+        };
+    };
+    let table = Table::from_first(first).map_err(|fault| fault.on_line(first.number))?;
+    if table.named {
+        lines.find(has_values);
+    }
+    let mut sink = Sink::new(table.holds, 0);
+    let mut row = Row::default();
+    let mut index = 0;
+    for line in lines.filter(has_values) {
+        if count.is_some_and(|(promised, _)| index >= promised) {
+            return Err(Fault::Surplus.on_line(line.number));
+        }
+        table.read(line, &mut row).map_err(|fault| fault.on_line(line.number).within("point", index))?;
+        sink.row(&row);
+        index += 1;
+    }
+    match count {
+        Some((promised, line)) if index < promised => Err(short(promised, index, line)),
+        _ => Ok(sink),
+    }
+}
+
+fn has_values(line: &Line<'_>) -> bool {
+    let text = line.text.trim_ascii_start();
+    !text.is_empty() && !text.starts_with(b"#") && !text.starts_with(b"//")
+}
+
+fn short(promised: u64, present: u64, line: u64) -> Broken {
+    let element = "point".into();
+    let fault = Fault::Promised { element, promised, present };
+    fault.on_line(line)
+}
+
+/// How the lines are divided, and what their columns are.
+struct Table {
+    divider: Option<u8>,
+    /// Up to the last column of use.
+    columns: Vec<Option<usize>>,
+    holds: Holds,
+    /// Whether the first line holds names, not values.
+    named: bool,
+}
+
+impl Table {
+    fn from_first(line: Line<'_>) -> Result<Self, Fault> {
+        let divider = [b';', b','].into_iter().find(|d| line.text.contains(d));
+        let mut table =
+            Self { divider, columns: [0, 1, 2].map(Some).into(), holds: Holds::default(), named: false };
+        let starts_with_number = table.values(line).next().is_some_and(|v| number(v).is_some());
+        if starts_with_number {
+            return Ok(table);
+        }
+        table.named = true;
+        table.columns = table.values(line).map(slot).collect();
+        table.holds =
+            Holds::among(table.columns.iter().copied().flatten()).map_err(|_less_clear| Fault::Expected {
+                expected: "three numbers (with decimal points), or names of columns with x, y and z among them",
+                found: shown(line.text),
+            })?;
+        for slot in 0..Row::default().len() {
+            if table.columns.iter().filter(|c| **c == Some(slot)).count() > 1 {
+                let name = name_of(slot).into();
+                return Err(Fault::Repeated { name });
+            }
+        }
+        let used = table.columns.iter().rposition(Option::is_some).map_or(0, |i| i + 1);
+        table.columns.truncate(used);
+        Ok(table)
+    }
+
+    /// The columns of a line, without the white space and quotes around them.
+    fn values<'a>(&self, line: Line<'a>) -> impl Iterator<Item = &'a [u8]> + use<'a> {
+        let divider = self.divider;
+        let is_divider = move |b: &u8| match divider {
+            Some(divider) => *b == divider,
+            None => b.is_ascii_whitespace(),
+        };
+        line.text.split(is_divider).filter(move |value| divider.is_some() || !value.is_empty()).map(unquoted)
+    }
+
+    fn read(&self, line: Line<'_>, row: &mut Row) -> Result<(), Fault> {
+        let mut values = self.values(line);
+        let mut columns = self.columns.iter();
+        while let Some(column) = columns.next() {
+            let Some(value) = values.next() else {
+                let missing = column.or_else(|| columns.find_map(|c| *c));
+                let column = name_of(missing.unwrap_or_default()).into();
+                return Err(Fault::ShortLine { column });
+            };
+            if let Some(slot) = *column {
+                row[slot] = number(value)
+                    .ok_or_else(|| Fault::NotANumber { column: name_of(slot).into(), found: shown(value) })?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unquoted(value: &[u8]) -> &[u8] {
+    match value.trim_ascii() {
+        [b'"', inner @ .., b'"'] => inner.trim_ascii(),
+        value => value,
+    }
+}
+
+fn name_of(slot: usize) -> &'static str {
+    ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"][slot]
+}

@@ -1,0 +1,147 @@
+//! Whatever happens to a file, a reader gives a model or an error, and never more points than there is space for.
+
+use std::path::Path;
+
+use nearmiss_io::{Format, Model, ReadError, read_bytes, read_mesh_bytes};
+use proptest::prelude::*;
+
+use crate::samples;
+
+fn check(bytes: &[u8], format: Option<Format>, name: &str) {
+    let check = |answer: Result<Model, ReadError>| match answer {
+        Ok(model) => {
+            let given =
+                model.cloud.len() + model.cloud.dropped().duplicate + model.cloud.dropped().not_finite;
+            // The least that a point can take: three bytes, and compression makes at most 88 out of one.
+            assert!(given * 3 <= bytes.len() * 88, "{name}: {given} points");
+            let source = model.cloud.source();
+            assert!(source.iter().all(|&i| (i as usize) < given), "{name}");
+            if let Some(mesh) = model.mesh {
+                assert_eq!(mesh.vertices().len(), given, "{name}");
+            }
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.starts_with(name), "{message}");
+            assert!(message.len() < 400, "{message}");
+            assert!(!message.chars().any(char::is_control), "{message:?}");
+        }
+    };
+    check(read_bytes(bytes, format, Path::new(name)));
+    let _mesh_or_error = read_mesh_bytes(bytes, format, Path::new(name));
+}
+
+fn any_sample() -> impl Strategy<Value = (&'static str, Vec<u8>)> {
+    proptest::sample::select(samples::all())
+}
+
+fn any_format() -> impl Strategy<Value = Option<Format>> {
+    proptest::sample::select(vec![
+        None,
+        Some(Format::Ply),
+        Some(Format::Pcd),
+        Some(Format::Xyz),
+        Some(Format::Obj),
+    ])
+}
+
+/// Bytes that readers look for.
+const TELLING: &[u8] = b"0123456789-+.eE \n\r\t#/,;\\\"xyzfvn\0\xff\x80";
+
+fn any_byte() -> impl Strategy<Value = u8> {
+    prop_oneof![any::<u8>(), proptest::sample::select(TELLING)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn changed_bytes(
+        (name, mut bytes) in any_sample(),
+        changes in proptest::collection::vec((any::<proptest::sample::Index>(), any_byte()), 1..12),
+    ) {
+        for (index, byte) in changes {
+            let at = index.index(bytes.len());
+            bytes[at] = byte;
+        }
+        check(&bytes, None, name);
+    }
+
+    #[test]
+    fn changed_headers(
+        (name, mut bytes) in any_sample(),
+        changes in proptest::collection::vec((0_usize..500, any_byte()), 1..4),
+    ) {
+        for (at, byte) in changes {
+            let at = at % bytes.len();
+            bytes[at] = byte;
+        }
+        check(&bytes, None, name);
+    }
+
+    #[test]
+    fn lines_left_out_doubled_or_exchanged(
+        (name, bytes) in any_sample(),
+        a in any::<proptest::sample::Index>(),
+        b in any::<proptest::sample::Index>(),
+        what in 0..3,
+    ) {
+        let mut lines: Vec<&[u8]> = bytes.split_inclusive(|&b| b == b'\n').collect();
+        let (a, b) = (a.index(lines.len()), b.index(lines.len()));
+        match what {
+            0 => drop(lines.remove(a)),
+            1 => lines.insert(b, lines[a]),
+            _ => lines.swap(a, b),
+        }
+        check(&lines.concat(), None, name);
+    }
+
+    #[test]
+    fn numbers_replaced(
+        (name, bytes) in any_sample(),
+        which in any::<proptest::sample::Index>(),
+        number in proptest::sample::select(vec![
+            "0", "-1", "1e999", "nan", "18446744073709551615", "18446744073709551616", "4294967296",
+            "9223372036854775807", "-9223372036854775808", "99999999999999999999999", "1.5", "x", "",
+        ]),
+    ) {
+        let digits: Vec<usize> = (0..bytes.len())
+            .filter(|&i| bytes[i].is_ascii_digit() && (i == 0 || !bytes[i - 1].is_ascii_digit()))
+            .collect();
+        let start = digits[which.index(digits.len())];
+        let length = bytes[start..].iter().take_while(|b| b.is_ascii_digit()).count();
+        let mut changed = bytes;
+        changed.splice(start..start + length, number.bytes());
+        check(&changed, None, name);
+    }
+
+    #[test]
+    fn read_as_another_format((name, bytes) in any_sample(), format in any_format()) {
+        check(&bytes, format, name);
+    }
+
+    #[test]
+    fn noise(bytes in proptest::collection::vec(any_byte(), 1..200), format in any_format()) {
+        check(&bytes, format, "noise");
+    }
+}
+
+#[test]
+fn cut_off_anywhere() {
+    let mut refused = 0;
+    for (name, bytes) in samples::all() {
+        check(&bytes, None, name);
+        for end in 0..bytes.len() {
+            check(&bytes[..end], None, name);
+            refused += usize::from(read_bytes(&bytes[..end], None, Path::new(name)).is_err());
+        }
+        // Formats with counts notice every cut but that of the last line's end, or within the last number.
+        if name.ends_with("ply") || name.ends_with("pcd") {
+            for end in 0..bytes.len() - 11 {
+                let cut = read_bytes(&bytes[..end], None, Path::new(name));
+                assert!(cut.is_err(), "{name} cut after {end} of {} bytes", bytes.len());
+            }
+        }
+    }
+    assert!(refused > 5000, "only {refused} cuts were noticed");
+}

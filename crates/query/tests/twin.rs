@@ -1,0 +1,185 @@
+//! Queries against brute force: every pair of discs, every pair of points.
+
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
+use nearmiss_query::{
+    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, Reason, ScanView, Semantics, Verdict, collide,
+};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+use nearmiss_testdata::oracle;
+
+fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
+    let leaf = BuildOptions::default().with_leaf_size(8);
+    PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &leaf).unwrap()
+}
+
+fn ask(a: &ScanView<'_>, b: &ScanView<'_>, options: CollideOptions, budget: &Budget) -> Answer {
+    let plan = CollidePlan::new(&options, a.scan(), b.scan()).unwrap();
+    collide(a, b, &plan, budget)
+}
+
+const SHAPES: [CloudKind; 8] = [
+    CloudKind::Random,
+    CloudKind::Clustered,
+    CloudKind::Lattice,
+    CloudKind::Rings,
+    CloudKind::Coplanar,
+    CloudKind::Sphere,
+    CloudKind::Outlier,
+    CloudKind::Huge,
+];
+
+/// The greatest slack of any two trusted discs in the world, in shares of their radii, and whether any doubtful
+/// ones cross.
+fn best_crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> (f64, bool) {
+    let discs = |view: &ScanView<'_>| -> Vec<(oracle::Disc, bool)> {
+        let scan = view.scan();
+        (0..scan.len())
+            .map(|i| {
+                let disc = oracle::Disc {
+                    centre: view.point(i),
+                    normal: view.placed().rotate(scan.normals()[i].map(f64::from)),
+                    radius: f64::from(scan.discs()[i]) * view.placed().scale(),
+                };
+                (disc, matches!(scan.kind(i), PointKind::Surface | PointKind::Border))
+            })
+            .collect()
+    };
+    let (discs_a, discs_b) = (discs(a), discs(b));
+    let mut best = f64::NEG_INFINITY;
+    let mut doubtful = false;
+    for (p, trusted_p) in &discs_a {
+        for (q, trusted_q) in &discs_b {
+            let crossing = oracle::crossing(p, q);
+            if *trusted_p && *trusted_q {
+                best = best.max(crossing.slack / p.radius.min(q.radius));
+            } else {
+                doubtful |= crossing.crosses;
+            }
+        }
+    }
+    (best, doubtful)
+}
+
+#[test]
+fn surfaces_meet_where_some_discs_cross() {
+    let mut rng = arbitrary::rng(11);
+    let (mut hits, mut misses) = (0, 0);
+    for (n, kind) in (0_u64..).zip(SHAPES.iter().cycle().take(48)) {
+        let a = prepared(&arbitrary::cloud(*kind, 250, n));
+        let b = prepared(&arbitrary::cloud(*kind, 200, n + 100));
+        let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        for _ in 0..4 {
+            let spread = arbitrary::point_in(&mut rng, 2.2 * size);
+            let pose = arbitrary::rotation(&mut rng).with_translation(spread);
+            let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
+            let (slack, doubtful) = best_crossing(&va, &vb);
+            let options = CollideOptions::default().with_detail(Detail::Verdict);
+            let verdict = ask(&va, &vb, options, &Budget::UNLIMITED).verdict;
+            // Rounding, and the thickness of nearly parallel discs, decide in between.
+            if slack > 1e-3 {
+                assert!(verdict.is_intersecting(), "{kind:?} {n}: slack {slack}, but {verdict:?}");
+                hits += 1;
+            } else if slack < -0.2 && !doubtful {
+                assert!(!verdict.is_intersecting(), "{kind:?} {n}: slack {slack}, but {verdict:?}");
+                misses += 1;
+            }
+        }
+    }
+    assert!(hits > 20 && misses > 40, "{hits} hits, {misses} misses");
+}
+
+#[test]
+fn thickened_equals_brute_force() {
+    let mut rng = arbitrary::rng(12);
+    let mut seen = [0, 0];
+    for (n, kind) in (0_u64..).zip(SHAPES.iter().cycle().take(32)) {
+        let (points_a, points_b) = (arbitrary::cloud(*kind, 250, n), arbitrary::cloud(*kind, 200, n + 100));
+        let (a, b) = (prepared(&points_a), prepared(&points_b));
+        let stored = |scan: &PointHierarchy| -> Vec<[f64; 3]> {
+            scan.positions().iter().map(|&p| scan.frame().to_world(p)).collect()
+        };
+        let (points_a, points_b) = (stored(&a), stored(&b));
+        let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        for round in 0..6 {
+            let scale = [1.0, 0.5, 3.0][round % 3];
+            let pose_b = arbitrary::rotation(&mut rng)
+                .with_translation(arbitrary::point_in(&mut rng, 3.0 * size))
+                .with_scale(scale);
+            let pose_a = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.1 * size));
+            let nearest = oracle::least_distance(&points_a, &pose_a, &points_b, &pose_b).unwrap();
+            let (va, vb) = (ScanView::new(&a, &pose_a), ScanView::new(&b, &pose_b));
+            for factor in [0.0, 0.3, 0.499_999, 0.500_001, 0.7, 5.0] {
+                let radius = factor * nearest.distance;
+                let options = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
+                let expected = oracle::touches(nearest.distance, radius, 0.0);
+                match ask(&va, &vb, options, &Budget::UNLIMITED).verdict {
+                    Verdict::Intersecting { contact, evidence: Evidence::Certified } => {
+                        assert!(expected, "{kind:?} {n}: {radius} for {}", nearest.distance);
+                        assert!(2.0 * contact.residual <= 2.0 * radius * (1.0 + 1e-12), "the pair found touches");
+                    }
+                    Verdict::Separated { gap, evidence: Evidence::Certified } => {
+                        assert!(!expected, "{kind:?} {n}: {radius} for {}", nearest.distance);
+                        assert!(
+                            gap <= nearest.distance - 2.0 * radius + 1e-12 * nearest.distance,
+                            "a lower bound: {gap}"
+                        );
+                    }
+                    other => panic!("undecided without a budget: {other:?}"),
+                }
+                seen[usize::from(expected)] += 1;
+            }
+        }
+    }
+    assert!(seen.iter().all(|&n| n > 300), "both verdicts: {seen:?}");
+}
+
+#[test]
+fn a_witness_lies_on_both_surfaces() {
+    let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
+    let mut rng = arbitrary::rng(3);
+    let size = sphere.bounds().half_extents()[0];
+    let mut certified = 0;
+    for _ in 0..40 {
+        let direction = arbitrary::unit_vector(&mut rng);
+        let shift = direction.map(|x| 1.2 * size * x);
+        let pose = arbitrary::rotation(&mut rng).with_translation(shift);
+        let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+        let answer = ask(&a, &b, CollideOptions::default(), &Budget::UNLIMITED);
+        let Verdict::Intersecting { contact, evidence } = answer.verdict else { panic!("spheres meet") };
+        if evidence == Evidence::Certified {
+            certified += 1;
+            for view in [&a, &b] {
+                let at = view.evaluate_with(contact.point, &mut nearmiss_hierarchy::GatherScratch::default());
+                assert!(at.f.abs() <= 1e-6 * at.bandwidth, "on the surface: {}", at.f / at.bandwidth);
+            }
+            assert!(answer.statistics.evaluations >= 2, "evaluations are counted");
+        }
+    }
+    assert!(certified >= 36, "{certified} of 40 certified");
+}
+
+#[test]
+fn a_work_budget_is_kept_and_reproducible() {
+    let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
+    let size = sphere.bounds().half_extents()[0];
+    let pose = Pose::from_translation([1.9 * size, 0.2 * size, 0.1 * size]);
+    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+    let unlimited = ask(&a, &b, CollideOptions::default(), &Budget::UNLIMITED);
+    for work in [0, 1, 10, 50, 1_000_000] {
+        let budget = Budget::default().with_work(work);
+        let answer = ask(&a, &b, CollideOptions::default(), &budget);
+        assert_eq!(answer, ask(&a, &b, CollideOptions::default(), &budget), "the same twice");
+        let spent = answer.statistics.evaluations + answer.statistics.node_pairs;
+        match answer.verdict {
+            Verdict::Undecided(Reason::Budget { likelihood }) => {
+                assert!((0.0..=1.0).contains(&likelihood), "a probability: {likelihood}");
+                assert!(spent <= work + 4, "{spent} units for {work}");
+            }
+            verdict => assert_eq!(verdict, unlimited.verdict, "what an unlimited query says"),
+        }
+    }
+    let past = nearmiss_query::Deadline::within(std::time::Duration::ZERO);
+    let late = ask(&a, &b, CollideOptions::default(), &Budget::default().with_deadline(past));
+    assert!(matches!(late.verdict, Verdict::Undecided(Reason::Budget { .. })), "{late:?}");
+}

@@ -1,0 +1,11 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+pub mod oracle;
+
+pub mod shapes;
+
+pub mod pairs;
+
+pub mod arbitrary;
+pub mod dragon;

@@ -1,0 +1,20 @@
+//! Naive twins in double precision, written from the formulas alone: every point against every point.
+//!
+//! They share no code with the libraries they judge. Everything is O(n) per evaluation and O(n²) per cloud,
+//! which is fine up to some ten thousand points.
+
+mod disc;
+mod eigen;
+mod radii;
+mod surface;
+mod thickened;
+
+pub(crate) use radii::count;
+
+pub use disc::{Crossing, Disc, crossing};
+pub use eigen::{Eigen, symmetric_eigen};
+pub use radii::{
+    GREATEST_RANK, LINE_RATIO, RANK, SLOPE, looks_like_a_line, quantile, radii, smoothed, spacing,
+};
+pub use surface::{BORDER, Bandwidth, Evaluation, GAP, Kernel, Parameters, Status, SurfaceTwin, THIN};
+pub use thickened::{Nearest, least_distance, nearest, touches};

@@ -1,0 +1,156 @@
+//! The spacing of every point: how far its neighbours are, made smooth.
+//!
+//! Raw: the distance to the K-th nearest other point, K = 6. While the point and its K nearest look like a
+//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 32. Smooth:
+//! `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::eigen::symmetric_eigen;
+
+/// K: how many neighbours spacing reaches over.
+pub const RANK: usize = 6;
+
+/// How far K may grow where neighbours look like a line.
+pub const GREATEST_RANK: usize = 32;
+
+/// Points look like a line when λ2 is less than this share of λ3.
+pub const LINE_RATIO: f64 = 0.05;
+
+/// How fast smoothed spacing may grow, per unit of distance.
+pub const SLOPE: f64 = 0.3;
+
+/// The smoothed spacing of every point: [`smoothed`] of [`spacing`]. In the unit of `points`.
+#[must_use]
+pub fn radii(points: &[[f64; 3]]) -> Vec<f64> {
+    smoothed(points, &spacing(points))
+}
+
+/// The raw spacing of every point, in the unit of `points`.
+///
+/// Other points at the very same place are not counted, and of several at one place only the first; among
+/// equally far neighbours the one of lower index is the nearer. Where fewer than K others exist, the farthest
+/// counts; without any the spacing is zero.
+#[must_use]
+pub fn spacing(points: &[[f64; 3]]) -> Vec<f64> {
+    (0..points.len()).map(|i| spacing_of(points, i)).collect()
+}
+
+fn spacing_of(points: &[[f64; 3]], i: usize) -> f64 {
+    let mut others: Vec<(f64, usize)> =
+        (0..points.len()).map(|j| (distance(points[i], points[j]), j)).filter(|&(d, _)| d > 0.0).collect();
+    others.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut group = vec![points[i]];
+    let mut reach = 0.0;
+    for (d, j) in others {
+        if group.contains(&points[j]) {
+            continue;
+        }
+        group.push(points[j]);
+        reach = d;
+        let k = group.len() - 1;
+        if k >= GREATEST_RANK || (k >= RANK && !looks_like_a_line(&group)) {
+            break;
+        }
+    }
+    reach
+}
+
+/// Whether the covariance of `group` about its mean has λ2 < 0.05 λ3.
+#[must_use]
+pub fn looks_like_a_line(group: &[[f64; 3]]) -> bool {
+    let sum: Vector3<f64> = group.iter().map(|&p| Vector3::from(p)).sum();
+    let n = count(group.len());
+    let mean = sum / n;
+    let mut covariance = Matrix3::zeros();
+    for &p in group {
+        let d = Vector3::from(p) - mean;
+        covariance += d * d.transpose() / n;
+    }
+    let [_, middle, greatest] = symmetric_eigen(&covariance).values;
+    middle < LINE_RATIO * greatest
+}
+
+/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over all j, of the values given.
+///
+/// # Panics
+/// When there is not one value for each point.
+#[must_use]
+pub fn smoothed(points: &[[f64; 3]], raw: &[f64]) -> Vec<f64> {
+    assert_eq!(points.len(), raw.len(), "one value for each point");
+    let least = |p: &[f64; 3]| {
+        let all = points.iter().zip(raw);
+        all.map(|(q, r)| r + SLOPE * distance(*p, *q)).fold(f64::INFINITY, f64::min)
+    };
+    points.iter().map(least).collect()
+}
+
+/// The least of `values` that at least a share `q` of them does not exceed; `q` in (0, 1].
+///
+/// # Panics
+/// When there is no value.
+#[must_use]
+pub fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and the number of values"
+    )]
+    let rank = (q * count(sorted.len())).ceil().max(1.0) as usize;
+    sorted[rank - 1]
+}
+
+/// A number of points as a factor.
+#[expect(clippy::cast_precision_loss, reason = "far below 2^53 points")]
+pub(crate) fn count(n: usize) -> f64 {
+    n as f64
+}
+
+pub(super) fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
+    (Vector3::from(p) - Vector3::from(q)).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_lattice_has_spacing_root_two() {
+        let points: Vec<_> = (0..121).map(|i| [f64::from(i % 11), f64::from(i / 11), 0.0]).collect();
+        let raw = spacing(&points);
+        assert!((raw[60] - 2.0_f64.sqrt()).abs() < 1e-15, "middle: {}", raw[60]);
+        assert!((raw[0] - 5.0_f64.sqrt()).abs() < 1e-15, "corner: {}", raw[0]);
+    }
+
+    #[test]
+    fn a_line_reaches_for_the_next_ring() {
+        // Two rings of a scanner: steps of 0.1 along, 1.2 across.
+        let ring = |y: f64| (0..41).map(move |i| [0.1 * f64::from(i), y, 0.0]);
+        let points: Vec<_> = ring(0.0).chain(ring(1.2)).collect();
+        let raw = spacing(&points);
+        assert!((raw[20] - 1.2).abs() < 1e-12, "one point of the other ring ends the growth: {}", raw[20]);
+        let single: Vec<_> = ring(0.0).collect();
+        assert!((spacing(&single)[0] - 3.2).abs() < 1e-12, "K stops at 32");
+    }
+
+    #[test]
+    fn duplicates_change_nothing() {
+        let points: Vec<_> = (0..64).map(|i| [f64::from(i % 8), f64::from(i / 8), 0.0]).collect();
+        let mut twice = points.clone();
+        twice.extend(&points);
+        assert_eq!(spacing(&twice)[..64], spacing(&points));
+    }
+
+    #[test]
+    fn a_lone_point_takes_its_neighbours_spacing() {
+        let mut points: Vec<_> = (0..64).map(|i| [f64::from(i % 8), f64::from(i / 8), 0.0]).collect();
+        points.push([3.5, 3.5, 10.0]);
+        let raw = spacing(&points);
+        let smooth = smoothed(&points, &raw);
+        assert!(raw[64] > 10.0 && smooth[64] < 5.0, "{} to {}", raw[64], smooth[64]);
+        assert!((quantile(&[3.0, 1.0, 2.0], 0.5) - 2.0).abs() < 1e-15);
+        assert!((quantile(&[3.0, 1.0, 2.0], 1.0) - 3.0).abs() < 1e-15);
+    }
+}
