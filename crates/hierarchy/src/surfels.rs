@@ -1,9 +1,9 @@
 //! Tangent discs ("surfels"): what each point says of the surface to first order.
 //!
 //! A point's normal is that of the weighted least-squares fit at the point itself. Its disc is as wide as it
-//! must be for the discs of neighbours to close the surface, and no wider: at a border, where the weighted
-//! mean lies to one side, it shrinks, so that the discs do not reach beyond the samples by more than half a
-//! sampling radius.
+//! must be for the discs of neighbours to close the surface, and narrower at a border, which shows as a wide
+//! sector of the tangent plane without a neighbour: the discs of two scans whose borders face each other a
+//! sampling radius apart must not meet.
 
 use bytemuck::{Pod, Zeroable};
 use nearmiss_geometry::nalgebra::Vector3;
@@ -19,11 +19,18 @@ use crate::topology::Node;
 /// lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
 const DISC: f32 = 0.65;
 
-/// Disc radius over local sampling radius at a border.
-const DISC_AT_BORDER: f32 = 0.4;
+/// Disc radius over local sampling radius at a border. Local radii grow there, to some 1.3 times those inside,
+/// and two discs must not bridge a sampling radius.
+const DISC_AT_BORDER: f32 = 0.35;
 
-/// ‖a(p) − p‖ over h along the surface for a point on a straight border: 1/√π.
-const BORDER_OFFSET: f64 = 0.564;
+/// Sectors into which the tangent plane is divided, of about 15 degrees.
+const SECTORS: u32 = 24;
+
+/// So many empty sectors side by side occur in the interior, even of random samples.
+const INTERIOR_GAP: u32 = 6;
+
+/// So many mean a border: 135 degrees. A straight one leaves 180, a right-angled notch 90.
+const BORDER_GAP: u32 = 9;
 
 /// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
 const LINE: f64 = 0.05;
@@ -89,12 +96,52 @@ pub(crate) fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, near: &mut N
     index.gather(x, near);
     let at = near.evaluate(index.plan, x);
     let n = Vector3::from(at.normal);
-    let mean = Vector3::from(at.centroid) - Vector3::from(x);
-    let aside = if at.bandwidth > 0.0 { (mean - n * mean.dot(&n)).norm() / at.bandwidth } else { 1.0 };
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-    let (inward, normal) = ((aside / BORDER_OFFSET).min(1.0) as f32, n.map(|c| c as f32).into());
-    let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * inward);
+    let normal = n.map(|c| c as f32).into();
+    let gap = widest_gap(near, normal).clamp(INTERIOR_GAP, BORDER_GAP) - INTERIOR_GAP;
+    #[expect(clippy::cast_precision_loss, reason = "a small number")]
+    let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
+    let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * border);
     Surfel { normal, disc, kind: kind(&at, spacing.is_line) }
+}
+
+/// The greatest number of neighbouring sectors of the tangent plane in which no point lies.
+fn widest_gap(near: &Neighbourhood, normal: [f32; 3]) -> u32 {
+    let (u, v) = tangents(normal);
+    let mut taken = 0_u64;
+    for offset in near.offsets() {
+        let (x, y) = (dot(offset, u), dot(offset, v));
+        let length = x.abs() + y.abs();
+        if length > 0.0 {
+            // The angle of the diamond |x| + |y| = 1, 0 to 4: a quarter turn each 1, without trigonometry.
+            let quarter = if y >= 0.0 { 1.0 - x / length } else { 3.0 + x / length };
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                clippy::cast_precision_loss,
+                reason = "0 to 24"
+            )]
+            let sector = (quarter * (SECTORS as f32 / 4.0)) as u32;
+            taken |= 1 << (sector % SECTORS);
+        }
+    }
+    // Twice round, so that a run across the start counts whole.
+    let round = taken | taken << SECTORS;
+    let (mut widest, mut run) = (0, 0);
+    for sector in 0..2 * SECTORS {
+        run = if round >> sector & 1 == 0 { run + 1 } else { 0 };
+        widest = widest.max(run);
+    }
+    widest.min(SECTORS)
+}
+
+/// Two unit vectors that complete `normal` to a right-handed frame (Duff et al., "Building an orthonormal
+/// basis, revisited", JCGT 6(1), 2017).
+fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+    let sign = 1.0_f32.copysign(z);
+    let a = -1.0 / (sign + z);
+    let b = x * y * a;
+    ([1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y])
 }
 
 fn kind(at: &Evaluation, is_line: bool) -> PointKind {

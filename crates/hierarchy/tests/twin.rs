@@ -82,7 +82,10 @@ fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
             };
             // A point whose horizon ends just here may fall on either side of it.
             if found.support as usize != expected.support {
-                assert!(found.support.abs_diff(u32::try_from(expected.support).unwrap()) <= 2, "support at {x:?}");
+                assert!(
+                    found.support.abs_diff(u32::try_from(expected.support).unwrap()) <= 2,
+                    "support at {x:?}"
+                );
                 continue;
             }
             let ok = expected.status == oracle::Status::Ok;
@@ -90,7 +93,8 @@ fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
             if ok && gap > 0.05 * expected.bandwidth.powi(2) {
                 let error = (found.f.abs() - expected.value.abs()).abs() / expected.bandwidth;
                 assert!(error < 1e-5, "f at {x:?}: {} for {}, off by {error} h", found.f, expected.value);
-                let twisted = (0..3).map(|k| (found.normal[k] - expected.normal[k]).abs()).fold(0.0, f64::max);
+                let twisted =
+                    (0..3).map(|k| (found.normal[k] - expected.normal[k]).abs()).fold(0.0, f64::max);
                 assert!(twisted < 1e-4 || twisted > 0.5, "normal at {x:?}: {twisted}");
                 compared += usize::from(found.status == Status::Ok);
             }
@@ -130,8 +134,7 @@ fn the_implicit_function_equals_the_twin() {
 
 #[test]
 fn near_an_interior_sheet_the_function_is_ok() {
-    let points: Vec<[f64; 3]> =
-        (0..2500_i32).map(|i| [f64::from(i % 50), f64::from(i / 50), 0.0]).collect();
+    let points: Vec<[f64; 3]> = (0..2500_i32).map(|i| [f64::from(i % 50), f64::from(i / 50), 0.0]).collect();
     let scan = prepared(&points, &BuildOptions::default());
     let mut rng = arbitrary::rng(1);
     let mut ok = 0;
@@ -149,7 +152,8 @@ fn near_an_interior_sheet_the_function_is_ok() {
 fn threads_and_order_of_work_do_not_matter() {
     let points = arbitrary::cloud(CloudKind::Clustered, 30_000, 9);
     let cloud = PointCloud::from_positions(&points).unwrap();
-    let build = |threads| PointHierarchy::build(&cloud, &BuildOptions::default().with_threads(threads)).unwrap();
+    let build =
+        |threads| PointHierarchy::build(&cloud, &BuildOptions::default().with_threads(threads)).unwrap();
     let (one, two, five) = (build(1), build(2), build(5));
     for other in [two, five] {
         assert_eq!(one.positions(), other.positions(), "order");

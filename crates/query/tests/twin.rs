@@ -3,7 +3,8 @@
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_query::{
-    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, Reason, ScanView, Semantics, Verdict, collide,
+    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, Reason, ScanView, Semantics, Verdict,
+    collide,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle;
@@ -106,7 +107,8 @@ fn thickened_equals_brute_force() {
             let pose_b = arbitrary::rotation(&mut rng)
                 .with_translation(arbitrary::point_in(&mut rng, 3.0 * size))
                 .with_scale(scale);
-            let pose_a = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.1 * size));
+            let pose_a =
+                arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.1 * size));
             let nearest = oracle::least_distance(&points_a, &pose_a, &points_b, &pose_b).unwrap();
             let (va, vb) = (ScanView::new(&a, &pose_a), ScanView::new(&b, &pose_b));
             for factor in [0.0, 0.3, 0.499_999, 0.500_001, 0.7, 5.0] {
@@ -116,7 +118,10 @@ fn thickened_equals_brute_force() {
                 match ask(&va, &vb, options, &Budget::UNLIMITED).verdict {
                     Verdict::Intersecting { contact, evidence: Evidence::Certified } => {
                         assert!(expected, "{kind:?} {n}: {radius} for {}", nearest.distance);
-                        assert!(2.0 * contact.residual <= 2.0 * radius * (1.0 + 1e-12), "the pair found touches");
+                        assert!(
+                            2.0 * contact.residual <= 2.0 * radius * (1.0 + 1e-12),
+                            "the pair found touches"
+                        );
                     }
                     Verdict::Separated { gap, evidence: Evidence::Certified } => {
                         assert!(!expected, "{kind:?} {n}: {radius} for {}", nearest.distance);

@@ -105,6 +105,12 @@ impl Neighbourhood {
         self.exponents.is_empty()
     }
 
+    /// The points relative to x.
+    pub fn offsets(&self) -> impl Iterator<Item = [f32; 3]> {
+        let [x, y, z] = &self.offsets;
+        x.iter().zip(y).zip(z).map(|((x, y), z)| [*x, *y, *z])
+    }
+
     /// The weighted sums, with the weights of `kernel`. The last lanes are filled with points of no weight.
     pub(crate) fn moments(&mut self, plan: &SurfacePlan) -> Moments {
         let count = self.len();
