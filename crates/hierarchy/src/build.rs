@@ -9,7 +9,7 @@ use crate::gather::{GatherScratch, Index};
 use crate::options::{BuildError, BuildOptions};
 use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
 use crate::split::{Item, id32, split};
-use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, surfel};
+use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, leaf_surfels};
 use crate::topology::Node;
 
 /// Share of the points whose local radius is at most the scan's sampling radius.
@@ -309,7 +309,9 @@ fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<Sur
     let fit = |&start: &usize| -> Vec<Surfel> {
         let mut scratch = GatherScratch::default();
         let end = spacings.len().min(start + task);
-        (start..end).map(|i| surfel(index, i, spacings[i], &mut scratch.near)).collect()
+        let leaves = (start..end).step_by(leaf_size);
+        let leaf = |first: usize| first..end.min(first + leaf_size);
+        leaves.flat_map(|first| leaf_surfels(index, leaf(first), spacings, &mut scratch)).collect()
     };
     #[cfg(feature = "rayon")]
     {

@@ -2,7 +2,7 @@
 
 use nearmiss_surface::{Centre, Neighbourhood, SurfacePlan};
 
-use crate::boxes::OrientedBox;
+use crate::boxes::{OrientedBox, dot, sub};
 use crate::split::id32;
 use crate::topology::Node;
 
@@ -13,6 +13,41 @@ pub(crate) const TREE_STACK: usize = 64;
 #[derive(Debug, Clone, Default)]
 pub struct GatherScratch {
     pub(crate) near: Neighbourhood,
+    /// Points that may reach some point of a ball, in canonical order.
+    candidates: Vec<([f32; 3], f32)>,
+}
+
+impl GatherScratch {
+    /// Keeps the points whose horizon may reach the ball of `radius` about `centre`.
+    pub(crate) fn collect(&mut self, index: &Index<'_>, centre: [f32; 3], radius: f32) {
+        let Self { candidates, .. } = self;
+        candidates.clear();
+        let within = |d_sq: f32, reach: f32| {
+            let far = (index.plan.horizon(reach) + radius) * (1.0 + 1e-5);
+            d_sq < far * far
+        };
+        index.descend(
+            |id| within(index.boxes[id].distance_sq(centre), index.boxes[id].reach),
+            |node| {
+                for i in node.points() {
+                    let d = sub(index.positions[i], centre);
+                    if within(dot(d, d), index.radii[i]) {
+                        candidates.push((index.positions[i], index.radii[i]));
+                    }
+                }
+            },
+        );
+    }
+
+    /// As [`Index::gather`], from the points collected about a ball in which `x` lies.
+    pub(crate) fn gather_collected(&mut self, plan: &SurfacePlan, x: [f64; 3]) {
+        let Self { near, candidates } = self;
+        near.clear();
+        let centre = Centre::new(x);
+        for &(p, radius) in &*candidates {
+            near.offer(plan, &centre, p, radius);
+        }
+    }
 }
 
 /// What a descent to neighbours reads.

@@ -80,8 +80,14 @@ fn is_line(points: &[[f32; 3]], near: &[(f32, usize)]) -> bool {
     #[expect(clippy::cast_precision_loss, reason = "at most 33")]
     let n = near.len() as f64;
     let [x, y, z, xx, xy, xz, yy, yz, zz] = s.map(|sum| sum / n);
-    let [_, l2, l3] =
-        symmetric_eigen([xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]).values;
+    let c = [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z];
+    // For a line λ1λ2 + λ3(λ1 + λ2) < (0.05² + 2·0.05) λ3²; most neighbourhoods are far from that, and the sum
+    // of the principal minors says so without a solve.
+    let minors = c[0] * c[3] - c[1] * c[1] + c[0] * c[5] - c[2] * c[2] + c[3] * c[5] - c[4] * c[4];
+    if minors > (LINE * LINE + 2.0 * LINE) * (c[0] + c[3] + c[5]).powi(2) * (1.0 + 1e-9) {
+        return false;
+    }
+    let [_, l2, l3] = symmetric_eigen(c).values;
     l2 < LINE * l3
 }
 

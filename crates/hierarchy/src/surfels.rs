@@ -10,8 +10,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Evaluation, Neighbourhood, Status, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
-use crate::boxes::{OrientedBox, dot};
-use crate::gather::Index;
+use crate::boxes::{OrientedBox, dot, sub};
+use crate::gather::{GatherScratch, Index};
 use crate::spacing::Spacing;
 use crate::topology::Node;
 
@@ -90,10 +90,28 @@ pub(crate) struct Surfel {
     pub(crate) kind: PointKind,
 }
 
-/// The disc of point `i`.
-pub(crate) fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, near: &mut Neighbourhood) -> Surfel {
+/// The discs of the points of one leaf, numbered `points`.
+pub(crate) fn leaf_surfels(
+    index: &Index<'_>,
+    points: std::ops::Range<usize>,
+    spacings: &[Spacing],
+    scratch: &mut GatherScratch,
+) -> Vec<Surfel> {
+    let places = &index.positions[points.clone()];
+    #[expect(clippy::cast_precision_loss, reason = "a leaf has at most 64 points")]
+    let share = 1.0 / places.len() as f32;
+    let sum = places.iter().fold([0.0; 3], |s, p| [s[0] + p[0], s[1] + p[1], s[2] + p[2]]);
+    let centre = sum.map(|c| c * share);
+    let radius_sq = places.iter().map(|p| sub(*p, centre)).map(|d| dot(d, d)).fold(0.0, f32::max);
+    scratch.collect(index, centre, radius_sq.sqrt());
+    points.map(|i| surfel(index, i, spacings[i], scratch)).collect()
+}
+
+/// The disc of point `i`, about whose leaf `scratch` has collected points.
+fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, scratch: &mut GatherScratch) -> Surfel {
     let x = index.positions[i].map(f64::from);
-    index.gather(x, near);
+    scratch.gather_collected(index.plan, x);
+    let near = &scratch.near;
     let at = near.evaluate(index.plan, x);
     let n = Vector3::from(at.normal);
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]

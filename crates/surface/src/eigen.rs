@@ -13,6 +13,9 @@ pub struct Eigen3 {
     pub vectors: [[f64; 3]; 3],
 }
 
+/// An off-diagonal entry this small, of a matrix whose largest entry is 1, is rounding.
+const NEGLIGIBLE: f64 = 1e-16;
+
 /// The index pairs of the three off-diagonal entries.
 const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
@@ -32,7 +35,7 @@ pub fn symmetric_eigen([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Eigen3 {
     let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]].map(|row| row.map(|x| x / largest));
     for _ in 0..SWEEPS {
         let off = PAIRS.iter().map(|&(p, q)| a[p][q].abs()).fold(0.0, f64::max);
-        if off < 1e-17 {
+        if off < NEGLIGIBLE {
             break;
         }
         for (p, q) in PAIRS {
@@ -50,7 +53,7 @@ pub fn symmetric_eigen([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Eigen3 {
 /// One Jacobi rotation that makes `a[p][q]` zero; `v` holds the eigenvectors in its rows.
 fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     let off = a[p][q];
-    if off.abs() < 1e-300 {
+    if off.abs() < NEGLIGIBLE {
         return;
     }
     let theta = (a[q][q] - a[p][p]) / (2.0 * off);

@@ -53,22 +53,30 @@ impl Centre {
     }
 }
 
+/// Points side by side: what is filled in is added up, the rest has no weight.
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    offset: [[f32; LANES]; 3],
+    /// d²/h².
+    exponent: [f32; LANES],
+    bandwidth: [f32; LANES],
+}
+
+const EMPTY: Block =
+    Block { offset: [[0.0; LANES]; 3], exponent: [f32::MAX; LANES], bandwidth: [0.0; LANES] };
+
 /// The points in whose horizon x lies, as offsets from x with d²/h² and h. Reused: no allocation once warm.
 #[derive(Debug, Clone, Default)]
 pub struct Neighbourhood {
-    offsets: [Vec<f32>; 3],
-    exponents: Vec<f32>,
-    bandwidths: Vec<f32>,
+    blocks: Vec<Block>,
+    count: usize,
 }
 
 impl Neighbourhood {
     /// Forgets all points.
     pub fn clear(&mut self) {
-        for axis in &mut self.offsets {
-            axis.clear();
-        }
-        self.exponents.clear();
-        self.bandwidths.clear();
+        self.blocks.clear();
+        self.count = 0;
     }
 
     /// Adds point `p` of local sampling radius `radius` if its horizon reaches `x`.
@@ -86,48 +94,46 @@ impl Neighbourhood {
     /// Adds a point at `offset` from x, with its d²/h² and its h.
     #[inline]
     pub fn push(&mut self, offset: [f32; 3], exponent: f32, bandwidth: f32) {
-        for k in 0..3 {
-            self.offsets[k].push(offset[k]);
+        let lane = self.count % LANES;
+        if lane == 0 {
+            self.blocks.push(EMPTY);
         }
-        self.exponents.push(exponent);
-        self.bandwidths.push(bandwidth);
+        if let Some(block) = self.blocks.last_mut() {
+            for k in 0..3 {
+                block.offset[k][lane] = offset[k];
+            }
+            block.exponent[lane] = exponent;
+            block.bandwidth[lane] = bandwidth;
+            self.count += 1;
+        }
     }
 
     /// How many points there are.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.exponents.len()
+        self.count
     }
 
     /// Whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.exponents.is_empty()
+        self.count == 0
     }
 
     /// The points relative to x.
     pub fn offsets(&self) -> impl Iterator<Item = [f32; 3]> {
-        let [x, y, z] = &self.offsets;
-        x.iter().zip(y).zip(z).map(|((x, y), z)| [*x, *y, *z])
+        let lane = |i: usize| {
+            let [x, y, z] = &self.blocks[i / LANES].offset;
+            [x[i % LANES], y[i % LANES], z[i % LANES]]
+        };
+        (0..self.count).map(lane)
     }
 
-    /// The weighted sums, with the weights of `kernel`. The last lanes are filled with points of no weight.
-    pub(crate) fn moments(&mut self, plan: &SurfacePlan) -> Moments {
-        let count = self.len();
-        let padded = count.next_multiple_of(LANES);
-        let Self { offsets: [x, y, z], exponents, bandwidths } = self;
-        for list in [&mut *x, &mut *y, &mut *z, &mut *bandwidths] {
-            list.resize(padded, 0.0);
-        }
-        exponents.resize(padded, f32::MAX);
+    /// The weighted sums, with the weights of the plan's kernel.
+    pub(crate) fn moments(&self, plan: &SurfacePlan) -> Moments {
         let mut sums = [[0.0_f32; LANES]; 11];
-        let blocks = x.as_chunks::<LANES>().0.iter().zip(y.as_chunks().0).zip(z.as_chunks().0);
-        let weights = exponents.as_chunks().0.iter().zip(bandwidths.as_chunks().0);
-        for (((x, y), z), (t, h)) in blocks.zip(weights) {
-            add_block(&mut sums, [x, y, z], t, h, plan);
-        }
-        for list in [x, y, z, exponents, bandwidths] {
-            list.truncate(count);
+        for block in &self.blocks {
+            add_block(&mut sums, block, plan);
         }
         let s = sums.map(sum_lanes);
         Moments {
@@ -141,14 +147,9 @@ impl Neighbourhood {
 
 /// One block of lanes into the eleven sums.
 #[inline]
-fn add_block(
-    sums: &mut [[f32; LANES]; 11],
-    [x, y, z]: [&[f32; LANES]; 3],
-    t: &[f32; LANES],
-    h: &[f32; LANES],
-    plan: &SurfacePlan,
-) {
+fn add_block(sums: &mut [[f32; LANES]; 11], block: &Block, plan: &SurfacePlan) {
     let end = plan.reach_sq();
+    let Block { offset: [x, y, z], exponent: t, bandwidth: h } = block;
     let mut w = [0.0_f32; LANES];
     match plan.kernel() {
         Kernel::Gaussian => (0..LANES).for_each(|i| w[i] = Kernel::Gaussian.weight(t[i])),
