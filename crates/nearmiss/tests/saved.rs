@@ -1,0 +1,81 @@
+//! A saved scan is the scan, and a file of an earlier release opens or is refused by name.
+
+use nearmiss::store::Fault;
+use nearmiss::{BuildOptions, Check, PointCloud, Scan};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+
+fn small() -> Scan {
+    let points = arbitrary::cloud(CloudKind::Sphere, 100, 1);
+    Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+fn same(a: &Scan, b: &Scan) {
+    assert_eq!(a.meta(), b.meta(), "metadata");
+    assert_eq!(a.positions(), b.positions(), "positions");
+    assert_eq!(a.normals(), b.normals(), "normals");
+    assert_eq!(a.radii(), b.radii(), "radii");
+    assert_eq!(a.discs(), b.discs(), "discs");
+    assert_eq!(a.source(), b.source(), "source");
+    assert_eq!(a.nodes(), b.nodes(), "nodes");
+    assert_eq!(a.boxes(), b.boxes(), "boxes");
+    assert_eq!(a.cones(), b.cones(), "cones");
+}
+
+#[test]
+fn what_is_saved_is_what_opens() {
+    let scan = small();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.nm");
+    let length = scan.save(&path).unwrap();
+    let mut bytes = Vec::new();
+    assert_eq!(scan.write_to(&mut bytes).unwrap(), length, "written and saved alike");
+    assert_eq!(std::fs::read(&path).unwrap(), bytes, "byte for byte");
+    for check in [Check::Full, Check::Structure] {
+        same(&Scan::open(&path, check).unwrap(), &scan);
+        same(&Scan::read(&path, check).unwrap(), &scan);
+        same(&Scan::from_bytes(bytes.clone(), check).unwrap(), &scan);
+    }
+}
+
+#[test]
+fn the_golden_file_of_version_one_opens() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v1.nm");
+    let golden = Scan::open(path, Check::Full).unwrap();
+    assert_eq!(golden.sanity_check(), Ok(()), "a valid scan");
+    same(&golden, &small());
+}
+
+#[test]
+fn another_version_is_refused_by_name() {
+    let mut bytes = Vec::new();
+    let mut writer = nearmiss::store::Writer::new(*b"SCAN", 999);
+    writer.metadata(&0_u8).unwrap();
+    writer.write_to(&mut bytes).unwrap();
+    let refused = Scan::from_bytes(bytes, Check::Full).unwrap_err();
+    let nearmiss::LoadError::Open(refused) = refused else { panic!("{refused}") };
+    assert!(matches!(refused.fault, Fault::Version { found: 999, .. }), "{refused}");
+    let mut bytes = Vec::new();
+    nearmiss::store::Writer::new(*b"MAPS", 1).write_to(&mut bytes).unwrap();
+    let refused = Scan::from_bytes(bytes, Check::Full).unwrap_err();
+    assert!(
+        matches!(refused, nearmiss::LoadError::Open(e) if matches!(e.fault, Fault::Kind { .. })),
+        "a map is no scan"
+    );
+}
+
+#[test]
+fn a_tree_that_lies_is_refused() {
+    let scan = small();
+    let mut bytes = Vec::new();
+    scan.write_to(&mut bytes).unwrap();
+    let file = nearmiss::store::File::from_bytes(bytes.clone(), Check::Full).unwrap();
+    let nodes = file.sections().iter().find(|s| s.id.tag == *b"NODE").unwrap();
+    let at = usize::try_from(nodes.offset).unwrap();
+    let mut refused = 0;
+    for field in 0..9 {
+        let mut lying = bytes.clone();
+        lying[at + 4 * field..at + 4 * field + 4].copy_from_slice(&77_u32.to_le_bytes());
+        refused += u32::from(Scan::from_bytes(lying, Check::Structure).is_err());
+    }
+    assert_eq!(refused, 9, "every field of the first three nodes is checked without checksums");
+}

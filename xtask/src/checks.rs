@@ -1,0 +1,93 @@
+//! `cargo xtask test`: every check, each with a name and the time it took.
+
+use std::time::{Duration, Instant};
+
+use crate::repository::{Outcome, cargo, members, root, run_cargo};
+use crate::tidy;
+
+type Check = fn() -> Outcome;
+
+/// In order of how soon they tell something.
+const CHECKS: [(&str, Check); 8] = [
+    ("tidy", tidy::run),
+    ("format", || run_cargo(&["fmt", "--all", "--check"])),
+    ("tests", || run_cargo(&["test", "--workspace", "--quiet"])),
+    ("lints", || run_cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])),
+    ("docs", docs),
+    ("features", features),
+    ("packages", tidy::packages),
+    ("determinism", determinism),
+];
+
+/// Runs the checks named, or all.
+pub(crate) fn run_named(names: &[&str]) -> Outcome<Vec<(&'static str, Duration)>> {
+    if let Some(unknown) = names.iter().find(|name| CHECKS.iter().all(|(known, _)| known != *name)) {
+        let known: Vec<&str> = CHECKS.iter().map(|(name, _)| *name).collect();
+        return Err(format!("no check `{unknown}`; there are {}", known.join(", ")).into());
+    }
+    let mut times = Vec::new();
+    for (name, check) in CHECKS {
+        if names.is_empty() || names.contains(&name) {
+            println!("— {name}");
+            let start = now();
+            check().map_err(|error| format!("check `{name}`: {error}"))?;
+            times.push((name, start.elapsed()));
+        }
+    }
+    Ok(times)
+}
+
+pub(crate) fn run(names: &[&str]) -> Outcome {
+    let times = run_named(names)?;
+    for (name, time) in &times {
+        println!("{name:12} {:6.1} s", time.as_secs_f64());
+    }
+    println!("all {} checks passed", times.len());
+    Ok(())
+}
+
+#[expect(clippy::disallowed_methods, reason = "a program may read the clock")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+fn docs() -> Outcome {
+    let mut command = cargo();
+    command.args(["doc", "--workspace", "--no-deps", "--document-private-items", "--quiet"]);
+    // Private items are documented for those who work here; public text may link to them.
+    command.env("RUSTDOCFLAGS", "-D warnings -A rustdoc::private_intra_doc_links");
+    crate::repository::run(&mut command, "cargo doc")
+}
+
+/// Each crate alone, with its default features and with none.
+fn features() -> Outcome {
+    for member in members()?.iter().filter(|member| member.published) {
+        for features in [&["--quiet"][..], &["--quiet", "--no-default-features"]] {
+            run_cargo(&[&["check", "-p", &member.name], features].concat())?;
+        }
+    }
+    Ok(())
+}
+
+/// The same file from one thread and two, from a debug and a release build.
+fn determinism() -> Outcome {
+    let folder = root().join("target/determinism");
+    std::fs::create_dir_all(&folder)?;
+    let scan = nearmiss_testdata::dragon::dragon_path(nearmiss_testdata::dragon::Dragon::Points5k);
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    for profile in ["dev", "release"] {
+        for threads in ["1", "2"] {
+            let file = folder.join(format!("{profile}-{threads}.nm"));
+            let mut command = cargo();
+            command.args(["run", "--quiet", "-p", "nearmiss-cli", "--profile", profile, "--", "preprocess"]);
+            command.arg(&scan).arg("-o").arg(&file).args(["--threads", threads, "--quiet", "--json"]);
+            crate::repository::run(command.stdout(std::process::Stdio::null()), "nearmiss preprocess")?;
+            files.push((format!("{profile}, {threads} threads"), std::fs::read(&file)?));
+        }
+    }
+    let (first, bytes) = &files[0];
+    match files.iter().find(|(_, other)| other != bytes) {
+        Some((other, _)) => Err(format!("{first} and {other} give different files").into()),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,34 @@
+//! `cargo xtask …`: the commands of `nearmiss` on a fresh checkout, and repository chores.
+//!
+//! * `demo` — the main job on a real scan, with a table and a picture.
+//! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
+//! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
+
+mod checks;
+mod demo;
+mod repository;
+mod tidy;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = args.iter().map(String::as_str).collect();
+    let outcome = match words.as_slice() {
+        [] => {
+            eprintln!("usage: cargo xtask demo | test [CHECK…] | preprocess, inspect, eval, collide, poses, export …");
+            return ExitCode::from(2);
+        }
+        ["demo"] => demo::run(),
+        ["test", names @ ..] => checks::run(names),
+        _ => return nearmiss_cli::run(std::env::args_os()),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! `cargo xtask test tidy`: what compilers do not check.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::repository::{Outcome, ask_cargo, members, root};
+
+/// A file longer than this is more than one noun or one step.
+const MOST_LINES: usize = 500;
+
+/// Names that say nothing about what is inside.
+const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
+
+/// Which members of the workspace each crate may use; the table of ARCHITECTURE.md.
+const LAYERS: [(&str, &[&str]); 11] = [
+    ("nearmiss-geometry", &[]),
+    ("nearmiss-store", &[]),
+    ("nearmiss-io", &["nearmiss-geometry"]),
+    ("nearmiss-surface", &["nearmiss-geometry"]),
+    ("nearmiss-hierarchy", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-store"]),
+    ("nearmiss-query", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-hierarchy"]),
+    (
+        "nearmiss",
+        &[
+            "nearmiss-geometry",
+            "nearmiss-store",
+            "nearmiss-io",
+            "nearmiss-surface",
+            "nearmiss-hierarchy",
+            "nearmiss-query",
+        ],
+    ),
+    ("nearmiss-cli", &["nearmiss"]),
+    ("nearmiss-testdata", &["nearmiss-geometry"]),
+    ("nearmiss-benches", &["nearmiss", "nearmiss-testdata"]),
+    ("xtask", &["nearmiss", "nearmiss-cli", "nearmiss-testdata"]),
+];
+
+/// Prints every fault; fails if there is one.
+pub(crate) fn run() -> Outcome {
+    let faults = find_faults()?;
+    for fault in &faults {
+        println!("{fault}");
+    }
+    if faults.is_empty() { Ok(()) } else { Err(format!("{} places to tidy", faults.len()).into()) }
+}
+
+fn find_faults() -> Outcome<Vec<String>> {
+    let mut faults = Vec::new();
+    let sources = tracked(".rs");
+    let references = fs::read_to_string(root().join("docs/theory/references.md")).unwrap_or_default();
+    for path in &sources {
+        let Ok(text) = fs::read_to_string(path) else { continue };
+        faults.extend(source_faults(path, &text, &references));
+    }
+    for member in members()? {
+        let Some((_, allowed)) = LAYERS.iter().find(|(name, _)| *name == member.name) else {
+            faults.push(format!("{}: add it to the table of layers", member.name));
+            continue;
+        };
+        for used in member.dependencies.iter().filter(|used| used.starts_with("nearmiss")) {
+            if !allowed.contains(&used.as_str()) {
+                faults.push(format!("{} may not use {used}: it is no layer below", member.name));
+            }
+        }
+        if member.published {
+            faults.extend(readme_faults(&member.folder));
+        }
+    }
+    Ok(faults)
+}
+
+/// Files that git tracks or would track, with this ending.
+fn tracked(ending: &str) -> Vec<PathBuf> {
+    let listing = Command::new("git")
+        .current_dir(root())
+        .args(["ls-files", "--cached", "--others", "--exclude-standard"])
+        .output();
+    let text = listing.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+    text.lines().filter(|line| line.ends_with(ending)).map(|line| root().join(line)).collect()
+}
+
+fn source_faults(path: &Path, text: &str, references: &str) -> Vec<String> {
+    let shown = path.strip_prefix(root()).unwrap_or(path).display();
+    let mut faults = Vec::new();
+    let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or(text);
+    let lines = code.lines().count();
+    if lines > MOST_LINES {
+        faults.push(format!("{shown}: {lines} lines; more than {MOST_LINES} is more than one thing"));
+    }
+    if path.file_name().is_some_and(|name| VAGUE.iter().any(|vague| name == *vague)) {
+        faults.push(format!("{shown}: name it after what is inside"));
+    }
+    // Written in two parts, so that this line is not a fault itself.
+    if code.contains(concat!(".partial", "_cmp(")) {
+        faults.push(format!("{shown}: use total_cmp; a partial order panics or lies on NaN"));
+    }
+    for title in cited_titles(code) {
+        if !references.contains(&title) {
+            faults.push(format!("{shown}: \"{title}\" is cited, but not in docs/theory/references.md"));
+        }
+    }
+    faults
+}
+
+/// Titles in quotation marks in comments, followed by a year soon after.
+fn cited_titles(code: &str) -> Vec<String> {
+    let comments: Vec<&str> = code
+        .lines()
+        .filter_map(|line| line.trim_start().strip_prefix("//"))
+        .map(|line| line.trim_start_matches(['/', '!']).trim())
+        .collect();
+    let text = comments.join(" ");
+    let parts: Vec<&str> = text.split('"').collect();
+    let quoted = parts.iter().skip(1).step_by(2).zip(parts.iter().skip(2).step_by(2));
+    quoted
+        .filter(|(title, after)| title.split(' ').count() >= 3 && names_a_year(after))
+        .map(|(title, _)| title.trim_end_matches(',').to_owned())
+        .collect()
+}
+
+/// Whether a year stands within the next few words.
+fn names_a_year(after: &str) -> bool {
+    let words = after.split(|c: char| !c.is_ascii_alphanumeric()).take(16);
+    words.filter_map(|word| word.parse::<u32>().ok()).any(|year| (1900..2100).contains(&year))
+}
+
+fn readme_faults(folder: &Path) -> Vec<String> {
+    let name = folder.display();
+    let readme = fs::read_to_string(folder.join("README.md")).unwrap_or_default();
+    let library = fs::read_to_string(folder.join("src/lib.rs")).unwrap_or_default();
+    let mut faults = Vec::new();
+    if readme.lines().count() < 5 {
+        faults.push(format!("{name}: a README of its own says what the crate is for"));
+    }
+    if !library.contains("#![doc = include_str!(\"../README.md\")]") {
+        faults.push(format!("{name}: its README is not its documentation, so it will rot"));
+    }
+    faults
+}
+
+/// What would be published: sources and README, no test data.
+pub(crate) fn packages() -> Outcome {
+    let mut faults = Vec::new();
+    for member in members()?.iter().filter(|member| member.published) {
+        let listing = ask_cargo(&["package", "--list", "--allow-dirty", "-p", &member.name])?;
+        for file in listing.lines() {
+            let expected = file.starts_with("src/")
+                || ["Cargo.toml", "Cargo.toml.orig", "Cargo.lock", "README.md", ".cargo_vcs_info.json"].contains(&file);
+            if !expected {
+                faults.push(format!("{} would publish {file}", member.name));
+            }
+        }
+    }
+    for fault in &faults {
+        println!("{fault}");
+    }
+    if faults.is_empty() { Ok(()) } else { Err("packages hold more than sources".into()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn citations_are_found_across_lines() {
+        let code = "//! See Alexa & Adamson, \"On normals and\n//! projection\", SPBG 2004).\n// a \"mere quoted phrase here\" stays\n";
+        assert_eq!(cited_titles(code), ["On normals and projection"]);
+    }
+
+    #[test]
+    fn faults_are_named() {
+        let long = "x\n".repeat(501);
+        assert_eq!(source_faults(&root().join("a/utils.rs"), &long, "").len(), 2);
+        let order = concat!("a.partial", "_cmp(&b)");
+        assert_eq!(source_faults(&root().join("a/b.rs"), order, "").len(), 1);
+        assert!(source_faults(&root().join("a/b.rs"), "fn main() {}", "").is_empty());
+    }
+}
