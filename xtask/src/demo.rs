@@ -1,0 +1,134 @@
+//! `cargo xtask demo`: the main job on a real scan.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use nearmiss::{
+    Answer, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, Pose, Scan, ScanView,
+    Semantics, Verdict, collide_with,
+};
+use nearmiss_testdata::dragon::{Dragon, dragon_path};
+
+use crate::repository::{Outcome, root};
+
+/// Where the second copy stands along its way in, in sampling radii past first touch.
+const STEPS: [f64; 15] = [-10.0, -6.0, -3.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0, 3.0, 6.0, 10.0];
+
+/// The way in for the picture: this far past first touch.
+const PICTURED: f64 = 6.0;
+
+/// The second copy comes from here, turned like this.
+const FROM: [f64; 3] = [0.8, 0.35, 0.5];
+const TURNED: ([f64; 3], f64) = ([0.2, 1.0, 0.3], 2.1);
+
+pub(crate) fn run() -> Outcome {
+    let folder = root().join("target/demo");
+    std::fs::create_dir_all(&folder)?;
+    let scan = prepared(&folder.join("dragon.nm"))?;
+    let r = scan.sampling_radius();
+    let touch = first_touch(&scan)?;
+    println!("\nA second copy comes in; first touch of the points at {touch:.4} from centre to centre.");
+    println!("Offsets are in sampling radii r = {r:.5} past that; each question asked once.\n");
+    println!("{:>7}  {:<12} {:<10} {:>10} {:>9} {:>11} {:>10}", "offset", "verdict", "evidence", "residual", "µs", "evaluations", "node pairs");
+    let mut scratch = CollideScratch::default();
+    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;
+    let a = scan.at(&Pose::IDENTITY);
+    // Warm: the first question pays for memory.
+    collide_with(&a, &scan.at(&pose(&scan, touch)), &plan, &Budget::UNLIMITED, &mut scratch);
+    for offset in STEPS {
+        let b_pose = pose(&scan, touch - offset * r);
+        let b = scan.at(&b_pose);
+        let start = now();
+        let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
+        let micros = start.elapsed().as_secs_f64() * 1e6;
+        print_row(offset, &answer, micros);
+    }
+    let picture = draw(&scan, &a, &plan, touch - PICTURED * r, folder.join("contact.png"))?;
+    println!("\nA picture of the contact {PICTURED} r in: {}", picture.display());
+    println!("Both scans, the witness and both normals; the same as `nearmiss collide … --image`.");
+    Ok(())
+}
+
+/// Prepares the shipped scan, saves it, opens it mapped.
+fn prepared(path: &std::path::Path) -> Outcome<Scan> {
+    let source = dragon_path(Dragon::Points23k);
+    let start = now();
+    let cloud = nearmiss::io::read(&source, None)?.cloud;
+    let read = start.elapsed();
+    let scan = Scan::build(&cloud, &BuildOptions::default())?;
+    let built = start.elapsed();
+    let bytes = scan.save(path)?;
+    let saved = start.elapsed();
+    let scan = Scan::open(path, Check::Full)?;
+    let opened = start.elapsed();
+    let millis = |time: std::time::Duration| time.as_secs_f64() * 1e3;
+    println!("The Stanford dragon, {} points.", scan.len());
+    println!("  read      {:8.2} ms", millis(read));
+    println!("  prepared  {:8.2} ms", millis(built - read));
+    println!("  saved     {:8.2} ms, {:.0} bytes a point", millis(saved - built), bytes as f64 / scan.len() as f64);
+    println!("  opened    {:8.2} ms, mapped, every checksum compared", millis(opened - saved));
+    println!("  usable    {:8.1} % of the points", 100.0 * scan.usable());
+    Ok(scan)
+}
+
+/// The second copy at this distance on its way in, both about the middle of the scan's bounds.
+fn pose(scan: &Scan, distance: f64) -> Pose {
+    let middle = scan.bounds().centre();
+    let turn = Pose::from_axis_angle(TURNED.0, TURNED.1);
+    let length = FROM.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let at = [0, 1, 2].map(|k| middle[k] + FROM[k] / length * distance);
+    let moved = turn.apply(middle);
+    turn.with_translation([0, 1, 2].map(|k| at[k] - moved[k]))
+}
+
+/// The distance at which the points, not the surfaces, first come within a tenth of r: by bisection from afar on
+/// the exact question for thickened points.
+fn first_touch(scan: &Scan) -> Outcome<f64> {
+    let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
+    let plan = CollidePlan::new(&balls, scan, scan)?;
+    let mut scratch = CollideScratch::default();
+    let mut touches = |distance: f64| {
+        let (a, b) = (scan.at(&Pose::IDENTITY), pose(scan, distance));
+        collide_with(&a, &scan.at(&b), &plan, &Budget::UNLIMITED, &mut scratch).verdict.is_intersecting()
+    };
+    let half = scan.bounds().half_extents();
+    let mut apart = 2.0 * half.iter().map(|x| x * x).sum::<f64>().sqrt();
+    // Step in until something touches, then halve.
+    let step = 2.0 * scan.sampling_radius();
+    while apart > 0.0 && !touches(apart - step) {
+        apart -= step;
+    }
+    let mut within = apart - step;
+    for _ in 0..40 {
+        let middle = 0.5 * (apart + within);
+        if touches(middle) { within = middle } else { apart = middle }
+    }
+    Ok(within)
+}
+
+fn print_row(offset: f64, answer: &Answer, micros: f64) {
+    let evidence = |e: Evidence| if e == Evidence::Certified { "certified" } else { "estimated" };
+    let (verdict, evidence, residual) = match answer.verdict {
+        Verdict::Intersecting { contact, evidence: e } => ("touch", evidence(e), format!("{:.1e}", contact.residual)),
+        Verdict::Separated { evidence: e, .. } => ("apart", evidence(e), String::new()),
+        Verdict::Undecided(_) => ("undecided", "", String::new()),
+    };
+    let spent = answer.statistics;
+    println!(
+        "{offset:>7.1}  {verdict:<12} {evidence:<10} {residual:>10} {micros:>9.1} {:>11} {:>10}",
+        spent.evaluations, spent.node_pairs
+    );
+}
+
+fn draw(scan: &Scan, a: &ScanView<'_>, plan: &CollidePlan, distance: f64, path: PathBuf) -> Outcome<PathBuf> {
+    let b_pose = pose(scan, distance);
+    let b = scan.at(&b_pose);
+    let answer = nearmiss::collide(a, &b, plan, &Budget::UNLIMITED);
+    nearmiss_cli::contact_picture(a, &b, &answer).save(&path)?;
+    Ok(path)
+}
+
+#[expect(clippy::disallowed_methods, reason = "a program may read the clock")]
+fn now() -> Instant {
+    Instant::now()
+}
