@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use nearmiss::{
-    Answer, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, Pose, Scan, ScanView,
-    Semantics, Verdict, collide_with,
+    Answer, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, Pose, Scan,
+    ScanView, Semantics, Verdict, collide_with,
 };
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
@@ -28,10 +28,16 @@ pub(crate) fn run() -> Outcome {
     let r = scan.sampling_radius();
     let touch = first_touch(&scan)?;
     println!("\nA second copy comes in; first touch of the points at {touch:.4} from centre to centre.");
-    println!("Offsets are in sampling radii r = {r:.5} past that; each question asked once.\n");
-    println!("{:>7}  {:<12} {:<10} {:>10} {:>9} {:>11} {:>10}", "offset", "verdict", "evidence", "residual", "µs", "evaluations", "node pairs");
+    println!("Offsets are in sampling radii r = {r:.5} past that; each question asked once.");
+    println!("The gap is a proven lower bound of the distance of the points, in r.\n");
+    println!(
+        "{:>7}  {:<10} {:<10} {:>8} {:>9} {:>9} {:>12} {:>11}",
+        "offset", "verdict", "evidence", "gap", "residual", "µs", "evaluations", "node pairs"
+    );
     let mut scratch = CollideScratch::default();
     let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;
+    let points = CollideOptions::default().with_semantics(Semantics::Thickened(0.0));
+    let points = CollidePlan::new(&points, &scan, &scan)?;
     let a = scan.at(&Pose::IDENTITY);
     // Warm: the first question pays for memory.
     collide_with(&a, &scan.at(&pose(&scan, touch)), &plan, &Budget::UNLIMITED, &mut scratch);
@@ -41,7 +47,11 @@ pub(crate) fn run() -> Outcome {
         let start = now();
         let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
         let micros = start.elapsed().as_secs_f64() * 1e6;
-        print_row(offset, &answer, micros);
+        let gap = match collide_with(&a, &b, &points, &Budget::UNLIMITED, &mut scratch).verdict {
+            Verdict::Separated { gap, .. } => gap / r,
+            _ => 0.0,
+        };
+        print_row(offset, &answer, gap, micros);
     }
     let picture = draw(&scan, &a, &plan, touch - PICTURED * r, folder.join("contact.png"))?;
     println!("\nA picture of the contact {PICTURED} r in: {}", picture.display());
@@ -65,7 +75,11 @@ fn prepared(path: &std::path::Path) -> Outcome<Scan> {
     println!("The Stanford dragon, {} points.", scan.len());
     println!("  read      {:8.2} ms", millis(read));
     println!("  prepared  {:8.2} ms", millis(built - read));
-    println!("  saved     {:8.2} ms, {:.0} bytes a point", millis(saved - built), bytes as f64 / scan.len() as f64);
+    println!(
+        "  saved     {:8.2} ms, {:.0} bytes a point",
+        millis(saved - built),
+        bytes as f64 / scan.len() as f64
+    );
     println!("  opened    {:8.2} ms, mapped, every checksum compared", millis(opened - saved));
     println!("  usable    {:8.1} % of the points", 100.0 * scan.usable());
     Ok(scan)
@@ -81,7 +95,7 @@ fn pose(scan: &Scan, distance: f64) -> Pose {
     turn.with_translation([0, 1, 2].map(|k| at[k] - moved[k]))
 }
 
-/// The distance at which the points, not the surfaces, first come within a tenth of r: by bisection from afar on
+/// The distance at which the points, not the surfaces, first come within r of each other: by bisection from afar on
 /// the exact question for thickened points.
 fn first_touch(scan: &Scan) -> Outcome<f64> {
     let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
@@ -106,16 +120,18 @@ fn first_touch(scan: &Scan) -> Outcome<f64> {
     Ok(within)
 }
 
-fn print_row(offset: f64, answer: &Answer, micros: f64) {
+fn print_row(offset: f64, answer: &Answer, gap: f64, micros: f64) {
     let evidence = |e: Evidence| if e == Evidence::Certified { "certified" } else { "estimated" };
     let (verdict, evidence, residual) = match answer.verdict {
-        Verdict::Intersecting { contact, evidence: e } => ("touch", evidence(e), format!("{:.1e}", contact.residual)),
+        Verdict::Intersecting { contact, evidence: e } => {
+            ("touch", evidence(e), format!("{:.1e}", contact.residual))
+        }
         Verdict::Separated { evidence: e, .. } => ("apart", evidence(e), String::new()),
         Verdict::Undecided(_) => ("undecided", "", String::new()),
     };
     let spent = answer.statistics;
     println!(
-        "{offset:>7.1}  {verdict:<12} {evidence:<10} {residual:>10} {micros:>9.1} {:>11} {:>10}",
+        "{offset:>7.1}  {verdict:<10} {evidence:<10} {gap:>8.2} {residual:>9} {micros:>9.1} {:>12} {:>11}",
         spent.evaluations, spent.node_pairs
     );
 }

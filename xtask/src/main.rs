@@ -17,7 +17,9 @@ fn main() -> ExitCode {
     let words: Vec<&str> = args.iter().map(String::as_str).collect();
     let outcome = match words.as_slice() {
         [] => {
-            eprintln!("usage: cargo xtask demo | test [CHECK…] | preprocess, inspect, eval, collide, poses, export …");
+            eprintln!(
+                "usage: cargo xtask demo | test [CHECK…] | preprocess, inspect, eval, collide, poses, export …"
+            );
             return ExitCode::from(2);
         }
         ["demo"] => demo::run(),

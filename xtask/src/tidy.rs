@@ -147,7 +147,8 @@ pub(crate) fn packages() -> Outcome {
         let listing = ask_cargo(&["package", "--list", "--allow-dirty", "-p", &member.name])?;
         for file in listing.lines() {
             let expected = file.starts_with("src/")
-                || ["Cargo.toml", "Cargo.toml.orig", "Cargo.lock", "README.md", ".cargo_vcs_info.json"].contains(&file);
+                || ["Cargo.toml", "Cargo.toml.orig", "Cargo.lock", "README.md", ".cargo_vcs_info.json"]
+                    .contains(&file);
             if !expected {
                 faults.push(format!("{} would publish {file}", member.name));
             }

@@ -13,10 +13,7 @@ pub struct Aabb {
 
 impl Aabb {
     /// The box of no point; growing it by any point gives that point.
-    pub const EMPTY: Self = Self {
-        min: [f64::INFINITY; 3],
-        max: [f64::NEG_INFINITY; 3],
-    };
+    pub const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
 
     /// The least box that contains all `points`; [`Aabb::EMPTY`] when there are none.
     #[must_use]

@@ -115,18 +115,8 @@ impl PointCloud {
         if u32::try_from(given).is_err() {
             return Err(CloudError::TooMany { given });
         }
-        let bounds = Aabb::of(
-            positions
-                .iter()
-                .filter(|p| is_finite(**p))
-                .map(|p| p.map(Into::into)),
-        );
-        if bounds
-            .min
-            .iter()
-            .chain(&bounds.max)
-            .any(|x| x.is_finite() && x.abs() > FARTHEST)
-        {
+        let bounds = Aabb::of(positions.iter().filter(|p| is_finite(**p)).map(|p| p.map(Into::into)));
+        if bounds.min.iter().chain(&bounds.max).any(|x| x.is_finite() && x.abs() > FARTHEST) {
             let far = |p: &[T; 3]| is_finite(*p) && p.iter().any(|x| (*x).into().abs() > FARTHEST);
             let index = positions.iter().position(far).unwrap_or_default();
             return Err(CloudError::TooLarge { index });
@@ -146,27 +136,12 @@ impl PointCloud {
         let not_finite = given - kept.len();
         let finite = kept.len();
         let kept = distinct(kept);
-        let dropped = Dropped {
-            not_finite,
-            duplicate: finite - kept.len(),
-        };
+        let dropped = Dropped { not_finite, duplicate: finite - kept.len() };
         if kept.len() < LEAST_POINTS {
-            return Err(CloudError::TooFew {
-                distinct: kept.len(),
-                given,
-            });
+            return Err(CloudError::TooFew { distinct: kept.len(), given });
         }
         let (positions, source) = kept.into_iter().unzip();
-        Ok(Self {
-            frame,
-            positions,
-            source,
-            given,
-            dropped,
-            step,
-            normals: None,
-            colours: None,
-        })
+        Ok(Self { frame, positions, source, given, dropped, step, normals: None, colours: None })
     }
 
     /// The same cloud with a normal for each point; `normals` are indexed like the input.
@@ -189,10 +164,7 @@ impl PointCloud {
 
     fn gathered<V: Copy>(&self, values: &[V]) -> Result<Vec<V>, CloudError> {
         if values.len() != self.given {
-            return Err(CloudError::AttributeCount {
-                given: values.len(),
-                points: self.given,
-            });
+            return Err(CloudError::AttributeCount { given: values.len(), points: self.given });
         }
         Ok(self.source.iter().map(|&i| values[i as usize]).collect())
     }
@@ -287,11 +259,7 @@ fn distinct(points: Vec<([f32; 3], u32)>) -> Vec<([f32; 3], u32)> {
     drop(keys);
     repeated.sort_unstable();
     let mut next = repeated.into_iter().peekable();
-    (0_u32..)
-        .zip(points)
-        .filter(|(i, _)| next.next_if_eq(i).is_none())
-        .map(|(_, p)| p)
-        .collect()
+    (0_u32..).zip(points).filter(|(i, _)| next.next_if_eq(i).is_none()).map(|(_, p)| p).collect()
 }
 
 #[cfg(test)]
@@ -299,9 +267,7 @@ mod tests {
     use super::*;
 
     fn grid(n: u16) -> Vec<[f64; 3]> {
-        (0..n)
-            .map(|i| [f64::from(i % 4), f64::from(i / 4), 0.5])
-            .collect()
+        (0..n).map(|i| [f64::from(i % 4), f64::from(i / 4), 0.5]).collect()
     }
 
     #[test]
@@ -312,72 +278,35 @@ mod tests {
         points.insert(0, [f64::INFINITY, 0.0, 0.0]);
         let cloud = PointCloud::cleaned(&points).unwrap();
         assert_eq!(cloud.len(), 12);
-        assert_eq!(
-            cloud.dropped(),
-            Dropped {
-                not_finite: 1,
-                duplicate: 2
-            }
-        );
+        assert_eq!(cloud.dropped(), Dropped { not_finite: 1, duplicate: 2 });
         for i in 0..cloud.len() {
             assert_eq!(cloud.point(i), points[cloud.source()[i] as usize], "point {i}");
         }
         assert_eq!(cloud.source()[..4], [1, 2, 3, 5], "index 4 repeats index 1");
         let numbers: Vec<[f32; 3]> = (0_u8..15).map(|i| [f32::from(i); 3]).collect();
         let cloud = cloud.with_normals(&numbers).unwrap();
-        assert_eq!(
-            cloud.normals().unwrap()[3],
-            [5.0; 3],
-            "attributes follow their points"
-        );
+        assert_eq!(cloud.normals().unwrap()[3], [5.0; 3], "attributes follow their points");
         let count = cloud.with_normals(&numbers[1..]).unwrap_err();
-        assert_eq!(
-            count,
-            CloudError::AttributeCount {
-                given: 14,
-                points: 15
-            }
-        );
+        assert_eq!(count, CloudError::AttributeCount { given: 14, points: 15 });
     }
 
     #[test]
     fn negative_zero_is_zero() {
         let mut points = grid(12);
         points.push([-0.0, -0.0, 0.5]);
-        assert_eq!(
-            PointCloud::from_positions(&points).unwrap().dropped().duplicate,
-            1
-        );
+        assert_eq!(PointCloud::from_positions(&points).unwrap().dropped().duplicate, 1);
     }
 
     #[test]
     fn refusals_name_the_place() {
         let mut points = grid(12);
         points[7][1] = f64::NAN;
-        assert_eq!(
-            PointCloud::from_positions(&points),
-            Err(CloudError::NotFinite { index: 7 })
-        );
+        assert_eq!(PointCloud::from_positions(&points), Err(CloudError::NotFinite { index: 7 }));
         points[7][1] = -1e200;
-        assert_eq!(
-            PointCloud::cleaned(&points),
-            Err(CloudError::TooLarge { index: 7 })
-        );
+        assert_eq!(PointCloud::cleaned(&points), Err(CloudError::TooLarge { index: 7 }));
         let few = vec![[1.0_f32; 3]; 100];
-        assert_eq!(
-            PointCloud::cleaned(&few),
-            Err(CloudError::TooFew {
-                distinct: 1,
-                given: 100
-            })
-        );
-        assert_eq!(
-            PointCloud::cleaned::<f32>(&[]),
-            Err(CloudError::TooFew {
-                distinct: 0,
-                given: 0
-            })
-        );
+        assert_eq!(PointCloud::cleaned(&few), Err(CloudError::TooFew { distinct: 1, given: 100 }));
+        assert_eq!(PointCloud::cleaned::<f32>(&[]), Err(CloudError::TooFew { distinct: 0, given: 0 }));
     }
 
     #[test]
@@ -386,18 +315,11 @@ mod tests {
         let cloud = PointCloud::from_positions(&points).unwrap();
         for i in 0..16 {
             for k in 0..3 {
-                assert!(
-                    (cloud.point(i)[k] - points[i][k]).abs() <= cloud.step(),
-                    "point {i}"
-                );
+                assert!((cloud.point(i)[k] - points[i][k]).abs() <= cloud.step(), "point {i}");
             }
         }
         assert!(cloud.step() > 0.0 && cloud.step() < 2e-7, "{}", cloud.step());
         let exact: Vec<[f32; 3]> = (0_u8..9).map(|i| [f32::from(i) / 3.0, 0.1, 0.2]).collect();
-        assert_eq!(
-            PointCloud::from_positions(&exact).unwrap().step().to_bits(),
-            0,
-            "f32 stays as it is"
-        );
+        assert_eq!(PointCloud::from_positions(&exact).unwrap().step().to_bits(), 0, "f32 stays as it is");
     }
 }

@@ -13,10 +13,7 @@ pub struct Frame {
 
 impl Default for Frame {
     fn default() -> Self {
-        Self {
-            origin: [0.0; 3],
-            scale: 1.0,
-        }
+        Self { origin: [0.0; 3], scale: 1.0 }
     }
 }
 
@@ -30,23 +27,13 @@ impl Frame {
     pub fn around(min: [f64; 3], max: [f64; 3]) -> Self {
         let half = (0..3).map(|k| 0.5 * max[k] - 0.5 * min[k]).fold(0.0, f64::max);
         if half == 0.0 {
-            return Self {
-                origin: min,
-                scale: 1.0,
-            };
+            return Self { origin: min, scale: 1.0 };
         }
         let exponent = exponent(half);
-        let scale = if exponent.abs() > MAX_EXPONENT {
-            exp2(exponent)
-        } else {
-            1.0
-        };
+        let scale = if exponent.abs() > MAX_EXPONENT { exp2(exponent) } else { 1.0 };
         let reach = (0..3).map(|k| max[k].abs().max(min[k].abs())).fold(0.0, f64::max);
         if reach <= 4.0 * half {
-            return Self {
-                origin: [0.0; 3],
-                scale,
-            };
+            return Self { origin: [0.0; 3], scale };
         }
         let grid = exp2(exponent - 4);
         let origin = [0, 1, 2].map(|k| ((0.5 * min[k] + 0.5 * max[k]) / grid).round() * grid);
@@ -101,15 +88,8 @@ mod tests {
             let frame = Frame::around([-size; 3], [size; 3]);
             let local = frame.to_local([size; 3]);
             assert!((1.0..=2.0).contains(&local[0]), "size {size}: {local:?}");
-            assert!(
-                (frame.to_world(local)[0] / size - 1.0).abs() < 1e-7,
-                "size {size}"
-            );
+            assert!((frame.to_world(local)[0] / size - 1.0).abs() < 1e-7, "size {size}");
         }
-        assert_eq!(
-            Frame::around([-1e9; 3], [1e9; 3]).scale.to_bits(),
-            1.0_f64.to_bits(),
-            "1e9 needs none"
-        );
+        assert_eq!(Frame::around([-1e9; 3], [1e9; 3]).scale.to_bits(), 1.0_f64.to_bits(), "1e9 needs none");
     }
 }

@@ -65,10 +65,7 @@ impl Pose {
     /// A shift by `t`.
     #[must_use]
     pub fn from_translation(t: [f64; 3]) -> Self {
-        Self {
-            translation: t.into(),
-            ..Self::IDENTITY
-        }
+        Self { translation: t.into(), ..Self::IDENTITY }
     }
 
     /// A turn by `angle` radians about `axis`, which needs no unit length; no turn when it has none at all.
@@ -78,10 +75,7 @@ impl Pose {
         let rotation = axis.map_or_else(nalgebra::Rotation3::identity, |axis| {
             nalgebra::Rotation3::from_axis_angle(&axis, angle)
         });
-        Self {
-            rotation: rotation.into_inner(),
-            ..Self::IDENTITY
-        }
+        Self { rotation: rotation.into_inner(), ..Self::IDENTITY }
     }
 
     /// The turn of a quaternion (x, y, z, w) of any length but zero; no turn for zero.
@@ -89,10 +83,7 @@ impl Pose {
     pub fn from_quaternion(q: [f64; 4]) -> Self {
         let q = nalgebra::Quaternion::from(q);
         let unit = nalgebra::Unit::try_new(q, 0.0).unwrap_or_default();
-        Self {
-            rotation: unit.to_rotation_matrix().into_inner(),
-            ..Self::IDENTITY
-        }
+        Self { rotation: unit.to_rotation_matrix().into_inner(), ..Self::IDENTITY }
     }
 
     /// The pose of a row-major 4×4 matrix: the nearest rotation and uniform scale, in the sense of the polar
@@ -111,19 +102,11 @@ impl Pose {
         let translation = Vector3::new(m[3], m[7], m[11]);
         let determinant = linear.determinant();
         let scale = determinant.cbrt();
-        let rotation = if scale.is_normal() && scale > 0.0 {
-            nearest_rotation(linear / scale)
-        } else {
-            None
-        };
+        let rotation = if scale.is_normal() && scale > 0.0 { nearest_rotation(linear / scale) } else { None };
         let Some(rotation) = rotation else {
             return Err(PoseError::NotProper { determinant });
         };
-        let pose = Self {
-            rotation,
-            translation,
-            scale,
-        };
+        let pose = Self { rotation, translation, scale };
         let moved = bounds
             .corners()
             .map(|c| {
@@ -133,11 +116,7 @@ impl Pose {
             .into_iter()
             .fold(0.0, f64::max);
         // Written so that a NaN is refused.
-        if moved <= tolerance {
-            Ok(pose)
-        } else {
-            Err(PoseError::NotRigid { moved, tolerance })
-        }
+        if moved <= tolerance { Ok(pose) } else { Err(PoseError::NotRigid { moved, tolerance }) }
     }
 
     /// The row-major 4×4 matrix.
@@ -163,10 +142,7 @@ impl Pose {
     /// The same pose, moved to `t`.
     #[must_use]
     pub fn with_translation(self, t: [f64; 3]) -> Self {
-        Self {
-            translation: t.into(),
-            ..self
-        }
+        Self { translation: t.into(), ..self }
     }
 
     /// The rotation.
@@ -226,11 +202,7 @@ impl Pose {
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();
         let translation = -(rotation * self.translation) / self.scale;
-        Self {
-            rotation,
-            translation,
-            scale: 1.0 / self.scale,
-        }
+        Self { rotation, translation, scale: 1.0 / self.scale }
     }
 }
 
@@ -255,27 +227,17 @@ fn nearest_rotation(m: Matrix3<f64>) -> Option<Matrix3<f64>> {
 mod tests {
     use super::*;
 
-    const BOX: Aabb = Aabb {
-        min: [-1.0; 3],
-        max: [1.0, 2.0, 3.0],
-    };
+    const BOX: Aabb = Aabb { min: [-1.0; 3], max: [1.0, 2.0, 3.0] };
 
     #[test]
     fn matrices_round_trip() {
-        let pose = Pose::from_axis_angle([1.0, -2.0, 0.5], 0.7)
-            .with_scale(2.5)
-            .with_translation([3.0, 4.0, 5.0]);
+        let pose =
+            Pose::from_axis_angle([1.0, -2.0, 0.5], 0.7).with_scale(2.5).with_translation([3.0, 4.0, 5.0]);
         let back = Pose::from_row_major(&pose.to_row_major(), &BOX, 1e-12).unwrap();
         for c in BOX.corners() {
             for k in 0..3 {
-                assert!(
-                    (pose.apply(c)[k] - back.apply(c)[k]).abs() < 1e-14,
-                    "corner {c:?}"
-                );
-                assert!(
-                    (pose.apply_inverse(pose.apply(c))[k] - c[k]).abs() < 1e-14,
-                    "inverse of {c:?}"
-                );
+                assert!((pose.apply(c)[k] - back.apply(c)[k]).abs() < 1e-14, "corner {c:?}");
+                assert!((pose.apply_inverse(pose.apply(c))[k] - c[k]).abs() < 1e-14, "inverse of {c:?}");
                 assert!(
                     (pose.inverse().apply(c)[k] - pose.apply_inverse(c)[k]).abs() < 1e-14,
                     "inverse pose"
@@ -294,14 +256,8 @@ mod tests {
         };
         assert_eq!(with(5, f64::NAN), Err(PoseError::NotFinite { index: 5 }));
         assert_eq!(with(12, 0.5), Err(PoseError::NotAffine));
-        assert!(
-            matches!(with(0, -1.0), Err(PoseError::NotProper { determinant: -1.0 })),
-            "a mirror"
-        );
-        assert!(
-            matches!(with(0, 0.0), Err(PoseError::NotProper { .. })),
-            "a flattening"
-        );
+        assert!(matches!(with(0, -1.0), Err(PoseError::NotProper { determinant: -1.0 })), "a mirror");
+        assert!(matches!(with(0, 0.0), Err(PoseError::NotProper { .. })), "a flattening");
         assert!(matches!(with(1, 0.1), Err(PoseError::NotRigid { .. })), "a shear");
         assert!(with(1, 1e-4).is_ok(), "a shear within the tolerance is mended");
     }

@@ -33,11 +33,7 @@ impl TriangleMesh {
     pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         for (triangle, corners) in triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices.len()) {
-                return Err(MeshError::NoSuchVertex {
-                    triangle,
-                    vertex,
-                    vertices: vertices.len(),
-                });
+                return Err(MeshError::NoSuchVertex { triangle, vertex, vertices: vertices.len() });
             }
         }
         Ok(Self { vertices, triangles })
@@ -63,10 +59,7 @@ impl TriangleMesh {
     pub fn longest_edge(&self, i: usize) -> f64 {
         let corners = self.triangles[i].map(|v| self.vertices[v as usize]);
         let edge_sq = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>();
-        (0..3)
-            .map(|k| edge_sq(corners[k], corners[(k + 1) % 3]))
-            .fold(0.0, f64::max)
-            .sqrt()
+        (0..3).map(|k| edge_sq(corners[k], corners[(k + 1) % 3])).fold(0.0, f64::max).sqrt()
     }
 }
 
@@ -78,18 +71,8 @@ mod tests {
     fn triangles_must_name_vertices_that_are_there() {
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]];
         let mesh = TriangleMesh::new(vertices.clone(), vec![[0, 1, 2]]).unwrap();
-        assert!(
-            (mesh.longest_edge(0) - 5.0_f64.sqrt()).abs() < 1e-15,
-            "hypotenuse"
-        );
+        assert!((mesh.longest_edge(0) - 5.0_f64.sqrt()).abs() < 1e-15, "hypotenuse");
         let refused = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 3, 1]]).unwrap_err();
-        assert_eq!(
-            refused,
-            MeshError::NoSuchVertex {
-                triangle: 1,
-                vertex: 3,
-                vertices: 3
-            }
-        );
+        assert_eq!(refused, MeshError::NoSuchVertex { triangle: 1, vertex: 3, vertices: 3 });
     }
 }

@@ -63,6 +63,47 @@ fn best_crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> (f64, bool) {
 }
 
 #[test]
+fn the_test_of_two_discs_equals_the_twin() {
+    let mut rng = arbitrary::rng(21);
+    let mut seen = [0, 0];
+    for round in 0..200_000 {
+        let mut disc = |radius: f64| oracle::Disc {
+            centre: arbitrary::point_in(&mut rng, 1.0),
+            normal: arbitrary::unit_vector(&mut rng),
+            radius,
+        };
+        let (p, mut q) = (disc(0.8), disc([0.8, 0.3, 1.5][round % 3]));
+        if round % 5 == 0 {
+            // Nearly parallel.
+            q.normal = [0, 1, 2].map(|k| p.normal[k] + 0.02 * q.normal[k]);
+            let length = q.normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+            q.normal = q.normal.map(|x| x / length);
+        }
+        let expected = oracle::crossing(&p, &q);
+        if expected.slack.abs() < 1e-3 {
+            continue;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "discs are single precision")]
+        let single = |d: &oracle::Disc| nearmiss_query::Disc {
+            centre: d.centre.map(|x| x as f32),
+            normal: d.normal.map(|x| x as f32),
+            radius: d.radius as f32,
+        };
+        let found = nearmiss_query::crossing(&single(&p), &single(&q));
+        let d = [0, 1, 2].map(|k| p.centre[k] - q.centre[k]);
+        let off = |n: [f64; 3]| (0..3).map(|k| n[k] * d[k]).sum::<f64>().abs();
+        let touching = off(p.normal).max(off(q.normal)) <= 0.051 * p.radius.min(q.radius);
+        if expected.crosses {
+            assert!(found, "{p:?} {q:?} cross by {}", expected.slack);
+        } else if !touching {
+            assert!(!found, "{p:?} {q:?} miss by {}", expected.slack);
+        }
+        seen[usize::from(expected.crosses)] += 1;
+    }
+    assert!(seen.iter().all(|&n| n > 30_000), "both answers: {seen:?}");
+}
+
+#[test]
 fn surfaces_meet_where_some_discs_cross() {
     let mut rng = arbitrary::rng(11);
     let (mut hits, mut misses) = (0, 0);

@@ -91,6 +91,12 @@ fn between_two_sheets_there_is_no_surface() {
         let middle = plates.at([0.2, 0.3, h]);
         assert!(middle.f.abs() < 1e-3 * h, "{kernel:?}: f vanishes there: {}", middle.f);
         assert_eq!(middle.status, Status::Ambiguous, "{kernel:?}: but the points are no one sheet");
+        // Closer, the normal stands upright again, but two sheets are still no one sheet.
+        #[expect(clippy::cast_possible_truncation, reason = "positions are single precision")]
+        let close = Sheet::plane(0.0, 99.0, kernel).with(Sheet::plane((1.1 * h) as f32, 99.0, kernel));
+        let between = close.at([0.2, 0.3, 0.55 * h]);
+        assert!(between.normal[2] > 0.99, "{kernel:?}: {:?}", between.normal);
+        assert_eq!(between.status, Status::Ambiguous, "{kernel:?}: {:?}", between.eigenvalues);
         let on = plates.at([0.2, 0.3, 0.0]);
         assert_eq!(on.status, Status::Ok, "{kernel:?}: on either sheet it is defined");
         assert!(on.f.abs() < 0.1 * h, "{kernel:?}: and where it was: {}", on.f);
