@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_store::{File, OpenError, WriteError, Writer};
-use nearmiss_surface::SurfacePlan;
+use nearmiss_surface::{SurfaceError, SurfaceOptions, SurfacePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -29,7 +29,7 @@ pub struct HierarchyMeta {
     sampling_radius: f32,
     leaf_size: u32,
     radius_neighbours: u32,
-    plan: SurfacePlan,
+    surface: SurfaceOptions,
 }
 
 /// Why a container does not hold a hierarchy.
@@ -39,6 +39,9 @@ pub enum LoadError {
     /// A section is missing or damaged.
     #[error(transparent)]
     Open(#[from] OpenError),
+    /// The surface is defined by numbers out of range.
+    #[error("{0}; prepare the scan again")]
+    Surface(#[from] SurfaceError),
     /// The sections contradict each other.
     #[error(transparent)]
     Flaw(#[from] Flaw),
@@ -56,7 +59,7 @@ impl PointHierarchy {
             sampling_radius: self.sampling_radius,
             leaf_size: self.leaf_size,
             radius_neighbours: self.radius_neighbours,
-            plan: self.plan,
+            surface: *self.plan.options(),
         }
     }
 
@@ -92,7 +95,7 @@ impl PointHierarchy {
             sampling_radius: meta.sampling_radius,
             leaf_size: meta.leaf_size,
             radius_neighbours: meta.radius_neighbours,
-            plan: meta.plan,
+            plan: SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale)?,
             positions: file.array(POSITIONS, 0)?,
             normals: file.array(NORMALS, 0)?,
             radii: file.array(RADII, 0)?,

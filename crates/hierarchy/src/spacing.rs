@@ -9,7 +9,7 @@ use std::num::NonZero;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss_surface::symmetric_eigen;
 
-use crate::boxes::OrientedBox;
+use crate::boxes::{OrientedBox, dot, sub};
 use crate::gather::TREE_STACK;
 use crate::split::id32;
 use crate::topology::Node;
@@ -32,21 +32,35 @@ pub(crate) struct Spacing {
 
 /// The spacing of every one of the distinct `points`.
 pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Vec<Spacing> {
-    let Ok(tree) = ImmutableKdTree::<f32, 3>::new_from_slice(points) else {
+    let turned = map(points, |p| turn(*p));
+    let Ok(tree) = ImmutableKdTree::<f64, 3>::new_from_slice(&turned) else {
         // Only an input that is not finite or empty is refused, and a cloud is neither.
         return vec![Spacing::default(); points.len()];
     };
-    let spacing = |p: &[f32; 3]| {
-        let near = nearest(&tree, p, neighbours);
-        if near.len() < neighbours || !is_line(points, &near) {
+    let ids: Vec<u32> = (0..id32(points.len())).collect();
+    map(&ids, |&i| {
+        let near = nearest(&tree, points, &turned, i as usize, neighbours);
+        if near.len() <= neighbours || !is_line(points, &near) {
             return Spacing { radius: near.last().map_or(0.0, |n| n.0.sqrt()), is_line: false };
         }
-        let near = nearest(&tree, p, MOST_NEIGHBOURS);
-        let grown = (neighbours..=near.len()).find(|&k| !is_line(points, &near[..=k.min(near.len() - 1)]));
-        let last = grown.unwrap_or(near.len() - 1).min(near.len() - 1);
-        Spacing { radius: near[last].0.sqrt(), is_line: grown.is_none() }
-    };
-    map(points, spacing)
+        let near = nearest(&tree, points, &turned, i as usize, MOST_NEIGHBOURS);
+        let last = near.len() - 1;
+        let grown = (neighbours..=last).find(|&k| !is_line(points, &near[..=k]));
+        Spacing { radius: near[grown.unwrap_or(last)].0.sqrt(), is_line: grown.is_none() }
+    })
+}
+
+/// A fixed rotation, by 1, 0.7 and 0.3 radians about the axes: a kd-tree whose points share a coordinate, or
+/// two, has leaves without end, and scans like walls and lines along an axis. Nothing scanned lies along these.
+/// In double precision, so that no neighbour changes its rank.
+#[inline]
+fn turn(p: [f32; 3]) -> [f64; 3] {
+    let [x, y, z] = p.map(f64::from);
+    [
+        0.730_681_649_935_512 * x + 0.358_208_578_049_394 * y + 0.581_197_850_184_727 * z,
+        0.226_026_321_249_623 * x + 0.676_369_202_093_991 * y - 0.701_025_537_738_177 * z,
+        -0.644_217_687_237_691 * x + 0.643_592_508_556_904 * y + 0.413_245_997_415_041 * z,
+    ]
 }
 
 /// `f` of every item, in order, on all cores where there are several.
@@ -60,11 +74,23 @@ pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Se
     items.iter().map(f).collect()
 }
 
-/// Squared distance and index of the nearest `count` other points and `p` itself, which stands first.
-fn nearest(tree: &ImmutableKdTree<f32, 3>, p: &[f32; 3], count: usize) -> Vec<(f32, usize)> {
+/// Squared distance and index of point `i` itself and of the nearest `count` others, by distance, then index.
+fn nearest(
+    tree: &ImmutableKdTree<f64, 3>,
+    points: &[[f32; 3]],
+    turned: &[[f64; 3]],
+    i: usize,
+    count: usize,
+) -> Vec<(f32, usize)> {
     let wanted = NonZero::new(count + 1).unwrap_or(NonZero::<usize>::MIN);
-    let found = tree.query(p).nearest_n::<SquaredEuclidean<f32>>(wanted).execute();
-    found.into_iter().map(|n| (n.distance, usize::try_from(n.item).unwrap_or_default())).collect()
+    let found = tree.query(&turned[i]).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
+    let exact = |j: usize| {
+        let d = sub(points[j], points[i]);
+        (dot(d, d), j)
+    };
+    let mut near: Vec<(f32, usize)> = found.iter().map(|n| exact(n.item as usize)).collect();
+    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    near
 }
 
 /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
@@ -111,8 +137,8 @@ pub(crate) fn smooth(points: &[[f32; 3]], radii: &[f32], nodes: &[Node], boxes: 
             let node = nodes[id];
             if node.is_leaf() {
                 for j in node.points() {
-                    let d = crate::boxes::sub(points[j], p);
-                    best = best.min(radii[j] + GROWTH * crate::boxes::dot(d, d).sqrt());
+                    let d = sub(points[j], p);
+                    best = best.min(radii[j] + GROWTH * dot(d, d).sqrt());
                 }
             } else {
                 stack[top] = node.right;

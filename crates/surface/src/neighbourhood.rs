@@ -80,31 +80,41 @@ impl Neighbourhood {
     }
 
     /// Adds point `p` of local sampling radius `radius` if its horizon reaches `x`.
+    ///
+    /// Written without a branch on the outcome, which no processor could predict: the point always goes into the
+    /// next lane, and stays there only if it counts.
     #[inline]
     pub fn offer(&mut self, plan: &SurfacePlan, x: &Centre, p: [f32; 3], radius: f32) {
         let d = x.offset(p);
         let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
         let horizon = plan.horizon(radius);
         let horizon_sq = horizon * horizon;
-        if d_sq < horizon_sq {
-            self.push(d, plan.reach_sq() * (d_sq / horizon_sq), plan.bandwidth(radius));
-        }
+        let counts = d_sq < horizon_sq;
+        let exponent = if counts { plan.reach_sq() * (d_sq / horizon_sq) } else { f32::MAX };
+        self.put(d, exponent, plan.bandwidth(radius));
+        self.count += usize::from(counts);
     }
 
     /// Adds a point at `offset` from x, with its d²/h² and its h.
     #[inline]
     pub fn push(&mut self, offset: [f32; 3], exponent: f32, bandwidth: f32) {
-        let lane = self.count % LANES;
-        if lane == 0 {
+        self.put(offset, exponent, bandwidth);
+        self.count += 1;
+    }
+
+    /// Fills the lane after the last point that counts.
+    #[inline]
+    fn put(&mut self, offset: [f32; 3], exponent: f32, bandwidth: f32) {
+        let (block, lane) = (self.count / LANES, self.count % LANES);
+        if block == self.blocks.len() {
             self.blocks.push(EMPTY);
         }
-        if let Some(block) = self.blocks.last_mut() {
-            for k in 0..3 {
-                block.offset[k][lane] = offset[k];
-            }
+        if let Some(block) = self.blocks.get_mut(block) {
+            block.offset[0][lane] = offset[0];
+            block.offset[1][lane] = offset[1];
+            block.offset[2][lane] = offset[2];
             block.exponent[lane] = exponent;
             block.bandwidth[lane] = bandwidth;
-            self.count += 1;
         }
     }
 

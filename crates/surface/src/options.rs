@@ -99,13 +99,15 @@ pub enum SurfaceError {
 }
 
 /// Validated options with what follows from them, for one scan.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePlan {
     options: SurfaceOptions,
     /// horizon_i = slope · r_i + level: one of the two is zero.
     slope: f32,
     level: f32,
     reach_sq: f32,
+    /// h/horizon.
+    per_horizon: f32,
 }
 
 impl SurfacePlan {
@@ -133,8 +135,13 @@ impl SurfacePlan {
             Bandwidth::Fixed(h) => return Err(SurfaceError::Bandwidth(h)),
         };
         #[expect(clippy::cast_possible_truncation, reason = "neighbour sums are single precision")]
-        let plan =
-            Self { options: *options, slope: slope as f32, level: level as f32, reach_sq: reach_sq as f32 };
+        let plan = Self {
+            options: *options,
+            slope: slope as f32,
+            level: level as f32,
+            reach_sq: reach_sq as f32,
+            per_horizon: (1.0 / reach_sq.sqrt()) as f32,
+        };
         Ok(plan)
     }
 
@@ -158,9 +165,10 @@ impl SurfacePlan {
     }
 
     /// The bandwidth h of a point of local sampling radius `radius`.
+    #[inline]
     #[must_use]
     pub fn bandwidth(&self, radius: f32) -> f32 {
-        self.horizon(radius) / self.reach_sq.sqrt()
+        self.horizon(radius) * self.per_horizon
     }
 
     /// (horizon/h)², the value of d²/h² at which weights end.
