@@ -1,6 +1,6 @@
 //! Oriented boxes, and whether two of them in relative motion overlap.
 //!
-//! The separating-axis test of Gottschalk, Lin & Manocha ("OBBTree", SIGGRAPH 1996) with the six face normals
+//! The separating-axis test of Gottschalk, Lin & Manocha ("`OBBTree`", SIGGRAPH 1996) with the six face normals
 //! only: the nine edge axes exclude few further pairs of thin patches and cost more than they save
 //! (benches/record).
 

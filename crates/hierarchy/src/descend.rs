@@ -51,8 +51,8 @@ pub trait Frontier {
     /// Adds the pairs that a split gave, with the urgency of those that were admitted.
     fn push(&mut self, pairs: [(Option<f32>, NodePair); 4]);
 
-    /// The pair to look at next.
-    fn pop(&mut self) -> Option<NodePair>;
+    /// The pair to look at next, with its urgency.
+    fn pop(&mut self) -> Option<(f32, NodePair)>;
 
     /// The pairs still there with their urgency.
     fn open(&self) -> impl Iterator<Item = (f32, NodePair)>;
@@ -87,8 +87,8 @@ impl Frontier for Stack {
     }
 
     #[inline]
-    fn pop(&mut self) -> Option<NodePair> {
-        self.pairs.pop().map(|(_, pair)| pair)
+    fn pop(&mut self) -> Option<(f32, NodePair)> {
+        self.pairs.pop()
     }
 
     fn open(&self) -> impl Iterator<Item = (f32, NodePair)> {
@@ -108,8 +108,13 @@ pub fn descend<V: Visitor, F: Frontier>(
 ) -> ControlFlow<()> {
     frontier.clear();
     push(visitor, frontier, [NodeId::ROOT; 2], [NodeId::ROOT; 2]);
-    while let Some(pair) = frontier.pop() {
-        visitor.go_on()?;
+    while let Some((urgency, pair)) = frontier.pop() {
+        if visitor.go_on().is_break() {
+            // It was not looked at, so it is still open.
+            let none = (None, pair);
+            frontier.push([(Some(urgency), pair), none, none, none]);
+            return ControlFlow::Break(());
+        }
         let (node_a, node_b) = (&a[pair.a.index()], &b[pair.b.index()]);
         let split = match (node_a.is_leaf(), node_b.is_leaf()) {
             (true, true) => {

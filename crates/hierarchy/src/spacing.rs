@@ -2,7 +2,7 @@
 //!
 //! A point's spacing is the distance to its K-th nearest neighbour, with K growing up to 32 while those
 //! neighbours look like a line, as the returns of one LiDAR ring do. It is then made smooth,
-//! r_i := min_j (r_j + 0.3 ‖p_i − p_j‖), so that a lone point cannot bleed over a dense region.
+//! `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region.
 
 use std::num::NonZero;
 
@@ -117,7 +117,7 @@ fn is_line(points: &[[f32; 3]], near: &[(f32, usize)]) -> bool {
     l2 < LINE * l3
 }
 
-/// r_i := min_j (r_j + 0.3 ‖p_i − p_j‖) over all j, by branch and bound on the tree.
+/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over all j, by branch and bound on the tree.
 pub(crate) fn smooth(points: &[[f32; 3]], radii: &[f32], nodes: &[Node], boxes: &[OrientedBox]) -> Vec<f32> {
     let least =
         fold_nodes(nodes, |range| radii[range].iter().copied().fold(f32::INFINITY, f32::min), f32::min);

@@ -1,4 +1,5 @@
 //! A saved scan is the scan, and a file of an earlier release opens or is refused by name.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::store::Fault;
 use nearmiss::{BuildOptions, Check, PointCloud, Scan};

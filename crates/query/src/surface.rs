@@ -18,7 +18,7 @@ use crate::options::Detail;
 use crate::verdict::{Contact, Evidence, Reason};
 use crate::view::ScanView;
 
-/// A witness is tried for at so many crossings before the first stands as estimated.
+/// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
 const TRIES: u32 = 4;
 
 /// A verified point further than this from the crossing, in disc radii, is some other place.
@@ -67,27 +67,20 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Points `i` and `j` have crossing discs.
+    /// Discs of two leaves cross, those of points `i` and `j` first.
     fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
-        if let Some(reason) = self.doubt_about(i, j) {
-            self.doubt.get_or_insert(reason);
-            return ControlFlow::Continue(());
-        }
         let contact = self.estimate(i, j);
         if self.detail == Detail::Verdict {
             self.found = Some((contact, Evidence::Estimated));
             return ControlFlow::Break(());
         }
-        let refined = self.refine(&contact, i);
         self.tries += 1;
-        match refined {
-            Some(contact) => {
-                self.found = Some((contact, Evidence::Certified));
-                return ControlFlow::Break(());
-            }
-            None if self.found.is_none() => self.found = Some((contact, Evidence::Estimated)),
-            None => {}
+        if let Some(contact) = self.refine(&contact, i) {
+            self.found = Some((contact, Evidence::Certified));
+            return ControlFlow::Break(());
         }
+        self.found.get_or_insert((contact, Evidence::Estimated));
+        // Other crossings of the same leaves would fail likewise.
         if self.tries >= TRIES { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
@@ -181,7 +174,10 @@ impl Visitor for Surfaces<'_> {
             while bits != 0 {
                 let j = node_b.first as usize + bits.trailing_zeros() as usize;
                 bits &= bits - 1;
-                self.crossed(i, j)?;
+                match self.doubt_about(i, j) {
+                    Some(reason) => _ = self.doubt.get_or_insert(reason),
+                    None => return self.crossed(i, j),
+                }
             }
         }
         ControlFlow::Continue(())

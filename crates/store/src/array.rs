@@ -84,10 +84,9 @@ impl<T> Clone for Array<T> {
     fn clone(&self) -> Self {
         let backing = match &self.backing {
             Backing::Owned(elements) => Backing::Owned(Arc::clone(elements)),
-            Backing::InPlace { bytes, range } => Backing::InPlace {
-                bytes: bytes.clone(),
-                range: range.clone(),
-            },
+            Backing::InPlace { bytes, range } => {
+                Backing::InPlace { bytes: bytes.clone(), range: range.clone() }
+            }
         };
         Self { backing }
     }
@@ -101,9 +100,7 @@ impl<T> Default for Array<T> {
 
 impl<T> From<Vec<T>> for Array<T> {
     fn from(elements: Vec<T>) -> Self {
-        Self {
-            backing: Backing::Owned(Arc::new(elements)),
-        }
+        Self { backing: Backing::Owned(Arc::new(elements)) }
     }
 }
 
@@ -186,10 +183,8 @@ mod tests {
     fn an_address_that_does_not_suit_the_element_is_copied() {
         let raw: Vec<u8> = (0..64).collect();
         let bytes = given(raw.clone());
-        let expected: Vec<u32> = raw[1..61]
-            .chunks(4)
-            .map(|c| u32::from_le_bytes(c.try_into().unwrap()))
-            .collect();
+        let expected: Vec<u32> =
+            raw[1..61].chunks(4).map(|c| u32::from_le_bytes(c.try_into().unwrap())).collect();
         // Of four neighbouring offsets one suits a u32, the others do not; all must give the right values.
         let in_place =
             (0..4).filter(|&shift| Array::<u32>::in_place(bytes.clone(), shift..60 + shift).is_in_place());
@@ -203,9 +198,7 @@ mod tests {
         let array = Array::<f32>::in_place(given(vec![0; 64]), 0..64);
         shareable(&array);
         let clone = array.clone();
-        let sum = std::thread::spawn(move || clone.iter().sum::<f32>())
-            .join()
-            .unwrap();
+        let sum = std::thread::spawn(move || clone.iter().sum::<f32>()).join().unwrap();
         assert_eq!(sum, array.iter().sum());
         assert_eq!(format!("{array:?}"), "Array { len: 16, in_place: true, .. }");
         assert_eq!(Array::<f32>::default(), Array::from(Vec::new()));

@@ -29,31 +29,19 @@ pub(crate) fn replace(
     path: &Path,
     write: impl FnOnce(&mut fs::File) -> io::Result<()>,
 ) -> Result<(), WriteError> {
-    let failed = |step| {
-        move |source| WriteError::Io {
-            path: Some(path.to_owned()),
-            step,
-            source,
-        }
-    };
+    let failed = |step| move |source| WriteError::Io { path: Some(path.to_owned()), step, source };
 
     let target = follow(path).map_err(failed(WriteStep::Inspect))?;
     let previous = match fs::metadata(&target) {
         Ok(previous) if previous.is_file() => Some(previous.permissions()),
         Ok(other) => {
-            return Err(WriteError::NotAFile {
-                path: path.to_owned(),
-                directory: other.is_dir(),
-            });
+            return Err(WriteError::NotAFile { path: path.to_owned(), directory: other.is_dir() });
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         Err(error) => return Err(failed(WriteStep::Inspect)(error)),
     };
     let Some(name) = target.file_name() else {
-        return Err(WriteError::NotAFile {
-            path: path.to_owned(),
-            directory: true,
-        });
+        return Err(WriteError::NotAFile { path: path.to_owned(), directory: true });
     };
     let folder = folder_of(&target);
 
@@ -66,9 +54,7 @@ pub(crate) fn replace(
         let _ = temporary.as_file().set_permissions(permissions);
     }
     temporary.as_file().sync_all().map_err(failed(WriteStep::Sync))?;
-    temporary
-        .persist(&target)
-        .map_err(|refused| failed(WriteStep::Rename)(refused.error))?;
+    temporary.persist(&target).map_err(|refused| failed(WriteStep::Rename)(refused.error))?;
     sync_folder(folder);
     Ok(())
 }
@@ -129,9 +115,7 @@ fn clear_litter(folder: &Path, name: &OsStr) {
 }
 
 fn is_temporary(candidate: &OsStr, prefix: &OsStr) -> bool {
-    let random = candidate
-        .as_encoded_bytes()
-        .strip_prefix(prefix.as_encoded_bytes());
+    let random = candidate.as_encoded_bytes().strip_prefix(prefix.as_encoded_bytes());
     random.is_some_and(|random| random.len() == RANDOM && random.iter().all(u8::is_ascii_alphanumeric))
 }
 

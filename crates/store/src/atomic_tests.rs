@@ -43,14 +43,7 @@ fn a_writer_that_fails_or_panics_leaves_the_previous_file() {
         file.write_all(b"half")?;
         Err(io::ErrorKind::StorageFull.into())
     });
-    let Err(WriteError::Io {
-        path,
-        step: WriteStep::Write,
-        source,
-    }) = error
-    else {
-        panic!("{error:?}")
-    };
+    let Err(WriteError::Io { path, step: WriteStep::Write, source }) = error else { panic!("{error:?}") };
     assert_eq!(path.as_deref(), Some(target.as_path()));
     assert_eq!(source.kind(), io::ErrorKind::StorageFull);
 
@@ -115,10 +108,7 @@ fn many_writers_at_once_all_succeed_and_one_of_them_wins() {
         }
     });
     let last = fs::read(&target).unwrap();
-    assert!(
-        last.len() == 1000 && last.iter().all(|&byte| byte == last[0]),
-        "a file of one writer"
-    );
+    assert!(last.len() == 1000 && last.iter().all(|&byte| byte == last[0]), "a file of one writer");
     assert_eq!(names(folder.path()), ["scan.nm"]);
 }
 
@@ -148,9 +138,7 @@ fn a_killed_writer_leaves_the_previous_file_and_the_next_clears_up() {
         .unwrap();
     let half_written = || {
         let others = names(folder.path()).into_iter().filter(|name| name != "scan.nm");
-        others
-            .map(|name| fs::read(folder.path().join(name)).unwrap())
-            .any(|bytes| bytes == b"half")
+        others.map(|name| fs::read(folder.path().join(name)).unwrap()).any(|bytes| bytes == b"half")
     };
     let seen = (0..3000).any(|_| {
         std::thread::sleep(Duration::from_millis(10));
@@ -181,38 +169,19 @@ fn links_stay_links_devices_stay_devices_and_permissions_are_kept() {
     let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
     let fresh = folder.path().join("fresh");
     fs::write(&fresh, b"").unwrap();
-    assert_eq!(
-        mode(&target),
-        mode(&fresh),
-        "a new file has the permissions that any new file has"
-    );
+    assert_eq!(mode(&target), mode(&fresh), "a new file has the permissions that any new file has");
 
     fs::set_permissions(&target, fs::Permissions::from_mode(0o640)).unwrap();
     symlink("scan.nm", &link).unwrap();
     replace(&link, put(b"new")).unwrap();
-    assert!(
-        fs::symlink_metadata(&link).unwrap().is_symlink(),
-        "the link is still one"
-    );
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink(), "the link is still one");
     assert_eq!(fs::read(&target).unwrap(), b"new");
     assert_eq!(mode(&target), 0o640);
 
     symlink("nowhere", folder.path().join("dangling")).unwrap();
     let error = replace(&folder.path().join("dangling"), put(b"new"));
-    assert!(
-        matches!(
-            error,
-            Err(WriteError::Io {
-                step: WriteStep::Inspect,
-                ..
-            })
-        ),
-        "{error:?}"
-    );
+    assert!(matches!(error, Err(WriteError::Io { step: WriteStep::Inspect, .. })), "{error:?}");
 
     let error = replace(Path::new("/dev/null"), put(b"new"));
-    assert!(
-        matches!(error, Err(WriteError::NotAFile { directory: false, .. })),
-        "{error:?}"
-    );
+    assert!(matches!(error, Err(WriteError::NotAFile { directory: false, .. })), "{error:?}");
 }

@@ -58,10 +58,7 @@ impl Bytes {
         let mut blocks: Vec<Block> = bytemuck::try_zeroed_vec(length.div_ceil(size_of::<Block>()))
             .map_err(|()| io::Error::from(io::ErrorKind::OutOfMemory))?;
         let length = fill(file, &mut bytemuck::cast_slice_mut(&mut blocks)[..length])?;
-        Ok(Self(Backing::Blocks {
-            blocks: Arc::new(blocks),
-            length,
-        }))
+        Ok(Self(Backing::Blocks { blocks: Arc::new(blocks), length }))
     }
 }
 
@@ -106,9 +103,6 @@ impl fmt::Debug for Bytes {
             Backing::Owned(_) | Backing::Shared(_) => "given",
             Backing::Static(_) => "static",
         };
-        f.debug_struct("Bytes")
-            .field("backing", &backing)
-            .field("length", &self.as_slice().len())
-            .finish()
+        f.debug_struct("Bytes").field("backing", &backing).field("length", &self.as_slice().len()).finish()
     }
 }

@@ -363,10 +363,7 @@ pub enum WriteError {
         limit: usize,
     },
     /// More sections than the header can count.
-    #[error(
-        "{count} sections are more than the {} a container can list; join some",
-        u32::MAX
-    )]
+    #[error("{count} sections are more than the {} a container can list; join some", u32::MAX)]
     TooManySections {
         /// How many were added.
         count: usize,
@@ -414,6 +411,5 @@ impl fmt::Display for WriteStep {
 }
 
 fn name(path: Option<&PathBuf>) -> String {
-    path.map(|path| format!("{}: ", path.display()))
-        .unwrap_or_default()
+    path.map(|path| format!("{}: ", path.display())).unwrap_or_default()
 }

@@ -54,9 +54,7 @@ impl File {
     /// [`OpenError`] if it is not a file, cannot be opened, or fails the checks asked for.
     pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Self, OpenError> {
         Self::from_path(path.as_ref(), check, |file, length| {
-            map::map(file)
-                .or_else(|_| Bytes::read(file, length))
-                .map_err(Fault::from)
+            map::map(file).or_else(|_| Bytes::read(file, length)).map_err(Fault::from)
         })
     }
 
@@ -67,9 +65,7 @@ impl File {
     /// # Errors
     /// [`OpenError`] if it is not a file, cannot be read, does not fit in memory, or fails the checks asked for.
     pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Self, OpenError> {
-        Self::from_path(path.as_ref(), check, |file, length| {
-            Bytes::read(file, length).map_err(Fault::from)
-        })
+        Self::from_path(path.as_ref(), check, |file, length| Bytes::read(file, length).map_err(Fault::from))
     }
 
     /// Takes a container that is in memory, say an asset from an archive, without copying it.
@@ -92,9 +88,7 @@ impl File {
             // Before opening: to open a pipe would wait for its other end.
             let kind = fs::metadata(path)?;
             if !kind.is_file() {
-                return Err(Fault::NotAFile {
-                    directory: kind.is_dir(),
-                });
+                return Err(Fault::NotAFile { directory: kind.is_dir() });
             }
             let mut file = fs::File::open(path)?;
             let length = file.metadata()?.len();
@@ -105,10 +99,7 @@ impl File {
             let bytes = load(&mut file, length)?;
             Self::assemble(bytes, Some(Arc::from(path)), check)
         };
-        attempt().map_err(|fault| OpenError {
-            path: Some(path.to_owned()),
-            fault,
-        })
+        attempt().map_err(|fault| OpenError { path: Some(path.to_owned()), fault })
     }
 
     fn assemble(bytes: Bytes, path: Option<Arc<Path>>, check: Check) -> Result<Self, Fault> {
@@ -118,12 +109,7 @@ impl File {
         if check == Check::Full {
             table.verify(whole)?;
         }
-        Ok(Self {
-            bytes,
-            header,
-            table: Arc::new(table),
-            path,
-        })
+        Ok(Self { bytes, header, table: Arc::new(table), path })
     }
 
     /// Compares every section with its checksum and requires zeros in the padding: what [`Check::Full`] does beyond
@@ -132,9 +118,7 @@ impl File {
     /// # Errors
     /// [`Fault::Checksum`] names the first section that differs, [`Fault::Padding`] the first byte.
     pub fn verify(&self) -> Result<(), OpenError> {
-        self.table
-            .verify(self.bytes.as_slice())
-            .map_err(|fault| self.error(fault))
+        self.table.verify(self.bytes.as_slice()).map_err(|fault| self.error(fault))
     }
 
     /// Requires content of one kind, in a version that the caller reads.
@@ -143,16 +127,10 @@ impl File {
     /// [`Fault::Kind`] or [`Fault::Version`].
     pub fn expect(&self, kind: [u8; 4], versions: RangeInclusive<u32>) -> Result<(), OpenError> {
         if self.kind() != kind {
-            return Err(self.error(Fault::Kind {
-                found: self.kind(),
-                expected: kind,
-            }));
+            return Err(self.error(Fault::Kind { found: self.kind(), expected: kind }));
         }
         if !versions.contains(&self.version()) {
-            return Err(self.error(Fault::Version {
-                found: self.version(),
-                supported: versions,
-            }));
+            return Err(self.error(Fault::Version { found: self.version(), supported: versions }));
         }
         Ok(())
     }
@@ -170,12 +148,7 @@ impl File {
         let (expected, found) = (element_size::<T>(), section.element_size);
         if found != expected {
             let (section, offset) = (section.id, section.offset);
-            return Err(self.error(Fault::WrongElementSize {
-                section,
-                offset,
-                expected,
-                found,
-            }));
+            return Err(self.error(Fault::WrongElementSize { section, offset, expected, found }));
         }
         Ok(Array::in_place(self.bytes.clone(), section.range()))
     }
@@ -231,16 +204,11 @@ impl File {
     }
 
     fn find(&self, id: SectionId) -> Result<&Section, OpenError> {
-        self.table
-            .find(id)
-            .ok_or_else(|| self.error(Fault::MissingSection { section: id }))
+        self.table.find(id).ok_or_else(|| self.error(Fault::MissingSection { section: id }))
     }
 
     fn error(&self, fault: Fault) -> OpenError {
-        OpenError {
-            path: self.path().map(PathBuf::from),
-            fault,
-        }
+        OpenError { path: self.path().map(PathBuf::from), fault }
     }
 }
 

@@ -45,10 +45,7 @@ pub(crate) struct Header {
     checksum: u64,
 }
 
-const _: () = assert!(
-    size_of::<Header>() == HEADER_LEN,
-    "the header is 64 bytes on disk"
-);
+const _: () = assert!(size_of::<Header>() == HEADER_LEN, "the header is 64 bytes on disk");
 
 impl Header {
     /// A sealed header for a table of `count` sections.
@@ -79,24 +76,16 @@ impl Header {
             return Err(if start.iter().eq(MAGIC.iter().rev()) {
                 Fault::ByteOrder
             } else {
-                Fault::NotAContainer {
-                    looks: Looks::of(head),
-                }
+                Fault::NotAContainer { looks: Looks::of(head) }
             });
         }
         let Some(bytes) = head.get(..HEADER_LEN) else {
-            return Err(Fault::Truncated {
-                expected: HEADER_LEN as u64,
-                found,
-            });
+            return Err(Fault::Truncated { expected: HEADER_LEN as u64, found });
         };
         let header: Self = bytemuck::pod_read_unaligned(bytes);
         // The layout comes before the checksum: another layout may well keep its checksum elsewhere.
         if header.layout != LAYOUT {
-            return Err(Fault::Layout {
-                found: header.layout,
-                supported: LAYOUT,
-            });
+            return Err(Fault::Layout { found: header.layout, supported: LAYOUT });
         }
         header.check(found)?;
         Ok(header)
@@ -106,27 +95,16 @@ impl Header {
     fn check(&self, found: u64) -> Result<(), Fault> {
         let computed = self.seal();
         if computed != self.checksum {
-            return Err(Fault::HeaderChecksum {
-                stored: self.checksum,
-                computed,
-            });
+            return Err(Fault::HeaderChecksum { stored: self.checksum, computed });
         }
         if self.reserved != [0; 16] {
-            return Err(Fault::Padding {
-                offset: std::mem::offset_of!(Self, reserved) as u64,
-            });
+            return Err(Fault::Padding { offset: std::mem::offset_of!(Self, reserved) as u64 });
         }
         if found < self.length {
-            return Err(Fault::Truncated {
-                expected: self.length,
-                found,
-            });
+            return Err(Fault::Truncated { expected: self.length, found });
         }
         if found > self.length {
-            return Err(Fault::TrailingBytes {
-                expected: self.length,
-                found,
-            });
+            return Err(Fault::TrailingBytes { expected: self.length, found });
         }
         if !self.length.is_multiple_of(ALIGN as u64) {
             return Err(Fault::RaggedLength { length: self.length });

@@ -7,10 +7,7 @@ use crate::bytes::Bytes;
 
 /// Maps a whole file for reading. The file must not be empty.
 #[cfg(feature = "mmap")]
-#[expect(
-    unsafe_code,
-    reason = "a map is only as steady as its file, which no signature can promise"
-)]
+#[expect(unsafe_code, reason = "a map is only as steady as its file, which no signature can promise")]
 pub(crate) fn map(file: &fs::File) -> io::Result<Bytes> {
     // SAFETY: the map is read-only and lives behind an `Arc` as long as any slice of it. What remains is that nobody
     // changes or shortens the file while it is mapped. This crate never does: it writes a new file and renames it, so

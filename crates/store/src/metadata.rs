@@ -16,16 +16,10 @@ pub const METADATA_LIMIT: usize = 64 * 1024;
 const CLAIM_LIMIT: usize = 16 * METADATA_LIMIT;
 
 pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, WriteError> {
-    let bytes = bincode::serde::encode_to_vec(value, bincode::config::standard()).map_err(|source| {
-        WriteError::Metadata {
-            source: Box::new(source),
-        }
-    })?;
+    let bytes = bincode::serde::encode_to_vec(value, bincode::config::standard())
+        .map_err(|source| WriteError::Metadata { source: Box::new(source) })?;
     if bytes.len() > METADATA_LIMIT {
-        return Err(WriteError::MetadataTooLarge {
-            length: bytes.len(),
-            limit: METADATA_LIMIT,
-        });
+        return Err(WriteError::MetadataTooLarge { length: bytes.len(), limit: METADATA_LIMIT });
     }
     Ok(bytes)
 }
@@ -33,23 +27,13 @@ pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, WriteError> {
 /// Decodes the section that lies at `offset`; bytes left over are an error.
 pub(crate) fn decode<M: DeserializeOwned>(bytes: &[u8], offset: u64) -> Result<M, Fault> {
     if bytes.len() > METADATA_LIMIT {
-        return Err(Fault::MetadataTooLarge {
-            offset,
-            length: bytes.len() as u64,
-            limit: METADATA_LIMIT,
-        });
+        return Err(Fault::MetadataTooLarge { offset, length: bytes.len() as u64, limit: METADATA_LIMIT });
     }
     let config = bincode::config::standard().with_limit::<CLAIM_LIMIT>();
-    let (value, used) =
-        bincode::serde::decode_from_slice(bytes, config).map_err(|source| Fault::Metadata {
-            offset,
-            source: Box::new(source),
-        })?;
+    let (value, used) = bincode::serde::decode_from_slice(bytes, config)
+        .map_err(|source| Fault::Metadata { offset, source: Box::new(source) })?;
     if used != bytes.len() {
-        return Err(Fault::MetadataTrailing {
-            offset: offset + used as u64,
-            count: bytes.len() - used,
-        });
+        return Err(Fault::MetadataTrailing { offset: offset + used as u64, count: bytes.len() - used });
     }
     Ok(value)
 }
@@ -71,10 +55,7 @@ mod tests {
         let value = vec![1_u8; METADATA_LIMIT];
         assert!(matches!(encode(&value), Err(WriteError::MetadataTooLarge { .. })));
         let bytes = vec![0; METADATA_LIMIT + 1];
-        assert!(matches!(
-            decode::<u8>(&bytes, 64),
-            Err(Fault::MetadataTooLarge { offset: 64, .. })
-        ));
+        assert!(matches!(decode::<u8>(&bytes, 64), Err(Fault::MetadataTooLarge { offset: 64, .. })));
     }
 
     #[test]
@@ -82,22 +63,10 @@ mod tests {
         let mut bytes = encode(&("name", 3_u32)).unwrap();
         bytes.push(0);
         let trailing = decode::<(String, u32)>(&bytes, 100).unwrap_err();
-        assert!(
-            matches!(
-                trailing,
-                Fault::MetadataTrailing {
-                    offset: 106,
-                    count: 1
-                }
-            ),
-            "{trailing:?}"
-        );
+        assert!(matches!(trailing, Fault::MetadataTrailing { offset: 106, count: 1 }), "{trailing:?}");
         // 253 announces a u64: a string of 2^63 bytes.
         let huge = [253, 0, 0, 0, 0, 0, 0, 0, 0x80];
         assert!(matches!(decode::<String>(&huge, 0), Err(Fault::Metadata { .. })));
-        assert!(matches!(
-            decode::<Vec<u64>>(&huge, 0),
-            Err(Fault::Metadata { .. })
-        ));
+        assert!(matches!(decode::<Vec<u64>>(&huge, 0), Err(Fault::Metadata { .. })));
     }
 }

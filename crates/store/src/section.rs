@@ -25,10 +25,7 @@ pub struct SectionId {
 
 impl SectionId {
     /// The one metadata section.
-    pub(crate) const META: Self = Self {
-        tag: *b"META",
-        part: 0,
-    };
+    pub(crate) const META: Self = Self { tag: *b"META", part: 0 };
 }
 
 impl fmt::Display for SectionId {
@@ -72,43 +69,21 @@ impl Section {
 
     /// Checks a table row of a file of `limit` bytes whose next free offset is `expected`.
     fn check(&self, expected: u64, limit: u64) -> Result<(), Fault> {
-        let Self {
-            id: section,
-            offset,
-            length,
-            element_size,
-            ..
-        } = *self;
+        let Self { id: section, offset, length, element_size, .. } = *self;
         if element_size == 0 || !length.is_multiple_of(u64::from(element_size)) {
-            return Err(Fault::ElementSize {
-                section,
-                element_size,
-                length,
-            });
+            return Err(Fault::ElementSize { section, element_size, length });
         }
         if !offset.is_multiple_of(ALIGN as u64) {
             return Err(Fault::Misaligned { section, offset });
         }
         if offset.checked_add(length).is_none_or(|end| end > limit) {
-            return Err(Fault::OutOfBounds {
-                section,
-                offset,
-                length,
-                limit,
-            });
+            return Err(Fault::OutOfBounds { section, offset, length, limit });
         }
         if offset < expected {
-            return Err(Fault::Overlapping {
-                section,
-                offset,
-                taken: expected,
-            });
+            return Err(Fault::Overlapping { section, offset, taken: expected });
         }
         if offset > expected {
-            return Err(Fault::Unclaimed {
-                offset: expected,
-                end: offset,
-            });
+            return Err(Fault::Unclaimed { offset: expected, end: offset });
         }
         Ok(())
     }
@@ -131,43 +106,15 @@ const _: () = assert!(size_of::<Entry>() == 40, "a table row is 40 bytes on disk
 
 impl From<Section> for Entry {
     fn from(section: Section) -> Self {
-        let Section {
-            id: SectionId { tag, part },
-            offset,
-            length,
-            element_size,
-            checksum,
-        } = section;
-        Self {
-            tag,
-            part,
-            offset,
-            length,
-            element_size,
-            reserved: 0,
-            checksum,
-        }
+        let Section { id: SectionId { tag, part }, offset, length, element_size, checksum } = section;
+        Self { tag, part, offset, length, element_size, reserved: 0, checksum }
     }
 }
 
 impl From<Entry> for Section {
     fn from(entry: Entry) -> Self {
-        let Entry {
-            tag,
-            part,
-            offset,
-            length,
-            element_size,
-            reserved: _,
-            checksum,
-        } = entry;
-        Self {
-            id: SectionId { tag, part },
-            offset,
-            length,
-            element_size,
-            checksum,
-        }
+        let Entry { tag, part, offset, length, element_size, reserved: _, checksum } = entry;
+        Self { id: SectionId { tag, part }, offset, length, element_size, checksum }
     }
 }
 
@@ -191,25 +138,16 @@ impl Table {
         let rows = &bytes[span(HEADER_LEN as u64, end)];
         let computed = xxh3_64(rows);
         if computed != header.table_checksum {
-            return Err(Fault::TableChecksum {
-                stored: header.table_checksum,
-                computed,
-            });
+            return Err(Fault::TableChecksum { stored: header.table_checksum, computed });
         }
 
-        let mut table = Self {
-            sections: Vec::new(),
-            positions: BTreeMap::new(),
-            end,
-        };
+        let mut table = Self { sections: Vec::new(), positions: BTreeMap::new(), end };
         let mut expected = align_up(end);
         for (position, row) in rows.chunks_exact(size_of::<Entry>()).enumerate() {
             let entry: Entry = bytemuck::pod_read_unaligned(row);
             if entry.reserved != 0 {
                 let row = HEADER_LEN + position * size_of::<Entry>();
-                return Err(Fault::Padding {
-                    offset: (row + std::mem::offset_of!(Entry, reserved)) as u64,
-                });
+                return Err(Fault::Padding { offset: (row + std::mem::offset_of!(Entry, reserved)) as u64 });
             }
             let section = Section::from(entry);
             section.check(expected, limit)?;
@@ -220,10 +158,7 @@ impl Table {
             table.sections.push(section);
         }
         if expected != limit {
-            return Err(Fault::Unclaimed {
-                offset: expected,
-                end: limit,
-            });
+            return Err(Fault::Unclaimed { offset: expected, end: limit });
         }
         Ok(table)
     }
@@ -239,12 +174,7 @@ impl Table {
             let computed = xxh3_64(&bytes[section.range()]);
             if computed != section.checksum {
                 let (section, offset, stored) = (section.id, section.offset, section.checksum);
-                return Err(Fault::Checksum {
-                    section,
-                    offset,
-                    stored,
-                    computed,
-                });
+                return Err(Fault::Checksum { section, offset, stored, computed });
             }
             check_padding(bytes, section.end())?;
         }
@@ -269,10 +199,7 @@ fn check_padding(bytes: &[u8], offset: u64) -> Result<(), Fault> {
     reason = "both ends are at most the length of a slice, checked at open"
 )]
 fn span(start: u64, end: u64) -> Range<usize> {
-    debug_assert!(
-        usize::try_from(end).is_ok(),
-        "offset {end} was checked against a slice"
-    );
+    debug_assert!(usize::try_from(end).is_ok(), "offset {end} was checked against a slice");
     start as usize..end as usize
 }
 
@@ -280,20 +207,11 @@ fn span(start: u64, end: u64) -> Range<usize> {
 ///
 /// Refused when compiled: types without a size, and types that ask for more than the 64 bytes of alignment that
 /// sections have.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "asserted in the line above, when compiled"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "asserted in the line above, when compiled")]
 pub(crate) const fn element_size<T>() -> u32 {
     const {
-        assert!(
-            size_of::<T>() > 0 && size_of::<T>() <= u32::MAX as usize,
-            "elements have a size, a u32"
-        );
-        assert!(
-            align_of::<T>() <= ALIGN,
-            "sections are aligned to 64 bytes, not more"
-        );
+        assert!(size_of::<T>() > 0 && size_of::<T>() <= u32::MAX as usize, "elements have a size, a u32");
+        assert!(align_of::<T>() <= ALIGN, "sections are aligned to 64 bytes, not more");
         size_of::<T>() as u32
     }
 }

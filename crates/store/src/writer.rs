@@ -39,12 +39,7 @@ impl<'a> Writer<'a> {
     /// [`File::expect`](crate::File::expect) for the other end.
     #[must_use]
     pub fn new(kind: [u8; 4], version: u32) -> Self {
-        Self {
-            kind,
-            version,
-            sections: Vec::new(),
-            ids: BTreeSet::new(),
-        }
+        Self { kind, version, sections: Vec::new(), ids: BTreeSet::new() }
     }
 
     /// Adds a section. Sections lie in the file in the order in which they are added.
@@ -65,11 +60,7 @@ impl<'a> Writer<'a> {
         }
         self.claim(id)?;
         let bytes = Cow::Borrowed(bytemuck::cast_slice(elements));
-        self.sections.push(Pending {
-            id,
-            element_size: element_size::<T>(),
-            bytes,
-        });
+        self.sections.push(Pending { id, element_size: element_size::<T>(), bytes });
         Ok(self)
     }
 
@@ -84,23 +75,14 @@ impl<'a> Writer<'a> {
     pub fn metadata(&mut self, value: &impl Serialize) -> Result<&mut Self, WriteError> {
         let bytes = Cow::Owned(metadata::encode(value)?);
         self.claim(SectionId::META)?;
-        self.sections.insert(
-            0,
-            Pending {
-                id: SectionId::META,
-                element_size: 1,
-                bytes,
-            },
-        );
+        self.sections.insert(0, Pending { id: SectionId::META, element_size: 1, bytes });
         Ok(self)
     }
 
     /// Length in bytes of what [`Writer::write_to`] would write now.
     #[must_use]
     pub fn byte_len(&self) -> u64 {
-        self.sections.iter().fold(self.table_end(), |end, section| {
-            align_up(end + section.bytes.len() as u64)
-        })
+        self.sections.iter().fold(self.table_end(), |end, section| align_up(end + section.bytes.len() as u64))
     }
 
     /// Writes the container, flushes, and returns the number of bytes written, a multiple of 64.
@@ -109,12 +91,11 @@ impl<'a> Writer<'a> {
     /// [`WriteError::Io`] without a path if `out` fails; what it has got by then is no valid container.
     pub fn write_to(&self, mut out: impl Write) -> Result<u64, WriteError> {
         let (header, table) = self.plan()?;
-        self.write_all(&mut out, &header, &table)
-            .map_err(|source| WriteError::Io {
-                path: None,
-                step: WriteStep::Write,
-                source,
-            })?;
+        self.write_all(&mut out, &header, &table).map_err(|source| WriteError::Io {
+            path: None,
+            step: WriteStep::Write,
+            source,
+        })?;
         Ok(header.length)
     }
 
@@ -134,18 +115,12 @@ impl<'a> Writer<'a> {
     /// [`WriteError::NotAFile`], or [`WriteError::Io`] with the step that failed.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<u64, WriteError> {
         let (header, table) = self.plan()?;
-        atomic::replace(path.as_ref(), |file| {
-            self.write_all(&mut BufWriter::new(file), &header, &table)
-        })?;
+        atomic::replace(path.as_ref(), |file| self.write_all(&mut BufWriter::new(file), &header, &table))?;
         Ok(header.length)
     }
 
     fn claim(&mut self, id: SectionId) -> Result<(), WriteError> {
-        if self.ids.insert(id) {
-            Ok(())
-        } else {
-            Err(WriteError::DuplicateSection { section: id })
-        }
+        if self.ids.insert(id) { Ok(()) } else { Err(WriteError::DuplicateSection { section: id }) }
     }
 
     /// Where the first section begins.
@@ -159,32 +134,12 @@ impl<'a> Writer<'a> {
         let count = u32::try_from(count).map_err(|_too_large| WriteError::TooManySections { count })?;
         let mut offset = self.table_end();
         let mut table = Vec::with_capacity(self.sections.len());
-        for Pending {
-            id,
-            element_size,
-            bytes,
-        } in &self.sections
-        {
+        for Pending { id, element_size, bytes } in &self.sections {
             let (length, checksum) = (bytes.len() as u64, xxh3_64(bytes));
-            table.push(
-                Section {
-                    id: *id,
-                    offset,
-                    length,
-                    element_size: *element_size,
-                    checksum,
-                }
-                .into(),
-            );
+            table.push(Section { id: *id, offset, length, element_size: *element_size, checksum }.into());
             offset = align_up(offset + length);
         }
-        let header = Header::new(
-            self.kind,
-            self.version,
-            count,
-            offset,
-            bytemuck::cast_slice(&table),
-        );
+        let header = Header::new(self.kind, self.version, count, offset, bytemuck::cast_slice(&table));
         Ok((header, table))
     }
 

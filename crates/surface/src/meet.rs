@@ -29,7 +29,7 @@ impl Meeting {
 /// A common zero of two implicit functions near `start`, both evaluated in one frame.
 ///
 /// Near its surface ∇f ≈ −n·(1 − 2λ₁/h²) (docs/theory). Each step is the least δ that makes both functions
-/// vanish to that order. Where the normals are nearly parallel, 1 − (n_A·n_B)² below 1e-3, that is
+/// vanish to that order. Where the normals are nearly parallel, `1 − (n_A·n_B)²` below 1e-3, that is
 /// ill-conditioned and the step goes halfway to either surface instead: the point settles between them, on
 /// both if they touch. Steps are at most h/2. At most 16 rounds, fewer when the distance stops shrinking; a
 /// good start needs three to six.

@@ -102,7 +102,7 @@ pub enum SurfaceError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePlan {
     options: SurfaceOptions,
-    /// horizon_i = slope · r_i + level: one of the two is zero.
+    /// `horizon_i = slope · r_i + level`: one of the two is zero.
     slope: f32,
     level: f32,
     reach_sq: f32,

@@ -1,4 +1,5 @@
 //! What every kernel must do: one suite, run for each.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_surface::{
     Centre, Evaluation, Kernel, Neighbourhood, Status, SurfaceOptions, SurfacePlan, meet, project,

@@ -22,17 +22,9 @@ fn attack(change: impl Fn(&mut Vec<u8>)) -> Fault {
     let mut bytes = Content::small().bytes();
     change(&mut bytes);
     repair(&mut bytes);
-    let full = File::from_bytes(bytes.clone(), Check::Full)
-        .expect_err("refused with checksums")
-        .fault;
-    let structure = File::from_bytes(bytes, Check::Structure)
-        .expect_err("refused without checksums")
-        .fault;
-    assert_eq!(
-        format!("{full:?}"),
-        format!("{structure:?}"),
-        "both find the same"
-    );
+    let full = File::from_bytes(bytes.clone(), Check::Full).expect_err("refused with checksums").fault;
+    let structure = File::from_bytes(bytes, Check::Structure).expect_err("refused without checksums").fault;
+    assert_eq!(format!("{full:?}"), format!("{structure:?}"), "both find the same");
     structure
 }
 
@@ -53,10 +45,7 @@ fn sections_beyond_the_file_are_refused() {
     let file_end = Content::small().bytes().len() as u64;
     for beyond in [file_end + 64, 1 << 40, 1 << 63, u64::MAX - 63] {
         let found = attack(|bytes| put(bytes, offset(2), beyond));
-        assert!(
-            matches!(found, Fault::OutOfBounds { offset, .. } if offset == beyond),
-            "{found:?}"
-        );
+        assert!(matches!(found, Fault::OutOfBounds { offset, .. } if offset == beyond), "{found:?}");
     }
     for long in [file_end, 1 << 40, (u64::MAX / 12) * 12, 1 << 63] {
         let found = attack(|bytes| put(bytes, length(1), long / 12 * 12));
@@ -66,10 +55,7 @@ fn sections_beyond_the_file_are_refused() {
         put(bytes, offset(3), u64::MAX - 63);
         put(bytes, length(3), 128);
     });
-    assert!(
-        matches!(both, Fault::OutOfBounds { .. }),
-        "the sum wraps round to a good value: {both:?}"
-    );
+    assert!(matches!(both, Fault::OutOfBounds { .. }), "the sum wraps round to a good value: {both:?}");
 }
 
 #[test]
@@ -120,37 +106,21 @@ fn element_sizes_that_do_not_divide_are_refused() {
     }
     // An empty section of elements without a size: nothing to divide, refused all the same.
     let found = attack(|bytes| bytes[element_size(4)..element_size(4) + 4].fill(0));
-    assert!(
-        matches!(
-            found,
-            Fault::ElementSize {
-                element_size: 0,
-                length: 0,
-                ..
-            }
-        ),
-        "{found:?}"
-    );
+    assert!(matches!(found, Fault::ElementSize { element_size: 0, length: 0, .. }), "{found:?}");
 }
 
 #[test]
 fn counts_that_the_file_cannot_hold_are_refused() {
     for count in [40_u32, 1 << 20, u32::MAX] {
         let found = attack(|bytes| bytes[20..24].copy_from_slice(&count.to_le_bytes()));
-        assert!(
-            matches!(found, Fault::TableOutOfBounds { count: c, .. } if c == count),
-            "{found:?}"
-        );
+        assert!(matches!(found, Fault::TableOutOfBounds { count: c, .. } if c == count), "{found:?}");
     }
     let fewer = attack(|bytes| bytes[20] = 5);
     assert!(matches!(fewer, Fault::Unclaimed { .. }), "{fewer:?}");
     let none = attack(|bytes| bytes[20] = 0);
     assert!(matches!(none, Fault::Unclaimed { .. }), "{none:?}");
     let more = attack(|bytes| bytes[20] = 7);
-    assert!(
-        matches!(more, Fault::Overlapping { .. }),
-        "the table grew into the metadata: {more:?}"
-    );
+    assert!(matches!(more, Fault::Overlapping { .. }), "the table grew into the metadata: {more:?}");
 }
 
 #[test]
@@ -164,10 +134,7 @@ fn lengths_that_lie_are_refused() {
     }
     for stated in [0, 64, honest - 64] {
         let found = attack(|bytes| put(bytes, 24, stated));
-        assert!(
-            matches!(found, Fault::TrailingBytes { expected, .. } if expected == stated),
-            "{found:?}"
-        );
+        assert!(matches!(found, Fault::TrailingBytes { expected, .. } if expected == stated), "{found:?}");
     }
     let ragged = attack(|bytes| {
         bytes.truncate(bytes.len() - 3);
@@ -198,12 +165,7 @@ fn names_listed_twice_and_reserved_bytes_are_refused() {
 #[test]
 fn hostile_metadata_cost_nothing() {
     // A string of 2^62 bytes, a list of as many numbers, more depth than there is: whatever META holds is an error.
-    for bytes in [
-        vec![253_u8, 0, 0, 0, 0, 0, 0, 0, 0x40],
-        vec![0xFF; 4096],
-        vec![255; 60_000],
-        vec![],
-    ] {
+    for bytes in [vec![253_u8, 0, 0, 0, 0, 0, 0, 0, 0x40], vec![0xFF; 4096], vec![255; 60_000], vec![]] {
         let mut writer = Writer::new(*b"TEST", 1);
         writer.section(*b"METB", 0, &bytes).unwrap();
         let mut file = Vec::new();

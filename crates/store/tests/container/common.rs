@@ -34,21 +34,10 @@ pub(crate) struct Content {
 
 impl Content {
     pub(crate) fn small() -> Self {
-        let about = About {
-            name: "small".to_owned(),
-            bandwidth: 0.1,
-            levels: vec![1, 300, 70_000],
-            margin: None,
-        };
-        let points = (0..7_u8)
-            .map(|i| [f32::from(i), -0.5, f32::MIN_POSITIVE])
-            .collect();
-        let node = |first| Node {
-            first,
-            count: 3,
-            axis: 2,
-            split: 1.5,
-        };
+        let about =
+            About { name: "small".to_owned(), bandwidth: 0.1, levels: vec![1, 300, 70_000], margin: None };
+        let points = (0..7_u8).map(|i| [f32::from(i), -0.5, f32::MIN_POSITIVE]).collect();
+        let node = |first| Node { first, count: 3, axis: 2, split: 1.5 };
         Self {
             about,
             points,
@@ -94,32 +83,19 @@ impl Content {
 /// Touches everything a caller could ask for; errors are welcome, panics are not. Returns the number of good answers.
 pub(crate) fn use_all(file: &File) -> usize {
     fn total<T: Pod>(array: Result<Array<T>, OpenError>) -> usize {
-        array.map_or(0, |array| {
-            1 + array
-                .iter()
-                .filter(|e| bytemuck::bytes_of(*e)[0] == 1)
-                .count()
-                .min(1)
-        })
+        array.map_or(0, |array| 1 + array.iter().filter(|e| bytemuck::bytes_of(*e)[0] == 1).count().min(1))
     }
     let mut good = total(file.array::<[f32; 3]>(*b"POSN", 0)) + total(file.array::<Node>(*b"NODE", 0));
     good += total(file.array::<f64>(*b"WGHT", 0)) + total(file.array::<f64>(*b"WGHT", 1));
     good += total(file.array::<u8>(*b"FLAG", 7));
     good += usize::from(file.metadata::<About>().is_ok()) + usize::from(file.verify().is_ok());
-    good + file
-        .sections()
-        .iter()
-        .map(|s| usize::try_from(s.elements()).unwrap().min(1))
-        .sum::<usize>()
+    good + file.sections().iter().map(|s| usize::try_from(s.elements()).unwrap().min(1)).sum::<usize>()
 }
 
 /// Makes both header checksums fit again, as an attacker would.
 pub(crate) fn repair(bytes: &mut [u8]) {
     let count = u32::from_le_bytes(bytes[20..24].try_into().unwrap()) as usize;
-    if let Some(table) = count
-        .checked_mul(40)
-        .and_then(|length| bytes.get(64..64 + length))
-    {
+    if let Some(table) = count.checked_mul(40).and_then(|length| bytes.get(64..64 + length)) {
         let sum = xxh3_64(table);
         put(bytes, 32, sum);
     }

@@ -47,19 +47,10 @@ fn a_checksum_that_fails_names_its_section_and_a_padding_byte_its_place() {
         for at in start..start + length {
             let mut bytes = good.clone();
             bytes[at] ^= 4;
-            let Fault::Checksum {
-                section: id,
-                offset,
-                stored,
-                computed,
-            } = fault(bytes, Check::Full)
-            else {
+            let Fault::Checksum { section: id, offset, stored, computed } = fault(bytes, Check::Full) else {
                 panic!("byte {at} is of {}", section.id)
             };
-            assert_eq!(
-                (id, offset, stored),
-                (section.id, section.offset, section.checksum)
-            );
+            assert_eq!((id, offset, stored), (section.id, section.offset, section.checksum));
             assert_ne!(stored, computed);
         }
     }
@@ -68,10 +59,7 @@ fn a_checksum_that_fails_names_its_section_and_a_padding_byte_its_place() {
         let mut bytes = good.clone();
         bytes[at] = 1;
         let found = fault(bytes, Check::Full);
-        assert!(
-            matches!(found, Fault::Padding { offset } if offset == at as u64),
-            "byte {at}: {found:?}"
-        );
+        assert!(matches!(found, Fault::Padding { offset } if offset == at as u64), "byte {at}: {found:?}");
     }
 }
 
@@ -84,10 +72,7 @@ fn what_structure_lets_pass_verify_finds() {
         let file = File::from_bytes(bytes, Check::Structure).unwrap();
         use_all(&file);
         let found = file.verify().expect_err("a changed byte").fault;
-        assert!(
-            matches!(found, Fault::Checksum { .. } | Fault::Padding { .. }),
-            "byte {at}: {found:?}"
-        );
+        assert!(matches!(found, Fault::Checksum { .. } | Fault::Padding { .. }), "byte {at}: {found:?}");
     }
 }
 
@@ -119,10 +104,7 @@ fn truncated_files_are_refused_from_disk_too() {
     let path = folder.path().join("cut.nm");
     for length in [0, 1, 63, 64, 100, good.len() - 1] {
         std::fs::write(&path, &good[..length]).unwrap();
-        let errors = [
-            File::open(&path, Check::Structure),
-            File::read(&path, Check::Structure),
-        ];
+        let errors = [File::open(&path, Check::Structure), File::read(&path, Check::Structure)];
         for error in errors.map(|result| result.expect_err("ought to be refused")) {
             assert_eq!(error.path.as_deref(), Some(path.as_path()));
             let expected = if length == 0 {
@@ -144,22 +126,14 @@ fn random_damage_never_panics_repaired_checksums_or_not() {
         let mut bytes = good.clone();
         for _ in 0..=random.below(4) {
             // Mostly where it hurts: header fields and the table.
-            let at = if random.below(4) == 0 {
-                random.below(bytes.len())
-            } else {
-                12 + random.below(292)
-            };
+            let at = if random.below(4) == 0 { random.below(bytes.len()) } else { 12 + random.below(292) };
             match random.below(4) {
                 0 => bytes[at] = random.next().to_le_bytes()[0],
                 1 => bytes[at] ^= 1 << random.below(8),
                 2 => {
                     let interesting = [0, 1, 64, 128, 1 << 31, 1 << 32, u64::MAX, u64::MAX - 63, 1 << 63];
                     let at = at / 8 * 8;
-                    put(
-                        &mut bytes,
-                        at.min(good.len() - 8),
-                        interesting[random.below(interesting.len())],
-                    );
+                    put(&mut bytes, at.min(good.len() - 8), interesting[random.below(interesting.len())]);
                 }
                 _ => {
                     let from = random.below(bytes.len() - 8);
@@ -184,10 +158,7 @@ fn random_damage_never_panics_repaired_checksums_or_not() {
             }
         }
     }
-    assert!(
-        opened > 3000 && refused > 20_000,
-        "both ways were taken: {opened} opened, {refused} refused"
-    );
+    assert!(opened > 3000 && refused > 20_000, "both ways were taken: {opened} opened, {refused} refused");
 }
 
 #[test]
@@ -204,21 +175,9 @@ fn files_of_other_kinds_are_named() {
     ] {
         let found = fault(start.to_vec(), Check::Full);
         if start == b"\x8E" {
-            assert!(
-                matches!(
-                    found,
-                    Fault::Truncated {
-                        expected: 64,
-                        found: 1
-                    }
-                ),
-                "{found:?}"
-            );
+            assert!(matches!(found, Fault::Truncated { expected: 64, found: 1 }), "{found:?}");
         } else {
-            assert!(
-                matches!(found, Fault::NotAContainer { looks: l } if l == looks),
-                "{found:?}"
-            );
+            assert!(matches!(found, Fault::NotAContainer { looks: l } if l == looks), "{found:?}");
         }
     }
 }
@@ -233,13 +192,7 @@ fn the_other_byte_order_and_other_layouts_are_recognised() {
     newer[8] = 2;
     repair(&mut newer);
     let found = fault(newer, Check::Full);
-    assert!(matches!(
-        found,
-        Fault::Layout {
-            found: 2,
-            supported: 1
-        }
-    ));
+    assert!(matches!(found, Fault::Layout { found: 2, supported: 1 }));
     assert!(found.to_string().ends_with("update the program"), "{found}");
 }
 
@@ -249,34 +202,21 @@ fn what_is_not_a_file_is_refused_by_name() {
     let missing = folder.path().join("missing.nm");
     for mapped in [true, false] {
         let load = |path: &Path| {
-            if mapped {
-                File::open(path, Check::Full)
-            } else {
-                File::read(path, Check::Full)
-            }
+            if mapped { File::open(path, Check::Full) } else { File::read(path, Check::Full) }
         };
         let error = load(&missing).unwrap_err();
         assert!(
             matches!(&error.fault, Fault::Io { source } if source.kind() == std::io::ErrorKind::NotFound)
         );
-        assert_eq!(
-            error.to_string(),
-            format!("{}: no such file; check the path", missing.display())
-        );
+        assert_eq!(error.to_string(), format!("{}: no such file; check the path", missing.display()));
         assert!(
             std::error::Error::source(&error).is_some(),
             "the system's words are one step down the chain"
         );
-        assert!(matches!(
-            load(folder.path()).unwrap_err().fault,
-            Fault::NotAFile { directory: true }
-        ));
+        assert!(matches!(load(folder.path()).unwrap_err().fault, Fault::NotAFile { directory: true }));
         if cfg!(unix) {
             let device = load(Path::new("/dev/zero")).unwrap_err();
-            assert!(
-                matches!(device.fault, Fault::NotAFile { directory: false }),
-                "{device}"
-            );
+            assert!(matches!(device.fault, Fault::NotAFile { directory: false }), "{device}");
         }
     }
 }

@@ -5,11 +5,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 const GOLDEN: &[u8] = include_bytes!("../golden/v1.nm");
 
-const POINTS: [[f32; 3]; 3] = [
-    [0.0, 0.5, -1.0],
-    [1.0e-3, 2.0, 3.25],
-    [f32::MAX, f32::MIN_POSITIVE, -0.0],
-];
+const POINTS: [[f32; 3]; 3] = [[0.0, 0.5, -1.0], [1.0e-3, 2.0, 3.25], [f32::MAX, f32::MIN_POSITIVE, -0.0]];
 const IDS: [u32; 5] = [4, 3, 2, 1, u32::MAX];
 const ROOTS: [f64; 1] = [std::f64::consts::SQRT_2];
 const EMPTY: [u16; 0] = [];
@@ -51,10 +47,7 @@ fn the_golden_file_opens_and_holds_what_it_held() {
 
 #[test]
 fn todays_writer_makes_the_same_bytes() {
-    assert_eq!(
-        LAYOUT, 1,
-        "a new layout gets a golden file of its own; this one stays"
-    );
+    assert_eq!(LAYOUT, 1, "a new layout gets a golden file of its own; this one stays");
     assert_eq!(written_today(), GOLDEN);
 }
 
@@ -75,13 +68,7 @@ fn the_layout_is_the_one_in_the_readme() {
     assert_eq!(u64_at(56), xxh3_64(&GOLDEN[..56]));
 
     let mut end = 64 + 40 * count;
-    let names = [
-        (b"META", 0, 1),
-        (b"POSN", 0, 12),
-        (b"IDS ", 0, 4),
-        (b"IDS ", 1, 2),
-        (b"ROOT", 0, 8),
-    ];
+    let names = [(b"META", 0, 1), (b"POSN", 0, 12), (b"IDS ", 0, 4), (b"IDS ", 1, 2), (b"ROOT", 0, 8)];
     for (row, (tag, part, size)) in names.into_iter().enumerate() {
         let at = 64 + 40 * row;
         assert_eq!((&GOLDEN[at..at + 4], u32_at(at + 4)), (&tag[..], part));
@@ -89,10 +76,7 @@ fn the_layout_is_the_one_in_the_readme() {
         let length = usize::try_from(u64_at(at + 16)).unwrap();
         assert_eq!((u32_at(at + 24), u32_at(at + 28)), (size, 0));
         assert_eq!(offset, end.div_ceil(64) * 64);
-        assert!(
-            GOLDEN[end..offset].iter().all(|&byte| byte == 0),
-            "padding before {row}"
-        );
+        assert!(GOLDEN[end..offset].iter().all(|&byte| byte == 0), "padding before {row}");
         assert_eq!(u64_at(at + 32), xxh3_64(&GOLDEN[offset..offset + length]));
         end = offset + length;
     }

@@ -26,10 +26,7 @@ fn every_way_in_gives_the_same_content() {
         for file in &files {
             content.check(file);
             file.verify().unwrap();
-            assert_eq!(
-                (file.kind(), file.version(), file.byte_len()),
-                (KIND, 3, bytes.len() as u64)
-            );
+            assert_eq!((file.kind(), file.version(), file.byte_len()), (KIND, 3, bytes.len() as u64));
         }
         assert!(files[..2].iter().all(|file| file.path() == Some(path.as_path())));
         assert!(files[2..].iter().all(|file| file.path().is_none()));
@@ -46,16 +43,9 @@ fn opened_and_read_files_serve_every_alignment_in_place() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lanes.nm");
     let mut writer = Writer::new(KIND, 1);
-    writer
-        .section(*b"BYTE", 0, &[1_u8, 2, 3])
-        .unwrap()
-        .section(*b"LANE", 0, &lanes)
-        .unwrap();
+    writer.section(*b"BYTE", 0, &[1_u8, 2, 3]).unwrap().section(*b"LANE", 0, &lanes).unwrap();
     writer.save(&path).unwrap();
-    for file in [
-        File::open(&path, Check::Full).unwrap(),
-        File::read(&path, Check::Full).unwrap(),
-    ] {
+    for file in [File::open(&path, Check::Full).unwrap(), File::read(&path, Check::Full).unwrap()] {
         let array = file.array::<Lane>(*b"LANE", 0).unwrap();
         assert!(array.is_in_place());
         assert_eq!(*array, lanes);
@@ -77,10 +67,7 @@ fn the_same_content_gives_the_same_bytes() {
     for path in &paths {
         Content::small().writer().save(path).unwrap();
     }
-    assert_eq!(
-        std::fs::read(&paths[0]).unwrap(),
-        std::fs::read(&paths[1]).unwrap()
-    );
+    assert_eq!(std::fs::read(&paths[0]).unwrap(), std::fs::read(&paths[1]).unwrap());
 }
 
 #[test]
@@ -109,12 +96,7 @@ fn a_read_file_does_not_mind_what_happens_to_the_file() {
     let path = folder.path().join("scan.nm");
     content.writer().save(&path).unwrap();
     let file = File::read(&path, Check::Structure).unwrap();
-    std::fs::File::options()
-        .write(true)
-        .open(&path)
-        .unwrap()
-        .set_len(0)
-        .unwrap();
+    std::fs::File::options().write(true).open(&path).unwrap().set_len(0).unwrap();
     content.check(&file);
     file.verify().unwrap();
 }
@@ -122,18 +104,10 @@ fn a_read_file_does_not_mind_what_happens_to_the_file() {
 #[test]
 fn sections_are_listed_metadata_first() {
     let file = File::from_bytes(Content::small().bytes(), Check::Full).unwrap();
-    let listed: Vec<_> = file
-        .sections()
-        .iter()
-        .map(|s| (s.id.to_string(), s.elements(), s.element_size))
-        .collect();
-    let expected = [
-        ("POSN/0", 7, 12),
-        ("NODE/0", 3, 12),
-        ("WGHT/0", 3, 8),
-        ("WGHT/1", 0, 8),
-        ("FLAG/7", 65, 1),
-    ];
+    let listed: Vec<_> =
+        file.sections().iter().map(|s| (s.id.to_string(), s.elements(), s.element_size)).collect();
+    let expected =
+        [("POSN/0", 7, 12), ("NODE/0", 3, 12), ("WGHT/0", 3, 8), ("WGHT/1", 0, 8), ("FLAG/7", 65, 1)];
     assert_eq!(listed[0].0, "META/0");
     for ((name, elements, size), expected) in listed[1..].iter().zip(expected) {
         assert_eq!((name.as_str(), *elements, *size), expected);
@@ -150,22 +124,14 @@ fn a_container_without_sections_is_one_header() {
     assert!(file.sections().is_empty());
     assert!(matches!(
         file.metadata::<u8>().unwrap_err().fault,
-        Fault::MissingSection {
-            section: SectionId {
-                tag: [b'M', b'E', b'T', b'A'],
-                part: 0
-            }
-        }
+        Fault::MissingSection { section: SectionId { tag: [b'M', b'E', b'T', b'A'], part: 0 } }
     ));
 }
 
 #[test]
 fn asking_for_what_is_not_there_says_so() {
     let file = File::from_bytes(Content::small().bytes(), Check::Full).unwrap();
-    let missing = file
-        .array::<u8>(*b"NONE", 2)
-        .unwrap_err()
-        .with_path("town.zip/scan.nm");
+    let missing = file.array::<u8>(*b"NONE", 2).unwrap_err().with_path("town.zip/scan.nm");
     assert!(matches!(missing.fault, Fault::MissingSection { .. }));
     assert_eq!(
         missing.to_string(),
@@ -173,34 +139,11 @@ fn asking_for_what_is_not_there_says_so() {
     );
 
     let wrong = file.array::<[f32; 4]>(*b"POSN", 0).unwrap_err();
-    assert!(
-        matches!(
-            wrong.fault,
-            Fault::WrongElementSize {
-                expected: 16,
-                found: 12,
-                ..
-            }
-        ),
-        "{wrong}"
-    );
-    assert_eq!(
-        file.array::<Node>(*b"POSN", 0).unwrap().len(),
-        7,
-        "only the size is stored, as documented"
-    );
+    assert!(matches!(wrong.fault, Fault::WrongElementSize { expected: 16, found: 12, .. }), "{wrong}");
+    assert_eq!(file.array::<Node>(*b"POSN", 0).unwrap().len(), 7, "only the size is stored, as documented");
 
     let kind = file.expect(*b"SLIC", 1..=9).unwrap_err();
-    assert!(
-        matches!(
-            kind.fault,
-            Fault::Kind {
-                found: KIND,
-                expected: [b'S', b'L', b'I', b'C']
-            }
-        ),
-        "{kind}"
-    );
+    assert!(matches!(kind.fault, Fault::Kind { found: KIND, expected: [b'S', b'L', b'I', b'C'] }), "{kind}");
     for (supported, advice) in [(1..=2, "versions 1 to 2; update"), (4..=4, "version 4; prepare")] {
         let version = file.expect(KIND, supported).unwrap_err();
         assert!(matches!(version.fault, Fault::Version { found: 3, .. }));
@@ -210,10 +153,7 @@ fn asking_for_what_is_not_there_says_so() {
         file.metadata::<[[u64; 32]; 4]>().unwrap_err().fault,
         Fault::Metadata { offset: 320, .. }
     ));
-    assert!(matches!(
-        file.metadata::<u8>().unwrap_err().fault,
-        Fault::MetadataTrailing { offset: 321, .. }
-    ));
+    assert!(matches!(file.metadata::<u8>().unwrap_err().fault, Fault::MetadataTrailing { offset: 321, .. }));
 }
 
 #[test]
@@ -221,30 +161,11 @@ fn a_writer_refuses_names_that_are_taken() {
     let mut writer = Writer::new(KIND, 1);
     writer.section(*b"POSN", 0, &[1_u8]).unwrap();
     let twice = writer.section(*b"POSN", 0, &[2_u8]).unwrap_err();
-    assert!(
-        matches!(
-            twice,
-            WriteError::DuplicateSection {
-                section: SectionId { part: 0, .. }
-            }
-        ),
-        "{twice}"
-    );
+    assert!(matches!(twice, WriteError::DuplicateSection { section: SectionId { part: 0, .. } }), "{twice}");
     let reserved = writer.section(*b"META", 5, &[2_u8]).unwrap_err();
-    assert!(
-        matches!(
-            reserved,
-            WriteError::ReservedTag {
-                section: SectionId { part: 5, .. }
-            }
-        ),
-        "{reserved}"
-    );
+    assert!(matches!(reserved, WriteError::ReservedTag { section: SectionId { part: 5, .. } }), "{reserved}");
     writer.metadata(&1_u8).unwrap();
-    assert!(matches!(
-        writer.metadata(&2_u8),
-        Err(WriteError::DuplicateSection { .. })
-    ));
+    assert!(matches!(writer.metadata(&2_u8), Err(WriteError::DuplicateSection { .. })));
     // What was refused was not added.
     let mut bytes = Vec::new();
     writer.write_to(&mut bytes).unwrap();
@@ -264,15 +185,9 @@ fn metadata_that_serde_cannot_number_are_an_error() {
     }
     let error = Writer::new(KIND, 1).metadata(&Endless).unwrap_err();
     assert!(matches!(error, WriteError::Metadata { .. }), "{error}");
-    let large = About {
-        levels: vec![0; 70_000],
-        ..Content::small().about
-    };
+    let large = About { levels: vec![0; 70_000], ..Content::small().about };
     let error = Writer::new(KIND, 1).metadata(&large).unwrap_err();
-    assert!(
-        matches!(error, WriteError::MetadataTooLarge { limit: 65_536, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, WriteError::MetadataTooLarge { limit: 65_536, .. }), "{error}");
 }
 
 /// The kernel's own books say which pages of the map were touched.
@@ -288,19 +203,13 @@ fn opening_without_checksums_leaves_the_bulk_alone() {
 
     let resident_kib = || {
         let maps = std::fs::read_to_string("/proc/self/smaps").unwrap();
-        let (_, ours) = maps
-            .split_once("large-and-untouched.nm")
-            .expect("the file is mapped");
+        let (_, ours) = maps.split_once("large-and-untouched.nm").expect("the file is mapped");
         let line = ours.lines().find(|line| line.starts_with("Rss:")).unwrap();
         line.split_whitespace().nth(1).unwrap().parse::<u64>().unwrap()
     };
     let file = File::open(&path, Check::Structure).unwrap();
     let array = file.array::<u64>(*b"BULK", 0).unwrap();
-    assert!(
-        resident_kib() <= 1024,
-        "{} KiB of 65536 were touched",
-        resident_kib()
-    );
+    assert!(resident_kib() <= 1024, "{} KiB of 65536 were touched", resident_kib());
     file.verify().unwrap();
     assert!(resident_kib() >= 60_000, "verifying reads all of them");
     assert_eq!(*array, *bulk);

@@ -23,11 +23,7 @@ impl Write for Full {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        if self.taken == self.room {
-            Err(io::ErrorKind::StorageFull.into())
-        } else {
-            Ok(())
-        }
+        if self.taken == self.room { Err(io::ErrorKind::StorageFull.into()) } else { Ok(()) }
     }
 }
 
@@ -38,22 +34,10 @@ fn a_stream_that_fails_at_any_byte_is_reported() {
     let length = content.bytes().len();
     for room in 0..=length {
         let error = writer.write_to(Full { room, taken: 0 }).expect_err("no room");
-        let WriteError::Io {
-            path: None,
-            step: WriteStep::Write,
-            source,
-        } = error
-        else {
-            panic!("{error}")
-        };
+        let WriteError::Io { path: None, step: WriteStep::Write, source } = error else { panic!("{error}") };
         assert_eq!(source.kind(), io::ErrorKind::StorageFull, "at byte {room}");
     }
-    let written = writer
-        .write_to(Full {
-            room: length + 1,
-            taken: 0,
-        })
-        .unwrap();
+    let written = writer.write_to(Full { room: length + 1, taken: 0 }).unwrap();
     assert_eq!(written, length as u64);
 }
 
@@ -74,10 +58,7 @@ fn sections_reach_the_stream_without_being_gathered_first() {
     writer.section(*b"BULK", 0, &bulk).unwrap();
     let mut seen = Addresses(Vec::new());
     writer.write_to(&mut seen).unwrap();
-    assert!(
-        seen.0.contains(&bulk.as_ptr().cast()),
-        "the very slice was handed on"
-    );
+    assert!(seen.0.contains(&bulk.as_ptr().cast()), "the very slice was handed on");
 }
 
 #[test]
@@ -88,10 +69,7 @@ fn places_that_cannot_be_written_are_refused_and_nothing_changes() {
     content.writer().save(&path).unwrap();
     let before = fs::read(&path).unwrap();
 
-    let nowhere = content
-        .writer()
-        .save(folder.path().join("nowhere/scan.nm"))
-        .unwrap_err();
+    let nowhere = content.writer().save(folder.path().join("nowhere/scan.nm")).unwrap_err();
     assert!(
         matches!(&nowhere, WriteError::Io { step: WriteStep::Create, source, .. } if source.kind() == io::ErrorKind::NotFound),
         "{nowhere:?}"
@@ -109,10 +87,7 @@ fn places_that_cannot_be_written_are_refused_and_nothing_changes() {
         "{onto}"
     );
     for odd in ["", "..", "/"] {
-        assert!(
-            content.writer().save(odd).is_err(),
-            "{odd:?} is no name for a file"
-        );
+        assert!(content.writer().save(odd).is_err(), "{odd:?} is no name for a file");
     }
     let long = folder.path().join("n".repeat(300));
     assert!(content.writer().save(&long).is_err());
@@ -141,16 +116,7 @@ fn a_folder_that_may_not_be_written_keeps_its_file() {
 
     if bound_by_permissions {
         let error = saved.unwrap_err();
-        assert!(
-            matches!(
-                error,
-                WriteError::Io {
-                    step: WriteStep::Create,
-                    ..
-                }
-            ),
-            "{error}"
-        );
+        assert!(matches!(error, WriteError::Io { step: WriteStep::Create, .. }), "{error}");
         assert_eq!(fs::read(&path).unwrap(), before);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no litter");
     } else {
@@ -169,10 +135,7 @@ fn a_full_device_is_reported() {
         matches!(&error, WriteError::Io { source, .. } if source.kind() == io::ErrorKind::StorageFull),
         "{error}"
     );
-    assert_eq!(
-        error.to_string(),
-        "cannot write (no storage space); check the space left and try again"
-    );
+    assert_eq!(error.to_string(), "cannot write (no storage space); check the space left and try again");
 }
 
 #[test]

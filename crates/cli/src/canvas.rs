@@ -1,0 +1,228 @@
+//! Pixels with depth: discs of points under an orthographic camera, and lines, rings and letters over them.
+
+use nearmiss::geometry::nalgebra::Vector3;
+
+use crate::font;
+
+pub(crate) type Colour = [u8; 3];
+
+/// Pixels are painted this much finer than they are kept, in both directions.
+pub(crate) const FINE: usize = 2;
+
+/// A rectangle of fine pixels.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Area {
+    pub(crate) left: usize,
+    pub(crate) top: usize,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+}
+
+/// An orthographic camera that paints into an area.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Camera {
+    /// Unit directions: to the right, up, and towards the viewer.
+    pub(crate) axes: [Vector3<f64>; 3],
+    /// Seen in the middle of the area.
+    pub(crate) centre: Vector3<f64>,
+    /// Pixels of a unit of length.
+    pub(crate) scale: f64,
+    pub(crate) area: Area,
+}
+
+impl Camera {
+    /// A direction or offset, to the right, up and towards the viewer.
+    pub(crate) fn turn(&self, v: Vector3<f64>) -> [f64; 3] {
+        self.axes.map(|axis| axis.dot(&v))
+    }
+
+    /// Column, row, and nearness in pixels.
+    pub(crate) fn project(&self, p: Vector3<f64>) -> [f64; 3] {
+        let [x, y, z] = self.turn(p - self.centre);
+        [self.middle(0) + self.scale * x, self.middle(1) - self.scale * y, self.scale * z]
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "pixels")]
+    fn middle(&self, axis: usize) -> f64 {
+        let Area { left, top, width, height } = self.area;
+        let (start, length) = if axis == 0 { (left, width) } else { (top, height) };
+        start as f64 + 0.5 * length as f64
+    }
+}
+
+/// A disc in the world.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Splat {
+    pub(crate) centre: Vector3<f64>,
+    pub(crate) normal: Vector3<f64>,
+    pub(crate) radius: f64,
+}
+
+/// From over the viewer's left shoulder: right, up, towards.
+const LIGHT: [f64; 3] = [-0.36, 0.48, 0.8];
+
+/// What is not lit keeps so much.
+const AMBIENT: f64 = 0.3;
+
+/// Discs seen more edge-on than this are painted as dots.
+const EDGE_ON: f64 = 0.12;
+
+/// No point is smaller than this, in pixels.
+const DOT: f64 = 1.4;
+
+/// No splat is larger than this, in pixels, however near the camera.
+const LARGEST: f64 = 200.0;
+
+#[derive(Debug, Clone)]
+pub(crate) struct Canvas {
+    width: usize,
+    height: usize,
+    pixels: Vec<Colour>,
+    depth: Vec<f64>,
+}
+
+impl Canvas {
+    pub(crate) fn new(width: usize, height: usize, ground: Colour) -> Self {
+        let count = width * height;
+        Self { width, height, pixels: vec![ground; count], depth: vec![f64::NEG_INFINITY; count] }
+    }
+
+    pub(crate) fn fill(&mut self, area: Area, colour: Colour) {
+        for y in area.top..(area.top + area.height).min(self.height) {
+            let row = y * self.width;
+            self.pixels[row + area.left..row + (area.left + area.width).min(self.width)].fill(colour);
+        }
+    }
+
+    /// A disc, lit and in front of what lies behind it.
+    pub(crate) fn splat(&mut self, camera: &Camera, splat: &Splat, colour: Colour) {
+        let [x, y, z] = camera.project(splat.centre);
+        let n = camera.turn(splat.normal);
+        let lambert = (0..3).map(|k| n[k] * LIGHT[k]).sum::<f64>().abs();
+        let lit = shade(colour, AMBIENT + (1.0 - AMBIENT) * lambert);
+        let radius = (camera.scale * splat.radius).min(LARGEST);
+        let (columns, rows) = pixels_about(camera.area, [x, y], radius.max(DOT));
+        for row in rows {
+            for column in columns.clone() {
+                let [u, v] = centre_of(column, row);
+                let (dx, dy) = (u - x, y - v);
+                let tilt = if n[2].abs() > EDGE_ON { -(n[0] * dx + n[1] * dy) / n[2] } else { f64::INFINITY };
+                let flat = dx * dx + dy * dy;
+                let in_dot = flat <= DOT * DOT;
+                let in_disc = flat + tilt * tilt <= radius * radius;
+                let near = z + if in_disc { tilt } else { 0.0 };
+                let i = row * self.width + column;
+                if (in_dot || in_disc) && near > self.depth[i] {
+                    self.depth[i] = near;
+                    self.pixels[i] = lit;
+                }
+            }
+        }
+    }
+
+    /// Blends `colour` over every pixel of `area` as far as `cover`, of a place, says.
+    fn overlay(
+        &mut self,
+        area: Area,
+        [x, y]: [f64; 2],
+        reach: f64,
+        colour: Colour,
+        cover: impl Fn([f64; 2]) -> f64,
+    ) {
+        let (columns, rows) = pixels_about(area, [x, y], reach);
+        for row in rows {
+            for column in columns.clone() {
+                let share = cover(centre_of(column, row)).clamp(0.0, 1.0);
+                let pixel = &mut self.pixels[row * self.width + column];
+                *pixel = blend(*pixel, colour, share);
+            }
+        }
+    }
+
+    /// A line of a given width with round ends.
+    pub(crate) fn line(&mut self, area: Area, [from, to]: [[f64; 2]; 2], width: f64, colour: Colour) {
+        let middle = [0, 1].map(|k| 0.5 * (from[k] + to[k]));
+        let length = distance(from, to);
+        self.overlay(area, middle, 0.5 * length + width, colour, |p| {
+            let along = (0..2).map(|k| (p[k] - from[k]) * (to[k] - from[k])).sum::<f64>();
+            let t = if length > 0.0 { (along / (length * length)).clamp(0.0, 1.0) } else { 0.0 };
+            let foot = [0, 1].map(|k| from[k] + t * (to[k] - from[k]));
+            0.5 * width - distance(p, foot) + 0.5
+        });
+    }
+
+    /// A circle of a given line width.
+    pub(crate) fn ring(&mut self, area: Area, centre: [f64; 2], radius: f64, width: f64, colour: Colour) {
+        self.overlay(area, centre, radius + width, colour, |p| {
+            0.5 * width - (distance(p, centre) - radius).abs() + 0.5
+        });
+    }
+
+    /// Letters with their upper left corner at `[x, y]`, each pixel of theirs `size` wide.
+    pub(crate) fn text(&mut self, [x, y]: [usize; 2], size: usize, colour: Colour, text: &str) {
+        for (i, letter) in text.chars().enumerate() {
+            for row in 0..font::HEIGHT {
+                for column in (0..font::ADVANCE).filter(|&c| font::is_set(letter, c, row)) {
+                    let left = x + (i * font::ADVANCE + column) * size;
+                    self.fill(Area { left, top: y + row * size, width: size, height: size }, colour);
+                }
+            }
+        }
+    }
+
+    /// Width, height and bytes, red green blue, [`FINE`]² pixels joined to one.
+    pub(crate) fn averaged(&self) -> (usize, usize, Vec<u8>) {
+        let (width, height) = (self.width / FINE, self.height / FINE);
+        let mut bytes = Vec::with_capacity(3 * width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let mut sum = [0_usize; 3];
+                for i in 0..FINE * FINE {
+                    let pixel = self.pixels[(FINE * y + i / FINE) * self.width + FINE * x + i % FINE];
+                    for (sum, channel) in sum.iter_mut().zip(pixel) {
+                        *sum += usize::from(channel);
+                    }
+                }
+                bytes.extend(sum.map(|s| u8::try_from(s / (FINE * FINE)).unwrap_or(u8::MAX)));
+            }
+        }
+        (width, height, bytes)
+    }
+}
+
+/// Columns and rows of `area` within `reach` of a place.
+fn pixels_about(
+    area: Area,
+    [x, y]: [f64; 2],
+    reach: f64,
+) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+    let range = |c: f64, start: usize, length: usize| {
+        let low = (c - reach).floor().max(0.0) as usize;
+        let high = ((c + reach).ceil().max(0.0) as usize).saturating_add(1);
+        low.max(start)..high.min(start + length)
+    };
+    (range(x, area.left, area.width), range(y, area.top, area.height))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixels")]
+fn centre_of(column: usize, row: usize) -> [f64; 2] {
+    [column as f64 + 0.5, row as f64 + 0.5]
+}
+
+fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
+    (p[0] - q[0]).hypot(p[1] - q[1])
+}
+
+pub(crate) fn shade(colour: Colour, light: f64) -> Colour {
+    blend([0; 3], colour, light.clamp(0.0, 1.0))
+}
+
+fn blend(below: Colour, above: Colour, share: f64) -> Colour {
+    std::array::from_fn(|k| {
+        let mixed = f64::from(below[k]) * (1.0 - share) + f64::from(above[k]) * share;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 255")]
+        let mixed = mixed.round() as u8;
+        mixed
+    })
+}

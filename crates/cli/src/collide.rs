@@ -1,0 +1,265 @@
+//! `collide`: whether, where and how near two scans meet.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use nearmiss::{
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Pose, Scan, Semantics,
+    collide_with,
+};
+use rayon::prelude::*;
+
+use crate::console::{Console, Results, now};
+use crate::error::CliError;
+use crate::posing::{self, PoseFile};
+use crate::preprocess::parse_threads;
+use crate::report::{AnswerReport, sentence};
+use crate::{input, output, picture};
+
+/// Options of `collide`.
+#[derive(Debug, Clone, Args)]
+pub struct CollideArgs {
+    /// The one scan: prepared, or a raw input, prepared on the fly
+    pub a: PathBuf,
+    /// The other scan
+    pub b: PathBuf,
+    /// Pose of a, object to world: 16 numbers, row-major, in one argument, or a file that holds them
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose_a: Option<String>,
+    /// Pose of b
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose_b: Option<String>,
+    /// A query a line, {"a":[16 numbers],"b":[16 numbers]}; an answer a line, in order
+    #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b", "image"])]
+    pub poses: Option<PathBuf>,
+    /// Compare balls of this radius about the points, in world units, instead of surfaces
+    #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
+    pub thickened: Option<f64>,
+    /// Time for each query: a number with ns, us, ms or s
+    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
+    pub budget: Option<Duration>,
+    /// Work units for each query, evaluations of f and node pairs; reproducible, unlike time
+    #[arg(long, value_name = "N")]
+    pub work: Option<u64>,
+    /// How much to find out about a contact
+    #[arg(long, value_enum, default_value_t = DetailName::Witness)]
+    pub detail: DetailName,
+    /// Threads, 0 for all cores: to prepare raw inputs, by default all, and to answer --poses, by default one
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    pub threads: Option<usize>,
+    /// Picture of both scans, and of the place where they meet
+    #[arg(long, value_name = "OUT.png")]
+    pub image: Option<PathBuf>,
+    /// One object of JSON a query instead of sentences
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// How much to find out about a contact, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum DetailName {
+    /// That there is one, to first order: fastest
+    Verdict,
+    /// A point on both surfaces, verified where that can be had
+    Witness,
+}
+
+fn parse_radius(text: &str) -> Result<f64, String> {
+    let radius = text.parse().ok().filter(|r: &f64| *r >= 0.0 && r.is_finite());
+    radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
+}
+
+fn parse_duration(text: &str) -> Result<Duration, String> {
+    let unit =
+        text.trim_start_matches(|c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | 'e' | 'E' | '-'));
+    let number = text.strip_suffix(unit).unwrap_or_default();
+    let seconds = match unit {
+        "ns" => 1e-9,
+        "us" | "µs" | "μs" => 1e-6,
+        "ms" => 1e-3,
+        "s" => 1.0,
+        _ => return Err("expected a number with one of the units ns, us, ms, s, as in 200us".into()),
+    };
+    let time = number.parse::<f64>().ok().and_then(|n| Duration::try_from_secs_f64(n * seconds).ok());
+    time.ok_or_else(|| "expected a time from zero on, as in 200us".into())
+}
+
+/// Everything that is the same for all queries.
+struct Question {
+    a: Scan,
+    b: Scan,
+    plan: CollidePlan,
+    budget: Option<Duration>,
+    work: Option<u64>,
+}
+
+impl Question {
+    /// The answer, and the microseconds it took.
+    fn ask(&self, poses: &[Pose; 2], scratch: &mut CollideScratch) -> (Answer, f64) {
+        let start = now();
+        let (a, b) = (self.a.at(&poses[0]), self.b.at(&poses[1]));
+        let mut budget = Budget::UNLIMITED;
+        if let Some(units) = self.work {
+            budget = budget.with_work(units);
+        }
+        if let Some(end) = self.budget.and_then(|time| start.checked_add(time)) {
+            budget = budget.with_deadline(Deadline::at(end));
+        }
+        let answer = collide_with(&a, &b, &self.plan, &budget, scratch);
+        #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+        let micros = start.elapsed().as_nanos() as f64 / 1e3;
+        (answer, micros)
+    }
+
+    fn tell(&self, results: &mut Results, asked: &Asked, args: &CollideArgs) -> Result<(), CliError> {
+        let report = AnswerReport::new(&asked.answer, asked.micros);
+        if args.json {
+            return results.json(&report);
+        }
+        let (a, b) = (self.a.at(&asked.poses[0]), self.b.at(&asked.poses[1]));
+        results.line(sentence(&asked.answer, &a, &b, args.thickened.is_some()))?;
+        if args.poses.is_none() {
+            results.line(report.details())?;
+        }
+        Ok(())
+    }
+}
+
+/// A query and its answer.
+struct Asked {
+    poses: [Pose; 2],
+    answer: Answer,
+    micros: f64,
+}
+
+pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
+    let console = Console::new(args.quiet);
+    if let Some(path) = &args.image {
+        output::check_apart(path, &[&args.a, &args.b])?;
+    }
+    let matrices = [("--pose-a", &args.pose_a), ("--pose-b", &args.pose_b)];
+    let [pose_a, pose_b] = matrices.map(|(name, given)| posing::from_option(name, given.as_deref()));
+    let matrices = [pose_a?, pose_b?];
+    let mut poses = args.poses.as_ref().map(|path| PoseFile::open(path)).transpose()?;
+
+    let threads = args.threads.unwrap_or(0);
+    let a = input::open(&args.a, threads, console)?;
+    // The same file twice is one scan.
+    let b = if args.a == args.b { a.clone() } else { input::open(&args.b, threads, console)? };
+    let semantics = args.thickened.map_or(Semantics::Surface, Semantics::Thickened);
+    let detail = match args.detail {
+        DetailName::Verdict => Detail::Verdict,
+        DetailName::Witness => Detail::Witness,
+    };
+    let options = CollideOptions::default().with_semantics(semantics).with_detail(detail);
+    let plan = CollidePlan::new(&options, &a, &b)?;
+    let question = Question { a, b, plan, budget: args.budget, work: args.work };
+
+    let mut results = Results::new();
+    if let Some(poses) = &mut poses {
+        answer_all(&question, poses, args, &mut results)?;
+        return results.flush();
+    }
+    let placed = |name: &str, matrix, scan| {
+        posing::of_scan(matrix, scan).map_err(|cause| CliError::Pose { place: name.into(), cause })
+    };
+    let poses =
+        [placed("--pose-a", &matrices[0], &question.a)?, placed("--pose-b", &matrices[1], &question.b)?];
+    let (answer, micros) = question.ask(&poses, &mut CollideScratch::default());
+    let asked = Asked { poses, answer, micros };
+    if let Some(path) = &args.image {
+        let bar = console.spinner(format_args!("painting {}", path.display()));
+        let (a, b) = (question.a.at(&poses[0]), question.b.at(&poses[1]));
+        picture::contact_picture(&a, &b, &asked.answer).save(path)?;
+        drop(bar);
+    }
+    question.tell(&mut results, &asked, args)?;
+    results.flush()
+}
+
+/// Poses held at a time when several threads answer.
+const BATCH: usize = 1024;
+
+/// An answer a line, in order; holds no more than a batch.
+fn answer_all(
+    question: &Question,
+    poses: &mut PoseFile,
+    args: &CollideArgs,
+    results: &mut Results,
+) -> Result<(), CliError> {
+    let threads = args.threads.unwrap_or(1);
+    if threads == 1 {
+        let mut scratch = CollideScratch::default();
+        while let Some(poses) = next(question, poses, results)? {
+            let (answer, micros) = question.ask(&poses, &mut scratch);
+            question.tell(results, &Asked { poses, answer, micros }, args)?;
+        }
+        return Ok(());
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.or(Err(CliError::Threads(threads)))?;
+    loop {
+        let mut batch = Vec::with_capacity(BATCH);
+        let mut failed = None;
+        while batch.len() < BATCH {
+            match next(question, poses, results) {
+                Ok(Some(poses)) => batch.push(poses),
+                Ok(None) => break,
+                Err(error) => {
+                    failed = Some(error);
+                    break;
+                }
+            }
+        }
+        let ask = |scratch: &mut CollideScratch, poses: &[Pose; 2]| {
+            let (answer, micros) = question.ask(poses, scratch);
+            Asked { poses: *poses, answer, micros }
+        };
+        let answers: Vec<Asked> =
+            pool.install(|| batch.par_iter().map_init(CollideScratch::default, ask).collect());
+        for asked in &answers {
+            question.tell(results, asked, args)?;
+        }
+        if let Some(error) = failed {
+            results.flush()?;
+            return Err(error);
+        }
+        if answers.len() < BATCH {
+            return Ok(());
+        }
+    }
+}
+
+/// The next poses; what was answered before a faulty line is told before the fault.
+fn next(
+    question: &Question,
+    poses: &mut PoseFile,
+    results: &mut Results,
+) -> Result<Option<[Pose; 2]>, CliError> {
+    let next = poses.next(&question.a, &question.b);
+    if next.is_err() {
+        results.flush()?;
+    }
+    next
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_need_a_unit() {
+        for (text, nanos) in
+            [("200us", 200_000), ("1.5ms", 1_500_000), ("20ns", 20), ("0s", 0), ("3µs", 3000)]
+        {
+            assert_eq!(parse_duration(text).map(|d| d.as_nanos()), Ok(nanos), "{text}");
+        }
+        for text in ["", "200", "us", "-1us", "1 us", "1min", "nans", "1e400s"] {
+            assert!(parse_duration(text).is_err(), "{text}");
+        }
+    }
+}

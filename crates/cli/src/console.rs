@@ -1,0 +1,111 @@
+//! What people see beside the results: progress, warnings, errors; and the clock.
+
+use std::fmt::Display;
+use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+
+use crate::error::CliError;
+
+/// Standard error. Failing to write there is ignored: there is nowhere left to say so.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Console {
+    bars: bool,
+}
+
+impl Console {
+    pub(crate) fn new(quiet: bool) -> Self {
+        Self { bars: !quiet && io::stderr().is_terminal() }
+    }
+
+    /// A sign of life for a step of unknown length; gone when dropped.
+    pub(crate) fn spinner(self, what: impl Display) -> Bar {
+        let bar = self.bar(ProgressBar::new_spinner(), "{spinner} {msg} {elapsed}");
+        bar.set_message(what.to_string());
+        if self.bars {
+            bar.enable_steady_tick(Duration::from_millis(100));
+        }
+        Bar(bar)
+    }
+
+    /// A bar for `length` steps; gone when dropped.
+    pub(crate) fn steps(self, what: impl Display, length: u64) -> Bar {
+        let bar = self.bar(ProgressBar::new(length), "{msg} [{bar:30}] {pos}/{len} {eta}");
+        bar.set_message(what.to_string());
+        Bar(bar)
+    }
+
+    fn bar(self, bar: ProgressBar, template: &str) -> ProgressBar {
+        let target = if self.bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        bar.set_draw_target(target);
+        bar.with_style(
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+        )
+    }
+}
+
+/// Progress on a terminal, which leaves no trace.
+#[derive(Debug)]
+pub(crate) struct Bar(ProgressBar);
+
+impl Bar {
+    pub(crate) fn advance(&self, steps: u64) {
+        self.0.inc(steps);
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Something that the user ought to know, on standard error.
+pub(crate) fn warn(what: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "warning: {what}");
+}
+
+/// Says why the command failed, if there is anything to say.
+pub(crate) fn fail(error: &CliError) -> ExitCode {
+    if !error.is_silent() {
+        let _ = writeln!(io::stderr().lock(), "error: {error}");
+    }
+    ExitCode::from(error.status())
+}
+
+/// Standard output, for results alone.
+#[derive(Debug)]
+pub(crate) struct Results {
+    out: BufWriter<StdoutLock<'static>>,
+}
+
+impl Results {
+    pub(crate) fn new() -> Self {
+        Self { out: BufWriter::with_capacity(1 << 16, io::stdout().lock()) }
+    }
+
+    /// A line for people.
+    pub(crate) fn line(&mut self, text: impl Display) -> Result<(), CliError> {
+        writeln!(self.out, "{text}").map_err(CliError::Stdout)
+    }
+
+    /// A line of JSON.
+    pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), CliError> {
+        serde_json::to_writer(&mut self.out, value).map_err(|e| CliError::Stdout(e.into()))?;
+        self.line("")
+    }
+
+    /// Hands over what has been gathered; without it, errors at the end would go unnoticed.
+    pub(crate) fn flush(&mut self) -> Result<(), CliError> {
+        self.out.flush().map_err(CliError::Stdout)
+    }
+}
+
+/// The time. Binaries may read clocks; this is the one place where ours does.
+#[expect(clippy::disallowed_methods, reason = "answers and reports say how long they took")]
+pub(crate) fn now() -> Instant {
+    Instant::now()
+}

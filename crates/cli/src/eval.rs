@@ -1,0 +1,101 @@
+//! `eval`: the implicit function at given points.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nearmiss::hierarchy::GatherScratch;
+use nearmiss::{Evaluation, Pose, Status};
+use serde::Serialize;
+
+use crate::console::{Console, Results};
+use crate::error::CliError;
+use crate::input::{self, TextLines, pieces};
+use crate::report::{place, short};
+
+/// Options of `eval`.
+#[derive(Debug, Clone, Args)]
+pub struct EvalArgs {
+    /// Prepared scan, or a raw input, prepared on the fly
+    #[arg(value_name = "FILE.nm")]
+    pub file: PathBuf,
+    /// Where to evaluate: a point a line, x y z, in the frame of the scan's input
+    #[arg(long, value_name = "FILE")]
+    pub points: PathBuf,
+    /// One object of JSON a line instead of sentences
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    f: Option<f64>,
+    normal: Option<[f64; 3]>,
+    centroid: [f64; 3],
+    support: u32,
+    status: Status,
+}
+
+pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
+    let mut lines = TextLines::open(&args.points)?;
+    let scan = input::open(&args.file, 0, Console::new(false))?;
+    let view = scan.at(&Pose::IDENTITY);
+    let unit = scan.sampling_radius() / 100.0;
+    let mut scratch = GatherScratch::default();
+    let mut results = Results::new();
+    while let Some(x) = next_point(&mut lines)? {
+        let at = view.evaluate_with(x, &mut scratch);
+        if args.json {
+            let defined = at.status == Status::Ok;
+            results.json(&Report {
+                f: defined.then_some(at.f),
+                normal: defined.then_some(at.normal),
+                centroid: at.centroid,
+                support: at.support,
+                status: at.status,
+            })?;
+        } else {
+            results.line(sentence(&at, unit))?;
+        }
+    }
+    results.flush()
+}
+
+fn sentence(at: &Evaluation, unit: f64) -> String {
+    let support = at.support;
+    match at.status {
+        Status::Ok => {
+            let normal = place(at.normal, 0.001);
+            format!(
+                "f = {}, normal {normal}, mean {}, support {support}",
+                short(at.f),
+                place(at.centroid, unit)
+            )
+        }
+        Status::Outside => format!("outside: {support} points reach here, too few"),
+        Status::Border => format!("border: off the surface, or beyond its border; support {support}"),
+        _ => format!("ambiguous: the points here do not look like one sheet; support {support}"),
+    }
+}
+
+/// The point on the next line that holds one; comments start with `#` or `//`.
+fn next_point(lines: &mut TextLines) -> Result<Option<[f64; 3]>, CliError> {
+    while let Some((_, text)) = lines.next_filled()? {
+        if text.starts_with('#') || text.starts_with("//") {
+            continue;
+        }
+        let mut columns = pieces(&text);
+        let mut point = [0.0; 3];
+        for (name, slot) in ["x", "y", "z"].into_iter().zip(&mut point) {
+            let Some(piece) = columns.next() else {
+                return Err(lines.fault(format!("the line ends before column `{name}`; a line is x y z")));
+            };
+            let number = piece.parse::<f64>().ok().filter(|c| c.is_finite());
+            *slot = number.ok_or_else(|| {
+                let shown: String = piece.chars().take(40).flat_map(char::escape_debug).collect();
+                lines.fault(format!("`{shown}` in column `{name}` is not a finite number; a line is x y z"))
+            })?;
+        }
+        return Ok(Some(point));
+    }
+    Ok(None)
+}

@@ -1,0 +1,148 @@
+//! Scans, prepared or raw, and rows of text.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use nearmiss::io::{Format, Model};
+use nearmiss::{BuildOptions, Check, Scan};
+
+use crate::console::{self, Console};
+use crate::error::CliError;
+use crate::report::short;
+
+/// First bytes of a prepared scan, also of one whose line ends were translated on the way.
+const MAGIC: &[u8] = b"\x8Enmiss";
+
+/// A mesh whose faces cover more than this share of its surface with longer edges than [`LONG`] is warned about.
+const LONG_SHARE: f64 = 0.05;
+
+/// In sampling radii.
+const LONG: f64 = 3.0;
+
+/// A line longer than this is no line of ours.
+const LONGEST_LINE: u64 = 1 << 20;
+
+/// Whether the file is, or by its name ought to be, a prepared scan.
+pub(crate) fn is_prepared(path: &Path) -> bool {
+    let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("nm"));
+    let mut head = [0; MAGIC.len()];
+    // Asked first, because opening a pipe waits for its other end.
+    let is_file = path.metadata().is_ok_and(|m| m.is_file());
+    named || is_file && File::open(path).and_then(|mut f| f.read_exact(&mut head)).is_ok() && head == MAGIC
+}
+
+/// Opens a prepared scan, or prepares a raw input on `threads` threads with default options.
+pub(crate) fn open(path: &Path, threads: usize, console: Console) -> Result<Scan, CliError> {
+    if is_prepared(path) {
+        return Scan::open(path, Check::Full).map_err(CliError::loading(path));
+    }
+    let bar = console.spinner(format_args!("reading {}", path.display()));
+    let model = read(path, None)?;
+    drop(bar);
+    let bar = console.spinner(format_args!("preparing {}", path.display()));
+    let scan = build(path, &model, &BuildOptions::default().with_threads(threads))?;
+    drop(bar);
+    Ok(scan)
+}
+
+/// Reads a raw input.
+pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliError> {
+    if is_prepared(path) {
+        let what =
+            "this is, or is named like, a prepared scan; name the point cloud or mesh it came from".into();
+        return Err(CliError::Unfit { path: path.to_owned(), what });
+    }
+    Ok(nearmiss::io::read(path, format)?)
+}
+
+/// Prepares what was read, and warns where the points do not do the input justice.
+pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Result<Scan, CliError> {
+    let scan = Scan::build(&model.cloud, options)
+        .map_err(|cause| CliError::Build { path: path.to_owned(), cause })?;
+    let radius = scan.sampling_radius();
+    if scan.step() > radius / 100.0 {
+        console::warn(format_args!(
+            "{}: single precision moves points by up to {}, more than a hundredth of the sampling radius \
+             {}; shift or split the input, so that it spans less",
+            path.display(),
+            short(scan.step()),
+            short(radius)
+        ));
+    }
+    let share = share_of_long_faces(model, LONG * radius);
+    if share > LONG_SHARE {
+        console::warn(format_args!(
+            "{}: {:.0} % of the mesh's surface lies in faces with edges longer than {LONG} sampling radii \
+             ({}); only vertices become points, so it has holes there: subdivide the faces or sample them",
+            path.display(),
+            100.0 * share,
+            short(LONG * radius),
+        ));
+    }
+    Ok(scan)
+}
+
+/// By area; 0 of what has no faces.
+fn share_of_long_faces(model: &Model, long: f64) -> f64 {
+    let Some(mesh) = &model.mesh else { return 0.0 };
+    let (mut whole, mut in_long) = (0.0, 0.0);
+    for (i, corners) in mesh.triangles().iter().enumerate() {
+        let [a, b, c] = corners.map(|v| mesh.vertices()[v as usize]);
+        let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+        let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let area = 0.5 * cross.iter().map(|x| x * x).sum::<f64>().sqrt();
+        whole += area;
+        if mesh.longest_edge(i) > long {
+            in_long += area;
+        }
+    }
+    if whole > 0.0 { in_long / whole } else { 0.0 }
+}
+
+/// The filled lines of a text file, one at a time.
+#[derive(Debug)]
+pub(crate) struct TextLines {
+    path: PathBuf,
+    reader: BufReader<File>,
+    number: u64,
+}
+
+impl TextLines {
+    pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
+        let file = File::open(path).map_err(CliError::reading(path))?;
+        Ok(Self { path: path.to_owned(), reader: BufReader::with_capacity(1 << 16, file), number: 0 })
+    }
+
+    /// The next line that is not blank, with its number, counted from 1.
+    pub(crate) fn next_filled(&mut self) -> Result<Option<(u64, String)>, CliError> {
+        loop {
+            let mut bytes = Vec::new();
+            self.number += 1;
+            let taken = (&mut self.reader).take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+            let length = taken.map_err(CliError::reading(&self.path))?;
+            if length == 0 {
+                return Ok(None);
+            }
+            if length as u64 == LONGEST_LINE {
+                return Err(self.fault("the line is longer than a mebibyte; is this a text file?"));
+            }
+            let start: &[u8] = if self.number == 1 { b"\xef\xbb\xbf" } else { b"" };
+            let text = std::str::from_utf8(bytes.strip_prefix(start).unwrap_or(&bytes)).ok();
+            let text = text.ok_or_else(|| self.fault("the line is no UTF-8 text"))?.trim();
+            if !text.is_empty() {
+                return Ok(Some((self.number, text.to_owned())));
+            }
+        }
+    }
+
+    /// A fault on the line returned last.
+    pub(crate) fn fault(&self, what: impl Into<String>) -> CliError {
+        CliError::Line { path: self.path.clone(), line: self.number, what: what.into() }
+    }
+}
+
+/// The pieces of a row of numbers: divided by white space, commas or semicolons.
+pub(crate) fn pieces(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|p| !p.is_empty())
+}

@@ -1,0 +1,58 @@
+//! `inspect`: what a prepared scan holds.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nearmiss::store::File;
+use nearmiss::{Check, Scan};
+use serde::Serialize;
+
+use crate::console::Results;
+use crate::error::CliError;
+use crate::report::{ScanReport, health};
+
+/// Options of `inspect`.
+#[derive(Debug, Clone, Args)]
+pub struct InspectArgs {
+    /// Prepared scan
+    #[arg(value_name = "FILE.nm")]
+    pub file: PathBuf,
+    /// Check every checksum, and every id and number against the others
+    #[arg(long)]
+    pub verify: bool,
+    /// One object of JSON instead of sentences
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    format_version: u32,
+    #[serde(flatten)]
+    scan: ScanReport,
+}
+
+pub(crate) fn run(args: &InspectArgs) -> Result<(), CliError> {
+    let loading = || CliError::loading(&args.file);
+    // Everything read is compared with its checksum, asked for or not: it costs one pass over the file.
+    let scan = Scan::open(&args.file, Check::Full).map_err(loading())?;
+    let file = File::open(&args.file, Check::Structure).map_err(|e| loading()(e.into()))?;
+    if args.verify {
+        scan.sanity_check()
+            .map_err(|flaw| CliError::Insane { path: args.file.clone(), what: flaw.to_string() })?;
+    }
+    let report = Report { format_version: file.version(), scan: ScanReport::new(&scan, file.byte_len()) };
+    let mut results = Results::new();
+    if args.json {
+        results.json(&report)?;
+        return results.flush();
+    }
+    results.line(format_args!("format     version {}", report.format_version))?;
+    for line in report.scan.lines().into_iter().chain(health(&scan)) {
+        results.line(line)?;
+    }
+    if args.verify {
+        results.line("verified   every checksum and every id is right")?;
+    }
+    results.flush()
+}

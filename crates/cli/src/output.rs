@@ -1,0 +1,87 @@
+//! Files written whole or not at all.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::CliError;
+
+/// Whether a file could be put at `path`, asked before the work that would fill it.
+pub(crate) fn check(path: &Path) -> Result<(), CliError> {
+    let unfit = |what: &str| Err(CliError::Unfit { path: path.to_owned(), what: what.to_owned() });
+    match fs::metadata(path) {
+        Ok(there) if there.is_dir() => return unfit("is a folder; name a file to write to"),
+        Ok(there) if !there.is_file() => {
+            return unfit("is a device or pipe; name a regular file to write to");
+        }
+        _ => {}
+    }
+    if path.file_name().is_none() {
+        return unfit("is no name of a file; name a file to write to");
+    }
+    let folder = folder(path);
+    if folder.is_dir() {
+        Ok(())
+    } else {
+        unfit(&format!("there is no folder {} to write to; make it first", folder.display()))
+    }
+}
+
+/// Refuses to replace one of the files read.
+pub(crate) fn check_apart(path: &Path, inputs: &[&Path]) -> Result<(), CliError> {
+    check(path)?;
+    let Ok(target) = path.canonicalize() else { return Ok(()) };
+    match inputs.iter().find(|i| i.canonicalize().is_ok_and(|i| i == target)) {
+        Some(input) => Err(CliError::Usage(format!(
+            "{}: this would replace the input {}; name another file to write to",
+            path.display(),
+            input.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Replaces the file at `path` by what `write` writes, or leaves everything as it was.
+pub(crate) fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    check(path)?;
+    let failed = CliError::writing;
+    // A link stays a link.
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut prefix: OsString = target.file_name().unwrap_or_default().to_owned();
+    prefix.push(".tmp-");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // What any program asks for when it creates a file; the umask takes its share.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    let temporary = builder.tempfile_in(folder(&target)).map_err(failed(path))?;
+    let mut out = BufWriter::with_capacity(1 << 16, temporary.as_file());
+    write(&mut out)?;
+    out.flush().map_err(failed(path))?;
+    drop(out);
+    temporary.as_file().sync_all().map_err(failed(path))?;
+    temporary.persist(&target).map_err(|refused| failed(path)(refused.error))?;
+    Ok(())
+}
+
+/// The same for writers that fail with the system's errors alone.
+pub(crate) fn replace_plain(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&fs::File>) -> io::Result<()>,
+) -> Result<(), CliError> {
+    replace(path, |out| write(out).map_err(CliError::writing(path)))
+}
+
+fn folder(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if folder != Path::new("") => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}

@@ -1,0 +1,192 @@
+//! `poses`: a sweep over distances, or poses about first contact.
+//!
+//! Both scans are scaled so that the longest side of their bounding box is 2, and centred. a stays, b is turned at
+//! random and lies at a distance d from a in a random direction.
+
+use std::f64::consts::TAU;
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use nearmiss::{Pose, Scan};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::console::{Bar, Console};
+use crate::error::CliError;
+use crate::{input, output};
+
+mod approach;
+
+use approach::Approach;
+
+/// Options of `poses`. Either a sweep or poses near contact are asked for.
+///
+/// Both scans are scaled so that the longest side of their bounding box is 2, and centred; a stays.
+#[derive(Debug, Clone, Args)]
+#[command(group = clap::ArgGroup::new("kind").required(true).args(["sweep", "near"]))]
+pub struct PosesArgs {
+    /// The scan that stays: prepared, or a raw input, prepared on the fly
+    pub a: PathBuf,
+    /// The scan that is turned and moved
+    pub b: PathBuf,
+    /// Distances from 0 to 3 in steps of 0.25, with random rotations and directions at each
+    #[arg(long)]
+    pub sweep: bool,
+    /// Shifts by up to 10 r from first touch, half of them apart. They touch at a least point distance of r/2; r is
+    /// the greater sampling radius. Found by bisection on that distance
+    #[arg(long)]
+    pub near: bool,
+    /// Poses at each distance of a sweep; poses in all near contact
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    pub per_distance: u32,
+    /// Seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// File to write, a pair of poses a line
+    #[arg(short, long, value_name = "F.jsonl")]
+    pub output: PathBuf,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Distances of a sweep: 0, 0.25, … 3.
+const DISTANCES: u32 = 13;
+
+/// Between two of them.
+const STEP: f64 = 0.25;
+
+/// A line of the file.
+#[derive(Debug, Serialize)]
+struct Line {
+    a: [f64; 16],
+    b: [f64; 16],
+    /// Between the centres.
+    d: f64,
+    /// Shift from first touch, positive apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset: Option<f64>,
+}
+
+pub(crate) fn run(args: &PosesArgs) -> Result<(), CliError> {
+    output::check_apart(&args.output, &[&args.a, &args.b])?;
+    let console = Console::new(args.quiet);
+    let a = input::open(&args.a, 0, console)?;
+    let b = if args.a == args.b { a.clone() } else { input::open(&args.b, 0, console)? };
+    let [base_a, base_b] = [(&args.a, &a), (&args.b, &b)].map(|(path, scan)| {
+        let what = || "all points lie in one place, so it cannot be scaled to a size of 2".into();
+        normalised(scan).ok_or_else(|| CliError::Unfit { path: path.clone(), what: what() })
+    });
+    let bases = [base_a?, base_b?];
+    if args.near {
+        let lines = near(args, [&a, &b], bases, console)?;
+        write(args, lines.into_iter())
+    } else {
+        let count = u64::from(DISTANCES) * u64::from(args.per_distance);
+        let bar = console.steps("making poses", count);
+        let per_distance = u64::from(args.per_distance);
+        let lines = (0..count).map(|i| {
+            bar.advance(1);
+            #[expect(clippy::cast_precision_loss, reason = "0 to 12")]
+            let d = (i / per_distance) as f64 * STEP;
+            let (turn, direction) = placement(&mut rng(args.seed, i));
+            Line {
+                a: bases[0].to_row_major(),
+                b: at(&turn, direction, d, &bases[1]).to_row_major(),
+                d,
+                offset: None,
+            }
+        });
+        write(args, lines)
+    }
+}
+
+fn write(args: &PosesArgs, mut lines: impl Iterator<Item = Line>) -> Result<(), CliError> {
+    output::replace_plain(&args.output, |out| {
+        lines.try_for_each(|line| {
+            serde_json::to_writer(&mut *out, &line)?;
+            writeln!(out)
+        })
+    })
+}
+
+/// Scale and shift that make the longest side of the bounds 2, and centre them; none for bounds without extent.
+fn normalised(scan: &Scan) -> Option<Pose> {
+    let bounds = scan.bounds();
+    let scale = 1.0 / bounds.half_extents().into_iter().fold(0.0, f64::max);
+    let centre = bounds.centre();
+    (scale.is_finite() && scale > 0.0)
+        .then(|| Pose::IDENTITY.with_scale(scale).with_translation(centre.map(|c| -c * scale)))
+}
+
+/// b turned and at distance `d`.
+fn at(turn: &Pose, direction: [f64; 3], d: f64, base: &Pose) -> Pose {
+    turn.with_translation(direction.map(|c| c * d)).after(base)
+}
+
+/// The generator of the `i`-th pose, so that poses can be made in any order.
+fn rng(seed: u64, i: u64) -> Xoshiro256PlusPlus {
+    // Consecutive states of a generator of its own, so that seeds 0 and 1 share no pose.
+    let mut of_seed = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let key: u64 = of_seed.random();
+    Xoshiro256PlusPlus::seed_from_u64(key ^ i.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+}
+
+/// A uniform rotation (Shoemake, "Uniform random rotations", Graphics Gems III, 1992) and a uniform direction.
+fn placement(rng: &mut Xoshiro256PlusPlus) -> (Pose, [f64; 3]) {
+    let share: f64 = rng.random();
+    let [s, t, phi] = [0; 3].map(|_| rng.random::<f64>() * TAU);
+    let (low, high) = ((1.0 - share).sqrt(), share.sqrt());
+    let turn = Pose::from_quaternion([low * s.sin(), low * s.cos(), high * t.sin(), high * t.cos()]);
+    let z = rng.random_range(-1.0..=1.0_f64);
+    let level = (1.0 - z * z).sqrt();
+    (turn, [level * phi.cos(), level * phi.sin(), z])
+}
+
+/// Shifts go as far as this many sampling radii from first touch.
+const FARTHEST: f64 = 10.0;
+
+/// Turns and directions that are tried before it is given up that two scans touch at all.
+const TRIES: usize = 200;
+
+fn near(
+    args: &PosesArgs,
+    scans: [&Scan; 2],
+    bases: [Pose; 2],
+    console: Console,
+) -> Result<Vec<Line>, CliError> {
+    let [ra, rb] = [0, 1].map(|k| scans[k].sampling_radius() * bases[k].scale());
+    let radius = ra.max(rb);
+    let approach = Approach::new(scans, &bases[0], 0.5 * radius, 0.02 * radius);
+    let bar: Bar = console.steps("making poses", u64::from(args.per_distance));
+    let line = |i: u32| {
+        let mut rng = rng(args.seed, u64::from(i));
+        let line = (0..TRIES).find_map(|_| {
+            let (turn, direction) = placement(&mut rng);
+            let touch = approach.first_touch(|d| at(&turn, direction, d, &bases[1]))?;
+            let shift: f64 = rng.random_range(0.0..FARTHEST) * radius;
+            let offset = if i.is_multiple_of(2) { shift } else { -shift };
+            let d = touch + offset;
+            Some(Line {
+                a: bases[0].to_row_major(),
+                b: at(&turn, direction, d, &bases[1]).to_row_major(),
+                d,
+                offset: Some(offset),
+            })
+        });
+        bar.advance(1);
+        line.ok_or_else(|| CliError::Unfit {
+            path: args.b.clone(),
+            what: format!(
+                "it slid through {} in {TRIES} random directions without a point distance of {:.2e} or less (half \
+                 a sampling radius, at a size of 2); are these scans surfaces?",
+                args.a.display(),
+                0.5 * radius
+            ),
+        })
+    };
+    (0..args.per_distance).into_par_iter().map(line).collect()
+}

@@ -1,0 +1,104 @@
+//! Poses from the command line and from files.
+
+use std::path::Path;
+
+use nearmiss::{Pose, PoseError, Scan};
+use serde::Deserialize;
+
+use crate::error::CliError;
+use crate::input::{TextLines, pieces};
+
+/// A matrix as given, row-major.
+pub(crate) type Matrix = [f64; 16];
+
+/// The matrix of an option: sixteen numbers, or a file that holds them; the identity if not given.
+pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, CliError> {
+    let Some(given) = given else { return Ok(Pose::IDENTITY.to_row_major()) };
+    if let Ok(matrix) = parse(given) {
+        return Ok(matrix);
+    }
+    let path = Path::new(given);
+    if !path.is_file() {
+        let what = match parse(given) {
+            Err(what) if pieces(given).nth(1).is_some() => what,
+            _ => format!("`{given}` is neither sixteen numbers nor a file that holds them"),
+        };
+        return Err(CliError::Usage(format!(
+            "{option}: {what}; a pose is a row-major 4×4 matrix, divided by commas or spaces, in one argument"
+        )));
+    }
+    let text = std::fs::read_to_string(path).map_err(CliError::reading(path))?;
+    parse(&text).map_err(|what| CliError::Unfit { path: path.to_owned(), what })
+}
+
+/// Sixteen numbers, brackets allowed.
+fn parse(text: &str) -> Result<Matrix, String> {
+    let bare = text.replace(['[', ']'], " ");
+    let mut matrix = [0.0; 16];
+    let mut count = 0;
+    for piece in pieces(&bare) {
+        let number = piece.parse().map_err(|_not_a_number| {
+            let shown: String = piece.chars().take(40).flat_map(char::escape_debug).collect();
+            format!("`{shown}` is not a number")
+        })?;
+        if let Some(slot) = matrix.get_mut(count) {
+            *slot = number;
+        }
+        count += 1;
+    }
+    if count == 16 { Ok(matrix) } else { Err(format!("{count} numbers where 16 belong")) }
+}
+
+/// The pose nearest to `matrix`, unless that moves the scan's bounds by more than a tenth of its sampling radius.
+pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseError> {
+    let row = |i: usize| [matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]];
+    let [x, y, z] = [row(0), row(1), row(2)];
+    let determinant = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
+        + x[2] * (y[0] * z[1] - y[1] * z[0]);
+    // Both in world units, so lengths of the object scale.
+    let tolerance = 0.1 * scan.sampling_radius() * determinant.abs().cbrt();
+    Pose::from_row_major(matrix, scan.bounds(), tolerance)
+}
+
+/// A line of a file of poses. Other fields are ignored.
+#[derive(Debug, Deserialize)]
+struct PoseLine {
+    a: Vec<f64>,
+    b: Vec<f64>,
+}
+
+/// A file with a query's two poses on each line.
+#[derive(Debug)]
+pub(crate) struct PoseFile {
+    lines: TextLines,
+}
+
+impl PoseFile {
+    pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
+        Ok(Self { lines: TextLines::open(path)? })
+    }
+
+    /// The poses on the next line that is not blank.
+    pub(crate) fn next(&mut self, a: &Scan, b: &Scan) -> Result<Option<[Pose; 2]>, CliError> {
+        let Some((_, text)) = self.lines.next_filled()? else { return Ok(None) };
+        let line: PoseLine = serde_json::from_str(&text).map_err(|e| {
+            let message = e.to_string();
+            let what = message.split(" at line ").next().unwrap_or_default();
+            self.lines.fault(format!(
+                "column {}: {what}; a line is {{\"a\":[16 numbers],\"b\":[16 numbers]}}",
+                e.column()
+            ))
+        })?;
+        Ok(Some([self.pose("a", &line.a, a)?, self.pose("b", &line.b, b)?]))
+    }
+
+    fn pose(&self, name: &str, numbers: &[f64], scan: &Scan) -> Result<Pose, CliError> {
+        let matrix: &Matrix = numbers.try_into().map_err(|_wrong_count| {
+            self.lines.fault(format!(
+                "`{name}` has {} numbers where 16 belong, a row-major 4×4 matrix",
+                numbers.len()
+            ))
+        })?;
+        of_scan(matrix, scan).map_err(|cause| self.lines.fault(format!("`{name}`: {cause}")))
+    }
+}

@@ -1,0 +1,158 @@
+//! `preprocess`: build once, save to disk.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use nearmiss::io::Format;
+use nearmiss::{Bandwidth, BuildOptions, Kernel, SurfaceOptions};
+use serde::Serialize;
+
+use crate::console::{Console, Results, now};
+use crate::error::CliError;
+use crate::report::{ScanReport, health};
+use crate::{input, output};
+
+/// Options of `preprocess`.
+#[derive(Debug, Clone, Args)]
+pub struct PreprocessArgs {
+    /// Point cloud (PLY, PCD, XYZ or CSV text) or mesh (OBJ, PLY with faces), of which the vertices are the points
+    pub input: PathBuf,
+    /// Prepared scan to write, usually named `.nm`; replaced in one step if it is there
+    #[arg(short, long, value_name = "OUT.nm")]
+    pub output: PathBuf,
+    /// Format of the input: ply, pcd, xyz, obj, or auto, by content and name
+    #[arg(long, default_value = "auto", value_parser = parse_format)]
+    pub format: FormatChoice,
+    /// K: local radii reach to the K-th neighbour, further where the points look like lines; 3 to 32
+    #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32))]
+    pub radius_neighbours: u32,
+    /// Weight of a point by its distance
+    #[arg(long, value_enum, default_value_t = WeightName::Gaussian)]
+    pub weight: WeightName,
+    /// Width of the weight: local (follows the spacing), global (from the sampling radius), or a length
+    #[arg(long, value_name = "local|global|M", default_value = "local", allow_hyphen_values = true, value_parser = parse_bandwidth)]
+    pub bandwidth: Bandwidth,
+    /// Points in a leaf of the hierarchy, 4 to 64
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(4..=64))]
+    pub leaf: u32,
+    /// Threads to work on, 0 for all cores; the result is the same
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
+    pub threads: usize,
+    /// One object of JSON instead of sentences
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// A format, or none for whatever content and name say.
+#[derive(Debug, Clone, Copy)]
+pub struct FormatChoice(
+    /// The format.
+    pub Option<Format>,
+);
+
+/// A weight function, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum WeightName {
+    /// exp(−d²/h²), cut off where it is small
+    Gaussian,
+    /// Wendland's C² function, zero from a finite distance on
+    Wendland,
+}
+
+fn parse_format(name: &str) -> Result<FormatChoice, String> {
+    if name.eq_ignore_ascii_case("auto") {
+        return Ok(FormatChoice(None));
+    }
+    name.parse().map(|f| FormatChoice(Some(f))).map_err(|e: nearmiss::io::UnknownFormatName| e.to_string())
+}
+
+fn parse_bandwidth(text: &str) -> Result<Bandwidth, String> {
+    match (text, text.parse::<f64>()) {
+        ("local", _) => Ok(Bandwidth::Local),
+        ("global", _) => Ok(Bandwidth::Global),
+        (_, Ok(h)) if h > 0.0 && h.is_finite() => Ok(Bandwidth::Fixed(h)),
+        _ => Err("expected local, global, or a positive length".into()),
+    }
+}
+
+/// More threads than this help nobody, and may not start.
+const MOST_THREADS: usize = 1024;
+
+pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n <= MOST_THREADS => Ok(n),
+        _ => Err(format!("expected a number from 0, for all cores, to {MOST_THREADS}")),
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    scan: ScanReport,
+    seconds: Seconds,
+}
+
+#[derive(Debug, Serialize)]
+struct Seconds {
+    read: f64,
+    hierarchy: f64,
+    graph: f64,
+    write: f64,
+}
+
+pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
+    output::check_apart(&args.output, &[&args.input])?;
+    let console = Console::new(args.quiet);
+    let name = args.input.display();
+
+    let start = now();
+    let bar = console.spinner(format_args!("reading {name}"));
+    let model = input::read(&args.input, args.format.0)?;
+    drop(bar);
+    let read = start.elapsed().as_secs_f64();
+
+    let start = now();
+    let bar = console.spinner(format_args!("preparing {} points", model.cloud.len()));
+    let scan = input::build(&args.input, &model, &options(args))?;
+    drop(bar);
+    let hierarchy = start.elapsed().as_secs_f64();
+
+    let start = now();
+    let bar = console.spinner(format_args!("writing {}", args.output.display()));
+    let bytes = scan.save(&args.output)?;
+    drop(bar);
+    let write = start.elapsed().as_secs_f64();
+
+    let seconds = Seconds { read, hierarchy, graph: 0.0, write };
+    let report = Report { scan: ScanReport::new(&scan, bytes), seconds };
+    let mut results = Results::new();
+    if args.json {
+        results.json(&report)?;
+    } else {
+        for line in report.scan.lines() {
+            results.line(line)?;
+        }
+        let Seconds { read, hierarchy, write, .. } = report.seconds;
+        results
+            .line(format_args!("seconds    read {read:.2}, hierarchy {hierarchy:.2}, write {write:.2}"))?;
+        for line in health(&scan) {
+            results.line(line)?;
+        }
+    }
+    results.flush()
+}
+
+fn options(args: &PreprocessArgs) -> BuildOptions {
+    let kernel = match args.weight {
+        WeightName::Gaussian => Kernel::Gaussian,
+        WeightName::Wendland => Kernel::Wendland,
+    };
+    BuildOptions::default()
+        .with_surface(SurfaceOptions::default().with_kernel(kernel).with_bandwidth(args.bandwidth))
+        .with_radius_neighbours(args.radius_neighbours)
+        .with_leaf_size(args.leaf)
+        .with_threads(args.threads)
+}

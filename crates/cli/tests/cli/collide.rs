@@ -1,0 +1,241 @@
+//! `collide`.
+
+use nearmiss_testdata::dragon::{Dragon, dragon_path};
+use nearmiss_testdata::shapes::sphere;
+use serde_json::Value;
+
+use crate::common::{Place, keys, name, numbers, shift, sorted};
+
+const FIELDS: &str = "verdict evidence reason witness normal_a normal_b residual source_a source_b gap \
+                      distance_estimate likelihood evaluations node_pairs leaf_pairs micros";
+
+fn balls() -> Place {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.08);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    place
+}
+
+fn ask(place: &Place, options: &[&str]) -> Value {
+    let done = place.ok(&[&["collide", "ball.nm", "ball.nm", "--json"], options].concat());
+    assert_eq!(done.results.lines().count(), 1, "{}", done.results);
+    let answer = done.json().remove(0);
+    assert_eq!(keys(&answer), sorted(FIELDS));
+    answer
+}
+
+#[test]
+fn every_verdict_has_all_fields() {
+    let place = balls();
+    let touching = shift(1.2, 0.0, 0.0);
+    let hit = ask(&place, &["--pose-b", &touching]);
+    assert_eq!((&hit["verdict"], &hit["evidence"]), (&"intersecting".into(), &"certified".into()));
+    let witness = numbers(&hit["witness"]);
+    assert!((witness[0] - 0.6).abs() < 0.02, "the circle x = 0.6: {witness:?}");
+    assert!(hit["residual"].as_f64().unwrap() < 1e-6, "{hit}");
+    for normal in ["normal_a", "normal_b"] {
+        let length: f64 = numbers(&hit[normal]).iter().map(|x| x * x).sum();
+        assert!((length - 1.0).abs() < 1e-9, "{normal} of {hit}");
+    }
+    assert!(hit["source_a"].is_u64() && hit["source_b"].is_u64(), "{hit}");
+    for null in ["reason", "gap", "distance_estimate", "likelihood"] {
+        assert!(hit[null].is_null(), "{null} of {hit}");
+    }
+
+    let quick = ask(&place, &["--pose-b", &touching, "--detail", "verdict"]);
+    assert_eq!((&quick["verdict"], &quick["evidence"]), (&"intersecting".into(), &"estimated".into()));
+    assert_eq!(quick["evaluations"], 0);
+
+    let miss = ask(&place, &["--pose-b", &shift(2.5, 0.0, 0.0)]);
+    assert_eq!(miss["verdict"], "separated");
+    assert!(miss["gap"].as_f64().unwrap() <= 0.5, "{miss}");
+    assert!(miss["witness"].is_null() && miss["source_a"].is_null() && miss["residual"].is_null(), "{miss}");
+
+    let short = ask(&place, &["--pose-b", &touching, "--work", "3"]);
+    assert_eq!((&short["verdict"], &short["reason"]), (&"undecided".into(), &"budget".into()));
+    assert!(
+        short["evidence"].is_null() && (0.0..=1.0).contains(&short["likelihood"].as_f64().unwrap()),
+        "{short}"
+    );
+    let ample = ask(&place, &["--pose-b", &touching, "--budget", "10s", "--work", "1000000"]);
+    assert_eq!(ample["verdict"], "intersecting");
+}
+
+#[test]
+fn sources_are_indices_into_the_input() {
+    let place = balls();
+    let text = std::fs::read_to_string(place.path("ball.xyz")).unwrap();
+    let points: Vec<Vec<f64>> =
+        text.lines().map(|l| l.split(' ').map(|x| x.parse().unwrap()).collect()).collect();
+    let hit = ask(&place, &["--pose-b", &shift(0.0, 1.2, 0.0)]);
+    let witness = numbers(&hit["witness"]);
+    for (source, dy) in [("source_a", 0.0), ("source_b", 1.2)] {
+        let p = &points[usize::try_from(hit[source].as_u64().unwrap()).unwrap()];
+        let q = [p[0], p[1] + dy, p[2]];
+        let distance = (0..3).map(|k| (q[k] - witness[k]).powi(2)).sum::<f64>().sqrt();
+        assert!(distance < 0.2, "{source} is {distance} from the witness");
+    }
+}
+
+#[test]
+fn thickened_points_are_decided_exactly() {
+    let place = balls();
+    let apart = shift(3.0, 0.0, 0.0);
+    let hit = ask(&place, &["--pose-b", &apart, "--thickened", "0.51"]);
+    assert_eq!((&hit["verdict"], &hit["evidence"]), (&"intersecting".into(), &"certified".into()));
+    assert!(hit["normal_a"].is_null() && hit["residual"].as_f64().unwrap() <= 0.51, "{hit}");
+    let miss = ask(&place, &["--pose-b", &apart, "--thickened", "0.45"]);
+    assert_eq!((&miss["verdict"], &miss["evidence"]), (&"separated".into(), &"certified".into()));
+    assert!((0.0..=0.11).contains(&miss["gap"].as_f64().unwrap()), "{miss}");
+}
+
+#[test]
+fn people_read_sentences() {
+    let place = balls();
+    let say = |options: &[&str]| {
+        let done = place.ok(&[&["collide", "ball.nm", "ball.xyz"], options].concat());
+        done.results.lines().next().unwrap().to_owned()
+    };
+    let touch = say(&["--pose-b", &shift(1.2, 0.0, 0.0)]);
+    assert!(touch.starts_with("They touch at (0.6") && touch.contains("within"), "{touch}");
+    assert_eq!(
+        say(&["--pose-b", &shift(2.5, 0.0, 0.0), "--thickened", "0.1"]).split("; at").next(),
+        Some("No contact")
+    );
+    assert!(say(&["--pose-b", &shift(9.0, 0.0, 0.0)]).starts_with("No contact"));
+    let short = say(&["--pose-b", &shift(1.2, 0.0, 0.0), "--work", "1"]);
+    assert!(short.starts_with("Cannot tell: ") && short.contains("--work"), "{short}");
+}
+
+#[test]
+fn poses_come_as_numbers_brackets_or_files() {
+    let place = balls();
+    let spaced = shift(1.2, 0.0, 0.0);
+    let commas = spaced.replace(' ', ", ");
+    let file = place.write("pose.txt", spaced.replace(" 0 1 0 ", "\n0 1 0 "));
+    let negative = "-1 0 0 1.2 0 -1 0 0 0 0 1 0 0 0 0 1";
+    let witness = |m: &str| numbers(&ask(&place, &["--pose-b", m])["witness"]);
+    let expected = witness(&spaced);
+    assert_eq!(witness(&commas), expected);
+    assert_eq!(witness(&format!("[{commas}]")), expected);
+    assert_eq!(witness(name(&file)), expected);
+    assert!((witness(negative)[0] - 0.6).abs() < 0.05, "a turn about z");
+    let world = ask(&place, &["--pose-a", &shift(0.0, 0.0, 5.0), "--pose-b", &shift(1.2, 0.0, 5.0)]);
+    assert!((numbers(&world["witness"])[2] - 5.0).abs() < 1.1, "in the world: {world}");
+}
+
+#[test]
+fn a_file_of_poses_is_answered_in_order() {
+    let place = balls();
+    let matrix = |x: f64| format!("[{}]", shift(x, 0.0, 0.0).replace(' ', ","));
+    let mut lines = String::new();
+    for i in 0..2500_u32 {
+        let x = if i % 3 == 0 { 1.5 } else { 2.5 };
+        lines += &format!("{{\"a\":{},\"b\":{},\"truth\":null}}\n", matrix(0.0), matrix(x));
+        if i == 7 {
+            lines += "\n";
+        }
+    }
+    place.write("poses.jsonl", &lines);
+    let untimed = |threads: &str| {
+        let args =
+            ["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl", "--json", "--threads", threads];
+        let mut answers = place.ok(&args).json();
+        for answer in &mut answers {
+            assert!(answer["micros"].as_f64().unwrap() > 0.0, "{answer}");
+            answer["micros"] = Value::Null;
+        }
+        answers
+    };
+    let one = untimed("1");
+    assert_eq!(one.len(), 2500);
+    for (i, answer) in one.iter().enumerate() {
+        let expected = if i % 3 == 0 { "intersecting" } else { "separated" };
+        assert_eq!(answer["verdict"], expected, "line {i}");
+    }
+    assert_eq!(untimed("2"), one, "whatever the threads");
+    let people = place.ok(&["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl"]);
+    assert_eq!(people.results.lines().count(), 2500);
+}
+
+#[test]
+fn a_faulty_line_is_named_after_the_answers_before_it() {
+    let place = balls();
+    let identity = "[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]";
+    let good = format!("{{\"a\":{identity},\"b\":{identity}}}");
+    for (bad, word) in [
+        ("nonsense", "column 2"),
+        ("{\"a\":[1,2,3],\"b\":[]}", "`a` has 3 numbers"),
+        (&format!("{{\"a\":{identity}}}"), "missing field `b`"),
+        (&good.replace("0,0,0,1]}", "0,0,1,1]}"), "`b`: the last row"),
+        (&good.replacen("[1,0", "[2,0", 1), "`a`: the pose is not a rotation"),
+        (&good.replacen("[1,", "[-1,", 1), "determinant -1"),
+        (&good.replacen("[1,", "[1e999,", 1), "number out of range"),
+    ] {
+        place.write("poses.jsonl", format!("{good}\n\n{bad}\n{good}\n"));
+        for threads in ["1", "2"] {
+            let args =
+                ["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl", "--json", "--threads", threads];
+            let done = place.run(&args);
+            assert_eq!(done.status, 1, "{bad}");
+            assert!(done.errors.starts_with("error: poses.jsonl: line 3: "), "{bad}: {}", done.errors);
+            assert!(done.errors.contains(word), "`{word}` in {}", done.errors);
+            assert_eq!(done.json().len(), 1, "the answer before it: {bad}");
+        }
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_status_2() {
+    let place = balls();
+    let both = |options: &[&'static str]| [&["collide", "ball.nm", "ball.nm"], options].concat();
+    for (options, word) in [
+        (&["--pose-a", "1 2 3"][..], "3 numbers where 16 belong"),
+        (&["--pose-b", "elsewhere"], "`elsewhere` is neither"),
+        (&["--budget", "200"], "ns, us, ms, s"),
+        (&["--budget", "-3us"], "--budget"),
+        (&["--thickened", "-1"], "--thickened"),
+        (&["--thickened", "nan"], "--thickened"),
+        (&["--threads", "many"], "--threads"),
+        (&["--poses", "p.jsonl", "--pose-a", "x"], "cannot be used with"),
+        (&["--image", "ball.nm"], "would replace the input"),
+        (&["--detail", "manifold"], "manifold"),
+        (&["--margin", "1"], "--margin"),
+    ] {
+        place.refused(2, &both(options), &[word]);
+    }
+    place.refused(2, &["collide", "ball.nm"], &["<B>"]);
+    place.refused(2, &["preprocess", "ball.xyz"], &["--output"]);
+    place.refused(2, &["preprocess", "ball.xyz", "-o", "x.nm", "--leaf", "2"], &["4..=64"]);
+    place.refused(2, &["preprocess", "ball.xyz", "-o", "x.nm", "--bandwidth", "0"], &["positive length"]);
+    place.refused(2, &["preprocess", "ball.xyz", "-o", "./ball.xyz"], &["would replace the input"]);
+    place.refused(2, &["export", "ball.nm"], &["--points"]);
+    place.refused(2, &["poses", "ball.nm", "ball.nm", "-o", "p.jsonl"], &["--sweep"]);
+    assert_eq!(place.ok(&["--help"]).status, 0);
+    assert!(place.ok(&["--version"]).results.starts_with("nearmiss "));
+    place.refused(1, &both(&["--pose-b", "0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0"]), &["--pose-b", "last row"]);
+    place.refused(1, &both(&["--poses", "missing.jsonl"]), &["missing.jsonl", "cannot read"]);
+}
+
+#[test]
+fn a_picture_shows_both_scans_and_the_contact() {
+    let place = Place::new();
+    let dragon = dragon_path(Dragon::Points5k);
+    place.ok(&["preprocess", name(&dragon), "-o", "d.nm", "--quiet"]);
+    let mut sizes = Vec::new();
+    for (file, x) in [("hit.png", 0.09), ("miss.png", 0.5)] {
+        place.ok(&["collide", "d.nm", "d.nm", "--pose-b", &shift(x, 0.03, 0.01), "--image", file, "--quiet"]);
+        let decoder =
+            png::Decoder::new(std::io::BufReader::new(std::fs::File::open(place.path(file)).unwrap()));
+        let mut reader = decoder.read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        let count = |is: fn(&[u8]) -> bool| pixels.chunks(3).filter(|p| is(p)).count();
+        let [blue, orange] =
+            [count(|p| p[2] > p[0].saturating_add(60)), count(|p| p[0] > p[2].saturating_add(60))];
+        assert!(blue > 10_000 && orange > 10_000, "{file}: {blue} blue and {orange} orange pixels");
+        sizes.push((info.width, info.height));
+    }
+    assert_eq!(sizes[0], sizes[1]);
+    assert_eq!(place.files(), ["d.nm", "hit.png", "miss.png"], "no temporary files stay");
+}

@@ -1,0 +1,9 @@
+//! The built command, as scripts and people run it.
+#![cfg(test)]
+
+mod bad_input;
+mod collide;
+mod common;
+mod looking_inside;
+mod making_poses;
+mod prepare;

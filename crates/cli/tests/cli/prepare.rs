@@ -1,0 +1,168 @@
+//! `preprocess` and `inspect`.
+
+use nearmiss_testdata::dragon::{Dragon, dragon_path};
+use nearmiss_testdata::shapes::{bowl, sphere};
+
+use crate::common::{Place, keys, name, numbers, sorted, text};
+
+const FIELDS: &str = "points dropped bounds sampling_radius bandwidth horizon support_min nodes leaves depth_mean \
+                      bytes bytes_per_node usable graph";
+
+#[test]
+fn the_report_has_the_fields_that_scripts_rely_on() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.1);
+    let done = place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--json"]);
+    let [report] = &done.json()[..] else { panic!("one line: {}", done.results) };
+    assert_eq!(keys(report), sorted(&format!("{FIELDS} seconds")));
+    assert_eq!(keys(&report["dropped"]), ["duplicate", "not_finite"]);
+    assert_eq!(keys(&report["seconds"]), ["graph", "hierarchy", "read", "write"]);
+    assert!(report["graph"].is_null(), "no graph yet");
+    assert_eq!(done.errors, "", "nothing but results, off a terminal");
+
+    let number = |field: &str| report[field].as_f64().unwrap();
+    let bytes = std::fs::metadata(place.path("ball.nm")).unwrap().len();
+    assert_eq!(report["bytes"].as_u64(), Some(bytes));
+    assert!((number("bytes_per_node") * number("nodes") / number("bytes") - 1.0).abs() < 1e-12, "{report}");
+    assert_eq!(number("nodes"), 2.0 * number("leaves") - 1.0, "a binary tree");
+    let depth = number("leaves").log2();
+    assert!((number("depth_mean") - depth).abs() < 1.0, "balanced: {} for {depth}", number("depth_mean"));
+    let radius = number("sampling_radius");
+    assert!((0.1..0.25).contains(&radius), "radius {radius} at a spacing of 0.1");
+    assert!(number("horizon") > number("bandwidth") && number("bandwidth") > 0.0, "{report}");
+    assert!(number("usable") > 0.99, "a clean sphere");
+
+    let mut seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
+    let version = seen.as_object_mut().unwrap().remove("format_version").unwrap();
+    assert_eq!(version.as_u64(), Some(1));
+    let mut told = report.clone();
+    told.as_object_mut().unwrap().remove("seconds");
+    assert_eq!(seen, told, "inspect sees what preprocess told");
+}
+
+#[test]
+fn people_read_a_health_line_and_advice() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.1);
+    let done = place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm"]);
+    assert!(done.results.lines().last().unwrap().starts_with("health"), "{}", done.results);
+    assert!(done.results.contains("100 % of the points usable"), "{}", done.results);
+
+    // Rings ten times as far from each other as their points.
+    let rings: Vec<[f64; 3]> = (0..20_u8)
+        .flat_map(|ring| (0..600_u16).map(move |i| (f64::from(ring), f64::from(i) * 0.01)))
+        .map(|(ring, turn)| [3.0 * turn.cos(), 3.0 * turn.sin(), 2.0 * ring])
+        .collect();
+    place.write("rings.xyz", text(&rings));
+    let done = place.ok(&["preprocess", "rings.xyz", "-o", "rings.nm"]);
+    assert!(done.results.contains("--radius-neighbours 12"), "{}", done.results);
+    assert!(done.results.contains("--thickened"), "{}", done.results);
+    let seen = place.ok(&["inspect", "rings.nm", "--verify"]);
+    assert!(seen.results.contains("advice") && seen.results.contains("verified"), "{}", seen.results);
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let place = Place::new();
+    let dragon = dragon_path(Dragon::Points5k);
+    for threads in ["1", "2", "0"] {
+        place.ok(&[
+            "preprocess",
+            name(&dragon),
+            "-o",
+            &format!("{threads}.nm"),
+            "--threads",
+            threads,
+            "--quiet",
+        ]);
+    }
+    let [one, two, all] = ["1.nm", "2.nm", "0.nm"].map(|n| std::fs::read(place.path(n)).unwrap());
+    assert!(one == two && one == all, "the same bytes");
+}
+
+#[test]
+fn options_reach_the_surface() {
+    let place = Place::new();
+    place.cloud("bowl.xyz", bowl(1.0), 0.1);
+    let report = |options: &[&str]| {
+        let args = [&["preprocess", "bowl.xyz", "-o", "bowl.nm", "--json"], options].concat();
+        place.ok(&args).json().remove(0)
+    };
+    let plain = report(&[]);
+    let fixed = report(&["--bandwidth", "0.25"]);
+    assert!((fixed["bandwidth"].as_f64().unwrap() - 0.25).abs() < 1e-6, "{fixed}");
+    let wider = report(&["--radius-neighbours", "12"]);
+    assert!(wider["sampling_radius"].as_f64() > plain["sampling_radius"].as_f64(), "{wider}");
+    let smaller = report(&["--leaf", "4"]);
+    assert!(smaller["leaves"].as_u64() > plain["leaves"].as_u64(), "{smaller}");
+    let wendland = report(&["--weight", "wendland", "--bandwidth", "global"]);
+    assert_ne!(wendland["bandwidth"], plain["bandwidth"]);
+    assert_eq!(report(&["--format", "XYZ"])["points"], plain["points"]);
+}
+
+#[test]
+fn what_is_dropped_is_counted_and_large_faces_are_warned_about() {
+    let place = Place::new();
+    let mut points = String::from("0 0 0\n0 0 0\nnan 1 1\n");
+    for i in 0..20_u8 {
+        points += &format!("{} {} 0\n", i % 5 + 1, i / 5);
+    }
+    place.write("odd.xyz", points);
+    let report = place.ok(&["preprocess", "odd.xyz", "-o", "odd.nm", "--json"]).json().remove(0);
+    assert_eq!(report["points"], 21);
+    assert_eq!((&report["dropped"]["not_finite"], &report["dropped"]["duplicate"]), (&1.into(), &1.into()));
+    assert_eq!(numbers(&report["bounds"][1]), [5.0, 3.0, 0.0]);
+
+    // A dense patch, and one face that goes far beyond it.
+    let mut mesh = String::new();
+    for i in 0..100_u8 {
+        mesh += &format!("v {} {} 0\n", i % 10, i / 10);
+    }
+    mesh += "v 500 0 0\nv 0 500 0\nf 1 2 12\nf 1 101 102\n";
+    place.write("large.obj", mesh);
+    let done = place.ok(&["preprocess", "large.obj", "-o", "large.nm", "--json"]);
+    assert!(done.errors.starts_with("warning: large.obj: 100 % of the mesh's surface"), "{}", done.errors);
+    assert_eq!(done.json().len(), 1, "results stay clean");
+}
+
+#[test]
+fn far_from_the_origin_nothing_is_lost() {
+    let place = Place::new();
+    let shape = sphere(1.0).sample(nearmiss_testdata::shapes::Sampling::clean(0.1));
+    let offset = [1e6, -2e6, 300.0];
+    let mut ply = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\n\
+         property double z\nend_header\n",
+        shape.points.len()
+    )
+    .into_bytes();
+    let far = shape.points.iter().map(|p| [0, 1, 2].map(|k| p[k] + offset[k]));
+    let far: Vec<[f64; 3]> = far.collect();
+    for x in far.as_flattened() {
+        ply.extend(x.to_le_bytes());
+    }
+    place.write("far.ply", ply);
+    let done = place.ok(&["preprocess", "far.ply", "-o", "far.nm", "--json"]);
+    assert_eq!(done.errors, "", "no warning: the step is small");
+    let report = done.json().remove(0);
+    for k in 0..3 {
+        let bounds = [0, 1].map(|side| report["bounds"][side][k].as_f64().unwrap() - offset[k]);
+        assert!((bounds[0] + 1.0).abs() < 0.05 && (bounds[1] - 1.0).abs() < 0.05, "axis {k}: {bounds:?}");
+    }
+
+    place.ok(&["export", "far.nm", "--points", "out.ply"]);
+    let back = nearmiss::io::read(&place.path("out.ply"), None).unwrap().cloud;
+    assert_eq!(back.len(), far.len());
+    let sources =
+        place.ok(&["eval", "far.nm", "--points", name(&place.write("x.xyz", text(&far[..1]))), "--json"]);
+    assert!(sources.json()[0]["f"].as_f64().unwrap().abs() < 0.02, "{}", sources.results);
+    let centroid = numbers(&sources.json()[0]["centroid"]);
+    assert!((0..3).all(|k| (centroid[k] - far[0][k]).abs() < 0.1), "{centroid:?} near {:?}", far[0]);
+
+    let pose = crate::common::shift(0.3, 0.0, 0.0);
+    let done = place.ok(&["collide", "far.nm", "far.nm", "--pose-b", &pose, "--json"]);
+    let witness = numbers(&done.json()[0]["witness"]);
+    let local = [0, 1, 2].map(|k| witness[k] - offset[k]);
+    let middle = (0..3).map(|k| local[k] * local[k]).sum::<f64>().sqrt();
+    assert!((middle - 1.0).abs() < 0.02 && (local[0] - 0.15).abs() < 0.02, "the circle x = 0.15: {local:?}");
+}
