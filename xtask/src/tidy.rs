@@ -49,7 +49,9 @@ pub(crate) fn run() -> Outcome {
 fn find_faults() -> Outcome<Vec<String>> {
     let mut faults = Vec::new();
     let sources = tracked(".rs");
-    let references = fs::read_to_string(root().join("docs/theory/references.md")).unwrap_or_default();
+    let references = fs::read_to_string(root().join("docs/theory/references.md"))?;
+    let references: Vec<&str> = references.split_whitespace().collect();
+    let references = references.join(" ");
     for path in &sources {
         let Ok(text) = fs::read_to_string(path) else { continue };
         faults.extend(source_faults(path, &text, &references));

@@ -2,7 +2,7 @@
 
 use nearmiss_testdata::shapes::sphere;
 
-use crate::common::Place;
+use crate::running::Place;
 
 #[test]
 fn raw_inputs_are_refused_with_file_and_place() {

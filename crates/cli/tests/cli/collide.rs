@@ -4,7 +4,7 @@ use nearmiss_testdata::dragon::{Dragon, dragon_path};
 use nearmiss_testdata::shapes::sphere;
 use serde_json::Value;
 
-use crate::common::{Place, keys, name, numbers, shift, sorted};
+use crate::running::{Place, keys, name, numbers, shift, sorted};
 
 const FIELDS: &str = "verdict evidence reason witness normal_a normal_b residual source_a source_b gap \
                       distance_estimate likelihood evaluations node_pairs leaf_pairs micros";

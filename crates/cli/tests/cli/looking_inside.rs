@@ -2,7 +2,7 @@
 
 use nearmiss_testdata::shapes::{patch, plates, sphere};
 
-use crate::common::{Place, keys, numbers, sorted};
+use crate::running::{Place, keys, numbers, sorted};
 
 #[test]
 fn f_is_told_where_it_means_something() {

@@ -3,7 +3,7 @@
 
 mod bad_input;
 mod collide;
-mod common;
 mod looking_inside;
 mod making_poses;
 mod prepare;
+mod running;

@@ -2,7 +2,7 @@
 
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
-use crate::common::{Place, keys, name, numbers};
+use crate::running::{Place, keys, name, numbers};
 
 fn dragon() -> Place {
     let place = Place::new();

@@ -3,7 +3,7 @@
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
 use nearmiss_testdata::shapes::{bowl, sphere};
 
-use crate::common::{Place, keys, name, numbers, sorted, text};
+use crate::running::{Place, keys, name, numbers, sorted, text};
 
 const FIELDS: &str = "points dropped bounds sampling_radius bandwidth horizon support_min nodes leaves depth_mean \
                       bytes bytes_per_node usable graph";
@@ -159,7 +159,7 @@ fn far_from_the_origin_nothing_is_lost() {
     let centroid = numbers(&sources.json()[0]["centroid"]);
     assert!((0..3).all(|k| (centroid[k] - far[0][k]).abs() < 0.1), "{centroid:?} near {:?}", far[0]);
 
-    let pose = crate::common::shift(0.3, 0.0, 0.0);
+    let pose = crate::running::shift(0.3, 0.0, 0.0);
     let done = place.ok(&["collide", "far.nm", "far.nm", "--pose-b", &pose, "--json"]);
     let witness = numbers(&done.json()[0]["witness"]);
     let local = [0, 1, 2].map(|k| witness[k] - offset[k]);

@@ -1,6 +1,6 @@
 //! Tables made by someone who knows the format: the checksums of header and table fit, the contents lie.
 
-use crate::common::{Content, put, repair};
+use crate::sample::{Content, put, repair};
 use nearmiss_store::{Check, Fault, File, Writer};
 
 /// Byte offsets of the fields of table row `row`.
@@ -173,7 +173,7 @@ fn hostile_metadata_cost_nothing() {
         file[tag(0) + 3] = b'A';
         repair(&mut file);
         let file = File::from_bytes(file, Check::Full).unwrap();
-        let error = file.metadata::<crate::common::About>().unwrap_err();
+        let error = file.metadata::<crate::sample::About>().unwrap_err();
         assert!(matches!(error.fault, Fault::Metadata { .. }), "{error}");
         assert!(file.metadata::<(Vec<u128>, String)>().is_err());
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::common::{Content, Random, put, repair, use_all};
+use crate::sample::{Content, Random, put, repair, use_all};
 use nearmiss_store::{Check, Fault, File, Looks};
 
 fn fault(bytes: Vec<u8>, check: Check) -> Fault {

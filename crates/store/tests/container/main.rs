@@ -3,8 +3,8 @@
 #![cfg(test)]
 
 mod attacks;
-mod common;
 mod damage;
 mod golden;
 mod round_trip;
+mod sample;
 mod saving;

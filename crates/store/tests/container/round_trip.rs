@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::common::{About, Content, KIND, Node};
+use crate::sample::{About, Content, KIND, Node};
 use nearmiss_store::{Check, Fault, File, SectionId, WriteError, Writer};
 
 #[test]

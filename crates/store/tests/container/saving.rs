@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{self, Write};
 
-use crate::common::{Content, KIND};
+use crate::sample::{Content, KIND};
 use nearmiss_store::{Check, File, WriteError, WriteStep, Writer};
 
 /// Takes `room` bytes, then fails; counts what it was given.
