@@ -1,1 +1,16 @@
-//! Benchmarks with rivals.
+#![doc = include_str!("../README.md")]
+
+pub mod arguments;
+pub mod clock;
+pub mod counting;
+pub mod machine;
+pub mod object;
+pub mod poses;
+pub mod rivals;
+pub mod sample;
+pub mod scorer;
+pub mod sweep;
+pub mod truth;
+
+/// What the programs here end with when something is wrong.
+pub type Failure = Box<dyn std::error::Error>;

@@ -1,6 +1,6 @@
 //! The points that f(x) needs: those whose horizon reaches x, by a short descent in canonical order.
 
-use nearmiss_surface::{Centre, Neighbourhood, SurfacePlan};
+use nearmiss_surface::{Centre, Evaluation, Neighbourhood, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::split::id32;
@@ -47,6 +47,42 @@ impl GatherScratch {
         for &(p, radius) in &*candidates {
             near.offer(plan, &centre, p, radius);
         }
+    }
+}
+
+/// A scan near some place: several evaluations there share one descent.
+#[derive(Debug)]
+pub struct Vicinity<'a> {
+    index: Index<'a>,
+    scratch: &'a mut GatherScratch,
+    centre: [f64; 3],
+    radius: f64,
+}
+
+impl<'a> Vicinity<'a> {
+    pub(crate) fn new(
+        index: Index<'a>,
+        centre: [f64; 3],
+        radius: f64,
+        scratch: &'a mut GatherScratch,
+    ) -> Self {
+        let rounded = Centre::new(centre).rounded();
+        // Grown by more than the rounding of the centre.
+        let reach = centre.iter().fold(radius, |m, c| m.max(c.abs()));
+        #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
+        scratch.collect(&index, rounded, (radius + 1e-6 * reach) as f32);
+        Self { index, scratch, centre, radius }
+    }
+
+    /// f at `x`: the same to the last bit as [`crate::PointHierarchy::evaluate`], anywhere.
+    pub fn evaluate(&mut self, x: [f64; 3]) -> Evaluation {
+        let away = (0..3).map(|k| (x[k] - self.centre[k]).powi(2)).sum::<f64>();
+        if away <= self.radius * self.radius {
+            self.scratch.gather_collected(self.index.plan, x);
+        } else {
+            self.index.gather(x, &mut self.scratch.near);
+        }
+        self.scratch.near.evaluate(self.index.plan, x)
     }
 }
 

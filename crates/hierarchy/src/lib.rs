@@ -16,7 +16,7 @@ mod topology;
 pub use boxes::{OrientedBox, Relative};
 pub use build::{PointHierarchy, Slices};
 pub use descend::{Frontier, NodePair, Split, Stack, Visitor, descend};
-pub use gather::GatherScratch;
+pub use gather::{GatherScratch, Vicinity};
 pub use options::{BuildError, BuildOptions};
 pub use sanity::Flaw;
 pub use sections::{HierarchyMeta, LoadError};

@@ -150,6 +150,24 @@ fn near_an_interior_sheet_the_function_is_ok() {
 }
 
 #[test]
+fn a_vicinity_changes_no_bit() {
+    let scan = prepared(&arbitrary::cloud(CloudKind::Clustered, 3000, 2), &BuildOptions::default());
+    let mut rng = arbitrary::rng(6);
+    let mut scratch = nearmiss_hierarchy::GatherScratch::default();
+    for i in (0..scan.len()).step_by(37) {
+        let radius = 2.0 * f64::from(scan.radii()[i]);
+        let centre = scan.positions()[i].map(f64::from);
+        let mut vicinity = scan.vicinity(centre, radius, &mut scratch);
+        for _ in 0..5 {
+            // Some of them outside the ball.
+            let offset = arbitrary::point_in(&mut rng, radius);
+            let x = [0, 1, 2].map(|k| centre[k] + offset[k]);
+            assert_eq!(vicinity.evaluate(x), scan.evaluate(x), "at {x:?}");
+        }
+    }
+}
+
+#[test]
 fn threads_and_order_of_work_do_not_matter() {
     let points = arbitrary::cloud(CloudKind::Clustered, 30_000, 9);
     let cloud = PointCloud::from_positions(&points).unwrap();

@@ -21,7 +21,10 @@ use crate::view::ScanView;
 /// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
 const TRIES: u32 = 4;
 
-/// A verified point further than this from the crossing, in disc radii, is some other place.
+/// Newton's steps hardly ever lead further than this from the crossing, in local radii.
+const NEWTON: f64 = 1.0;
+
+/// A verified point further than this from the crossing, in local radii, is some other place.
 const NEARBY: f64 = 4.0;
 
 /// The search for a crossing.
@@ -126,8 +129,15 @@ impl<'a> Surfaces<'a> {
     fn refine(&mut self, contact: &Contact, i: usize) -> Option<Contact> {
         let [va, vb] = self.views;
         let [scratch_a, scratch_b] = &mut *self.gathers;
-        let meeting =
-            meet(contact.point, |x| [va.evaluate_with(x, scratch_a), vb.evaluate_with(x, scratch_b)]);
+        let radius = NEWTON * f64::from(self.a.radii[i]);
+        let in_b = radius / f64::from(self.relative.scale());
+        let start = contact.point;
+        let mut near_a = va.scan().vicinity(va.placed().apply_inverse(start), radius, scratch_a);
+        let mut near_b = vb.scan().vicinity(vb.placed().apply_inverse(start), in_b, scratch_b);
+        let meeting = meet(start, |x| {
+            let at_a = va.in_world(near_a.evaluate(va.placed().apply_inverse(x)));
+            [at_a, vb.in_world(near_b.evaluate(vb.placed().apply_inverse(x)))]
+        });
         self.meter.spent.evaluations += 2 * u64::from(meeting.rounds);
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
         let nearby = NEARBY * f64::from(self.a.radii[i]) * va.placed().scale();

@@ -52,7 +52,11 @@ impl<'a> ScanView<'a> {
 
     /// The implicit function at `x`, all in the world.
     pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        let at = self.scan.evaluate_with(self.placed.apply_inverse(x), scratch);
+        self.in_world(self.scan.evaluate_with(self.placed.apply_inverse(x), scratch))
+    }
+
+    /// What holds in the stored frame, in the world.
+    pub(crate) fn in_world(&self, at: Evaluation) -> Evaluation {
         let scale = self.placed.scale();
         Evaluation {
             f: at.f * scale,

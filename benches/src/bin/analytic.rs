@@ -1,0 +1,108 @@
+//! Scores verdicts on the shapes with known answers, by family and noise.
+//!
+//! `analytic [--repeats N] [--seed N] [--witness] [--list]`
+//!
+//! Ends with status 1 if a verdict outside the band is wrong or missing, `Ambiguous` on thin pairs apart, which
+//! may be one in twenty of them.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::collections::BTreeMap;
+use std::process::ExitCode;
+
+use nearmiss::{
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, PointCloud, Reason, Scan,
+    Verdict, collide_with,
+};
+use nearmiss_benches::Failure;
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_testdata::pairs::{Pair, SetOptions, analytic_set};
+
+/// One in this many thin pairs may be `Ambiguous`.
+const THIN_ALLOWANCE: usize = 20;
+
+/// Counts of one family at one level of noise.
+#[derive(Debug, Clone, Copy, Default)]
+struct Row {
+    outside: usize,
+    false_hits: usize,
+    misses: usize,
+    undecided: usize,
+    excused: usize,
+    band: usize,
+    band_wrong: usize,
+}
+
+impl Row {
+    fn count(&mut self, pair: &Pair, verdict: &Verdict) -> bool {
+        let undecided = matches!(verdict, Verdict::Undecided(_));
+        let wrong = !undecided && verdict.is_intersecting() != pair.truth;
+        if pair.is_in_band() {
+            self.band += 1;
+            self.band_wrong += usize::from(wrong);
+            return true;
+        }
+        self.outside += 1;
+        if pair.thin && matches!(verdict, Verdict::Undecided(Reason::Ambiguous)) {
+            self.excused += 1;
+            return true;
+        }
+        self.undecided += usize::from(undecided);
+        self.misses += usize::from(wrong && pair.truth);
+        self.false_hits += usize::from(wrong && !pair.truth);
+        !undecided && !wrong
+    }
+}
+
+fn main() -> Result<ExitCode, Failure> {
+    let mut arguments = Arguments::of_process();
+    let repeats = arguments.value("--repeats")?.unwrap_or(3);
+    let seed = arguments.value("--seed")?.unwrap_or(1);
+    let detail = if arguments.flag("--witness") { Detail::Witness } else { Detail::Verdict };
+    let list = arguments.flag("--list");
+    if let Some(word) = arguments.words()?.first() {
+        return Err(format!("what is {word:?}?").into());
+    }
+    let set = analytic_set(seed, &SetOptions { repeats, ..SetOptions::default() });
+    let build = |points: &Vec<[f64; 3]>| -> Result<Scan, Failure> {
+        Ok(Scan::build(&PointCloud::from_positions(points)?, &BuildOptions::default())?)
+    };
+    let scans: Vec<Scan> = set.shapes.iter().map(|shape| build(&shape.points)).collect::<Result<_, _>>()?;
+    let mut scratch = CollideScratch::default();
+    // By family and noise in tenths of a percent.
+    let mut rows: BTreeMap<(&str, String), Row> = BTreeMap::new();
+    let mut clean = true;
+    for pair in &set.pairs {
+        let (a, b) = (&scans[pair.a], &scans[pair.b]);
+        let plan = CollidePlan::new(&CollideOptions::default().with_detail(detail), a, b)?;
+        let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
+        let verdict = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
+        let row = rows.entry((pair.family, format!("{:4.2}", pair.noise))).or_default();
+        let right = row.count(pair, &verdict);
+        clean &= right;
+        if list && !right {
+            println!("{} noise {}, gap {:+.2} r: {verdict:?}", pair.family, pair.noise, pair.gap / pair.r);
+        }
+    }
+    let thin = set.pairs.iter().filter(|pair| pair.thin && !pair.is_in_band()).count();
+    let excused: usize = rows.values().map(|row| row.excused).sum();
+    clean &= excused * THIN_ALLOWANCE <= thin;
+    print_rows(&rows);
+    println!(
+        "\n{excused} of {thin} thin pairs ambiguous; {}",
+        if clean { "all right" } else { "NOT all right" }
+    );
+    Ok(if clean { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn print_rows(rows: &BTreeMap<(&str, String), Row>) {
+    println!(
+        "| family | noise | outside | false hits | misses | undecided | thin, ambiguous | band | wrong |"
+    );
+    println!("| --- | --: | --: | --: | --: | --: | --: | --: | --: |");
+    for ((family, noise), row) in rows {
+        println!(
+            "| {family} | {noise} | {} | {} | {} | {} | {} | {} | {} |",
+            row.outside, row.false_hits, row.misses, row.undecided, row.excused, row.band, row.band_wrong
+        );
+    }
+}

@@ -1,0 +1,111 @@
+//! What it costs to prepare a large scan, with rivals beside.
+//!
+//! `preparation [OBJECT] [--runs N] [--threads N]…`; the object is `bumpy:1000000` unless told otherwise.
+//!
+//! Memory is what the allocator handed out, the most that was live at once, above what was live before: the
+//! input, which is there in any case, is not counted. Pages that a mapped file needs are not the allocator's.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::path::PathBuf;
+
+use nearmiss::{BuildOptions, Check, PointCloud, Scan};
+use nearmiss_benches::clock::timed;
+use nearmiss_benches::counting::Counting;
+use nearmiss_benches::object::Object;
+use nearmiss_benches::rivals::kiddo::PointScan;
+use nearmiss_benches::rivals::parry::MeshTree;
+use nearmiss_benches::sample::{count, quantile};
+use nearmiss_benches::{Failure, arguments::Arguments, machine};
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
+
+/// A file that is removed when nobody needs it any more.
+struct Scratch(PathBuf);
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // Nobody is left to tell if that fails.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// Prints the median time of `runs` of `work` with peak and rest of memory in bytes a point; returns its last
+/// result.
+fn measure<T>(
+    what: &str,
+    points: usize,
+    runs: usize,
+    mut work: impl FnMut() -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let mut times = Vec::new();
+    loop {
+        let before = ALLOCATOR.live();
+        ALLOCATOR.restart();
+        let (result, time) = timed(&mut work);
+        let result = result?;
+        times.push(time.as_secs_f64() * 1e3);
+        if times.len() < runs {
+            continue;
+        }
+        times.sort_unstable_by(f64::total_cmp);
+        let each = |bytes: usize| count(bytes.saturating_sub(before)) / count(points);
+        println!(
+            "| {what} | {:.3} | {:.3} | {:.1} | {:.1} |",
+            quantile(&times, 0.5),
+            times[0],
+            each(ALLOCATOR.peak()),
+            each(ALLOCATOR.live()),
+        );
+        return Ok(result);
+    }
+}
+
+fn main() -> Result<(), Failure> {
+    let mut arguments = Arguments::of_process();
+    let runs = arguments.value("--runs")?.unwrap_or(3_usize).max(1);
+    let mut threads: Vec<usize> = arguments.values("--threads")?;
+    if threads.is_empty() {
+        threads = vec![1, 0];
+    }
+    let words = arguments.words()?;
+    let object = Object::read(words.first().map_or("bumpy:1000000", String::as_str))?;
+    let (cloud, n) = (&object.cloud, object.cloud.len());
+    println!("{}\n## {}, {n} points\n", machine::description(), object.name);
+    println!("| | median ms | best ms | peak B/point | kept B/point |");
+    println!("| --- | --: | --: | --: | --: |");
+
+    let positions: Vec<[f64; 3]> = (0..n).map(|i| cloud.point(i)).collect();
+    measure("cloud from positions", n, runs, || Ok(PointCloud::from_positions(&positions)?))?;
+    let mut scan = None;
+    for threads in threads {
+        let name = if threads == 0 { "all threads".into() } else { format!("{threads} thread(s)") };
+        let options = BuildOptions::default().with_threads(threads);
+        drop(scan.take());
+        scan = Some(measure(&format!("prepare, {name}"), n, runs, || Ok(Scan::build(cloud, &options)?))?);
+    }
+    let scan = scan.ok_or("no number of threads")?;
+    let file = Scratch(std::env::temp_dir().join(format!("nearmiss-{}.scan", std::process::id())));
+    let bytes = measure("save", n, runs, || Ok(scan.save(&file.0)?))?;
+    let open = |check| Ok(Scan::open(&file.0, check)?);
+    measure("open, Check::Structure", n, runs.max(9), || open(Check::Structure))?;
+    measure("open, Check::Full", n, runs, || open(Check::Full))?;
+    measure("read, Check::Full", n, runs, || Ok(Scan::read(&file.0, Check::Full)?))?;
+    measure("rival: kiddo's kd-tree", n, runs, || PointScan::new(cloud, object.r))?;
+    if let Some(mesh) = &object.mesh {
+        measure("rival: parry's BVH of the mesh", n, runs, || Ok(MeshTree::new(mesh)))?;
+    }
+    let size = count(usize::try_from(bytes)?);
+    println!(
+        "\nfile: {bytes} bytes, {:.1} a point; {} nodes, {:.1} bytes a node",
+        size / count(n),
+        scan.nodes().len(),
+        size / count(scan.nodes().len())
+    );
+    println!(
+        "{:.2} % of the points usable, sampling radius {:.6}",
+        100.0 * scan.usable(),
+        scan.sampling_radius()
+    );
+    Ok(())
+}

@@ -1,0 +1,151 @@
+//! The sweep of measured queries, ours and rivals' in the same run, as Markdown.
+//!
+//! `sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival parry|trimesh|kiddo]… [--witness]
+//! [--seed N] [--threads N]`
+//!
+//! An object is a file of points, with or without a mesh, or one that `Object::read` knows by name.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use nearmiss::{BuildOptions, Detail, Scan};
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::clock::timed;
+use nearmiss_benches::object::Object;
+use nearmiss_benches::rivals::ours::Ours;
+use nearmiss_benches::rivals::{self, Method};
+use nearmiss_benches::sweep::{self, Track};
+use nearmiss_benches::{Failure, machine, poses};
+
+/// What was asked for.
+struct Options {
+    objects: Vec<String>,
+    per_distance: usize,
+    passes: u64,
+    near: usize,
+    rivals: Vec<String>,
+    witness: bool,
+    seed: u64,
+    threads: usize,
+}
+
+impl Options {
+    fn read() -> Result<Self, Failure> {
+        let mut arguments = Arguments::of_process();
+        let options = Self {
+            per_distance: arguments.value("--per-distance")?.unwrap_or(1000),
+            passes: arguments.value("--passes")?.unwrap_or(1),
+            near: arguments.value("--near")?.unwrap_or(1000),
+            rivals: arguments.values("--rival")?,
+            witness: arguments.flag("--witness"),
+            seed: arguments.value("--seed")?.unwrap_or(1),
+            threads: arguments.value("--threads")?.unwrap_or(0),
+            objects: arguments.words()?,
+        };
+        if options.objects.is_empty() {
+            return Err(
+                "usage: sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival NAME]".into()
+            );
+        }
+        Ok(options)
+    }
+}
+
+fn main() -> Result<(), Failure> {
+    let options = Options::read()?;
+    println!("{}", machine::description());
+    options.objects.iter().try_for_each(|source| measure(source, &options))
+}
+
+fn measure(source: &str, options: &Options) -> Result<(), Failure> {
+    let object = Object::read(source)?.scaled()?;
+    let build = BuildOptions::default().with_threads(options.threads);
+    let (scan, time) = timed(|| Scan::build(&object.cloud, &build));
+    let scan = scan?;
+    let mut methods: Vec<Box<dyn Method + '_>> = vec![Box::new(Ours::new(&scan, Detail::Verdict)?)];
+    if options.witness {
+        methods.push(Box::new(Ours::new(&scan, Detail::Witness)?));
+    }
+    let mut left_out = Vec::new();
+    for name in &options.rivals {
+        match rivals::rival(name, &object)? {
+            Some(rival) => methods.push(rival),
+            None => left_out.push(name.as_str()),
+        }
+    }
+    let mut tracks = sweep::tracks(&methods);
+    let warm = poses::sweep(20, options.seed, u64::from(u32::MAX));
+    for number in 0..options.passes {
+        let poses = poses::sweep(options.per_distance, options.seed, number);
+        sweep::pass(&mut methods, &mut tracks, &poses, &warm);
+    }
+    let near = poses::near(&object, options.near, options.seed)?;
+    sweep::near(&mut methods, &mut tracks, &near);
+
+    println!(
+        "## {}\n\n{} points, r {:.5}, {:.0} points a unit of volume; prepared in {time:.2?}; {} poses a \
+         distance, {} passes, {} near contact\n",
+        object.name,
+        object.cloud.len(),
+        object.r,
+        object.density(),
+        options.per_distance,
+        options.passes,
+        near.len(),
+    );
+    if !left_out.is_empty() {
+        println!("no mesh, so without: {}\n", left_out.join(", "));
+    }
+    print_summary(&tracks);
+    tracks.iter().for_each(print_distances);
+    Ok(())
+}
+
+fn print_summary(tracks: &[Track]) {
+    println!("| µs | sweep mean | worst d | mean, d ≤ 1.5 | near contact: mean | median | p99 | hits |");
+    println!("| --- | --: | --: | --: | --: | --: | --: | --: |");
+    for track in tracks {
+        let (worst, mean) = track.worst_distance();
+        let near = track.near.times.summary();
+        println!(
+            "| {} | {:.3} | {:.3} (d = {}) | {:.3} | {:.3} | {:.3} | {:.3} | {} |",
+            track.name,
+            track.sweep_mean() / 1e3,
+            mean / 1e3,
+            poses::distance(worst),
+            track.inner_mean() / 1e3,
+            near.mean / 1e3,
+            near.median / 1e3,
+            near.p99 / 1e3,
+            track.near.hits,
+        );
+    }
+    if tracks.iter().any(|track| track.pass_means.len() > 1) {
+        println!("\nsweep means of the passes, µs:\n");
+        for track in tracks {
+            let means: Vec<String> = track.pass_means.iter().map(|m| format!("{:.3}", m / 1e3)).collect();
+            println!("* {}: {}", track.name, means.join(" "));
+        }
+    }
+    println!();
+}
+
+fn print_distances(track: &Track) {
+    println!("### {}\n", track.name);
+    println!("| d | mean µs | median | p99 | worst | hits | evaluations | node pairs |");
+    println!("| --: | --: | --: | --: | --: | --: | --: | --: |");
+    for (i, column) in track.columns.iter().enumerate() {
+        let all = column.times.summary();
+        println!(
+            "| {} | {:.3} | {:.3} | {:.3} | {:.3} | {} of {} | {:.2} | {:.1} |",
+            poses::distance(i),
+            all.mean / 1e3,
+            all.median / 1e3,
+            all.p99 / 1e3,
+            all.worst / 1e3,
+            column.hits,
+            column.times.len(),
+            column.mean_evaluations(),
+            column.mean_node_pairs(),
+        );
+    }
+    println!();
+}

@@ -1,0 +1,109 @@
+//! What is measured: points, their mesh where there is one, and the radius that scoring goes by.
+
+use std::path::Path;
+
+use nearmiss::{Aabb, PointCloud, TriangleMesh};
+use nearmiss_testdata::dragon::{Dragon, dragon_path};
+
+use crate::Failure;
+use crate::scorer::radius;
+
+/// Longest side of an object's bounding box in a sweep (Zachmann 2002).
+const SIDE: f64 = 2.0;
+
+/// An object to measure with.
+#[derive(Debug, Clone)]
+pub struct Object {
+    /// What to call it.
+    pub name: String,
+    /// Its points: distinct and finite.
+    pub cloud: PointCloud,
+    /// Its mesh, if it has one.
+    pub mesh: Option<TriangleMesh>,
+    /// r, as scoring computes it, in the units of the cloud.
+    pub r: f64,
+}
+
+impl Object {
+    /// Reads `source`: the path of a file, `dragon-5k` or `dragon-23k` for what the tests ship, or
+    /// `bumpy:POINTS` for a generated surface.
+    ///
+    /// # Errors
+    /// When there is no such object.
+    pub fn read(source: &str) -> Result<Self, Failure> {
+        let shipped = match source {
+            "dragon-5k" => Some(dragon_path(Dragon::Points5k)),
+            "dragon-23k" => Some(dragon_path(Dragon::Points23k)),
+            _ => None,
+        };
+        if let Some(count) = source.strip_prefix("bumpy:") {
+            let cloud = PointCloud::from_positions(&bumpy_sphere(count.parse()?))?;
+            return Ok(Self { name: source.into(), r: radius(&cloud)?, cloud, mesh: None });
+        }
+        let path = shipped.as_deref().unwrap_or_else(|| Path::new(source));
+        let model = nearmiss::io::read(path, None)?;
+        let name = path.file_stem().map_or_else(|| source.into(), |stem| stem.to_string_lossy().into_owned());
+        Ok(Self { name, r: radius(&model.cloud)?, cloud: model.cloud, mesh: model.mesh })
+    }
+
+    /// The same object, centred and scaled so that the longest side of its bounding box is 2.
+    ///
+    /// # Errors
+    /// When scaling makes points equal, or the object has no extent.
+    pub fn scaled(&self) -> Result<Self, Failure> {
+        let bounds = self.cloud.bounds();
+        let longest = bounds.half_extents().into_iter().fold(0.0, f64::max);
+        let scale = 0.5 * SIDE / longest;
+        let centre = bounds.centre();
+        let place = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - centre[k]) * scale);
+        let points: Vec<[f64; 3]> = (0..self.cloud.len()).map(|i| place(self.cloud.point(i))).collect();
+        let cloud = PointCloud::from_positions(&points)?;
+        let mesh = match &self.mesh {
+            Some(mesh) => {
+                let vertices = mesh.vertices().iter().map(|&p| place(p)).collect();
+                Some(TriangleMesh::new(vertices, mesh.triangles().to_vec())?)
+            }
+            None => None,
+        };
+        Ok(Self { name: self.name.clone(), r: self.r * scale, cloud, mesh })
+    }
+
+    /// Points over the volume of the bounding box: the density of Klein and Zachmann 2005.
+    #[must_use]
+    pub fn density(&self) -> f64 {
+        let Aabb { min, max } = self.cloud.bounds();
+        crate::sample::count(self.cloud.len()) / (0..3).map(|k| max[k] - min[k]).product::<f64>()
+    }
+}
+
+/// `count` points on a sphere with bumps, evenly spread over the directions along a Fibonacci spiral: a closed
+/// surface of uneven curvature, smooth where a scan is.
+#[must_use]
+pub fn bumpy_sphere(count: u32) -> Vec<[f64; 3]> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let n = f64::from(count.max(1));
+    (0..count)
+        .map(|i| {
+            let i = f64::from(i);
+            let z = 1.0 - (2.0 * i + 1.0) / n;
+            let flat = (1.0 - z * z).sqrt();
+            let (s, c) = (golden * i).sin_cos();
+            let [x, y] = [flat * c, flat * s];
+            let radius = 1.0 + 0.05 * (7.0 * x).sin() * (6.0 * y).cos() + 0.03 * (11.0 * z).sin();
+            [x, y, z].map(|k| k * radius)
+        })
+        .collect()
+}
+
+/// The object of this file name in the folder that the environment names in `NEARMISS_DATA`; `None` where it
+/// names none or the file is not there.
+///
+/// # Errors
+/// When the file cannot be read as an object.
+pub fn from_folder(file: &str) -> Result<Option<Object>, Failure> {
+    let Some(folder) = std::env::var_os("NEARMISS_DATA") else {
+        return Ok(None);
+    };
+    let path = Path::new(&folder).join(file);
+    if path.is_file() { Object::read(&path.to_string_lossy()).map(Some) } else { Ok(None) }
+}

@@ -1,0 +1,229 @@
+//! Scoring against exact answers: the radius, the counts, and what is a defect.
+
+use std::fmt;
+use std::num::NonZero;
+
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nearmiss::{Evidence, PointCloud, Pose, Verdict};
+
+use crate::Failure;
+use crate::sample::quantile;
+use crate::truth::Question;
+
+/// The neighbour whose distance is a point's spacing.
+const RANK: usize = 6;
+
+/// r is this quantile of the spacings.
+const QUANTILE: f64 = 0.9;
+
+/// Along no direction that scans prefer.
+const AXIS: [f64; 3] = [0.36, 0.48, 0.8];
+
+/// Within this many r no method that sees only points can be right. A little less than one, for depths in truth
+/// sets are steps of a ladder, one of which is r itself: rounding of r must not decide who is judged, so they are.
+const BAND: f64 = 0.999;
+
+/// Deeper than this many r no separation may be certified, inside the band or not.
+const DEEP: f64 = -0.3;
+
+/// From this many r on at least [`CERTIFIED_SHARE`] of separations are to be certified.
+const CLEAR: f64 = 6.0;
+
+/// See [`CLEAR`].
+const CERTIFIED_SHARE: f64 = 0.95;
+
+/// r: the 0.9-quantile over all points of the distance to the 6th distinct neighbour, computed from the points
+/// alone.
+///
+/// # Errors
+/// When the tree refuses the points.
+pub fn radius(cloud: &PointCloud) -> Result<f64, Failure> {
+    // Turned, because the tree cannot split many points of one coordinate; distances do not change.
+    let turn = Pose::from_axis_angle(AXIS, 1.0);
+    let points: Vec<[f64; 3]> = cloud.positions().iter().map(|p| turn.apply(p.map(f64::from))).collect();
+    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&points).map_err(|e| format!("{e:?}"))?;
+    // The point itself comes first: a cloud's points are distinct.
+    let wanted = NonZero::new(RANK + 1).ok_or("no rank")?;
+    let spacing = |p: &[f64; 3]| {
+        let near = tree.query(p).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
+        near.last().map_or(0.0, |n| n.distance.sqrt())
+    };
+    let mut spacings: Vec<f64> = points.iter().map(spacing).collect();
+    spacings.sort_unstable_by(f64::total_cmp);
+    Ok(quantile(&spacings, QUANTILE) * cloud.frame().scale)
+}
+
+/// A verdict that is wrong or missing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    /// Index of the question.
+    pub index: usize,
+    /// Its gap in multiples of r.
+    pub gap: f64,
+    /// What was answered, where more is to be said.
+    pub answer: String,
+}
+
+/// Separations from some gap on, and how many of them are certified.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Share {
+    /// Separations.
+    pub all: usize,
+    /// Those of them that are certified.
+    pub certified: usize,
+}
+
+/// How many questions were answered how.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Score {
+    /// Questions with |gap| > r, and their hits that are none, misses, and missing verdicts.
+    pub outside: usize,
+    /// Hits of what is apart by more than r.
+    pub false_hits: Vec<Case>,
+    /// Separations of what intersects by more than r.
+    pub misses: Vec<Case>,
+    /// No verdict, outside the band.
+    pub undecided: Vec<Case>,
+    /// Separations certified although deeper than 0.3 r.
+    pub certified_wrongly: Vec<Case>,
+    /// Questions with |gap| ≤ r.
+    pub band: usize,
+    /// Wrong verdicts among them.
+    pub band_wrong: usize,
+    /// Missing verdicts among them.
+    pub band_undecided: usize,
+    /// All verdicts: intersecting certified, estimated; separated certified, estimated; undecided.
+    pub verdicts: [usize; 5],
+    /// Separations with gap ≥ 6 r.
+    pub clear: Share,
+    /// Separations with gap ≥ 3 r.
+    pub near: Share,
+}
+
+impl Score {
+    /// Counts the verdict on the question of this index; `r` in the units of its gap.
+    pub fn count(&mut self, index: usize, question: &Question, r: f64, verdict: &Verdict) {
+        let gap = question.gap / r;
+        let kind = match verdict {
+            Verdict::Intersecting { evidence: Evidence::Certified, .. } => 0,
+            Verdict::Intersecting { .. } => 1,
+            Verdict::Separated { evidence: Evidence::Certified, .. } => 2,
+            Verdict::Separated { .. } => 3,
+            Verdict::Undecided(_) => 4,
+        };
+        self.verdicts[kind] += 1;
+        if verdict.is_separated() {
+            for (share, from) in [(&mut self.clear, CLEAR), (&mut self.near, 3.0)] {
+                share.all += usize::from(gap >= from);
+                share.certified += usize::from(gap >= from && kind == 2);
+            }
+        }
+        let case = || Case { index, gap, answer: format!("{verdict:?}") };
+        if kind == 2 && gap < DEEP {
+            self.certified_wrongly.push(case());
+        }
+        let wrong = kind < 4 && verdict.is_intersecting() != question.truth;
+        if gap.abs() <= BAND {
+            self.band += 1;
+            self.band_wrong += usize::from(wrong);
+            self.band_undecided += usize::from(kind == 4);
+            return;
+        }
+        self.outside += 1;
+        if kind == 4 {
+            self.undecided.push(case());
+        } else if wrong && question.truth {
+            self.misses.push(case());
+        } else if wrong {
+            self.false_hits.push(case());
+        }
+    }
+
+    /// Whether nothing is wrong or undecided outside the band, and nothing deep is certified apart.
+    #[must_use]
+    pub fn is_clean(&self) -> bool {
+        self.false_hits.is_empty()
+            && self.misses.is_empty()
+            && self.undecided.is_empty()
+            && self.certified_wrongly.is_empty()
+    }
+
+    /// Whether enough of what is clearly apart is certified so.
+    #[must_use]
+    pub fn is_certified_enough(&self) -> bool {
+        let Share { all, certified } = self.clear;
+        crate::sample::count(certified) >= CERTIFIED_SHARE * crate::sample::count(all)
+    }
+}
+
+impl fmt::Display for Score {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |f: &mut fmt::Formatter<'_>, what: &str, cases: &[Case]| {
+            writeln!(f, "  {what}: {}", cases.len())?;
+            (cases.iter()).try_for_each(|case| {
+                writeln!(f, "    #{} at {:+.2} r: {}", case.index, case.gap, case.answer)
+            })
+        };
+        writeln!(f, "outside the band: {}", self.outside)?;
+        list(f, "false hits", &self.false_hits)?;
+        list(f, "misses", &self.misses)?;
+        list(f, "undecided", &self.undecided)?;
+        let (band, wrong, undecided) = (self.band, self.band_wrong, self.band_undecided);
+        writeln!(f, "inside the band: {band}, wrong {wrong}, undecided {undecided}")?;
+        let [hit, hit_estimated, apart, apart_estimated, undecided] = self.verdicts;
+        writeln!(
+            f,
+            "intersecting: {hit} certified, {hit_estimated} estimated; separated: {apart} certified, \
+             {apart_estimated} estimated; undecided: {undecided}"
+        )?;
+        let (clear, near) = (self.clear, self.near);
+        writeln!(
+            f,
+            "separations certified: {} of {} from 6 r on, {} of {} from 3 r on",
+            clear.certified, clear.all, near.certified, near.all
+        )?;
+        list(f, "certified apart but deeper than 0.3 r", &self.certified_wrongly)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nearmiss::Reason;
+    use nearmiss_testdata::arbitrary::{CloudKind, cloud};
+    use nearmiss_testdata::shapes::scorer_radius;
+
+    #[test]
+    fn radius_is_that_of_the_naive_twin() {
+        for kind in [CloudKind::Random, CloudKind::Clustered, CloudKind::Duplicates, CloudKind::EqualX] {
+            let points = cloud(kind, 500, 3);
+            let cloud = PointCloud::from_positions(&points).unwrap();
+            let stored: Vec<[f64; 3]> = (0..cloud.len()).map(|i| cloud.point(i)).collect();
+            let r = radius(&cloud).unwrap();
+            assert!((r / scorer_radius(&stored) - 1.0).abs() < 1e-9, "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn cases_are_counted_where_they_belong() {
+        let pose = Pose::IDENTITY;
+        let question = |gap: f64| Question { a: pose, b: pose, truth: gap < 0.0, gap };
+        let apart = |evidence| Verdict::Separated { gap: 0.0, evidence };
+        let mut score = Score::default();
+        score.count(0, &question(7.0), 1.0, &apart(Evidence::Certified));
+        score.count(1, &question(0.9), 1.0, &Verdict::Undecided(Reason::Ambiguous));
+        assert!(score.is_clean() && score.is_certified_enough());
+        score.count(2, &question(-1.1), 1.0, &apart(Evidence::Estimated));
+        score.count(3, &question(1.1), 1.0, &Verdict::Undecided(Reason::Undersampled));
+        score.count(4, &question(-0.4), 1.0, &apart(Evidence::Certified));
+        score.count(5, &question(-0.2), 1.0, &apart(Evidence::Certified));
+        score.count(6, &question(9.0), 1.0, &apart(Evidence::Estimated));
+        let indices = |cases: &[Case]| cases.iter().map(|c| c.index).collect::<Vec<_>>();
+        assert_eq!(indices(&score.misses), [2]);
+        assert_eq!(indices(&score.undecided), [3]);
+        assert_eq!(indices(&score.certified_wrongly), [4]);
+        assert_eq!((score.outside, score.band, score.band_wrong, score.band_undecided), (4, 3, 2, 1));
+        assert_eq!(score.clear, Share { all: 2, certified: 1 });
+        assert!(!score.is_clean() && !score.is_certified_enough());
+    }
+}

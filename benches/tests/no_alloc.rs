@@ -1,0 +1,97 @@
+//! Once their scratch is warm, queries and evaluations ask for no memory.
+//!
+//! One test alone: the counter is of the whole process, and a second test would run beside it.
+
+use nearmiss::hierarchy::GatherScratch;
+use nearmiss::{
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Pose, Scan,
+    Semantics, Verdict, collide_with,
+};
+use nearmiss_benches::counting::Counting;
+use nearmiss_benches::object::Object;
+use nearmiss_benches::poses;
+use nearmiss_testdata::arbitrary::{point_in, rng};
+use std::time::Duration;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
+
+/// Poses of each kind that are asked while the counter is watched.
+const POSES: usize = 300;
+
+/// What is asked, and within what.
+fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
+    let options = CollideOptions::default();
+    let [verdict, witness] = [Detail::Verdict, Detail::Witness].map(|detail| options.with_detail(detail));
+    let thick = options.with_semantics(Semantics::Thickened(0.5 * r));
+    let whole = Budget::UNLIMITED;
+    let hour = whole.with_deadline(Deadline::within(Duration::from_secs(3600)));
+    let asked = [
+        (verdict, whole),
+        (witness, whole),
+        (thick, whole),
+        (verdict, whole.with_work(8)),
+        (witness, whole.with_work(40)),
+        (thick, whole.with_work(8)),
+        (witness, hour),
+    ];
+    let plan = |options: &CollideOptions| CollidePlan::new(options, scan, scan).expect("options in range");
+    asked.map(|(options, budget)| (plan(&options), budget)).to_vec()
+}
+
+/// The poses asked of a scan, and how many verdicts of each kind they had.
+fn ask_all(
+    scan: &Scan,
+    questions: &[(CollidePlan, Budget)],
+    poses: &[Pose],
+    scratch: &mut CollideScratch,
+) -> [usize; 3] {
+    let mut verdicts = [0; 3];
+    for (plan, budget) in questions {
+        for pose in poses {
+            let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
+            let kind = match collide_with(&a, &b, plan, budget, scratch).verdict {
+                Verdict::Intersecting { .. } => 0,
+                Verdict::Separated { .. } => 1,
+                Verdict::Undecided(_) => 2,
+            };
+            verdicts[kind] += 1;
+        }
+    }
+    verdicts
+}
+
+#[test]
+fn warm_queries_and_evaluations_allocate_nothing() {
+    let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
+    let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
+    let mut poses: Vec<Pose> = poses::near(&object, POSES, 1).unwrap().iter().map(|near| near.pose).collect();
+    poses.extend(poses::sweep(POSES / 10, 1, 0).into_iter().flatten());
+    let questions = questions(&scan, object.r);
+    let mut scratch = CollideScratch::default();
+    // The very same questions: buffers grow to what these need and no further.
+    let first = ask_all(&scan, &questions, &poses, &mut scratch);
+    let before = ALLOCATOR.calls();
+    let second = ask_all(&scan, &questions, &poses, &mut scratch);
+    assert_eq!(ALLOCATOR.calls() - before, 0, "queries allocated");
+    assert_eq!(first, second, "verdicts depend on the scratch");
+    assert!(first.iter().all(|&n| n > 20), "of every kind of verdict some: {first:?}");
+
+    let rng = &mut rng(5);
+    let places: Vec<[f64; 3]> = (0..POSES)
+        .map(|i| {
+            let [p, d] = [scan.positions()[i * 7].map(f64::from), point_in(rng, object.r)];
+            [0, 1, 2].map(|k| p[k] + d[k])
+        })
+        .collect();
+    let mut gather = GatherScratch::default();
+    let evaluate = |gather: &mut GatherScratch| -> usize {
+        places.iter().filter(|&&x| scan.evaluate_with(x, gather).f.is_finite()).count()
+    };
+    let defined = evaluate(&mut gather);
+    let before = ALLOCATOR.calls();
+    let again = evaluate(&mut gather);
+    assert_eq!(ALLOCATOR.calls() - before, 0, "evaluations allocated");
+    assert_eq!(defined, again, "evaluations depend on the scratch");
+    assert!(defined > POSES / 2, "{defined} of {POSES} places have an f");
+}
