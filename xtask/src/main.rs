@@ -1,6 +1,7 @@
 //! `cargo xtask …`: the commands of `nearmiss` on a fresh checkout, and repository chores.
 //!
 //! * `demo` — the main job on a real scan, with a table and a picture.
+//! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
 //! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
@@ -18,11 +19,13 @@ fn main() -> ExitCode {
     let outcome = match words.as_slice() {
         [] => {
             eprintln!(
-                "usage: cargo xtask demo | test [CHECK…] | preprocess, inspect, eval, collide, poses, export …"
+                "usage: cargo xtask demo | tidy | ci | test [CHECK…] | preprocess, inspect, eval, collide, poses, export …"
             );
             return ExitCode::from(2);
         }
         ["demo"] => demo::run(),
+        ["tidy"] => checks::run(&["tidy"]),
+        ["ci"] => checks::run(&[]),
         ["test", names @ ..] => checks::run(names),
         _ => return nearmiss_cli::run(std::env::args_os()),
     };

@@ -236,6 +236,7 @@ impl AnswerReport {
                     }
                     Reason::Undersampled => Some("undersampled"),
                     Reason::Ambiguous => Some("ambiguous"),
+                    Reason::Pose => Some("pose"),
                     _ => None,
                 };
             }
@@ -330,6 +331,7 @@ fn doubt(reason: Reason, a: &ScanView<'_>, b: &ScanView<'_>, thickened: bool) ->
                 100.0 * share
             )
         }
+        Reason::Pose => "a pose is not finite or makes one object vanish beside the other".to_owned(),
         _ => "for a reason that this program does not know; update it".to_owned(),
     }
 }

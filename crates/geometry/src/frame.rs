@@ -55,11 +55,11 @@ impl Frame {
     }
 }
 
-/// Floor of the binary logarithm of a positive finite number.
+/// Floor of the binary logarithm of a positive finite number, at least −1000, so that the power is normal.
 fn exponent(x: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "between -1075 and 1024")]
     let e = x.log2().floor() as i32;
-    e
+    e.max(-1000)
 }
 
 /// 2^e, for any exponent of a normal number.
@@ -80,6 +80,13 @@ mod tests {
         for p in [a, b] {
             assert_eq!(frame.to_world(frame.to_local(p)), p, "no bit lost");
         }
+    }
+
+    #[test]
+    fn denormal_extents_stay_finite() {
+        let frame = Frame::around([0.0; 3], [4e-310; 3]);
+        assert!(frame.scale.is_normal(), "{frame:?}");
+        assert!(frame.to_local([4e-310; 3]).iter().all(|x| x.is_finite()), "{frame:?}");
     }
 
     #[test]

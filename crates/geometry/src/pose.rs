@@ -16,6 +16,12 @@ pub enum PoseError {
         /// Index of the entry, 0 to 15.
         index: usize,
     },
+    /// An entry is so large that squared distances overflow.
+    #[error("entry {index} of the pose (row-major) is beyond ±1e100")]
+    TooLarge {
+        /// Index of the entry, 0 to 15.
+        index: usize,
+    },
     /// The last row is not 0 0 0 1.
     #[error(
         "the last row of the pose is not 0 0 0 1; matrices are row-major, translation in the last column"
@@ -39,6 +45,9 @@ pub enum PoseError {
         tolerance: f64,
     },
 }
+
+/// Beyond this squares and cubes leave the range of double precision.
+const FARTHEST: f64 = 1e100;
 
 /// world = scale · rotation · object + translation, in double precision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -94,6 +103,9 @@ impl Pose {
     pub fn from_row_major(m: &[f64; 16], bounds: &Aabb, tolerance: f64) -> Result<Self, PoseError> {
         if let Some(index) = m.iter().position(|x| !x.is_finite()) {
             return Err(PoseError::NotFinite { index });
+        }
+        if let Some(index) = m.iter().position(|x| x.abs() > FARTHEST) {
+            return Err(PoseError::TooLarge { index });
         }
         if m[12..] != [0.0, 0.0, 0.0, 1.0] {
             return Err(PoseError::NotAffine);
@@ -255,6 +267,7 @@ mod tests {
             Pose::from_row_major(&m, &BOX, 1e-3)
         };
         assert_eq!(with(5, f64::NAN), Err(PoseError::NotFinite { index: 5 }));
+        assert_eq!(with(3, 1e200), Err(PoseError::TooLarge { index: 3 }));
         assert_eq!(with(12, 0.5), Err(PoseError::NotAffine));
         assert!(matches!(with(0, -1.0), Err(PoseError::NotProper { determinant: -1.0 })), "a mirror");
         assert!(matches!(with(0, 0.0), Err(PoseError::NotProper { .. })), "a flattening");

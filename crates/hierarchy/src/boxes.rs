@@ -24,7 +24,9 @@ pub struct OrientedBox {
     pub reach: f32,
 }
 
-/// What rounding can do to a coordinate of a box, relative to the largest number involved.
+/// What rounding can do to a coordinate of a box or a point in motion, relative to the largest number involved:
+/// a sum of four products rounds seven times by 2⁻²⁴, twice over where a rounded centre is turned again, and
+/// axes are unit to 2⁻²³ each; together below 16 · 2⁻²⁴.
 const ROUNDING: f32 = 1e-6;
 
 impl OrientedBox {

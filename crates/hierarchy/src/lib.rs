@@ -20,5 +20,5 @@ pub use gather::{GatherScratch, Vicinity};
 pub use options::{BuildError, BuildOptions};
 pub use sanity::Flaw;
 pub use sections::{HierarchyMeta, LoadError};
-pub use surfels::{NormalCone, PointKind};
-pub use topology::Node;
+pub use surfels::{NormalCone, PointKind, THICKNESS};
+pub use topology::{MOST_LEAF_POINTS, Node};

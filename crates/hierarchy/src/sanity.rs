@@ -3,7 +3,9 @@
 
 use thiserror::Error;
 
-use crate::boxes::{dot, sub};
+use nearmiss_geometry::nalgebra::Vector3;
+
+use crate::boxes::dot;
 use crate::build::PointHierarchy;
 use crate::gather::TREE_STACK;
 use crate::topology::Node;
@@ -119,12 +121,12 @@ impl PointHierarchy {
 
     fn box_holds_disc(&self, id: usize, i: usize) -> bool {
         let bounds = &self.boxes[id];
-        let d = sub(self.positions[i], bounds.centre);
+        let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+        let d = double(self.positions[i]) - double(bounds.centre);
         (0..3).all(|k| {
-            let tilt = dot(self.normals[i], bounds.axes[k]);
-            let spread = self.discs[i] * (1.0 - tilt * tilt).max(0.0).sqrt();
-            let reach = bounds.half.iter().copied().fold(0.0, f32::max);
-            dot(d, bounds.axes[k]).abs() + spread <= bounds.half[k] + 1e-6 * reach
+            let axis = double(bounds.axes[k]);
+            let spread = f64::from(self.discs[i]) * double(self.normals[i]).cross(&axis).norm();
+            d.dot(&axis).abs() + spread <= f64::from(bounds.half[k])
         })
     }
 }

@@ -41,13 +41,19 @@ pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Vec<Spacing> {
     map(&ids, |&i| {
         let near = nearest(&tree, points, &turned, i as usize, neighbours);
         if near.len() <= neighbours || !is_line(points, &near) {
-            return Spacing { radius: near.last().map_or(0.0, |n| n.0.sqrt()), is_line: false };
+            return Spacing { radius: near.last().map_or(0.0, length), is_line: false };
         }
         let near = nearest(&tree, points, &turned, i as usize, MOST_NEIGHBOURS);
         let last = near.len() - 1;
         let grown = (neighbours..=last).find(|&k| !is_line(points, &near[..=k]));
-        Spacing { radius: near[grown.unwrap_or(last)].0.sqrt(), is_line: grown.is_none() }
+        Spacing { radius: length(&near[grown.unwrap_or(last)]), is_line: grown.is_none() }
     })
+}
+
+/// The distance of a neighbour: at least 1e-18, whose square single precision still holds.
+#[expect(clippy::cast_possible_truncation, reason = "radii are stored in single precision")]
+fn length(near: &(f64, usize)) -> f32 {
+    near.0.sqrt().max(1e-18) as f32
 }
 
 /// A fixed rotation, by 1, 0.7 and 0.3 radians about the axes: a kd-tree whose points share a coordinate, or
@@ -81,20 +87,20 @@ fn nearest(
     turned: &[[f64; 3]],
     i: usize,
     count: usize,
-) -> Vec<(f32, usize)> {
+) -> Vec<(f64, usize)> {
     let wanted = NonZero::new(count + 1).unwrap_or(NonZero::<usize>::MIN);
     let found = tree.query(&turned[i]).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
     let exact = |j: usize| {
-        let d = sub(points[j], points[i]);
-        (dot(d, d), j)
+        let d = [0, 1, 2].map(|k| f64::from(points[j][k]) - f64::from(points[i][k]));
+        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
     };
-    let mut near: Vec<(f32, usize)> = found.iter().map(|n| exact(n.item as usize)).collect();
+    let mut near: Vec<(f64, usize)> = found.iter().map(|n| exact(n.item as usize)).collect();
     near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     near
 }
 
 /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
-fn is_line(points: &[[f32; 3]], near: &[(f32, usize)]) -> bool {
+fn is_line(points: &[[f32; 3]], near: &[(f64, usize)]) -> bool {
     let origin = points[near[0].1];
     let mut s = [0.0_f64; 9];
     for &(_, i) in near {

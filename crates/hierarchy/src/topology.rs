@@ -6,6 +6,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+/// Greatest number of points that a leaf may be built with; queries reserve room for so many.
+pub const MOST_LEAF_POINTS: usize = 64;
+
 /// A node: a contiguous run of points in leaf order, and two children unless it is a leaf.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C)]

@@ -65,6 +65,17 @@ fn radii_equal_the_twin() {
     }
 }
 
+/// Whether no threshold is so near that rounding could decide the status.
+fn is_clear(at: &oracle::Evaluation, x: [f64; 3]) -> bool {
+    let [l1, l2, l3] = at.eigenvalues;
+    let half = 0.5 * at.bandwidth.powi(2);
+    let aside = (0..3).map(|k| (x[k] - at.centroid[k]).powi(2)).sum::<f64>().sqrt();
+    let clear = |value: f64, threshold: f64| (value / threshold - 1.0).abs() > 1e-3;
+    clear(aside / at.bandwidth, oracle::BORDER)
+        && clear(l1 / half, oracle::THIN)
+        && clear((l2 - l1) / (l1 + l2 + l3), oracle::GAP)
+}
+
 /// Compares f with the twin at points near the stored ones; returns how many were ok on both sides.
 fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
     let points = stored(scan);
@@ -88,6 +99,15 @@ fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
                     "support at {x:?}"
                 );
                 continue;
+            }
+            if is_clear(&expected, x) {
+                let same = match expected.status {
+                    oracle::Status::Outside => Status::Outside,
+                    oracle::Status::Border => Status::Border,
+                    oracle::Status::Ambiguous => Status::Ambiguous,
+                    oracle::Status::Ok => Status::Ok,
+                };
+                assert_eq!(found.status, same, "status at {x:?}: {expected:?}");
             }
             let ok = expected.status == oracle::Status::Ok;
             let gap = expected.eigenvalues[1] - expected.eigenvalues[0];

@@ -3,6 +3,11 @@
 
 mod scan;
 
+/// The front page's example compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct FrontPage;
+
 pub use nearmiss_geometry as geometry;
 pub use nearmiss_hierarchy as hierarchy;
 #[cfg(feature = "io")]

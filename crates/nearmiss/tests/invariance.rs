@@ -39,8 +39,8 @@ fn verdicts_outside_the_band_do_not_change() {
             let (va, vb) = (a.at(&pose_a), b.at(&pose_b));
             let verdict = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
             assert_eq!(
-                verdict.is_intersecting(),
-                pair.truth,
+                (verdict.is_intersecting(), verdict.is_separated()),
+                (pair.truth, !pair.truth),
                 "{name}, {}: {verdict:?} at gap {:.2} r",
                 pair.family,
                 pair.gap / pair.r

@@ -80,3 +80,38 @@ fn a_tree_that_lies_is_refused() {
     }
     assert_eq!(refused, 9, "every field of the first three nodes is checked without checksums");
 }
+
+/// Points, normals and discs that no build would write must not lead a query out of its arrays.
+#[test]
+fn absurd_numbers_do_not_panic() {
+    let points = arbitrary::cloud(CloudKind::Sphere, 101, 1);
+    let scan = Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap();
+    let mut bytes = Vec::new();
+    scan.write_to(&mut bytes).unwrap();
+    let sections = nearmiss::store::File::from_bytes(bytes.clone(), Check::Full).unwrap().sections().to_vec();
+    let fill = |bytes: &mut [u8], tag: &[u8; 4], value: f32| {
+        let section = sections.iter().find(|s| s.id.tag == *tag).unwrap();
+        let start = usize::try_from(section.offset).unwrap();
+        let end = start + usize::try_from(section.length).unwrap();
+        for word in bytes[start..end].chunks_exact_mut(4) {
+            word.copy_from_slice(&value.to_le_bytes());
+        }
+    };
+    let sound = scan.at(&nearmiss::Pose::IDENTITY);
+    for value in [0.0, 1e20, -1.0, f32::MAX, f32::NAN, f32::INFINITY] {
+        for tags in [&[b"DISC"][..], &[b"NRML"], &[b"BOXS"], &[b"RADI"], &[b"PNTS"], &[b"DISC", b"NRML"]] {
+            let mut absurd = bytes.clone();
+            for tag in tags {
+                fill(&mut absurd, tag, value);
+            }
+            let Ok(absurd) = Scan::from_bytes(absurd, Check::Structure) else { continue };
+            let plan =
+                nearmiss::CollidePlan::new(&nearmiss::CollideOptions::default(), &absurd, &scan).unwrap();
+            let view = absurd.at(&nearmiss::Pose::from_translation([0.3, 0.1, 0.0]));
+            for (a, b) in [(&view, &sound), (&sound, &view), (&view, &view)] {
+                let answer = nearmiss::collide(a, b, &plan, &nearmiss::Budget::UNLIMITED);
+                assert!(answer.statistics.node_pairs < 10_000, "{tags:?} {value}: {:?}", answer.statistics);
+            }
+        }
+    }
+}

@@ -5,8 +5,15 @@ use std::time::{Duration, Instant};
 
 use crate::verdict::Statistics;
 
-/// Work units between two looks at the clock, which cost 22 ns each; a unit costs 20 to 500 ns.
-const UNITS_A_LOOK: u64 = 16;
+/// Between two looks at the clock, which cost some 22 ns each, lies work of about this many node pairs, which cost
+/// about 15 ns each.
+const PAIRS_A_LOOK: u64 = 64;
+
+/// An evaluation costs as much as so many node pairs.
+const PAIRS_AN_EVALUATION: u64 = 64;
+
+/// So many pairs of points cost as much as a node pair.
+const POINTS_A_PAIR: u64 = 4;
 
 /// A point in time at which to stop; absolute, so that one can span all queries of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -65,6 +72,8 @@ impl Budget {
 #[derive(Debug)]
 pub(crate) struct Meter {
     budget: Budget,
+    /// Leaf work so far, in node pairs.
+    leaf_work: u64,
     next_look: u64,
     /// What was spent.
     pub(crate) spent: Statistics,
@@ -72,7 +81,14 @@ pub(crate) struct Meter {
 
 impl Meter {
     pub(crate) fn new(budget: &Budget) -> Self {
-        Self { budget: *budget, next_look: 0, spent: Statistics::default() }
+        Self { budget: *budget, leaf_work: 0, next_look: 0, spent: Statistics::default() }
+    }
+
+    /// Counts two leaves of so many points each.
+    #[inline]
+    pub(crate) fn leaf_pair(&mut self, a: u32, b: u32) {
+        self.spent.leaf_pairs += 1;
+        self.leaf_work += u64::from(a) * u64::from(b) / POINTS_A_PAIR;
     }
 
     /// Whether anything is left.
@@ -85,12 +101,13 @@ impl Meter {
         if self.budget.work.is_some_and(|most| units >= most) {
             return ControlFlow::Break(());
         }
-        if let Some(deadline) = self.budget.deadline
-            && units >= self.next_look
-        {
-            self.next_look = units + UNITS_A_LOOK;
-            if deadline.is_past() {
-                return ControlFlow::Break(());
+        if let Some(deadline) = self.budget.deadline {
+            let work = PAIRS_AN_EVALUATION * self.spent.evaluations + self.spent.node_pairs + self.leaf_work;
+            if work >= self.next_look {
+                self.next_look = work + PAIRS_A_LOOK;
+                if deadline.is_past() {
+                    return ControlFlow::Break(());
+                }
             }
         }
         ControlFlow::Continue(())

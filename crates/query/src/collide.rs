@@ -1,7 +1,7 @@
 //! The query: do two scans meet?
 //!
 //! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
-//! two children of the larger node, the deeper overlap first.
+//! children of both, or of the much larger one; the deepest overlap first.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Frontier, GatherScratch, Relative, Stack, descend};
@@ -46,9 +46,10 @@ pub fn collide_with(
     };
     let relative = match relative(a, b, reach) {
         Ok(relative) => relative,
-        Err(gap) => {
+        Err(early) => {
             meter.spent.node_pairs = 1;
-            return Answer { verdict: separated(plan, gap - reach), statistics: meter.spent };
+            let verdict = early.map_or(Verdict::Undecided(Reason::Pose), |gap| separated(plan, gap - reach));
+            return Answer { verdict, statistics: meter.spent };
         }
     };
     let nodes = (a.slices().nodes, b.slices().nodes);
@@ -83,9 +84,19 @@ fn separated(plan: &CollidePlan, gap: f64) -> Verdict {
     }
 }
 
-/// The motion of b's stored frame into a's; `None` when balls about the two scans are further apart than any
-/// contact reaches.
-fn relative(a: &ScanView<'_>, b: &ScanView<'_>, reach: f64) -> Result<Relative, f64> {
+/// Scans whose sizes differ by more than this are not compared in single precision.
+const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
+
+/// The motion of b's stored frame into a's. An error is the distance of balls about the two scans if that is more
+/// than any contact reaches, or `None` for poses that are none.
+fn relative(a: &ScanView<'_>, b: &ScanView<'_>, reach: f64) -> Result<Relative, Option<f64>> {
+    let ratio = b.placed().scale() / a.placed().scale();
+    let finite = |m: [f64; 16]| m.iter().all(|x| x.is_finite());
+    let proper = finite(a.placed().to_row_major()) && finite(b.placed().to_row_major());
+    let positive = a.placed().scale() > 0.0 && b.placed().scale() > 0.0;
+    if !(proper && positive && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
+        return Err(None);
+    }
     let [(ca, ra), (cb, rb)] = [a, b].map(|view| {
         let root = &view.scan().boxes()[0];
         let centre = view.placed().apply(root.centre.map(f64::from));
@@ -93,7 +104,7 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, reach: f64) -> Result<Relative, 
     });
     let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6);
     if gap > reach {
-        return Err(gap);
+        return Err(Some(gap));
     }
     let pose = a.placed().inverse().after(b.placed());
     // Coordinates in a's stored frame: of its own points, and of b's.

@@ -5,6 +5,8 @@
 //! chords are `√(ρ_a² − v²/g)` and `√(ρ_b² − u²/g)`, and their midpoints lie `√(d² − (u² + v² − 2cuv)/g)` apart
 //! along the line. Multiplied by g nothing is divided by, and no sign of a normal matters (docs/theory/discs.md).
 
+use nearmiss_hierarchy::{MOST_LEAF_POINTS, THICKNESS};
+
 /// A point's tangent disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
@@ -16,10 +18,6 @@ pub struct Disc {
     pub radius: f32,
 }
 
-/// Parallel discs nearer than this share of the smaller radius touch: to first order nothing tells a sheet
-/// that grazes another from one that lies on it.
-pub(crate) const THICKNESS: f32 = 0.05;
-
 /// Discs as arrays of lanes.
 #[derive(Debug, Clone)]
 pub(crate) struct Lanes {
@@ -29,8 +27,8 @@ pub(crate) struct Lanes {
     pub(crate) radius: [f32; MOST],
 }
 
-/// Greatest number of points in a leaf.
-pub(crate) const MOST: usize = 64;
+/// Room for the points of a leaf.
+const MOST: usize = MOST_LEAF_POINTS;
 
 /// Lanes that are worked on together.
 const WIDTH: usize = 8;
@@ -65,7 +63,8 @@ impl Lanes {
         for start in (0..self.count).step_by(WIDTH) {
             bits |= u64::from(self.block(disc, start)) << start;
         }
-        bits
+        // Lanes that were only filled up never count, whatever their neighbours hold.
+        bits & u64::MAX.unbounded_shr(u64::BITS - u32::try_from(self.count).unwrap_or(u64::BITS))
     }
 
     /// Eight lanes at once. Written with arrays of lanes throughout, so that it compiles to vector code.
@@ -127,7 +126,8 @@ fn cross(a: &Disc, d: [f32; 3], normal: [f32; 3], radius: f32) -> bool {
     let chord_a = ra_sq * g - v * v;
     let chord_b = rb_sq * g - u * u;
     let apart = dot(d, d) * g - (u * u + v * v - 2.0 * c * u * v);
-    let both = (chord_a.max(0.0) * chord_b.max(0.0)).sqrt();
+    // Two roots, not one of the product: that would underflow for radii that are still fine.
+    let both = chord_a.max(0.0).sqrt() * chord_b.max(0.0).sqrt();
     let cross = chord_a >= 0.0 && chord_b >= 0.0 && apart <= chord_a + chord_b + 2.0 * both;
     let thin = THICKNESS * a.radius.min(radius);
     cross || u.abs().max(v.abs()) <= thin

@@ -24,7 +24,7 @@ const TRIES: u32 = 4;
 /// Newton's steps hardly ever lead further than this from the crossing, in local radii.
 const NEWTON: f64 = 1.0;
 
-/// A verified point further than this from the crossing, in local radii, is some other place.
+/// A verified point further than this from the crossing, in the greater of the two local radii, is some other place.
 const NEARBY: f64 = 4.0;
 
 /// The search for a crossing.
@@ -78,7 +78,7 @@ impl<'a> Surfaces<'a> {
             return ControlFlow::Break(());
         }
         self.tries += 1;
-        if let Some(contact) = self.refine(&contact, i) {
+        if let Some(contact) = self.refine(&contact, i, j) {
             self.found = Some((contact, Evidence::Certified));
             return ControlFlow::Break(());
         }
@@ -101,7 +101,7 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// The middle of the common chord of the discs, in the world.
+    /// The middle of what the chords of two crossing discs share, in the world.
     fn estimate(&self, i: usize, j: usize) -> Contact {
         let [va, vb] = self.views;
         let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
@@ -116,23 +116,38 @@ impl<'a> Surfaces<'a> {
         } else {
             ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
         };
-        let residual = nb.dot(&(pa - pb)).abs().min(na.dot(&(pa - pb)).abs());
+        let radii = [
+            f64::from(self.a.discs[i]) * va.placed().scale(),
+            f64::from(self.b.discs[j]) * vb.placed().scale(),
+        ];
+        let place = middle + step;
+        // Along the common line each chord is an interval; for parallel planes the place is as good as any.
+        let along = na.cross(&nb).try_normalize(0.03).map_or_else(Vector3::zeros, |line| {
+            let chord = |p: Vector3<f64>, radius: f64| {
+                let t = line.dot(&(p - place));
+                let half = (radius * radius - (p - place - t * line).norm_squared()).max(0.0).sqrt();
+                (t - half, t + half)
+            };
+            let ((a0, a1), (b0, b1)) = (chord(pa, radii[0]), chord(pb, radii[1]));
+            line * (0.5 * (a0.max(b0) + a1.min(b1)))
+        });
         Contact {
-            point: (middle + step).into(),
+            point: (place + along).into(),
             normals: Some([na.into(), nb.into()]),
-            residual,
+            residual: nb.dot(&(pa - pb)).abs().max(na.dot(&(pa - pb)).abs()),
             sources: [va.scan().id(i), vb.scan().id(j)],
         }
     }
 
     /// A verified point on both surfaces near `contact`.
-    fn refine(&mut self, contact: &Contact, i: usize) -> Option<Contact> {
+    fn refine(&mut self, contact: &Contact, i: usize, j: usize) -> Option<Contact> {
         let [va, vb] = self.views;
         let [scratch_a, scratch_b] = &mut *self.gathers;
-        let radius = NEWTON * f64::from(self.a.radii[i]);
-        let in_b = radius / f64::from(self.relative.scale());
+        let scale = vb.placed().scale() / va.placed().scale();
+        let radius = f64::from(self.a.radii[i]).max(f64::from(self.b.radii[j]) * scale);
+        let (in_a, in_b) = (NEWTON * radius, NEWTON * radius / scale);
         let start = contact.point;
-        let mut near_a = va.scan().vicinity(va.placed().apply_inverse(start), radius, scratch_a);
+        let mut near_a = va.scan().vicinity(va.placed().apply_inverse(start), in_a, scratch_a);
         let mut near_b = vb.scan().vicinity(vb.placed().apply_inverse(start), in_b, scratch_b);
         let meeting = meet(start, |x| {
             let at_a = va.in_world(near_a.evaluate(va.placed().apply_inverse(x)));
@@ -140,7 +155,7 @@ impl<'a> Surfaces<'a> {
         });
         self.meter.spent.evaluations += 2 * u64::from(meeting.rounds);
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
-        let nearby = NEARBY * f64::from(self.a.radii[i]) * va.placed().scale();
+        let nearby = NEARBY * radius * va.placed().scale();
         (meeting.verified && moved <= nearby).then(|| Contact {
             point: meeting.point,
             normals: Some(meeting.at.map(|e| e.normal)),
@@ -157,7 +172,8 @@ impl Visitor for Surfaces<'_> {
         let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
         let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
         let [p, q, r, s] = self.relative.gaps(boxes_a, boxes_b);
-        let admit = |gap: f32| (gap <= self.relative.slack()).then_some(-gap);
+        let slack = self.relative.slack();
+        let admit = |gap: f32| if gap > slack { None } else { Some(-gap) };
         [admit(p), admit(q), admit(r), admit(s)]
     }
 
@@ -172,7 +188,7 @@ impl Visitor for Surfaces<'_> {
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        self.meter.spent.leaf_pairs += 1;
+        self.meter.leaf_pair(self.a.nodes[pair.a.index()].count, self.b.nodes[pair.b.index()].count);
         let node_b = self.b.nodes[pair.b.index()];
         for (lane, j) in node_b.points().enumerate() {
             let disc = self.disc_b(j);

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, Relative, Slices, Split, Visitor};
+use nearmiss_hierarchy::{MOST_LEAF_POINTS, NodePair, Relative, Slices, Split, Visitor};
 
 use crate::budget::Meter;
 use crate::surface::larger;
@@ -46,12 +46,13 @@ impl Visitor for Balls<'_> {
         let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
         let gaps = self.relative.gaps(boxes_a, boxes_b);
         gaps.map(|gap| {
-            if gap <= self.reach_stored {
-                return Some(-gap);
+            // Written so that a gap that is no number excludes nothing.
+            if gap > self.reach_stored {
+                let bound = f64::from(gap - self.relative.slack()) * self.views[0].placed().scale();
+                self.apart = self.apart.min(bound);
+                return None;
             }
-            let bound = f64::from(gap - self.relative.slack()) * self.views[0].placed().scale();
-            self.apart = self.apart.min(bound);
-            None
+            Some(self.reach_stored - gap)
         })
     }
 
@@ -66,12 +67,16 @@ impl Visitor for Balls<'_> {
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        self.meter.spent.leaf_pairs += 1;
+        let (node_a, node_b) = (self.a.nodes[pair.a.index()], self.b.nodes[pair.b.index()]);
+        self.meter.leaf_pair(node_a.count, node_b.count);
         let [va, vb] = self.views;
-        for i in self.a.nodes[pair.a.index()].points() {
+        let mut points_b = [Vector3::zeros(); MOST_LEAF_POINTS];
+        for (q, j) in points_b.iter_mut().zip(node_b.points()) {
+            *q = Vector3::from(vb.point(j));
+        }
+        for i in node_a.points() {
             let p = Vector3::from(va.point(i));
-            for j in self.b.nodes[pair.b.index()].points() {
-                let q = Vector3::from(vb.point(j));
+            for (&q, j) in points_b.iter().zip(node_b.points()) {
                 let distance = (p - q).norm();
                 self.apart = self.apart.min(distance);
                 if distance <= self.reach {

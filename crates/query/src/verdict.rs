@@ -61,6 +61,8 @@ pub enum Reason {
     Undersampled,
     /// They come near each other only where a scan's points do not look like one sheet.
     Ambiguous,
+    /// A pose is not finite, has no positive scale, or makes one scan more than 2⁶⁰ times as large as the other.
+    Pose,
 }
 
 /// A place where two scans meet, in the world.
@@ -70,7 +72,9 @@ pub struct Contact {
     pub point: [f64; 3],
     /// Unit normals of both surfaces there, of arbitrary sign; none where points are compared, not surfaces.
     pub normals: Option<[[f64; 3]; 2]>,
-    /// Greatest distance of the place from either surface, as far as known; see [`Evidence`].
+    /// How far off the place may be, in world units. Certified: the greater |f| of the two surfaces there.
+    /// Estimated: the greater distance of either point from the other's tangent plane. Balls: half the distance
+    /// of the points.
     pub residual: f64,
     /// The points whose discs (or balls) meet there, as the caller numbered them.
     pub sources: [PointId; 2],

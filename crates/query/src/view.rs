@@ -50,7 +50,7 @@ impl<'a> ScanView<'a> {
         self.placed.apply(self.slices.positions[i].map(f64::from))
     }
 
-    /// The implicit function at `x`, all in the world.
+    /// The implicit function at `x`, all in the world; the sign of f and of the normal as in the stored frame.
     pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         self.in_world(self.scan.evaluate_with(self.placed.apply_inverse(x), scratch))
     }

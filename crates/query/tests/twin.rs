@@ -233,3 +233,82 @@ fn a_work_budget_is_kept_and_reproducible() {
     let late = ask(&a, &b, CollideOptions::default(), &Budget::default().with_deadline(past));
     assert!(matches!(late.verdict, Verdict::Undecided(Reason::Budget { .. })), "{late:?}");
 }
+
+/// A square lattice in the plane z = 0 from −half to half.
+fn lattice(half: i32, spacing: f64) -> Vec<[f64; 3]> {
+    let side = |i: i32| f64::from(i) * spacing;
+    (-half..=half).flat_map(|i| (-half..=half).map(move |j| [side(i), side(j), 0.0])).collect()
+}
+
+#[test]
+fn grazing_sheets_touch_flat_or_not() {
+    let flat = prepared(&lattice(25, 1.0));
+    let verdict = CollideOptions::default().with_detail(Detail::Verdict);
+    // Discs have a radius of some 0.65 · 1.41, and a twentieth of that is how near sheets touch.
+    for (lift, touches) in [(0.0, true), (0.02, true), (0.04, true), (0.06, false), (0.5, false)] {
+        let pose = Pose::from_translation([0.3, 0.2, lift]);
+        let (a, b) = (ScanView::new(&flat, &Pose::IDENTITY), ScanView::new(&flat, &pose));
+        let found = ask(&a, &b, verdict, &Budget::UNLIMITED).verdict;
+        assert_eq!(found.is_intersecting(), touches, "lifted by {lift}: {found:?}");
+    }
+}
+
+#[test]
+fn contacts_of_coarse_and_fine_lie_on_both() {
+    let coarse = prepared(&lattice(10, 1.0));
+    let fine = prepared(&lattice(10, 0.01));
+    let mut rng = arbitrary::rng(5);
+    let mut hits = 0;
+    for round in 0..300 {
+        let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.4));
+        let (a, b) = (ScanView::new(&coarse, &Pose::IDENTITY), ScanView::new(&fine, &pose));
+        let (a, b) = if round % 2 == 0 { (a, b) } else { (b, a) };
+        let options = CollideOptions::default().with_detail(Detail::Verdict);
+        if let Verdict::Intersecting { contact, .. } = ask(&a, &b, options, &Budget::UNLIMITED).verdict {
+            hits += 1;
+            let in_fine = pose.apply_inverse(contact.point);
+            let away = in_fine.map(|x| (x.abs() - 0.1).max(0.0)).iter().map(|x| x * x).sum::<f64>().sqrt();
+            assert!(away < 0.02, "{in_fine:?} is off the fine patch");
+            assert!(contact.point[2].abs() < 1e-6, "{:?} is off the coarse plane", contact.point);
+        }
+    }
+    assert!(hits > 30, "{hits} hits");
+}
+
+#[test]
+fn a_pose_that_is_none_is_undecided() {
+    let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 300, 1));
+    let poses = [
+        Pose::from_translation([f64::NAN, 0.0, 0.0]),
+        Pose::from_translation([0.0, f64::INFINITY, 0.0]),
+        Pose::IDENTITY.with_scale(0.0),
+        Pose::IDENTITY.with_scale(-1.0),
+        Pose::IDENTITY.with_scale(f64::NAN),
+        Pose::IDENTITY.with_scale(1e39),
+        Pose::from_axis_angle([1.0, 0.0, 0.0], f64::NAN),
+    ];
+    for pose in poses {
+        let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+        for (a, b) in [(a, b), (b, a)] {
+            for semantics in [Semantics::Surface, Semantics::Thickened(0.1)] {
+                let options = CollideOptions::default().with_semantics(semantics);
+                let verdict = ask(&a, &b, options, &Budget::UNLIMITED).verdict;
+                assert_eq!(verdict, Verdict::Undecided(Reason::Pose), "{pose:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn balls_that_surely_meet_are_likely_to() {
+    let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
+    let size = sphere.bounds().half_extents()[0];
+    let pose = Pose::from_translation([3.0 * size, 0.0, 0.0]);
+    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+    let options = CollideOptions::default().with_semantics(Semantics::Thickened(5.0 * size));
+    for work in [0, 1, 5] {
+        let verdict = ask(&a, &b, options, &Budget::default().with_work(work)).verdict;
+        let Verdict::Undecided(Reason::Budget { likelihood }) = verdict else { panic!("{verdict:?}") };
+        assert!(likelihood > 0.5, "{likelihood} after {work} units");
+    }
+}

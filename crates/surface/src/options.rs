@@ -80,6 +80,9 @@ impl SurfaceOptions {
     }
 }
 
+/// Bandwidths, in stored units, whose squares single precision holds.
+const REPRESENTABLE: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
+
 /// Which option is out of range.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -93,8 +96,8 @@ pub enum SurfaceError {
     /// Fewer than three points span no plane.
     #[error("a least support of {0}; three points are needed to span a plane")]
     Support(u32),
-    /// A fixed bandwidth must be a positive length.
-    #[error("a bandwidth of {0}; it must be positive and finite")]
+    /// A fixed bandwidth must be a positive length that single precision can square.
+    #[error("a bandwidth of {0}; it must be positive, and neither vanish nor be boundless beside the scan")]
     Bandwidth(f64),
 }
 
@@ -131,7 +134,7 @@ impl SurfacePlan {
         let (slope, level) = match bandwidth {
             Bandwidth::Local => (horizon, 0.0),
             Bandwidth::Global => (0.0, horizon * sampling_radius),
-            Bandwidth::Fixed(h) if h > 0.0 && h.is_finite() => (0.0, h * unit * reach_sq.sqrt()),
+            Bandwidth::Fixed(h) if REPRESENTABLE.contains(&(h * unit)) => (0.0, h * unit * reach_sq.sqrt()),
             Bandwidth::Fixed(h) => return Err(SurfaceError::Bandwidth(h)),
         };
         #[expect(clippy::cast_possible_truncation, reason = "neighbour sums are single precision")]
@@ -191,7 +194,9 @@ mod tests {
         assert!(matches!(bad(d().with_horizon(f64::NAN)), SurfaceError::Horizon(_)));
         assert_eq!(bad(d().with_threshold(0.0)), SurfaceError::Threshold(0.0));
         assert_eq!(bad(d().with_support_min(2)), SurfaceError::Support(2));
-        assert_eq!(bad(d().with_bandwidth(Bandwidth::Fixed(-1.0))), SurfaceError::Bandwidth(-1.0));
+        for h in [-1.0, 0.0, 1e-300, 1e300, f64::INFINITY] {
+            assert_eq!(bad(d().with_bandwidth(Bandwidth::Fixed(h))), SurfaceError::Bandwidth(h));
+        }
     }
 
     #[test]
