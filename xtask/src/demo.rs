@@ -27,14 +27,18 @@ pub(crate) fn run() -> Outcome {
     let scan = prepared(&folder.join("dragon.nm"))?;
     let r = scan.sampling_radius();
     let touch = first_touch(&scan)?;
-    println!("\nA second copy comes in; first touch of the points at {touch:.4} from centre to centre.");
-    println!("Offsets are in sampling radii r = {r:.5} past that; each question asked once.");
     println!(
-        "Beside each: the least distance of any two points, in r, by bisection on the exact question.\n"
+        "\nA second copy comes in. At offset 0 the nearest two points are one sampling radius r = {r:.5} apart;"
     );
     println!(
-        "{:>7}  {:<10} {:<10} {:>8} {:>9} {:>9} {:>12} {:>11}",
-        "offset", "verdict", "evidence", "distance", "residual", "µs", "evaluations", "node pairs"
+        "offsets, in r, go further in. Rows marked ~ lie within r of contact, where nothing is promised."
+    );
+    println!(
+        "Nearest: the least distance of any two points, in r, found by asking about ever larger balls.\n"
+    );
+    println!(
+        "{:>8}  {:<10} {:<10} {:>8} {:>9} {:>9} {:>12} {:>11}",
+        "offset", "verdict", "evidence", "nearest", "residual", "µs", "evaluations", "node pairs"
     );
     let mut scratch = CollideScratch::default();
     let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;
@@ -51,7 +55,7 @@ pub(crate) fn run() -> Outcome {
         print_row(offset, &answer, distance, micros);
     }
     let picture = draw(&scan, &a, &plan, touch - PICTURED * r, folder.join("contact.png"))?;
-    println!("\nA picture of the contact {PICTURED} r in: {}", picture.display());
+    println!("\nA picture of the contact at offset {PICTURED}: {}", picture.display());
     println!("Both scans, the witness and both normals; the same as `nearmiss collide … --image`.");
     Ok(())
 }
@@ -148,8 +152,10 @@ fn print_row(offset: f64, answer: &Answer, distance: f64, micros: f64) {
         Verdict::Undecided(_) => ("undecided", "", String::new()),
     };
     let spent = answer.statistics;
+    // Points r apart, surfaces touching some r further in.
+    let close = if (0.0..=2.0).contains(&offset) { '~' } else { ' ' };
     println!(
-        "{offset:>7.1}  {verdict:<10} {evidence:<10} {distance:>8.2} {residual:>9} {micros:>9.1} {:>12} {:>11}",
+        "{close}{offset:>7.1}  {verdict:<10} {evidence:<10} {distance:>8.2} {residual:>9} {micros:>9.1} {:>12} {:>11}",
         spent.evaluations, spent.node_pairs
     );
 }

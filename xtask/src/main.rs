@@ -13,15 +13,28 @@ mod tidy;
 
 use std::process::ExitCode;
 
+const USAGE: &str = "\
+usage: cargo xtask COMMAND
+
+of the repository
+  demo           prepare a real scan, sweep two copies past each other; a table and a picture
+  test [CHECK…]  every check, or: tidy, format, tests, lints, docs, features, packages, determinism
+  tidy, ci       the first of them; all of them
+
+of nearmiss (`cargo xtask COMMAND --help` says more)
+  preprocess, inspect, eval, collide, poses, export";
+
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = args.iter().map(String::as_str).collect();
     let outcome = match words.as_slice() {
         [] => {
-            eprintln!(
-                "usage: cargo xtask demo | tidy | ci | test [CHECK…] | preprocess, inspect, eval, collide, poses, export …"
-            );
+            eprintln!("{USAGE}");
             return ExitCode::from(2);
+        }
+        ["--help" | "-h" | "help"] => {
+            println!("{USAGE}");
+            Ok(())
         }
         ["demo"] => demo::run(),
         ["tidy"] => checks::run(&["tidy"]),

@@ -9,6 +9,7 @@ use nearmiss_hierarchy::{Frontier, GatherScratch, Relative, Stack, descend};
 use crate::budget::{Budget, Meter};
 use crate::crossing::Lanes;
 use crate::options::{CollidePlan, Semantics};
+use crate::posed::Posed;
 use crate::surface::Surfaces;
 use crate::thickened::Balls;
 use crate::verdict::{Answer, Evidence, Reason, Verdict};
@@ -54,17 +55,18 @@ pub fn collide_with(
     };
     let nodes = (a.slices().nodes, b.slices().nodes);
     let CollideScratch { stack, lanes, gathers } = scratch;
+    let pair = Posed::new([a, b], relative, meter);
     let (found, ended, doubt, apart, statistics) = match plan.options().semantics {
         Semantics::Surface => {
-            let mut search = Surfaces::new([a, b], relative, plan.options().detail, meter, (lanes, gathers));
+            let mut search = Surfaces::new(pair, plan.options().detail, lanes, gathers);
             let ended = descend(nodes.0, nodes.1, &mut search, stack).is_break();
-            (search.found, ended, search.doubt, 0.0, search.meter.spent)
+            (search.found, ended, search.doubt, 0.0, search.pair.meter.spent)
         }
         Semantics::Thickened(radius) => {
-            let mut search = Balls::new([a, b], relative, radius, meter);
+            let mut search = Balls::new(pair, radius);
             let ended = descend(nodes.0, nodes.1, &mut search, stack).is_break();
             let found = search.found.map(|contact| (contact, Evidence::Certified));
-            (found, ended, None, search.apart - reach, search.meter.spent)
+            (found, ended, None, search.apart - reach, search.pair.meter.spent)
         }
     };
     let verdict = match (found, doubt) {

@@ -5,6 +5,7 @@ mod budget;
 mod collide;
 mod crossing;
 mod options;
+mod posed;
 mod surface;
 mod thickened;
 mod verdict;

@@ -9,14 +9,13 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, OrientedBox, PointKind, Relative, Slices, Split, Visitor};
+use nearmiss_hierarchy::{GatherScratch, NodePair, PointKind, Split, Visitor};
 use nearmiss_surface::meet;
 
-use crate::budget::Meter;
 use crate::crossing::{Disc, Lanes};
 use crate::options::Detail;
+use crate::posed::Posed;
 use crate::verdict::{Contact, Evidence, Reason};
-use crate::view::ScanView;
 
 /// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
 const TRIES: u32 = 4;
@@ -30,14 +29,10 @@ const NEARBY: f64 = 4.0;
 /// The search for a crossing.
 #[derive(Debug)]
 pub(crate) struct Surfaces<'a> {
-    views: [&'a ScanView<'a>; 2],
-    a: Slices<'a>,
-    b: Slices<'a>,
-    relative: Relative,
+    pub(crate) pair: Posed<'a>,
     detail: Detail,
-    pub(crate) meter: Meter,
     lanes: &'a mut Lanes,
-    gathers: &'a mut [nearmiss_hierarchy::GatherScratch; 2],
+    gathers: &'a mut [GatherScratch; 2],
     tries: u32,
     /// The best contact so far.
     pub(crate) found: Option<(Contact, Evidence)>,
@@ -47,26 +42,27 @@ pub(crate) struct Surfaces<'a> {
 
 impl<'a> Surfaces<'a> {
     pub(crate) fn new(
-        views: [&'a ScanView<'a>; 2],
-        relative: Relative,
+        pair: Posed<'a>,
         detail: Detail,
-        meter: Meter,
-        scratch: (&'a mut Lanes, &'a mut [nearmiss_hierarchy::GatherScratch; 2]),
+        lanes: &'a mut Lanes,
+        gathers: &'a mut [GatherScratch; 2],
     ) -> Self {
-        let [a, b] = views.map(|view| *view.slices());
-        let (lanes, gathers) = scratch;
-        Self { views, a, b, relative, detail, meter, lanes, gathers, tries: 0, found: None, doubt: None }
+        Self { pair, detail, lanes, gathers, tries: 0, found: None, doubt: None }
     }
 
     fn disc_a(&self, i: usize) -> Disc {
-        Disc { centre: self.a.positions[i], normal: self.a.normals[i], radius: self.a.discs[i] }
+        Disc {
+            centre: self.pair.a.positions[i],
+            normal: self.pair.a.normals[i],
+            radius: self.pair.a.discs[i],
+        }
     }
 
     fn disc_b(&self, j: usize) -> Disc {
         Disc {
-            centre: self.relative.point(self.b.positions[j]),
-            normal: self.relative.direction(self.b.normals[j]),
-            radius: self.b.discs[j] * self.relative.scale(),
+            centre: self.pair.relative.point(self.pair.b.positions[j]),
+            normal: self.pair.relative.direction(self.pair.b.normals[j]),
+            radius: self.pair.b.discs[j] * self.pair.relative.scale(),
         }
     }
 
@@ -89,13 +85,13 @@ impl<'a> Surfaces<'a> {
 
     /// Why a crossing of the discs of points `i` and `j` says little, if it does.
     fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
-        match self.views[0].scan().kind(i).max(self.views[1].scan().kind(j)) {
+        match self.pair.views[0].scan().kind(i).max(self.pair.views[1].scan().kind(j)) {
             PointKind::Surface | PointKind::Border => None,
             PointKind::Line | PointKind::Isolated => Some(Reason::Undersampled),
             // Within a sampling radius of each other the points themselves say enough.
             _ => {
                 let d = Vector3::from(self.disc_a(i).centre) - Vector3::from(self.disc_b(j).centre);
-                let radius = self.a.radii[i].min(self.b.radii[j] * self.relative.scale());
+                let radius = self.pair.a.radii[i].min(self.pair.b.radii[j] * self.pair.relative.scale());
                 (d.norm() > radius).then_some(Reason::Ambiguous)
             }
         }
@@ -103,10 +99,10 @@ impl<'a> Surfaces<'a> {
 
     /// The middle of what the chords of two crossing discs share, in the world.
     fn estimate(&self, i: usize, j: usize) -> Contact {
-        let [va, vb] = self.views;
+        let [va, vb] = self.pair.views;
         let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
-        let na = Vector3::from(va.placed().rotate(self.a.normals[i].map(f64::from)));
-        let nb = Vector3::from(vb.placed().rotate(self.b.normals[j].map(f64::from)));
+        let na = Vector3::from(va.placed().rotate(self.pair.a.normals[i].map(f64::from)));
+        let nb = Vector3::from(vb.placed().rotate(self.pair.b.normals[j].map(f64::from)));
         let middle = 0.5 * (pa + pb);
         let (fa, fb) = (na.dot(&(pa - middle)), nb.dot(&(pb - middle)));
         let c = na.dot(&nb);
@@ -117,8 +113,8 @@ impl<'a> Surfaces<'a> {
             ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
         };
         let radii = [
-            f64::from(self.a.discs[i]) * va.placed().scale(),
-            f64::from(self.b.discs[j]) * vb.placed().scale(),
+            f64::from(self.pair.a.discs[i]) * va.placed().scale(),
+            f64::from(self.pair.b.discs[j]) * vb.placed().scale(),
         ];
         let place = middle + step;
         // Along the common line each chord is an interval; for parallel planes the place is as good as any.
@@ -141,10 +137,10 @@ impl<'a> Surfaces<'a> {
 
     /// A verified point on both surfaces near `contact`.
     fn refine(&mut self, contact: &Contact, i: usize, j: usize) -> Option<Contact> {
-        let [va, vb] = self.views;
+        let [va, vb] = self.pair.views;
         let [scratch_a, scratch_b] = &mut *self.gathers;
         let scale = vb.placed().scale() / va.placed().scale();
-        let radius = f64::from(self.a.radii[i]).max(f64::from(self.b.radii[j]) * scale);
+        let radius = f64::from(self.pair.a.radii[i]).max(f64::from(self.pair.b.radii[j]) * scale);
         let (in_a, in_b) = (NEWTON * radius, NEWTON * radius / scale);
         let start = contact.point;
         let mut near_a = va.scan().vicinity(va.placed().apply_inverse(start), in_a, scratch_a);
@@ -153,7 +149,7 @@ impl<'a> Surfaces<'a> {
             let at_a = va.in_world(near_a.evaluate(va.placed().apply_inverse(x)));
             [at_a, vb.in_world(near_b.evaluate(vb.placed().apply_inverse(x)))]
         });
-        self.meter.spent.evaluations += 2 * u64::from(meeting.rounds);
+        self.pair.meter.spent.evaluations += 2 * u64::from(meeting.rounds);
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
         let nearby = NEARBY * radius * va.placed().scale();
         (meeting.verified && moved <= nearby).then(|| Contact {
@@ -168,34 +164,33 @@ impl<'a> Surfaces<'a> {
 impl Visitor for Surfaces<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
-        self.meter.spent.node_pairs += u64::from(count);
-        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
-        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
-        let [p, q, r, s] = self.relative.gaps(boxes_a, boxes_b);
-        let slack = self.relative.slack();
+        let [p, q, r, s] = self.pair.gaps(a, b, count);
+        let slack = self.pair.relative.slack();
         let admit = |gap: f32| if gap > slack { None } else { Some(-gap) };
         [admit(p), admit(q), admit(r), admit(s)]
     }
 
     #[inline]
     fn split(&self, pair: NodePair) -> Split {
-        larger(&self.a.boxes[pair.a.index()], &self.b.boxes[pair.b.index()], self.relative.scale())
+        self.pair.split(pair)
     }
 
     #[inline]
     fn go_on(&mut self) -> ControlFlow<()> {
-        self.meter.go_on()
+        self.pair.meter.go_on()
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        self.meter.leaf_pair(self.a.nodes[pair.a.index()].count, self.b.nodes[pair.b.index()].count);
-        let node_b = self.b.nodes[pair.b.index()];
+        self.pair
+            .meter
+            .leaf_pair(self.pair.a.nodes[pair.a.index()].count, self.pair.b.nodes[pair.b.index()].count);
+        let node_b = self.pair.b.nodes[pair.b.index()];
         for (lane, j) in node_b.points().enumerate() {
             let disc = self.disc_b(j);
             self.lanes.set(lane, &disc);
         }
         self.lanes.close(node_b.count as usize);
-        for i in self.a.nodes[pair.a.index()].points() {
+        for i in self.pair.a.nodes[pair.a.index()].points() {
             let mut bits = self.lanes.crossings(&self.disc_a(i));
             while bits != 0 {
                 let j = node_b.first as usize + bits.trailing_zeros() as usize;
@@ -207,18 +202,5 @@ impl Visitor for Surfaces<'_> {
             }
         }
         ControlFlow::Continue(())
-    }
-}
-
-/// Both nodes, unless one is more than twice as long as the other: then that one.
-#[inline]
-pub(crate) fn larger(a: &OrientedBox, b: &OrientedBox, scale: f32) -> Split {
-    let (a, b) = (a.half[0], b.half[0] * scale);
-    if a > 2.0 * b {
-        Split::First
-    } else if b > 2.0 * a {
-        Split::Second
-    } else {
-        Split::Both
     }
 }

@@ -4,24 +4,18 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{MOST_LEAF_POINTS, NodePair, Relative, Slices, Split, Visitor};
+use nearmiss_hierarchy::{MOST_LEAF_POINTS, NodePair, Split, Visitor};
 
-use crate::budget::Meter;
-use crate::surface::larger;
+use crate::posed::Posed;
 use crate::verdict::Contact;
-use crate::view::ScanView;
 
 /// The search for two points within twice the radius of each other.
 #[derive(Debug)]
 pub(crate) struct Balls<'a> {
-    views: [&'a ScanView<'a>; 2],
-    a: Slices<'a>,
-    b: Slices<'a>,
-    relative: Relative,
+    pub(crate) pair: Posed<'a>,
     /// 2R in the world, and a little more in a's stored frame.
     reach: f64,
     reach_stored: f32,
-    pub(crate) meter: Meter,
     /// The first such pair.
     pub(crate) found: Option<Contact>,
     /// A lower bound of the distance of all points looked at or excluded, in the world.
@@ -29,26 +23,22 @@ pub(crate) struct Balls<'a> {
 }
 
 impl<'a> Balls<'a> {
-    pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, radius: f64, meter: Meter) -> Self {
-        let [a, b] = views.map(|view| *view.slices());
+    pub(crate) fn new(pair: Posed<'a>, radius: f64) -> Self {
         let reach = 2.0 * radius;
+        let stored = reach / pair.views[0].placed().scale();
         #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
-        let reach_stored = (reach / views[0].placed().scale()) as f32 * (1.0 + 1e-6) + relative.slack();
-        Self { views, a, b, relative, reach, reach_stored, meter, found: None, apart: f64::INFINITY }
+        let reach_stored = stored as f32 * (1.0 + 1e-6) + pair.relative.slack();
+        Self { pair, reach, reach_stored, found: None, apart: f64::INFINITY }
     }
 }
 
 impl Visitor for Balls<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
-        self.meter.spent.node_pairs += u64::from(count);
-        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
-        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
-        let gaps = self.relative.gaps(boxes_a, boxes_b);
-        gaps.map(|gap| {
+        self.pair.gaps(a, b, count).map(|gap| {
             // Written so that a gap that is no number excludes nothing.
             if gap > self.reach_stored {
-                let bound = f64::from(gap - self.relative.slack()) * self.views[0].placed().scale();
+                let bound = f64::from(gap - self.pair.relative.slack()) * self.pair.views[0].placed().scale();
                 self.apart = self.apart.min(bound);
                 return None;
             }
@@ -58,18 +48,18 @@ impl Visitor for Balls<'_> {
 
     #[inline]
     fn split(&self, pair: NodePair) -> Split {
-        larger(&self.a.boxes[pair.a.index()], &self.b.boxes[pair.b.index()], self.relative.scale())
+        self.pair.split(pair)
     }
 
     #[inline]
     fn go_on(&mut self) -> ControlFlow<()> {
-        self.meter.go_on()
+        self.pair.meter.go_on()
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        let (node_a, node_b) = (self.a.nodes[pair.a.index()], self.b.nodes[pair.b.index()]);
-        self.meter.leaf_pair(node_a.count, node_b.count);
-        let [va, vb] = self.views;
+        let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
+        self.pair.meter.leaf_pair(node_a.count, node_b.count);
+        let [va, vb] = self.pair.views;
         let mut points_b = [Vector3::zeros(); MOST_LEAF_POINTS];
         for (q, j) in points_b.iter_mut().zip(node_b.points()) {
             *q = Vector3::from(vb.point(j));

@@ -1,0 +1,47 @@
+//! Two scans in relative motion, and what every search through them does with a pair of nodes.
+
+use nearmiss_geometry::NodeId;
+use nearmiss_hierarchy::{NodePair, Relative, Slices, Split};
+
+use crate::budget::Meter;
+use crate::view::ScanView;
+
+/// Two views, their arrays, the motion between them, and what the search has cost.
+#[derive(Debug)]
+pub(crate) struct Posed<'a> {
+    pub(crate) views: [&'a ScanView<'a>; 2],
+    pub(crate) a: Slices<'a>,
+    pub(crate) b: Slices<'a>,
+    pub(crate) relative: Relative,
+    pub(crate) meter: Meter,
+}
+
+impl<'a> Posed<'a> {
+    pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, meter: Meter) -> Self {
+        let [a, b] = views.map(|view| *view.slices());
+        Self { views, a, b, relative, meter }
+    }
+
+    /// The gaps between the boxes of either of `a` and either of `b`, of which `count` pairs are counted.
+    #[inline]
+    pub(crate) fn gaps(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [f32; 4] {
+        self.meter.spent.node_pairs += u64::from(count);
+        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
+        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
+        self.relative.gaps(boxes_a, boxes_b)
+    }
+
+    /// Both nodes, unless one is more than twice as long as the other: then that one.
+    #[inline]
+    pub(crate) fn split(&self, pair: NodePair) -> Split {
+        let a = self.a.boxes[pair.a.index()].half[0];
+        let b = self.b.boxes[pair.b.index()].half[0] * self.relative.scale();
+        if a > 2.0 * b {
+            Split::First
+        } else if b > 2.0 * a {
+            Split::Second
+        } else {
+            Split::Both
+        }
+    }
+}
