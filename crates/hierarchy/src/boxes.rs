@@ -153,7 +153,8 @@ impl Relative {
 
     /// A box of b's frame in a's.
     #[inline]
-    fn moved(&self, b: &OrientedBox) -> OrientedBox {
+    #[must_use]
+    pub fn moved(&self, b: &OrientedBox) -> OrientedBox {
         let [hx, hy, hz] = b.half;
         let [ex, ey, ez] = b.axes;
         OrientedBox {

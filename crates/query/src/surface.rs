@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{GatherScratch, NodePair, PointKind, Split, Visitor};
+use nearmiss_hierarchy::{GatherScratch, Node, NodePair, PointKind, Split, Visitor};
 use nearmiss_surface::meet;
 
 use crate::crossing::{Disc, Lanes};
@@ -64,6 +64,15 @@ impl<'a> Surfaces<'a> {
             normal: self.pair.relative.direction(self.pair.b.normals[j]),
             radius: self.pair.b.discs[j] * self.pair.relative.scale(),
         }
+    }
+
+    /// Puts the discs of a leaf of b into the lanes.
+    fn fill(&mut self, node: &Node) {
+        for (lane, j) in node.points().enumerate() {
+            let disc = self.disc_b(j);
+            self.lanes.set(lane, &disc);
+        }
+        self.lanes.close(node.count as usize);
     }
 
     /// Discs of two leaves cross, those of points `i` and `j` first.
@@ -181,17 +190,23 @@ impl Visitor for Surfaces<'_> {
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        self.pair
-            .meter
-            .leaf_pair(self.pair.a.nodes[pair.a.index()].count, self.pair.b.nodes[pair.b.index()].count);
-        let node_b = self.pair.b.nodes[pair.b.index()];
-        for (lane, j) in node_b.points().enumerate() {
-            let disc = self.disc_b(j);
-            self.lanes.set(lane, &disc);
-        }
-        self.lanes.close(node_b.count as usize);
-        for i in self.pair.a.nodes[pair.a.index()].points() {
-            let mut bits = self.lanes.crossings(&self.disc_a(i));
+        let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
+        self.pair.meter.leaf_pair(node_a.count, node_b.count);
+        // Most discs of one leaf are out of reach of all of the other.
+        let bounds = self.pair.relative.moved(&self.pair.b.boxes[pair.b.index()]);
+        let slack = self.pair.relative.slack();
+        let mut ready = false;
+        for i in node_a.points() {
+            let disc = self.disc_a(i);
+            let reach = disc.radius + slack;
+            if bounds.distance_sq(disc.centre) > reach * reach {
+                continue;
+            }
+            if !ready {
+                self.fill(&node_b);
+                ready = true;
+            }
+            let mut bits = self.lanes.crossings(&disc);
             while bits != 0 {
                 let j = node_b.first as usize + bits.trailing_zeros() as usize;
                 bits &= bits - 1;

@@ -1,0 +1,86 @@
+//! Verdicts near contact against the exact test of the mesh, for objects without a truth set.
+//!
+//! `agreement OBJECT… [--poses N] [--seed N]`
+//!
+//! A pose counts as outside the band when the mesh's answer stays the same under shifts by 1.05 r in each of 26
+//! directions: then neither a contact nor a gap is shallower than that. Objects are scaled as in the sweep. Ends
+//! with status 1 if a verdict outside the band is wrong or missing.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::process::ExitCode;
+
+use nearmiss::{Budget, BuildOptions, CollideOptions, CollidePlan, Pose, Scan, Verdict, collide};
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::object::Object;
+use nearmiss_benches::poses::{NearPose, near};
+use nearmiss_benches::rivals::{Method, rival};
+use nearmiss_benches::{Failure, machine};
+
+/// A little more than the band, so that rounding of r decides nothing.
+const SHIFT: f64 = 1.05;
+
+fn main() -> Result<ExitCode, Failure> {
+    let mut arguments = Arguments::of_process();
+    let count = arguments.value("--poses")?.unwrap_or(1500);
+    let seed = arguments.value("--seed")?.unwrap_or(7);
+    let sources = arguments.words()?;
+    if sources.is_empty() {
+        return Err("usage: agreement OBJECT… [--poses N] [--seed N]".into());
+    }
+    println!("{}", machine::description());
+    println!(
+        "| object | points | r | outside the band | false hits | misses | undecided | inside | differ |"
+    );
+    println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
+    let mut faults = 0;
+    for source in sources {
+        faults += compare(&source, count, seed)?;
+    }
+    Ok(if faults == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Prints a line for one object; returns how many verdicts outside the band are wrong or missing.
+fn compare(source: &str, count: usize, seed: u64) -> Result<u32, Failure> {
+    let object = Object::read(source)?.scaled()?;
+    let Some(mut mesh) = rival("parry", &object)? else {
+        return Err(format!("{source} has no mesh to compare with").into());
+    };
+    let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
+    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;
+    let [mut outside, mut hits, mut misses, mut undecided, mut inside, mut differ] = [0_u32; 6];
+    for NearPose { pose, .. } in near(&object, count, seed)? {
+        let truth = mesh.ask(&Pose::IDENTITY, &pose).hit;
+        let verdict = collide(&scan.at(&Pose::IDENTITY), &scan.at(&pose), &plan, &Budget::UNLIMITED).verdict;
+        if !is_steady(mesh.as_mut(), &pose, truth, SHIFT * object.r) {
+            inside += 1;
+            differ += u32::from(verdict.is_intersecting() != truth);
+            continue;
+        }
+        outside += 1;
+        match verdict {
+            Verdict::Undecided(_) => undecided += 1,
+            _ if verdict.is_intersecting() == truth => {}
+            _ if truth => misses += 1,
+            _ => hits += 1,
+        }
+    }
+    println!(
+        "| {} | {} | {:.4} | {outside} | {hits} | {misses} | {undecided} | {inside} | {differ} |",
+        object.name,
+        scan.len(),
+        object.r
+    );
+    Ok(hits + misses + undecided)
+}
+
+/// Whether the mesh's answer stays `truth` when the second copy is shifted by `length` any of 26 ways.
+fn is_steady(mesh: &mut dyn Method, pose: &Pose, truth: bool, length: f64) -> bool {
+    let steps = [-1.0, 0.0, 1.0_f64];
+    let directions = steps.iter().flat_map(|&x| steps.iter().flat_map(move |&y| steps.map(|z| [x, y, z])));
+    directions.filter(|d| d.iter().any(|&c| c.abs() > 0.5)).all(|direction| {
+        let norm = direction.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let at = pose.translation();
+        let shifted = [0, 1, 2].map(|k| at[k] + length * direction[k] / norm);
+        mesh.ask(&Pose::IDENTITY, &pose.with_translation(shifted)).hit == truth
+    })
+}
