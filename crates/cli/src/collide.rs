@@ -1,6 +1,6 @@
 //! `collide`: whether, where and how near two scans meet.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
@@ -14,7 +14,8 @@ use crate::console::{Console, Results, now};
 use crate::error::CliError;
 use crate::posing::{self, PoseFile};
 use crate::preprocess::parse_threads;
-use crate::report::{AnswerReport, sentence};
+use crate::report::AnswerReport;
+use crate::sentence::{hint, sentence};
 use crate::{input, output, picture};
 
 /// Options of `collide`.
@@ -30,16 +31,16 @@ pub struct CollideArgs {
     /// Pose of b
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_b: Option<String>,
-    /// A query a line, {"a":[16 numbers],"b":[16 numbers]}; an answer a line, in order
+    /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b", "image"])]
     pub poses: Option<PathBuf>,
     /// Compare balls of this radius about the points, in world units, instead of surfaces
     #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
     pub thickened: Option<f64>,
-    /// Time for each query: a number with ns, us, ms or s
+    /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s
     #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
-    /// Work units for each query, evaluations of f and node pairs; reproducible, unlike time
+    /// Work units for each query, evaluations of f and node pairs, often 500 to 10000; reproducible, unlike time
     #[arg(long, value_name = "N")]
     pub work: Option<u64>,
     /// How much to find out about a contact
@@ -48,7 +49,7 @@ pub struct CollideArgs {
     /// Threads, 0 for all cores: to prepare raw inputs, by default all, and to answer --poses, by default one
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
-    /// Picture of both scans, and of the place where they meet
+    /// Picture, as PNG, of both scans and of the place where they meet
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
     /// One object of JSON a query instead of sentences
@@ -121,16 +122,22 @@ impl Question {
             return results.json(&report);
         }
         let (a, b) = (self.a.at(&asked.poses[0]), self.b.at(&asked.poses[1]));
-        results.line(sentence(&asked.answer, &a, &b, args.thickened.is_some()))?;
-        if args.poses.is_none() {
-            results.line(report.details())?;
+        let sentence = sentence(&asked.answer, [&a, &b], args.thickened);
+        if let Some(line) = asked.line {
+            return results.line(format_args!("line {line}: {sentence}"));
         }
-        Ok(())
+        results.line(sentence)?;
+        if let Some(hint) = hint(&asked.answer, [&a, &b]) {
+            results.line(hint)?;
+        }
+        results.line(report.details())
     }
 }
 
 /// A query and its answer.
 struct Asked {
+    /// Of the file of poses.
+    line: Option<u64>,
     poses: [Pose; 2],
     answer: Answer,
     micros: f64,
@@ -140,6 +147,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     if let Some(path) = &args.image {
         output::check_apart(path, &[&args.a, &args.b])?;
+        picture::check_name(path)?;
     }
     let matrices = [("--pose-a", &args.pose_a), ("--pose-b", &args.pose_b)];
     let [pose_a, pose_b] = matrices.map(|(name, given)| posing::from_option(name, given.as_deref()));
@@ -165,20 +173,30 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         return results.flush();
     }
     let placed = |name: &str, matrix, scan| {
-        posing::of_scan(matrix, scan).map_err(|cause| CliError::Pose { place: name.into(), cause })
+        posing::of_scan(matrix, scan).map_err(|refused| CliError::Pose { place: name.into(), refused })
     };
     let poses =
         [placed("--pose-a", &matrices[0], &question.a)?, placed("--pose-b", &matrices[1], &question.b)?];
     let (answer, micros) = question.ask(&poses, &mut CollideScratch::default());
-    let asked = Asked { poses, answer, micros };
+    let asked = Asked { line: None, poses, answer, micros };
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let (a, b) = (question.a.at(&poses[0]), question.b.at(&poses[1]));
-        picture::contact_picture(&a, &b, &asked.answer).save(path)?;
+        let style = picture::Style { names: names([&args.a, &args.b]), points: args.thickened.is_some() };
+        picture::paint([&a, &b], &asked.answer, &style).save(path)?;
         drop(bar);
     }
     question.tell(&mut results, &asked, args)?;
     results.flush()
+}
+
+/// What a legend calls the scans.
+fn names(paths: [&Path; 2]) -> [String; 2] {
+    let mut letters = ["A", "B"].into_iter();
+    paths.map(|path| {
+        let letter = letters.next().unwrap_or_default();
+        path.file_name().map_or(letter.into(), |name| format!("{letter}: {}", name.to_string_lossy()))
+    })
 }
 
 /// Poses held at a time when several threads answer.
@@ -194,9 +212,9 @@ fn answer_all(
     let threads = args.threads.unwrap_or(1);
     if threads == 1 {
         let mut scratch = CollideScratch::default();
-        while let Some(poses) = next(question, poses, results)? {
+        while let Some((line, poses)) = next(question, poses, results)? {
             let (answer, micros) = question.ask(&poses, &mut scratch);
-            question.tell(results, &Asked { poses, answer, micros }, args)?;
+            question.tell(results, &Asked { line: Some(line), poses, answer, micros }, args)?;
         }
         return Ok(());
     }
@@ -215,9 +233,9 @@ fn answer_all(
                 }
             }
         }
-        let ask = |scratch: &mut CollideScratch, poses: &[Pose; 2]| {
+        let ask = |scratch: &mut CollideScratch, (line, poses): &(u64, [Pose; 2])| {
             let (answer, micros) = question.ask(poses, scratch);
-            Asked { poses: *poses, answer, micros }
+            Asked { line: Some(*line), poses: *poses, answer, micros }
         };
         let answers: Vec<Asked> =
             pool.install(|| batch.par_iter().map_init(CollideScratch::default, ask).collect());
@@ -234,12 +252,12 @@ fn answer_all(
     }
 }
 
-/// The next poses; what was answered before a faulty line is told before the fault.
+/// The next poses with the number of their line; what was answered before a faulty line is told before the fault.
 fn next(
     question: &Question,
     poses: &mut PoseFile,
     results: &mut Results,
-) -> Result<Option<[Pose; 2]>, CliError> {
+) -> Result<Option<(u64, [Pose; 2])>, CliError> {
     let next = poses.next(&question.a, &question.b);
     if next.is_err() {
         results.flush()?;

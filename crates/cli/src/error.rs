@@ -4,8 +4,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nearmiss::io::ReadError;
-use nearmiss::{BuildError, LoadError, PlanError, PoseError, SaveError};
+use nearmiss::{BuildError, LoadError, PlanError, SaveError};
 use thiserror::Error;
+
+use crate::posing::PoseRefused;
 
 /// Why a command failed.
 #[derive(Debug, Error)]
@@ -49,13 +51,13 @@ pub enum CliError {
     Plan(#[from] PlanError),
     /// A matrix that is no pose.
     #[error(
-        "{place}: {cause}; give a rotation, one scale and a translation, or re-export it with more digits"
+        "{place}: {refused}; give a rotation, one scale and a translation, or re-export it with more digits"
     )]
     Pose {
-        /// The option, or the file and line.
+        /// The option that gave it.
         place: String,
         /// Why not.
-        cause: PoseError,
+        refused: PoseRefused,
     },
     /// A line of a text file is not what it should be.
     #[error("{}: line {line}: {what}", path.display())]
@@ -66,6 +68,12 @@ pub enum CliError {
         line: u64,
         /// What is wrong there, and what belongs there.
         what: String,
+    },
+    /// There is no such file.
+    #[error("{}: no such file; check the path", path.display())]
+    Missing {
+        /// Where it was looked for.
+        path: PathBuf,
     },
     /// A file could not be read or written.
     #[error("{}: cannot {verb} ({cause}); {remedy}", path.display())]
@@ -99,7 +107,10 @@ impl CliError {
     /// A file that cannot be read.
     pub(crate) fn reading(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        |cause| Self::File { path, verb: "read it", cause, remedy: "check the path and its permissions" }
+        |cause| match cause.kind() {
+            io::ErrorKind::NotFound => Self::Missing { path },
+            _ => Self::File { path, verb: "read it", cause, remedy: "check its permissions and the disk" },
+        }
     }
 
     /// A file that cannot be written.

@@ -8,9 +8,9 @@ use nearmiss::{Evaluation, Pose, Status};
 use serde::Serialize;
 
 use crate::console::{Console, Results};
+use crate::digits::{place, short};
 use crate::error::CliError;
 use crate::input::{self, TextLines, pieces};
-use crate::report::{place, short};
 
 /// Options of `eval`.
 #[derive(Debug, Clone, Args)]
@@ -36,13 +36,24 @@ struct Report {
 }
 
 pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
+    input::check_there(&args.points)?;
+    if input::is_prepared(&args.points) {
+        let what = "this is, or is named like, a prepared scan, not text with a point x y z a line; are the two \
+                    files swapped?";
+        return Err(CliError::Unfit { path: args.points.clone(), what: what.into() });
+    }
     let mut lines = TextLines::open(&args.points)?;
+    // Before the scan is opened, which files that are swapped would make fail in another way.
+    let mut next = next_point(&mut lines)?;
+    if next.is_none() {
+        return Err(lines.unfit("holds no points; a line is x y z"));
+    }
     let scan = input::open(&args.file, 0, Console::new(false))?;
     let view = scan.at(&Pose::IDENTITY);
     let unit = scan.sampling_radius() / 100.0;
     let mut scratch = GatherScratch::default();
     let mut results = Results::new();
-    while let Some(x) = next_point(&mut lines)? {
+    while let Some(x) = next {
         let at = view.evaluate_with(x, &mut scratch);
         if args.json {
             let defined = at.status == Status::Ok;
@@ -56,6 +67,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
         } else {
             results.line(sentence(&at, unit))?;
         }
+        next = next_point(&mut lines)?;
     }
     results.flush()
 }
@@ -77,11 +89,18 @@ fn sentence(at: &Evaluation, unit: f64) -> String {
     }
 }
 
+/// How the first line of a point cloud begins that is no text with a point a line.
+const STARTS_OF_SCANS: [&str; 2] = ["ply", "VERSION"];
+
 /// The point on the next line that holds one; comments start with `#` or `//`.
 fn next_point(lines: &mut TextLines) -> Result<Option<[f64; 3]>, CliError> {
     while let Some((_, text)) = lines.next_filled()? {
         if text.starts_with('#') || text.starts_with("//") {
             continue;
+        }
+        if STARTS_OF_SCANS.iter().any(|start| text.starts_with(start)) {
+            let what = "this is a scan, not text with a point x y z a line; are the two files swapped?";
+            return Err(lines.unfit(what));
         }
         let mut columns = pieces(&text);
         let mut point = [0.0; 3];

@@ -1,15 +1,15 @@
 //! Scans, prepared or raw, and rows of text.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use nearmiss::io::{Format, Model};
 use nearmiss::{BuildOptions, Check, Scan};
 
 use crate::console::{self, Console};
+use crate::digits::short;
 use crate::error::CliError;
-use crate::report::short;
 
 /// First bytes of a prepared scan, also of one whose line ends were translated on the way.
 const MAGIC: &[u8] = b"\x8Enmiss";
@@ -32,8 +32,17 @@ pub(crate) fn is_prepared(path: &Path) -> bool {
     named || is_file && File::open(path).and_then(|mut f| f.read_exact(&mut head)).is_ok() && head == MAGIC
 }
 
+/// Says of every missing input the same.
+pub(crate) fn check_there(path: &Path) -> Result<(), CliError> {
+    match path.metadata() {
+        Err(cause) if cause.kind() == ErrorKind::NotFound => Err(CliError::Missing { path: path.to_owned() }),
+        _ => Ok(()),
+    }
+}
+
 /// Opens a prepared scan, or prepares a raw input on `threads` threads with default options.
 pub(crate) fn open(path: &Path, threads: usize, console: Console) -> Result<Scan, CliError> {
+    check_there(path)?;
     if is_prepared(path) {
         return Scan::open(path, Check::Full).map_err(CliError::loading(path));
     }
@@ -48,6 +57,7 @@ pub(crate) fn open(path: &Path, threads: usize, console: Console) -> Result<Scan
 
 /// Reads a raw input.
 pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliError> {
+    check_there(path)?;
     if is_prepared(path) {
         let what =
             "this is, or is named like, a prepared scan; name the point cloud or mesh it came from".into();
@@ -110,6 +120,7 @@ pub(crate) struct TextLines {
 
 impl TextLines {
     pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
+        check_there(path)?;
         let file = File::open(path).map_err(CliError::reading(path))?;
         Ok(Self { path: path.to_owned(), reader: BufReader::with_capacity(1 << 16, file), number: 0 })
     }
@@ -134,6 +145,11 @@ impl TextLines {
                 return Ok(Some((self.number, text.to_owned())));
             }
         }
+    }
+
+    /// What the file lacks as a whole.
+    pub(crate) fn unfit(&self, what: impl Into<String>) -> CliError {
+        CliError::Unfit { path: self.path.clone(), what: what.into() }
     }
 
     /// A fault on the line returned last.

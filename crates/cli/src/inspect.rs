@@ -7,9 +7,11 @@ use nearmiss::store::File;
 use nearmiss::{Check, Scan};
 use serde::Serialize;
 
+use crate::advice::health;
 use crate::console::Results;
 use crate::error::CliError;
-use crate::report::{ScanReport, health};
+use crate::input;
+use crate::report::ScanReport;
 
 /// Options of `inspect`.
 #[derive(Debug, Clone, Args)]
@@ -33,6 +35,7 @@ struct Report {
 }
 
 pub(crate) fn run(args: &InspectArgs) -> Result<(), CliError> {
+    input::check_there(&args.file)?;
     let loading = || CliError::loading(&args.file);
     // Everything read is compared with its checksum, asked for or not: it costs one pass over the file.
     let scan = Scan::open(&args.file, Check::Full).map_err(loading())?;

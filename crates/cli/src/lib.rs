@@ -13,7 +13,11 @@ mod preprocess;
 mod input;
 mod output;
 mod posing;
+
+mod advice;
+mod digits;
 mod report;
+mod sentence;
 
 mod canvas;
 mod font;
@@ -24,6 +28,7 @@ use std::iter;
 use std::path::Path;
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use clap;
@@ -34,6 +39,7 @@ pub use export::ExportArgs;
 pub use inspect::InspectArgs;
 pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
+pub use posing::PoseRefused;
 pub use preprocess::{FormatChoice, PreprocessArgs, WeightName};
 
 /// Whether, where and how near scanned things meet, straight from their points.
@@ -46,21 +52,48 @@ struct Cli {
     command: Command,
 }
 
+const COLLIDE_EXAMPLES: &str = "\
+Examples:
+  nearmiss collide a.nm b.nm --pose-b \"1 0 0 0.09  0 1 0 0.03  0 0 1 0.01  0 0 0 1\"
+  nearmiss collide a.nm b.nm --poses near.jsonl --work 2000 --json
+  nearmiss collide ring-1.nm ring-2.nm --thickened 0.15 --image contact.png";
+
+const POSES_EXAMPLES: &str = "\
+Example:
+  nearmiss poses a.nm b.nm --near --per-distance 100 -o near.jsonl
+  nearmiss collide a.nm b.nm --poses near.jsonl --json
+
+A line of the output is {\"a\":[16 numbers],\"b\":[16 numbers],\"d\":d}, with \"offset\" too for --near. The \
+matrices, row-major, object to world, scale each scan so that the longest side of its bounding box is 2, and move \
+that box's centre, of a to the origin and of b to the distance d from there. Lengths of the answers are in that \
+world. offset is the shift along the line between the centres from where the two first touch: positive apart, \
+negative further in.";
+
 /// The commands, each with its options. `xtask` flattens them into its own.
 #[derive(Debug, Clone, Subcommand)]
 #[non_exhaustive]
 pub enum Command {
     /// Prepare a point cloud or mesh for queries, once, and save it
+    #[command(after_long_help = "Example:\n  nearmiss preprocess dragon.ply -o dragon.nm")]
     Preprocess(PreprocessArgs),
     /// Say what a prepared scan holds
+    #[command(after_long_help = "Example:\n  nearmiss inspect dragon.nm --verify")]
     Inspect(InspectArgs),
     /// The implicit function f of a scan at given points
+    #[command(
+        after_long_help = "Example, with a line x y z a point in at.txt:\n  nearmiss eval dragon.nm --points at.txt"
+    )]
     Eval(EvalArgs),
     /// Whether, where and how near two scans meet
+    #[command(after_long_help = COLLIDE_EXAMPLES)]
     Collide(CollideArgs),
     /// Make poses to ask `collide` about: a sweep, or poses about first contact
+    #[command(after_long_help = POSES_EXAMPLES)]
     Poses(PosesArgs),
     /// Look inside a prepared scan: points with normals, node boxes, radii
+    #[command(
+        after_long_help = "Example:\n  nearmiss export dragon.nm --points normals.ply --boxes level-6.obj --level 6"
+    )]
     Export(ExportArgs),
 }
 
@@ -96,10 +129,20 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         .and_then(|matches| Cli::from_arg_matches(&matches));
     match parsed {
         Ok(cli) => cli.command.run(),
-        Err(refused) => {
+        Err(mut refused) => {
+            suggest_output(&mut refused);
             // Help and version go to standard output, errors to standard error; a closed pipe is nobody's concern.
             let _ = refused.print();
             ExitCode::from(u8::try_from(refused.exit_code()).unwrap_or(2))
         }
+    }
+}
+
+/// Whoever names the output of `preprocess` without `-o` is told of it.
+fn suggest_output(refused: &mut clap::Error) {
+    let Some(ContextValue::String(extra)) = refused.get(ContextKind::InvalidArg) else { return };
+    if refused.kind() == ErrorKind::UnknownArgument && !extra.starts_with('-') && extra.ends_with(".nm") {
+        let tip = format!("to write to {extra}, use `-o {extra}`");
+        refused.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }
 }

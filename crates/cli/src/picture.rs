@@ -8,9 +8,10 @@ use nearmiss::surface::symmetric_eigen;
 use nearmiss::{Answer, Contact, Evidence, PointId, ScanView, Verdict};
 
 use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, shade};
+use crate::digits::short;
 use crate::error::CliError;
+use crate::font;
 use crate::output;
-use crate::report::short;
 
 /// In fine pixels.
 const PANEL: usize = 780 * FINE;
@@ -34,6 +35,17 @@ const LARGEST: f64 = 14.0;
 
 /// Points that are looked at to choose a view.
 const SAMPLE: usize = 20_000;
+
+/// Refuses a name that promises another format than the one written.
+pub(crate) fn check_name(path: &Path) -> Result<(), CliError> {
+    match path.extension() {
+        Some(extension) if !extension.eq_ignore_ascii_case("png") => Err(CliError::Usage(format!(
+            "{}: pictures are PNG; name a file that ends in .png",
+            path.display()
+        ))),
+        _ => Ok(()),
+    }
+}
 
 /// A picture, ready to be saved.
 #[derive(Debug, Clone)]
@@ -74,10 +86,23 @@ impl Picture {
 /// surfaces cut each other, the near half taken away, with the witness and both normals.
 #[must_use]
 pub fn contact_picture(a: &ScanView<'_>, b: &ScanView<'_>, answer: &Answer) -> Picture {
-    let views = [a, b];
+    paint([a, b], answer, &Style { names: ["A", "B"].map(Into::into), points: false })
+}
+
+/// How scans are shown.
+#[derive(Debug)]
+pub(crate) struct Style {
+    /// Of both scans.
+    pub(crate) names: [String; 2],
+    /// Points instead of surfaces.
+    pub(crate) points: bool,
+}
+
+/// [`contact_picture`] in a style.
+pub(crate) fn paint(views: [&ScanView<'_>; 2], answer: &Answer, style: &Style) -> Picture {
     let mut canvas = Canvas::new(2 * PANEL + 3 * GAP, PANEL + LEGEND + 2 * GAP, GROUND);
     let contact = match answer.verdict {
-        Verdict::Intersecting { contact, .. } => Some(Close::new(views, &contact)),
+        Verdict::Intersecting { contact, .. } => Some(Close::new(views, &contact, style.points)),
         _ => None,
     };
     let width = if contact.is_some() { PANEL } else { 2 * PANEL + GAP };
@@ -87,7 +112,9 @@ pub fn contact_picture(a: &ScanView<'_>, b: &ScanView<'_>, answer: &Answer) -> P
     for (view, colour) in views.into_iter().zip([OF_A, OF_B]) {
         for i in 0..view.scan().len() {
             let splat = splat(view, i);
-            canvas.splat(&whole, &Splat { radius: splat.radius.min(LARGEST / whole.scale), ..splat }, colour);
+            let splat = Splat { radius: splat.radius.min(LARGEST / whole.scale), ..splat };
+            let splat = if style.points { dot(&splat, &whole, WHOLE_DOT) } else { splat };
+            canvas.splat(&whole, &splat, colour);
         }
     }
     scale_bar(&mut canvas, &whole);
@@ -98,7 +125,7 @@ pub fn contact_picture(a: &ScanView<'_>, b: &ScanView<'_>, answer: &Answer) -> P
         mark(&mut canvas, &whole, close.point, 1.0);
         frame(&mut canvas, &whole, close);
     }
-    legend(&mut canvas, answer);
+    legend(&mut canvas, answer, &style.names);
     let (width, height, pixels) = canvas.averaged();
     Picture { width, height, pixels }
 }
@@ -113,16 +140,27 @@ fn splat(view: &ScanView<'_>, i: usize) -> Splat {
     }
 }
 
+/// Radii of points in fine pixels.
+const WHOLE_DOT: f64 = 2.5;
+const CLOSE_DOT: f64 = 9.0;
+
+/// A point in place of a disc, facing the viewer.
+fn dot(splat: &Splat, camera: &Camera, pixels: f64) -> Splat {
+    Splat { normal: camera.axes[2], radius: pixels / camera.scale, ..*splat }
+}
+
 /// What the close view shows.
 struct Close {
     point: Vector3<f64>,
     normals: [Vector3<f64>; 2],
     /// Half the width of the view.
     reach: f64,
+    /// The two points nearest to it, where points are shown.
+    pair: Option<[Vector3<f64>; 2]>,
 }
 
 impl Close {
-    fn new(views: [&ScanView<'_>; 2], contact: &Contact) -> Self {
+    fn new(views: [&ScanView<'_>; 2], contact: &Contact, points: bool) -> Self {
         let at = |k: usize| stored_index(views[k], contact.sources[k]);
         let indices = [at(0), at(1)];
         let normals = match contact.normals {
@@ -130,7 +168,8 @@ impl Close {
             None => [0, 1].map(|k| splat(views[k], indices[k]).normal),
         };
         let radius = |k: usize| f64::from(views[k].scan().radii()[indices[k]]) * views[k].placed().scale();
-        Self { point: contact.point.into(), normals, reach: CLOSE * radius(0).max(radius(1)) }
+        let pair = points.then(|| [0, 1].map(|k| Vector3::from(views[k].point(indices[k]))));
+        Self { point: contact.point.into(), normals, reach: CLOSE * radius(0).max(radius(1)), pair }
     }
 
     /// The direction of the line in which the surfaces cut each other, or any along both.
@@ -162,16 +201,32 @@ impl Close {
                 let offset = splat.centre - self.point;
                 let depth = chord.dot(&offset);
                 if depth <= 0.0 && offset.norm() < 1.5 * self.reach {
+                    if self.pair.is_some() {
+                        canvas.splat(&camera, &dot(&splat, &camera, CLOSE_DOT), colour);
+                        continue;
+                    }
                     let is_cut = depth > -CUT * self.reach;
                     canvas.splat(&camera, &splat, if is_cut { shade(colour, 0.45) } else { colour });
                 }
             }
         }
-        let colours = [shade(OF_A, 0.7), shade(OF_B, 0.75)];
-        for (normal, colour) in self.normals.into_iter().zip(colours) {
-            let n = camera.turn(normal);
-            let side = if n[1] < 0.0 { -1.0 } else { 1.0 };
-            arrow(canvas, &camera, self.point, normal * (side * 0.4 * self.reach), colour);
+        if let Some(pair) = self.pair {
+            let ends = pair.map(|p| camera.project(p)).map(|[x, y, _]| [x, y]);
+            for (width, colour) in [(5.0 + 2.0 * HALO, GROUND), (5.0, INK)] {
+                canvas.line(area, ends, width, colour);
+            }
+            for (p, colour) in pair.into_iter().zip([OF_A, OF_B]) {
+                let [x, y, _] = camera.project(p);
+                canvas.line(area, [[x, y]; 2], 2.0 * CLOSE_DOT + 2.0 * HALO, INK);
+                canvas.line(area, [[x, y]; 2], 2.0 * CLOSE_DOT, colour);
+            }
+        } else {
+            let colours = [shade(OF_A, 0.7), shade(OF_B, 0.75)];
+            for (normal, colour) in self.normals.into_iter().zip(colours) {
+                let n = camera.turn(normal);
+                let side = if n[1] < 0.0 { -1.0 } else { 1.0 };
+                arrow(canvas, &camera, self.point, normal * (side * 0.4 * self.reach), colour);
+            }
         }
         mark(canvas, &camera, self.point, 1.3);
         scale_bar(canvas, &camera);
@@ -341,13 +396,17 @@ fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
     canvas.text([x, y - 22 * FINE], 3 * FINE / 2, INK, &short(length));
 }
 
-fn legend(canvas: &mut Canvas, answer: &Answer) {
+/// Longer names are cut short.
+const LONGEST_NAME: usize = 32;
+
+fn legend(canvas: &mut Canvas, answer: &Answer, names: &[String; 2]) {
     let top = PANEL + 2 * GAP + 8 * FINE;
     let mut left = GAP + 4 * FINE;
-    for (name, colour) in [("A", OF_A), ("B", OF_B)] {
+    for (name, colour) in names.iter().zip([OF_A, OF_B]) {
+        let name: String = name.chars().take(LONGEST_NAME).collect();
         canvas.fill(Area { left, top, width: 14 * FINE, height: 14 * FINE }, colour);
-        canvas.text([left + 20 * FINE, top], 2 * FINE, INK, name);
-        left += 52 * FINE;
+        canvas.text([left + 20 * FINE, top], 2 * FINE, INK, &name);
+        left += (40 + 2 * font::ADVANCE * name.chars().count()) * FINE;
     }
     let sure = |evidence| if evidence == Evidence::Certified { "CERTIFIED" } else { "ESTIMATED" };
     let verdict = match answer.verdict {

@@ -23,8 +23,6 @@ mod approach;
 use approach::Approach;
 
 /// Options of `poses`. Either a sweep or poses near contact are asked for.
-///
-/// Both scans are scaled so that the longest side of their bounding box is 2, and centred; a stays.
 #[derive(Debug, Clone, Args)]
 #[command(group = clap::ArgGroup::new("kind").required(true).args(["sweep", "near"]))]
 pub struct PosesArgs {
@@ -32,20 +30,20 @@ pub struct PosesArgs {
     pub a: PathBuf,
     /// The scan that is turned and moved
     pub b: PathBuf,
-    /// Distances from 0 to 3 in steps of 0.25, with random rotations and directions at each
+    /// Distances d of the centres from 0 to 3 in steps of 0.25, both scans being scaled to a longest side of 2, with random rotations and directions at each
     #[arg(long)]
     pub sweep: bool,
     /// Shifts by up to 10 r from first touch, half of them apart. They touch at a least point distance of r/2; r is
     /// the greater sampling radius. Found by bisection on that distance
     #[arg(long)]
     pub near: bool,
-    /// Poses at each distance of a sweep; poses in all near contact
-    #[arg(long, value_name = "N", default_value_t = 1000)]
+    /// Number of poses at each distance (--sweep) or in all (--near), at least 1
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
     /// Seed of all that is random
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// File to write, a pair of poses a line
+    /// File to write, a pair of poses a line, for `collide --poses`
     #[arg(short, long, value_name = "F.jsonl")]
     pub output: PathBuf,
     /// No progress on the terminal

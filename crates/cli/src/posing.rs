@@ -1,10 +1,12 @@
 //! Poses from the command line and from files.
 
+use std::fmt;
 use std::path::Path;
 
 use nearmiss::{Pose, PoseError, Scan};
 use serde::Deserialize;
 
+use crate::digits::short;
 use crate::error::CliError;
 use crate::input::{TextLines, pieces};
 
@@ -50,18 +52,58 @@ fn parse(text: &str) -> Result<Matrix, String> {
 }
 
 /// The pose nearest to `matrix`, unless that moves the scan's bounds by more than a tenth of its sampling radius.
-pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseError> {
+pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseRefused> {
     let row = |i: usize| [matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]];
     let [x, y, z] = [row(0), row(1), row(2)];
     let determinant = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
         + x[2] * (y[0] * z[1] - y[1] * z[0]);
     // Both in world units, so lengths of the object scale.
     let tolerance = 0.1 * scan.sampling_radius() * determinant.abs().cbrt();
-    Pose::from_row_major(matrix, scan.bounds(), tolerance)
+    Pose::from_row_major(matrix, scan.bounds(), tolerance).map_err(|cause| {
+        let last_column = [3, 7, 11, 15].map(|i| matrix[i]);
+        let is_transposed = cause == PoseError::NotAffine && last_column == [0.0, 0.0, 0.0, 1.0];
+        PoseRefused { cause, is_transposed }
+    })
 }
+
+/// Why a matrix is no pose; displayed with few digits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseRefused {
+    /// Why not.
+    pub cause: PoseError,
+    /// Whether its transpose has the form of a pose.
+    pub is_transposed: bool,
+}
+
+impl fmt::Display for PoseRefused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.cause {
+            PoseError::NotAffine if self.is_transposed => {
+                f.write_str("the last row of the pose is not 0 0 0 1; it looks column-major; transpose it")
+            }
+            PoseError::NotProper { determinant } => write!(
+                f,
+                "the pose has determinant {}; a rotation with uniform scale has a positive one",
+                short(*determinant)
+            ),
+            PoseError::NotRigid { moved, tolerance } => write!(
+                f,
+                "the pose is not a rotation with uniform scale: the nearest one moves the object's bounds by {}, \
+                 more than {} (a tenth of the sampling radius)",
+                short(*moved),
+                short(*tolerance)
+            ),
+            cause => write!(f, "{cause}"),
+        }
+    }
+}
+
+/// What the messages show.
+const POSE_LINE: &str = r#"a pose line is {"a":[16 numbers],"b":[16 numbers]}"#;
 
 /// A line of a file of poses. Other fields are ignored.
 #[derive(Debug, Deserialize)]
+#[serde(expecting = "an object")]
 struct PoseLine {
     a: Vec<f64>,
     b: Vec<f64>,
@@ -71,25 +113,31 @@ struct PoseLine {
 #[derive(Debug)]
 pub(crate) struct PoseFile {
     lines: TextLines,
+    /// No line with poses has been met so far.
+    is_empty: bool,
 }
 
 impl PoseFile {
     pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
-        Ok(Self { lines: TextLines::open(path)? })
+        Ok(Self { lines: TextLines::open(path)?, is_empty: true })
     }
 
-    /// The poses on the next line that is not blank.
-    pub(crate) fn next(&mut self, a: &Scan, b: &Scan) -> Result<Option<[Pose; 2]>, CliError> {
-        let Some((_, text)) = self.lines.next_filled()? else { return Ok(None) };
+    /// The poses on the next line that is not blank, and its number, counted from 1.
+    pub(crate) fn next(&mut self, a: &Scan, b: &Scan) -> Result<Option<(u64, [Pose; 2])>, CliError> {
+        let Some((number, text)) = self.lines.next_filled()? else {
+            return if self.is_empty {
+                Err(self.lines.unfit(format!("holds no poses; {POSE_LINE}, as `poses` makes them")))
+            } else {
+                Ok(None)
+            };
+        };
+        self.is_empty = false;
         let line: PoseLine = serde_json::from_str(&text).map_err(|e| {
             let message = e.to_string();
             let what = message.split(" at line ").next().unwrap_or_default();
-            self.lines.fault(format!(
-                "column {}: {what}; a line is {{\"a\":[16 numbers],\"b\":[16 numbers]}}",
-                e.column()
-            ))
+            self.lines.fault(format!("column {}: {what}; {POSE_LINE}", e.column()))
         })?;
-        Ok(Some([self.pose("a", &line.a, a)?, self.pose("b", &line.b, b)?]))
+        Ok(Some((number, [self.pose("a", &line.a, a)?, self.pose("b", &line.b, b)?])))
     }
 
     fn pose(&self, name: &str, numbers: &[f64], scan: &Scan) -> Result<Pose, CliError> {
@@ -99,6 +147,6 @@ impl PoseFile {
                 numbers.len()
             ))
         })?;
-        of_scan(matrix, scan).map_err(|cause| self.lines.fault(format!("`{name}`: {cause}")))
+        of_scan(matrix, scan).map_err(|refused| self.lines.fault(format!("`{name}`: {refused}")))
     }
 }

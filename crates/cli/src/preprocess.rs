@@ -7,9 +7,10 @@ use nearmiss::io::Format;
 use nearmiss::{Bandwidth, BuildOptions, Kernel, SurfaceOptions};
 use serde::Serialize;
 
+use crate::advice::health;
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
-use crate::report::{ScanReport, health};
+use crate::report::ScanReport;
 use crate::{input, output};
 
 /// Options of `preprocess`.

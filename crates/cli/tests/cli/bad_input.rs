@@ -19,7 +19,7 @@ fn raw_inputs_are_refused_with_file_and_place() {
     let binary = header.replace("ascii", "binary_little_endian").replace("vertex 9", "vertex 4000000000");
     place.write("vast.ply", format!("{binary}end_header\nabcdefghijklmnop"));
     for (file, words) in [
-        ("missing.ply", &["missing.ply"][..]),
+        ("missing.ply", &["missing.ply: no such file; check the path"][..]),
         ("folder", &["folder", "not a regular file"]),
         ("empty.ply", &["empty.ply", "empty"]),
         ("unknown.bin", &["unknown.bin", "unknown format", "--format"]),
@@ -68,6 +68,7 @@ fn prepared_files_are_refused_when_anything_is_off() {
         place.refused(1, &["collide", file, "ball.nm"], &[file]);
         place.refused(1, &["eval", file, "--points", "at.txt"], &[file]);
     }
+    place.refused(1, &["inspect", "missing.nm"], &["missing.nm: no such file; check the path"]);
     place.refused(1, &["inspect", "ball.xyz"], &["ball.xyz", "preprocess"]);
     place.refused(1, &["preprocess", "ball.nm", "-o", "out.nm"], &["ball.nm", "prepared scan"]);
     place.ok(&["inspect", "ball.nm", "--verify"]);
@@ -91,6 +92,8 @@ fn outputs_that_cannot_be_are_refused_before_the_work() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.2);
     std::fs::create_dir(place.path("folder")).unwrap();
+    place.refused(2, &["collide", "ball.xyz", "ball.xyz", "--image", "out.jpg"], &["out.jpg", ".png"]);
+    place.refused(2, &["preprocess", "ball.xyz", "out.nm"], &["use `-o out.nm`"]);
     for (output, word) in [("folder", "is a folder"), ("nowhere/out", "no folder nowhere")] {
         place.refused(1, &["preprocess", "ball.xyz", "-o", output], &[output, word]);
         place.refused(1, &["export", "ball.xyz", "--radii", output], &[output, word]);

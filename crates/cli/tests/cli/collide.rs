@@ -97,12 +97,24 @@ fn people_read_sentences() {
         done.results.lines().next().unwrap().to_owned()
     };
     let touch = say(&["--pose-b", &shift(1.2, 0.0, 0.0)]);
-    assert!(touch.starts_with("They touch at (0.6") && touch.contains("within"), "{touch}");
+    let residual = touch.split("within ").nth(1).and_then(|t| t.split(' ').next());
+    let residual: f64 = residual.unwrap().parse().unwrap();
+    assert!(touch.starts_with("They touch at (0.6") && residual < 1e-6, "not rounded to r/100: {touch}");
+    let balls = say(&["--pose-b", &shift(2.05, 0.0, 0.0), "--thickened", "0.1"]);
+    assert!(balls.starts_with("Balls of radius 0.1 overlap at (1.0"), "{balls}");
+    let apart = balls.split("the two points are ").nth(1).and_then(|t| t.strip_suffix(" apart."));
+    assert!((0.05..=0.2).contains(&apart.unwrap().parse().unwrap()), "{balls}");
     assert_eq!(
         say(&["--pose-b", &shift(2.5, 0.0, 0.0), "--thickened", "0.1"]).split("; at").next(),
         Some("No contact")
     );
     assert!(say(&["--pose-b", &shift(9.0, 0.0, 0.0)]).starts_with("No contact"));
+    for (x, is_hinted) in [(9.0, true), (4.5, true), (3.5, false), (2.5, false)] {
+        let done = place.ok(&["collide", "ball.nm", "ball.xyz", "--pose-b", &shift(x, 0.0, 0.0)]);
+        assert_eq!(done.results.contains("hint: their bounds are"), is_hinted, "{x}: {}", done.results);
+    }
+    let one = place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &shift(9.0, 0.0, 0.0)]);
+    assert!(one.results.contains("1 node pair, 0 leaf pairs, 0 evaluations"), "{}", one.results);
     let short = say(&["--pose-b", &shift(1.2, 0.0, 0.0), "--work", "1"]);
     assert!(short.starts_with("Cannot tell: ") && short.contains("--work"), "{short}");
 }
@@ -156,6 +168,9 @@ fn a_file_of_poses_is_answered_in_order() {
     assert_eq!(untimed("2"), one, "whatever the threads");
     let people = place.ok(&["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl"]);
     assert_eq!(people.results.lines().count(), 2500);
+    assert!(people.results.starts_with("line 1: They touch"), "{}", people.results.lines().next().unwrap());
+    let last = people.results.lines().last().unwrap();
+    assert!(last.starts_with("line 2501: "), "one line is blank: {last}");
 }
 
 #[test]
@@ -165,6 +180,13 @@ fn a_faulty_line_is_named_after_the_answers_before_it() {
     let good = format!("{{\"a\":{identity},\"b\":{identity}}}");
     for (bad, word) in [
         ("nonsense", "column 2"),
+        ("3", "expected an object; a pose line is {\"a\":[16 numbers],\"b\":[16 numbers]}"),
+        ("[[1]]", "expected an object; a pose line"),
+        (
+            &good.replacen("0,0,0,1]", "7,8,9,1]", 1),
+            "`a`: the last row of the pose is not 0 0 0 1; it looks column-major",
+        ),
+        (&good.replacen("[1,0", "[1.123456789,0", 1), "bounds by 0.101, more than 0.0117 (a"),
         ("{\"a\":[1,2,3],\"b\":[]}", "`a` has 3 numbers"),
         (&format!("{{\"a\":{identity}}}"), "missing field `b`"),
         (&good.replace("0,0,0,1]}", "0,0,1,1]}"), "`b`: the last row"),
@@ -211,10 +233,25 @@ fn wrong_usage_ends_with_status_2() {
     place.refused(2, &["preprocess", "ball.xyz", "-o", "./ball.xyz"], &["would replace the input"]);
     place.refused(2, &["export", "ball.nm"], &["--points"]);
     place.refused(2, &["poses", "ball.nm", "ball.nm", "-o", "p.jsonl"], &["--sweep"]);
+    let none = ["poses", "ball.nm", "ball.nm", "--near", "--per-distance", "0", "-o", "p.jsonl"];
+    place.refused(2, &none, &["--per-distance"]);
+    for command in ["preprocess", "inspect", "eval", "collide", "poses", "export"] {
+        let help = place.ok(&["help", command]).results;
+        assert!(help.contains("Example") && help.contains(&format!("nearmiss {command} ")), "{help}");
+    }
     assert_eq!(place.ok(&["--help"]).status, 0);
     assert!(place.ok(&["--version"]).results.starts_with("nearmiss "));
     place.refused(1, &both(&["--pose-b", "0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0"]), &["--pose-b", "last row"]);
-    place.refused(1, &both(&["--poses", "missing.jsonl"]), &["missing.jsonl", "cannot read"]);
+    place.refused(1, &both(&["--poses", "missing.jsonl"]), &["missing.jsonl: no such file; check the path"]);
+    place.write("empty.jsonl", "\n\n");
+    for threads in ["1", "2"] {
+        let args = both(&["--poses", "empty.jsonl", "--threads", threads]);
+        place.refused(1, &args, &["empty.jsonl: holds no poses; a pose line is"]);
+    }
+    let transposed = "1 0 0 0 0 1 0 0 0 0 1 0 1 2 3 1";
+    place.refused(1, &both(&["--pose-b", transposed]), &["--pose-b", "looks column-major; transpose it"]);
+    let sheared = "1 0.123456789 0 0 0 1 0 0 0 0 1 0 0 0 0 1";
+    place.refused(1, &both(&["--pose-a", sheared]), &["--pose-a", "a tenth of the sampling radius"]);
 }
 
 #[test]

@@ -60,7 +60,21 @@ fn points_that_are_none_are_named_by_line() {
     }
     place.write("at.txt", b"0 0 \xff\n");
     place.refused(1, &["eval", "ball.xyz", "--points", "at.txt"], &["line 1", "UTF-8"]);
-    place.refused(1, &["eval", "ball.xyz", "--points", "none.txt"], &["none.txt"]);
+    place.refused(
+        1,
+        &["eval", "ball.xyz", "--points", "none.txt"],
+        &["none.txt: no such file; check the path"],
+    );
+    for text in ["", "\n# nothing but a comment\n"] {
+        place.write("at.txt", text);
+        place.refused(1, &["eval", "ball.xyz", "--points", "at.txt"], &["at.txt: holds no points"]);
+    }
+    place.write("at.txt", "0 0 1\n");
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    place.ok(&["export", "ball.nm", "--points", "ball.ply"]);
+    for scan in ["ball.nm", "ball.ply"] {
+        place.refused(1, &["eval", "at.txt", "--points", scan], &[scan, "are the two files swapped?"]);
+    }
 }
 
 #[test]

@@ -55,10 +55,47 @@ fn people_read_a_health_line_and_advice() {
         .collect();
     place.write("rings.xyz", text(&rings));
     let done = place.ok(&["preprocess", "rings.xyz", "-o", "rings.nm"]);
-    assert!(done.results.contains("--radius-neighbours 12"), "{}", done.results);
-    assert!(done.results.contains("--thickened"), "{}", done.results);
+    let advice = done.results.lines().last().unwrap();
+    assert!(advice.contains("`collide --thickened") && advice.contains("merge several frames"), "{advice}");
+    assert!(!advice.contains("--radius-neighbours"), "radii grow along lines by themselves: {advice}");
+    let sentence =
+        place.ok(&["collide", "rings.nm", "rings.nm", "--pose-b", "1 0 0 .09 0 1 0 .03 0 0 1 .01 0 0 0 1"]);
+    assert!(sentence.results.contains("sampled as lines; try --thickened"), "{}", sentence.results);
     let seen = place.ok(&["inspect", "rings.nm", "--verify"]);
     assert!(seen.results.contains("advice") && seen.results.contains("verified"), "{}", seen.results);
+}
+
+#[test]
+fn advice_is_given_once() {
+    let place = Place::new();
+    // A blob: no sheet anywhere. Steps of a Kronecker sequence, even in three dimensions.
+    let blob: Vec<[f64; 3]> =
+        (1..3000_u16).map(|i| [0.8192, 0.6711, 0.5497].map(|step| f64::from(i) * step % 1.0)).collect();
+    place.write("blob.xyz", text(&blob));
+    let advice = |options: &[&str]| {
+        let done = place.ok(&[&["preprocess", "blob.xyz", "-o", "blob.nm"], options].concat());
+        done.results.lines().find(|l| l.contains("one sheet")).expect("a blob is ambiguous").to_owned()
+    };
+    assert!(advice(&[]).contains("try --bandwidth"), "{}", advice(&[]));
+    let chosen = advice(&["--bandwidth", "0.1"]);
+    assert!(!chosen.contains("--bandwidth") && chosen.contains("--thickened"), "{chosen}");
+}
+
+#[test]
+fn sizes_are_told_a_point_and_odd_numbers_with_exponents() {
+    let place = Place::new();
+    for (name, scale) in [("vast.xyz", 1e20), ("tiny.xyz", 1e-20)] {
+        let points: Vec<[f64; 3]> = sphere(1.0)
+            .sample(nearmiss_testdata::shapes::Sampling::clean(0.2))
+            .points
+            .iter()
+            .map(|p| p.map(|c| c * scale))
+            .collect();
+        place.write(name, text(&points));
+        let told = place.ok(&["preprocess", name, "-o", "out.nm"]).results;
+        assert!(told.contains(" bytes a point"), "{told}");
+        assert!(told.lines().all(|l| l.len() < 130), "{told}");
+    }
 }
 
 #[test]

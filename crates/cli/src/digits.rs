@@ -1,0 +1,146 @@
+//! Numbers for people: as many digits as mean something.
+
+/// Fewer digits after the point than this are written out.
+const MOST_DECIMALS: i32 = 9;
+
+/// Magnitudes, but for zero, that are written out; what lies outside is easier to read with an exponent.
+const PLAIN: std::ops::Range<f64> = 1e-6..1e15;
+
+/// More digits than this double precision does not hold.
+const MOST_DIGITS: i32 = 15;
+
+/// A point, to the nearest `unit` or finer.
+pub(crate) fn place(p: [f64; 3], unit: f64) -> String {
+    let [x, y, z] = p.map(|c| rounded(c, unit));
+    format!("({x}, {y}, {z})")
+}
+
+/// A length to the nearest `unit` or finer.
+pub(crate) fn rounded(x: f64, unit: f64) -> String {
+    let decimals = decimals(unit);
+    // What rounds to zero needs no exponent.
+    let is_plain = PLAIN.contains(&x.abs()) || x.abs() < PLAIN.start.min(0.5 * unit);
+    if let Some(decimals) = decimals.filter(|_| is_plain || x == 0.0) {
+        let text = format!("{x:.decimals$}");
+        let is_zero = text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.'));
+        return if is_zero { text.trim_start_matches('-').to_owned() } else { text };
+    }
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = magnitude(x).saturating_sub(magnitude(unit)).clamp(2, MOST_DIGITS);
+    let digits = usize::try_from(digits).unwrap_or(2);
+    format!("{x:.digits$e}")
+}
+
+/// A positive length, never rounded up: a lower bound stays one.
+pub(crate) fn rounded_down(x: f64, unit: f64) -> String {
+    match decimals(unit) {
+        Some(decimals) if x >= unit && PLAIN.contains(&x) => {
+            let step = 0.1_f64.powi(i32::try_from(decimals).unwrap_or(0));
+            rounded((x - 0.5 * step).max(0.0), unit)
+        }
+        _ => short(x * 0.995),
+    }
+}
+
+/// Decimals that show `unit`; none if it is beyond what is pleasant to read.
+fn decimals(unit: f64) -> Option<usize> {
+    #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
+    let decimals = (-unit.log10()).ceil() as i32;
+    if decimals > MOST_DECIMALS { None } else { usize::try_from(decimals.max(0)).ok() }
+}
+
+/// Three significant digits.
+pub(crate) fn short(x: f64) -> String {
+    significant(x, 3)
+}
+
+/// Two significant digits.
+pub(crate) fn rough(x: f64) -> String {
+    significant(x, 2)
+}
+
+/// Two significant digits, rounded up: a length that is to be enough.
+pub(crate) fn short_up(x: f64) -> String {
+    significant(x * 1.05, 2)
+}
+
+fn significant(x: f64, digits: i32) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    if !x.is_finite() {
+        return x.to_string();
+    }
+    if !PLAIN.contains(&x.abs()) {
+        let digits = usize::try_from(digits - 1).unwrap_or(2);
+        return format!("{x:.digits$e}");
+    }
+    let decimals = usize::try_from(digits - 1 - magnitude(x)).unwrap_or(0);
+    let text = format!("{x:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// The power of ten of the first digit; that of zero is far below all.
+#[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
+fn magnitude(x: f64) -> i32 {
+    x.abs().log10().floor() as i32
+}
+
+/// A size of a file.
+#[expect(clippy::cast_precision_loss, reason = "for people")]
+pub(crate) fn bytes(n: u64) -> String {
+    match n {
+        0..10_000 => format!("{n} bytes"),
+        10_000..1_000_000 => format!("{:.1} kB", n as f64 / 1e3),
+        _ => format!("{:.1} MB", n as f64 / 1e6),
+    }
+}
+
+/// A number and what it counts, `thing` being one of them.
+pub(crate) fn count(n: u64, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A share in whole percent.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_carry_the_digits_that_mean_something() {
+        assert_eq!(rounded(0.123_456, 0.001), "0.123");
+        assert_eq!(rounded(0.123_456, 0.000_4), "0.1235", "finer than the unit, never coarser");
+        assert_eq!(rounded(1234.567, 12.0), "1235");
+        assert_eq!(rounded(-1e-17, 0.001), "0.000", "a zero has no sign and no exponent");
+        assert_eq!(
+            [short(0.001_234_5), short(1234.5), short(0.5), short(0.0)],
+            ["0.00123", "1234", "0.5", "0"]
+        );
+        assert_eq!(short_up(0.050_1), "0.053", "enough, not nearest");
+        assert_eq!(rough(2.71e-11), "2.7e-11");
+    }
+
+    #[test]
+    fn very_large_and_very_small_ones_have_an_exponent() {
+        assert_eq!(rounded(1.5e-12, 1e-14), "1.50e-12");
+        assert_eq!(rounded(-1.234_567e20, 1e16), "-1.2346e20");
+        assert_eq!(rounded(5e-7, 1e-8), "5.00e-7");
+        assert_eq!(rounded(0.0, 1e-14), "0");
+        assert_eq!(rounded(2.0, 0.0), "2.000000000000000e0", "no unit, all digits");
+        assert_eq!([short(1.234e-9), short(5e9), short(1e16)], ["1.23e-9", "5000000000", "1.00e16"]);
+    }
+
+    #[test]
+    fn bounds_are_never_rounded_up() {
+        for (x, unit) in [(0.123_46, 0.001), (0.000_999_9, 0.001), (3.999_6e17, 1e14), (9.999e-9, 1e-11)] {
+            let shown: f64 = rounded_down(x, unit).parse().unwrap();
+            assert!(shown <= x && shown > 0.98 * x, "{shown} for {x}");
+        }
+    }
+}
