@@ -26,6 +26,17 @@ impl Sheet {
         Self::new(lattice.filter(|p| p[0] <= end).collect(), 2.0_f32.sqrt(), kernel)
     }
 
+    /// Evenly spread points on a sphere about the origin, some 1 apart for 4000 of them at a radius of 18.
+    fn sphere(count: u16, radius: f64, kernel: Kernel) -> Self {
+        let points = (0..count).map(|i| {
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
+            let (s, t) = ((1.0 - z * z).sqrt(), f64::from(i) * 2.399_963_229_728_653);
+            #[expect(clippy::cast_possible_truncation, reason = "positions are single precision")]
+            [s * t.cos(), s * t.sin(), z].map(|c| (radius * c) as f32)
+        });
+        Self::new(points.collect(), 1.4, kernel)
+    }
+
     fn with(mut self, other: Self) -> Self {
         self.points.extend(other.points);
         self
@@ -107,16 +118,7 @@ fn between_two_sheets_there_is_no_surface() {
 #[test]
 fn a_sphere_shrinks_by_its_curvature() {
     each_kernel(|kernel| {
-        // 4000 points on a sphere of radius 18: spacing about 1.
-        let points: Vec<[f32; 3]> = (0..4000_u16)
-            .map(|i| {
-                let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 4000.0;
-                let (s, t) = ((1.0 - z * z).sqrt(), f64::from(i) * 2.399_963_229_728_653);
-                #[expect(clippy::cast_possible_truncation, reason = "positions are single precision")]
-                [s * t.cos(), s * t.sin(), z].map(|c| (18.0 * c) as f32)
-            })
-            .collect();
-        let sphere = Sheet::new(points, 1.4, kernel);
+        let sphere = Sheet::sphere(4000, 18.0, kernel);
         let bias = sphere.h().powi(2) / (2.0 * 18.0);
         let mut rng = arbitrary::rng(2);
         for _ in 0..50 {
@@ -163,5 +165,28 @@ fn parallel_planes_meet_only_if_they_coincide() {
         assert!((apart.residual() - 0.1).abs() < 1e-3, "{kernel:?}: halfway between: {}", apart.residual());
         let same = meet([0.4, 0.2, 0.1], |x| [sheet.at(x), turned(&sheet, 0.0, 0.0, x)]);
         assert!(same.verified, "{kernel:?}: {same:?}");
+    });
+}
+
+#[test]
+fn newton_takes_few_rounds_on_curved_sheets() {
+    each_kernel(|kernel| {
+        // Radius 4 at a spacing of 1: the points about a place spread by a seventh of h across the surface.
+        let sphere = Sheet::sphere(200, 4.0, kernel);
+        let mut rng = arbitrary::rng(9);
+        let (mut rounds, mut verified) = (0, 0);
+        for _ in 0..100 {
+            let [x, y, z] = arbitrary::unit_vector(&mut rng);
+            // A second sphere, 4 to the side: they meet in a circle in the plane half way.
+            let length = (y * y + z * z).sqrt().max(0.1);
+            let start = [2.0 + 0.1 * x, 3.3 * y / length, 3.3 * z / length];
+            let meeting = meet(start, |p| [sphere.at(p), sphere.at([p[0] - 4.0, p[1], p[2]])]);
+            if meeting.verified {
+                verified += 1;
+                rounds += meeting.rounds;
+            }
+        }
+        assert!(verified >= 80, "{kernel:?}: {verified} of 100");
+        assert!(rounds <= 5 * verified, "{kernel:?}: {rounds} rounds for {verified} witnesses");
     });
 }
