@@ -268,7 +268,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
     drop(items);
 
-    let spacings = spacings(&positions, options.radius_neighbours as usize);
+    let spacings = spacings(&positions, options.radius_neighbours as usize)?;
     let rough: Vec<f32> = spacings.iter().map(|s| s.radius).collect();
     let radii = smooth(&positions, &rough, &nodes, &boxes);
     drop(rough);

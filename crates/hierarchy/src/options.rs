@@ -73,6 +73,9 @@ pub enum BuildError {
     /// Too few or too many neighbours for a radius.
     #[error("a local radius from {0} neighbours; 3 to 32 are possible")]
     RadiusNeighbours(u32),
+    /// The kd-tree refused the points; a cloud's points are finite and few enough, so this is a defect.
+    #[error("the index of nearest neighbours refuses the points; please report it with the scan")]
+    Neighbours,
     /// The threads could not be started.
     #[error("cannot start {0} threads")]
     Threads(usize),

@@ -11,6 +11,7 @@ use nearmiss_surface::symmetric_eigen;
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::gather::TREE_STACK;
+use crate::options::BuildError;
 use crate::split::id32;
 use crate::topology::Node;
 
@@ -31,14 +32,11 @@ pub(crate) struct Spacing {
 }
 
 /// The spacing of every one of the distinct `points`.
-pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Vec<Spacing> {
+pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Result<Vec<Spacing>, BuildError> {
     let turned = map(points, |p| turn(*p));
-    let Ok(tree) = ImmutableKdTree::<f64, 3>::new_from_slice(&turned) else {
-        // Only an input that is not finite or empty is refused, and a cloud is neither.
-        return vec![Spacing::default(); points.len()];
-    };
+    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&turned).or(Err(BuildError::Neighbours))?;
     let ids: Vec<u32> = (0..id32(points.len())).collect();
-    map(&ids, |&i| {
+    Ok(map(&ids, |&i| {
         let near = nearest(&tree, points, &turned, i as usize, neighbours);
         if near.len() <= neighbours || !is_line(points, &near) {
             return Spacing { radius: near.last().map_or(0.0, length), is_line: false };
@@ -47,7 +45,7 @@ pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Vec<Spacing> {
         let last = near.len() - 1;
         let grown = (neighbours..=last).find(|&k| !is_line(points, &near[..=k]));
         Spacing { radius: length(&near[grown.unwrap_or(last)]), is_line: grown.is_none() }
-    })
+    }))
 }
 
 /// The distance of a neighbour: at least 1e-18, whose square single precision still holds.
