@@ -1,12 +1,14 @@
 //! `collide`: whether, where and how near two scans meet.
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Pose, Scan, Semantics,
-    collide_with,
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence, Pose, Proof, Scan,
+    ScanView, Semantics, collide_proving, collide_with,
 };
 use rayon::prelude::*;
 
@@ -16,7 +18,7 @@ use crate::posing::{self, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::sentence::{hint, sentence};
-use crate::{input, output, picture};
+use crate::{input, output, picture, proof};
 
 /// Options of `collide`.
 #[derive(Debug, Clone, Args)]
@@ -37,6 +39,15 @@ pub struct CollideArgs {
     /// Compare balls of this radius about the points, in world units, instead of surfaces
     #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
     pub thickened: Option<f64>,
+    /// Count as meeting what comes nearer than this, in world units
+    #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
+    pub margin: f64,
+    /// How sure a separation should be: certified is tried for, and proven distances told, at up to twice the time
+    #[arg(long, value_enum, default_value_t = EvidenceName::Certified)]
+    pub evidence: EvidenceName,
+    /// Write what certified answers rest on, a line of JSON a query, for an independent check
+    #[arg(long, value_name = "FILE", conflicts_with = "thickened")]
+    pub prove: Option<PathBuf>,
     /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s
     #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
@@ -69,6 +80,15 @@ pub enum DetailName {
     Witness,
 }
 
+/// How sure a separation should be, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EvidenceName {
+    /// Proven, where the volumes about the surfaces are disjoint
+    Certified,
+    /// By an exhaustive search, with nothing proven: faster
+    Estimated,
+}
+
 fn parse_radius(text: &str) -> Result<f64, String> {
     let radius = text.parse().ok().filter(|r: &f64| *r >= 0.0 && r.is_finite());
     radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
@@ -96,13 +116,14 @@ struct Question {
     plan: CollidePlan,
     budget: Option<Duration>,
     work: Option<u64>,
+    prove: bool,
 }
 
 impl Question {
-    /// The answer, and the microseconds it took.
-    fn ask(&self, poses: &[Pose; 2], scratch: &mut CollideScratch) -> (Answer, f64) {
+    /// The answer to the question on this line of the file of poses.
+    fn ask(&self, line: Option<u64>, poses: [Pose; 2], scratch: &mut CollideScratch) -> Asked {
         let start = now();
-        let (a, b) = (self.a.at(&poses[0]), self.b.at(&poses[1]));
+        let [a, b] = self.views(&poses);
         let mut budget = Budget::UNLIMITED;
         if let Some(units) = self.work {
             budget = budget.with_work(units);
@@ -110,18 +131,32 @@ impl Question {
         if let Some(end) = self.budget.and_then(|time| start.checked_add(time)) {
             budget = budget.with_deadline(Deadline::at(end));
         }
-        let answer = collide_with(&a, &b, &self.plan, &budget, scratch);
+        let mut proof = self.prove.then(Proof::default);
+        let answer = match &mut proof {
+            Some(proof) => collide_proving(&a, &b, &self.plan, &budget, scratch, proof),
+            None => collide_with(&a, &b, &self.plan, &budget, scratch),
+        };
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
-        (answer, micros)
+        Asked { line, poses, answer, proof, micros }
     }
 
-    fn tell(&self, results: &mut Results, asked: &Asked, args: &CollideArgs) -> Result<(), CliError> {
+    fn views(&self, poses: &[Pose; 2]) -> [ScanView<'_>; 2] {
+        [self.a.at(&poses[0]), self.b.at(&poses[1])]
+    }
+
+    fn tell(&self, out: &mut Outputs<'_, '_>, asked: &Asked, args: &CollideArgs) -> Result<(), CliError> {
+        let [a, b] = self.views(&asked.poses);
+        if let (Some((path, file)), Some(proof)) = (&mut out.proof, &asked.proof) {
+            let line = asked.line.unwrap_or(0);
+            proof::write(file, line, [&a, &b], args.margin, &asked.answer, proof)
+                .map_err(CliError::writing(path))?;
+        }
+        let results = &mut *out.results;
         let report = AnswerReport::new(&asked.answer, asked.micros);
         if args.json {
             return results.json(&report);
         }
-        let (a, b) = (self.a.at(&asked.poses[0]), self.b.at(&asked.poses[1]));
         let sentence = sentence(&asked.answer, [&a, &b], args.thickened);
         if let Some(line) = asked.line {
             return results.line(format_args!("line {line}: {sentence}"));
@@ -140,7 +175,15 @@ struct Asked {
     line: Option<u64>,
     poses: [Pose; 2],
     answer: Answer,
+    /// What it rests on, if that is to be written.
+    proof: Option<Proof>,
     micros: f64,
+}
+
+/// Where answers go.
+struct Outputs<'a, 'f> {
+    results: &'a mut Results,
+    proof: Option<(&'a Path, &'a mut BufWriter<&'f File>)>,
 }
 
 pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
@@ -148,6 +191,9 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     if let Some(path) = &args.image {
         output::check_apart(path, &[&args.a, &args.b])?;
         picture::check_name(path)?;
+    }
+    if let Some(path) = &args.prove {
+        output::check_apart(path, &[&args.a, &args.b])?;
     }
     let matrices = [("--pose-a", &args.pose_a), ("--pose-b", &args.pose_b)];
     let [pose_a, pose_b] = matrices.map(|(name, given)| posing::from_option(name, given.as_deref()));
@@ -163,31 +209,56 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         DetailName::Verdict => Detail::Verdict,
         DetailName::Witness => Detail::Witness,
     };
-    let options = CollideOptions::default().with_semantics(semantics).with_detail(detail);
+    let evidence = match args.evidence {
+        EvidenceName::Certified => Evidence::Certified,
+        EvidenceName::Estimated => Evidence::Estimated,
+    };
+    let options = CollideOptions::default()
+        .with_semantics(semantics)
+        .with_detail(detail)
+        .with_margin(args.margin)
+        .with_evidence(evidence);
     let plan = CollidePlan::new(&options, &a, &b)?;
-    let question = Question { a, b, plan, budget: args.budget, work: args.work };
+    let prove = args.prove.is_some();
+    let question = Question { a, b, plan, budget: args.budget, work: args.work, prove };
 
     let mut results = Results::new();
-    if let Some(poses) = &mut poses {
-        answer_all(&question, poses, args, &mut results)?;
-        return results.flush();
+    let mut answer = |out: &mut Outputs<'_, '_>| match &mut poses {
+        Some(poses) => answer_all(&question, poses, args, out),
+        None => answer_one(&question, &matrices, args, console, out),
+    };
+    match &args.prove {
+        Some(path) => output::replace(path, |file| {
+            let mut out = Outputs { results: &mut results, proof: Some((path, file)) };
+            answer(&mut out)
+        })?,
+        None => answer(&mut Outputs { results: &mut results, proof: None })?,
     }
+    results.flush()
+}
+
+/// The one answer to the poses of the command line.
+fn answer_one(
+    question: &Question,
+    matrices: &[[f64; 16]; 2],
+    args: &CollideArgs,
+    console: Console,
+    out: &mut Outputs<'_, '_>,
+) -> Result<(), CliError> {
     let placed = |name: &str, matrix, scan| {
         posing::of_scan(matrix, scan).map_err(|refused| CliError::Pose { place: name.into(), refused })
     };
     let poses =
         [placed("--pose-a", &matrices[0], &question.a)?, placed("--pose-b", &matrices[1], &question.b)?];
-    let (answer, micros) = question.ask(&poses, &mut CollideScratch::default());
-    let asked = Asked { line: None, poses, answer, micros };
+    let asked = question.ask(None, poses, &mut CollideScratch::default());
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
-        let (a, b) = (question.a.at(&poses[0]), question.b.at(&poses[1]));
+        let [a, b] = question.views(&asked.poses);
         let style = picture::Style { names: names([&args.a, &args.b]), points: args.thickened.is_some() };
         picture::paint([&a, &b], &asked.answer, &style).save(path)?;
         drop(bar);
     }
-    question.tell(&mut results, &asked, args)?;
-    results.flush()
+    question.tell(out, &asked, args)
 }
 
 /// What a legend calls the scans.
@@ -207,14 +278,14 @@ fn answer_all(
     question: &Question,
     poses: &mut PoseFile,
     args: &CollideArgs,
-    results: &mut Results,
+    out: &mut Outputs<'_, '_>,
 ) -> Result<(), CliError> {
     let threads = args.threads.unwrap_or(1);
     if threads == 1 {
         let mut scratch = CollideScratch::default();
-        while let Some((line, poses)) = next(question, poses, results)? {
-            let (answer, micros) = question.ask(&poses, &mut scratch);
-            question.tell(results, &Asked { line: Some(line), poses, answer, micros }, args)?;
+        while let Some((line, poses)) = next(question, poses, out.results)? {
+            let asked = question.ask(Some(line), poses, &mut scratch);
+            question.tell(out, &asked, args)?;
         }
         return Ok(());
     }
@@ -224,7 +295,7 @@ fn answer_all(
         let mut batch = Vec::with_capacity(BATCH);
         let mut failed = None;
         while batch.len() < BATCH {
-            match next(question, poses, results) {
+            match next(question, poses, out.results) {
                 Ok(Some(poses)) => batch.push(poses),
                 Ok(None) => break,
                 Err(error) => {
@@ -234,16 +305,15 @@ fn answer_all(
             }
         }
         let ask = |scratch: &mut CollideScratch, (line, poses): &(u64, [Pose; 2])| {
-            let (answer, micros) = question.ask(poses, scratch);
-            Asked { line: Some(*line), poses: *poses, answer, micros }
+            question.ask(Some(*line), *poses, scratch)
         };
         let answers: Vec<Asked> =
             pool.install(|| batch.par_iter().map_init(CollideScratch::default, ask).collect());
         for asked in &answers {
-            question.tell(results, asked, args)?;
+            question.tell(out, asked, args)?;
         }
         if let Some(error) = failed {
-            results.flush()?;
+            out.results.flush()?;
             return Err(error);
         }
         if answers.len() < BATCH {

@@ -9,6 +9,7 @@ mod export;
 mod inspect;
 mod poses;
 mod preprocess;
+mod proof;
 
 mod input;
 mod output;

@@ -5,6 +5,7 @@ use nearmiss_store::Array;
 use nearmiss_surface::{Evaluation, SurfacePlan};
 
 use crate::boxes::OrientedBox;
+use crate::enclosure::{Cell, box_of_cells};
 use crate::gather::{GatherScratch, Index, Vicinity};
 use crate::options::{BuildError, BuildOptions};
 use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
@@ -40,6 +41,7 @@ pub struct PointHierarchy {
     pub(crate) source: Array<u32>,
     pub(crate) nodes: Array<Node>,
     pub(crate) boxes: Array<OrientedBox>,
+    pub(crate) enclosures: Array<OrientedBox>,
     pub(crate) cones: Array<NormalCone>,
 }
 
@@ -59,6 +61,8 @@ pub struct Slices<'a> {
     pub nodes: &'a [Node],
     /// A box about the discs of each node's points.
     pub boxes: &'a [OrientedBox],
+    /// A box about each node's part of the surface, proven to contain it.
+    pub enclosures: &'a [OrientedBox],
 }
 
 impl PointHierarchy {
@@ -110,6 +114,7 @@ impl PointHierarchy {
             discs: &self.discs,
             nodes: &self.nodes,
             boxes: &self.boxes,
+            enclosures: &self.enclosures,
         }
     }
 
@@ -252,6 +257,13 @@ impl PointHierarchy {
         &self.boxes
     }
 
+    /// A box about each node's part of the surface, proven to contain it (docs/theory/certificates.md): every
+    /// surface point whose nearest stored point is the node's.
+    #[must_use]
+    pub fn enclosures(&self) -> &[OrientedBox] {
+        &self.enclosures
+    }
+
     /// The directions of a leaf's normals. Leaves are numbered in the order of their points.
     #[must_use]
     pub fn cones(&self) -> &[NormalCone] {
@@ -286,11 +298,15 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
     let discs: Vec<f32> = surfels.iter().map(|s| s.disc).collect();
     let kinds: Vec<u8> = surfels.iter().map(|s| s.kind.code()).collect();
+    let cells: Vec<Cell> = surfels.iter().map(|s| s.cell).collect();
     drop(surfels);
-    let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
+    let enclosures =
+        map(&ids, |&i| box_of_cells(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &cells));
+    drop(cells);
     boxes =
         map(&ids, |&i| box_of_discs(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &discs));
+    let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
 
     Ok(PointHierarchy {
         frame: cloud.frame(),
@@ -309,6 +325,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         source: source.into(),
         nodes: nodes.into(),
         boxes: boxes.into(),
+        enclosures: enclosures.into(),
         cones: cones.into(),
     })
 }

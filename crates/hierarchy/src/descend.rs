@@ -107,7 +107,17 @@ pub fn descend<V: Visitor, F: Frontier>(
     frontier: &mut F,
 ) -> ControlFlow<()> {
     frontier.clear();
-    push(visitor, frontier, [NodeId::ROOT; 2], [NodeId::ROOT; 2]);
+    enter(visitor, frontier, [NodeId::ROOT; 2], [NodeId::ROOT; 2]);
+    resume(a, b, visitor, frontier)
+}
+
+/// As [`descend`], from the pairs that the frontier holds.
+pub fn resume<V: Visitor, F: Frontier>(
+    a: &[Node],
+    b: &[Node],
+    visitor: &mut V,
+    frontier: &mut F,
+) -> ControlFlow<()> {
     while let Some((urgency, pair)) = frontier.pop() {
         if visitor.go_on().is_break() {
             // It was not looked at, so it is still open.
@@ -127,14 +137,14 @@ pub fn descend<V: Visitor, F: Frontier>(
         };
         let children_a = if split == Split::Second { [pair.a; 2] } else { children(pair.a, node_a) };
         let children_b = if split == Split::First { [pair.b; 2] } else { children(pair.b, node_b) };
-        push(visitor, frontier, children_a, children_b);
+        enter(visitor, frontier, children_a, children_b);
     }
     ControlFlow::Continue(())
 }
 
 /// Puts those of the four combinations into the frontier that differ and are admitted.
 #[inline]
-fn push<V: Visitor, F: Frontier>(visitor: &mut V, frontier: &mut F, a: [NodeId; 2], b: [NodeId; 2]) {
+fn enter<V: Visitor, F: Frontier>(visitor: &mut V, frontier: &mut F, a: [NodeId; 2], b: [NodeId; 2]) {
     let whole = [a[0] == a[1], b[0] == b[1]];
     let count = if whole[0] { 1 } else { 2 } * if whole[1] { 1 } else { 2 };
     let mut urgencies = visitor.admit(a, b, count);

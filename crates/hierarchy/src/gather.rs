@@ -3,6 +3,7 @@
 use nearmiss_surface::{Centre, Evaluation, Neighbourhood, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
+use crate::enclosure::Surroundings;
 use crate::split::id32;
 use crate::topology::Node;
 
@@ -15,6 +16,7 @@ pub struct GatherScratch {
     pub(crate) near: Neighbourhood,
     /// Points that may reach some point of a ball, in canonical order.
     candidates: Vec<([f32; 3], f32)>,
+    pub(crate) surroundings: Surroundings,
 }
 
 impl GatherScratch {
@@ -39,9 +41,34 @@ impl GatherScratch {
         );
     }
 
+    /// As [`Self::collect`], and puts the points within twice their horizon of the ball into the surroundings.
+    pub(crate) fn collect_widely(&mut self, index: &Index<'_>, centre: [f32; 3], radius: f32) {
+        self.collect(index, centre, radius);
+        let Self { candidates, surroundings, .. } = self;
+        surroundings.clear();
+        let greatest = candidates.iter().map(|(_, r)| index.plan.horizon(*r)).fold(0.0, f32::max);
+        let radius = radius + 0.5 * greatest;
+        let within = |d_sq: f32, reach: f32| {
+            let far = (index.plan.horizon(reach) + radius) * (1.0 + 1e-5);
+            d_sq < far * far
+        };
+        index.descend(
+            |id| within(index.boxes[id].distance_sq(centre), index.boxes[id].reach),
+            |node| {
+                for i in node.points() {
+                    let p = index.positions[i];
+                    let d = sub(p, centre);
+                    if within(dot(d, d), index.radii[i]) {
+                        surroundings.push(p, index.plan.horizon(index.radii[i]));
+                    }
+                }
+            },
+        );
+    }
+
     /// As [`Index::gather`], from the points collected about a ball in which `x` lies.
     pub(crate) fn gather_collected(&mut self, plan: &SurfacePlan, x: [f64; 3]) {
-        let Self { near, candidates } = self;
+        let Self { near, candidates, .. } = self;
         near.clear();
         let centre = Centre::new(x);
         for &(p, radius) in &*candidates {

@@ -4,6 +4,7 @@
 mod boxes;
 mod build;
 mod descend;
+mod enclosure;
 mod gather;
 mod options;
 mod sanity;
@@ -15,7 +16,7 @@ mod topology;
 
 pub use boxes::{OrientedBox, Relative};
 pub use build::{PointHierarchy, Slices};
-pub use descend::{Frontier, NodePair, Split, Stack, Visitor, descend};
+pub use descend::{Frontier, NodePair, Split, Stack, Visitor, descend, resume};
 pub use gather::{GatherScratch, Vicinity};
 pub use options::{BuildError, BuildOptions};
 pub use sanity::Flaw;

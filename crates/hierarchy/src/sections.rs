@@ -17,6 +17,7 @@ const KINDS: [u8; 4] = *b"KIND";
 const SOURCE: [u8; 4] = *b"SRCE";
 const NODES: [u8; 4] = *b"NODE";
 const BOXES: [u8; 4] = *b"BOXS";
+const ENCLOSURES: [u8; 4] = *b"ENCL";
 const CONES: [u8; 4] = *b"CONE";
 
 /// What a hierarchy stores beside its arrays.
@@ -71,6 +72,7 @@ impl PointHierarchy {
         writer
             .section(NODES, 0, &self.nodes)?
             .section(BOXES, 0, &self.boxes)?
+            .section(ENCLOSURES, 0, &self.enclosures)?
             .section(CONES, 0, &self.cones)?
             .section(POSITIONS, 0, &self.positions)?
             .section(NORMALS, 0, &self.normals)?
@@ -104,6 +106,7 @@ impl PointHierarchy {
             source: file.array(SOURCE, 0)?,
             nodes: file.array(NODES, 0)?,
             boxes: file.array(BOXES, 0)?,
+            enclosures: file.array(ENCLOSURES, 0)?,
             cones: file.array(CONES, 0)?,
         };
         hierarchy.check_lengths()?;
@@ -122,6 +125,7 @@ impl PointHierarchy {
             ("kinds", self.kinds.len(), points),
             ("source", self.source.len(), points),
             ("boxes", self.boxes.len(), nodes),
+            ("enclosures", self.enclosures.len(), nodes),
             ("cones", self.cones.len(), leaves),
         ];
         match expected.into_iter().find(|(_, found, expected)| found != expected) {

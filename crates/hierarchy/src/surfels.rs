@@ -11,6 +11,7 @@ use nearmiss_surface::{Evaluation, Neighbourhood, Status, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot, sub};
+use crate::enclosure::Cell;
 use crate::gather::{GatherScratch, Index};
 use crate::spacing::Spacing;
 use crate::topology::Node;
@@ -92,6 +93,7 @@ pub(crate) struct Surfel {
     pub(crate) normal: [f32; 3],
     pub(crate) disc: f32,
     pub(crate) kind: PointKind,
+    pub(crate) cell: Cell,
 }
 
 /// The discs of the points of one leaf, numbered `points`.
@@ -107,7 +109,7 @@ pub(crate) fn leaf_surfels(
     let sum = places.iter().fold([0.0; 3], |s, p| [s[0] + p[0], s[1] + p[1], s[2] + p[2]]);
     let centre = sum.map(|c| c * share);
     let radius_sq = places.iter().map(|p| sub(*p, centre)).map(|d| dot(d, d)).fold(0.0, f32::max);
-    scratch.collect(index, centre, radius_sq.sqrt());
+    scratch.collect_widely(index, centre, radius_sq.sqrt());
     points.map(|i| surfel(index, i, spacings[i], scratch)).collect()
 }
 
@@ -124,7 +126,8 @@ fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, scratch: &mut GatherScr
     #[expect(clippy::cast_precision_loss, reason = "a small number")]
     let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
     let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * border);
-    Surfel { normal, disc, kind: kind(&at, spacing.is_line) }
+    let cell = scratch.surroundings.cell(index.plan, index.positions[i], normal, index.radii[i], disc);
+    Surfel { normal, disc, kind: kind(&at, spacing.is_line), cell }
 }
 
 /// The greatest number of neighbouring sectors of the tangent plane in which no point lies.
@@ -159,7 +162,7 @@ fn widest_gap(near: &Neighbourhood, normal: [f32; 3]) -> u32 {
 
 /// Two unit vectors that complete `normal` to a right-handed frame (Duff et al., "Building an orthonormal
 /// basis, revisited", JCGT 6(1), 2017).
-fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+pub(crate) fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let sign = 1.0_f32.copysign(z);
     let a = -1.0 / (sign + z);
     let b = x * y * a;
@@ -201,7 +204,7 @@ pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
     NormalCone { axis, cosine }
 }
 
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+pub(crate) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

@@ -3,16 +3,18 @@
 //! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
 //! children of both, or of the much larger one; the deepest overlap first.
 
+use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Frontier, GatherScratch, Relative, Stack, descend};
+use nearmiss_hierarchy::{Frontier, GatherScratch, NodePair, Relative, Stack, descend};
 
 use crate::budget::{Budget, Meter};
+use crate::certify::{Certifier, Excluded, Proof};
 use crate::crossing::Lanes;
-use crate::options::{CollidePlan, Semantics};
+use crate::options::{CollideOptions, CollidePlan, Semantics};
 use crate::posed::Posed;
 use crate::surface::Surfaces;
 use crate::thickened::Balls;
-use crate::verdict::{Answer, Evidence, Reason, Verdict};
+use crate::verdict::{Answer, Evidence, Reason, Statistics, Verdict};
 use crate::view::ScanView;
 
 /// Reused between queries, one a thread; never influences an answer.
@@ -21,6 +23,7 @@ pub struct CollideScratch {
     stack: Stack,
     lanes: Lanes,
     gathers: [GatherScratch; 2],
+    excluded: Vec<Excluded>,
 }
 
 /// Whether `a` and `b` meet. Allocates a scratch of its own; see [`collide_with`].
@@ -40,49 +43,111 @@ pub fn collide_with(
     budget: &Budget,
     scratch: &mut CollideScratch,
 ) -> Answer {
-    let mut meter = Meter::new(budget);
-    let reach = match plan.options().semantics {
-        Semantics::Thickened(radius) => 2.0 * radius,
-        Semantics::Surface => 0.0,
-    };
-    let relative = match relative(a, b, reach) {
+    search(a, b, plan, budget, scratch, None)
+}
+
+/// As [`collide_with`], and leaves in `proof` what a certified separation of surfaces rests on; nothing after any
+/// other answer.
+pub fn collide_proving(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+    budget: &Budget,
+    scratch: &mut CollideScratch,
+    proof: &mut Proof,
+) -> Answer {
+    proof.pairs.clear();
+    let answer = search(a, b, plan, budget, scratch, Some(proof));
+    if !matches!(answer.verdict, Verdict::Separated { evidence: Evidence::Certified, .. }) {
+        proof.pairs.clear();
+    }
+    answer
+}
+
+fn search(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+    budget: &Budget,
+    scratch: &mut CollideScratch,
+    proof: Option<&mut Proof>,
+) -> Answer {
+    let meter = Meter::new(budget);
+    let options = plan.options();
+    let relative = match relative(a, b, plan) {
         Ok(relative) => relative,
         Err(early) => {
-            meter.spent.node_pairs = 1;
-            let verdict = early.map_or(Verdict::Undecided(Reason::Pose), |gap| separated(plan, gap - reach));
-            return Answer { verdict, statistics: meter.spent };
+            let verdict = early.map_or(Verdict::Undecided(Reason::Pose), |distance| {
+                if let Some(proof) = proof {
+                    let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
+                    proof.pairs.push((roots, distance));
+                }
+                apart(options, distance, true)
+            });
+            let statistics = Statistics { node_pairs: 1, ..meter.spent };
+            return Answer { verdict, statistics };
         }
     };
-    let nodes = (a.slices().nodes, b.slices().nodes);
-    let CollideScratch { stack, lanes, gathers } = scratch;
     let pair = Posed::new([a, b], relative, meter);
-    let (found, ended, doubt, apart, statistics) = match plan.options().semantics {
-        Semantics::Surface => {
-            let mut search = Surfaces::new(pair, plan.options().detail, lanes, gathers);
-            let ended = descend(nodes.0, nodes.1, &mut search, stack).is_break();
-            (search.found, ended, search.doubt, 0.0, search.pair.meter.spent)
-        }
-        Semantics::Thickened(radius) => {
-            let mut search = Balls::new(pair, radius);
-            let ended = descend(nodes.0, nodes.1, &mut search, stack).is_break();
-            let found = search.found.map(|contact| (contact, Evidence::Certified));
-            (found, ended, None, search.apart - reach, search.pair.meter.spent)
-        }
-    };
+    match options.semantics {
+        Semantics::Surface => surfaces(pair, options, scratch, proof),
+        Semantics::Thickened(_) => balls(pair, plan, scratch),
+    }
+}
+
+/// Pairs of tangent discs, then, if they are apart and a certificate is wanted, pairs of enclosures.
+fn surfaces(
+    pair: Posed<'_>,
+    options: &CollideOptions,
+    scratch: &mut CollideScratch,
+    proof: Option<&mut Proof>,
+) -> Answer {
+    let CollideScratch { stack, lanes, gathers, excluded } = scratch;
+    let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
+    let mut search = Surfaces::new(pair, options, lanes, gathers, excluded);
+    let ended = descend(nodes_a, nodes_b, &mut search, stack).is_break();
+    let Surfaces { pair, found, doubt, reach, excluded, .. } = search;
+    let mut statistics = pair.meter.spent;
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
-        _ if ended => Verdict::Undecided(Reason::Budget { likelihood: likelihood(a, b, &relative, stack) }),
+        _ if ended => Verdict::Undecided(Reason::Budget { likelihood: likelihood(&pair, stack) }),
         (None, Some(reason)) => Verdict::Undecided(reason),
-        (None, None) => separated(plan, apart),
+        (None, None) if options.evidence == Evidence::Estimated => apart(options, 0.0, false),
+        (None, None) => {
+            let mut certifier = Certifier::new(pair, reach, proof);
+            let whole = certifier.prove(excluded, stack).is_continue();
+            statistics = certifier.pair.meter.spent;
+            apart(options, certifier.gap, whole)
+        }
     };
     Answer { verdict, statistics }
 }
 
-/// Apart, by a `gap` that is proven only where points are compared.
-fn separated(plan: &CollidePlan, gap: f64) -> Verdict {
-    match plan.options().semantics {
+/// Pairs of points.
+fn balls(pair: Posed<'_>, plan: &CollidePlan, scratch: &mut CollideScratch) -> Answer {
+    let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
+    let mut search = Balls::new(pair, plan.reach());
+    let ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.stack).is_break();
+    let verdict = match search.found {
+        Some(contact) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
+        None if ended => {
+            Verdict::Undecided(Reason::Budget { likelihood: likelihood(&search.pair, &scratch.stack) })
+        }
+        None => apart(plan.options(), search.apart, true),
+    };
+    Answer { verdict, statistics: search.pair.meter.spent }
+}
+
+/// Apart, by at least `distance` between surfaces or points if that is `proven`.
+fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
+    match options.semantics {
+        Semantics::Thickened(radius) => {
+            Verdict::Separated { gap: (distance - 2.0 * radius).max(0.0), evidence: Evidence::Certified }
+        }
+        Semantics::Surface if proven && options.evidence == Evidence::Certified => {
+            Verdict::Separated { gap: distance.max(0.0), evidence: Evidence::Certified }
+        }
         Semantics::Surface => Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
-        Semantics::Thickened(_) => Verdict::Separated { gap: gap.max(0.0), evidence: Evidence::Certified },
     }
 }
 
@@ -91,7 +156,7 @@ const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 
 /// The motion of b's stored frame into a's. An error is the distance of balls about the two scans if that is more
 /// than any contact reaches, or `None` for poses that are none.
-fn relative(a: &ScanView<'_>, b: &ScanView<'_>, reach: f64) -> Result<Relative, Option<f64>> {
+fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<Relative, Option<f64>> {
     let ratio = b.placed().scale() / a.placed().scale();
     let finite = |m: [f64; 16]| m.iter().all(|x| x.is_finite());
     let proper = finite(a.placed().to_row_major()) && finite(b.placed().to_row_major());
@@ -100,17 +165,21 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, reach: f64) -> Result<Relative, 
         return Err(None);
     }
     let [(ca, ra), (cb, rb)] = [a, b].map(|view| {
-        let root = &view.scan().boxes()[0];
+        // The enclosure contains the box.
+        let root = match plan.options().semantics {
+            Semantics::Surface => &view.slices().enclosures[0],
+            Semantics::Thickened(_) => &view.slices().boxes[0],
+        };
         let centre = view.placed().apply(root.centre.map(f64::from));
         (Vector3::from(centre), f64::from(root.radius()) * view.placed().scale())
     });
     let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6);
-    if gap > reach {
+    if gap > plan.reach() {
         return Err(Some(gap));
     }
     let pose = a.placed().inverse().after(b.placed());
     // Coordinates in a's stored frame: of its own points, and of b's.
-    let own = a.scan().boxes()[0].centre.map(f64::from);
+    let own = a.slices().enclosures[0].centre.map(f64::from);
     let extent = Vector3::from(own).norm() + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
     let shift = Vector3::from(pose.translation()).norm();
     Ok(Relative::new(&pose, extent + shift))
@@ -118,10 +187,10 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, reach: f64) -> Result<Relative, 
 
 /// An uncalibrated estimate of the chance that the pairs still open hide a contact: each counts by how deeply
 /// its boxes overlap against their size, the sixteen most urgent ones as if independent.
-fn likelihood(a: &ScanView<'_>, b: &ScanView<'_>, relative: &Relative, stack: &Stack) -> f64 {
-    let miss = |(depth, pair): (f32, nearmiss_hierarchy::NodePair)| {
-        let size_a = a.scan().boxes()[pair.a.index()].radius();
-        let size_b = b.scan().boxes()[pair.b.index()].radius() * relative.scale();
+fn likelihood(pair: &Posed<'_>, stack: &Stack) -> f64 {
+    let miss = |(depth, nodes): (f32, NodePair)| {
+        let size_a = pair.a.boxes[nodes.a.index()].radius();
+        let size_b = pair.b.boxes[nodes.b.index()].radius() * pair.relative.scale();
         let size = size_a.min(size_b);
         if size > 0.0 { 1.0 - f64::from((depth / size).clamp(0.0, 1.0)) } else { 1.0 }
     };

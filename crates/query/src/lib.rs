@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod budget;
+mod certify;
 mod collide;
 mod crossing;
 mod options;
@@ -12,7 +13,8 @@ mod verdict;
 mod view;
 
 pub use budget::{Budget, Deadline};
-pub use collide::{CollideScratch, collide, collide_with};
+pub use certify::Proof;
+pub use collide::{CollideScratch, collide, collide_proving, collide_with};
 pub use crossing::{Disc, crossing};
 pub use options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
 pub use verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};

@@ -4,6 +4,8 @@ use nearmiss_hierarchy::PointHierarchy;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::verdict::Evidence;
+
 /// What it means that two scans meet.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -27,13 +29,31 @@ pub enum Detail {
 }
 
 /// What is asked. Plain values; [`CollidePlan::new`] validates them.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct CollideOptions {
     /// What it means to meet. Default: surfaces.
     pub semantics: Semantics,
     /// How much to say of a contact. Default: a witness.
     pub detail: Detail,
+    /// What nearer than this, in world units, counts as meeting; zero or more. Default: 0, nothing but contact.
+    ///
+    /// Never too small: two points nearer than it are never separated.
+    pub margin: f64,
+    /// How sure a separation of surfaces should be. Default: estimated. Certified costs up to as much again, and
+    /// says a proven distance; where the proof fails, the separation is still answered as estimated.
+    pub evidence: Evidence,
+}
+
+impl Default for CollideOptions {
+    fn default() -> Self {
+        Self {
+            semantics: Semantics::default(),
+            detail: Detail::default(),
+            margin: 0.0,
+            evidence: Evidence::Estimated,
+        }
+    }
 }
 
 impl CollideOptions {
@@ -41,6 +61,18 @@ impl CollideOptions {
     #[must_use]
     pub const fn with_semantics(self, semantics: Semantics) -> Self {
         Self { semantics, ..self }
+    }
+
+    /// The same options with this margin.
+    #[must_use]
+    pub const fn with_margin(self, margin: f64) -> Self {
+        Self { margin, ..self }
+    }
+
+    /// The same options with this evidence of separations.
+    #[must_use]
+    pub const fn with_evidence(self, evidence: Evidence) -> Self {
+        Self { evidence, ..self }
     }
 
     /// The same options with this detail.
@@ -57,6 +89,9 @@ pub enum PlanError {
     /// A radius that is no length.
     #[error("a radius of {0} about the points; it must be finite and not negative")]
     Radius(f64),
+    /// A margin that is no length.
+    #[error("a margin of {0}; it must be finite and not negative")]
+    Margin(f64),
 }
 
 /// A validated question about two scans.
@@ -75,9 +110,19 @@ impl CollidePlan {
         _a: &PointHierarchy,
         _b: &PointHierarchy,
     ) -> Result<Self, PlanError> {
+        let is_length = |l: f64| l >= 0.0 && l.is_finite();
         match options.semantics {
-            Semantics::Thickened(r) if !(r >= 0.0 && r.is_finite()) => Err(PlanError::Radius(r)),
+            Semantics::Thickened(r) if !is_length(r) => Err(PlanError::Radius(r)),
+            _ if !is_length(options.margin) => Err(PlanError::Margin(options.margin)),
             _ => Ok(Self { options: *options }),
+        }
+    }
+
+    /// How near points or surfaces must come to meet, in the world.
+    pub(crate) fn reach(&self) -> f64 {
+        match self.options.semantics {
+            Semantics::Thickened(radius) => 2.0 * radius + self.options.margin,
+            Semantics::Surface => self.options.margin,
         }
     }
 

@@ -22,6 +22,13 @@ impl<'a> Posed<'a> {
         Self { views, a, b, relative, meter }
     }
 
+    /// A length of the world in a's stored frame, and a little more: what rounding may take from a gap there.
+    pub(crate) fn stored(&self, length: f64) -> f32 {
+        #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
+        let length = (length / self.views[0].placed().scale()) as f32 * (1.0 + 1e-6);
+        length + self.relative.slack()
+    }
+
     /// The gaps between the boxes of either of `a` and either of `b`, of which `count` pairs are counted.
     #[inline]
     pub(crate) fn gaps(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [f32; 4] {

@@ -12,8 +12,9 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{GatherScratch, Node, NodePair, PointKind, Split, Visitor};
 use nearmiss_surface::meet;
 
+use crate::certify::{Excluded, distinct};
 use crate::crossing::{Disc, Lanes};
-use crate::options::Detail;
+use crate::options::{CollideOptions, Detail};
 use crate::posed::Posed;
 use crate::verdict::{Contact, Evidence, Reason};
 
@@ -31,6 +32,12 @@ const NEARBY: f64 = 4.0;
 pub(crate) struct Surfaces<'a> {
     pub(crate) pair: Posed<'a>,
     detail: Detail,
+    /// What is further apart than this, in a's stored frame, does not meet.
+    pub(crate) reach: f32,
+    /// Whether separations are to be proven.
+    certify: bool,
+    /// The pairs that were excluded, to be proven apart.
+    pub(crate) excluded: &'a mut Vec<Excluded>,
     lanes: &'a mut Lanes,
     gathers: &'a mut [GatherScratch; 2],
     tries: u32,
@@ -43,11 +50,25 @@ pub(crate) struct Surfaces<'a> {
 impl<'a> Surfaces<'a> {
     pub(crate) fn new(
         pair: Posed<'a>,
-        detail: Detail,
+        options: &CollideOptions,
         lanes: &'a mut Lanes,
         gathers: &'a mut [GatherScratch; 2],
+        excluded: &'a mut Vec<Excluded>,
     ) -> Self {
-        Self { pair, detail, lanes, gathers, tries: 0, found: None, doubt: None }
+        excluded.clear();
+        let reach = pair.stored(options.margin);
+        Self {
+            pair,
+            detail: options.detail,
+            reach,
+            certify: options.evidence == Evidence::Certified,
+            excluded,
+            lanes,
+            gathers,
+            tries: 0,
+            found: None,
+            doubt: None,
+        }
     }
 
     fn disc_a(&self, i: usize) -> Disc {
@@ -174,9 +195,17 @@ impl Visitor for Surfaces<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
         let [p, q, r, s] = self.pair.gaps(a, b, count);
-        let slack = self.pair.relative.slack();
-        let admit = |gap: f32| if gap > slack { None } else { Some(-gap) };
-        [admit(p), admit(q), admit(r), admit(s)]
+        let reach = self.reach;
+        let admit = |gap: f32| if gap > reach { None } else { Some(-gap) };
+        let admitted = [admit(p), admit(q), admit(r), admit(s)];
+        if self.certify {
+            let distinct = distinct(a, b);
+            let mask = [0, 1, 2, 3].map(|i| distinct[i] && admitted[i].is_none());
+            if mask.contains(&true) {
+                self.excluded.push(Excluded { a, b, mask });
+            }
+        }
+        admitted
     }
 
     #[inline]

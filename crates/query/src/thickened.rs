@@ -13,7 +13,7 @@ use crate::verdict::Contact;
 #[derive(Debug)]
 pub(crate) struct Balls<'a> {
     pub(crate) pair: Posed<'a>,
-    /// 2R in the world, and a little more in a's stored frame.
+    /// 2R + margin in the world, and a little more in a's stored frame.
     reach: f64,
     reach_stored: f32,
     /// The first such pair.
@@ -23,11 +23,8 @@ pub(crate) struct Balls<'a> {
 }
 
 impl<'a> Balls<'a> {
-    pub(crate) fn new(pair: Posed<'a>, radius: f64) -> Self {
-        let reach = 2.0 * radius;
-        let stored = reach / pair.views[0].placed().scale();
-        #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
-        let reach_stored = stored as f32 * (1.0 + 1e-6) + pair.relative.slack();
+    pub(crate) fn new(pair: Posed<'a>, reach: f64) -> Self {
+        let reach_stored = pair.stored(reach);
         Self { pair, reach, reach_stored, found: None, apart: f64::INFINITY }
     }
 }

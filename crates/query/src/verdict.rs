@@ -15,7 +15,8 @@ pub enum Verdict {
     },
     /// They do not.
     Separated {
-        /// A lower bound of their distance in world units if certified, else 0.
+        /// If certified, a proven lower bound of the distance in world units of their surfaces, or of their balls;
+        /// else 0.
         gap: f64,
         /// How sure that is.
         evidence: Evidence,

@@ -11,8 +11,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Neighbourhood, SurfacePlan, symmetric_eigen};
 
-/// On a half plane the weighted mean is h/√π = 0.564 h away from the border; beyond the border it is further.
-pub(crate) const BORDER: f64 = 0.56;
+/// A surface point is within this many bandwidths of a(x). On a half plane the weighted mean is h/√π = 0.564 h
+/// away from the border; beyond the border it is further.
+pub const BORDER: f64 = 0.56;
+
+/// A surface point is in the inner half of some point's horizon (this is the square): further from every sample
+/// nothing but the rims of holes, or of the horizons themselves, holds a zero of f. It bounds where the surface
+/// nearest to a point can be, on which certificates rest.
+const NEAR_SQ: f32 = 0.25;
 
 /// The least eigenvalue over h²/2: about 0 on a clean sheet, 0.14 on either of two sheets 2h apart, 1 between
 /// them, where n turns tangential and f vanishes in a whole slab.
@@ -28,7 +34,7 @@ const EIGENVALUE_GAP: f64 = 0.1;
 pub enum Status {
     /// It does.
     Ok,
-    /// Too few points reach x.
+    /// Too few points reach x, or none of them by the inner half of its horizon.
     Outside,
     /// x is further from a(x) than 0.56 h: beyond the border of the surface, or far off it.
     Border,
@@ -80,7 +86,8 @@ impl Neighbourhood {
         let normal = with_positive_largest(eigen.vectors[0]);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
         let bandwidth = m.bandwidth / m.weight;
-        let status = if support < plan.options().support_min {
+        let is_near = m.nearest <= NEAR_SQ * plan.reach_sq();
+        let status = if support < plan.options().support_min || !is_near {
             Status::Outside
         } else if Vector3::from(mean).norm() > BORDER * bandwidth {
             Status::Border

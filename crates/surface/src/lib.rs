@@ -10,7 +10,7 @@ mod options;
 mod project;
 
 pub use eigen::{Eigen3, symmetric_eigen};
-pub use fit::{Evaluation, Status};
+pub use fit::{BORDER, Evaluation, Status};
 pub use kernel::Kernel;
 pub use meet::{Meeting, meet};
 pub use neighbourhood::{Centre, Neighbourhood};

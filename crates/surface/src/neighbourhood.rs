@@ -17,6 +17,8 @@ pub(crate) struct Moments {
     pub(crate) second: [f64; 6],
     /// Σw·h.
     pub(crate) bandwidth: f64,
+    /// The least d²/h².
+    pub(crate) nearest: f32,
 }
 
 /// A point split into the nearest `f32` and the rest, so that differences from stored points keep their
@@ -142,8 +144,12 @@ impl Neighbourhood {
     /// The weighted sums, with the weights of the plan's kernel.
     pub(crate) fn moments(&self, plan: &SurfacePlan) -> Moments {
         let mut sums = [[0.0_f32; LANES]; 11];
+        let mut nearest = [f32::MAX; LANES];
         for block in &self.blocks {
             add_block(&mut sums, block, plan);
+            for (least, t) in nearest.iter_mut().zip(&block.exponent) {
+                *least = if t < least { *t } else { *least };
+            }
         }
         let s = sums.map(sum_lanes);
         Moments {
@@ -151,6 +157,7 @@ impl Neighbourhood {
             first: [s[1], s[2], s[3]],
             second: [s[4], s[5], s[6], s[7], s[8], s[9]],
             bandwidth: s[10],
+            nearest: nearest.into_iter().fold(f32::MAX, f32::min),
         }
     }
 }

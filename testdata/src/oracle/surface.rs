@@ -86,7 +86,7 @@ pub struct Parameters {
 /// Whether a zero of f at x would be a point of the surface; the first that applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// Support below the least.
+    /// Support below the least, or x in the inner half of no point's horizon.
     Outside,
     /// ‖x − a‖ > 0.56 h(x): beyond a border.
     Border,
@@ -178,6 +178,8 @@ impl SurfaceTwin {
         let eigen = symmetric_eigen(&covariance);
         let normal = with_greatest_component_positive(eigen.vectors[0].into());
         let support = reaching.len();
+        let is_near = (self.points.iter().zip(&self.radii))
+            .any(|(&p, &r)| (Vector3::from(p) - x).norm() <= 0.5 * reach * r);
         Some(Evaluation {
             value: normal.dot(&(mean - x)),
             normal: normal.into(),
@@ -185,7 +187,7 @@ impl SurfaceTwin {
             support,
             bandwidth,
             eigenvalues: eigen.values,
-            status: if support < self.parameters.least_support {
+            status: if support < self.parameters.least_support || !is_near {
                 Status::Outside
             } else {
                 status((x - mean).norm(), bandwidth, eigen.values)

@@ -1,0 +1,96 @@
+//! What answers rest on, a line of JSON each, for a checker that shares nothing with the search.
+
+use std::io::{self, Write};
+
+use nearmiss::hierarchy::{Node, NodePair, OrientedBox};
+use nearmiss::{Answer, Evidence, Proof, ScanView, Verdict};
+use serde::Serialize;
+
+use crate::report::word;
+
+/// A line of the file.
+#[derive(Serialize)]
+struct Line {
+    /// Line of the file of poses, or 0.
+    query: u64,
+    /// From stored positions to the world, row-major, as the search placed the scans.
+    placed_a: [f64; 16],
+    placed_b: [f64; 16],
+    margin: f64,
+    verdict: &'static str,
+    evidence: Option<&'static str>,
+    gap: Option<f64>,
+    witness: Option<[f64; 3]>,
+    residual: Option<f64>,
+    /// The nodes of the pairs, each once.
+    nodes_a: Vec<Enclosure>,
+    nodes_b: Vec<Enclosure>,
+    /// Indices into the two lists.
+    pairs: Vec<[usize; 2]>,
+}
+
+/// A node: its points, as stored, and its enclosure in the stored frame.
+#[derive(Serialize)]
+struct Enclosure {
+    first: u32,
+    count: u32,
+    centre: [f32; 3],
+    half: [f32; 3],
+    axes: [[f32; 3]; 3],
+}
+
+impl Enclosure {
+    fn new(node: Node, bounds: &OrientedBox) -> Self {
+        let OrientedBox { centre, half, axes, .. } = *bounds;
+        Self { first: node.first, count: node.count, centre, half, axes }
+    }
+}
+
+/// Writes what `answer` to a question with this `margin` rests on.
+pub(crate) fn write(
+    out: &mut impl Write,
+    query: u64,
+    views: [&ScanView<'_>; 2],
+    margin: f64,
+    answer: &Answer,
+    proof: &Proof,
+) -> io::Result<()> {
+    let pairs: Vec<NodePair> = proof.pairs.iter().map(|(pair, _)| *pair).collect();
+    let (nodes_a, index_a) = nodes(views[0], pairs.iter().map(|pair| pair.a.index()));
+    let (nodes_b, index_b) = nodes(views[1], pairs.iter().map(|pair| pair.b.index()));
+    let (verdict, evidence, gap, contact) = match answer.verdict {
+        Verdict::Intersecting { contact, evidence } => ("intersecting", Some(evidence), None, Some(contact)),
+        Verdict::Separated { gap, evidence } => ("separated", Some(evidence), Some(gap), None),
+        Verdict::Undecided(_) => ("undecided", None, None, None),
+    };
+    let contact = contact.filter(|_| evidence == Some(Evidence::Certified));
+    let line = Line {
+        query,
+        placed_a: views[0].placed().to_row_major(),
+        placed_b: views[1].placed().to_row_major(),
+        margin,
+        verdict,
+        evidence: evidence.map(word),
+        gap,
+        witness: contact.map(|c| c.point),
+        residual: contact.map(|c| c.residual),
+        nodes_a,
+        nodes_b,
+        pairs: index_a.into_iter().zip(index_b).map(|(a, b)| [a, b]).collect(),
+    };
+    serde_json::to_writer(&mut *out, &line)?;
+    out.write_all(b"\n")
+}
+
+/// The nodes of these ids, each once, and where each id is among them.
+fn nodes(view: &ScanView<'_>, ids: impl Iterator<Item = usize>) -> (Vec<Enclosure>, Vec<usize>) {
+    let ids: Vec<usize> = ids.collect();
+    let mut distinct = ids.clone();
+    distinct.sort_unstable();
+    distinct.dedup();
+    let slices = view.slices();
+    let enclosures =
+        distinct.iter().map(|&id| Enclosure::new(slices.nodes[id], &slices.enclosures[id])).collect();
+    let place = |id: &usize| distinct.binary_search(id).unwrap_or_default();
+    (enclosures, ids.iter().map(place).collect())
+}
