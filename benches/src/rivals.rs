@@ -6,7 +6,7 @@ pub mod parry;
 pub mod triangles;
 pub mod trimesh;
 
-use nearmiss::{BuildOptions, Detail, Pose, Scan};
+use nearmiss::{BuildOptions, CollideOptions, Detail, Pose, Scan};
 
 use crate::Failure;
 use crate::object::Object;
@@ -55,7 +55,7 @@ pub fn rival(name: &str, object: &Object) -> Result<Option<Box<dyn Method>>, Fai
 pub fn bench(object: &Object, mut measure: impl FnMut(&mut dyn Method)) -> Result<(), Failure> {
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     for detail in [Detail::Verdict, Detail::Witness] {
-        measure(&mut ours::Ours::new(&scan, detail)?);
+        measure(&mut ours::Ours::new(&scan, &CollideOptions::default().with_detail(detail))?);
     }
     for name in ["parry", "kiddo"] {
         if let Some(mut rival) = rival(name, object)? {

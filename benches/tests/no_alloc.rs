@@ -4,8 +4,8 @@
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Pose, Scan,
-    Semantics, Verdict, collide_with,
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence, Pose,
+    Scan, Semantics, Verdict, collide_with,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -34,6 +34,8 @@ fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
         (witness, whole.with_work(40)),
         (thick, whole.with_work(8)),
         (witness, hour),
+        (verdict.with_evidence(Evidence::Certified), whole),
+        (witness.with_margin(r), whole),
     ];
     let plan = |options: &CollideOptions| CollidePlan::new(options, scan, scan).expect("options in range");
     asked.map(|(options, budget)| (plan(&options), budget)).to_vec()

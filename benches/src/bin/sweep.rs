@@ -1,12 +1,12 @@
 //! The sweep of measured queries, ours and rivals' in the same run, as Markdown.
 //!
 //! `sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival parry|trimesh|kiddo]… [--witness]
-//! [--seed N] [--threads N]`
+//! [--certified] [--seed N] [--threads N]`
 //!
 //! An object is a file of points, with or without a mesh, or one that `Object::read` knows by name.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
-use nearmiss::{BuildOptions, Detail, Scan};
+use nearmiss::{BuildOptions, CollideOptions, Detail, Evidence, Scan};
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;
@@ -23,6 +23,7 @@ struct Options {
     near: usize,
     rivals: Vec<String>,
     witness: bool,
+    certified: bool,
     seed: u64,
     threads: usize,
 }
@@ -36,6 +37,7 @@ impl Options {
             near: arguments.value("--near")?.unwrap_or(1000),
             rivals: arguments.values("--rival")?,
             witness: arguments.flag("--witness"),
+            certified: arguments.flag("--certified"),
             seed: arguments.value("--seed")?.unwrap_or(1),
             threads: arguments.value("--threads")?.unwrap_or(0),
             objects: arguments.words()?,
@@ -60,9 +62,13 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     let build = BuildOptions::default().with_threads(options.threads);
     let (scan, time) = timed(|| Scan::build(&object.cloud, &build));
     let scan = scan?;
-    let mut methods: Vec<Box<dyn Method + '_>> = vec![Box::new(Ours::new(&scan, Detail::Verdict)?)];
+    let verdict = CollideOptions::default().with_detail(Detail::Verdict);
+    let mut methods: Vec<Box<dyn Method + '_>> = vec![Box::new(Ours::new(&scan, &verdict)?)];
+    if options.certified {
+        methods.push(Box::new(Ours::new(&scan, &verdict.with_evidence(Evidence::Certified))?));
+    }
     if options.witness {
-        methods.push(Box::new(Ours::new(&scan, Detail::Witness)?));
+        methods.push(Box::new(Ours::new(&scan, &CollideOptions::default())?));
     }
     let mut left_out = Vec::new();
     for name in &options.rivals {

@@ -3,14 +3,14 @@
 //! `truth CLOUD POSES.jsonl [--witness] [--rival parry|trimesh] [--certified] [--threads N]`
 //!
 //! Ends with status 1 if a verdict outside the band |gap| ≤ r is wrong or missing, or a deep separation is
-//! certified; with `--certified` also if fewer than 95 % of separations from 6 r on are certified. A rival is
+//! certified; with `--certified`, which asks for certificates, also if fewer than 95 % of separations from 6 r on are certified. A rival is
 //! judged by every pose, for a mesh knows what points do not.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::path::Path;
 use std::process::ExitCode;
 
-use nearmiss::{BuildOptions, Detail, Scan};
+use nearmiss::{BuildOptions, CollideOptions, Detail, Evidence, Scan};
 use nearmiss_benches::Failure;
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -39,7 +39,9 @@ fn main() -> Result<ExitCode, Failure> {
     let (scan, time) = timed(|| Scan::build(&object.cloud, &options));
     let scan = scan?;
     println!("prepared in {time:.2?}, {:.2} % of the points usable", 100.0 * scan.usable());
-    let score = score(&mut Ours::new(&scan, detail)?, &questions, object.r);
+    let evidence = if certified { Evidence::Certified } else { Evidence::Estimated };
+    let asked = CollideOptions::default().with_detail(detail).with_evidence(evidence);
+    let score = score(&mut Ours::new(&scan, &asked)?, &questions, object.r);
     let mut clean = score.is_clean() && (!certified || score.is_certified_enough());
     for name in rivals {
         match rivals::rival(&name, &object)? {

@@ -1,7 +1,7 @@
 //! Ours, as a user would call it.
 
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Pose, Scan, Verdict, collide_with,
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Evidence, Pose, Scan, Verdict, collide_with,
 };
 
 use crate::Failure;
@@ -17,12 +17,12 @@ pub struct Ours<'a> {
 }
 
 impl<'a> Ours<'a> {
-    /// Asks for `detail` without a limit.
+    /// Asks with these `options`, without a limit.
     ///
     /// # Errors
     /// When there is no plan for that.
-    pub fn new(scan: &'a Scan, detail: Detail) -> Result<Self, Failure> {
-        let plan = CollidePlan::new(&CollideOptions::default().with_detail(detail), scan, scan)?;
+    pub fn new(scan: &'a Scan, options: &CollideOptions) -> Result<Self, Failure> {
+        let plan = CollidePlan::new(options, scan, scan)?;
         Ok(Self { scan, plan, budget: Budget::UNLIMITED, scratch: CollideScratch::default() })
     }
 
@@ -41,7 +41,9 @@ impl<'a> Ours<'a> {
 
 impl Method for Ours<'_> {
     fn name(&self) -> String {
-        format!("nearmiss ({:?})", self.plan.options().detail).to_lowercase()
+        let options = self.plan.options();
+        let certified = if options.evidence == Evidence::Certified { ", certified" } else { "" };
+        format!("nearmiss ({:?}{certified})", options.detail).to_lowercase()
     }
 
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply {

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence, Pose, Proof, Scan,
-    ScanView, Semantics, collide_proving, collide_with,
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence, Pose, Proof,
+    Scan, ScanView, Semantics, collide_proving, collide_with,
 };
 use rayon::prelude::*;
 

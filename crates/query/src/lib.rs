@@ -5,6 +5,7 @@ mod budget;
 mod certify;
 mod collide;
 mod crossing;
+mod margin;
 mod options;
 mod posed;
 mod surface;

@@ -31,7 +31,9 @@ const NEARBY: f64 = 4.0;
 #[derive(Debug)]
 pub(crate) struct Surfaces<'a> {
     pub(crate) pair: Posed<'a>,
-    detail: Detail,
+    pub(crate) detail: Detail,
+    /// Surfaces nearer than this, in the world, meet.
+    pub(crate) margin: f64,
     /// What is further apart than this, in a's stored frame, does not meet.
     pub(crate) reach: f32,
     /// Whether separations are to be proven.
@@ -39,7 +41,7 @@ pub(crate) struct Surfaces<'a> {
     /// The pairs that were excluded, to be proven apart.
     pub(crate) excluded: &'a mut Vec<Excluded>,
     lanes: &'a mut Lanes,
-    gathers: &'a mut [GatherScratch; 2],
+    pub(crate) gathers: &'a mut [GatherScratch; 2],
     tries: u32,
     /// The best contact so far.
     pub(crate) found: Option<(Contact, Evidence)>,
@@ -60,6 +62,7 @@ impl<'a> Surfaces<'a> {
         Self {
             pair,
             detail: options.detail,
+            margin: options.margin,
             reach,
             certify: options.evidence == Evidence::Certified,
             excluded,
@@ -79,7 +82,7 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    fn disc_b(&self, j: usize) -> Disc {
+    pub(crate) fn disc_b(&self, j: usize) -> Disc {
         Disc {
             centre: self.pair.relative.point(self.pair.b.positions[j]),
             normal: self.pair.relative.direction(self.pair.b.normals[j]),
@@ -114,7 +117,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Why a crossing of the discs of points `i` and `j` says little, if it does.
-    fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
+    pub(crate) fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
         match self.pair.views[0].scan().kind(i).max(self.pair.views[1].scan().kind(j)) {
             PointKind::Surface | PointKind::Border => None,
             PointKind::Line | PointKind::Isolated => Some(Reason::Undersampled),
@@ -223,11 +226,10 @@ impl Visitor for Surfaces<'_> {
         self.pair.meter.leaf_pair(node_a.count, node_b.count);
         // Most discs of one leaf are out of reach of all of the other.
         let bounds = self.pair.relative.moved(&self.pair.b.boxes[pair.b.index()]);
-        let slack = self.pair.relative.slack();
         let mut ready = false;
         for i in node_a.points() {
             let disc = self.disc_a(i);
-            let reach = disc.radius + slack;
+            let reach = disc.radius + self.reach;
             if bounds.distance_sq(disc.centre) > reach * reach {
                 continue;
             }
@@ -243,6 +245,9 @@ impl Visitor for Surfaces<'_> {
                     Some(reason) => _ = self.doubt.get_or_insert(reason),
                     None => return self.crossed(i, j),
                 }
+            }
+            if self.margin > 0.0 {
+                self.near_discs(i, &disc, &node_b)?;
             }
         }
         ControlFlow::Continue(())
