@@ -41,6 +41,15 @@ impl OrientedBox {
         Self { centre, half, axes, reach }
     }
 
+    /// Least and greatest coordinate along each of `axes`.
+    pub(crate) fn along(&self, axes: &Axes) -> [[f32; 2]; 3] {
+        axes.map(|axis| {
+            let middle = dot(axis, self.centre);
+            let spread: f32 = (0..3).map(|k| self.half[k] * dot(axis, self.axes[k]).abs()).sum();
+            [middle - spread, middle + spread]
+        })
+    }
+
     /// Squared distance of `p` from the box, 0 inside.
     #[inline]
     #[must_use]

@@ -5,7 +5,7 @@ use nearmiss_store::Array;
 use nearmiss_surface::{Evaluation, SurfacePlan};
 
 use crate::boxes::OrientedBox;
-use crate::enclosure::{Cell, box_of_cells};
+use crate::enclosure::{LeafBounds, enclosures};
 use crate::gather::{GatherScratch, Index, Vicinity};
 use crate::options::{BuildError, BuildOptions};
 use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
@@ -293,20 +293,18 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     }
 
     let index = Index { nodes: &nodes, boxes: &boxes, positions: &positions, radii: &radii, plan: &plan };
-    let surfels = surfels(&index, &spacings, leaf_size);
+    let parts = surfels(&index, &spacings, leaf_size);
     drop(spacings);
-    let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
-    let discs: Vec<f32> = surfels.iter().map(|s| s.disc).collect();
-    let kinds: Vec<u8> = surfels.iter().map(|s| s.kind.code()).collect();
-    let cells: Vec<Cell> = surfels.iter().map(|s| s.cell).collect();
-    drop(surfels);
+    let all = || parts.iter().flat_map(|(surfels, _)| surfels);
+    let mut normals: Vec<[f32; 3]> = all().map(|s| s.normal).collect();
+    let discs: Vec<f32> = all().map(|s| s.disc).collect();
+    let kinds: Vec<u8> = all().map(|s| s.kind.code()).collect();
+    let leaves: Vec<LeafBounds> = parts.into_iter().flat_map(|(_, leaves)| leaves).collect();
+    let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
-    let enclosures =
-        map(&ids, |&i| box_of_cells(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &cells));
-    drop(cells);
     boxes =
         map(&ids, |&i| box_of_discs(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &discs));
-    let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
+    let enclosures = enclosures(&nodes, &boxes, &leaves);
 
     Ok(PointHierarchy {
         frame: cloud.frame(),
@@ -330,24 +328,32 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     })
 }
 
-/// The discs of all points, leaf by leaf.
-fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<Surfel> {
-    let task = leaf_size * LEAVES_A_TASK;
-    let starts: Vec<usize> = (0..spacings.len()).step_by(task).collect();
-    let fit = |&start: &usize| -> Vec<Surfel> {
+/// The discs of all points and the bounds of all leaves, in order, some leaves at a time.
+fn surfels(
+    index: &Index<'_>,
+    spacings: &[Spacing],
+    leaf_size: usize,
+) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
+    let leaves: Vec<(&Node, &OrientedBox)> =
+        index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).collect();
+    let fit = |leaves: &[(&Node, &OrientedBox)]| {
         let mut scratch = GatherScratch::default();
-        let end = spacings.len().min(start + task);
-        let leaves = (start..end).step_by(leaf_size);
-        let leaf = |first: usize| first..end.min(first + leaf_size);
-        leaves.flat_map(|first| leaf_surfels(index, leaf(first), spacings, &mut scratch)).collect()
+        let mut surfels = Vec::with_capacity(leaves.len() * leaf_size);
+        let bounds = leaves
+            .iter()
+            .map(|(leaf, about)| {
+                leaf_surfels(index, leaf.points(), about, spacings, &mut scratch, &mut surfels)
+            })
+            .collect();
+        (surfels, bounds)
     };
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        starts.par_iter().flat_map_iter(fit).collect()
+        leaves.par_chunks(LEAVES_A_TASK).map(fit).collect()
     }
     #[cfg(not(feature = "rayon"))]
-    starts.iter().flat_map(fit).collect()
+    leaves.chunks(LEAVES_A_TASK).map(fit).collect()
 }
 
 fn quantile(radii: &[f32]) -> f32 {

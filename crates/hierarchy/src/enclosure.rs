@@ -1,34 +1,26 @@
-//! Enclosures: volumes that provably contain the surface.
+//! Enclosures: boxes that provably contain the surface.
 //!
-//! A surface point belongs to the leaf of its nearest cloud point p. Here each p gets a cell, a cylinder about
-//! its normal that contains every surface point nearest to p; the enclosure of a node is the least box, along
-//! the axes of its other box, about the cells of its points. docs/theory/certificates.md has the argument step
-//! by step. It rests on three facts about a surface point x and the set J of the points whose horizon reaches x:
+//! A surface point x belongs to the leaf of its nearest cloud point p. With J the points whose horizon reaches x,
+//! three facts bound where it can be (docs/theory/certificates.md has the argument step by step):
 //!
 //! 1. a(x) is in the hull of J and ‖x − a(x)‖ ≤ 0.56 h(x), so x is in the hull of J grown by 0.56 of J's greatest h;
-//! 2. p is not further from x than any point of J is, and that is less than its horizon: J is among the points
-//!    within twice their horizon of p;
+//! 2. x is in the inner half of the horizon of one of J, and p is not further from x than that: x is within half
+//!    the greatest horizon of those that reach p;
 //! 3. x is on p's side of the plane half-way between p and any other point.
 //!
-//! The paper's claim that x is in the hull itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
+//! For a leaf all three are applied along the axes of its box; the enclosure of an inner node is the least box
+//! along its own axes about those of its leaves. The paper's claim that x is in the hull of J itself (Klein &
+//! Zachmann 2004, §4.2) does not hold (docs/theory).
 
-use nearmiss_surface::{BORDER, SurfacePlan};
+use nearmiss_surface::{BORDER, Neighbourhood, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
-use crate::surfels::{THICKNESS, cross, tangents};
+use crate::gather::GatherScratch;
+use crate::split::id32;
+use crate::spacing::map;
 use crate::topology::Node;
 
-/// Where the surface points nearest to a cloud point can be: a cylinder about the point's normal.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Cell {
-    /// Radius.
-    across: f32,
-    /// Least (not positive) and greatest (not negative) height along the normal.
-    low: f32,
-    high: f32,
-}
-
-/// Sectors of the tangent plane in which a cell is bounded one by one.
+/// Sectors of the plane of a leaf in which cells are bounded one by one.
 const SECTORS: usize = 16;
 
 /// Unit vectors between the sectors, 22.5 degrees apart.
@@ -42,230 +34,193 @@ const RAYS: [[f32; SECTORS]; 2] = {
     ]
 };
 
-/// Neighbours further than this many local radii bound no sector that nearer ones leave open, but at holes;
-/// what is missed there makes a cell wider, never wrong.
-const NEIGHBOURS: f32 = 2.5;
-
-/// A sector as open as this, in local radii, is at a border: the hull may bound it better.
-const OPEN: f32 = 1.25;
-
-/// Each of height, width and reach bounds the others.
-const ROUNDS: usize = 3;
+/// Neighbours further than this many local radii bound a cell only beside holes; what is missed there makes it
+/// wider, never wrong.
+const NEIGHBOURS: f32 = 1.75;
 
 /// What single precision may cost here, relatively: some hundred roundings in differences of nearby numbers.
 const GROWN: f32 = 1.0 + 1e-4;
 
-/// The points within twice their horizon of some point of a leaf, one array a coordinate, with what is worked out
-/// for one point of the leaf.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Surroundings {
-    points: Vec<([f32; 3], f32)>,
-    /// Distance from the point less the horizon: x must be that far from the point to be reached.
-    away: Vec<f32>,
-    height: Vec<f32>,
+/// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeafBounds {
+    axes: [[f32; 3]; 3],
+    origin: [f32; 3],
+    low: [f32; 3],
+    high: [f32; 3],
+    /// Fact 2.
+    reach: f32,
 }
 
-/// The least and greatest height of the points that may reach a cell, and their greatest horizon.
-#[derive(Clone, Copy)]
-struct Reaching {
-    low: f32,
-    high: f32,
-    horizon: f32,
-}
-
-impl Surroundings {
-    pub(crate) fn clear(&mut self) {
-        self.points.clear();
-    }
-
-    /// Adds a point and its horizon.
-    #[inline]
-    pub(crate) fn push(&mut self, p: [f32; 3], horizon: f32) {
-        self.points.push((p, horizon * GROWN));
-    }
-
-    /// The cell of the point `p` with this normal and local sampling radius, not less than the disc about it.
-    pub(crate) fn cell(
-        &mut self,
+impl LeafBounds {
+    /// Facts 1 and 2 for a leaf with these points and box, about which `scratch` has collected.
+    pub(crate) fn new(
         plan: &SurfacePlan,
-        p: [f32; 3],
-        normal: [f32; 3],
-        radius: f32,
-        disc: f32,
-    ) -> Cell {
-        self.measure(p, normal);
-        let border = border(plan);
-        // Fact 2.
-        let mut reach = 0.5 * self.near_horizon();
-        let mut reaching = self.reaching(reach);
-        let mut across = reach;
-        let mut heights = [-reach, reach];
-        for _ in 0..ROUNDS {
-            let margin = border * reaching.horizon;
-            heights[0] = heights[0].max(reaching.low - margin);
-            heights[1] = heights[1].min(reaching.high + margin);
-            across = across.min(self.across(p, normal, radius, heights, reach, margin));
-            heights = self.heights(p, heights, across);
-            reach = reach.min(length(across, heights));
-            reaching = self.reaching(reach);
+        points: &[[f32; 3]],
+        about: &OrientedBox,
+        scratch: &GatherScratch,
+    ) -> Self {
+        let (axes, origin) = (about.axes, points[0]);
+        let local = |p: [f32; 3]| axes.map(|axis| dot(axis, sub(p, origin)));
+        let mut own = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+        for p in points {
+            include(&mut own, local(*p));
         }
-        Cell {
-            across: across.max(disc * (1.0 + THICKNESS)) * GROWN,
-            low: heights[0].min(-disc * THICKNESS) * GROWN,
-            high: heights[1].max(disc * THICKNESS) * GROWN,
+        let reach = scratch.reach * GROWN;
+        let mut hull = own;
+        let mut horizon = 0.0_f32;
+        for (p, radius) in &scratch.surroundings {
+            let x = local(*p);
+            let far = (0..3).map(|k| (own[0][k] - x[k]).max(x[k] - own[1][k]).max(0.0));
+            let own_horizon = plan.horizon(*radius);
+            let within = (own_horizon + reach) * GROWN;
+            if far.map(|d| d * d).sum::<f32>() < within * within {
+                include(&mut hull, x);
+                horizon = horizon.max(own_horizon);
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "a constant")]
+        let margin = BORDER as f32 * (plan.bandwidth(1.0) / plan.horizon(1.0)) * horizon * GROWN;
+        let low = [0, 1, 2].map(|k| (hull[0][k] - margin).max(own[0][k] - reach));
+        let high = [0, 1, 2].map(|k| (hull[1][k] + margin).min(own[1][k] + reach));
+        Self { axes, origin, low, high, reach }
+    }
+
+    /// Begins to bound the leaf by its points' cells, fact 3, across the third axis, along which it is thin.
+    pub(crate) fn cells(&self) -> Cells<'_> {
+        Cells { leaf: self, low: [f32::INFINITY; 2], high: [f32::NEG_INFINITY; 2] }
+    }
+
+    /// The numbers of the leaf's points, those first that are furthest along some side: once their cells are known,
+    /// most others cannot widen the bounds.
+    pub(crate) fn outermost_first(&self, points: &[[f32; 3]]) -> impl Iterator<Item = usize> {
+        let mut ends = [(f32::NEG_INFINITY, 0); 4];
+        for (i, p) in points.iter().enumerate() {
+            let d = sub(*p, self.origin);
+            let (x, y) = (dot(d, self.axes[0]), dot(d, self.axes[1]));
+            for (end, along) in ends.iter_mut().zip([x, -x, y, -y]) {
+                if along > end.0 {
+                    *end = (along, i);
+                }
+            }
+        }
+        let first = ends.map(|(_, i)| i);
+        let is_new = move |k: usize| !first[..k].contains(&first[k]);
+        let rest = (0..points.len()).filter(move |i| !first.contains(i));
+        (0..4).filter(move |&k| is_new(k)).map(move |k| first[k]).chain(rest)
+    }
+
+    /// The box, not less than `bounds`, which has the same axes.
+    fn enclosure(&self, bounds: &OrientedBox) -> OrientedBox {
+        let at = self.axes.map(|axis| dot(axis, self.origin));
+        let (low, high) = (self.low.map(|x| x * GROWN), self.high.map(|x| x * GROWN));
+        let other = bounds.along(&self.axes);
+        let low = [0, 1, 2].map(|k| (at[k] + low[k]).min(other[k][0]));
+        let high = [0, 1, 2].map(|k| (at[k] + high[k]).max(other[k][1]));
+        OrientedBox::spanned(self.axes, low, high, bounds.reach)
+    }
+}
+
+/// The extents of the cells of a leaf's points in the plane of the leaf.
+#[derive(Debug)]
+pub(crate) struct Cells<'a> {
+    leaf: &'a LeafBounds,
+    low: [f32; 2],
+    high: [f32; 2],
+}
+
+impl Cells<'_> {
+    /// Includes the cell of the point `p` with this local radius and these neighbours.
+    pub(crate) fn include(&mut self, p: [f32; 3], radius: f32, near: &Neighbourhood) {
+        let LeafBounds { axes, origin, low, high, reach } = self.leaf;
+        let [x, y, z] = axes.map(|axis| dot(axis, sub(p, *origin)));
+        let full = [x, y].map(|c| [c - reach, c + reach]);
+        if (0..2).all(|k| full[k][0] >= self.low[k] && full[k][1] <= self.high[k]) {
+            return;
+        }
+        let bounds = sectors(axes, [low[2] - z, high[2] - z], NEIGHBOURS * radius, near);
+        for (k, c) in [x, y].into_iter().enumerate() {
+            let (mut least, mut most) = (0.0_f32, 0.0_f32);
+            for (i, bound) in bounds.iter().enumerate() {
+                let bound = bound.min(*reach);
+                let ends = [RAYS[k][i], RAYS[k][(i + 1) % SECTORS]];
+                least = least.min(bound * ends[0].min(ends[1]));
+                most = most.max(bound * ends[0].max(ends[1]));
+            }
+            self.low[k] = self.low[k].min(c + least);
+            self.high[k] = self.high[k].max(c + most);
         }
     }
 
-    /// Distances and heights of all points, and the bounds of those within twice their horizon.
-    fn measure(&mut self, p: [f32; 3], normal: [f32; 3]) {
-        self.away.clear();
-        self.height.clear();
-        for &(q, horizon) in &self.points {
-            let d = sub(q, p);
-            let (height, distance) = (dot(d, normal), dot(d, d).sqrt());
-            self.away.push(distance - horizon);
-            self.height.push(height);
+    /// The bounds of the leaf with the cells of all its points included.
+    pub(crate) fn close(self) -> LeafBounds {
+        let mut leaf = *self.leaf;
+        for k in 0..2 {
+            leaf.low[k] = leaf.low[k].max(self.low[k]);
+            leaf.high[k] = leaf.high[k].min(self.high[k]);
         }
+        leaf
     }
+}
 
-    /// The greatest horizon of the points whose horizon reaches this one.
-    fn near_horizon(&self) -> f32 {
-        let horizons = self.points.iter().zip(&self.away).filter(|(_, away)| **away < 0.0);
-        horizons.map(|((_, horizon), _)| *horizon).fold(0.0, f32::max)
-    }
-
-    /// The bounds of the points that reach some place within `reach` of the point.
-    fn reaching(&self, reach: f32) -> Reaching {
-        let mut all = Reaching { low: 0.0, high: 0.0, horizon: 0.0 };
-        for ((&away, &height), (_, horizon)) in self.away.iter().zip(&self.height).zip(&self.points) {
-            if away < reach {
-                all.include(height, *horizon);
-            }
+/// How far a surface point nearest to a point can be from it in each sector of the plane of the first two axes, at
+/// heights between these two along the third.
+fn sectors(axes: &[[f32; 3]; 3], heights: [f32; 2], within: f32, near: &Neighbourhood) -> [f32; SECTORS] {
+    // Per sector the greatest reciprocal of a bound.
+    let mut closed = [0.0_f32; SECTORS];
+    for q in near.offsets() {
+        let d_sq = dot(q, q);
+        if d_sq > within * within || d_sq <= 0.0 {
+            continue;
         }
-        all
-    }
-
-    /// How far from the point's axis a surface point can be whose height is between `heights`.
-    fn across(
-        &self,
-        p: [f32; 3],
-        normal: [f32; 3],
-        radius: f32,
-        heights: [f32; 2],
-        reach: f32,
-        margin: f32,
-    ) -> f32 {
-        let (u, v) = tangents(normal);
-        // Per sector the greatest reciprocal of a bound.
-        let mut closed = [0.0_f32; SECTORS];
-        let near = NEIGHBOURS * radius;
-        for ((&(q, horizon), &away), &height) in self.points.iter().zip(&self.away).zip(&self.height) {
-            let distance = away + horizon;
-            if distance > near || distance <= 0.0 {
-                continue;
-            }
-            // Fact 3: t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal and any height z.
-            let d = sub(q, p);
-            let c = 0.5 * dot(d, d) + (-heights[0] * height).max(-heights[1] * height);
-            let (x, y) = (dot(d, u) / c, dot(d, v) / c);
-            let mut side = [0.0_f32; SECTORS];
-            for k in 0..SECTORS {
-                side[k] = x * RAYS[0][k] + y * RAYS[1][k];
-            }
-            // Between two rays the bound is weaker than at neither only if it holds at both.
-            for k in 0..SECTORS {
-                let least = side[k].min(side[(k + 1) % SECTORS]);
-                closed[k] = closed[k].max(least);
-            }
-        }
-        let mut across = 0.0_f32;
+        // Fact 3: t·q ≤ ‖q‖²/2 − z·height for the part t of x − p in the plane and any height z.
+        let height = dot(q, axes[2]);
+        let c = 0.5 * d_sq + (-heights[0] * height).max(-heights[1] * height).max(0.0);
+        let (x, y) = (dot(q, axes[0]) / c, dot(q, axes[1]) / c);
+        let mut side = [0.0_f32; SECTORS];
         for k in 0..SECTORS {
-            let mut bound = 1.0 / closed[k];
-            if bound > OPEN * radius {
-                bound = bound.min(self.support(p, (u, v), k, reach) + margin);
+            side[k] = x * RAYS[0][k] + y * RAYS[1][k];
+        }
+        // What holds at both rays of a sector holds between them.
+        let mut next = [side[0]; SECTORS];
+        next[..SECTORS - 1].copy_from_slice(&side[1..]);
+        for k in 0..SECTORS {
+            let least = if side[k] < next[k] { side[k] } else { next[k] };
+            closed[k] = if closed[k] > least { closed[k] } else { least };
+        }
+    }
+    closed.map(|c| GROWN / c)
+}
+
+fn include(bounds: &mut [[f32; 3]; 2], x: [f32; 3]) {
+    for k in 0..3 {
+        bounds[0][k] = bounds[0][k].min(x[k]);
+        bounds[1][k] = bounds[1][k].max(x[k]);
+    }
+}
+
+/// The enclosures of all nodes, given the bounds of the leaves in order and the boxes about the discs.
+pub(crate) fn enclosures(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<OrientedBox> {
+    let ids: Vec<u32> = (0..id32(nodes.len())).collect();
+    let mut of_leaves = Vec::with_capacity(leaves.len());
+    let leaf_boxes = nodes.iter().zip(boxes).filter(|(node, _)| node.is_leaf());
+    of_leaves.extend(leaf_boxes.zip(leaves).map(|((_, bounds), leaf)| leaf.enclosure(bounds)));
+    let leaf_size = nodes.iter().find(|node| node.is_leaf()).map_or(1, |leaf| leaf.count as usize);
+    map(&ids, |&id| {
+        let (node, bounds) = (&nodes[id as usize], &boxes[id as usize]);
+        let range = node.first as usize / leaf_size..(node.first + node.count).div_ceil(id32(leaf_size)) as usize;
+        if node.is_leaf() {
+            return of_leaves[range.start];
+        }
+        let own = bounds.along(&bounds.axes);
+        let (mut low, mut high) = (own.map(|side| side[0]), own.map(|side| side[1]));
+        for leaf in &of_leaves[range] {
+            let other = leaf.along(&bounds.axes);
+            for k in 0..3 {
+                low[k] = low[k].min(other[k][0]);
+                high[k] = high[k].max(other[k][1]);
             }
-            across = across.max(bound);
         }
-        across
-    }
-
-    /// Fact 3 along the normal: the least and greatest height of a surface point within `across` of the axis.
-    fn heights(&self, p: [f32; 3], [mut low, mut high]: [f32; 2], across: f32) -> [f32; 2] {
-        for (&(q, _), &height) in self.points.iter().zip(&self.height) {
-            let d = sub(q, p);
-            let d_sq = dot(d, d);
-            let c = 0.5 * d_sq + across * (d_sq - height * height).max(0.0).sqrt();
-            if height > 0.0 {
-                high = high.min(c / height);
-            } else if height < 0.0 {
-                low = low.max(c / height);
-            }
-        }
-        [low, high]
-    }
-
-    /// Fact 1 for the sector `k`: how far the hull of the points that reach goes along its rays, at most.
-    fn support(&self, p: [f32; 3], (u, v): ([f32; 3], [f32; 3]), k: usize, reach: f32) -> f32 {
-        let ray = |k: usize| {
-            let (x, y) = (RAYS[0][k % SECTORS], RAYS[1][k % SECTORS]);
-            [0, 1, 2].map(|i| x * u[i] + y * v[i])
-        };
-        let (first, last) = (ray(k), ray(k + 1));
-        // A direction of the sector is a combination of its rays with coefficients that sum to at most 1.02.
-        let mut most = 0.0_f32;
-        for (&(q, _), &away) in self.points.iter().zip(&self.away) {
-            if away < reach {
-                let d = sub(q, p);
-                most = most.max(dot(d, first)).max(dot(d, last));
-            }
-        }
-        1.02 * most
-    }
-}
-
-impl Reaching {
-    #[inline]
-    fn include(&mut self, height: f32, horizon: f32) {
-        self.low = self.low.min(height);
-        self.high = self.high.max(height);
-        self.horizon = self.horizon.max(horizon);
-    }
-}
-
-/// 0.56 h over the horizon, and a little more for the rounding of a(x).
-fn border(plan: &SurfacePlan) -> f32 {
-    #[expect(clippy::cast_possible_truncation, reason = "a constant")]
-    let border = BORDER as f32;
-    border * GROWN * plan.bandwidth(1.0) / plan.horizon(1.0)
-}
-
-fn length(across: f32, [low, high]: [f32; 2]) -> f32 {
-    let height = high.max(-low);
-    (across * across + height * height).sqrt()
-}
-
-/// The least box along the axes of `about` that contains the cells of the node's points.
-pub(crate) fn box_of_cells(
-    node: &Node,
-    about: &OrientedBox,
-    positions: &[[f32; 3]],
-    normals: &[[f32; 3]],
-    cells: &[Cell],
-) -> OrientedBox {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for i in node.points() {
-        let cell = &cells[i];
-        for k in 0..3 {
-            let axis = about.axes[k];
-            let c = dot(axis, positions[i]);
-            let cosine = dot(axis, normals[i]);
-            let spread = cross(axis, normals[i]);
-            let spread = cell.across * dot(spread, spread).sqrt();
-            let (a, b) = (cosine * cell.low, cosine * cell.high);
-            low[k] = low[k].min(c - spread + a.min(b));
-            high[k] = high[k].max(c + spread + a.max(b));
-        }
-    }
-    OrientedBox::spanned(about.axes, low, high, about.reach)
+        OrientedBox::spanned(bounds.axes, low, high, bounds.reach)
+    })
 }

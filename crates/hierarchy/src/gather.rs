@@ -1,9 +1,8 @@
 //! The points that f(x) needs: those whose horizon reaches x, by a short descent in canonical order.
 
-use nearmiss_surface::{Centre, Evaluation, Neighbourhood, SurfacePlan};
+use nearmiss_surface::{Centre, Evaluation, Neighbourhood, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
-use crate::enclosure::Surroundings;
 use crate::split::id32;
 use crate::topology::Node;
 
@@ -16,7 +15,12 @@ pub struct GatherScratch {
     pub(crate) near: Neighbourhood,
     /// Points that may reach some point of a ball, in canonical order.
     candidates: Vec<([f32; 3], f32)>,
-    pub(crate) surroundings: Surroundings,
+    /// The candidates side by side.
+    blocks: Vec<PointBlock>,
+    /// The same about a larger ball: the points that may reach a surface point nearest to one of the smaller.
+    pub(crate) surroundings: Vec<([f32; 3], f32)>,
+    /// How much larger.
+    pub(crate) reach: f32,
 }
 
 impl GatherScratch {
@@ -41,38 +45,59 @@ impl GatherScratch {
         );
     }
 
-    /// As [`Self::collect`], and puts the points within twice their horizon of the ball into the surroundings.
-    pub(crate) fn collect_widely(&mut self, index: &Index<'_>, centre: [f32; 3], radius: f32) {
-        self.collect(index, centre, radius);
-        let Self { candidates, surroundings, .. } = self;
-        surroundings.clear();
-        let greatest = candidates.iter().map(|(_, r)| index.plan.horizon(*r)).fold(0.0, f32::max);
-        let radius = radius + 0.5 * greatest;
-        let within = |d_sq: f32, reach: f32| {
-            let far = (index.plan.horizon(reach) + radius) * (1.0 + 1e-5);
-            d_sq < far * far
-        };
-        index.descend(
-            |id| within(index.boxes[id].distance_sq(centre), index.boxes[id].reach),
-            |node| {
-                for i in node.points() {
-                    let p = index.positions[i];
-                    let d = sub(p, centre);
-                    if within(dot(d, d), index.radii[i]) {
-                        surroundings.push(p, index.plan.horizon(index.radii[i]));
-                    }
+    /// As [`Self::collect`], and collects what may reach a surface point nearest to one of the ball; `guess` is what
+    /// the greatest local radius near it may be.
+    pub(crate) fn collect_widely(
+        &mut self,
+        index: &Index<'_>,
+        centre: [f32; 3],
+        radius: f32,
+        mut guess: f32,
+    ) {
+        // The wider collection comes first, for the narrower is part of it. A good guess saves a second descent.
+        loop {
+            self.collect(index, centre, radius + 0.5 * index.plan.horizon(guess));
+            let Self { candidates, surroundings, .. } = self;
+            std::mem::swap(candidates, surroundings);
+            candidates.clear();
+            let mut greatest = 0.0_f32;
+            for &(p, own) in &*surroundings {
+                let d = sub(p, centre);
+                let far = (index.plan.horizon(own) + radius) * (1.0 + 1e-5);
+                if dot(d, d) < far * far {
+                    candidates.push((p, own));
+                    greatest = greatest.max(own);
                 }
-            },
-        );
+            }
+            self.reach = 0.5 * index.plan.horizon(greatest);
+            if greatest <= guess {
+                self.pack(index.plan);
+                return;
+            }
+            guess = greatest;
+        }
+    }
+
+    /// Puts the candidates side by side.
+    pub(crate) fn pack(&mut self, plan: &SurfacePlan) {
+        let Self { candidates, blocks, .. } = self;
+        blocks.clear();
+        for chunk in candidates.chunks(PointBlock::WIDTH) {
+            let mut block = PointBlock::EMPTY;
+            for (lane, &(p, radius)) in chunk.iter().enumerate() {
+                block.set(lane, plan, p, radius);
+            }
+            blocks.push(block);
+        }
     }
 
     /// As [`Index::gather`], from the points collected about a ball in which `x` lies.
     pub(crate) fn gather_collected(&mut self, plan: &SurfacePlan, x: [f64; 3]) {
-        let Self { near, candidates, .. } = self;
+        let Self { near, blocks, .. } = self;
         near.clear();
         let centre = Centre::new(x);
-        for &(p, radius) in &*candidates {
-            near.offer(plan, &centre, p, radius);
+        for block in &*blocks {
+            near.offer_block(plan, &centre, block);
         }
     }
 }
@@ -98,6 +123,7 @@ impl<'a> Vicinity<'a> {
         let reach = centre.iter().fold(radius, |m, c| m.max(c.abs()));
         #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
         scratch.collect(&index, rounded, (radius + 1e-6 * reach) as f32);
+        scratch.pack(index.plan);
         Self { index, scratch, centre, radius }
     }
 

@@ -11,7 +11,7 @@ use nearmiss_surface::{Evaluation, Neighbourhood, Status, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot, sub};
-use crate::enclosure::Cell;
+use crate::enclosure::LeafBounds;
 use crate::gather::{GatherScratch, Index};
 use crate::spacing::Spacing;
 use crate::topology::Node;
@@ -41,11 +41,12 @@ pub const THICKNESS: f32 = 0.05;
 const LINE: f64 = 0.05;
 
 /// What the neighbourhood of a point looks like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[repr(u8)]
 #[non_exhaustive]
 pub enum PointKind {
     /// One sheet: the disc is to be trusted.
+    #[default]
     Surface = 0,
     /// At or beyond the border of its surface.
     Border = 1,
@@ -88,29 +89,39 @@ pub struct NormalCone {
 }
 
 /// A point's disc.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Surfel {
     pub(crate) normal: [f32; 3],
     pub(crate) disc: f32,
     pub(crate) kind: PointKind,
-    pub(crate) cell: Cell,
 }
 
-/// The discs of the points of one leaf, numbered `points`.
+/// The discs of the points of one leaf, numbered `points`, and bounds of its part of the surface; `about` is its box.
 pub(crate) fn leaf_surfels(
     index: &Index<'_>,
     points: std::ops::Range<usize>,
+    about: &OrientedBox,
     spacings: &[Spacing],
     scratch: &mut GatherScratch,
-) -> Vec<Surfel> {
+    surfels: &mut Vec<Surfel>,
+) -> LeafBounds {
     let places = &index.positions[points.clone()];
     #[expect(clippy::cast_precision_loss, reason = "a leaf has at most 64 points")]
     let share = 1.0 / places.len() as f32;
     let sum = places.iter().fold([0.0; 3], |s, p| [s[0] + p[0], s[1] + p[1], s[2] + p[2]]);
     let centre = sum.map(|c| c * share);
     let radius_sq = places.iter().map(|p| sub(*p, centre)).map(|d| dot(d, d)).fold(0.0, f32::max);
-    scratch.collect_widely(index, centre, radius_sq.sqrt());
-    points.map(|i| surfel(index, i, spacings[i], scratch)).collect()
+    // Radii grow by at most 0.3 per length, and few as fast.
+    scratch.collect_widely(index, centre, radius_sq.sqrt(), 1.3 * about.reach);
+    let bounds = LeafBounds::new(index.plan, places, about, scratch);
+    let mut cells = bounds.cells();
+    let start = surfels.len();
+    surfels.resize(start + points.len(), Surfel::default());
+    for i in bounds.outermost_first(places) {
+        surfels[start + i] = surfel(index, points.start + i, spacings[points.start + i], scratch);
+        cells.include(places[i], index.radii[points.start + i], &scratch.near);
+    }
+    cells.close()
 }
 
 /// The disc of point `i`, about whose leaf `scratch` has collected points.
@@ -126,8 +137,7 @@ fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, scratch: &mut GatherScr
     #[expect(clippy::cast_precision_loss, reason = "a small number")]
     let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
     let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * border);
-    let cell = scratch.surroundings.cell(index.plan, index.positions[i], normal, index.radii[i], disc);
-    Surfel { normal, disc, kind: kind(&at, spacing.is_line), cell }
+    Surfel { normal, disc, kind: kind(&at, spacing.is_line) }
 }
 
 /// The greatest number of neighbouring sectors of the tangent plane in which no point lies.
@@ -162,7 +172,7 @@ fn widest_gap(near: &Neighbourhood, normal: [f32; 3]) -> u32 {
 
 /// Two unit vectors that complete `normal` to a right-handed frame (Duff et al., "Building an orthonormal
 /// basis, revisited", JCGT 6(1), 2017).
-pub(crate) fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let sign = 1.0_f32.copysign(z);
     let a = -1.0 / (sign + z);
     let b = x * y * a;
@@ -204,7 +214,7 @@ pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
     NormalCone { axis, cosine }
 }
 
-pub(crate) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

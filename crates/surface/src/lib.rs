@@ -13,6 +13,6 @@ pub use eigen::{Eigen3, symmetric_eigen};
 pub use fit::{BORDER, Evaluation, Status};
 pub use kernel::Kernel;
 pub use meet::{Meeting, meet};
-pub use neighbourhood::{Centre, Neighbourhood};
+pub use neighbourhood::{Centre, Neighbourhood, PointBlock};
 pub use options::{Bandwidth, SurfaceError, SurfaceOptions, SurfacePlan};
 pub use project::{Projection, project};

@@ -55,6 +55,38 @@ impl Centre {
     }
 }
 
+/// Eight points side by side, to be offered together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointBlock {
+    position: [[f32; LANES]; 3],
+    radius: [f32; LANES],
+    /// Squared; 0 where there is no point.
+    horizon_sq: [f32; LANES],
+}
+
+impl PointBlock {
+    /// How many points fit.
+    pub const WIDTH: usize = LANES;
+
+    /// No points.
+    pub const EMPTY: Self =
+        Self { position: [[0.0; LANES]; 3], radius: [0.0; LANES], horizon_sq: [0.0; LANES] };
+
+    /// Puts the point `p` of local sampling radius `radius` into a lane.
+    ///
+    /// # Panics
+    /// When there is no such lane.
+    #[inline]
+    pub fn set(&mut self, lane: usize, plan: &SurfacePlan, p: [f32; 3], radius: f32) {
+        for k in 0..3 {
+            self.position[k][lane] = p[k];
+        }
+        let horizon = plan.horizon(radius);
+        self.radius[lane] = radius;
+        self.horizon_sq[lane] = horizon * horizon;
+    }
+}
+
 /// Points side by side: what is filled in is added up, the rest has no weight.
 #[derive(Debug, Clone, Copy)]
 struct Block {
@@ -95,6 +127,30 @@ impl Neighbourhood {
         let exponent = if counts { plan.reach_sq() * (d_sq / horizon_sq) } else { f32::MAX };
         self.put(d, exponent, plan.bandwidth(radius));
         self.count += usize::from(counts);
+    }
+
+    /// As [`Self::offer`], of all points of a block, in order.
+    #[inline]
+    pub fn offer_block(&mut self, plan: &SurfacePlan, x: &Centre, block: &PointBlock) {
+        let mut d = [[0.0_f32; LANES]; 3];
+        for k in 0..3 {
+            for i in 0..LANES {
+                d[k][i] = (block.position[k][i] - x.high[k]) - x.low[k];
+            }
+        }
+        let mut exponent = [0.0_f32; LANES];
+        let mut counts = [0_u32; LANES];
+        for i in 0..LANES {
+            let d_sq = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
+            counts[i] = u32::from(d_sq < block.horizon_sq[i]) << i;
+            exponent[i] = plan.reach_sq() * (d_sq / block.horizon_sq[i]);
+        }
+        let mut bits: u32 = counts.iter().sum();
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize % LANES;
+            bits &= bits - 1;
+            self.push([d[0][i], d[1][i], d[2][i]], exponent[i], plan.bandwidth(block.radius[i]));
+        }
     }
 
     /// Adds a point at `offset` from x, with its d²/h² and its h.
