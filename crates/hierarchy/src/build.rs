@@ -5,7 +5,7 @@ use nearmiss_store::Array;
 use nearmiss_surface::{Evaluation, SurfacePlan};
 
 use crate::boxes::OrientedBox;
-use crate::enclosure::{LeafBounds, enclosures};
+use crate::enclosure::{LeafBounds, Surroundings, enclosures};
 use crate::gather::{GatherScratch, Index, Vicinity};
 use crate::options::{BuildError, BuildOptions};
 use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
@@ -329,20 +329,23 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
 }
 
 /// The discs of all points and the bounds of all leaves, in order, some leaves at a time.
-fn surfels(
-    index: &Index<'_>,
-    spacings: &[Spacing],
-    leaf_size: usize,
-) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
+fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
     let leaves: Vec<(&Node, &OrientedBox)> =
         index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).collect();
     let fit = |leaves: &[(&Node, &OrientedBox)]| {
-        let mut scratch = GatherScratch::default();
+        let (mut scratch, mut surroundings) = (GatherScratch::default(), Surroundings::default());
         let mut surfels = Vec::with_capacity(leaves.len() * leaf_size);
         let bounds = leaves
             .iter()
             .map(|(leaf, about)| {
-                leaf_surfels(index, leaf.points(), about, spacings, &mut scratch, &mut surfels)
+                leaf_surfels(
+                    index,
+                    leaf.points(),
+                    about,
+                    spacings,
+                    (&mut scratch, &mut surroundings),
+                    &mut surfels,
+                )
             })
             .collect();
         (surfels, bounds)

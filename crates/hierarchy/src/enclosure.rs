@@ -8,19 +8,20 @@
 //!    the greatest horizon of those that reach p;
 //! 3. x is on p's side of the plane half-way between p and any other point.
 //!
-//! For a leaf all three are applied along the axes of its box; the enclosure of an inner node is the least box
-//! along its own axes about those of its leaves. The paper's claim that x is in the hull of J itself (Klein &
+//! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a cylinder about its
+//! normal, and the leaf's part is in the box about these as well; whichever is less counts. The enclosure of an
+//! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull of J itself (Klein &
 //! Zachmann 2004, §4.2) does not hold (docs/theory).
 
 use nearmiss_surface::{BORDER, Neighbourhood, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
-use crate::gather::GatherScratch;
-use crate::split::id32;
 use crate::spacing::map;
+use crate::split::id32;
+use crate::surfels::{cross, tangents};
 use crate::topology::Node;
 
-/// Sectors of the plane of a leaf in which cells are bounded one by one.
+/// Sectors of a tangent plane in which a cell is bounded one by one.
 const SECTORS: usize = 16;
 
 /// Unit vectors between the sectors, 22.5 degrees apart.
@@ -38,134 +39,125 @@ const RAYS: [[f32; SECTORS]; 2] = {
 /// wider, never wrong.
 const NEIGHBOURS: f32 = 1.75;
 
+/// Width, height and reach of a cell bound each other; a second round takes a fifth off, a third next to nothing.
+const ROUNDS: usize = 2;
+
 /// What single precision may cost here, relatively: some hundred roundings in differences of nearby numbers.
 const GROWN: f32 = 1.0 + 1e-4;
 
-/// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LeafBounds {
-    axes: [[f32; 3]; 3],
+/// Points that are worked on together.
+const WIDTH: usize = 8;
+
+/// What may reach a leaf's part of the surface, relative to a point of the leaf, in lanes.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Surroundings {
     origin: [f32; 3],
-    low: [f32; 3],
-    high: [f32; 3],
-    /// Fact 2.
+    blocks: Vec<Block>,
+    /// How far a surface point can be from its nearest point: fact 2.
     reach: f32,
+    /// 0.56 h over the horizon.
+    border: f32,
 }
 
-impl LeafBounds {
-    /// Facts 1 and 2 for a leaf with these points and box, about which `scratch` has collected.
-    pub(crate) fn new(
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    position: [[f32; WIDTH]; 3],
+    horizon: [f32; WIDTH],
+}
+
+/// Far from everything, and heard nowhere.
+const NOWHERE: Block = Block { position: [[1e18; WIDTH]; 3], horizon: [0.0; WIDTH] };
+
+impl Surroundings {
+    /// Those of a leaf with a point `origin`, from the `points` collected about it with their radii.
+    pub(crate) fn fill(
+        &mut self,
         plan: &SurfacePlan,
-        points: &[[f32; 3]],
-        about: &OrientedBox,
-        scratch: &GatherScratch,
-    ) -> Self {
-        let (axes, origin) = (about.axes, points[0]);
-        let local = |p: [f32; 3]| axes.map(|axis| dot(axis, sub(p, origin)));
-        let mut own = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        for p in points {
-            include(&mut own, local(*p));
-        }
-        let reach = scratch.reach * GROWN;
-        let mut hull = own;
-        let mut horizon = 0.0_f32;
-        for (p, radius) in &scratch.surroundings {
-            let x = local(*p);
-            let far = (0..3).map(|k| (own[0][k] - x[k]).max(x[k] - own[1][k]).max(0.0));
-            let own_horizon = plan.horizon(*radius);
-            let within = (own_horizon + reach) * GROWN;
-            if far.map(|d| d * d).sum::<f32>() < within * within {
-                include(&mut hull, x);
-                horizon = horizon.max(own_horizon);
-            }
-        }
+        origin: [f32; 3],
+        points: &[([f32; 3], f32)],
+        reach: f32,
+    ) {
+        self.origin = origin;
+        self.reach = reach * GROWN;
         #[expect(clippy::cast_possible_truncation, reason = "a constant")]
-        let margin = BORDER as f32 * (plan.bandwidth(1.0) / plan.horizon(1.0)) * horizon * GROWN;
-        let low = [0, 1, 2].map(|k| (hull[0][k] - margin).max(own[0][k] - reach));
-        let high = [0, 1, 2].map(|k| (hull[1][k] + margin).min(own[1][k] + reach));
-        Self { axes, origin, low, high, reach }
-    }
-
-    /// Begins to bound the leaf by its points' cells, fact 3, across the third axis, along which it is thin.
-    pub(crate) fn cells(&self) -> Cells<'_> {
-        Cells { leaf: self, low: [f32::INFINITY; 2], high: [f32::NEG_INFINITY; 2] }
-    }
-
-    /// The numbers of the leaf's points, those first that are furthest along some side: once their cells are known,
-    /// most others cannot widen the bounds.
-    pub(crate) fn outermost_first(&self, points: &[[f32; 3]]) -> impl Iterator<Item = usize> {
-        let mut ends = [(f32::NEG_INFINITY, 0); 4];
-        for (i, p) in points.iter().enumerate() {
-            let d = sub(*p, self.origin);
-            let (x, y) = (dot(d, self.axes[0]), dot(d, self.axes[1]));
-            for (end, along) in ends.iter_mut().zip([x, -x, y, -y]) {
-                if along > end.0 {
-                    *end = (along, i);
+        let border = BORDER as f32 * GROWN;
+        self.border = border * plan.bandwidth(1.0) / plan.horizon(1.0);
+        self.blocks.clear();
+        for chunk in points.chunks(WIDTH) {
+            let mut block = NOWHERE;
+            for (lane, &(p, radius)) in chunk.iter().enumerate() {
+                let d = sub(p, origin);
+                for k in 0..3 {
+                    block.position[k][lane] = d[k];
                 }
+                block.horizon[lane] = plan.horizon(radius) * GROWN;
+            }
+            self.blocks.push(block);
+        }
+    }
+
+    /// Where the surface points nearest to the point `p` can be, whose neighbours are `near`.
+    pub(crate) fn cell(&self, p: [f32; 3], normal: [f32; 3], radius: f32, near: &Neighbourhood) -> Cell {
+        let p = sub(p, self.origin);
+        let (u, v) = tangents(normal);
+        let mut reach = self.reach;
+        let mut cell = Cell { across: reach, low: -reach, high: reach };
+        for _ in 0..ROUNDS {
+            let (low, high) = self.heights(p, normal, reach);
+            cell.low = cell.low.max(low);
+            cell.high = cell.high.min(high);
+            let across = across([u, v, normal], &cell, NEIGHBOURS * radius, near);
+            cell.across = cell.across.min(across);
+            let before = reach;
+            reach = reach.min(cell.reach() * GROWN);
+            if reach > 0.9 * before {
+                break;
             }
         }
-        let first = ends.map(|(_, i)| i);
-        let is_new = move |k: usize| !first[..k].contains(&first[k]);
-        let rest = (0..points.len()).filter(move |i| !first.contains(i));
-        (0..4).filter(move |&k| is_new(k)).map(move |k| first[k]).chain(rest)
+        cell
     }
 
-    /// The box, not less than `bounds`, which has the same axes.
-    fn enclosure(&self, bounds: &OrientedBox) -> OrientedBox {
-        let at = self.axes.map(|axis| dot(axis, self.origin));
-        let (low, high) = (self.low.map(|x| x * GROWN), self.high.map(|x| x * GROWN));
-        let other = bounds.along(&self.axes);
-        let low = [0, 1, 2].map(|k| (at[k] + low[k]).min(other[k][0]));
-        let high = [0, 1, 2].map(|k| (at[k] + high[k]).max(other[k][1]));
-        OrientedBox::spanned(self.axes, low, high, bounds.reach)
-    }
-}
-
-/// The extents of the cells of a leaf's points in the plane of the leaf.
-#[derive(Debug)]
-pub(crate) struct Cells<'a> {
-    leaf: &'a LeafBounds,
-    low: [f32; 2],
-    high: [f32; 2],
-}
-
-impl Cells<'_> {
-    /// Includes the cell of the point `p` with this local radius and these neighbours.
-    pub(crate) fn include(&mut self, p: [f32; 3], radius: f32, near: &Neighbourhood) {
-        let LeafBounds { axes, origin, low, high, reach } = self.leaf;
-        let [x, y, z] = axes.map(|axis| dot(axis, sub(p, *origin)));
-        let full = [x, y].map(|c| [c - reach, c + reach]);
-        if (0..2).all(|k| full[k][0] >= self.low[k] && full[k][1] <= self.high[k]) {
-            return;
-        }
-        let bounds = sectors(axes, [low[2] - z, high[2] - z], NEIGHBOURS * radius, near);
-        for (k, c) in [x, y].into_iter().enumerate() {
-            let (mut least, mut most) = (0.0_f32, 0.0_f32);
-            for (i, bound) in bounds.iter().enumerate() {
-                let bound = bound.min(*reach);
-                let ends = [RAYS[k][i], RAYS[k][(i + 1) % SECTORS]];
-                least = least.min(bound * ends[0].min(ends[1]));
-                most = most.max(bound * ends[0].max(ends[1]));
+    /// Fact 1 along the normal of `p`: the least and greatest height of a surface point within `reach` of it.
+    fn heights(&self, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
+        let (mut low, mut high, mut most) = ([0.0_f32; WIDTH], [0.0_f32; WIDTH], [0.0_f32; WIDTH]);
+        for Block { position: [x, y, z], horizon } in &self.blocks {
+            for i in 0..WIDTH {
+                let d = [x[i] - p[0], y[i] - p[1], z[i] - p[2]];
+                let within = horizon[i] + reach;
+                let reaches = dot(d, d) < within * within;
+                let height = if reaches { dot(d, normal) } else { 0.0 };
+                let heard = if reaches { horizon[i] } else { 0.0 };
+                low[i] = if height < low[i] { height } else { low[i] };
+                high[i] = if height > high[i] { height } else { high[i] };
+                most[i] = if heard > most[i] { heard } else { most[i] };
             }
-            self.low[k] = self.low[k].min(c + least);
-            self.high[k] = self.high[k].max(c + most);
         }
-    }
-
-    /// The bounds of the leaf with the cells of all its points included.
-    pub(crate) fn close(self) -> LeafBounds {
-        let mut leaf = *self.leaf;
-        for k in 0..2 {
-            leaf.low[k] = leaf.low[k].max(self.low[k]);
-            leaf.high[k] = leaf.high[k].min(self.high[k]);
-        }
-        leaf
+        let margin = self.border * most.into_iter().fold(0.0, f32::max);
+        (low.into_iter().fold(0.0, f32::min) - margin, high.into_iter().fold(0.0, f32::max) + margin)
     }
 }
 
-/// How far a surface point nearest to a point can be from it in each sector of the plane of the first two axes, at
-/// heights between these two along the third.
-fn sectors(axes: &[[f32; 3]; 3], heights: [f32; 2], within: f32, near: &Neighbourhood) -> [f32; SECTORS] {
+/// Where the surface points nearest to a point can be: a cylinder about its normal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Cell {
+    /// Radius.
+    across: f32,
+    /// Least (not positive) and greatest (not negative) height along the normal.
+    low: f32,
+    high: f32,
+}
+
+impl Cell {
+    /// The greatest distance from the point.
+    fn reach(&self) -> f32 {
+        let height = self.high.max(-self.low);
+        (self.across * self.across + height * height).sqrt()
+    }
+}
+
+/// Fact 3: how far from its axis a surface point in the cell can be. `near` are the neighbours of the point, of
+/// which those `within` some distance are looked at; the last axis is the normal.
+fn across(axes: [[f32; 3]; 3], cell: &Cell, within: f32, near: &Neighbourhood) -> f32 {
     // Per sector the greatest reciprocal of a bound.
     let mut closed = [0.0_f32; SECTORS];
     for q in near.offsets() {
@@ -173,9 +165,9 @@ fn sectors(axes: &[[f32; 3]; 3], heights: [f32; 2], within: f32, near: &Neighbou
         if d_sq > within * within || d_sq <= 0.0 {
             continue;
         }
-        // Fact 3: t·q ≤ ‖q‖²/2 − z·height for the part t of x − p in the plane and any height z.
+        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, and any height z.
         let height = dot(q, axes[2]);
-        let c = 0.5 * d_sq + (-heights[0] * height).max(-heights[1] * height).max(0.0);
+        let c = 0.5 * d_sq + (-cell.low * height).max(-cell.high * height).max(0.0);
         let (x, y) = (dot(q, axes[0]) / c, dot(q, axes[1]) / c);
         let mut side = [0.0_f32; SECTORS];
         for k in 0..SECTORS {
@@ -189,7 +181,93 @@ fn sectors(axes: &[[f32; 3]; 3], heights: [f32; 2], within: f32, near: &Neighbou
             closed[k] = if closed[k] > least { closed[k] } else { least };
         }
     }
-    closed.map(|c| GROWN / c)
+    GROWN / closed.into_iter().fold(f32::INFINITY, f32::min)
+}
+
+/// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeafBounds {
+    axes: [[f32; 3]; 3],
+    origin: [f32; 3],
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl LeafBounds {
+    /// Facts 1 and 2 for a leaf with these points and box.
+    pub(crate) fn new(points: &[[f32; 3]], about: &OrientedBox, surroundings: &Surroundings) -> Self {
+        let (axes, origin, reach) = (about.axes, points[0], surroundings.reach);
+        let mut own = [[0.0_f32; 3]; 2];
+        for p in points {
+            include(&mut own, axes.map(|axis| dot(axis, sub(*p, origin))));
+        }
+        let mut hull = own;
+        let mut greatest = 0.0_f32;
+        for Block { position: [x, y, z], horizon } in &surroundings.blocks {
+            for i in 0..WIDTH {
+                let at = axes.map(|axis| dot(axis, [x[i], y[i], z[i]]));
+                let far = (0..3).map(|k| (own[0][k] - at[k]).max(at[k] - own[1][k]).max(0.0));
+                let within = horizon[i] + reach;
+                if far.map(|d| d * d).sum::<f32>() < within * within {
+                    include(&mut hull, at);
+                    greatest = greatest.max(horizon[i]);
+                }
+            }
+        }
+        let margin = surroundings.border * greatest;
+        let low = [0, 1, 2].map(|k| (hull[0][k] - margin).max(own[0][k] - reach));
+        let high = [0, 1, 2].map(|k| (hull[1][k] + margin).min(own[1][k] + reach));
+        Self { axes, origin, low, high }
+    }
+
+    /// Begins to bound the leaf by its points' cells.
+    pub(crate) fn cells(&self) -> Cells {
+        Cells { leaf: *self, low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] }
+    }
+
+    /// The box, not less than `bounds`, which has the same axes.
+    fn enclosure(&self, bounds: &OrientedBox) -> OrientedBox {
+        let at = self.axes.map(|axis| dot(axis, self.origin));
+        let other = bounds.along(&self.axes);
+        let low = [0, 1, 2].map(|k| (at[k] + self.low[k] * GROWN).min(other[k][0]));
+        let high = [0, 1, 2].map(|k| (at[k] + self.high[k] * GROWN).max(other[k][1]));
+        OrientedBox::spanned(self.axes, low, high, bounds.reach)
+    }
+}
+
+/// The extents of the cells of a leaf's points.
+#[derive(Debug)]
+pub(crate) struct Cells {
+    leaf: LeafBounds,
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl Cells {
+    /// Includes the cell of the point `p` with this normal.
+    pub(crate) fn include(&mut self, p: [f32; 3], normal: [f32; 3], cell: &Cell) {
+        let d = sub(p, self.leaf.origin);
+        for k in 0..3 {
+            let axis = self.leaf.axes[k];
+            let spread = cross(axis, normal);
+            let spread = cell.across * dot(spread, spread).sqrt();
+            let cosine = dot(axis, normal);
+            let (a, b) = (cosine * cell.low, cosine * cell.high);
+            let c = dot(axis, d);
+            self.low[k] = self.low[k].min(c - spread + a.min(b));
+            self.high[k] = self.high[k].max(c + spread + a.max(b));
+        }
+    }
+
+    /// The bounds of the leaf with the cells of all its points included.
+    pub(crate) fn close(self) -> LeafBounds {
+        let Self { mut leaf, low, high } = self;
+        for k in 0..3 {
+            leaf.low[k] = leaf.low[k].max(low[k]);
+            leaf.high[k] = leaf.high[k].min(high[k]);
+        }
+        leaf
+    }
 }
 
 fn include(bounds: &mut [[f32; 3]; 2], x: [f32; 3]) {
@@ -208,7 +286,8 @@ pub(crate) fn enclosures(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBo
     let leaf_size = nodes.iter().find(|node| node.is_leaf()).map_or(1, |leaf| leaf.count as usize);
     map(&ids, |&id| {
         let (node, bounds) = (&nodes[id as usize], &boxes[id as usize]);
-        let range = node.first as usize / leaf_size..(node.first + node.count).div_ceil(id32(leaf_size)) as usize;
+        let range =
+            node.first as usize / leaf_size..(node.first + node.count).div_ceil(id32(leaf_size)) as usize;
         if node.is_leaf() {
             return of_leaves[range.start];
         }

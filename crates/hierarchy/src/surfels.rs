@@ -11,7 +11,7 @@ use nearmiss_surface::{Evaluation, Neighbourhood, Status, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot, sub};
-use crate::enclosure::LeafBounds;
+use crate::enclosure::{LeafBounds, Surroundings};
 use crate::gather::{GatherScratch, Index};
 use crate::spacing::Spacing;
 use crate::topology::Node;
@@ -41,12 +41,11 @@ pub const THICKNESS: f32 = 0.05;
 const LINE: f64 = 0.05;
 
 /// What the neighbourhood of a point looks like.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[repr(u8)]
 #[non_exhaustive]
 pub enum PointKind {
     /// One sheet: the disc is to be trusted.
-    #[default]
     Surface = 0,
     /// At or beyond the border of its surface.
     Border = 1,
@@ -89,7 +88,7 @@ pub struct NormalCone {
 }
 
 /// A point's disc.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Surfel {
     pub(crate) normal: [f32; 3],
     pub(crate) disc: f32,
@@ -102,7 +101,7 @@ pub(crate) fn leaf_surfels(
     points: std::ops::Range<usize>,
     about: &OrientedBox,
     spacings: &[Spacing],
-    scratch: &mut GatherScratch,
+    (scratch, surroundings): (&mut GatherScratch, &mut Surroundings),
     surfels: &mut Vec<Surfel>,
 ) -> LeafBounds {
     let places = &index.positions[points.clone()];
@@ -113,13 +112,13 @@ pub(crate) fn leaf_surfels(
     let radius_sq = places.iter().map(|p| sub(*p, centre)).map(|d| dot(d, d)).fold(0.0, f32::max);
     // Radii grow by at most 0.3 per length, and few as fast.
     scratch.collect_widely(index, centre, radius_sq.sqrt(), 1.3 * about.reach);
-    let bounds = LeafBounds::new(index.plan, places, about, scratch);
-    let mut cells = bounds.cells();
-    let start = surfels.len();
-    surfels.resize(start + points.len(), Surfel::default());
-    for i in bounds.outermost_first(places) {
-        surfels[start + i] = surfel(index, points.start + i, spacings[points.start + i], scratch);
-        cells.include(places[i], index.radii[points.start + i], &scratch.near);
+    surroundings.fill(index.plan, places[0], &scratch.surroundings, scratch.reach);
+    let mut cells = LeafBounds::new(places, about, surroundings).cells();
+    for i in points {
+        let surfel = surfel(index, i, spacings[i], scratch);
+        let cell = surroundings.cell(index.positions[i], surfel.normal, index.radii[i], &scratch.near);
+        cells.include(index.positions[i], surfel.normal, &cell);
+        surfels.push(surfel);
     }
     cells.close()
 }
@@ -172,7 +171,7 @@ fn widest_gap(near: &Neighbourhood, normal: [f32; 3]) -> u32 {
 
 /// Two unit vectors that complete `normal` to a right-handed frame (Duff et al., "Building an orthonormal
 /// basis, revisited", JCGT 6(1), 2017).
-fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
+pub(crate) fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     let sign = 1.0_f32.copysign(z);
     let a = -1.0 / (sign + z);
     let b = x * y * a;
@@ -214,7 +213,7 @@ pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
     NormalCone { axis, cosine }
 }
 
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+pub(crate) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

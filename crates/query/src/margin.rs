@@ -2,7 +2,7 @@
 //!
 //! Two points nearer than it always do: that is a fact, whatever their discs say. Otherwise their tangent discs
 //! decide, whose distance alternating projection finds (both are convex: Cheney & Goldstein, "Proximity maps for
-//! convex sets", Proc. AMS 10, 1959). For a witness the same is done on the implicit surfaces.
+//! convex sets", Proc. AMS 10, 1959). For a witness a point of either implicit surface walks towards the other.
 
 use std::ops::ControlFlow;
 
@@ -19,7 +19,7 @@ use crate::verdict::{Contact, Evidence};
 /// cosine between the planes, and what remains after so many is a fraction of the least margin of use.
 const DISC_ROUNDS: u32 = 16;
 
-/// The same between the surfaces; each costs some ten evaluations.
+/// Steps along the surfaces; each costs some ten evaluations.
 const SURFACE_ROUNDS: u32 = 4;
 
 /// A point of either disc, not further than `enough` from each other, if alternating projection finds such.
@@ -83,7 +83,7 @@ impl Surfaces<'_> {
     fn met(&mut self, places: [Vector3<f64>; 2], i: usize, j: usize) -> ControlFlow<()> {
         let contact = self.between(places, i, j);
         if self.detail == Detail::Witness
-            && let Some(contact) = self.approach(places, &contact)
+            && let Some(contact) = self.approach(places, &contact, i, j)
         {
             self.found = Some((contact, Evidence::Certified));
         } else {
@@ -105,25 +105,37 @@ impl Surfaces<'_> {
         }
     }
 
-    /// A verified point of either surface, nearer to each other than the margin.
-    fn approach(&mut self, [p, _]: [Vector3<f64>; 2], contact: &Contact) -> Option<Contact> {
-        let [va, vb] = self.pair.views;
-        let [scratch_a, scratch_b] = &mut *self.gathers;
+    /// A verified point of either surface, nearer to each other than the margin: both walk towards each other along
+    /// their surfaces, at most a local radius at a time.
+    fn approach(
+        &mut self,
+        [p, q]: [Vector3<f64>; 2],
+        contact: &Contact,
+        i: usize,
+        j: usize,
+    ) -> Option<Contact> {
+        let views = self.pair.views;
+        let radii = [self.pair.a.radii[i], self.pair.b.radii[j]];
         let mut evaluations = 0;
-        let mut land = |x: Vector3<f64>, on_a: bool| -> Projection {
-            let (view, scratch) = if on_a { (va, &mut *scratch_a) } else { (vb, &mut *scratch_b) };
-            let foot = project(x.into(), |y| view.evaluate_with(y, scratch));
+        let mut land = |side: usize, x: Vector3<f64>| {
+            let scratch = &mut self.gathers[side];
+            let foot = project(x.into(), |y| views[side].evaluate_with(y, scratch));
             evaluations += u64::from(foot.evaluations);
             foot
         };
-        let mut x = land(p, true);
+        let step = |side: usize, from: &Projection, to: &Projection| {
+            let [from, to, n] = [from.point, to.point, from.at.normal].map(Vector3::from);
+            let along = (to - from) - n * n.dot(&(to - from));
+            let most = f64::from(radii[side]) * views[side].placed().scale();
+            from + along * (most / along.norm()).min(1.0)
+        };
+        let (mut x, mut y) = (land(0, p), land(1, q));
         let mut found = None;
         for _ in 0..SURFACE_ROUNDS {
-            let y = land(x.point.into(), false);
-            let [u, v] = [x.point, y.point].map(Vector3::from);
             if !(x.converged && y.converged) {
                 break;
             }
+            let [u, v] = [x.point, y.point].map(Vector3::from);
             if (u - v).norm() <= self.margin {
                 found = Some(Contact {
                     point: (0.5 * (u + v)).into(),
@@ -133,7 +145,8 @@ impl Surfaces<'_> {
                 });
                 break;
             }
-            x = land(v, true);
+            x = land(0, step(0, &x, &y));
+            y = land(1, step(1, &y, &x));
         }
         self.pair.meter.spent.evaluations += evaluations;
         found

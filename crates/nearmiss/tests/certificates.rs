@@ -1,0 +1,82 @@
+//! Certified separations against exact distances, and what the proof of one consists of.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use nearmiss::hierarchy::Node;
+use nearmiss::{
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, PointCloud, Pose,
+    Proof, Scan, Verdict, collide_proving, collide_with,
+};
+use nearmiss_testdata::arbitrary;
+use nearmiss_testdata::pairs::{SetOptions, analytic_set};
+use nearmiss_testdata::shapes::{Sampling, scorer_radius, sphere};
+
+fn scan(points: &[[f64; 3]]) -> Scan {
+    Scan::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+#[test]
+fn no_certificate_is_false_and_nearly_all_clear_separations_have_one() {
+    let set = analytic_set(2, &SetOptions { noises: vec![0.0, 0.1], repeats: 2 });
+    let scans: Vec<Scan> = set.shapes.iter().map(|shape| scan(&shape.points)).collect();
+    let mut scratch = CollideScratch::default();
+    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let (mut clear, mut certified) = (0, 0);
+    for pair in &set.pairs {
+        let (a, b) = (&scans[pair.a], &scans[pair.b]);
+        let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
+        let mut ask = |options: CollideOptions| {
+            let plan = CollidePlan::new(&options, a, b).unwrap();
+            collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict
+        };
+        let estimated = ask(options);
+        let verdict = ask(options.with_evidence(Evidence::Certified));
+        assert_eq!(verdict.is_separated(), estimated.is_separated(), "evidence never changes the verdict");
+        assert_eq!(verdict.is_intersecting(), estimated.is_intersecting());
+        if pair.gap >= 6.0 * pair.r {
+            clear += 1;
+        }
+        if let Verdict::Separated { gap, evidence: Evidence::Certified } = verdict {
+            assert!(pair.gap > -0.3 * pair.r, "{}: certified {gap} for {}", pair.family, pair.gap);
+            assert!(gap > 0.0 && gap < pair.gap + 0.3 * pair.r, "{}: {gap} for {}", pair.family, pair.gap);
+            certified += u32::from(pair.gap >= 6.0 * pair.r);
+        }
+    }
+    assert!(clear > 100 && f64::from(certified) >= 0.95 * f64::from(clear), "{certified} of {clear}");
+}
+
+#[test]
+fn a_proof_covers_all_pairs_of_points() {
+    let shape = sphere(1.0).sample(Sampling::clean(0.08));
+    let scan = scan(&shape.points);
+    let r = scorer_radius(&shape.points);
+    let plan = CollidePlan::new(&CollideOptions::default().with_evidence(Evidence::Certified), &scan, &scan)
+        .unwrap();
+    let mut rng = arbitrary::rng(3);
+    let mut scratch = CollideScratch::default();
+    let mut proof = Proof::default();
+    let (mut proven, mut most) = (0, 0);
+    for round in 0..60 {
+        let away = arbitrary::unit_vector(&mut rng).map(|c| c * (2.0 + r * f64::from(round % 12)));
+        let pose = arbitrary::rotation(&mut rng).with_translation(away);
+        let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&pose));
+        let answer = collide_proving(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch, &mut proof);
+        let Verdict::Separated { gap, evidence: Evidence::Certified } = answer.verdict else {
+            assert!(proof.pairs.is_empty(), "nothing is proven of {:?}", answer.verdict);
+            continue;
+        };
+        proven += 1;
+        most = most.max(proof.pairs.len());
+        assert!(proof.pairs.iter().all(|(_, distance)| *distance >= gap), "{gap} is the least of all");
+        let mut covered = vec![0_u8; scan.len() * scan.len()];
+        for (pair, _) in &proof.pairs {
+            let points = |id: usize| -> std::ops::Range<usize> { Node::points(&scan.nodes()[id]) };
+            for i in points(pair.a.index()) {
+                for j in points(pair.b.index()) {
+                    covered[i * scan.len() + j] += 1;
+                }
+            }
+        }
+        assert!(covered.iter().all(|&times| times == 1), "every pair of points is excluded, once");
+    }
+    assert!(proven > 20 && most > 20, "{proven} proofs of up to {most} pairs");
+}
