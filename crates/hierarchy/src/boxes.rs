@@ -24,10 +24,15 @@ pub struct OrientedBox {
     pub reach: f32,
 }
 
-/// What rounding can do to a coordinate of a box or a point in motion, relative to the largest number involved:
-/// a sum of four products rounds seven times by 2⁻²⁴, twice over where a rounded centre is turned again, and
-/// axes are unit to 2⁻²³ each; together below 16 · 2⁻²⁴.
-const ROUNDING: f32 = 1e-6;
+/// What rounding can do to an interval of a box, relative to the greatest coordinate along its axes. In units of
+/// 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 7 for axes that are orthonormal to rounding
+/// only, √3 between coordinates and lengths; together below 30.
+const ROUNDING: f32 = 2e-6;
+
+/// The same for a gap between boxes in motion, relative to the sum of all lengths involved: 12 for the centre of
+/// the box that is moved, 4 for the distance of the centres along an axis, 18 for the half lengths, each less than
+/// 8 off in its cosine; together below 40.
+const SLACK: f32 = 4e-6;
 
 impl OrientedBox {
     /// The least box along `axes` that contains all `intervals`, given per axis; grown by what rounding may
@@ -93,7 +98,7 @@ impl Relative {
             rotation,
             translation: pose.translation().map(|x| x as f32),
             scale,
-            slack: ROUNDING * reach as f32,
+            slack: SLACK * reach as f32,
         }
     }
 

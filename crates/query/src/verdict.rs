@@ -74,8 +74,8 @@ pub struct Contact {
     /// Unit normals of both surfaces there, of arbitrary sign; none where points are compared, not surfaces.
     pub normals: Option<[[f64; 3]; 2]>,
     /// How far off the place may be, in world units. Certified: the greater |f| of the two surfaces there.
-    /// Estimated: the greater distance of either point from the other's tangent plane. Balls: half the distance
-    /// of the points.
+    /// Estimated: the greater distance of either point from the other's tangent plane. Balls, and
+    /// surfaces nearer than a margin: half the distance of the two points.
     pub residual: f64,
     /// The points whose discs (or balls) meet there, as the caller numbered them.
     pub sources: [PointId; 2],
