@@ -3,9 +3,11 @@
 //! * `demo` — the main job on a real scan, with a table and a picture.
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
+//! * `check-proof` — whether what `collide --prove` wrote holds.
 //! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
+mod check_proof;
 mod checks;
 mod demo;
 mod repository;
@@ -20,6 +22,8 @@ of the repository
   demo           prepare a real scan, sweep two copies past each other; a table and a picture
   test [CHECK…]  every check, or: tidy, format, tests, lints, docs, features, packages, determinism
   tidy, ci       the first of them; all of them
+  check-proof PROOF A B [--poses F]
+                 whether what `collide A B --prove PROOF` wrote holds, by means of its own
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
   preprocess, inspect, eval, collide, poses, export";
@@ -39,6 +43,7 @@ fn main() -> ExitCode {
         ["demo"] => demo::run(),
         ["tidy"] => checks::run(&["tidy"]),
         ["ci"] => checks::run(&[]),
+        ["check-proof", ..] => check_proof::run(std::env::args_os().skip(1)),
         ["test", names @ ..] => checks::run(names),
         _ => return nearmiss_cli::run(std::env::args_os()),
     };

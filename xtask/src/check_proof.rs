@@ -1,0 +1,233 @@
+//! `cargo xtask check-proof`: whether what certified answers rest on holds, without the code that found them.
+//!
+//! * Apart: the pairs of nodes cover all pairs of points, and their enclosures are apart, in interval arithmetic.
+//! * Intersecting: the witness is a zero of both functions, summed over all points in double precision.
+//! * Of each scan: a million points of its surface lie in the enclosures of the nodes of their nearest points. That is
+//!   a trial, not a proof; the proof is docs/theory/certificates.md.
+
+mod boxes;
+mod claim;
+mod cover;
+mod interval;
+mod neighbour;
+mod placement;
+mod proof;
+mod sample;
+mod subject;
+mod surface;
+mod witness;
+
+#[cfg(test)]
+mod trial;
+
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
+
+use nearmiss_cli::clap::{self, Parser};
+use rayon::prelude::*;
+
+use crate::repository::Outcome;
+use claim::{Checker, Finding, Kind};
+use proof::{Line, Lines, Poses};
+use subject::Subject;
+use surface::Sampled;
+
+/// Lines that are read before they are checked, on all threads.
+const BATCH: usize = 256;
+
+/// Faults that are named.
+const NAMED: usize = 10;
+
+/// Check what `nearmiss collide A B --prove PROOF` wrote; exit status 0 only if everything holds
+#[derive(Debug, Parser)]
+#[command(bin_name = "cargo xtask check-proof")]
+struct Args {
+    /// The file that `--prove` named
+    proof: PathBuf,
+    /// The one scan: prepared, or a raw input, prepared on the fly
+    a: PathBuf,
+    /// The other scan
+    b: PathBuf,
+    /// The file of poses that was asked about, to see that the proof is about these
+    #[arg(long, value_name = "FILE.jsonl")]
+    poses: Option<PathBuf>,
+    /// Points of each surface to look for in the enclosures
+    #[arg(long, default_value_t = 1_000_000)]
+    points: u64,
+    /// Of the random places from which they are looked for
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// 0 for all cores
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+}
+
+/// Checks as `args` say, the command's own name first.
+pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> Outcome {
+    let args = Args::parse_from(args);
+    rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global()?;
+    let faults = check(&args)?;
+    if faults == 0 {
+        println!("everything holds");
+        return Ok(());
+    }
+    Err(format!("{faults} violations").into())
+}
+
+/// Prints what was found; returns how many faults there are.
+fn check(args: &Args) -> Outcome<usize> {
+    let a = Subject::open(&args.a)?;
+    let other = if args.a == args.b { None } else { Some(Subject::open(&args.b)?) };
+    let b = other.as_ref().unwrap_or(&a);
+    let poses = args.poses.as_deref().map(proof::read_poses).transpose()?;
+    let checker = Checker { subjects: [&a, b], poses: poses.as_ref() };
+    let mut faults = Faults::default();
+    Tally::of(&args.proof, &checker, &mut faults)?.print(poses.as_ref());
+    let scans = [(&args.a, Some(&a)), (&args.b, other.as_ref())];
+    for (path, subject) in scans {
+        if let Some(subject) = subject.filter(|_| args.points > 0) {
+            let sampled = sample(path, subject, args);
+            print_sampled(path, &sampled);
+            faults.extend(&path.display().to_string(), sampled.faults);
+        }
+    }
+    Ok(faults.count)
+}
+
+/// What does not hold: all counted, some named.
+#[derive(Debug, Default)]
+struct Faults {
+    count: usize,
+}
+
+impl Faults {
+    fn extend(&mut self, place: &str, faults: Vec<String>) {
+        for fault in faults {
+            if self.count < NAMED {
+                println!("VIOLATION {place}: {fault}");
+            }
+            self.count += 1;
+        }
+    }
+}
+
+/// What was found of all lines.
+#[derive(Debug, Default)]
+struct Tally {
+    lines: usize,
+    separated: usize,
+    intersecting: usize,
+    pairs: usize,
+    claimed: f64,
+    off: f64,
+    on_the_brink: usize,
+    mended: f64,
+    queries: BTreeSet<u64>,
+}
+
+impl Tally {
+    /// Checks the lines of the file at `path`.
+    fn of(path: &Path, checker: &Checker<'_>, faults: &mut Faults) -> Outcome<Self> {
+        let mut lines = Lines::open(path)?;
+        let mut tally = Self::default();
+        loop {
+            let batch = lines.batch(BATCH)?;
+            if batch.is_empty() {
+                break;
+            }
+            let check =
+                |(_, text): &(u64, String)| Line::parse(text).map(|line| (line.query, checker.check(&line)));
+            let found: Vec<Result<(u64, Finding), String>> = batch.par_iter().map(check).collect();
+            for ((number, _), found) in batch.iter().zip(found) {
+                let place = format!("line {number}");
+                tally.lines += 1;
+                match found {
+                    Ok((query, finding)) => faults.extend(&place, tally.count(query, finding)),
+                    Err(what) => faults.extend(&place, vec![what]),
+                }
+            }
+        }
+        if tally.lines == 0 {
+            return Err(format!("{}: no lines", path.display()).into());
+        }
+        Ok(tally)
+    }
+
+    /// Counts a line about this query; returns its faults.
+    fn count(&mut self, query: u64, finding: Finding) -> Vec<String> {
+        let mut faults = finding.faults;
+        if !self.queries.insert(query) {
+            faults.push(format!("query {query} is answered twice"));
+        }
+        self.separated += usize::from(finding.kind == Kind::Separated);
+        self.intersecting += usize::from(finding.kind == Kind::Intersecting);
+        self.pairs += finding.pairs;
+        self.claimed = self.claimed.max(finding.claimed);
+        self.off = self.off.max(finding.off);
+        self.on_the_brink += usize::from(finding.on_the_brink);
+        self.mended = self.mended.max(finding.mended);
+        faults
+    }
+
+    fn print(&self, poses: Option<&Poses>) {
+        let Self { lines, separated, intersecting, pairs, claimed, off, on_the_brink, mended, .. } = self;
+        let unproven = lines - separated - intersecting;
+        println!("{lines} answers, {unproven} of them not certified");
+        println!(
+            "{separated} certified apart, by {pairs} pairs of enclosures; a gap claims at most {:.4} % of what is proven",
+            100.0 * claimed
+        );
+        println!(
+            "{intersecting} certified to intersect; a witness is at most {off:.1e} bandwidths off; {on_the_brink} \
+             within rounding of a condition"
+        );
+        if let Some(poses) = poses {
+            let unanswered = poses.keys().filter(|query| !self.queries.contains(query)).count();
+            println!(
+                "{} poses, {unanswered} without an answer; of certified ones mended by at most {mended:.1e} sampling radii",
+                poses.len()
+            );
+        }
+    }
+}
+
+fn print_sampled(path: &Path, sampled: &Sampled) {
+    let Sampled { starts, points, fill, far, .. } = sampled;
+    println!(
+        "{}: {points} surface points from {starts} starts, at most {:.2} % out to a face of an enclosure and {far:.3} \
+         local radii from the nearest point",
+        path.display(),
+        100.0 * fill
+    );
+}
+
+/// Looks at points of a surface, with progress on a terminal.
+fn sample(path: &Path, subject: &Subject, args: &Args) -> Sampled {
+    let (done, ended) = (AtomicU64::new(0), AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        let watcher = scope.spawn(|| watch(path, args.points, &done, &ended));
+        let sampled = surface::check(subject, args.points, args.seed, &done);
+        ended.store(true, Ordering::Relaxed);
+        watcher.thread().unpark();
+        sampled
+    })
+}
+
+/// Shows how far it is, until it has ended; on a terminal only.
+fn watch(path: &Path, points: u64, done: &AtomicU64, ended: &AtomicBool) {
+    let mut out = std::io::stderr();
+    let shown = out.is_terminal();
+    while shown && !ended.load(Ordering::Relaxed) {
+        // Failing to show progress is nobody's concern.
+        let _ =
+            write!(out, "\r{}: {} of {points} surface points", path.display(), done.load(Ordering::Relaxed));
+        std::thread::park_timeout(Duration::from_millis(200));
+    }
+    if shown {
+        let _ = write!(out, "\r\x1b[K");
+    }
+}

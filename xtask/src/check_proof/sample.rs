@@ -1,0 +1,41 @@
+//! Random numbers from a seed, the same everywhere: Steele, Lea & Flood's SplitMix64.
+
+/// A source of random numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct Source(u64);
+
+impl Source {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// Sixty-four random bits.
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// An integer below `n`, which is not zero; uneven by n/2^64.
+    pub(crate) fn below(&mut self, n: u64) -> u64 {
+        self.next() % n
+    }
+
+    /// Between −1 and 1.
+    #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
+    pub(crate) fn signed(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// A point of the unit ball, evenly.
+    pub(crate) fn in_ball(&mut self) -> [f64; 3] {
+        loop {
+            let p = [self.signed(), self.signed(), self.signed()];
+            if p.iter().map(|x| x * x).sum::<f64>() <= 1.0 {
+                return p;
+            }
+        }
+    }
+}

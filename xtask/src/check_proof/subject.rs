@@ -1,0 +1,155 @@
+//! A scan that a proof is about, with what the checks look up in it.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use nearmiss::hierarchy::Node;
+use nearmiss::{Bandwidth, BuildOptions, Check, Kernel, Scan};
+use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
+
+use super::proof::Enclosure;
+use crate::repository::Outcome;
+
+/// First bytes of a prepared scan.
+const MAGIC: &[u8] = b"\x8Enmiss";
+
+/// A prepared scan.
+pub(crate) struct Subject {
+    pub(crate) scan: Scan,
+    pub(crate) twin: SurfaceTwin,
+    /// Of a point, per unit of the twin's radii.
+    pub(crate) horizon: f64,
+    /// Ids of the nodes by their points.
+    ids: BTreeMap<(u32, u32), usize>,
+    /// Of the stored positions.
+    pub(crate) bounds: [[f32; 3]; 2],
+}
+
+impl Subject {
+    /// Opens a prepared scan, or prepares a raw input with default options.
+    pub(crate) fn open(path: &Path) -> Outcome<Self> {
+        let mut head = [0; MAGIC.len()];
+        let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("nm"));
+        let is_prepared =
+            named || File::open(path).and_then(|mut f| f.read_exact(&mut head)).is_ok() && head == MAGIC;
+        let scan = if is_prepared {
+            Scan::open(path, Check::Full).map_err(|e| format!("{}: {e}", path.display()))?
+        } else {
+            Scan::build(&nearmiss::io::read(path, None)?.cloud, &BuildOptions::default())?
+        };
+        Self::new(scan).map_err(|e| format!("{}: {e}", path.display()).into())
+    }
+
+    /// # Errors
+    /// When its nodes are no tree over its points, or its surface has no naive twin.
+    pub(crate) fn new(scan: Scan) -> Result<Self, String> {
+        check_tree(scan.nodes(), scan.len())?;
+        if scan.enclosures().len() != scan.nodes().len() {
+            return Err("not as many enclosures as nodes".into());
+        }
+        let ids = scan.nodes().iter().enumerate().map(|(id, n)| ((n.first, n.count), id)).collect();
+        let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+        for p in scan.positions() {
+            for k in 0..3 {
+                bounds[0][k] = bounds[0][k].min(p[k]);
+                bounds[1][k] = bounds[1][k].max(p[k]);
+            }
+        }
+        let (twin, horizon) = twin(&scan)?;
+        Ok(Self { scan, twin, horizon, ids, bounds })
+    }
+
+    /// # Errors
+    /// When no node has these points, or its enclosure differs in a bit.
+    pub(crate) fn check_node(&self, claimed: &Enclosure) -> Result<(), String> {
+        let Enclosure { first, count, .. } = *claimed;
+        let Some(&id) = self.ids.get(&(first, count)) else {
+            return Err(format!("no node has the points {first} to {first} + {count}"));
+        };
+        let stored = &self.scan.enclosures()[id];
+        let bits = |[a, b, c]: [f32; 3]| [a.to_bits(), b.to_bits(), c.to_bits()];
+        let same = bits(stored.centre) == bits(claimed.centre)
+            && bits(stored.half) == bits(claimed.half)
+            && stored.axes.map(bits) == claimed.axes.map(bits);
+        if same {
+            Ok(())
+        } else {
+            Err(format!("node {id} ({first} to {first} + {count}) has another enclosure"))
+        }
+    }
+}
+
+/// Whether every node has the points of its two children, the root all of them: then the nodes that have a point are
+/// its leaf and that leaf's ancestors.
+fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
+    let range =
+        |id: usize| nodes.get(id).map(|n| (u64::from(n.first), u64::from(n.first) + u64::from(n.count)));
+    if range(0) != Some((0, points as u64)) {
+        return Err("the root has not all points".into());
+    }
+    let mut parents = vec![0_u32; nodes.len()];
+    for (id, node) in nodes.iter().enumerate() {
+        let Some((right, own)) = (node.right != 0).then_some(node.right as usize).zip(range(id)) else {
+            continue;
+        };
+        let children = (range(id + 1), range(right));
+        let (Some(left), Some(other)) = children else {
+            return Err(format!("node {id} has no children there"));
+        };
+        if left.0 != own.0 || left.1 != other.0 || other.1 != own.1 || left.0 == left.1 || other.0 == other.1
+        {
+            return Err(format!("node {id} has not the points of its children"));
+        }
+        parents[id + 1] += 1;
+        parents[right] += 1;
+    }
+    if parents.iter().skip(1).any(|n| *n != 1) { Err("a node has not one parent".into()) } else { Ok(()) }
+}
+
+/// The scan's surface, by summing over all of it, in the frame of the stored positions; and the horizon per radius.
+fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
+    let options = scan.plan().options();
+    let kernel = match options.kernel {
+        Kernel::Gaussian => oracle::Kernel::Gaussian { theta: options.threshold },
+        Kernel::Wendland => oracle::Kernel::Wendland,
+        other => return Err(format!("there is no naive twin of the kernel {other:?}")),
+    };
+    let unit = scan.frame().scale;
+    let (reach, radii) = match options.bandwidth {
+        Bandwidth::Local => (options.horizon, scan.radii().iter().map(|r| f64::from(*r)).collect()),
+        Bandwidth::Global => (options.horizon, vec![scan.sampling_radius() / unit; scan.len()]),
+        // The horizon for which the bandwidth is as given.
+        Bandwidth::Fixed(h) => (1.0 / kernel.bandwidth(1.0), vec![h / unit; scan.len()]),
+        other => return Err(format!("there is no naive twin of the bandwidth {other:?}")),
+    };
+    let points: Vec<[f64; 3]> = scan.positions().iter().map(|p| p.map(f64::from)).collect();
+    let least_support = options.support_min as usize;
+    let parameters = Parameters { reach, kernel, bandwidth: oracle::Bandwidth::Local, least_support };
+    Ok((SurfaceTwin::with_radii(&points, &radii, parameters), reach))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_that_are_no_tree_are_refused() {
+        let node = |first, count, right| Node { first, count, right };
+        let tree = [node(0, 10, 4), node(0, 6, 3), node(0, 3, 0), node(3, 3, 0), node(6, 4, 0)];
+        assert_eq!(check_tree(&tree, 10), Ok(()));
+        assert!(check_tree(&tree, 11).is_err(), "a point without a node");
+        for (id, wrong) in [
+            (1, node(0, 5, 3)),
+            (4, node(5, 5, 0)),
+            (1, node(0, 6, 2)),
+            (0, node(0, 10, 9)),
+            (2, node(0, 0, 0)),
+        ] {
+            let mut nodes = tree;
+            nodes[id] = wrong;
+            assert!(check_tree(&nodes, 10).is_err(), "{wrong:?} for node {id}");
+        }
+    }
+}

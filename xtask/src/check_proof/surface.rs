@@ -1,0 +1,190 @@
+//! Whether the surface lies in the enclosures: points of the surface, projected from random places, each in the
+//! enclosures of all nodes that have its nearest cloud point.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use nearmiss::hierarchy::GatherScratch;
+use nearmiss::surface::project;
+use rayon::prelude::*;
+
+use super::neighbour::Neighbours;
+use super::sample::Source;
+use super::subject::Subject;
+
+/// Points of the surface that are looked for with one source of random numbers.
+const CHUNK: u64 = 4096;
+
+/// Starts for each point wanted, at most: some scans are mostly ambiguous.
+const TRIES: u64 = 8;
+
+/// Starts lie so far from a cloud point, in local radii; one in [`FAR_SHARE`] further.
+const REACH: f64 = 1.0;
+const FAR_REACH: f64 = 2.5;
+const FAR_SHARE: u64 = 5;
+
+/// What was found of points of a surface.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sampled {
+    pub(crate) starts: u64,
+    pub(crate) points: u64,
+    /// The greatest |t_k|/half_k of a point in an enclosure; above 1 it is outside.
+    pub(crate) fill: f64,
+    /// The greatest distance of a point from its nearest cloud point, in the latter's local radii.
+    pub(crate) far: f64,
+    pub(crate) faults: Vec<String>,
+}
+
+/// A box, ready for points.
+struct Inverse {
+    centre: [f64; 3],
+    half: [f64; 3],
+    /// Rows of the inverse of the matrix whose columns are the axes.
+    rows: [[f64; 3]; 3],
+}
+
+impl Inverse {
+    fn new(centre: [f32; 3], half: [f32; 3], axes: [[f32; 3]; 3]) -> Self {
+        let [x, y, z] = axes.map(|v| v.map(f64::from));
+        let volume = dot(x, cross(y, z));
+        let rows = [cross(y, z), cross(z, x), cross(x, y)].map(|v| v.map(|c| c / volume));
+        Self { centre: centre.map(f64::from), half: half.map(f64::from), rows }
+    }
+
+    /// How much of the box it takes to hold `x`: above 1 if it is outside.
+    fn fill(&self, x: [f64; 3]) -> f64 {
+        let d = [0, 1, 2].map(|k| x[k] - self.centre[k]);
+        let part = |k: usize| {
+            let t = dot(self.rows[k], d).abs();
+            if t == 0.0 { 0.0 } else { t / self.half[k] }
+        };
+        part(0).max(part(1)).max(part(2))
+    }
+}
+
+/// The tree of a scan, looked at from its leaves.
+struct Tree<'a> {
+    subject: &'a Subject,
+    neighbours: Neighbours<'a>,
+    boxes: Vec<Inverse>,
+    /// Of each node; the root's own.
+    parents: Vec<usize>,
+    /// Of each point.
+    leaves: Vec<usize>,
+}
+
+impl<'a> Tree<'a> {
+    fn new(subject: &'a Subject) -> Self {
+        let scan = &subject.scan;
+        let boxes = scan.enclosures().iter().map(|b| Inverse::new(b.centre, b.half, b.axes)).collect();
+        let mut parents = vec![0; scan.nodes().len()];
+        let mut leaves = vec![0; scan.len()];
+        for (id, node) in scan.nodes().iter().enumerate() {
+            let first = node.first as usize;
+            if node.right == 0 {
+                leaves[first..first + node.count as usize].fill(id);
+            } else {
+                parents[id + 1] = id;
+                parents[node.right as usize] = id;
+            }
+        }
+        Self { subject, neighbours: Neighbours::new(scan.positions()), boxes, parents, leaves }
+    }
+
+    /// Counts the surface point `x` (stored frame).
+    fn check(&self, x: [f64; 3], sampled: &mut Sampled) {
+        let nearest = self.neighbours.nearest(x);
+        let point = nearest.index as usize;
+        let radius = f64::from(self.subject.scan.radii()[point]);
+        sampled.points += 1;
+        sampled.far = sampled.far.max(nearest.distance_sq.sqrt() / radius);
+        let mut id = self.leaves[point];
+        loop {
+            let fill = self.boxes[id].fill(x);
+            sampled.fill = sampled.fill.max(fill);
+            // Written so that no number is a fault.
+            if !(fill <= 1.0) {
+                sampled.faults.push(format!(
+                    "the surface point {x:?} (stored frame), nearest to point {point}, is outside the enclosure of \
+                     node {id}: {fill} of its half extent"
+                ));
+            }
+            if id == 0 {
+                return;
+            }
+            id = self.parents[id];
+        }
+    }
+
+    fn chunk(&self, wanted: u64, mut source: Source) -> Sampled {
+        let scan = &self.subject.scan;
+        let mut scratch = GatherScratch::default();
+        let mut sampled = Sampled::default();
+        while sampled.points < wanted && sampled.starts < TRIES * wanted {
+            let i = usize::try_from(source.below(scan.len() as u64)).unwrap_or_default();
+            let reach = if source.below(FAR_SHARE) == 0 { FAR_REACH } else { REACH };
+            let radius = f64::from(scan.radii()[i]) * reach;
+            let away = source.in_ball();
+            let start = [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + radius * away[k]);
+            let end = project(start, |x| scan.evaluate_with(x, &mut scratch));
+            sampled.starts += 1;
+            if end.converged {
+                self.check(end.point, &mut sampled);
+            }
+        }
+        sampled
+    }
+}
+
+/// Looks at so many points of the surface; the same for any number of threads. Counts in `done` as it goes.
+pub(crate) fn check(subject: &Subject, points: u64, seed: u64, done: &AtomicU64) -> Sampled {
+    let tree = Tree::new(subject);
+    let chunks: Vec<Sampled> = (0..points.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|i| {
+            let wanted = CHUNK.min(points - i * CHUNK);
+            // Each chunk's seed is a random number from the seed.
+            let sampled = tree.chunk(wanted, Source::new(Source::new(seed ^ (i << 32)).next()));
+            done.fetch_add(wanted, Ordering::Relaxed);
+            sampled
+        })
+        .collect();
+    let mut all = Sampled::default();
+    for chunk in chunks {
+        all.starts += chunk.starts;
+        all.points += chunk.points;
+        all.fill = all.fill.max(chunk.fill);
+        all.far = all.far.max(chunk.far);
+        all.faults.extend(chunk.faults);
+    }
+    all
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fill_is_measured_along_the_axes_whatever_they_are() {
+        // A skewed box: its second axis leans.
+        let skewed = Inverse::new(
+            [1.0, 0.0, 0.0],
+            [2.0, 1.0, 0.5],
+            [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        );
+        let at = |t: [f64; 3]| [1.0 + t[0] + t[1], t[1], t[2]];
+        for (t, fill) in [([2.0, 1.0, 0.5], 1.0), ([1.0, -0.25, 0.0], 0.5), ([0.0, 0.0, -0.75], 1.5)] {
+            assert!((skewed.fill(at(t)) - fill).abs() < 1e-15, "{t:?}");
+        }
+        let flat =
+            Inverse::new([0.0; 3], [1.0, 1.0, 0.0], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        assert!(flat.fill([0.5, 0.0, 0.0]) <= 1.0 && flat.fill([0.0, 0.0, 1e-300]) > 1.0, "no thickness");
+    }
+}
