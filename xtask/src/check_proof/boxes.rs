@@ -1,7 +1,7 @@
 //! Whether two placed boxes are apart, proven.
 //!
 //! A direction is looked for in floating point, any one will do; that it parts the boxes is then shown in intervals.
-//! A box is exactly the set of centre + Σ t_k axes_k with |t_k| ≤ half_k, whatever the axes.
+//! A box is exactly the set of `centre + Σ t_k axes_k` with `|t_k| ≤ half_k`, whatever the axes.
 
 use super::interval::{Interval, dot};
 use super::proof::{Enclosure, Matrix};

@@ -87,8 +87,7 @@ impl Checker<'_> {
                 let radius = scan.sampling_radius() / scan.frame().scale * placement.scale;
                 let moved = placement.moved(&poses[i], scan.frame(), *bounds) / radius;
                 finding.mended = finding.mended.max(moved);
-                // Written so that no number is refused.
-                if !(moved <= MENDED) {
+                if moved.is_nan() || moved > MENDED {
                     return Err(format!("{name} is {moved:.2e} sampling radii away from the pose asked for"));
                 }
             }

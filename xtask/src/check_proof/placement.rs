@@ -27,8 +27,7 @@ impl Placement {
         let square = (product(0, 0) + product(1, 1) + product(2, 2)) / 3.0;
         let off = |(i, j): (usize, usize)| (product(i, j) - if i == j { square } else { 0.0 }).abs();
         let worst = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(off).into_iter().fold(0.0, f64::max);
-        // Written so that no number is refused.
-        if !(square > 0.0 && worst <= ROUNDING * square) {
+        if !square.is_normal() || worst > ROUNDING * square {
             return Err(format!("no turn with one scale: off by {:.1e}", worst / square));
         }
         let [x, y, z] = [column(0), column(1), column(2)];
@@ -51,13 +50,17 @@ impl Placement {
     /// caller's positions.
     pub(crate) fn moved(&self, pose: &Matrix, frame: &Frame, bounds: [[f32; 3]; 2]) -> f64 {
         let mut most = 0.0_f64;
+        let mut sum = 0.0;
         for corner in 0..8_usize {
             let stored = [0, 1, 2].map(|k| f64::from(bounds[(corner >> k) & 1][k]));
             let given = [0, 1, 2].map(|k| frame.origin[k] + frame.scale * stored[k]);
             let [x, y] = [apply(&self.matrix, stored), apply(pose, given)];
-            most = most.max((0..3).map(|k| (x[k] - y[k]).powi(2)).sum::<f64>().sqrt());
+            let moved = (0..3).map(|k| (x[k] - y[k]).powi(2)).sum::<f64>().sqrt();
+            sum += moved;
+            most = most.max(moved);
         }
-        most
+        // Unlike a maximum, a sum does not swallow what is no number.
+        if sum.is_nan() { sum } else { most }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Random numbers from a seed, the same everywhere: Steele, Lea & Flood's SplitMix64.
+//! Random numbers from a seed, the same everywhere: `SplitMix64` (Steele, Lea & Flood 2014).
 
 /// A source of random numbers.
 #[derive(Debug, Clone)]

@@ -27,7 +27,7 @@ const FAR_SHARE: u64 = 5;
 pub(crate) struct Sampled {
     pub(crate) starts: u64,
     pub(crate) points: u64,
-    /// The greatest |t_k|/half_k of a point in an enclosure; above 1 it is outside.
+    /// The greatest `|t_k|/half_k` of a point in an enclosure; above 1 it is outside.
     pub(crate) fill: f64,
     /// The greatest distance of a point from its nearest cloud point, in the latter's local radii.
     pub(crate) far: f64,
@@ -57,7 +57,9 @@ impl Inverse {
             let t = dot(self.rows[k], d).abs();
             if t == 0.0 { 0.0 } else { t / self.half[k] }
         };
-        part(0).max(part(1)).max(part(2))
+        // Unlike a maximum, a sum does not swallow what is no number.
+        let all = [part(0), part(1), part(2)];
+        if all.iter().sum::<f64>().is_nan() { f64::NAN } else { all.into_iter().fold(0.0, f64::max) }
     }
 }
 
@@ -101,8 +103,7 @@ impl<'a> Tree<'a> {
         loop {
             let fill = self.boxes[id].fill(x);
             sampled.fill = sampled.fill.max(fill);
-            // Written so that no number is a fault.
-            if !(fill <= 1.0) {
+            if fill.is_nan() || fill > 1.0 {
                 sampled.faults.push(format!(
                     "the surface point {x:?} (stored frame), nearest to point {point}, is outside the enclosure of \
                      node {id}: {fill} of its half extent"

@@ -30,8 +30,7 @@ pub(crate) fn check(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Re
     let x = placement.stored(x);
     let Some(at) = subject.twin.evaluate(x) else { return Err("no point reaches the witness".into()) };
     let off = at.value.abs() / at.bandwidth;
-    // Written so that no number is refused.
-    if !(off <= ON_SURFACE) {
+    if off.is_nan() || off > ON_SURFACE {
         return Err(format!("the witness is {off:.2e} bandwidths off the surface"));
     }
     let on_the_brink = at.status != Status::Ok;
