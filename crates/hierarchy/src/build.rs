@@ -361,12 +361,16 @@ fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<(Ve
 
 fn quantile(radii: &[f32]) -> f32 {
     let mut sorted = radii.to_vec();
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "an index below 2^32"
-    )]
-    let rank = ((sorted.len() - 1) as f64 * SAMPLING_QUANTILE).round() as usize;
-    *sorted.select_nth_unstable_by(rank, f32::total_cmp).1
+    *sorted.select_nth_unstable_by(sampling_rank(radii.len()), f32::total_cmp).1
+}
+
+/// Which of `count` ascending radii, from 0, is the sampling radius.
+#[expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "an index below 2^32"
+)]
+pub(crate) fn sampling_rank(count: usize) -> usize {
+    ((count - 1) as f64 * SAMPLING_QUANTILE).round() as usize
 }

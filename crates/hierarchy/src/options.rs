@@ -3,6 +3,9 @@
 use nearmiss_surface::{SurfaceError, SurfaceOptions};
 use thiserror::Error;
 
+/// K of the local radii: fewer span no plane, more say nothing of the spacing.
+pub(crate) const RADIUS_NEIGHBOURS: std::ops::RangeInclusive<u32> = 3..=32;
+
 /// How a hierarchy is built. Plain numbers, checked by the build.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -53,7 +56,7 @@ impl BuildOptions {
         if !(4..=64).contains(&self.leaf_size) {
             return Err(BuildError::LeafSize(self.leaf_size));
         }
-        if !(3..=32).contains(&self.radius_neighbours) {
+        if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
             return Err(BuildError::RadiusNeighbours(self.radius_neighbours));
         }
         Ok(())

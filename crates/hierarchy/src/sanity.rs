@@ -1,14 +1,23 @@
-//! What must hold of a hierarchy: the part that queries rely on for safety is checked whenever one is loaded,
-//! all of it by [`PointHierarchy::sanity_check`].
+//! What must hold of a hierarchy. What queries rely on for safety and for a bounded cost is checked whenever one is
+//! loaded, what their answers rely on too when the whole file is compared with its checksums
+//! ([`Check`](nearmiss_store::Check)), and all of it by [`PointHierarchy::sanity_check`].
+
+#[cfg(test)]
+mod lies;
+mod metadata;
+mod nodes;
+mod points;
 
 use thiserror::Error;
 
 use nearmiss_geometry::nalgebra::Vector3;
 
-use crate::boxes::dot;
 use crate::build::PointHierarchy;
 use crate::gather::TREE_STACK;
 use crate::topology::Node;
+
+/// No stored length exceeds this, so that no square of one overflows. Frames keep coordinates below 2³⁴.
+const FARTHEST: f32 = (1_u64 << 40) as f32;
 
 /// What is wrong with a hierarchy.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -30,13 +39,19 @@ pub enum Flaw {
         /// Its id.
         node: usize,
     },
-    /// A number contradicts what it says about others.
-    #[error("{what} of entry {index} is wrong")]
+    /// A number is none that a build writes, or contradicts what it says about others.
+    #[error("{what} {index} is wrong; prepare the scan again")]
     Value {
-        /// Which number.
+        /// Which number, and of what.
         what: &'static str,
         /// Whose.
         index: usize,
+    },
+    /// A number about the whole scan is none that a build writes, or contradicts the arrays.
+    #[error("{what} is wrong; prepare the scan again")]
+    Metadata {
+        /// Which number.
+        what: &'static str,
     },
 }
 
@@ -83,40 +98,48 @@ pub(crate) fn check_topology(nodes: &[Node], points: usize, leaf_size: u32) -> R
 }
 
 impl PointHierarchy {
-    /// Checks every invariant, those included that only the quality of answers rests on. O(n log n); for tests.
+    /// What queries need to stay within their arrays: lengths, tree, metadata, and numbers of boxes in their ranges.
+    /// One pass over the nodes; the points are not read.
+    pub(crate) fn check_structure(&self) -> Result<(), Flaw> {
+        self.check_lengths()?;
+        check_topology(&self.nodes, self.len(), self.leaf_size)?;
+        self.check_metadata()?;
+        nodes::check_ranges(&self.boxes)
+    }
+
+    /// What their answers need besides, given the structure: each box lies within its parent's, and every number of
+    /// every point is one that a build writes, and lies within what its leaf says. One pass over the whole.
+    pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
+        nodes::check(&self.nodes, &self.boxes)?;
+        points::check(self)?;
+        self.check_summary()
+    }
+
+    /// Checks every invariant: what a load checks, that each box of each node holds the discs of all points under it,
+    /// and that no point of the input is stored twice. O(n log n); for tests.
     ///
     /// # Errors
     /// Names the first that does not hold.
     pub fn sanity_check(&self) -> Result<(), Flaw> {
         let wrong = |what, index| Err(Flaw::Value { what, index });
-        check_topology(&self.nodes, self.len(), self.leaf_size)?;
-        for i in 0..self.len() {
-            let (n, r) = (self.normals[i], self.radii[i]);
-            if (dot(n, n) - 1.0).abs() > 1e-5 {
-                return wrong("normal", i);
-            }
-            if !(r > 0.0 && r.is_finite()) {
-                return wrong("radius", i);
-            }
-            if !(self.discs[i] > 0.0 && self.discs[i] <= r) {
-                return wrong("disc", i);
-            }
-            let cone = &self.cones[i / self.leaf_size as usize];
-            if dot(n, cone.axis) < cone.cosine - 1e-5 || !(-1e-5..=1.0 + 1e-5).contains(&cone.cosine) {
-                return wrong("cone", i / self.leaf_size as usize);
-            }
-        }
+        self.check_structure()?;
+        self.check_contents()?;
         for (id, node) in self.nodes.iter().enumerate() {
             for i in node.points() {
                 if self.boxes[id].reach < self.radii[i] {
-                    return wrong("reach", id);
+                    return wrong("the reach of node", id);
                 }
                 if !self.box_holds_disc(id, i) {
-                    return wrong("box", id);
+                    return wrong("the box of node", id);
                 }
             }
         }
-        Ok(())
+        let mut sources: Vec<u32> = self.source.to_vec();
+        sources.sort_unstable();
+        match sources.windows(2).find(|two| two[0] == two[1]) {
+            Some(two) => wrong("the place in the input, stored twice,", two[0] as usize),
+            None => Ok(()),
+        }
     }
 
     fn box_holds_disc(&self, id: usize, i: usize) -> bool {

@@ -1,13 +1,13 @@
 //! The hierarchy in a container: one section an array, the rest in the metadata.
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
-use nearmiss_store::{File, OpenError, WriteError, Writer};
+use nearmiss_store::{Check, File, OpenError, WriteError, Writer};
 use nearmiss_surface::{SurfaceError, SurfaceOptions, SurfacePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::build::PointHierarchy;
-use crate::sanity::{Flaw, check_topology};
+use crate::sanity::Flaw;
 
 const POSITIONS: [u8; 4] = *b"PNTS";
 const NORMALS: [u8; 4] = *b"NRML";
@@ -83,12 +83,13 @@ impl PointHierarchy {
         Ok(())
     }
 
-    /// The hierarchy in `file`, its arrays in place. The structure is checked: lengths agree, and every node's
-    /// children and points are there.
+    /// The hierarchy in `file`, its arrays in place. With either `check` the structure is looked through: lengths
+    /// agree, every node's children and points are there, numbers of boxes lie in their ranges. With [`Check::Full`]
+    /// each box also lies within its parent's, and the numbers of every point are looked at.
     ///
     /// # Errors
-    /// When a section is missing or the sections contradict each other.
-    pub fn load(file: &File, meta: HierarchyMeta) -> Result<Self, LoadError> {
+    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    pub fn load(file: &File, meta: HierarchyMeta, check: Check) -> Result<Self, LoadError> {
         let hierarchy = Self {
             frame: meta.frame,
             bounds: meta.bounds,
@@ -109,28 +110,10 @@ impl PointHierarchy {
             enclosures: file.array(ENCLOSURES, 0)?,
             cones: file.array(CONES, 0)?,
         };
-        hierarchy.check_lengths()?;
-        check_topology(&hierarchy.nodes, hierarchy.len(), hierarchy.leaf_size)?;
-        Ok(hierarchy)
-    }
-
-    fn check_lengths(&self) -> Result<(), Flaw> {
-        let points = self.positions.len();
-        let leaves = points.div_ceil(self.leaf_size.max(1) as usize);
-        let nodes = self.nodes.len();
-        let expected = [
-            ("normals", self.normals.len(), points),
-            ("radii", self.radii.len(), points),
-            ("discs", self.discs.len(), points),
-            ("kinds", self.kinds.len(), points),
-            ("source", self.source.len(), points),
-            ("boxes", self.boxes.len(), nodes),
-            ("enclosures", self.enclosures.len(), nodes),
-            ("cones", self.cones.len(), leaves),
-        ];
-        match expected.into_iter().find(|(_, found, expected)| found != expected) {
-            Some((array, found, expected)) => Err(Flaw::Length { array, found, expected }),
-            None => Ok(()),
+        hierarchy.check_structure()?;
+        if check == Check::Full {
+            hierarchy.check_contents()?;
         }
+        Ok(hierarchy)
     }
 }

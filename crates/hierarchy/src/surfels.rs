@@ -70,6 +70,9 @@ impl PointKind {
         }
     }
 
+    /// The greatest number that a kind is stored as.
+    pub(crate) const LAST: u8 = Self::Isolated.code();
+
     /// The number it is stored as.
     #[must_use]
     pub const fn code(self) -> u8 {

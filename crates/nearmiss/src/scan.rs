@@ -82,13 +82,17 @@ impl Scan {
 
     /// Opens a saved scan by mapping it: nothing is copied, and with [`Check::Structure`] little is read.
     ///
+    /// [`Check::Structure`] looks through the nodes and their boxes, for files one has written oneself.
+    /// [`Check::Full`], for all others, compares checksums too, and looks at every number of every point: what it
+    /// lets pass could have been written by [`Scan::save`]. Either way a query ends, and never leaves its arrays.
+    ///
     /// The file must not be changed in place while it is open (see `nearmiss_store::File::open`); replacing it
     /// by [`Scan::save`] is fine.
     ///
     /// # Errors
     /// When the file cannot be opened, is no prepared scan, of another version, damaged, or contradicts itself.
     pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Self, LoadError> {
-        Self::load(&File::open(path, check)?)
+        Self::load(&File::open(path, check)?, check)
     }
 
     /// Reads a saved scan into memory.
@@ -96,7 +100,7 @@ impl Scan {
     /// # Errors
     /// As [`Scan::open`].
     pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Self, LoadError> {
-        Self::load(&File::read(path, check)?)
+        Self::load(&File::read(path, check)?, check)
     }
 
     /// A scan from the bytes that [`Scan::save`] or [`Scan::write_to`] wrote.
@@ -104,13 +108,13 @@ impl Scan {
     /// # Errors
     /// As [`Scan::open`].
     pub fn from_bytes(bytes: impl Into<Bytes>, check: Check) -> Result<Self, LoadError> {
-        Self::load(&File::from_bytes(bytes, check)?)
+        Self::load(&File::from_bytes(bytes, check)?, check)
     }
 
-    fn load(file: &File) -> Result<Self, LoadError> {
+    fn load(file: &File, check: Check) -> Result<Self, LoadError> {
         file.expect(KIND, VERSION..=VERSION)?;
         let meta: ScanMeta = file.metadata()?;
-        Ok(Self { hierarchy: Arc::new(PointHierarchy::load(file, meta.hierarchy)?) })
+        Ok(Self { hierarchy: Arc::new(PointHierarchy::load(file, meta.hierarchy, check)?) })
     }
 
     /// The scan in a pose, which leads from the frame of its input to the world.

@@ -1,0 +1,147 @@
+//! Hierarchies in which one number lies: each is refused, and by its name.
+
+use nearmiss_geometry::PointCloud;
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+
+use super::Flaw;
+use crate::build::PointHierarchy;
+use crate::options::BuildOptions;
+
+fn honest() -> PointHierarchy {
+    let points = arbitrary::cloud(CloudKind::Sphere, 301, 1);
+    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+/// The flaw that is found after `lie`, by the checks of the structure alone and by those of the contents as well.
+fn found(lie: impl FnOnce(&mut PointHierarchy)) -> [Option<String>; 2] {
+    let mut scan = honest();
+    lie(&mut scan);
+    let structure = scan.check_structure();
+    let full = structure.clone().and_then(|()| scan.check_contents());
+    assert!(full.is_err() == scan.sanity_check().is_err(), "the thorough check is no laxer");
+    [structure, full].map(|outcome| outcome.err().map(|flaw| flaw.to_string()))
+}
+
+/// A lie that only the contents show.
+fn deep(words: &str, lie: impl FnOnce(&mut PointHierarchy)) {
+    let message = format!("{words} is wrong; prepare the scan again");
+    assert_eq!(found(lie), [None, Some(message)]);
+}
+
+/// A lie that the structure shows.
+fn plain(words: &str, lie: impl FnOnce(&mut PointHierarchy)) {
+    let message = Some(format!("{words}; prepare the scan again"));
+    assert_eq!(found(lie), [message.clone(), message]);
+}
+
+const NONE: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+
+#[test]
+fn nothing_is_wrong_with_an_honest_one() {
+    assert_eq!(found(|_| ()), [None, None]);
+}
+
+#[test]
+fn boxes_that_are_none() {
+    for value in NONE.into_iter().chain([2e12, -2e12]) {
+        for k in 0..3 {
+            plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].centre[k] = value);
+            plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].half[k] = value);
+            plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].axes[k][1] = value);
+        }
+        plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].reach = value);
+    }
+    plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].half[2] = -1e-3);
+    plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].axes[2][0] = 1.01);
+    deep("the box of node 7", |scan| scan.boxes.to_mut()[7].axes = [[0.0; 3]; 3]);
+    deep("the box of node 7", |scan| {
+        let [x, _, z] = scan.boxes[7].axes;
+        scan.boxes.to_mut()[7].axes = [x, x, z];
+    });
+}
+
+#[test]
+fn boxes_that_leave_their_parents_or_their_points() {
+    let nodes = honest().nodes.to_vec();
+    for (id, node) in nodes.iter().enumerate().skip(1) {
+        for k in 0..3 {
+            // Some boxes have room in their parent's: grow until there can be none.
+            deep(&format!("the box of node {id}"), |scan| scan.boxes.to_mut()[id].half[k] = 2.0);
+            deep(&format!("the box of node {id}"), |scan| scan.boxes.to_mut()[id].centre[k] += 4.0);
+        }
+        deep(&format!("the box of node {id}"), |scan| scan.boxes.to_mut()[id].reach *= 2.0);
+        if node.is_leaf() {
+            // Smaller than the discs it is about: one of its points, or more, stick out.
+            let [_, flaw] = found(|scan| scan.boxes.to_mut()[id].half[0] *= 0.9);
+            assert!(flaw.is_some_and(|words| words.starts_with("the box about point ")), "leaf {id}");
+            let [_, flaw] = found(|scan| scan.boxes.to_mut()[id].reach *= 0.5);
+            assert!(flaw.is_some_and(|words| words.starts_with("the radius of point ")), "leaf {id}");
+        }
+    }
+}
+
+#[test]
+fn points_that_no_build_writes() {
+    // The last point of all shares its block with lanes that are filled up.
+    for i in [0, 7, 8, 150, 300] {
+        let named = |words: &str| format!("{words} of point {i}");
+        for value in NONE {
+            deep(&named("the position"), |scan| scan.positions.to_mut()[i][1] = value);
+            deep(&named("the normal"), |scan| scan.normals.to_mut()[i][2] = value);
+        }
+        for value in NONE.into_iter().chain([0.0, -0.1, 1e3]) {
+            deep(&named("the radius"), |scan| scan.radii.to_mut()[i] = value);
+            deep(&named("the disc"), |scan| scan.discs.to_mut()[i] = value);
+        }
+        deep(&format!("the box about point {i}"), |scan| scan.positions.to_mut()[i][0] += 1.0);
+        deep(&named("the normal"), |scan| scan.normals.to_mut()[i] = [0.0; 3]);
+        deep(&format!("the cone about the normal of point {i}"), |scan| {
+            let turned = scan.normals[i].map(|x| -x);
+            scan.normals.to_mut()[i] = turned;
+        });
+        deep(&named("the kind"), |scan| scan.kinds.to_mut()[i] = 5);
+        deep(&named("the place in the input"), |scan| scan.source.to_mut()[i] = 301);
+    }
+}
+
+#[test]
+fn cones_that_are_none() {
+    for value in NONE.into_iter().chain([-0.1, 1.1]) {
+        deep("the cone of leaf 3", |scan| scan.cones.to_mut()[3].cosine = value);
+    }
+    deep("the cone of leaf 3", |scan| scan.cones.to_mut()[3].axis = [0.0; 3]);
+    deep("the cone of leaf 3", |scan| scan.cones.to_mut()[3].axis[1] = f32::NAN);
+}
+
+#[test]
+fn metadata_that_no_build_writes() {
+    for value in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e-320, f64::MAX] {
+        plain("the frame of the stored positions is wrong", |scan| scan.frame.scale = value);
+    }
+    for value in [f64::NAN, f64::INFINITY] {
+        plain("the frame of the stored positions is wrong", |scan| scan.frame.origin[2] = value);
+        plain("the box of bounds is wrong", |scan| scan.bounds.max[0] = value);
+        plain("what rounding cost is wrong", |scan| scan.step = value);
+    }
+    plain("the box of bounds is wrong", |scan| scan.bounds.min[0] = 7.0);
+    deep("the box of bounds", |scan| scan.bounds.min[0] -= 1e-9);
+    deep("the box of bounds", |scan| scan.frame.origin[1] = 0.5);
+    for value in [f32::NAN, f32::INFINITY, 0.0, -1.0, 2e12] {
+        plain("the sampling radius is wrong", |scan| scan.sampling_radius = value);
+    }
+    deep("the sampling radius", |scan| scan.sampling_radius *= 1.01);
+    deep("the sampling radius", |scan| scan.sampling_radius *= 0.99);
+    for value in [0, 2, 33, u32::MAX] {
+        plain("the number of neighbours for a radius is wrong", |scan| scan.radius_neighbours = value);
+    }
+    plain("the number of dropped points is wrong", |scan| scan.dropped.duplicate = usize::MAX);
+}
+
+#[test]
+fn a_point_stored_twice_is_for_the_thorough_check() {
+    let mut scan = honest();
+    let first = scan.source[0];
+    scan.source.to_mut()[9] = first;
+    assert_eq!(scan.check_contents(), Ok(()), "one pass does not see it");
+    assert!(matches!(scan.sanity_check(), Err(Flaw::Value { index, .. }) if index == first as usize));
+}

@@ -1,0 +1,88 @@
+//! The numbers about a whole scan: how many entries its arrays have, and what the metadata say.
+
+use nearmiss_geometry::{Aabb, Frame};
+
+use super::{FARTHEST, Flaw};
+use crate::build::{PointHierarchy, sampling_rank};
+use crate::options::RADIUS_NEIGHBOURS;
+
+impl PointHierarchy {
+    pub(super) fn check_lengths(&self) -> Result<(), Flaw> {
+        let points = self.positions.len();
+        let leaves = points.div_ceil(self.leaf_size.max(1) as usize);
+        let nodes = self.nodes.len();
+        let expected = [
+            ("normals", self.normals.len(), points),
+            ("radii", self.radii.len(), points),
+            ("discs", self.discs.len(), points),
+            ("kinds", self.kinds.len(), points),
+            ("source", self.source.len(), points),
+            ("boxes", self.boxes.len(), nodes),
+            ("cones", self.cones.len(), leaves),
+        ];
+        match expected.into_iter().find(|(_, found, expected)| found != expected) {
+            Some((array, found, expected)) => Err(Flaw::Length { array, found, expected }),
+            None => Ok(()),
+        }
+    }
+
+    /// What the metadata say, as far as it shows without the points.
+    pub(super) fn check_metadata(&self) -> Result<(), Flaw> {
+        let wrong = |what| Err(Flaw::Metadata { what });
+        let Frame { origin, scale } = self.frame;
+        // Then nothing overflows on its way to the caller's frame and back.
+        let turns_back = scale > 0.0 && scale.is_normal() && scale.recip().is_normal();
+        if !(turns_back && origin.iter().all(|x| x.is_finite())) {
+            return wrong("the frame of the stored positions");
+        }
+        let Aabb { min, max } = self.bounds;
+        if !(0..3).all(|k| min[k].is_finite() && max[k].is_finite() && min[k] <= max[k]) {
+            return wrong("the box of bounds");
+        }
+        if !(self.step >= 0.0 && self.step.is_finite()) {
+            return wrong("what rounding cost");
+        }
+        if !(self.sampling_radius > 0.0 && self.sampling_radius <= FARTHEST) {
+            return wrong("the sampling radius");
+        }
+        if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
+            return wrong("the number of neighbours for a radius");
+        }
+        if u32::try_from(self.given()).is_err() {
+            return wrong("the number of dropped points");
+        }
+        Ok(())
+    }
+
+    /// How many points the input had: sources lie below it.
+    pub(super) fn given(&self) -> usize {
+        let dropped = self.dropped.not_finite.saturating_add(self.dropped.duplicate);
+        dropped.saturating_add(self.len())
+    }
+
+    /// What the metadata say, against the points, which are sound.
+    pub(super) fn check_summary(&self) -> Result<(), Flaw> {
+        let [mut low, mut high] = [self.positions[0]; 2];
+        for p in &self.positions {
+            for k in 0..3 {
+                low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+                high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+            }
+        }
+        // The way to the caller's frame keeps the order, rounding included.
+        if (self.frame.to_world(low), self.frame.to_world(high)) != (self.bounds.min, self.bounds.max) {
+            return Err(Flaw::Metadata { what: "the box of bounds" });
+        }
+        let (mut less, mut more) = (0_u32, 0_u32);
+        for &r in &self.radii {
+            less += u32::from(r < self.sampling_radius);
+            more += u32::from(r > self.sampling_radius);
+        }
+        let (less, more) = (less as usize, more as usize);
+        let rank = sampling_rank(self.len());
+        if less > rank || more > self.len() - 1 - rank {
+            return Err(Flaw::Metadata { what: "the sampling radius" });
+        }
+        Ok(())
+    }
+}
