@@ -72,7 +72,11 @@ fn search(
     scratch: &mut CollideScratch,
     proof: Option<&mut Proof>,
 ) -> Answer {
-    let meter = Meter::new(budget);
+    let [leaves, points] = [
+        [a, b].map(|view| view.slices().nodes.len().div_ceil(2) as u64),
+        [a, b].map(|view| u64::from(view.scan().leaf_size())),
+    ];
+    let meter = Meter::new(budget, leaves, points);
     let options = plan.options();
     let relative = match relative(a, b, plan) {
         Ok(relative) => relative,
@@ -192,7 +196,8 @@ fn likelihood(pair: &Posed<'_>, stack: &Stack) -> f64 {
         let size_a = pair.a.boxes[nodes.a.index()].radius();
         let size_b = pair.b.boxes[nodes.b.index()].radius() * pair.relative.scale();
         let size = size_a.min(size_b);
-        if size > 0.0 { 1.0 - f64::from((depth / size).clamp(0.0, 1.0)) } else { 1.0 }
+        // What is no number, as of boxes that overflow, says nothing.
+        if size > 0.0 && depth > 0.0 { 1.0 - f64::from((depth / size).min(1.0)) } else { 1.0 }
     };
     1.0 - stack.open().take(16).map(miss).product::<f64>()
 }

@@ -53,7 +53,7 @@ pub enum Evidence {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Reason {
-    /// The budget was spent first.
+    /// The budget was spent first; without one, so much that a file must be damaged ([`Budget`](crate::Budget)).
     Budget {
         /// An estimate of the probability that they meet, 0 to 1, from how deeply the volumes still open overlap.
         likelihood: f64,

@@ -1,0 +1,62 @@
+//! Everything that a program does with a scan, in small: questions in a few poses, evaluations, checks, saving again.
+
+use nearmiss::{
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evaluation, Pose, Reason, Scan,
+    Semantics, Verdict, collide_with,
+};
+
+/// What a scan answered.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Answers {
+    /// To questions about it and another scan, and itself.
+    pub(crate) collide: Vec<Answer>,
+    /// At places near some of its points.
+    pub(crate) at: Vec<Evaluation>,
+}
+
+/// Poses of the other scan: on the first, a little off, across its rim, far away.
+fn poses(size: f64) -> [Pose; 4] {
+    let turn = Pose::from_axis_angle([1.0, 2.0, 3.0], 0.7);
+    [
+        Pose::IDENTITY,
+        turn.with_translation([0.01 * size, 0.0, 0.02 * size]),
+        turn.with_translation([0.6 * size, 0.2 * size, 0.1 * size]),
+        Pose::from_translation([9.0 * size, 0.0, 0.0]),
+    ]
+}
+
+/// Asks `scan` everything, beside `other`.
+///
+/// # Panics
+/// When a question costs more than to compare every node with every node, or a scan cannot be written.
+#[must_use]
+pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
+    let size = other.bounds().half_extents().into_iter().fold(0.0, f64::max);
+    let mut scratch = CollideScratch::default();
+    let mut collide = Vec::new();
+    let everything = (2 * scan.nodes().len() * 2 * other.nodes().len().max(scan.nodes().len())) as u64;
+    for semantics in [Semantics::Surface, Semantics::Thickened(1e-3 * size)] {
+        for detail in [Detail::Verdict, Detail::Witness] {
+            let options = CollideOptions::default().with_semantics(semantics).with_detail(detail);
+            for pose in poses(size) {
+                for (a, b) in [(scan, other), (other, scan), (scan, scan)] {
+                    let Ok(plan) = CollidePlan::new(&options, a, b) else { continue };
+                    let (a, b) = (a.at(&Pose::IDENTITY), b.at(&pose));
+                    let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
+                    assert!(answer.statistics.node_pairs <= everything + 4, "{:?}", answer.statistics);
+                    if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
+                        assert!((0.0..=1.0).contains(&likelihood), "a likelihood of {likelihood}");
+                    }
+                    collide.push(answer);
+                }
+            }
+        }
+    }
+    let view = scan.at(&Pose::IDENTITY);
+    let places = (0..scan.len()).step_by(scan.len() / 7 + 1).map(|i| view.point(i).map(|x| x + 0.01 * size));
+    let at = places.chain([[0.0; 3], [1e30; 3]]).map(|x| scan.evaluate(x)).collect();
+    let _sound_or_not = scan.sanity_check();
+    let mut sink = std::io::sink();
+    assert!(scan.write_to(&mut sink).is_ok(), "what was loaded can be saved");
+    Answers { collide, at }
+}

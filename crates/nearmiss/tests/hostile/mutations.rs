@@ -1,0 +1,130 @@
+//! Thousands of damaged files. `NEARMISS_MUTATIONS` says how many of each sort, `NEARMISS_SEED` where to begin.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::{Duration, Instant};
+
+use nearmiss::{Bandwidth, BuildOptions, Check, PointCloud, Scan, SurfaceOptions, Verdict};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+
+use crate::damage::{Random, damage, restate_length};
+use crate::exercise::{Answers, exercise};
+use crate::repair::repair;
+
+/// No single file may cost more, on any machine that runs tests.
+const LONGEST: Duration = Duration::from_secs(20);
+
+/// Every message holds one of these.
+const REMEDIES: [&str; 5] =
+    ["prepare", "copy it again", "update the program", "name another file", "unpack it"];
+
+/// A sound scan, its file, and what it answers.
+struct Sample {
+    scan: Scan,
+    bytes: Vec<u8>,
+    answers: Answers,
+}
+
+fn samples() -> Vec<Sample> {
+    let global = SurfaceOptions::default().with_bandwidth(Bandwidth::Global);
+    let kinds = [
+        (CloudKind::Sphere, 120, BuildOptions::default()),
+        (CloudKind::Random, 150, BuildOptions::default().with_leaf_size(4)),
+        (CloudKind::Rings, 300, BuildOptions::default().with_leaf_size(64)),
+        (CloudKind::FarClusters, 110, BuildOptions::default().with_surface(global)),
+        (CloudKind::Lattice, 125, BuildOptions::default()),
+        (CloudKind::Outlier, 130, BuildOptions::default().with_radius_neighbours(3)),
+    ];
+    let sample = |(kind, n, options)| {
+        let cloud = PointCloud::cleaned(&arbitrary::cloud(kind, n, 7)).unwrap();
+        let scan = Scan::build(&cloud, &options).unwrap();
+        let mut bytes = Vec::new();
+        scan.write_to(&mut bytes).unwrap();
+        let answers = exercise(&scan, &scan);
+        Sample { scan, bytes, answers }
+    };
+    kinds.into_iter().map(sample).collect()
+}
+
+fn setting(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
+}
+
+/// What became of the damaged files.
+#[derive(Debug, Default)]
+struct Tally {
+    refused: u32,
+    /// Opened, and answered as before.
+    same: u32,
+    /// Opened, and answered otherwise.
+    other: u32,
+    /// Of those answers: undecided.
+    undecided: u32,
+    longest: Duration,
+}
+
+/// Opens files that `spoil` has damaged and asks what opens everything.
+fn run(seed: u64, check: Check, spoil: impl Fn(&mut Vec<u8>, &mut Random)) -> Tally {
+    let samples = samples();
+    let mut tally = Tally::default();
+    for case in 0..setting("NEARMISS_MUTATIONS", 1500) {
+        let mut random = Random(seed + (setting("NEARMISS_SEED", 1) << 32) + 1000 * case);
+        let sample = &samples[random.below(samples.len())];
+        let mut bytes = sample.bytes.clone();
+        spoil(&mut bytes, &mut random);
+        let start = now();
+        let outcome = catch_unwind(AssertUnwindSafe(|| match Scan::from_bytes(bytes, check) {
+            Ok(scan) => Some(exercise(&scan, &sample.scan)),
+            Err(error) => {
+                let message = error.to_string();
+                let remedy = REMEDIES.iter().any(|words| message.contains(words));
+                assert!(remedy, "what would mend it? {message}");
+                None
+            }
+        }));
+        tally.longest = tally.longest.max(start.elapsed());
+        match outcome.unwrap_or_else(|_| panic!("case {case} of seed {seed}")) {
+            None => tally.refused += 1,
+            Some(answers) if answers == sample.answers => tally.same += 1,
+            Some(answers) => {
+                tally.other += 1;
+                let undecided = answers.collide.iter().filter(|a| matches!(a.verdict, Verdict::Undecided(_)));
+                tally.undecided += u32::from(undecided.count() > 0);
+            }
+        }
+    }
+    assert!(tally.longest < LONGEST, "a file that takes {:?}", tally.longest);
+    println!("{check:?}: {tally:?}");
+    tally
+}
+
+#[expect(clippy::disallowed_methods, reason = "a test may read the clock")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+#[test]
+fn damage_is_refused_or_does_no_harm() {
+    let tally = run(1, Check::Full, damage);
+    assert_eq!(tally.other, 0, "an answer that differs from the sound file's");
+    assert!(tally.refused > 0 && tally.same > 0, "{tally:?}: most damage shows, some undoes itself");
+}
+
+fn repaired(bytes: &mut Vec<u8>, random: &mut Random) {
+    damage(bytes, random);
+    if random.below(2) == 0 {
+        restate_length(bytes);
+    }
+    repair(bytes);
+}
+
+#[test]
+fn damage_with_fitting_checksums_is_refused_or_harmless() {
+    let tally = run(2, Check::Full, repaired);
+    assert!(tally.refused > 10 * tally.other, "{tally:?}: little gets past the checks of every number");
+}
+
+#[test]
+fn damage_with_fitting_checksums_does_not_stop_a_query_that_trusts_the_file() {
+    let tally = run(3, Check::Structure, repaired);
+    assert!(tally.refused > 100 && tally.other > 100, "{tally:?}: both ways are taken");
+}
