@@ -310,6 +310,17 @@ pub enum Fault {
         /// Length that the header's fields and points take.
         needed: u64,
     },
+    /// Compressed data that would take very much memory for their length.
+    #[error(
+        "{packed} compressed bytes are to give {points} points, far more than scans give; if that is right, save the \
+         file with `DATA binary`"
+    )]
+    Expansion {
+        /// Points that the header declares.
+        points: u64,
+        /// Bytes of the compressed data.
+        packed: u64,
+    },
     /// Compressed data that do not decompress to their declared length.
     #[error("the compressed data are corrupt")]
     Corrupt,

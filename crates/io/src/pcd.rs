@@ -13,6 +13,16 @@ use crate::sink::Sink;
 use crate::text::{Lines, number, shown, whole};
 use header::{Encoding, Field, Header, Part};
 
+/// Memory that reading takes for each point, beside its bytes: in double precision, then rounded and sorted.
+const BYTES_A_POINT: u128 = 64;
+
+/// Compressed data may take this much memory whatever their length: two million points, all of them at one place.
+const FREE: u128 = 128 << 20;
+
+/// Beyond it, so much for each compressed byte. Scans take some 10 bytes of memory a byte; frames most of whose pixels
+/// saw nothing up to 100. Made to harm, a byte gives 2000.
+const BYTES_A_BYTE: u128 = 128;
+
 /// The content of a PCD file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let (header, lines) = header::parse(bytes)?;
@@ -114,6 +124,11 @@ fn compressed(header: &Header, bytes: &[u8], start: usize) -> Result<Sink, Broke
         let values = packed.into();
         Fault::ListPastEnd { values, left }.at_byte(start)
     })?;
+    let taken = needed + BYTES_A_POINT * u128::from(header.points);
+    if taken > FREE + BYTES_A_BYTE * data.len() as u128 {
+        let (points, packed) = (header.points, packed.into());
+        return Err(Fault::Expansion { points, packed }.at_byte(start));
+    }
     let unpacked = lzf::unpack(data, declared).map_err(|at| Fault::Corrupt.at_byte(start + 8 + at))?;
     let points = header.capacity(usize::MAX);
     let mut sink = Sink::new(header.holds, points);

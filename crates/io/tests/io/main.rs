@@ -1,6 +1,7 @@
 //! What readers and the writer promise, on made and on real files.
 
 mod errors;
+mod expansion;
 mod mutations;
 mod real_data;
 mod round_trips;

