@@ -4,12 +4,14 @@
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
+//! * `fuzz [TARGET] [SECONDS]` — feed the readers with inputs that a fuzzer makes up; see fuzz/README.md.
 //! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 mod check_proof;
 mod checks;
 mod demo;
+mod fuzz;
 mod repository;
 mod tidy;
 
@@ -24,6 +26,7 @@ of the repository
   tidy, ci       the first of them; all of them
   check-proof PROOF A B [--poses F]
                  whether what `collide A B --prove PROOF` wrote holds, by means of its own
+  fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
   preprocess, inspect, eval, collide, poses, export";
@@ -44,6 +47,7 @@ fn main() -> ExitCode {
         ["tidy"] => checks::run(&["tidy"]),
         ["ci"] => checks::run(&[]),
         ["check-proof", ..] => check_proof::run(std::env::args_os().skip(1)),
+        ["fuzz", words @ ..] => fuzz::run(words),
         ["test", names @ ..] => checks::run(names),
         _ => return nearmiss_cli::run(std::env::args_os()),
     };

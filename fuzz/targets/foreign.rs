@@ -1,0 +1,26 @@
+//! What holds of every reader of others' files.
+
+use std::path::Path;
+
+use nearmiss::io::{Format, read_bytes, read_mesh_bytes};
+
+/// Reads `bytes`, whatever they are: a model that agrees with itself, or an error that says what is wrong.
+pub(crate) fn read(bytes: &[u8], format: Format) {
+    let name = Path::new("input");
+    match read_bytes(bytes, Some(format), name) {
+        Ok(model) => {
+            let given =
+                model.cloud.len() + model.cloud.dropped().duplicate + model.cloud.dropped().not_finite;
+            assert!(model.cloud.source().iter().all(|&i| (i as usize) < given));
+            if let Some(mesh) = model.mesh {
+                assert_eq!(mesh.vertices().len(), given);
+            }
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.starts_with("input") && message.len() < 400, "{message}");
+            assert!(!message.chars().any(char::is_control), "{message:?}");
+        }
+    }
+    let _mesh_or_error = read_mesh_bytes(bytes, Some(format), name);
+}
