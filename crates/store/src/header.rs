@@ -83,6 +83,9 @@ impl Header {
             return Err(Fault::Truncated { expected: HEADER_LEN as u64, found });
         };
         let header: Self = bytemuck::pod_read_unaligned(bytes);
+        if header.layout == LAYOUT.swap_bytes() {
+            return Err(Fault::ByteOrder);
+        }
         // The layout comes before the checksum: another layout may well keep its checksum elsewhere.
         if header.layout != LAYOUT {
             return Err(Fault::Layout { found: header.layout, supported: LAYOUT });

@@ -78,7 +78,7 @@ pub(crate) struct Done {
 }
 
 impl Done {
-    fn new(output: Output, args: &[&str]) -> Self {
+    pub(crate) fn new(output: Output, args: &[&str]) -> Self {
         let status = output.status.code();
         Self {
             status: status.unwrap_or_else(|| panic!("{args:?} was killed")),

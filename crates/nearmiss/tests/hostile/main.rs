@@ -5,5 +5,6 @@
 mod cost;
 mod damage;
 mod exercise;
+mod faults;
 mod mutations;
 mod repair;

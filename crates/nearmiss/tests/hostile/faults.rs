@@ -1,0 +1,105 @@
+//! Files cut short, of other machines and versions, and replaced under an open scan.
+
+use std::io;
+
+use nearmiss::store::{Fault, File, WriteError, WriteStep};
+use nearmiss::{BuildOptions, Check, LoadError, PointCloud, Scan};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+
+use crate::damage::restate_length;
+use crate::exercise::exercise;
+use crate::repair::{HEADER, ROW, repair};
+
+fn scan(seed: u64) -> Scan {
+    let points = arbitrary::cloud(CloudKind::Sphere, 120, seed);
+    Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+fn bytes_of(scan: &Scan) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    scan.write_to(&mut bytes).unwrap();
+    bytes
+}
+
+/// Why `bytes` are refused as a scan, with and without their checksums compared.
+fn refusals(bytes: &[u8]) -> [LoadError; 2] {
+    [Check::Full, Check::Structure].map(|check| Scan::from_bytes(bytes.to_vec(), check).unwrap_err())
+}
+
+#[test]
+fn a_scan_cut_anywhere_is_refused_even_if_its_header_owns_up() {
+    let whole = bytes_of(&scan(1));
+    let sections = File::from_bytes(whole.clone(), Check::Full).unwrap().sections().to_vec();
+    let ends = sections.iter().flat_map(|s| [s.offset, s.offset + s.length]);
+    let boundaries = ends.map(|end| usize::try_from(end).unwrap()).chain([0, 1, 63, 64, HEADER + ROW]);
+    let mut cuts = 0;
+    for end in boundaries.chain((0..whole.len()).step_by(61)).filter(|&end| end < whole.len()) {
+        let mut cut = whole[..end].to_vec();
+        for refused in refusals(&cut) {
+            let LoadError::Open(refused) = refused else { panic!("cut after {end}: {refused}") };
+            let told = match refused.fault {
+                Fault::Empty => end == 0,
+                Fault::Truncated { found, .. } => found == end as u64,
+                _ => false,
+            };
+            assert!(told, "cut after {end}: {refused}");
+        }
+        // The last section may be followed by padding, the lack of which alone is made good here.
+        restate_length(&mut cut);
+        repair(&mut cut);
+        if cut.len() < whole.len() {
+            refusals(&cut);
+        }
+        cuts += 1;
+    }
+    assert!(cuts > 90, "{cuts} cuts");
+}
+
+#[test]
+fn a_file_of_a_machine_of_the_other_byte_order_is_named_as_such() {
+    let whole = bytes_of(&scan(1));
+    // Such a machine writes its numbers the other way round; the first eight bytes are bytes, or are swapped as one.
+    for swapped in [&[(0, 8)][..], &[(8, 12)], &[(8, 12), (16, 20), (20, 24), (24, 32), (32, 40), (56, 64)]] {
+        let mut other = whole.clone();
+        for &(start, end) in swapped {
+            other[start..end].reverse();
+        }
+        for refused in refusals(&other) {
+            let LoadError::Open(refused) = refused else { panic!("{refused}") };
+            assert!(matches!(refused.fault, Fault::ByteOrder), "{swapped:?}: {refused}");
+            assert!(refused.to_string().contains("big-endian machine; prepare it again"), "{refused}");
+        }
+    }
+}
+
+#[test]
+fn a_scan_answers_the_same_while_its_file_is_replaced_and_removed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.nm");
+    let (first, second) = (scan(1), scan(2));
+    first.save(&path).unwrap();
+    let open = Scan::open(&path, Check::Full).unwrap();
+    let before = exercise(&open, &first);
+    for _ in 0..3 {
+        second.save(&path).unwrap();
+        assert_eq!(exercise(&open, &first), before, "the bytes that were opened");
+        first.save(&path).unwrap();
+    }
+    second.save(&path).unwrap();
+    let replaced = Scan::open(&path, Check::Full).unwrap();
+    assert_ne!(exercise(&replaced, &first), before, "who opens it now gets the other scan");
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(exercise(&open, &first), before, "even without a name");
+}
+
+/// A folder in which nobody, not even root, makes files.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_that_takes_no_files_is_reported() {
+    let refused = scan(1).save("/proc/scan.nm").unwrap_err();
+    let WriteError::Io { path, step: WriteStep::Create, source } = &refused else { panic!("{refused}") };
+    assert_eq!(path.as_deref(), Some(std::path::Path::new("/proc/scan.nm")));
+    let kinds = [io::ErrorKind::NotFound, io::ErrorKind::PermissionDenied];
+    assert!(kinds.contains(&source.kind()), "{source:?}");
+    assert!(refused.to_string().ends_with("may be written to"), "{refused}");
+}
