@@ -45,7 +45,7 @@ pub enum Status {
 /// The implicit function at a point; lengths and directions in the frame of the scan's stored positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluation {
-    /// n·(a − x); NaN-free, and 0 when nothing reaches x.
+    /// n·(a − x); NaN-free, and 0 when nothing reaches x, or what reaches it is no number.
     pub f: f64,
     /// n, unit, its largest component positive.
     pub normal: [f64; 3],
@@ -67,16 +67,17 @@ impl Neighbourhood {
     pub fn evaluate(&self, plan: &SurfacePlan, x: [f64; 3]) -> Evaluation {
         let support = u32::try_from(self.len()).unwrap_or(u32::MAX);
         let m = self.moments(plan);
+        let nothing = Evaluation {
+            f: 0.0,
+            normal: [0.0, 0.0, 1.0],
+            centroid: x,
+            support,
+            bandwidth: 0.0,
+            eigenvalues: [0.0; 3],
+            status: Status::Outside,
+        };
         if m.weight <= 0.0 {
-            return Evaluation {
-                f: 0.0,
-                normal: [0.0, 0.0, 1.0],
-                centroid: x,
-                support,
-                bandwidth: 0.0,
-                eigenvalues: [0.0; 3],
-                status: Status::Outside,
-            };
+            return nothing;
         }
         let mean = m.first.map(|s| s / m.weight);
         let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s / m.weight);
@@ -86,6 +87,10 @@ impl Neighbourhood {
         let normal = with_positive_largest(eigen.vectors[0]);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
         let bandwidth = m.bandwidth / m.weight;
+        // Points that are none, as in a damaged file, make sums that are none.
+        if !(f.is_finite() && bandwidth.is_finite()) {
+            return nothing;
+        }
         let is_near = m.nearest <= NEAR_SQ * plan.reach_sq();
         let status = if support < plan.options().support_min || !is_near {
             Status::Outside

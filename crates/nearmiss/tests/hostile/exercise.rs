@@ -28,7 +28,8 @@ fn poses(size: f64) -> [Pose; 4] {
 /// Asks `scan` everything, beside `other`.
 ///
 /// # Panics
-/// When a question costs more than to compare every node with every node, or a scan cannot be written.
+/// When a question costs more than to compare every node with every node, an evaluation is no number, or the scan
+/// cannot be written.
 #[must_use]
 pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let size = other.bounds().half_extents().into_iter().fold(0.0, f64::max);
@@ -54,7 +55,8 @@ pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     }
     let view = scan.at(&Pose::IDENTITY);
     let places = (0..scan.len()).step_by(scan.len() / 7 + 1).map(|i| view.point(i).map(|x| x + 0.01 * size));
-    let at = places.chain([[0.0; 3], [1e30; 3]]).map(|x| scan.evaluate(x)).collect();
+    let at: Vec<Evaluation> = places.chain([[0.0; 3], [1e30; 3]]).map(|x| scan.evaluate(x)).collect();
+    assert!(at.iter().all(|e| e.f.is_finite() && e.bandwidth.is_finite()), "{at:?}");
     let _sound_or_not = scan.sanity_check();
     let mut sink = std::io::sink();
     assert!(scan.write_to(&mut sink).is_ok(), "what was loaded can be saved");
