@@ -14,7 +14,8 @@ pub(crate) use radii::count;
 pub use disc::{Crossing, Disc, crossing};
 pub use eigen::{Eigen, symmetric_eigen};
 pub use radii::{
-    GREATEST_RANK, LINE_RATIO, RANK, SLOPE, looks_like_a_line, quantile, radii, smoothed, spacing,
+    GREATEST_RANK, LINE_RATIO, RANK, SLOPE, Spacing, looks_like_a_line, quantile, radii, smoothed, spacing,
+    spacings,
 };
 pub use surface::{BORDER, Bandwidth, Evaluation, GAP, Kernel, Parameters, Status, SurfaceTwin, THIN};
 pub use thickened::{Nearest, least_distance, nearest, touches};

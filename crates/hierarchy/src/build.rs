@@ -57,12 +57,36 @@ pub struct Slices<'a> {
     pub radii: &'a [f32],
     /// Radii of the tangent discs.
     pub discs: &'a [f32],
+    /// What the points' neighbourhoods look like, as [`PointKind::code`].
+    pub kinds: &'a [u8],
     /// The tree.
     pub nodes: &'a [Node],
-    /// A box about the discs of each node's points.
+    /// A box about the discs of each node's points, and about their balls.
     pub boxes: &'a [OrientedBox],
     /// A box about each node's part of the surface, proven to contain it.
     pub enclosures: &'a [OrientedBox],
+    /// The scan's sampling radius.
+    pub sampling_radius: f32,
+}
+
+impl Slices<'_> {
+    /// About a [sparse](PointKind::is_sparse) point, the radius of the ball in which surface may be that no disc
+    /// stands for: the local radius, but no more than the scan's, within which nothing is promised of any point.
+    /// Zero for others.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn ball(&self, i: usize) -> f32 {
+        ball(PointKind::from_code(self.kinds[i]), self.radii[i], self.sampling_radius)
+    }
+}
+
+/// See [`Slices::ball`].
+#[inline]
+fn ball(kind: PointKind, radius: f32, sampling_radius: f32) -> f32 {
+    if kind.is_sparse() { radius.min(sampling_radius) } else { 0.0 }
 }
 
 impl PointHierarchy {
@@ -112,9 +136,11 @@ impl PointHierarchy {
             normals: &self.normals,
             radii: &self.radii,
             discs: &self.discs,
+            kinds: &self.kinds,
             nodes: &self.nodes,
             boxes: &self.boxes,
             enclosures: &self.enclosures,
+            sampling_radius: self.sampling_radius,
         }
     }
 
@@ -251,7 +277,7 @@ impl PointHierarchy {
         &self.nodes
     }
 
-    /// A box about the discs of each node's points.
+    /// A box about the discs of each node's points, and about their [balls](Slices::ball).
     #[must_use]
     pub fn boxes(&self) -> &[OrientedBox] {
         &self.boxes
@@ -281,9 +307,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     drop(items);
 
     let spacings = spacings(&positions, options.radius_neighbours as usize)?;
-    let rough: Vec<f32> = spacings.iter().map(|s| s.radius).collect();
-    let radii = smooth(&positions, &rough, &nodes, &boxes);
-    drop(rough);
+    let radii = smooth(&positions, &spacings, &nodes, &boxes);
     let sampling_radius = quantile(&radii);
     let unit = 1.0 / cloud.frame().scale;
     let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
@@ -293,17 +317,20 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     }
 
     let index = Index { nodes: &nodes, boxes: &boxes, positions: &positions, radii: &radii, plan: &plan };
-    let parts = surfels(&index, &spacings, leaf_size);
+    let parts = surfels(&index, &spacings, sampling_radius, leaf_size);
     drop(spacings);
     let all = || parts.iter().flat_map(|(surfels, _)| surfels);
     let mut normals: Vec<[f32; 3]> = all().map(|s| s.normal).collect();
     let discs: Vec<f32> = all().map(|s| s.disc).collect();
     let kinds: Vec<u8> = all().map(|s| s.kind.code()).collect();
+    let balls: Vec<f32> = all().zip(&radii).map(|(s, &r)| ball(s.kind, r, sampling_radius)).collect();
     let leaves: Vec<LeafBounds> = parts.into_iter().flat_map(|(_, leaves)| leaves).collect();
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
-    boxes =
-        map(&ids, |&i| box_of_discs(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &discs));
+    boxes = map(&ids, |&i| {
+        box_of_discs(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &discs, &balls)
+    });
+    drop(balls);
     let enclosures = enclosures(&nodes, &boxes, &leaves);
 
     Ok(PointHierarchy {
@@ -329,7 +356,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
 }
 
 /// The discs of all points and the bounds of all leaves, in order, some leaves at a time.
-fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
+fn surfels(index: &Index<'_>, spacings: &[Spacing], ordinary: f32, leaf_size: usize) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
     let leaves: Vec<(&Node, &OrientedBox)> =
         index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).collect();
     let fit = |leaves: &[(&Node, &OrientedBox)]| {
@@ -342,7 +369,7 @@ fn surfels(index: &Index<'_>, spacings: &[Spacing], leaf_size: usize) -> Vec<(Ve
                     index,
                     leaf.points(),
                     about,
-                    spacings,
+                    (spacings, ordinary),
                     (&mut scratch, &mut surroundings),
                     &mut surfels,
                 )

@@ -129,7 +129,7 @@ impl PointHierarchy {
                 if self.boxes[id].reach < self.radii[i] {
                     return wrong("the reach of node", id);
                 }
-                if !self.box_holds_disc(id, i) {
+                if !self.box_holds(id, i) {
                     return wrong("the box of node", id);
                 }
             }
@@ -142,14 +142,16 @@ impl PointHierarchy {
         }
     }
 
-    fn box_holds_disc(&self, id: usize, i: usize) -> bool {
+    /// Whether the box of node `id` holds the disc and the ball of point `i`.
+    fn box_holds(&self, id: usize, i: usize) -> bool {
         let bounds = &self.boxes[id];
         let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let d = double(self.positions[i]) - double(bounds.centre);
+        let ball = f64::from(self.slices().ball(i));
         (0..3).all(|k| {
             let axis = double(bounds.axes[k]);
             let spread = f64::from(self.discs[i]) * double(self.normals[i]).cross(&axis).norm();
-            d.dot(&axis).abs() + spread <= f64::from(bounds.half[k])
+            d.dot(&axis).abs() + spread.max(ball) <= f64::from(bounds.half[k])
         })
     }
 }

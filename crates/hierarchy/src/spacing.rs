@@ -1,10 +1,12 @@
 //! Local sampling radii.
 //!
-//! A point's spacing is the distance to its K-th nearest neighbour, with K growing up to 32 while those
+//! A point's spacing is the distance to its K-th nearest neighbour, with K growing up to 256 while those
 //! neighbours look like a line, as the returns of one LiDAR ring do. It is then made smooth,
-//! `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region.
+//! `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region; lines without
+//! another beside them and bends in rings, whose distances say nothing of a surface, are no such j.
 
 use std::num::NonZero;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss_surface::symmetric_eigen;
@@ -15,8 +17,13 @@ use crate::options::BuildError;
 use crate::split::id32;
 use crate::topology::Node;
 
-/// More neighbours than this say more about the shape than about the spacing.
-const MOST_NEIGHBOURS: usize = 32;
+/// How many neighbours are looked at where the first look like a line; doubled while they all do.
+const LINE_NEIGHBOURS: usize = 32;
+
+/// Points along a ring may be so many times nearer than the next ring is, twice over: 256 neighbours reach a ring
+/// a hundred spacings away, as sixteen beams 2° apart, 0.2° along, leave it on a floor met at a slope of one in
+/// ten. What is alone for longer is a wire, or stands for itself.
+const MOST_NEIGHBOURS: usize = 256;
 
 /// λ2 < 0.05 λ3 is what a line of points with noise looks like.
 const LINE: f64 = 0.05;
@@ -24,28 +31,77 @@ const LINE: f64 = 0.05;
 /// How fast radii may grow with distance. 0.3 lets them double over some three spacings.
 const GROWTH: f32 = 0.3;
 
-/// A spacing, and whether the neighbours still looked like a line when their number ran out.
+/// A spacing, and what the neighbours looked like.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Spacing {
     pub(crate) radius: f32,
-    pub(crate) is_line: bool,
+    pub(crate) look: Look,
+}
+
+/// What the neighbours of a point look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Look {
+    /// The first K spread over an area.
+    #[default]
+    Area,
+    /// The first K are a line, more of them are not: a ring among others.
+    Ring,
+    /// A line as far as was looked.
+    Line,
+    /// The first K spread, but only because a ring bends there or is jagged: most points about see a ring.
+    Bend,
 }
 
 /// The spacing of every one of the distinct `points`.
 pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Result<Vec<Spacing>, BuildError> {
     let turned = map(points, |p| turn(*p));
     let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&turned).or(Err(BuildError::Neighbours))?;
+    let nearest = |i: usize, count| nearest(&tree, points, &turned, i, count);
     let ids: Vec<u32> = (0..id32(points.len())).collect();
-    Ok(map(&ids, |&i| {
-        let near = nearest(&tree, points, &turned, i as usize, neighbours);
-        if near.len() <= neighbours || !is_line(points, &near) {
-            return Spacing { radius: near.last().map_or(0.0, length), is_line: false };
+    let mut spacings = map(&ids, |&i| spacing(points, neighbours, |count| nearest(i as usize, count)));
+
+    let rings: Vec<u32> = ids.into_iter().filter(|&i| spacings[i as usize].look != Look::Area).collect();
+    let votes: Vec<AtomicU32> =
+        (0..if rings.is_empty() { 0 } else { points.len() }).map(|_| 0.into()).collect();
+    // A sum does not depend on its order.
+    map(&rings, |&i| {
+        for (_, j) in nearest(i as usize, neighbours) {
+            votes[j].fetch_add(1, Ordering::Relaxed);
         }
-        let near = nearest(&tree, points, &turned, i as usize, MOST_NEIGHBOURS);
-        let last = near.len() - 1;
-        let grown = (neighbours..=last).find(|&k| !is_line(points, &near[..=k]));
-        Spacing { radius: length(&near[grown.unwrap_or(last)]), is_line: grown.is_none() }
-    }))
+    });
+    for (spacing, votes) in spacings.iter_mut().zip(votes) {
+        if spacing.look == Look::Area && 2 * votes.into_inner() as usize >= neighbours {
+            spacing.look = Look::Bend;
+        }
+    }
+    Ok(spacings)
+}
+
+/// The spacing of a point whose `nearest(count)` neighbours, itself first, are asked for as far as needed.
+fn spacing(points: &[[f32; 3]], neighbours: usize, nearest: impl Fn(usize) -> Vec<(f64, usize)>) -> Spacing {
+    let mut near = nearest(neighbours);
+    let radius = near.last().map_or(0.0, length);
+    let mut sums = Sums::default();
+    near.iter().for_each(|n| sums.add(points, near[0].1, n.1));
+    if near.len() <= neighbours || !sums.is_line() {
+        return Spacing { radius, look: Look::Area };
+    }
+    let mut count = LINE_NEIGHBOURS;
+    while sums.count < MOST_NEIGHBOURS {
+        let known = near.len();
+        near = nearest(count);
+        for n in near.iter().skip(known) {
+            sums.add(points, near[0].1, n.1);
+            if !sums.is_line() {
+                return Spacing { radius: length(n), look: Look::Ring };
+            }
+        }
+        if near.len() <= count {
+            break;
+        }
+        count *= 2;
+    }
+    Spacing { radius, look: Look::Line }
 }
 
 /// The distance of a neighbour: at least 1e-18, whose square single precision still holds.
@@ -97,38 +153,65 @@ fn nearest(
     near
 }
 
-/// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
-fn is_line(points: &[[f32; 3]], near: &[(f64, usize)]) -> bool {
-    let origin = points[near[0].1];
-    let mut s = [0.0_f64; 9];
-    for &(_, i) in near {
-        let [x, y, z] = [0, 1, 2].map(|k| f64::from(points[i][k] - origin[k]));
-        for (sum, v) in s.iter_mut().zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]) {
-            *sum += v;
-        }
-    }
-    #[expect(clippy::cast_precision_loss, reason = "at most 33")]
-    let n = near.len() as f64;
-    let [x, y, z, xx, xy, xz, yy, yz, zz] = s.map(|sum| sum / n);
-    let c = [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z];
-    // For a line λ1λ2 + λ3(λ1 + λ2) < (0.05² + 2·0.05) λ3²; most neighbourhoods are far from that, and the sum
-    // of the principal minors says so without a solve.
-    let minors = c[0] * c[3] - c[1] * c[1] + c[0] * c[5] - c[2] * c[2] + c[3] * c[5] - c[4] * c[4];
-    if minors > (LINE * LINE + 2.0 * LINE) * (c[0] + c[3] + c[5]).powi(2) * (1.0 + 1e-9) {
-        return false;
-    }
-    let [_, l2, l3] = symmetric_eigen(c).values;
-    l2 < LINE * l3
+/// Sums over some points, relative to one of them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    count: usize,
+    /// x y z xx xy xz yy yz zz.
+    of: [f64; 9],
 }
 
-/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over all j, by branch and bound on the tree.
-pub(crate) fn smooth(points: &[[f32; 3]], radii: &[f32], nodes: &[Node], boxes: &[OrientedBox]) -> Vec<f32> {
+impl Sums {
+    /// Adds point `i`, relative to point `origin`.
+    fn add(&mut self, points: &[[f32; 3]], origin: usize, i: usize) {
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(points[i][k] - points[origin][k]));
+        for (sum, v) in self.of.iter_mut().zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]) {
+            *sum += v;
+        }
+        self.count += 1;
+    }
+
+    /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
+    fn is_line(&self) -> bool {
+        #[expect(clippy::cast_precision_loss, reason = "at most 257")]
+        let n = self.count as f64;
+        let [x, y, z, xx, xy, xz, yy, yz, zz] = self.of.map(|sum| sum / n);
+        let c = [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z];
+        // The sum of the principal minors is λ1λ2 + λ3(λ1 + λ2). For a line it is less than
+        // (0.05² + 2·0.05) λ3², for anything else at least 0.05/1.05² of the trace's square: most
+        // neighbourhoods are decided without a solve.
+        let minors = c[0] * c[3] - c[1] * c[1] + c[0] * c[5] - c[2] * c[2] + c[3] * c[5] - c[4] * c[4];
+        let trace_sq = (c[0] + c[3] + c[5]).powi(2);
+        if minors > (LINE * LINE + 2.0 * LINE) * trace_sq * (1.0 + 1e-9) {
+            return false;
+        }
+        if minors < LINE / (1.0 + LINE).powi(2) * trace_sq * (1.0 - 1e-9) {
+            return true;
+        }
+        let [_, l2, l3] = symmetric_eigen(c).values;
+        l2 < LINE * l3
+    }
+}
+
+/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines and bends, by branch and bound on the tree.
+pub(crate) fn smooth(
+    points: &[[f32; 3]],
+    spacings: &[Spacing],
+    nodes: &[Node],
+    boxes: &[OrientedBox],
+) -> Vec<f32> {
+    // How near points are along a line says nothing of the surface about it.
+    let radii = map(spacings, |s| match s.look {
+        Look::Area | Look::Ring => s.radius,
+        Look::Line | Look::Bend => f32::INFINITY,
+    });
     let least =
         fold_nodes(nodes, |range| radii[range].iter().copied().fold(f32::INFINITY, f32::min), f32::min);
     let ids: Vec<u32> = (0..id32(points.len())).collect();
     map(&ids, |&i| {
         let p = points[i as usize];
-        let mut best = radii[i as usize];
+        let own = spacings[i as usize];
+        let mut best = if own.look == Look::Bend { f32::MAX } else { own.radius };
         let mut stack = [0_u32; TREE_STACK];
         let mut top = 1;
         while top > 0 {
@@ -150,7 +233,7 @@ pub(crate) fn smooth(points: &[[f32; 3]], radii: &[f32], nodes: &[Node], boxes: 
                 top += 2;
             }
         }
-        best
+        if best < f32::MAX { best } else { own.radius }
     })
 }
 

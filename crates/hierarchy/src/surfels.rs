@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::enclosure::{LeafBounds, Surroundings};
 use crate::gather::{GatherScratch, Index};
-use crate::spacing::Spacing;
+use crate::spacing::{Look, Spacing};
 use crate::topology::Node;
 
 /// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a square
@@ -72,6 +72,13 @@ impl PointKind {
 
     /// The greatest number that a kind is stored as.
     pub(crate) const LAST: u8 = Self::Isolated.code();
+    /// Whether too little is known about the point for its disc to be trusted: there is some surface within about
+    /// a local radius.
+    #[inline]
+    #[must_use]
+    pub const fn is_sparse(self) -> bool {
+        matches!(self, Self::Line | Self::Isolated)
+    }
 
     /// The number it is stored as.
     #[must_use]
@@ -98,12 +105,13 @@ pub(crate) struct Surfel {
     pub(crate) kind: PointKind,
 }
 
-/// The discs of the points of one leaf, numbered `points`, and bounds of its part of the surface; `about` is its box.
+/// The discs of the points of one leaf, numbered `points`, and bounds of its part of the surface; `about` is its box,
+/// `ordinary` the scan's sampling radius.
 pub(crate) fn leaf_surfels(
     index: &Index<'_>,
     points: std::ops::Range<usize>,
     about: &OrientedBox,
-    spacings: &[Spacing],
+    (spacings, ordinary): (&[Spacing], f32),
     (scratch, surroundings): (&mut GatherScratch, &mut Surroundings),
     surfels: &mut Vec<Surfel>,
 ) -> LeafBounds {
@@ -118,7 +126,7 @@ pub(crate) fn leaf_surfels(
     surroundings.fill(index.plan, places[0], &scratch.surroundings, scratch.reach);
     let mut cells = LeafBounds::new(places, about, surroundings).cells();
     for i in points {
-        let surfel = surfel(index, i, spacings[i], scratch);
+        let surfel = surfel(index, i, spacings[i], ordinary, scratch);
         let cell = surroundings.cell(index.positions[i], surfel.normal, index.radii[i], &scratch.near);
         cells.include(index.positions[i], surfel.normal, &cell);
         surfels.push(surfel);
@@ -127,7 +135,13 @@ pub(crate) fn leaf_surfels(
 }
 
 /// The disc of point `i`, about whose leaf `scratch` has collected points.
-fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, scratch: &mut GatherScratch) -> Surfel {
+fn surfel(
+    index: &Index<'_>,
+    i: usize,
+    spacing: Spacing,
+    ordinary: f32,
+    scratch: &mut GatherScratch,
+) -> Surfel {
     let x = index.positions[i].map(f64::from);
     scratch.gather_collected(index.plan, x);
     let near = &scratch.near;
@@ -139,7 +153,11 @@ fn surfel(index: &Index<'_>, i: usize, spacing: Spacing, scratch: &mut GatherScr
     #[expect(clippy::cast_precision_loss, reason = "a small number")]
     let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
     let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * border);
-    Surfel { normal, disc, kind: kind(&at, spacing.is_line) }
+    let kind = kind(&at, spacing.look == Look::Line);
+    // What is further than an ordinary horizon from all points is no surface (S0 eq. 6) but a hole, however sparse
+    // the points about it; what a lone point knows of ends with its ball.
+    let widest = if kind.is_sparse() { ordinary } else { index.plan.horizon(ordinary) };
+    Surfel { normal, disc: disc.min(widest), kind }
 }
 
 /// The greatest number of neighbouring sectors of the tangent plane in which no point lies.
@@ -220,13 +238,15 @@ pub(crate) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The least box along the axes of `about` that contains the discs of the node's points and their thickness.
+/// The least box along the axes of `about` that contains the discs of the node's points with their thickness, and
+/// their `balls`.
 pub(crate) fn box_of_discs(
     node: &Node,
     about: &OrientedBox,
     positions: &[[f32; 3]],
     normals: &[[f32; 3]],
     discs: &[f32],
+    balls: &[f32],
 ) -> OrientedBox {
     let mut low = [f32::INFINITY; 3];
     let mut high = [f32::NEG_INFINITY; 3];
@@ -236,7 +256,7 @@ pub(crate) fn box_of_discs(
             let c = dot(axis, positions[i]);
             // ‖n × axis‖, without the cancellation of √(1 − (n·axis)²).
             let [x, y, z] = cross(axis, normals[i]);
-            let spread = discs[i] * ((x * x + y * y + z * z).sqrt() + THICKNESS);
+            let spread = (discs[i] * ((x * x + y * y + z * z).sqrt() + THICKNESS)).max(balls[i]);
             low[k] = low[k].min(c - spread);
             high[k] = high[k].max(c + spread);
         }

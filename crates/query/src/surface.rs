@@ -1,7 +1,8 @@
 //! `Semantics::Surface`: the tangent discs of one scan against those of the other.
 //!
 //! Boxes hold the discs of their points, so a pair of disjoint boxes hides no crossing, and the descent finds
-//! a crossing exactly if there is one. Where two discs cross, Newton's method looks for a point on both
+//! a crossing exactly if there is one. Discs of points on lines and of lone ones are not to be trusted: where only
+//! they cross, or the other scan comes within a local radius of such a point, the answer stays open. Where two discs cross, Newton's method looks for a point on both
 //! implicit surfaces; it adds a witness and certainty, and does not overrule: the weighted fit rounds off tips
 //! and ends early at borders, where discs of points still tell (docs/decisions).
 
@@ -90,13 +91,29 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Puts the discs of a leaf of b into the lanes.
-    fn fill(&mut self, node: &Node) {
+    /// Puts the discs of a leaf of b into the lanes. Returns whether any point there is sparse.
+    fn fill(&mut self, node: &Node) -> bool {
+        let mut sparse = false;
         for (lane, j) in node.points().enumerate() {
             let disc = self.disc_b(j);
             self.lanes.set(lane, &disc);
+            sparse |= self.pair.b.ball(j) > 0.0;
         }
         self.lanes.close(node.count as usize);
+        sparse
+    }
+
+    /// Whether a disc of leaf `node` of b comes into the `ball` about the centre of `disc` of a, or that disc into
+    /// one of its balls. A point with a ball has no disc here.
+    fn comes_near_sparse(&self, disc: &Disc, ball: f32, node: &Node) -> bool {
+        let point =
+            |disc: &Disc, ball: f32| Disc { radius: if ball > 0.0 { 0.0 } else { disc.radius }, ..*disc };
+        node.points().any(|j| {
+            let other = self.disc_b(j);
+            let ball_b = self.pair.b.ball(j) * self.pair.relative.scale();
+            comes_within(ball, disc.centre, &point(&other, ball_b))
+                || comes_within(ball_b, other.centre, &point(disc, ball))
+        })
     }
 
     /// Discs of two leaves cross, those of points `i` and `j` first.
@@ -194,6 +211,14 @@ impl<'a> Surfaces<'a> {
     }
 }
 
+/// Whether some place of `disc` is within `radius` of `p`, which is more than zero.
+fn comes_within(radius: f32, p: [f32; 3], disc: &Disc) -> bool {
+    let d = Vector3::from(p) - Vector3::from(disc.centre);
+    let height = d.dot(&Vector3::from(disc.normal));
+    let beside = (d.norm_squared() - height * height).max(0.0).sqrt() - disc.radius;
+    radius > 0.0 && height * height + beside.max(0.0).powi(2) <= radius * radius
+}
+
 impl Visitor for Surfaces<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
@@ -226,16 +251,21 @@ impl Visitor for Surfaces<'_> {
         self.pair.meter.leaf_pair(node_a.count, node_b.count);
         // Most discs of one leaf are out of reach of all of the other.
         let bounds = self.pair.relative.moved(&self.pair.b.boxes[pair.b.index()]);
-        let mut ready = false;
+        let (mut ready, mut sparse) = (false, false);
         for i in node_a.points() {
             let disc = self.disc_a(i);
-            let reach = disc.radius + self.reach;
+            let ball = self.pair.a.ball(i);
+            let reach = disc.radius.max(ball) + self.reach;
             if bounds.distance_sq(disc.centre) > reach * reach {
                 continue;
             }
             if !ready {
-                self.fill(&node_b);
+                sparse = self.fill(&node_b);
                 ready = true;
+            }
+            let is_open = self.doubt == Some(Reason::Undersampled);
+            if (ball > 0.0 || sparse) && !is_open && self.comes_near_sparse(&disc, ball, &node_b) {
+                self.doubt = Some(Reason::Undersampled);
             }
             let mut bits = self.lanes.crossings(&disc);
             while bits != 0 {

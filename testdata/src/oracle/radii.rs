@@ -1,8 +1,12 @@
 //! The spacing of every point: how far its neighbours are, made smooth.
 //!
 //! Raw: the distance to the K-th nearest other point, K = 6. While the point and its K nearest look like a
-//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 32. Smooth:
-//! `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region.
+//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 256; if they still do
+//! then, the distance to the 6th counts after all. A point whose own six are no line, but which is among the six
+//! nearest of three or more points whose six are, is a bend in a ring: its distance says nothing.
+//!
+//! Smooth: `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region, over i
+//! itself, unless it is a bend, and all j that are neither lines to the end nor bends.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -12,7 +16,7 @@ use super::eigen::symmetric_eigen;
 pub const RANK: usize = 6;
 
 /// How far K may grow where neighbours look like a line.
-pub const GREATEST_RANK: usize = 32;
+pub const GREATEST_RANK: usize = 256;
 
 /// Points look like a line when λ2 is less than this share of λ3.
 pub const LINE_RATIO: f64 = 0.05;
@@ -20,40 +24,79 @@ pub const LINE_RATIO: f64 = 0.05;
 /// How fast smoothed spacing may grow, per unit of distance.
 pub const SLOPE: f64 = 0.3;
 
-/// The smoothed spacing of every point: [`smoothed`] of [`spacing`]. In the unit of `points`.
+/// How far a point's neighbours are, and how they lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spacing {
+    /// The distance, in the unit of the points.
+    pub radius: f64,
+    /// Whether the first K look like a line.
+    pub is_ring: bool,
+    /// Whether that distance tells how densely a surface is sampled: not on a line to the end, nor at a bend.
+    pub speaks: bool,
+}
+
+/// The smoothed spacing of every point: [`smoothed`] of [`spacings`]. In the unit of `points`.
 #[must_use]
 pub fn radii(points: &[[f64; 3]]) -> Vec<f64> {
-    smoothed(points, &spacing(points))
+    smoothed(points, &spacings(points))
 }
 
 /// The raw spacing of every point, in the unit of `points`.
+#[must_use]
+pub fn spacing(points: &[[f64; 3]]) -> Vec<f64> {
+    spacings(points).iter().map(|s| s.radius).collect()
+}
+
+/// The raw spacing of every point, and how its neighbours lie.
 ///
 /// Other points at the very same place are not counted, and of several at one place only the first; among
 /// equally far neighbours the one of lower index is the nearer. Where fewer than K others exist, the farthest
 /// counts; without any the spacing is zero.
 #[must_use]
-pub fn spacing(points: &[[f64; 3]]) -> Vec<f64> {
-    (0..points.len()).map(|i| spacing_of(points, i)).collect()
-}
-
-fn spacing_of(points: &[[f64; 3]], i: usize) -> f64 {
-    let mut others: Vec<(f64, usize)> =
-        (0..points.len()).map(|j| (distance(points[i], points[j]), j)).filter(|&(d, _)| d > 0.0).collect();
-    others.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut group = vec![points[i]];
-    let mut reach = 0.0;
-    for (d, j) in others {
-        if group.contains(&points[j]) {
-            continue;
-        }
-        group.push(points[j]);
-        reach = d;
-        let k = group.len() - 1;
-        if k >= GREATEST_RANK || (k >= RANK && !looks_like_a_line(&group)) {
-            break;
+pub fn spacings(points: &[[f64; 3]]) -> Vec<Spacing> {
+    let mut all: Vec<Spacing> = (0..points.len()).map(|i| spacing_of(points, i)).collect();
+    let mut votes = vec![0; points.len()];
+    for i in (0..points.len()).filter(|&i| all[i].is_ring) {
+        for (_, j) in others(points, i).into_iter().take(RANK) {
+            votes[j] += 1;
         }
     }
-    reach
+    for (spacing, votes) in all.iter_mut().zip(votes) {
+        spacing.speaks &= spacing.is_ring || 2 * votes < RANK;
+    }
+    all
+}
+
+/// Distance and index of the other points, the first at each place, by distance, then index.
+fn others(points: &[[f64; 3]], i: usize) -> Vec<(f64, usize)> {
+    let mut all: Vec<(f64, usize)> =
+        (0..points.len()).map(|j| (distance(points[i], points[j]), j)).filter(|&(d, _)| d > 0.0).collect();
+    all.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut distinct: Vec<(f64, usize)> = Vec::new();
+    for (d, j) in all {
+        // Points at one place are equally far, so they are among the last kept.
+        let same = |other: &&(f64, usize)| other.0.total_cmp(&d).is_eq();
+        if distinct.iter().rev().take_while(same).all(|other| points[other.1] != points[j]) {
+            distinct.push((d, j));
+        }
+    }
+    distinct
+}
+
+fn spacing_of(points: &[[f64; 3]], i: usize) -> Spacing {
+    let others = others(points, i);
+    let first = others.get(..RANK).unwrap_or(&others);
+    let radius = first.last().map_or(0.0, |other| other.0);
+    let group = |k: usize| -> Vec<[f64; 3]> {
+        [points[i]].into_iter().chain(others[..k].iter().map(|other| points[other.1])).collect()
+    };
+    if first.len() < RANK || !looks_like_a_line(&group(RANK)) {
+        return Spacing { radius, is_ring: false, speaks: true };
+    }
+    let most = others.len().min(GREATEST_RANK);
+    let grown = (RANK + 1..=most).find(|&k| !looks_like_a_line(&group(k)));
+    let radius = grown.map_or(radius, |k| others[k - 1].0);
+    Spacing { radius, is_ring: true, speaks: grown.is_some() }
 }
 
 /// Whether the covariance of `group` about its mean has λ2 < 0.05 λ3.
@@ -71,18 +114,21 @@ pub fn looks_like_a_line(group: &[[f64; 3]]) -> bool {
     middle < LINE_RATIO * greatest
 }
 
-/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over all j, of the values given.
+/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i, unless it is a bend, and all j that speak.
 ///
 /// # Panics
 /// When there is not one value for each point.
 #[must_use]
-pub fn smoothed(points: &[[f64; 3]], raw: &[f64]) -> Vec<f64> {
+pub fn smoothed(points: &[[f64; 3]], raw: &[Spacing]) -> Vec<f64> {
     assert_eq!(points.len(), raw.len(), "one value for each point");
-    let least = |p: &[f64; 3]| {
-        let all = points.iter().zip(raw);
-        all.map(|(q, r)| r + SLOPE * distance(*p, *q)).fold(f64::INFINITY, f64::min)
+    let least = |(p, own): (&[f64; 3], &Spacing)| {
+        let speaking = points.iter().zip(raw).filter(|(_, r)| r.speaks);
+        let of_others =
+            speaking.map(|(q, r)| r.radius + SLOPE * distance(*p, *q)).fold(f64::INFINITY, f64::min);
+        let is_bend = !own.is_ring && !own.speaks;
+        if is_bend && of_others.is_finite() { of_others } else { of_others.min(own.radius) }
     };
-    points.iter().map(least).collect()
+    points.iter().zip(raw).map(least).collect()
 }
 
 /// The least of `values` that at least a share `q` of them does not exceed; `q` in (0, 1].
@@ -132,7 +178,21 @@ mod tests {
         let raw = spacing(&points);
         assert!((raw[20] - 1.2).abs() < 1e-12, "one point of the other ring ends the growth: {}", raw[20]);
         let single: Vec<_> = ring(0.0).collect();
-        assert!((spacing(&single)[0] - 3.2).abs() < 1e-12, "K stops at 32");
+        assert!((spacing(&single)[0] - 0.6).abs() < 1e-12, "alone, the sixth counts");
+        let far: Vec<_> = ring(0.0).chain(ring(1e3)).chain([[0.0, -1e3, 0.0]]).collect();
+        assert!((radii(&far)[20] - 0.3).abs() < 1e-12, "beyond the 256th nothing is looked for");
+    }
+
+    #[test]
+    fn a_bend_takes_the_spacing_about_it() {
+        // Rings 1.2 apart with steps of 0.1 and a kink to one side in the middle of one.
+        let ring = |y: f64| (0..41).map(move |i| [0.1 * f64::from(i), y, 0.0]);
+        let mut points: Vec<_> = (0..5).flat_map(|k| ring(1.2 * f64::from(k))).collect();
+        let kink = 2 * 41 + 20;
+        points[kink][1] += 0.13;
+        let raw = spacings(&points);
+        assert!(!raw[kink].speaks && raw[kink].radius < 0.4, "{:?}", raw[kink]);
+        assert!(radii(&points)[kink] > 1.0, "{}", radii(&points)[kink]);
     }
 
     #[test]
@@ -147,9 +207,9 @@ mod tests {
     fn a_lone_point_takes_its_neighbours_spacing() {
         let mut points: Vec<_> = (0..64).map(|i| [f64::from(i % 8), f64::from(i / 8), 0.0]).collect();
         points.push([3.5, 3.5, 10.0]);
-        let raw = spacing(&points);
+        let raw = spacings(&points);
         let smooth = smoothed(&points, &raw);
-        assert!(raw[64] > 10.0 && smooth[64] < 5.0, "{} to {}", raw[64], smooth[64]);
+        assert!(raw[64].radius > 10.0 && smooth[64] < 5.0, "{} to {}", raw[64].radius, smooth[64]);
         assert!((quantile(&[3.0, 1.0, 2.0], 0.5) - 2.0).abs() < 1e-15);
         assert!((quantile(&[3.0, 1.0, 2.0], 1.0) - 3.0).abs() < 1e-15);
     }

@@ -48,10 +48,10 @@ fn people_read_a_health_line_and_advice() {
     assert!(done.results.lines().last().unwrap().starts_with("health"), "{}", done.results);
     assert!(done.results.contains("100 % of the points usable"), "{}", done.results);
 
-    // Rings ten times as far from each other as their points.
+    // Rings a thousand times as far from each other as their points.
     let rings: Vec<[f64; 3]> = (0..20_u8)
         .flat_map(|ring| (0..600_u16).map(move |i| (f64::from(ring), f64::from(i) * 0.01)))
-        .map(|(ring, turn)| [3.0 * turn.cos(), 3.0 * turn.sin(), 2.0 * ring])
+        .map(|(ring, turn)| [3.0 * turn.cos(), 3.0 * turn.sin(), 30.0 * ring])
         .collect();
     place.write("rings.xyz", text(&rings));
     let done = place.ok(&["preprocess", "rings.xyz", "-o", "rings.nm"]);
