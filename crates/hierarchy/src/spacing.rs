@@ -90,10 +90,10 @@ fn spacing(points: &[[f32; 3]], neighbours: usize, nearest: impl Fn(usize) -> Ve
     while sums.count < MOST_NEIGHBOURS {
         let known = near.len();
         near = nearest(count);
-        for n in near.iter().skip(known) {
-            sums.add(points, near[0].1, n.1);
-            if !sums.is_line() {
-                return Spacing { radius: length(n), look: Look::Ring };
+        for k in known..near.len() {
+            sums.add(points, near[0].1, near[k].1);
+            if !sums.is_line() && sums.lies_across(points, &near[..=k]) {
+                return Spacing { radius: length(&near[k]), look: Look::Ring };
             }
         }
         if near.len() <= count {
@@ -171,12 +171,28 @@ impl Sums {
         self.count += 1;
     }
 
-    /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
-    fn is_line(&self) -> bool {
+    /// The covariance about their mean as xx xy xz yy yz zz.
+    fn covariance(&self) -> [f64; 6] {
         #[expect(clippy::cast_precision_loss, reason = "at most 257")]
         let n = self.count as f64;
         let [x, y, z, xx, xy, xz, yy, yz, zz] = self.of.map(|sum| sum / n);
-        let c = [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z];
+        [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
+    }
+
+    /// Whether any of the points `near` lies more across the main direction than along it, seen from the first: an
+    /// arc grows wide too, but the next ring alone has points beside it.
+    fn lies_across(&self, points: &[[f32; 3]], near: &[(f64, usize)]) -> bool {
+        let main = symmetric_eigen(self.covariance()).vectors[2];
+        let origin = points[near[0].1];
+        near.iter().any(|&(d_sq, i)| {
+            let along: f64 = (0..3).map(|k| main[k] * f64::from(points[i][k] - origin[k])).sum();
+            2.0 * along * along < d_sq
+        })
+    }
+
+    /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
+    fn is_line(&self) -> bool {
+        let c = self.covariance();
         // The sum of the principal minors is λ1λ2 + λ3(λ1 + λ2). For a line it is less than
         // (0.05² + 2·0.05) λ3², for anything else at least 0.05/1.05² of the trace's square: most
         // neighbourhoods are decided without a solve.

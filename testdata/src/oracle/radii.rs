@@ -1,8 +1,8 @@
 //! The spacing of every point: how far its neighbours are, made smooth.
 //!
 //! Raw: the distance to the K-th nearest other point, K = 6. While the point and its K nearest look like a
-//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 256; if they still do
-//! then, the distance to the 6th counts after all. A point whose own six are no line, but which is among the six
+//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 256, until they do not and one lies
+//! more across their main direction than along it, seen from the point (an arc has none); if that does not happen, the distance to the 6th counts after all. A point whose own six are no line, but which is among the six
 //! nearest of three or more points whose six are, is a bend in a ring: its distance says nothing.
 //!
 //! Smooth: `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region, over i
@@ -94,14 +94,29 @@ fn spacing_of(points: &[[f64; 3]], i: usize) -> Spacing {
         return Spacing { radius, is_ring: false, speaks: true };
     }
     let most = others.len().min(GREATEST_RANK);
-    let grown = (RANK + 1..=most).find(|&k| !looks_like_a_line(&group(k)));
+    let grown = (RANK + 1..=most).find(|&k| !looks_like_a_line(&group(k)) && lies_across(&group(k)));
     let radius = grown.map_or(radius, |k| others[k - 1].0);
     Spacing { radius, is_ring: true, speaks: grown.is_some() }
+}
+
+/// Whether any of `group` lies more across its main direction than along it, seen from the first.
+fn lies_across(group: &[[f64; 3]]) -> bool {
+    let main: Vector3<f64> = symmetric_eigen(&covariance(group)).vectors[2].into();
+    group.iter().any(|&p| {
+        let d = Vector3::from(p) - Vector3::from(group[0]);
+        2.0 * d.dot(&main).powi(2) < d.norm_squared()
+    })
 }
 
 /// Whether the covariance of `group` about its mean has λ2 < 0.05 λ3.
 #[must_use]
 pub fn looks_like_a_line(group: &[[f64; 3]]) -> bool {
+    let [_, middle, greatest] = symmetric_eigen(&covariance(group)).values;
+    middle < LINE_RATIO * greatest
+}
+
+/// The covariance of `group` about its mean.
+fn covariance(group: &[[f64; 3]]) -> Matrix3<f64> {
     let sum: Vector3<f64> = group.iter().map(|&p| Vector3::from(p)).sum();
     let n = count(group.len());
     let mean = sum / n;
@@ -110,8 +125,7 @@ pub fn looks_like_a_line(group: &[[f64; 3]]) -> bool {
         let d = Vector3::from(p) - mean;
         covariance += d * d.transpose() / n;
     }
-    let [_, middle, greatest] = symmetric_eigen(&covariance).values;
-    middle < LINE_RATIO * greatest
+    covariance
 }
 
 /// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i, unless it is a bend, and all j that speak.
@@ -181,6 +195,14 @@ mod tests {
         assert!((spacing(&single)[0] - 0.6).abs() < 1e-12, "alone, the sixth counts");
         let far: Vec<_> = ring(0.0).chain(ring(1e3)).chain([[0.0, -1e3, 0.0]]).collect();
         assert!((radii(&far)[20] - 0.3).abs() < 1e-12, "beyond the 256th nothing is looked for");
+    }
+
+    #[test]
+    fn a_circle_alone_is_a_line() {
+        let turn = |i: u32| (f64::from(i) * 0.01).sin_cos();
+        let points: Vec<_> = (0..628).map(turn).map(|(s, c)| [3.0 * c, 3.0 * s, 0.0]).collect();
+        let all = spacings(&points);
+        assert!(all[300].is_ring && !all[300].speaks && all[300].radius < 0.1, "{:?}", all[300]);
     }
 
     #[test]
