@@ -9,3 +9,4 @@ pub mod pairs;
 
 pub mod arbitrary;
 pub mod dragon;
+pub mod scanner;

@@ -290,7 +290,8 @@ mod tests {
         let set = set();
         for t in set.tally() {
             let one_sided =
-                ["spheres-shifted", "patches-parallel", "sheet-between-plates"].contains(&t.family);
+                ["spheres-shifted", "patches-parallel", "sheet-between-plates", "sheet-above-plates"]
+                    .contains(&t.family);
             assert!(t.apart + t.intersecting >= 12, "{t:?}");
             assert!(one_sided || (t.apart >= 8 && t.intersecting >= 4), "{t:?}");
         }

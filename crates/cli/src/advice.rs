@@ -16,9 +16,11 @@ pub(crate) fn health(scan: &Scan) -> Vec<String> {
         [PointKind::Line, PointKind::Ambiguous, PointKind::Isolated].map(|kind| scan.share(kind));
     let spacing = f64::from(median(scan.radii())) * scan.frame().scale;
     let mut said = vec![format!(
-        "health     spacing {}; {} of the points usable, {} sampled as lines, {} ambiguous, {} isolated",
+        "health     spacing {}; {} of the points usable ({} at borders), {} sampled as lines, {} ambiguous, \
+         {} isolated",
         short(spacing),
         percent(scan.usable()),
+        percent(scan.share(PointKind::Border)),
         percent(lines),
         percent(ambiguous),
         percent(isolated)

@@ -1,6 +1,6 @@
 //! What scripts are told, the fields of the JSON lines, and the same in rows for people.
 
-use nearmiss::{Answer, Evidence, Reason, Scan, Verdict};
+use nearmiss::{Answer, Evidence, PointKind, Reason, Scan, Verdict};
 use serde::Serialize;
 
 use crate::digits::{bytes, count, place, short};
@@ -22,6 +22,7 @@ pub(crate) struct ScanReport {
     bytes: u64,
     bytes_per_node: f64,
     usable: f64,
+    kinds: KindsReport,
     /// None is built yet.
     graph: Option<()>,
 }
@@ -30,6 +31,16 @@ pub(crate) struct ScanReport {
 struct DroppedReport {
     not_finite: usize,
     duplicate: usize,
+}
+
+/// Shares of the points by what their neighbourhoods look like; together 1.
+#[derive(Debug, Serialize)]
+struct KindsReport {
+    surface: f64,
+    border: f64,
+    line: f64,
+    isolated: f64,
+    ambiguous: f64,
 }
 
 impl ScanReport {
@@ -57,6 +68,13 @@ impl ScanReport {
             bytes,
             bytes_per_node: bytes as f64 / nodes as f64,
             usable: scan.usable(),
+            kinds: KindsReport {
+                surface: scan.share(PointKind::Surface),
+                border: scan.share(PointKind::Border),
+                line: scan.share(PointKind::Line),
+                isolated: scan.share(PointKind::Isolated),
+                ambiguous: scan.share(PointKind::Ambiguous),
+            },
             graph: None,
         }
     }

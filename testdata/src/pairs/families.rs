@@ -59,7 +59,7 @@ const BETWEEN: &str =
     "a sheet between two parallel plates, parallel to them: the distance to the nearer, exact";
 
 /// Distances of plates, in r of a lattice.
-const DISTANCES: [f64; 6] = [0.5, 1.0, 2.0, 3.0, 4.0, 6.0];
+const DISTANCES: [f64; 7] = [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
 
 pub(super) fn families() -> Vec<Family> {
     use Body::{
@@ -91,6 +91,7 @@ pub(super) fn families() -> Vec<Family> {
     for distance in DISTANCES {
         let plates = Plates(distance);
         all.push(thin("sheet-between-plates", BETWEEN, [plates, Sheet], sheets::between));
+        all.push(thin("sheet-above-plates", PARALLEL, [plates, Sheet], sheets::parallel));
         all.push(thin("edge-plates", EDGE, [plates, Sheet], sheets::edge));
         all.push(thin("ball-plates", BALL, [plates, Ball], ball::ball));
     }

@@ -6,7 +6,7 @@ use nearmiss_testdata::shapes::{bowl, sphere};
 use crate::running::{Place, keys, name, numbers, sorted, text};
 
 const FIELDS: &str = "points dropped bounds sampling_radius bandwidth horizon support_min nodes leaves depth_mean \
-                      bytes bytes_per_node usable graph";
+                      bytes bytes_per_node usable kinds graph";
 
 #[test]
 fn the_report_has_the_fields_that_scripts_rely_on() {
@@ -31,6 +31,12 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
     assert!((0.1..0.25).contains(&radius), "radius {radius} at a spacing of 0.1");
     assert!(number("horizon") > number("bandwidth") && number("bandwidth") > 0.0, "{report}");
     assert!(number("usable") > 0.99, "a clean sphere");
+    let kinds = &report["kinds"];
+    assert_eq!(keys(kinds), ["ambiguous", "border", "isolated", "line", "surface"]);
+    let share = |kind: &str| kinds[kind].as_f64().unwrap();
+    assert!((share("surface") + share("border") - number("usable")).abs() < 1e-12, "{kinds}");
+    let all: f64 = ["ambiguous", "border", "isolated", "line", "surface"].map(share).iter().sum();
+    assert!((all - 1.0).abs() < 1e-12, "{kinds}");
 
     let mut seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
     let version = seen.as_object_mut().unwrap().remove("format_version").unwrap();

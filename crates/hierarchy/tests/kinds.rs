@@ -1,0 +1,103 @@
+//! What points are said to be, on clouds whose nature is known.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use nearmiss_geometry::PointCloud;
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
+use nearmiss_testdata::arbitrary::{gaussian, point_in, rng};
+use nearmiss_testdata::scanner::{self, Frame};
+
+fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
+    let scan = PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default());
+    let scan = scan.unwrap();
+    assert_eq!(scan.sanity_check(), Ok(()));
+    scan
+}
+
+/// A square lattice of n × n points.
+fn lattice(n: u32, spacing: f64, height: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
+    let side = |i: u32| f64::from(i) * spacing;
+    let all = (0..n).flat_map(|i| (0..n).map(move |j| [side(i), side(j)]));
+    all.map(|[x, y]| [x, y, height(x, y)]).collect()
+}
+
+#[test]
+fn rings_of_a_scanner_make_a_surface() {
+    for (beams, steps, noise) in [(32, 900, 0.0), (32, 1800, 0.005), (64, 1800, 0.005), (16, 1800, 0.0)] {
+        let points = scanner::frame(&Frame { beams, steps, noise, seed: 3 });
+        let scan = prepared(&points);
+        let label = format!("{beams} beams of {steps}, noise {noise}");
+        assert!(scan.usable() > 0.8, "{label}: {} usable", scan.usable());
+        assert!(scan.share(PointKind::Line) < 0.1, "{label}: {} lines", scan.share(PointKind::Line));
+        let (mut turned, mut trusted) = (0, 0);
+        for i in (0..scan.len()).filter(|&i| scan.kind(i) == PointKind::Surface) {
+            let p = scan.positions()[i].map(f64::from);
+            let origin = scan.frame().origin;
+            let (_, normal) = scanner::off([0, 1, 2].map(|k| p[k] * scan.frame().scale + origin[k]));
+            let cosine: f64 = (0..3).map(|k| normal[k] * f64::from(scan.normals()[i][k])).sum();
+            turned += u32::from(cosine.abs() < 0.9);
+            trusted += 1;
+        }
+        let share = f64::from(turned) / f64::from(trusted);
+        assert!(share < 0.05, "{label}: {share} of the trusted normals are off by more than 26°");
+    }
+}
+
+#[test]
+fn quantised_sheets_are_surfaces() {
+    // A slope and a wave, heights rounded to the grid's step.
+    let rounded = |z: f64| (z / 0.01).round() * 0.01;
+    for points in [
+        lattice(60, 0.01, |x, _| rounded(0.37 * x)),
+        lattice(60, 0.02, |x, y| rounded(0.05 * (9.0 * x).sin() + 0.1 * y)),
+    ] {
+        let scan = prepared(&points);
+        assert!(scan.usable() > 0.97, "{} usable", scan.usable());
+    }
+    // Each return twice, an error of a hundredth of the spacing apart.
+    let mut rng = rng(4);
+    let twice = lattice(50, 0.1, |_, _| 0.0);
+    let again: Vec<[f64; 3]> = twice.iter().map(|p| p.map(|x| x + 0.001 * gaussian(&mut rng))).collect();
+    let scan = prepared(&[twice, again].concat());
+    assert!(scan.usable() > 0.97, "{} usable", scan.usable());
+}
+
+#[test]
+fn blobs_wires_and_lone_points_are_named() {
+    let mut rng = rng(5);
+    let blob: Vec<[f64; 3]> = (0..3000).map(|_| point_in(&mut rng, 1.0)).collect();
+    let scan = prepared(&blob);
+    assert!(scan.share(PointKind::Ambiguous) > 0.7, "{} of a blob", scan.share(PointKind::Ambiguous));
+    assert!(scan.share(PointKind::Surface) < 0.2, "{} of a blob", scan.share(PointKind::Surface));
+
+    let wire: Vec<[f64; 3]> =
+        (0..2000_u16).map(|i| f64::from(i) * 0.01).map(|t| [t, 0.3 * t.sin(), 0.0]).collect();
+    let scan = prepared(&wire);
+    assert!(scan.share(PointKind::Line) > 0.99, "{} of a wire", scan.share(PointKind::Line));
+    let greatest = scan.radii().iter().copied().fold(0.0, f32::max);
+    assert!(greatest < 0.065, "a wire alone is as thin as its sixth neighbour: {greatest}");
+
+    let mut points = lattice(40, 0.1, |_, _| 0.0);
+    points.extend([[1.0, 1.0, 2.0], [3.0, 2.0, 3.0]]);
+    let scan = prepared(&points);
+    let lone = scan.source().iter().position(|&s| s == 1600).unwrap();
+    assert_eq!(scan.kind(lone), PointKind::Isolated);
+    let ball = scan.slices().ball(lone);
+    assert!(scan.discs()[lone] <= ball && f64::from(ball) <= scan.sampling_radius(), "{ball}");
+    assert!(scan.share(PointKind::Isolated) < 0.002, "no other");
+}
+
+#[test]
+fn where_samples_are_far_fewer_than_elsewhere_discs_end_at_the_horizon() {
+    // A twentieth of the points, thirty times as far from each other, and too far away to be smoothed.
+    let far = lattice(15, 3.0, |_, _| 0.0).into_iter().map(|[x, y, z]| [x + 500.0, y, z]);
+    let points: Vec<[f64; 3]> = lattice(70, 0.1, |_, _| 0.0).into_iter().chain(far).collect();
+    let scan = prepared(&points);
+    let greatest = |of: &[f32]| f64::from(of.iter().copied().fold(0.0, f32::max));
+    let horizon = f64::from(scan.plan().horizon(1.0)) * scan.sampling_radius();
+    assert!(greatest(scan.radii()) > 4.0, "{}", greatest(scan.radii()));
+    assert!(
+        (greatest(scan.discs()) / horizon - 1.0).abs() < 1e-5,
+        "{} for {horizon}",
+        greatest(scan.discs())
+    );
+}
