@@ -33,7 +33,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use clap;
-pub use collide::{CollideArgs, DetailName};
+pub use collide::{CollideArgs, DetailName, EvidenceName};
 pub use error::CliError;
 pub use eval::EvalArgs;
 pub use export::ExportArgs;

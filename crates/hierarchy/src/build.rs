@@ -356,7 +356,12 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
 }
 
 /// The discs of all points and the bounds of all leaves, in order, some leaves at a time.
-fn surfels(index: &Index<'_>, spacings: &[Spacing], ordinary: f32, leaf_size: usize) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
+fn surfels(
+    index: &Index<'_>,
+    spacings: &[Spacing],
+    ordinary: f32,
+    leaf_size: usize,
+) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
     let leaves: Vec<(&Node, &OrientedBox)> =
         index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).collect();
     let fit = |leaves: &[(&Node, &OrientedBox)]| {

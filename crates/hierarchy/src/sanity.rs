@@ -104,13 +104,14 @@ impl PointHierarchy {
         self.check_lengths()?;
         check_topology(&self.nodes, self.len(), self.leaf_size)?;
         self.check_metadata()?;
-        nodes::check_ranges(&self.boxes)
+        nodes::check_ranges(&self.boxes)?;
+        nodes::check_ranges(&self.enclosures)
     }
 
     /// What their answers need besides, given the structure: each box lies within its parent's, and every number of
     /// every point is one that a build writes, and lies within what its leaf says. One pass over the whole.
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
-        nodes::check(&self.nodes, &self.boxes)?;
+        nodes::check(&self.nodes, &self.boxes, &self.enclosures)?;
         points::check(self)?;
         self.check_summary()
     }

@@ -1,7 +1,8 @@
 //! The same scene elsewhere, turned, larger or smaller, is the same scene.
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, PointCloud, Pose, Scan, collide_with,
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, PointCloud, Pose, Reason, Scan,
+    Verdict, collide_with,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -26,7 +27,7 @@ fn verdicts_outside_the_band_do_not_change() {
         Scan::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
     };
     let mut scratch = CollideScratch::default();
-    let mut asked = 0;
+    let (mut asked, mut thin, mut ambiguous) = (0, 0, 0);
     for (name, motion) in motions() {
         let moved: Vec<Scan> = (set.shapes.iter())
             .map(|shape| build(&shape.points.iter().map(|&p| motion.apply(p)).collect::<Vec<_>>()))
@@ -38,6 +39,12 @@ fn verdicts_outside_the_band_do_not_change() {
             let (pose_a, pose_b) = (pair.pose_a.after(&back), pair.pose_b.after(&back));
             let (va, vb) = (a.at(&pose_a), b.at(&pose_b));
             let verdict = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
+            thin += usize::from(pair.thin);
+            asked += 1;
+            if pair.thin && verdict == Verdict::Undecided(Reason::Ambiguous) {
+                ambiguous += 1;
+                continue;
+            }
             assert_eq!(
                 (verdict.is_intersecting(), verdict.is_separated()),
                 (pair.truth, !pair.truth),
@@ -45,8 +52,8 @@ fn verdicts_outside_the_band_do_not_change() {
                 pair.family,
                 pair.gap / pair.r
             );
-            asked += 1;
         }
     }
     assert!(asked > 1000, "{asked} questions");
+    assert!(ambiguous * 20 <= thin, "{ambiguous} of {thin} thin ones undecided");
 }

@@ -19,6 +19,7 @@ fn same(a: &Scan, b: &Scan) {
     assert_eq!(a.source(), b.source(), "source");
     assert_eq!(a.nodes(), b.nodes(), "nodes");
     assert_eq!(a.boxes(), b.boxes(), "boxes");
+    assert_eq!(a.enclosures(), b.enclosures(), "enclosures");
     assert_eq!(a.cones(), b.cones(), "cones");
 }
 
@@ -39,8 +40,15 @@ fn what_is_saved_is_what_opens() {
 }
 
 #[test]
-fn the_golden_file_of_version_one_opens() {
+fn the_golden_file_of_version_one_is_refused_by_name() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v1.nm");
+    let refused = Scan::open(path, Check::Full).unwrap_err().to_string();
+    assert!(refused.contains("version 1") && refused.contains("prepare"), "{refused}");
+}
+
+#[test]
+fn the_golden_file_of_version_two_opens() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v2.nm");
     let golden = Scan::open(path, Check::Full).unwrap();
     assert_eq!(golden.sanity_check(), Ok(()), "a valid scan");
     same(&golden, &small());

@@ -108,11 +108,13 @@ impl<'a> Surfaces<'a> {
     fn comes_near_sparse(&self, disc: &Disc, ball: f32, node: &Node) -> bool {
         let point =
             |disc: &Disc, ball: f32| Disc { radius: if ball > 0.0 { 0.0 } else { disc.radius }, ..*disc };
+        // Within a margin of a ball is as good as within it.
+        let reach = |ball: f32| if ball > 0.0 { ball + self.reach } else { 0.0 };
         node.points().any(|j| {
             let other = self.disc_b(j);
             let ball_b = self.pair.b.ball(j) * self.pair.relative.scale();
-            comes_within(ball, disc.centre, &point(&other, ball_b))
-                || comes_within(ball_b, other.centre, &point(disc, ball))
+            comes_within(reach(ball), disc.centre, &point(&other, ball_b))
+                || comes_within(reach(ball_b), other.centre, &point(disc, ball))
         })
     }
 

@@ -10,8 +10,8 @@ use crate::topology::Node;
 const ASKEW: f32 = 1e-3;
 
 /// What rounding may make a child stick out of its parent, relative to their coordinates: both boxes were grown by
-/// 1e-6 of their own, and the comparison rounds as much again.
-const STICKS_OUT: f32 = 4e-6;
+/// 2e-6 of their own, and the comparison rounds as much again.
+const STICKS_OUT: f32 = 8e-6;
 
 /// Numbers of a box.
 const NUMBERS: usize = size_of::<OrientedBox>() / size_of::<f32>();
@@ -46,15 +46,17 @@ pub(super) fn check_ranges(boxes: &[OrientedBox]) -> Result<(), Flaw> {
     first_wrong(boxes.iter().position(|b| !is_sound(b)))
 }
 
-/// Checks the boxes of a tree whose topology and ranges are sound: axes form a frame, and each box lies within its
-/// parent's.
-pub(super) fn check(nodes: &[Node], boxes: &[OrientedBox]) -> Result<(), Flaw> {
+/// Checks the boxes of a tree whose topology and ranges are sound: axes form a frame, each box lies within its
+/// enclosure and its parent's box, and each enclosure within its parent's.
+pub(super) fn check(nodes: &[Node], boxes: &[OrientedBox], enclosures: &[OrientedBox]) -> Result<(), Flaw> {
     let askew = boxes.iter().position(|b| !is_frame(&b.axes));
     first_wrong(askew)?;
+    let narrow = boxes.iter().zip(enclosures).position(|(b, e)| e.axes != b.axes || !lies_within(b, e));
+    first_wrong(narrow)?;
     for (id, (node, bounds)) in nodes.iter().zip(boxes).enumerate() {
         if !node.is_leaf() {
             for child in [id + 1, node.right as usize] {
-                if !lies_within(&boxes[child], bounds) {
+                if !(lies_within(&boxes[child], bounds) && lies_within(&enclosures[child], &enclosures[id])) {
                     return first_wrong(Some(child));
                 }
             }
