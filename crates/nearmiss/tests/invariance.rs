@@ -1,11 +1,13 @@
-//! The same scene elsewhere, turned, larger or smaller, is the same scene.
+//! The same scene elsewhere, turned, larger or smaller, is the same scene; so it is with its scans exchanged, their
+//! points in another order, given twice, or more of them.
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, PointCloud, Pose, Reason, Scan,
-    Verdict, collide_with,
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Evidence, PointCloud, Pose, Reason,
+    Scan, Semantics, Verdict, collide_with,
 };
-use nearmiss_testdata::arbitrary;
+use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
+use nearmiss_testdata::shapes::{Sampling, scorer_radius, sphere, torus};
 
 /// Motions of a scan's points, whose inverses are put before the poses.
 fn motions() -> Vec<(&'static str, Pose)> {
@@ -56,4 +58,157 @@ fn verdicts_outside_the_band_do_not_change() {
     }
     assert!(asked > 1000, "{asked} questions");
     assert!(ambiguous * 20 <= thin, "{ambiguous} of {thin} thin ones undecided");
+}
+
+fn build(points: &[[f64; 3]]) -> Scan {
+    Scan::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+fn ask(a: &Scan, b: &Scan, poses: [Pose; 2], options: CollideOptions) -> Verdict {
+    let plan = CollidePlan::new(&options, a, b).unwrap();
+    let (a, b) = (a.at(&poses[0]), b.at(&poses[1]));
+    collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict
+}
+
+fn kind(verdict: &Verdict) -> &'static str {
+    match verdict {
+        Verdict::Intersecting { .. } => "intersecting",
+        Verdict::Separated { .. } => "separated",
+        Verdict::Undecided(_) => "undecided",
+    }
+}
+
+#[test]
+fn exchanged_or_moved_together_they_are_as_far_apart() {
+    let set = analytic_set(5, &SetOptions { noises: vec![0.0, 0.1], repeats: 1 });
+    let scans: Vec<Scan> = set.shapes.iter().map(|shape| build(&shape.points)).collect();
+    let mut rng = arbitrary::rng(6);
+    let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+    let mut asked = 0;
+    for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
+        let (a, b) = (&scans[pair.a], &scans[pair.b]);
+        let motion = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 100.0));
+        let (pose_a, pose_b) = (pair.pose_a, pair.pose_b);
+        for options in [certified, certified.with_margin(2.0 * pair.r), thickened(pair.r)] {
+            let verdict = ask(a, b, [pose_a, pose_b], options);
+            let exchanged = ask(b, a, [pose_b, pose_a], options);
+            let moved = ask(a, b, [motion.after(&pose_a), motion.after(&pose_b)], options);
+            // A margin, like a contact, may be met within the band only.
+            let by = pair.gap - options.margin;
+            if options.semantics == Semantics::Surface && by.abs() <= pair.r {
+                continue;
+            }
+            asked += 1;
+            let place = format!("{} at {:.2} r, {options:?}", pair.family, pair.gap / pair.r);
+            assert_eq!(kind(&exchanged), kind(&verdict), "exchanged: {place}");
+            assert_eq!(kind(&moved), kind(&verdict), "moved: {place}");
+            for other in [verdict, exchanged, moved] {
+                if let Verdict::Separated { gap, .. } = other {
+                    assert!(gap <= pair.gap + 0.3 * pair.r, "a lower bound: {gap}, {place}");
+                }
+            }
+        }
+    }
+    assert!(asked > 1000, "{asked} questions");
+}
+
+fn thickened(radius: f64) -> CollideOptions {
+    CollideOptions::default().with_semantics(Semantics::Thickened(0.45 * radius))
+}
+
+#[test]
+fn duplicates_change_nothing_and_order_only_names() {
+    for kind in [CloudKind::Sphere, CloudKind::Rings, CloudKind::Clustered, CloudKind::Lattice] {
+        let points = arbitrary::cloud(kind, 700, 8);
+        let scan = build(&points);
+        let twice = build(&[points.clone(), points.iter().rev().copied().collect()].concat());
+        assert_eq!(twice.positions(), scan.positions(), "{kind:?}");
+        assert_eq!(twice.radii(), scan.radii(), "{kind:?}");
+        assert_eq!(twice.discs(), scan.discs(), "{kind:?}");
+        assert_eq!(twice.enclosures(), scan.enclosures(), "{kind:?}");
+        assert_eq!(twice.source(), scan.source(), "{kind:?}");
+        assert_eq!(twice.dropped().duplicate - scan.dropped().duplicate, 700, "{kind:?}");
+
+        // A permutation: 271 and 700 have no common divisor.
+        let order: Vec<usize> = (0..points.len()).map(|i| (271 * i + 5) % points.len()).collect();
+        let other = build(&order.iter().map(|&i| points[i]).collect::<Vec<_>>());
+        let by_place = |scan: &Scan| {
+            let mut all: Vec<([u32; 3], u32, u8)> = (0..scan.len())
+                .map(|i| {
+                    let place = scan.positions()[i].map(f32::to_bits);
+                    (place, scan.radii()[i].to_bits(), scan.kind(i).code())
+                })
+                .collect();
+            all.sort_unstable();
+            all
+        };
+        assert_eq!(other.sampling_radius().to_bits(), scan.sampling_radius().to_bits(), "{kind:?}");
+        let differ = by_place(&other).iter().zip(by_place(&scan)).filter(|(a, b)| **a != *b).count();
+        // Sums over neighbours round in another order, which may move a point across a threshold.
+        assert!(differ * 100 <= scan.len(), "{kind:?}: {differ} of {} points differ", scan.len());
+    }
+}
+
+#[test]
+fn powers_of_two_scale_every_number() {
+    let points = arbitrary::cloud(CloudKind::Sphere, 600, 9);
+    let scan = build(&points);
+    for power in [-20, -1, 7, 25] {
+        let factor = 2.0_f64.powi(power);
+        let other = build(&points.iter().map(|p| p.map(|c| c * factor)).collect::<Vec<_>>());
+        let unit = (other.frame().scale / scan.frame().scale / factor) as f32;
+        let same = |name: &str, a: &[f32], b: &[f32]| {
+            let differ = a.iter().zip(b).filter(|(a, b)| (**a).to_bits() != (**b * unit).to_bits()).count();
+            assert_eq!(differ, 0, "2^{power}: {name}");
+        };
+        same("positions", scan.positions().as_flattened(), other.positions().as_flattened());
+        same("radii", scan.radii(), other.radii());
+        same("discs", scan.discs(), other.discs());
+        assert_eq!(scan.normals(), other.normals(), "2^{power}");
+        assert_eq!(scan.source(), other.source(), "2^{power}");
+        for (a, b) in scan.enclosures().iter().zip(other.enclosures()) {
+            same("centres of enclosures", &a.centre, &b.centre);
+            same("half lengths of enclosures", &a.half, &b.half);
+        }
+    }
+}
+
+/// Vertices of a torus in a lattice of `n` by `n / 2` quadrilaterals, as a mesher would leave them.
+fn torus_vertices(n: u32) -> Vec<[f64; 3]> {
+    let turn = |i: u32, of: u32| std::f64::consts::TAU * f64::from(i) / f64::from(of);
+    let vertex = |i: u32, j: u32| {
+        let (u, v) = (turn(i, n), turn(j, n / 2));
+        let across = 1.0 + 0.4 * v.cos();
+        [across * u.cos(), across * u.sin(), 0.4 * v.sin()]
+    };
+    (0..n).flat_map(|i| (0..n / 2).map(move |j| vertex(i, j))).collect()
+}
+
+#[test]
+fn a_finer_mesh_answers_as_the_coarser_did() {
+    let exact = torus(1.0, 0.4);
+    let ball = sphere(0.5).sample(Sampling::clean(0.06));
+    let probe = build(&ball.points);
+    let coarse = torus_vertices(64);
+    let r = scorer_radius(&coarse).max(scorer_radius(&ball.points));
+    let scans = [build(&coarse), build(&torus_vertices(128)), build(&torus_vertices(256))];
+    let mut rng = arbitrary::rng(10);
+    let (mut hits, mut apart) = (0, 0);
+    for _ in 0..400 {
+        let centre = arbitrary::point_in(&mut rng, 1.8);
+        let gap = exact.distance(centre) - 0.5;
+        // Deeper inside, the ball is wholly within the tube.
+        if gap.abs() <= r || gap < -0.45 {
+            continue;
+        }
+        let pose = arbitrary::rotation(&mut rng).with_translation(centre);
+        for scan in &scans {
+            let verdict = ask(scan, &probe, [Pose::IDENTITY, pose], CollideOptions::default());
+            assert_eq!(verdict.is_intersecting(), gap < 0.0, "gap {:.2} r: {verdict:?}", gap / r);
+            assert_eq!(verdict.is_separated(), gap > 0.0, "gap {:.2} r: {verdict:?}", gap / r);
+        }
+        hits += u32::from(gap < 0.0);
+        apart += u32::from(gap > 0.0);
+    }
+    assert!(hits > 50 && apart > 100, "{hits} hits, {apart} apart");
 }
