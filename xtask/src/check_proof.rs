@@ -123,6 +123,7 @@ struct Tally {
     intersecting: usize,
     pairs: usize,
     claimed: f64,
+    between: usize,
     off: f64,
     on_the_brink: usize,
     mended: f64,
@@ -167,6 +168,7 @@ impl Tally {
         self.intersecting += usize::from(finding.kind == Kind::Intersecting);
         self.pairs += finding.pairs;
         self.claimed = self.claimed.max(finding.claimed);
+        self.between += usize::from(finding.between);
         self.off = self.off.max(finding.off);
         self.on_the_brink += usize::from(finding.on_the_brink);
         self.mended = self.mended.max(finding.mended);
@@ -174,7 +176,8 @@ impl Tally {
     }
 
     fn print(&self, poses: Option<&Poses>) {
-        let Self { lines, separated, intersecting, pairs, claimed, off, on_the_brink, mended, .. } = self;
+        let Self { lines, separated, intersecting, pairs, claimed, .. } = self;
+        let Self { between, off, on_the_brink, mended, .. } = self;
         let unproven = lines - separated - intersecting;
         println!("{lines} answers, {unproven} of them not certified");
         println!(
@@ -182,8 +185,8 @@ impl Tally {
             100.0 * claimed
         );
         println!(
-            "{intersecting} certified to intersect; a witness is at most {off:.1e} bandwidths off; {on_the_brink} \
-             within rounding of a condition"
+            "{intersecting} certified to intersect, {between} of them by points of either surface within the margin; \
+             a point is at most {off:.1e} bandwidths off; {on_the_brink} within rounding of a condition"
         );
         if let Some(poses) = poses {
             let unanswered = poses.keys().filter(|query| !self.queries.contains(query)).count();

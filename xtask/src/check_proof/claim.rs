@@ -13,6 +13,9 @@ const MENDED: f64 = 0.1;
 /// What rounding may do to a residual, in bandwidths.
 const RESIDUAL: f64 = 1e-5;
 
+/// What it may do to a distance in the world, relatively.
+const ROUNDING: f64 = 1e-6;
+
 /// What a line claims.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
@@ -31,6 +34,8 @@ pub(crate) struct Finding {
     pub(crate) pairs: usize,
     /// The greatest part of what could be proven of a pair that the gap claims.
     pub(crate) claimed: f64,
+    /// Whether the witness lies between two surfaces nearer than the margin, not on both.
+    pub(crate) between: bool,
     /// The greater |f| at the witness, in bandwidths.
     pub(crate) off: f64,
     /// Whether a condition of a surface holds at the witness only up to rounding.
@@ -58,6 +63,7 @@ impl Checker<'_> {
             faults: Vec::new(),
             pairs: 0,
             claimed: 0.0,
+            between: false,
             off: 0.0,
             on_the_brink: false,
             mended: 0.0,
@@ -135,7 +141,8 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// The witness lies on both surfaces.
+    /// The witness lies on both surfaces; or, if these count as meeting from a margin on, points of either are so near
+    /// to it that they are nearer to each other than the margin.
     fn intersecting(
         &self,
         line: &Line,
@@ -144,14 +151,32 @@ impl Checker<'_> {
     ) -> Result<(), String> {
         let witness = line.witness.ok_or("certified to intersect without a witness")?;
         let claimed = line.residual.filter(|r| *r >= 0.0).ok_or("a witness without a residual")?;
-        let seen = |i: usize, name: &str| {
+        let on = |i: usize, name: &str| {
             witness::check(self.subjects[i], &placements[i], witness).map_err(|e| format!("{name}: {e}"))
         };
-        let (a, b) = (seen(0, "a")?, seen(1, "b")?);
+        let near = |i: usize, name: &str| {
+            witness::check_near(self.subjects[i], &placements[i], witness, claimed)
+                .map_err(|e| format!("{name}: {e}"))
+        };
+        let (a, b) = match (on(0, "a"), on(1, "b")) {
+            (Ok(a), Ok(b)) => (a, b),
+            (a, b) if line.margin == 0.0 => (a?, b?),
+            _ => {
+                finding.between = true;
+                let ((a, from_a), (b, from_b)) = (near(0, "a")?, near(1, "b")?);
+                if from_a + from_b > line.margin * (1.0 + ROUNDING) {
+                    let far = format!("{from_a:.4e} and {from_b:.4e} from the witness");
+                    return Err(format!(
+                        "points of the surfaces were found {far}, together more than the margin"
+                    ));
+                }
+                (a, b)
+            }
+        };
         finding.off = a.off.max(b.off);
         finding.on_the_brink = a.on_the_brink || b.on_the_brink;
         let residual = a.residual.max(b.residual);
-        if (residual - claimed).abs() > RESIDUAL * a.bandwidth.max(b.bandwidth) {
+        if !finding.between && (residual - claimed).abs() > RESIDUAL * a.bandwidth.max(b.bandwidth) {
             return Err(format!("the residual is {residual:.2e}, not {claimed:.2e}"));
         }
         Ok(())

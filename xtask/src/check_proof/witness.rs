@@ -1,5 +1,7 @@
-//! Whether a point lies on a surface, by the formulas alone and all of the points.
+//! Whether a point lies on a surface, or near it, by the formulas alone and all of the points.
 
+use nearmiss::hierarchy::GatherScratch;
+use nearmiss::surface::project;
 use nearmiss_testdata::oracle::{BORDER, Evaluation, GAP, Status, THIN};
 
 use super::placement::Placement;
@@ -11,6 +13,10 @@ const ON_SURFACE: f64 = 1e-5;
 /// What single precision may do to a distance beside a horizon, and to what is compared with a condition's bound.
 const DISTANCE: f64 = 1e-5;
 const CONDITION: f64 = 1e-4;
+
+/// Cloud points from which a surface point near a witness is looked for, and steps from each towards the witness.
+const STARTS: usize = 512;
+const STEPS: usize = 12;
 
 /// A point seen to lie on a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,7 +33,11 @@ pub(crate) struct Seen {
 /// # Errors
 /// When the point `x` of the world does not lie on the surface.
 pub(crate) fn check(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result<Seen, String> {
-    let x = placement.stored(x);
+    check_stored(subject, placement, placement.stored(x))
+}
+
+/// As [`check`], for a point among the stored positions.
+fn check_stored(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result<Seen, String> {
     let Some(at) = subject.twin.evaluate(x) else { return Err("no point reaches the witness".into()) };
     let off = at.value.abs() / at.bandwidth;
     if off.is_nan() || off > ON_SURFACE {
@@ -41,13 +51,73 @@ pub(crate) fn check(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Re
     Ok(Seen { off, residual, bandwidth, on_the_brink })
 }
 
+/// A point on the surface as near to the point `x` of the world as can be found, with its distance; anything within
+/// `enough` will do. Steps towards `x` from the cloud points nearest to it need not find what is nearest, but what
+/// they find is seen to lie on the surface.
+///
+/// # Errors
+/// When none is found.
+pub(crate) fn check_near(
+    subject: &Subject,
+    placement: &Placement,
+    x: [f64; 3],
+    enough: f64,
+) -> Result<(Seen, f64), String> {
+    let x = placement.stored(x);
+    let positions = subject.scan.positions();
+    let mut starts: Vec<(f64, usize)> =
+        positions.iter().enumerate().map(|(i, p)| (distance(&p.map(f64::from), &x), i)).collect();
+    starts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let mut feet = Vec::new();
+    for (_, i) in starts.into_iter().take(STARTS) {
+        for foot in walk(subject, positions[i].map(f64::from), x) {
+            let away = distance(&foot, &x) * placement.scale;
+            if away <= enough
+                && let Ok(seen) = check_stored(subject, placement, foot)
+            {
+                return Ok((seen, away));
+            }
+            feet.push((away, foot));
+        }
+    }
+    feet.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let seen =
+        feet.into_iter().find_map(|(away, foot)| Some((check_stored(subject, placement, foot).ok()?, away)));
+    seen.ok_or_else(|| "no point of the surface was found near the witness".into())
+}
+
+/// Points of the surface from near `start` towards `to`, stepping along the surface.
+fn walk(subject: &Subject, start: [f64; 3], to: [f64; 3]) -> Vec<[f64; 3]> {
+    let mut scratch = GatherScratch::default();
+    let mut from = start;
+    let mut feet = Vec::new();
+    for _ in 0..STEPS {
+        let foot = project(from, |x| subject.scan.evaluate_with(x, &mut scratch));
+        if !foot.converged {
+            break;
+        }
+        feet.push(foot.point);
+        let (x, n) = (foot.point, foot.at.normal);
+        let d = [0, 1, 2].map(|k| to[k] - x[k]);
+        let height: f64 = (0..3).map(|k| n[k] * d[k]).sum();
+        let along = [0, 1, 2].map(|k| d[k] - height * n[k]);
+        // A bandwidth is about a local radius.
+        let part = (foot.at.bandwidth / distance(&along, &[0.0; 3])).min(1.0);
+        from = [0, 1, 2].map(|k| x[k] + part * along[k]);
+    }
+    feet
+}
+
+fn distance(p: &[f64; 3], q: &[f64; 3]) -> f64 {
+    (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()
+}
+
 /// The conditions of the surface, each relaxed by what rounding may do.
 fn is_nearly_ok(subject: &Subject, x: [f64; 3], at: &Evaluation) -> bool {
-    let distance = |p: &[f64; 3]| (0..3).map(|k| (p[k] - x[k]).powi(2)).sum::<f64>().sqrt();
     let options = subject.scan.plan().options();
     let (mut support, mut is_near) = (0, false);
     for (p, r) in subject.twin.points().iter().zip(subject.twin.radii()) {
-        let (d, reach) = (distance(p), subject.horizon * r * (1.0 + DISTANCE));
+        let (d, reach) = (distance(p, &x), subject.horizon * r * (1.0 + DISTANCE));
         support += u32::from(d < reach);
         is_near |= d <= 0.5 * reach;
     }
@@ -55,7 +125,7 @@ fn is_nearly_ok(subject: &Subject, x: [f64; 3], at: &Evaluation) -> bool {
     let h = at.bandwidth;
     support >= options.support_min
         && is_near
-        && distance(&at.centroid) <= BORDER * h * (1.0 + CONDITION)
+        && distance(&at.centroid, &x) <= BORDER * h * (1.0 + CONDITION)
         && l1 <= THIN * 0.5 * h * h * (1.0 + CONDITION)
         && l2 - l1 >= GAP * (l1 + l2 + l3) * (1.0 - CONDITION)
 }
