@@ -1,6 +1,6 @@
 //! How well a scan is sampled, and what to do if badly.
 
-use nearmiss::{Bandwidth, BuildOptions, PointKind, Scan, ScanView};
+use nearmiss::{Bandwidth, BuildOptions, PointHierarchy, PointKind, Scan, ScanView};
 
 use crate::digits::{percent, short, short_up};
 use crate::report::median;
@@ -28,9 +28,10 @@ pub(crate) fn health(scan: &Scan) -> Vec<String> {
     let mut advise = |what: String| said.push(format!("advice     {what}"));
     let balls = thickened(scan.sampling_radius());
     if lines > MANY_ON_LINES {
+        let wider = wider_along_lines(scan).map_or(String::new(), |option| format!("{option}, or "));
         advise(format!(
-            "{} of the points lie on lines, as a spinning LiDAR's do: try `collide {balls}`, or merge several \
-             frames before preparing",
+            "{} of the points lie on lines, as a spinning LiDAR's do: try {wider}`collide {balls}`, or merge \
+             several frames before preparing",
             percent(lines)
         ));
     }
@@ -63,7 +64,14 @@ fn thickened(radius: f64) -> String {
     format!("--thickened {}", short_up(0.5 * radius))
 }
 
-/// A larger number of neighbours, worth trying once: along lines radii reach as far as they may by themselves.
+/// A larger number of neighbours, where that helps against lines. Among usable points lines are rings jagged by noise,
+/// in which the first few neighbours spread by chance and radii stay small; a scan of little but lines has been
+/// searched to 256 neighbours already.
+fn wider_along_lines(scan: &PointHierarchy) -> Option<String> {
+    (scan.share(PointKind::Line) < scan.usable()).then(|| more_neighbours(scan.radius_neighbours())).flatten()
+}
+
+/// A larger number of neighbours, worth trying once.
 fn more_neighbours(now: u32) -> Option<String> {
     let twice = 2 * BuildOptions::default().radius_neighbours;
     (now < twice).then(|| format!("--radius-neighbours {twice}"))
@@ -81,6 +89,7 @@ pub(crate) fn for_sparse(view: &ScanView<'_>, radius: f64, thickened_already: bo
     let mut ways = Vec::new();
     let balls = (!thickened_already).then(|| thickened(radius));
     if scan.share(PointKind::Line) >= scan.share(PointKind::Isolated) {
+        ways.extend(wider_along_lines(scan));
         ways.extend(balls);
         ways.push("merge several frames before preparing".to_owned());
     } else {

@@ -67,8 +67,35 @@ fn people_read_a_health_line_and_advice() {
     let sentence =
         place.ok(&["collide", "rings.nm", "rings.nm", "--pose-b", "1 0 0 .09 0 1 0 .03 0 0 1 .01 0 0 0 1"]);
     assert!(sentence.results.contains("sampled as lines; try --thickened"), "{}", sentence.results);
+    // Following it gives an answer.
+    let radius = sentence.results.split_once("--thickened ").unwrap().1.split([',', ' ']).next().unwrap();
+    let pose = ["--pose-b", "1 0 0 .09 0 1 0 .03 0 0 1 .01 0 0 0 1"];
+    let decided =
+        place.ok(&[&["collide", "rings.nm", "rings.nm", "--thickened", radius][..], &pose].concat());
+    assert!(decided.results.starts_with("Balls of radius"), "{}", decided.results);
     let seen = place.ok(&["inspect", "rings.nm", "--verify"]);
     assert!(seen.results.contains("advice") && seen.results.contains("verified"), "{}", seen.results);
+}
+
+#[test]
+fn more_neighbours_are_advised_where_they_help() {
+    use nearmiss_testdata::scanner::{Frame, frame};
+    let place = Place::new();
+    // Noise as large as the steps along a ring: six neighbours spread, twelve see the ring and reach the next.
+    let points = frame(&Frame { beams: 16, steps: 1800, noise: 0.01, seed: 1 });
+    place.write("frame.xyz", text(&points));
+    let prepare = |k: &str, json: &[&str]| {
+        let args = ["preprocess", "frame.xyz", "-o", "frame.nm", "--radius-neighbours", k];
+        place.ok(&[&args[..], json].concat())
+    };
+    let told = prepare("6", &[]).results;
+    assert!(
+        told.contains("lie on lines") && told.contains("try --radius-neighbours 12, or `collide"),
+        "{told}"
+    );
+    let lines = |k: &str| prepare(k, &["--json"]).json()[0]["kinds"]["line"].as_f64().unwrap();
+    let (few, many) = (lines("6"), lines("12"));
+    assert!(few > 0.1 && many < 0.01, "following it helps: {few} to {many}");
 }
 
 #[test]
