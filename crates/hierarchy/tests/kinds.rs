@@ -9,7 +9,7 @@ use nearmiss_testdata::scanner::{self, Frame};
 fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     let scan = PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default());
     let scan = scan.unwrap();
-    assert_eq!(scan.sanity_check(), Ok(()));
+    assert_eq!(scan.sanity_check(), Ok(()), "an invariant");
     scan
 }
 
