@@ -140,10 +140,10 @@ impl<'a> Surfaces<'a> {
         match self.pair.views[0].scan().kind(i).max(self.pair.views[1].scan().kind(j)) {
             PointKind::Surface | PointKind::Border => None,
             PointKind::Line | PointKind::Isolated => Some(Reason::Undersampled),
-            // Within a sampling radius of each other the points themselves say enough.
+            // As near each other as either's disc reaches the points themselves say enough, however it lies.
             _ => {
                 let d = Vector3::from(self.disc_a(i).centre) - Vector3::from(self.disc_b(j).centre);
-                let radius = self.pair.a.radii[i].min(self.pair.b.radii[j] * self.pair.relative.scale());
+                let radius = self.pair.a.discs[i].min(self.pair.b.discs[j] * self.pair.relative.scale());
                 (d.norm() > radius).then_some(Reason::Ambiguous)
             }
         }
