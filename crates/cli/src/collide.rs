@@ -157,7 +157,7 @@ impl Question {
         if args.json {
             return results.json(&report);
         }
-        let sentence = sentence(&asked.answer, [&a, &b], args.thickened);
+        let sentence = sentence(&asked.answer, [&a, &b], self.plan.options());
         if let Some(line) = asked.line {
             return results.line(format_args!("line {line}: {sentence}"));
         }

@@ -1,25 +1,41 @@
 //! Answers for people, with as many digits as the sampling carries.
 
-use nearmiss::{Aabb, Answer, Evidence, PointKind, Reason, ScanView, Verdict};
+use nearmiss::{Aabb, Answer, CollideOptions, Evidence, PointKind, Reason, ScanView, Semantics, Verdict};
 
 use crate::advice;
 use crate::digits::{percent, place, rough, rounded, rounded_down, short};
 use crate::report::word;
 
-/// The answer as a sentence; `thickened` is the radius of the balls, where balls were compared.
-pub(crate) fn sentence(answer: &Answer, views: [&ScanView<'_>; 2], thickened: Option<f64>) -> String {
+/// The answer, to a question with these `options`, as a sentence.
+pub(crate) fn sentence(answer: &Answer, views: [&ScanView<'_>; 2], options: &CollideOptions) -> String {
     let [ra, rb] = views.map(world_radius);
     let unit = ra.min(rb) / 100.0;
+    let thickened = match options.semantics {
+        Semantics::Thickened(radius) => Some(radius),
+        _ => None,
+    };
+    let margin = (options.margin > 0.0).then(|| short(options.margin));
     match answer.verdict {
         Verdict::Intersecting { contact, evidence } => {
             let at = place(contact.point, unit);
             if let Some(radius) = thickened {
-                let (verb, apart) = (if radius > 0.0 { "overlap" } else { "meet" }, 2.0 * contact.residual);
+                let apart = 2.0 * contact.residual;
+                if let Some(margin) = margin {
+                    return format!(
+                        "Balls of radius {} come within {margin} of each other at {at}; the two points are {} apart.",
+                        short(radius),
+                        short(apart)
+                    );
+                }
+                let verb = if radius > 0.0 { "overlap" } else { "meet" };
                 return format!(
                     "Balls of radius {} {verb} at {at}; the two points are {} apart.",
                     short(radius),
                     short(apart)
                 );
+            }
+            if let Some(margin) = margin {
+                return format!("They come within {margin} of each other at {at} ({}).", word(evidence));
             }
             let within = match evidence {
                 Evidence::Certified => rough(contact.residual),
@@ -30,7 +46,10 @@ pub(crate) fn sentence(answer: &Answer, views: [&ScanView<'_>; 2], thickened: Op
         Verdict::Separated { gap, evidence } if gap > 0.0 => {
             format!("No contact; at least {} apart ({}).", rounded_down(gap, unit), word(evidence))
         }
-        Verdict::Separated { evidence, .. } => format!("No contact found ({}).", word(evidence)),
+        Verdict::Separated { evidence, .. } => {
+            let within = margin.map_or(String::new(), |margin| format!(" within {margin}"));
+            format!("No contact found{within} ({}).", word(evidence))
+        }
         Verdict::Undecided(reason) => {
             format!("Cannot tell: {}.", doubt(reason, views, thickened.is_some()))
         }

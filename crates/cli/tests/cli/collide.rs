@@ -222,7 +222,10 @@ fn wrong_usage_ends_with_status_2() {
         (&["--poses", "p.jsonl", "--pose-a", "x"], "cannot be used with"),
         (&["--image", "ball.nm"], "would replace the input"),
         (&["--detail", "manifold"], "manifold"),
-        (&["--margin", "1"], "--margin"),
+        (&["--margin", "-1"], "--margin"),
+        (&["--evidence", "proven"], "certified"),
+        (&["--prove", "ball.nm"], "would replace the input"),
+        (&["--prove", "p.jsonl", "--thickened", "1"], "cannot be used with"),
     ] {
         place.refused(2, &both(options), &[word]);
     }
@@ -275,4 +278,45 @@ fn a_picture_shows_both_scans_and_the_contact() {
     }
     assert_eq!(sizes[0], sizes[1]);
     assert_eq!(place.files(), ["d.nm", "hit.png", "miss.png"], "no temporary files stay");
+}
+
+#[test]
+fn separations_are_certified_and_their_proof_is_written() {
+    let place = balls();
+    let apart = shift(0.0, 3.0, 0.0);
+    let certified = ask(&place, &["--pose-b", &apart, "--prove", "proof.jsonl"]);
+    assert_eq!((&certified["verdict"], &certified["evidence"]), (&"separated".into(), &"certified".into()));
+    let gap = certified["gap"].as_f64().unwrap();
+    assert!(gap > 0.0 && gap <= 1.0, "the balls are 1 apart: {gap}");
+    let proof: Value =
+        serde_json::from_str(&std::fs::read_to_string(place.path("proof.jsonl")).unwrap()).unwrap();
+    let count = |list: &str| proof[list].as_array().unwrap().len();
+    assert!(count("pairs") > 0 && count("nodes_a") > 0 && count("nodes_b") > 0, "{proof}");
+    assert_eq!(proof["gap"], certified["gap"]);
+    assert_eq!(proof["placed_a"].as_array().unwrap().len(), 16);
+
+    let estimated = ask(&place, &["--pose-b", &apart, "--evidence", "estimated"]);
+    assert_eq!((&estimated["evidence"], &estimated["gap"]), (&"estimated".into(), &0.0.into()));
+    let told = place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &apart]).results;
+    assert!(told.contains("No contact; at least ") && told.contains("(certified)"), "{told}");
+    let told =
+        place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &apart, "--evidence", "estimated"]).results;
+    assert!(told.contains("No contact found (estimated)"), "{told}");
+}
+
+#[test]
+fn a_margin_makes_near_misses_contacts() {
+    let place = balls();
+    let apart = shift(0.0, 2.6, 0.0);
+    let far = ask(&place, &["--pose-b", &apart, "--margin", "0.4"]);
+    assert_eq!(far["verdict"], "separated", "0.6 apart: {far}");
+    let near = ask(&place, &["--pose-b", &apart, "--margin", "0.8"]);
+    assert_eq!((&near["verdict"], &near["evidence"]), (&"intersecting".into(), &"certified".into()));
+    assert!((numbers(&near["witness"])[1] - 1.3).abs() < 0.2, "between them: {near}");
+    let residual = near["residual"].as_f64().unwrap();
+    assert!((0.29..=0.4).contains(&residual), "half a distance from 0.6 to 0.8: {residual}");
+    let told = place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &apart, "--margin", "0.8"]).results;
+    assert!(told.contains("They come within 0.8 of each other at "), "{told}");
+    let balls = ask(&place, &["--pose-b", &apart, "--thickened", "0.2", "--margin", "0.3"]);
+    assert_eq!(balls["verdict"], "intersecting", "0.2 apart: {balls}");
 }
