@@ -157,6 +157,9 @@ pub(crate) fn check(subject: &Subject, points: u64, seed: u64, done: &AtomicU64)
         all.far = all.far.max(chunk.far);
         all.faults.extend(chunk.faults);
     }
+    if all.points == 0 && points > 0 {
+        all.faults.push("no point of the surface was found, so nothing was seen of the enclosures".into());
+    }
     all
 }
 

@@ -29,7 +29,11 @@ const SHIFTS: [f64; 9] = [0.0, 0.06, 0.1, 0.14, 0.15, 0.175, 0.18, 0.2, 1.0];
 static TRIAL: OnceLock<Trial> = OnceLock::new();
 
 fn trial() -> &'static Trial {
-    TRIAL.get_or_init(|| {
+    TRIAL.get_or_init(|| Trial::new("0"))
+}
+
+impl Trial {
+    fn new(margin: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let [scan, poses, proof] =
             ["dragon.nm", "poses.jsonl", "proof.jsonl"].map(|name| folder.path().join(name));
@@ -46,18 +50,16 @@ fn trial() -> &'static Trial {
             words(&["nearmiss", "collide"], &scan),
             words(&[], &scan),
             words(&["--poses"], &poses),
-            words(&["--prove"], &proof),
+            words(&["--margin", margin, "--prove"], &proof),
         ];
         assert_eq!(nearmiss_cli::run(args.concat()), ExitCode::SUCCESS);
         let subject = Subject::open(&scan).unwrap();
         let poses = proof::read_poses(&poses).unwrap();
         let text = fs::read_to_string(&proof).unwrap();
         let lines = text.lines().map(|line| Line::parse(line).unwrap()).collect();
-        Trial { subject, poses, lines }
-    })
-}
+        Self { subject, poses, lines }
+    }
 
-impl Trial {
     fn checker(&self) -> Checker<'_> {
         Checker { subjects: [&self.subject; 2], poses: Some(&self.poses) }
     }
@@ -165,6 +167,26 @@ fn witnesses_lie_on_both_surfaces() {
     let residual = Line { residual: Some(0.01 * r), ..line.clone() };
     assert!(trial.fault(&residual).contains("the residual is"));
     assert!(trial.fault(&Line { witness: None, ..line.clone() }).contains("without a witness"));
+}
+
+#[test]
+fn witnesses_between_surfaces_are_within_the_margin() {
+    let margin = 0.012;
+    let trial = Trial::new(&margin.to_string());
+    let mut between = Vec::new();
+    for line in &trial.lines {
+        let finding = trial.checker().check(line);
+        assert_eq!(finding.faults, Vec::<String>::new(), "line {}", line.query);
+        between.extend(finding.between.then_some(line));
+    }
+    // Of these the scans furthest apart, which do not meet without a margin.
+    let line = between.last().unwrap();
+    let mut moved = (*line).clone();
+    moved.witness = line.witness.map(|[x, y, z]| [x, y + 5.0 * margin, z]);
+    assert!(trial.fault(&moved).contains("more than the margin"));
+    let narrow = Line { margin: 0.1 * line.residual.unwrap(), ..(*line).clone() };
+    assert!(trial.fault(&narrow).contains("more than the margin"));
+    assert!(trial.fault(&Line { margin: 0.0, ..(*line).clone() }).contains("off the surface"));
 }
 
 #[test]
