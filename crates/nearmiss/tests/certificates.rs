@@ -80,3 +80,32 @@ fn a_proof_covers_all_pairs_of_points() {
     }
     assert!(proven > 20 && most > 20, "{proven} proofs of up to {most} pairs");
 }
+
+/// A bowl of few points, a lot of nothing, and a small patch inside the bowl whose discs miss the bowl's, though the
+/// leaves are compared: other pairs being proven apart says nothing of these.
+#[test]
+fn leaves_that_were_compared_are_not_certified() {
+    let lattice = |step: f64, height: &dyn Fn(f64, f64) -> f64| -> Vec<[f64; 3]> {
+        let at = |i: i32| (f64::from(i) - 1.5) * step;
+        (0..4).flat_map(|i| (0..4).map(move |j| (at(i), at(j)))).map(|(x, y)| [x, y, height(x, y)]).collect()
+    };
+    let mut bowl = lattice(0.3, &|x, y| 1.2 * (x * x + y * y));
+    for i in 0..4 {
+        for j in 0..4 {
+            bowl.push([20.0 + 0.3 * f64::from(i), 0.3 * f64::from(j), 0.0]);
+        }
+    }
+    let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(Evidence::Certified);
+    for height in [0.35, 0.236] {
+        let (a, b) = (scan(&bowl), scan(&lattice(0.02, &|x, _| height + 0.3 * x)));
+        let plan = CollidePlan::new(&options, &a, &b).unwrap();
+        let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&Pose::IDENTITY));
+        let answer = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut CollideScratch::default());
+        assert!(answer.statistics.leaf_pairs > 0, "the leaves are compared");
+        assert!(
+            !matches!(answer.verdict, Verdict::Separated { evidence: Evidence::Certified, .. }),
+            "{:?}",
+            answer.verdict
+        );
+    }
+}

@@ -116,7 +116,10 @@ fn surfaces(
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => Verdict::Undecided(Reason::Budget { likelihood: likelihood(&pair, stack) }),
         (None, Some(reason)) => Verdict::Undecided(reason),
-        (None, None) if options.evidence == Evidence::Estimated => apart(options, 0.0, false),
+        // Leaves whose boxes overlap have enclosures that overlap.
+        (None, None) if options.evidence == Evidence::Estimated || statistics.leaf_pairs > 0 => {
+            apart(options, 0.0, false)
+        }
         (None, None) => {
             let mut certifier = Certifier::new(pair, reach, proof);
             let whole = certifier.prove(excluded, stack).is_continue();

@@ -28,6 +28,15 @@ const NEWTON: f64 = 1.0;
 /// A verified point further than this from the crossing, in the greater of the two local radii, is some other place.
 const NEARBY: f64 = 4.0;
 
+/// As near each other as discs are wide, in the lesser local radius, points say enough by themselves, however their
+/// discs lie.
+const NEAR: f32 = 0.65;
+
+/// Where surfaces cross, samples of either are within some 0.6 local radii of the place, and nearer than this to each
+/// other, in the greater radius. Discs reach up to 1.3; those that stand upright, as noise on thin plates makes them,
+/// would bridge a gap of that width.
+const FAR: f32 = 0.9;
+
 /// The search for a crossing.
 #[derive(Debug)]
 pub(crate) struct Surfaces<'a> {
@@ -140,13 +149,18 @@ impl<'a> Surfaces<'a> {
         match self.pair.views[0].scan().kind(i).max(self.pair.views[1].scan().kind(j)) {
             PointKind::Surface | PointKind::Border => None,
             PointKind::Line | PointKind::Isolated => Some(Reason::Undersampled),
-            // As near each other as either's disc reaches the points themselves say enough, however it lies.
             _ => {
-                let d = Vector3::from(self.disc_a(i).centre) - Vector3::from(self.disc_b(j).centre);
-                let radius = self.pair.a.discs[i].min(self.pair.b.discs[j] * self.pair.relative.scale());
-                (d.norm() > radius).then_some(Reason::Ambiguous)
+                let (distance, [ra, rb]) = self.points(i, j);
+                (distance > NEAR * ra.min(rb)).then_some(Reason::Ambiguous)
             }
         }
+    }
+
+    /// The distance of two points, and their local radii, in a's stored frame.
+    fn points(&self, i: usize, j: usize) -> (f32, [f32; 2]) {
+        let q = self.pair.relative.point(self.pair.b.positions[j]);
+        let distance = (Vector3::from(self.pair.a.positions[i]) - Vector3::from(q)).norm();
+        (distance, [self.pair.a.radii[i], self.pair.b.radii[j] * self.pair.relative.scale()])
     }
 
     /// The middle of what the chords of two crossing discs share, in the world.
@@ -273,6 +287,10 @@ impl Visitor for Surfaces<'_> {
             while bits != 0 {
                 let j = node_b.first as usize + bits.trailing_zeros() as usize;
                 bits &= bits - 1;
+                let (distance, [ra, rb]) = self.points(i, j);
+                if distance > FAR * ra.max(rb) {
+                    continue;
+                }
                 match self.doubt_about(i, j) {
                     Some(reason) => _ = self.doubt.get_or_insert(reason),
                     None => return self.crossed(i, j),

@@ -34,7 +34,7 @@ const SHAPES: [CloudKind; 8] = [
 /// The greatest slack of any two trusted discs in the world, in shares of their radii, and whether any doubtful
 /// ones cross.
 fn best_crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> (f64, bool) {
-    let discs = |view: &ScanView<'_>| -> Vec<(oracle::Disc, bool)> {
+    let discs = |view: &ScanView<'_>| -> Vec<(oracle::Disc, bool, f64)> {
         let scan = view.scan();
         (0..scan.len())
             .map(|i| {
@@ -43,16 +43,21 @@ fn best_crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> (f64, bool) {
                     normal: view.placed().rotate(scan.normals()[i].map(f64::from)),
                     radius: f64::from(scan.discs()[i]) * view.placed().scale(),
                 };
-                (disc, matches!(scan.kind(i), PointKind::Surface | PointKind::Border))
+                let radius = f64::from(scan.radii()[i]) * view.placed().scale();
+                (disc, matches!(scan.kind(i), PointKind::Surface | PointKind::Border), radius)
             })
             .collect()
     };
     let (discs_a, discs_b) = (discs(a), discs(b));
     let mut best = f64::NEG_INFINITY;
     let mut doubtful = false;
-    for (p, trusted_p) in &discs_a {
-        for (q, trusted_q) in &discs_b {
+    for (p, trusted_p, radius_p) in &discs_a {
+        for (q, trusted_q, radius_q) in &discs_b {
             let crossing = oracle::crossing(p, q);
+            let d = [0, 1, 2].map(|k| p.centre[k] - q.centre[k]);
+            if d.iter().map(|x| x * x).sum::<f64>().sqrt() > 0.9 * radius_p.max(*radius_q) {
+                continue;
+            }
             if *trusted_p && *trusted_q {
                 best = best.max(crossing.slack / p.radius.min(q.radius));
             } else {
