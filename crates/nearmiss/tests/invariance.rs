@@ -1,5 +1,6 @@
 //! The same scene elsewhere, turned, larger or smaller, is the same scene; so it is with its scans exchanged, their
 //! points in another order, given twice, or more of them.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::{
     Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Evidence, PointCloud, Pose, Reason,
@@ -156,6 +157,7 @@ fn powers_of_two_scale_every_number() {
     for power in [-20, -1, 7, 25] {
         let factor = 2.0_f64.powi(power);
         let other = build(&points.iter().map(|p| p.map(|c| c * factor)).collect::<Vec<_>>());
+        #[expect(clippy::cast_possible_truncation, reason = "a power of two")]
         let unit = (other.frame().scale / scan.frame().scale / factor) as f32;
         let same = |name: &str, a: &[f32], b: &[f32]| {
             let differ = a.iter().zip(b).filter(|(a, b)| (**a).to_bits() != (**b * unit).to_bits()).count();
