@@ -1,8 +1,8 @@
 //! Everything that a program does with a scan, in small: questions in a few poses, evaluations, checks, saving again.
 
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evaluation, Pose, Reason, Scan,
-    Semantics, Verdict, collide_with,
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evaluation, Evidence, Pose, Reason,
+    Scan, Semantics, Verdict, collide_with,
 };
 
 /// What a scan answered.
@@ -36,20 +36,27 @@ pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let mut scratch = CollideScratch::default();
     let mut collide = Vec::new();
     let everything = (2 * scan.nodes().len() * 2 * other.nodes().len().max(scan.nodes().len())) as u64;
-    for semantics in [Semantics::Surface, Semantics::Thickened(1e-3 * size)] {
-        for detail in [Detail::Verdict, Detail::Witness] {
-            let options = CollideOptions::default().with_semantics(semantics).with_detail(detail);
-            for pose in poses(size) {
-                for (a, b) in [(scan, other), (other, scan), (scan, scan)] {
-                    let Ok(plan) = CollidePlan::new(&options, a, b) else { continue };
-                    let (a, b) = (a.at(&Pose::IDENTITY), b.at(&pose));
-                    let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
-                    assert!(answer.statistics.node_pairs <= everything + 4, "{:?}", answer.statistics);
-                    if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
-                        assert!((0.0..=1.0).contains(&likelihood), "a likelihood of {likelihood}");
-                    }
-                    collide.push(answer);
+    let surface = CollideOptions::default();
+    let balls = surface.with_semantics(Semantics::Thickened(1e-3 * size));
+    let all = [
+        surface.with_detail(Detail::Verdict).with_evidence(Evidence::Certified),
+        surface,
+        surface.with_margin(0.02 * size).with_evidence(Evidence::Certified),
+        balls,
+        balls.with_margin(0.02 * size),
+    ];
+    for options in all {
+        for pose in poses(size) {
+            for (a, b) in [(scan, other), (other, scan), (scan, scan)] {
+                let Ok(plan) = CollidePlan::new(&options, a, b) else { continue };
+                let (a, b) = (a.at(&Pose::IDENTITY), b.at(&pose));
+                let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
+                // A pair of nodes is compared once by boxes, once by enclosures.
+                assert!(answer.statistics.node_pairs <= 2 * everything + 4, "{:?}", answer.statistics);
+                if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
+                    assert!((0.0..=1.0).contains(&likelihood), "a likelihood of {likelihood}");
                 }
+                collide.push(answer);
             }
         }
     }
