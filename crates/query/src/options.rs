@@ -30,6 +30,7 @@ pub enum Detail {
 
 /// What is asked. Plain values; [`CollidePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 #[non_exhaustive]
 pub struct CollideOptions {
     /// What it means to meet. Default: surfaces.
