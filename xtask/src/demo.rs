@@ -12,7 +12,8 @@ use nearmiss_testdata::dragon::{Dragon, dragon_path};
 use crate::repository::{Outcome, root};
 
 /// Where the second copy stands along its way in, in sampling radii past first touch.
-const STEPS: [f64; 15] = [-10.0, -6.0, -3.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0, 3.0, 6.0, 10.0];
+const STEPS: [f64; 16] =
+    [-20.0, -10.0, -6.0, -3.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0, 3.0, 6.0, 10.0];
 
 /// The way in for the picture: this far past first touch.
 const PICTURED: f64 = 6.0;
@@ -34,14 +35,16 @@ pub(crate) fn run() -> Outcome {
         "offsets, in r, go further in. Rows marked ~ lie within r of contact, where nothing is promised."
     );
     println!(
-        "Nearest: the least distance of any two points, in r, found by asking about ever larger balls.\n"
+        "Nearest: the least distance of any two points, in r, found by asking about ever larger balls. Gap: what the\n\
+         certificate proves of the surfaces, in r.\n"
     );
     println!(
-        "{:>8}  {:<10} {:<10} {:>8} {:>9} {:>9} {:>12} {:>11}",
-        "offset", "verdict", "evidence", "nearest", "residual", "µs", "evaluations", "node pairs"
+        "{:>8}  {:<10} {:<10} {:>8} {:>8} {:>9} {:>9} {:>12} {:>11}",
+        "offset", "verdict", "evidence", "nearest", "gap", "residual", "µs", "evaluations", "node pairs"
     );
     let mut scratch = CollideScratch::default();
-    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;
+    let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+    let plan = CollidePlan::new(&certified, &scan, &scan)?;
     let a = scan.at(&Pose::IDENTITY);
     // Warm: the first question pays for memory.
     collide_with(&a, &scan.at(&pose(&scan, touch)), &plan, &Budget::UNLIMITED, &mut scratch);
@@ -52,7 +55,7 @@ pub(crate) fn run() -> Outcome {
         let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
         let micros = start.elapsed().as_secs_f64() * 1e6;
         let distance = least_distance(&scan, &a, &b, &mut scratch)? / r;
-        print_row(offset, &answer, distance, micros);
+        print_row(offset, &answer, [distance, r], micros);
     }
     let picture = draw(&scan, &a, &plan, touch - PICTURED * r, folder.join("contact.png"))?;
     println!("\nA picture of the contact at offset {PICTURED}: {}", picture.display());
@@ -142,20 +145,24 @@ fn first_touch(scan: &Scan) -> Outcome<f64> {
     Ok(within)
 }
 
-fn print_row(offset: f64, answer: &Answer, distance: f64, micros: f64) {
+fn print_row(offset: f64, answer: &Answer, [distance, r]: [f64; 2], micros: f64) {
     let evidence = |e: Evidence| if e == Evidence::Certified { "certified" } else { "estimated" };
-    let (verdict, evidence, residual) = match answer.verdict {
+    let none = String::new;
+    let (verdict, evidence, gap, residual) = match answer.verdict {
         Verdict::Intersecting { contact, evidence: e } => {
-            ("touch", evidence(e), format!("{:.1e}", contact.residual))
+            ("touch", evidence(e), none(), format!("{:.1e}", contact.residual))
         }
-        Verdict::Separated { evidence: e, .. } => ("apart", evidence(e), String::new()),
-        Verdict::Undecided(_) => ("undecided", "", String::new()),
+        Verdict::Separated { gap, evidence: e } if gap > 0.0 => {
+            ("apart", evidence(e), format!("{:.2}", gap / r), none())
+        }
+        Verdict::Separated { evidence: e, .. } => ("apart", evidence(e), none(), none()),
+        Verdict::Undecided(_) => ("undecided", "", none(), none()),
     };
     let spent = answer.statistics;
     // Points r apart, surfaces touching some r further in.
     let close = if (0.0..=2.0).contains(&offset) { '~' } else { ' ' };
     println!(
-        "{close}{offset:>7.1}  {verdict:<10} {evidence:<10} {distance:>8.2} {residual:>9} {micros:>9.1} {:>12} {:>11}",
+        "{close}{offset:>7.1}  {verdict:<10} {evidence:<10} {distance:>8.2} {gap:>8} {residual:>9} {micros:>9.1} {:>12} {:>11}",
         spent.evaluations, spent.node_pairs
     );
 }

@@ -15,6 +15,23 @@ pub struct NodePair {
     pub b: NodeId,
 }
 
+impl NodePair {
+    /// What takes the place of either node when this pair is split, as `which` wants it if there is a choice; a node that
+    /// is not split stands there twice. None for two leaves.
+    #[inline]
+    pub fn split(self, a: &Node, b: &Node, which: impl FnOnce() -> Split) -> Option<[[NodeId; 2]; 2]> {
+        let split = match (a.is_leaf(), b.is_leaf()) {
+            (true, true) => return None,
+            (true, false) => Split::Second,
+            (false, true) => Split::First,
+            (false, false) => which(),
+        };
+        let of_a = if split == Split::Second { [self.a; 2] } else { a.children(self.a) };
+        let of_b = if split == Split::First { [self.b; 2] } else { b.children(self.b) };
+        Some([of_a, of_b])
+    }
+}
+
 /// Which node of a pair to replace by its children.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
@@ -126,18 +143,10 @@ pub fn resume<V: Visitor, F: Frontier>(
             return ControlFlow::Break(());
         }
         let (node_a, node_b) = (&a[pair.a.index()], &b[pair.b.index()]);
-        let split = match (node_a.is_leaf(), node_b.is_leaf()) {
-            (true, true) => {
-                visitor.leaves(pair)?;
-                continue;
-            }
-            (true, false) => Split::Second,
-            (false, true) => Split::First,
-            (false, false) => visitor.split(pair),
-        };
-        let children_a = if split == Split::Second { [pair.a; 2] } else { children(pair.a, node_a) };
-        let children_b = if split == Split::First { [pair.b; 2] } else { children(pair.b, node_b) };
-        enter(visitor, frontier, children_a, children_b);
+        match pair.split(node_a, node_b, || visitor.split(pair)) {
+            Some([children_a, children_b]) => enter(visitor, frontier, children_a, children_b),
+            None => visitor.leaves(pair)?,
+        }
     }
     ControlFlow::Continue(())
 }
@@ -157,9 +166,4 @@ fn enter<V: Visitor, F: Frontier>(visitor: &mut V, frontier: &mut F, a: [NodeId;
     }
     let pair = |i: usize| (urgencies[i], NodePair { a: a[i >> 1], b: b[i & 1] });
     frontier.push([pair(0), pair(1), pair(2), pair(3)]);
-}
-
-#[inline]
-fn children(id: NodeId, node: &Node) -> [NodeId; 2] {
-    [NodeId(id.0 + 1), NodeId(node.right)]
 }

@@ -5,6 +5,7 @@
 //! advance where each part belongs.
 
 use bytemuck::{Pod, Zeroable};
+use nearmiss_geometry::NodeId;
 
 /// Greatest number of points that a leaf may be built with; queries reserve room for so many.
 pub const MOST_LEAF_POINTS: usize = 64;
@@ -27,6 +28,13 @@ impl Node {
     #[must_use]
     pub const fn is_leaf(&self) -> bool {
         self.right == 0
+    }
+
+    /// The children of this node, whose id is `id`; the node must not be a leaf.
+    #[inline]
+    #[must_use]
+    pub const fn children(&self, id: NodeId) -> [NodeId; 2] {
+        [NodeId(id.0 + 1), NodeId(self.right)]
     }
 
     /// The points under the node.

@@ -3,9 +3,14 @@
 //!
 //! The search notes the pairs of nodes that its tight boxes exclude; together they cover all pairs of points.
 //! A pair whose enclosures are disjoint is proven; one whose enclosures overlap is replaced by its children. The
-//! certificate is whole when no pair of leaves overlaps, and given up at the first that does. The pairs are taken
-//! last first: what was excluded last lies deepest, and is the likeliest to fail.
+//! certificate is whole when no pair of leaves overlaps, and given up at the first that does. The nearest
+//! pairs are taken first: they are the likeliest to fail.
+//!
+//! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with the least bound
+//! is split further, for about an eighth as long as all took before.
 
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
@@ -29,19 +34,53 @@ pub struct Proof {
     pub pairs: Vec<(NodePair, f64)>,
 }
 
+/// A pair of nodes whose parts of the surfaces are this far apart, in a's stored frame. Ordered so that the least is
+/// greatest.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bound {
+    gap: f32,
+    pair: NodePair,
+    /// The pair, or one of its ancestors, whose enclosures show it.
+    shown_by: NodePair,
+}
+
+impl Ord for Bound {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let key = |bound: &Self| (bound.pair.a.0, bound.pair.b.0);
+        other.gap.total_cmp(&self.gap).then_with(|| key(other).cmp(&key(self)))
+    }
+}
+
+impl PartialOrd for Bound {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Bound {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Bound {}
+
+/// So many node pairs are compared for a better bound even where hardly any were needed before: a microsecond.
+const LEAST_SPLITS: u64 = 16;
+
 /// The search for a pair of leaves whose enclosures are not apart.
-pub(crate) struct Certifier<'a, 'p> {
+pub(crate) struct Certifier<'a> {
     pub(crate) pair: Posed<'a>,
     /// Enclosures must be further apart than this, in a's stored frame.
     reach: f32,
-    /// A lower bound of the distance of all pairs proven so far, in the world.
-    pub(crate) gap: f64,
-    proof: Option<&'p mut Proof>,
+    /// What was proven.
+    proven: &'a mut Vec<Bound>,
 }
 
-impl<'a, 'p> Certifier<'a, 'p> {
-    pub(crate) fn new(pair: Posed<'a>, reach: f32, proof: Option<&'p mut Proof>) -> Self {
-        Self { pair, reach, gap: f64::INFINITY, proof }
+impl<'a> Certifier<'a> {
+    pub(crate) fn new(pair: Posed<'a>, reach: f32, proven: &'a mut Vec<Bound>) -> Self {
+        proven.clear();
+        Self { pair, reach, proven }
     }
 
     /// Proves all of `excluded`, or breaks.
@@ -57,12 +96,60 @@ impl<'a, 'p> Certifier<'a, 'p> {
         ControlFlow::Continue(())
     }
 
+    /// Splits the pair with the least bound again and again, until that is two leaves, or an eighth as many node pairs
+    /// more were compared as until now. The least bound of all then, in the world.
+    pub(crate) fn tighten(&mut self) -> f64 {
+        let most = self.pair.meter.spent.node_pairs + self.pair.meter.spent.node_pairs / 8 + LEAST_SPLITS;
+        let mut heap = BinaryHeap::from(std::mem::take(self.proven));
+        while let Some(&least) = heap.peek() {
+            let pair = least.pair;
+            let nodes = (&self.pair.a.nodes[pair.a.index()], &self.pair.b.nodes[pair.b.index()]);
+            let Some([a, b]) = pair.split(nodes.0, nodes.1, || self.pair.split(pair)) else { break };
+            if self.pair.meter.spent.node_pairs >= most || self.pair.meter.go_on().is_break() {
+                break;
+            }
+            let (gaps, mask) = (self.gaps(a, b), distinct(a, b));
+            self.pair.meter.spent.node_pairs += mask.iter().map(|&counts| u64::from(counts)).sum::<u64>();
+            heap.pop();
+            for i in (0..4).filter(|&i| mask[i]) {
+                let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
+                // Its part is in that of its parents: what is proven of these holds.
+                let own = gaps[i] > least.gap;
+                heap.push(Bound {
+                    gap: if own { gaps[i] } else { least.gap },
+                    pair,
+                    shown_by: if own { pair } else { least.shown_by },
+                });
+            }
+        }
+        let least = heap.peek().map_or(f64::INFINITY, |least| self.in_world(least.gap));
+        *self.proven = heap.into_vec();
+        least
+    }
+
+    /// What was proven, in the world.
+    pub(crate) fn hand_out(&self, proof: &mut Proof) {
+        proof.pairs.extend(self.proven.iter().map(|bound| (bound.shown_by, self.in_world(bound.gap))));
+    }
+
+    /// What a gap in a's stored frame proves in the world.
+    fn in_world(&self, gap: f32) -> f64 {
+        let slack = self.pair.relative.slack();
+        // Less the rounding of the scale and of the product.
+        f64::from(gap - slack) * self.pair.views[0].placed().scale() * (1.0 - 1e-9)
+    }
+
+    #[inline]
+    fn gaps(&self, a: [NodeId; 2], b: [NodeId; 2]) -> [f32; 4] {
+        let enclosures_a = a.map(|id| &self.pair.a.enclosures[id.index()]);
+        let enclosures_b = b.map(|id| &self.pair.b.enclosures[id.index()]);
+        self.pair.relative.gaps(enclosures_a, enclosures_b)
+    }
+
     /// The depth of overlap of those pairs in `mask` whose enclosures are not apart.
     #[inline]
     fn overlaps(&mut self, a: [NodeId; 2], b: [NodeId; 2], mask: [bool; 4]) -> [Option<f32>; 4] {
-        let enclosures_a = a.map(|id| &self.pair.a.enclosures[id.index()]);
-        let enclosures_b = b.map(|id| &self.pair.b.enclosures[id.index()]);
-        let gaps = self.pair.relative.gaps(enclosures_a, enclosures_b);
+        let gaps = self.gaps(a, b);
         let mut overlaps = [None; 4];
         for i in 0..4 {
             if !mask[i] {
@@ -70,11 +157,8 @@ impl<'a, 'p> Certifier<'a, 'p> {
             }
             self.pair.meter.spent.node_pairs += 1;
             if gaps[i] > self.reach {
-                let bound = bound(&self.pair, gaps[i]);
-                self.gap = self.gap.min(bound);
-                if let Some(proof) = &mut self.proof {
-                    proof.pairs.push((NodePair { a: a[i >> 1], b: b[i & 1] }, bound));
-                }
+                let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
+                self.proven.push(Bound { gap: gaps[i], pair, shown_by: pair });
             } else {
                 overlaps[i] = Some(-gaps[i]);
             }
@@ -83,14 +167,7 @@ impl<'a, 'p> Certifier<'a, 'p> {
     }
 }
 
-/// What a gap in a's stored frame proves in the world.
-fn bound(pair: &Posed<'_>, gap: f32) -> f64 {
-    let slack = pair.relative.slack();
-    // Less the rounding of the scale and of the product.
-    f64::from(gap - slack) * pair.views[0].placed().scale() * (1.0 - 1e-9)
-}
-
-impl Visitor for Certifier<'_, '_> {
+impl Visitor for Certifier<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], _count: u8) -> [Option<f32>; 4] {
         self.overlaps(a, b, distinct(a, b))

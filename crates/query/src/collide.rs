@@ -8,7 +8,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Frontier, GatherScratch, NodePair, Relative, Stack, descend};
 
 use crate::budget::{Budget, Meter};
-use crate::certify::{Certifier, Excluded, Proof};
+use crate::certify::{Bound, Certifier, Excluded, Proof};
 use crate::crossing::Lanes;
 use crate::options::{CollideOptions, CollidePlan, Semantics};
 use crate::posed::Posed;
@@ -24,6 +24,7 @@ pub struct CollideScratch {
     lanes: Lanes,
     gathers: [GatherScratch; 2],
     excluded: Vec<Excluded>,
+    proven: Vec<Bound>,
 }
 
 /// Whether `a` and `b` meet. Allocates a scratch of its own; see [`collide_with`].
@@ -106,7 +107,7 @@ fn surfaces(
     scratch: &mut CollideScratch,
     proof: Option<&mut Proof>,
 ) -> Answer {
-    let CollideScratch { stack, lanes, gathers, excluded } = scratch;
+    let CollideScratch { stack, lanes, gathers, excluded, proven } = scratch;
     let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
     let mut search = Surfaces::new(pair, options, lanes, gathers, excluded);
     let ended = descend(nodes_a, nodes_b, &mut search, stack).is_break();
@@ -121,10 +122,14 @@ fn surfaces(
             apart(options, 0.0, false)
         }
         (None, None) => {
-            let mut certifier = Certifier::new(pair, reach, proof);
+            let mut certifier = Certifier::new(pair, reach, proven);
             let whole = certifier.prove(excluded, stack).is_continue();
+            let distance = if whole { certifier.tighten() } else { 0.0 };
+            if let Some(proof) = proof.filter(|_| whole) {
+                certifier.hand_out(proof);
+            }
             statistics = certifier.pair.meter.spent;
-            apart(options, certifier.gap, whole)
+            apart(options, distance, whole)
         }
     };
     Answer { verdict, statistics }

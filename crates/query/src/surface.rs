@@ -48,6 +48,8 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) reach: f32,
     /// Whether separations are to be proven.
     certify: bool,
+    /// The least gap of any pair excluded.
+    nearest: f32,
     /// The pairs that were excluded, to be proven apart.
     pub(crate) excluded: &'a mut Vec<Excluded>,
     lanes: &'a mut Lanes,
@@ -75,6 +77,7 @@ impl<'a> Surfaces<'a> {
             margin: options.margin,
             reach,
             certify: options.evidence == Evidence::Certified,
+            nearest: f32::INFINITY,
             excluded,
             lanes,
             gathers,
@@ -246,7 +249,16 @@ impl Visitor for Surfaces<'_> {
             let distinct = distinct(a, b);
             let mask = [0, 1, 2, 3].map(|i| distinct[i] && admitted[i].is_none());
             if mask.contains(&true) {
+                let gaps = [p, q, r, s];
+                let least = (0..4).filter(|&i| mask[i]).fold(f32::INFINITY, |least, i| least.min(gaps[i]));
                 self.excluded.push(Excluded { a, b, mask });
+                // The nearest come last.
+                if least < self.nearest {
+                    self.nearest = least;
+                } else {
+                    let last = self.excluded.len() - 1;
+                    self.excluded.swap(last, last - 1);
+                }
             }
         }
         admitted
