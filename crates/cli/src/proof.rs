@@ -90,7 +90,7 @@ fn nodes(view: &ScanView<'_>, ids: impl Iterator<Item = usize>) -> (Vec<Enclosur
     distinct.dedup();
     let slices = view.slices();
     let enclosures =
-        distinct.iter().map(|&id| Enclosure::new(slices.nodes[id], &slices.enclosures[id])).collect();
+        distinct.iter().map(|&id| Enclosure::new(slices.nodes[id], &slices.enclosure(id))).collect();
     let place = |id: &usize| distinct.binary_search(id).unwrap_or_default();
     (enclosures, ids.iter().map(place).collect())
 }

@@ -27,7 +27,7 @@ pub struct OrientedBox {
 /// What rounding can do to an interval of a box, relative to the greatest coordinate along its axes. In units of
 /// 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 7 for axes that are orthonormal to rounding
 /// only, √3 between coordinates and lengths; together below 30.
-const ROUNDING: f32 = 2e-6;
+pub(crate) const ROUNDING: f32 = 2e-6;
 
 /// The same for a gap between boxes in motion, relative to the sum of all lengths involved: 12 for the centre of
 /// the box that is moved, 4 for the distance of the centres along an axis, 18 for the half lengths, each less than

@@ -5,8 +5,9 @@ use nearmiss_store::Array;
 use nearmiss_surface::{Evaluation, SurfacePlan};
 
 use crate::boxes::OrientedBox;
-use crate::enclosure::{LeafBounds, Surroundings, enclosures};
+use crate::enclosure::{LeafBounds, Surroundings, growths};
 use crate::gather::{GatherScratch, Index, Vicinity};
+use crate::growth::Growth;
 use crate::options::{BuildError, BuildOptions};
 use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
 use crate::split::{Item, id32, split};
@@ -41,7 +42,7 @@ pub struct PointHierarchy {
     pub(crate) source: Array<u32>,
     pub(crate) nodes: Array<Node>,
     pub(crate) boxes: Array<OrientedBox>,
-    pub(crate) enclosures: Array<OrientedBox>,
+    pub(crate) growths: Array<Growth>,
     pub(crate) cones: Array<NormalCone>,
 }
 
@@ -63,13 +64,24 @@ pub struct Slices<'a> {
     pub nodes: &'a [Node],
     /// A box about the discs of each node's points, and about their balls.
     pub boxes: &'a [OrientedBox],
-    /// A box about each node's part of the surface, proven to contain it.
-    pub enclosures: &'a [OrientedBox],
+    /// What the boxes must grow by to contain each node's part of the surface.
+    pub growths: &'a [Growth],
     /// The scan's sampling radius.
     pub sampling_radius: f32,
 }
 
 impl Slices<'_> {
+    /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's box, and
+    /// contains it.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[inline]
+    #[must_use]
+    pub fn enclosure(&self, node: usize) -> OrientedBox {
+        self.growths[node].of(&self.boxes[node])
+    }
+
     /// About a [sparse](PointKind::is_sparse) point, the radius of the ball in which surface may be that no disc
     /// stands for: the local radius, but no more than the scan's, within which nothing is promised of any point.
     /// Zero for others.
@@ -139,7 +151,7 @@ impl PointHierarchy {
             kinds: &self.kinds,
             nodes: &self.nodes,
             boxes: &self.boxes,
-            enclosures: &self.enclosures,
+            growths: &self.growths,
             sampling_radius: self.sampling_radius,
         }
     }
@@ -286,8 +298,9 @@ impl PointHierarchy {
     /// A box about each node's part of the surface, proven to contain it (docs/theory/certificates.md): every
     /// surface point whose nearest stored point is the node's.
     #[must_use]
-    pub fn enclosures(&self) -> &[OrientedBox] {
-        &self.enclosures
+    pub fn enclosures(&self) -> impl ExactSizeIterator<Item = OrientedBox> {
+        let slices = self.slices();
+        (0..self.nodes.len()).map(move |id| slices.enclosure(id))
     }
 
     /// The directions of a leaf's normals. Leaves are numbered in the order of their points.
@@ -331,7 +344,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         box_of_discs(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &discs, &balls)
     });
     drop(balls);
-    let enclosures = enclosures(&nodes, &boxes, &leaves);
+    let growths = growths(&nodes, &boxes, &leaves);
 
     Ok(PointHierarchy {
         frame: cloud.frame(),
@@ -350,7 +363,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         source: source.into(),
         nodes: nodes.into(),
         boxes: boxes.into(),
-        enclosures: enclosures.into(),
+        growths: growths.into(),
         cones: cones.into(),
     })
 }

@@ -16,6 +16,7 @@
 use nearmiss_surface::{BORDER, Neighbourhood, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
+use crate::growth::Growth;
 use crate::spacing::map;
 use crate::split::id32;
 use crate::surfels::{cross, tangents};
@@ -225,13 +226,14 @@ impl LeafBounds {
         Cells { leaf: *self, low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] }
     }
 
-    /// The box, not less than `bounds`, which has the same axes.
-    fn enclosure(&self, bounds: &OrientedBox) -> OrientedBox {
+    /// What `bounds`, a box of the same axes, must grow by.
+    fn growth(&self, bounds: &OrientedBox) -> Growth {
         let at = self.axes.map(|axis| dot(axis, self.origin));
-        let other = bounds.along(&self.axes);
-        let low = [0, 1, 2].map(|k| (at[k] + self.low[k] * GROWN).min(other[k][0]));
-        let high = [0, 1, 2].map(|k| (at[k] + self.high[k] * GROWN).max(other[k][1]));
-        OrientedBox::spanned(self.axes, low, high, bounds.reach)
+        Growth::new(
+            bounds,
+            [0, 1, 2].map(|k| at[k] + self.low[k] * GROWN),
+            [0, 1, 2].map(|k| at[k] + self.high[k] * GROWN),
+        )
     }
 }
 
@@ -277,29 +279,33 @@ fn include(bounds: &mut [[f32; 3]; 2], x: [f32; 3]) {
     }
 }
 
-/// The enclosures of all nodes, given the bounds of the leaves in order and the boxes about the discs.
-pub(crate) fn enclosures(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<OrientedBox> {
+/// What the boxes about the discs of all nodes must grow by to be enclosures, given the bounds of the leaves in order.
+pub(crate) fn growths(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<Growth> {
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
-    let mut of_leaves = Vec::with_capacity(leaves.len());
     let leaf_boxes = nodes.iter().zip(boxes).filter(|(node, _)| node.is_leaf());
-    of_leaves.extend(leaf_boxes.zip(leaves).map(|((_, bounds), leaf)| leaf.enclosure(bounds)));
+    let of_leaves: Vec<(Growth, OrientedBox)> = leaf_boxes
+        .zip(leaves)
+        .map(|((_, bounds), leaf)| {
+            let growth = leaf.growth(bounds);
+            (growth, growth.of(bounds))
+        })
+        .collect();
     let leaf_size = nodes.iter().find(|node| node.is_leaf()).map_or(1, |leaf| leaf.count as usize);
     map(&ids, |&id| {
         let (node, bounds) = (&nodes[id as usize], &boxes[id as usize]);
         let range =
             node.first as usize / leaf_size..(node.first + node.count).div_ceil(id32(leaf_size)) as usize;
         if node.is_leaf() {
-            return of_leaves[range.start];
+            return of_leaves[range.start].0;
         }
-        let own = bounds.along(&bounds.axes);
-        let (mut low, mut high) = (own.map(|side| side[0]), own.map(|side| side[1]));
-        for leaf in &of_leaves[range] {
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        for (_, leaf) in &of_leaves[range] {
             let other = leaf.along(&bounds.axes);
             for k in 0..3 {
                 low[k] = low[k].min(other[k][0]);
                 high[k] = high[k].max(other[k][1]);
             }
         }
-        OrientedBox::spanned(bounds.axes, low, high, bounds.reach)
+        Growth::new(bounds, low, high)
     })
 }

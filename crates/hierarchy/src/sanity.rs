@@ -105,13 +105,13 @@ impl PointHierarchy {
         check_topology(&self.nodes, self.len(), self.leaf_size)?;
         self.check_metadata()?;
         nodes::check_ranges(&self.boxes)?;
-        nodes::check_ranges(&self.enclosures)
+        nodes::check_growths(&self.growths)
     }
 
     /// What their answers need besides, given the structure: each box lies within its parent's, and every number of
     /// every point is one that a build writes, and lies within what its leaf says. One pass over the whole.
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
-        nodes::check(&self.nodes, &self.boxes, &self.enclosures)?;
+        nodes::check(&self.nodes, &self.boxes)?;
         points::check(self)?;
         self.check_summary()
     }

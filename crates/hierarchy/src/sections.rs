@@ -17,7 +17,7 @@ const KINDS: [u8; 4] = *b"KIND";
 const SOURCE: [u8; 4] = *b"SRCE";
 const NODES: [u8; 4] = *b"NODE";
 const BOXES: [u8; 4] = *b"BOXS";
-const ENCLOSURES: [u8; 4] = *b"ENCL";
+const GROWTHS: [u8; 4] = *b"GROW";
 const CONES: [u8; 4] = *b"CONE";
 
 /// What a hierarchy stores beside its arrays.
@@ -72,7 +72,7 @@ impl PointHierarchy {
         writer
             .section(NODES, 0, &self.nodes)?
             .section(BOXES, 0, &self.boxes)?
-            .section(ENCLOSURES, 0, &self.enclosures)?
+            .section(GROWTHS, 0, &self.growths)?
             .section(CONES, 0, &self.cones)?
             .section(POSITIONS, 0, &self.positions)?
             .section(NORMALS, 0, &self.normals)?
@@ -107,7 +107,7 @@ impl PointHierarchy {
             source: file.array(SOURCE, 0)?,
             nodes: file.array(NODES, 0)?,
             boxes: file.array(BOXES, 0)?,
-            enclosures: file.array(ENCLOSURES, 0)?,
+            growths: file.array(GROWTHS, 0)?,
             cones: file.array(CONES, 0)?,
         };
         hierarchy.check_structure()?;

@@ -24,6 +24,7 @@ fn nearest(scan: &PointHierarchy, x: [f64; 3]) -> usize {
 fn enclosed(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
     let mut scratch = GatherScratch::default();
     let mut random = arbitrary::rng(seed);
+    let enclosures: Vec<OrientedBox> = scan.enclosures().collect();
     let mut found = 0;
     for i in 0..count {
         let i = i % scan.len();
@@ -37,7 +38,7 @@ fn enclosed(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
         let p = nearest(scan, foot.point);
         for (id, node) in scan.nodes().iter().enumerate() {
             if node.points().contains(&p) {
-                let beyond = outside(&scan.enclosures()[id], foot.point);
+                let beyond = outside(&enclosures[id], foot.point);
                 assert!(beyond <= 0.0, "{beyond} outside node {id}, near point {p}");
             }
         }

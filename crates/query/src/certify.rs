@@ -141,9 +141,9 @@ impl<'a> Certifier<'a> {
 
     #[inline]
     fn gaps(&self, a: [NodeId; 2], b: [NodeId; 2]) -> [f32; 4] {
-        let enclosures_a = a.map(|id| &self.pair.a.enclosures[id.index()]);
-        let enclosures_b = b.map(|id| &self.pair.b.enclosures[id.index()]);
-        self.pair.relative.gaps(enclosures_a, enclosures_b)
+        let [a0, a1] = a.map(|id| self.pair.a.enclosure(id.index()));
+        let [b0, b1] = b.map(|id| self.pair.b.enclosure(id.index()));
+        self.pair.relative.gaps([&a0, &a1], [&b0, &b1])
     }
 
     /// The depth of overlap of those pairs in `mask` whose enclosures are not apart.

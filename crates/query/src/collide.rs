@@ -179,8 +179,8 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<Re
     let [(ca, ra), (cb, rb)] = [a, b].map(|view| {
         // The enclosure contains the box.
         let root = match plan.options().semantics {
-            Semantics::Surface => &view.slices().enclosures[0],
-            Semantics::Thickened(_) => &view.slices().boxes[0],
+            Semantics::Surface => view.slices().enclosure(0),
+            Semantics::Thickened(_) => view.slices().boxes[0],
         };
         let centre = view.placed().apply(root.centre.map(f64::from));
         (Vector3::from(centre), f64::from(root.radius()) * view.placed().scale())
@@ -191,7 +191,7 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<Re
     }
     let pose = a.placed().inverse().after(b.placed());
     // Coordinates in a's stored frame: of its own points, and of b's.
-    let own = a.slices().enclosures[0].centre.map(f64::from);
+    let own = a.slices().enclosure(0).centre.map(f64::from);
     let extent = Vector3::from(own).norm() + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
     let shift = Vector3::from(pose.translation()).norm();
     Ok(Relative::new(&pose, extent + shift))

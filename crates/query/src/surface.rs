@@ -257,7 +257,7 @@ impl Visitor for Surfaces<'_> {
                     self.nearest = least;
                 } else {
                     let last = self.excluded.len() - 1;
-                    self.excluded.swap(last, last - 1);
+                    self.excluded.swap(last, last.saturating_sub(1));
                 }
             }
         }

@@ -46,9 +46,6 @@ impl Subject {
     /// When its nodes are no tree over its points, or its surface has no naive twin.
     pub(crate) fn new(scan: Scan) -> Result<Self, String> {
         check_tree(scan.nodes(), scan.len())?;
-        if scan.enclosures().len() != scan.nodes().len() {
-            return Err("not as many enclosures as nodes".into());
-        }
         let ids = scan.nodes().iter().enumerate().map(|(id, n)| ((n.first, n.count), id)).collect();
         let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
         for p in scan.positions() {
@@ -68,7 +65,7 @@ impl Subject {
         let Some(&id) = self.ids.get(&(first, count)) else {
             return Err(format!("no node has the points {first} to {first} + {count}"));
         };
-        let stored = &self.scan.enclosures()[id];
+        let stored = self.scan.slices().enclosure(id);
         let bits = |[a, b, c]: [f32; 3]| [a.to_bits(), b.to_bits(), c.to_bits()];
         let same = bits(stored.centre) == bits(claimed.centre)
             && bits(stored.half) == bits(claimed.half)

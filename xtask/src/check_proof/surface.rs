@@ -77,7 +77,7 @@ struct Tree<'a> {
 impl<'a> Tree<'a> {
     fn new(subject: &'a Subject) -> Self {
         let scan = &subject.scan;
-        let boxes = scan.enclosures().iter().map(|b| Inverse::new(b.centre, b.half, b.axes)).collect();
+        let boxes = scan.enclosures().map(|b| Inverse::new(b.centre, b.half, b.axes)).collect();
         let mut parents = vec![0; scan.nodes().len()];
         let mut leaves = vec![0; scan.len()];
         for (id, node) in scan.nodes().iter().enumerate() {

@@ -18,7 +18,7 @@ impl PointHierarchy {
             ("kinds", self.kinds.len(), points),
             ("source", self.source.len(), points),
             ("boxes", self.boxes.len(), nodes),
-            ("enclosures", self.enclosures.len(), nodes),
+            ("growths", self.growths.len(), nodes),
             ("cones", self.cones.len(), leaves),
         ];
         match expected.into_iter().find(|(_, found, expected)| found != expected) {

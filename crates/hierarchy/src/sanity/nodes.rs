@@ -4,6 +4,7 @@ use bytemuck::cast_ref;
 
 use super::{FARTHEST, Flaw};
 use crate::boxes::{OrientedBox, dot, sub};
+use crate::growth::Growth;
 use crate::topology::Node;
 
 /// Axes are unit and at right angles to rounding; this is far from rounding and far from a box that lies.
@@ -46,23 +47,27 @@ pub(super) fn check_ranges(boxes: &[OrientedBox]) -> Result<(), Flaw> {
     first_wrong(boxes.iter().position(|b| !is_sound(b)))
 }
 
-/// Checks the boxes of a tree whose topology and ranges are sound: axes form a frame, each box lies within its
-/// enclosure and its parent's box, and each enclosure within its parent's.
-pub(super) fn check(nodes: &[Node], boxes: &[OrientedBox], enclosures: &[OrientedBox]) -> Result<(), Flaw> {
+/// Checks the boxes of a tree whose topology and ranges are sound: axes form a frame, and each box lies within its
+/// parent's.
+pub(super) fn check(nodes: &[Node], boxes: &[OrientedBox]) -> Result<(), Flaw> {
     let askew = boxes.iter().position(|b| !is_frame(&b.axes));
     first_wrong(askew)?;
-    let narrow = boxes.iter().zip(enclosures).position(|(b, e)| e.axes != b.axes || !lies_within(b, e));
-    first_wrong(narrow)?;
     for (id, (node, bounds)) in nodes.iter().zip(boxes).enumerate() {
         if !node.is_leaf() {
             for child in [id + 1, node.right as usize] {
-                if !(lies_within(&boxes[child], bounds) && lies_within(&enclosures[child], &enclosures[id])) {
+                if !lies_within(&boxes[child], bounds) {
                     return first_wrong(Some(child));
                 }
             }
         }
     }
     Ok(())
+}
+
+/// Checks that enclosures are no smaller than boxes, and finite.
+pub(super) fn check_growths(growths: &[Growth]) -> Result<(), Flaw> {
+    let wrong = growths.iter().position(|growth| !growth.is_sound());
+    wrong.map_or(Ok(()), |index| Err(Flaw::Value { what: "the enclosure of node", index }))
 }
 
 fn first_wrong(node: Option<usize>) -> Result<(), Flaw> {

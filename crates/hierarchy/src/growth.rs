@@ -1,0 +1,79 @@
+//! How much larger an enclosure is than the box of its node: both have the same axes, so six lengths say it.
+//!
+//! Kept short, for a certificate looks at many enclosures whose boxes it has looked at before: single precision
+//! without the lower half of its digits, rounded up.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::boxes::{OrientedBox, ROUNDING};
+
+/// By how much an enclosure sticks out of the box of its node, along either side of each axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Growth {
+    /// Against the axes: the upper halves of single-precision numbers.
+    low: [u16; 3],
+    /// Along the axes.
+    high: [u16; 3],
+}
+
+/// The upper half of a length that is no shorter.
+fn up(length: f32) -> u16 {
+    let bits = length.max(0.0).to_bits().saturating_add(0xffff) >> 16;
+    u16::try_from(bits).unwrap_or(u16::MAX)
+}
+
+#[inline]
+fn length(half: u16) -> f32 {
+    f32::from_bits(u32::from(half) << 16)
+}
+
+impl Growth {
+    /// What `bounds` must grow by to contain these intervals along its axes.
+    pub(crate) fn new(bounds: &OrientedBox, low: [f32; 3], high: [f32; 3]) -> Self {
+        let own = bounds.along(&bounds.axes);
+        let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
+        let more = ROUNDING * far;
+        Self {
+            low: [0, 1, 2].map(|k| up((own[k][0] - low[k]).max(0.0) + more)),
+            high: [0, 1, 2].map(|k| up((high[k] - own[k][1]).max(0.0) + more)),
+        }
+    }
+
+    /// `bounds` grown.
+    #[inline]
+    #[must_use]
+    pub fn of(&self, bounds: &OrientedBox) -> OrientedBox {
+        let mut grown = *bounds;
+        for k in 0..3 {
+            let (low, high) = (length(self.low[k]), length(self.high[k]));
+            let shift = 0.5 * (high - low);
+            for i in 0..3 {
+                grown.centre[i] += shift * bounds.axes[k][i];
+            }
+            grown.half[k] += 0.5 * (high + low);
+        }
+        grown
+    }
+
+    /// Whether all lengths are lengths.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.low.iter().chain(&self.high).all(|&half| length(half) < f32::INFINITY && half < 1 << 15)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_rounded_up_by_less_than_a_hundredth() {
+        for x in [0.0, 1e-30, 1.0, 1.003, 0.333_333, 7.5e8, f32::MAX] {
+            let kept = length(up(x));
+            assert!(kept >= x && (kept <= 1.008 * x || kept.is_infinite()), "{x} is kept as {kept}");
+        }
+        assert!(!Growth { low: [up(f32::INFINITY), 0, 0], high: [0; 3] }.is_sound());
+        assert!(!Growth { low: [0; 3], high: [0x8001, 0, 0] }.is_sound(), "less than nothing");
+        assert!(Growth { low: [up(0.5); 3], high: [up(3e9); 3] }.is_sound());
+    }
+}
