@@ -32,7 +32,7 @@ pub(crate) const ROUNDING: f32 = 2e-6;
 /// The same for a gap between boxes in motion, relative to the sum of all lengths involved: 12 for the centre of
 /// the box that is moved, 4 for the distance of the centres along an axis, 18 for the half lengths, each less than
 /// 8 off in its cosine; together below 40.
-const SLACK: f32 = 4e-6;
+pub const SLACK: f32 = 4e-6;
 
 impl OrientedBox {
     /// The least box along `axes` that contains all `intervals`, given per axis; grown by what rounding may

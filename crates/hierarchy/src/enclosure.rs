@@ -8,6 +8,8 @@
 //!    the greatest horizon of those that reach p;
 //! 3. x is on p's side of the plane half-way between p and any other point.
 //!
+//! None of them uses f(x) = 0: every x of status ok is enclosed.
+//!
 //! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a cylinder about its
 //! normal, and the leaf's part is in the box about these as well; whichever is less counts. The enclosure of an
 //! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull of J itself (Klein &
@@ -169,6 +171,9 @@ fn across(axes: [[f32; 3]; 3], cell: &Cell, within: f32, near: &Neighbourhood) -
         // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, and any height z.
         let height = dot(q, axes[2]);
         let c = 0.5 * d_sq + (-cell.low * height).max(-cell.high * height).max(0.0);
+        if c < f32::MIN_POSITIVE {
+            continue;
+        }
         let (x, y) = (dot(q, axes[0]) / c, dot(q, axes[1]) / c);
         let mut side = [0.0_f32; SECTORS];
         for k in 0..SECTORS {
@@ -179,10 +184,12 @@ fn across(axes: [[f32; 3]; 3], cell: &Cell, within: f32, near: &Neighbourhood) -
         next[..SECTORS - 1].copy_from_slice(&side[1..]);
         for k in 0..SECTORS {
             let least = if side[k] < next[k] { side[k] } else { next[k] };
-            closed[k] = if closed[k] > least { closed[k] } else { least };
+            // What is no number, or a zero of either sign, leaves a sector open.
+            closed[k] = if least > closed[k] { least } else { closed[k] };
         }
     }
-    GROWN / closed.into_iter().fold(f32::INFINITY, f32::min)
+    let least = closed.into_iter().fold(f32::INFINITY, f32::min);
+    if least > 0.0 { GROWN / least } else { f32::INFINITY }
 }
 
 /// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
@@ -265,8 +272,11 @@ impl Cells {
     pub(crate) fn close(self) -> LeafBounds {
         let Self { mut leaf, low, high } = self;
         for k in 0..3 {
-            leaf.low[k] = leaf.low[k].max(low[k]);
-            leaf.high[k] = leaf.high[k].min(high[k]);
+            // Nothing but numbers in order may take anything off.
+            if low[k] <= high[k] {
+                leaf.low[k] = leaf.low[k].max(low[k]);
+                leaf.high[k] = leaf.high[k].min(high[k]);
+            }
         }
         leaf
     }

@@ -17,11 +17,14 @@ pub struct Growth {
     high: [u16; 3],
 }
 
-/// The upper half of a length that is no shorter.
+/// The upper half of a length that is no shorter; boundless for what is no number.
 fn up(length: f32) -> u16 {
-    let bits = length.max(0.0).to_bits().saturating_add(0xffff) >> 16;
-    u16::try_from(bits).unwrap_or(u16::MAX)
+    let bits = if length <= f32::MAX { length.max(0.0).to_bits() } else { f32::INFINITY.to_bits() };
+    u16::try_from(bits.saturating_add(0xffff) >> 16).unwrap_or(BOUNDLESS).min(BOUNDLESS)
 }
+
+/// Infinity: a box that grows so much is apart from nothing.
+const BOUNDLESS: u16 = 0x7f80;
 
 #[inline]
 fn length(half: u16) -> f32 {
@@ -34,9 +37,12 @@ impl Growth {
         let own = bounds.along(&bounds.axes);
         let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
         let more = ROUNDING * far;
+        // Not `max`, which would make nothing of what is no number.
+        let side = |beyond: f32| up(if beyond < 0.0 { more } else { beyond + more });
+        let in_order = |k: usize, beyond: f32| if low[k] <= high[k] { beyond } else { f32::NAN };
         Self {
-            low: [0, 1, 2].map(|k| up((own[k][0] - low[k]).max(0.0) + more)),
-            high: [0, 1, 2].map(|k| up((high[k] - own[k][1]).max(0.0) + more)),
+            low: [0, 1, 2].map(|k| side(in_order(k, own[k][0] - low[k]))),
+            high: [0, 1, 2].map(|k| side(in_order(k, high[k] - own[k][1]))),
         }
     }
 
@@ -56,9 +62,9 @@ impl Growth {
         grown
     }
 
-    /// Whether all lengths are lengths.
+    /// Whether all lengths are lengths, if boundless ones.
     pub(crate) fn is_sound(&self) -> bool {
-        self.low.iter().chain(&self.high).all(|&half| length(half) < f32::INFINITY && half < 1 << 15)
+        self.low.iter().chain(&self.high).all(|&half| half <= BOUNDLESS)
     }
 }
 
@@ -72,7 +78,9 @@ mod tests {
             let kept = length(up(x));
             assert!(kept >= x && (kept <= 1.008 * x || kept.is_infinite()), "{x} is kept as {kept}");
         }
-        assert!(!Growth { low: [up(f32::INFINITY), 0, 0], high: [0; 3] }.is_sound());
+        assert_eq!(up(f32::INFINITY), BOUNDLESS);
+        assert_eq!(up(f32::NAN), BOUNDLESS, "never less than it may be");
+        assert!(!Growth { low: [BOUNDLESS + 1, 0, 0], high: [0; 3] }.is_sound(), "no number");
         assert!(!Growth { low: [0; 3], high: [0x8001, 0, 0] }.is_sound(), "less than nothing");
         assert!(Growth { low: [up(0.5); 3], high: [up(3e9); 3] }.is_sound());
     }

@@ -15,7 +15,7 @@ mod split;
 mod surfels;
 mod topology;
 
-pub use boxes::{OrientedBox, Relative};
+pub use boxes::{OrientedBox, Relative, SLACK};
 pub use build::{PointHierarchy, Slices};
 pub use descend::{Frontier, NodePair, Split, Stack, Visitor, descend, resume};
 pub use gather::{GatherScratch, Vicinity};

@@ -1,10 +1,10 @@
-//! Enclosures against the surface itself: zeros of f found by projection, each in the enclosure of every node that
-//! holds its nearest point.
+//! Enclosures against the surface itself: zeros of f found by projection, and places of status ok, driven outwards as
+//! long as they stay ok, each in the enclosure of every node that holds its nearest point.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, OrientedBox, PointHierarchy};
-use nearmiss_surface::{Bandwidth, Kernel, SurfaceOptions, project};
+use nearmiss_surface::{Bandwidth, Kernel, Status, SurfaceOptions, project};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 /// How far `x` is outside the box, in double precision.
@@ -18,6 +18,91 @@ fn nearest(scan: &PointHierarchy, x: [f64; 3]) -> usize {
     let distance_sq = |p: &[f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
     let least = scan.positions().iter().map(distance_sq).enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
     least.unwrap().0
+}
+
+/// Fails unless `x` is in the enclosures of all nodes that hold its nearest point.
+fn check_enclosed(scan: &PointHierarchy, enclosures: &[OrientedBox], x: [f64; 3]) {
+    let p = nearest(scan, x);
+    for (id, node) in scan.nodes().iter().enumerate() {
+        if node.points().contains(&p) {
+            let beyond = outside(&enclosures[id], x);
+            assert!(beyond <= 0.0, "{x:?} is {beyond} outside node {id}, near point {p}");
+        }
+    }
+}
+
+/// Starts at `count` places near points of `scan` where the status is ok, and takes steps that lead further out of the
+/// leaf's enclosure and keep it ok. How many starts there were.
+fn driven_outwards(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
+    let mut scratch = GatherScratch::default();
+    let mut random = arbitrary::rng(seed);
+    let enclosures: Vec<OrientedBox> = scan.enclosures().collect();
+    let leaf_of =
+        |p: usize| scan.nodes().iter().position(|n| n.is_leaf() && n.points().contains(&p)).unwrap();
+    let mut starts = 0;
+    for i in 0..count {
+        let i = i % scan.len();
+        let r = f64::from(scan.radii()[i]);
+        let step = |from: [f64; 3], by: f64, random: &mut _| {
+            let d = arbitrary::point_in(random, by);
+            [0, 1, 2].map(|k| from[k] + d[k])
+        };
+        let mut x = step(scan.positions()[i].map(f64::from), 1.2 * r, &mut random);
+        if scan.evaluate_with(x, &mut scratch).status != Status::Ok {
+            continue;
+        }
+        starts += 1;
+        let mut fill = outside(&enclosures[leaf_of(nearest(scan, x))], x);
+        for round in 0..40 {
+            let to = step(x, r * 0.8_f64.powi(round), &mut random);
+            if scan.evaluate_with(to, &mut scratch).status == Status::Ok {
+                let reached = outside(&enclosures[leaf_of(nearest(scan, to))], to);
+                if reached > fill {
+                    (x, fill) = (to, reached);
+                }
+            }
+        }
+        check_enclosed(scan, &enclosures, x);
+    }
+    starts
+}
+
+/// A grid with a hole in the plane across the given axis; its borders lie along the others.
+fn flat_grid(axis: usize, n: i32) -> Vec<[f64; 3]> {
+    let mut points = Vec::new();
+    for i in 0..2 * n {
+        for j in 0..n {
+            if (i - n).abs() + (j - n / 2).abs() > n / 4 {
+                let mut p = [0.0; 3];
+                p[(axis + 1) % 3] = f64::from(i);
+                p[(axis + 2) % 3] = f64::from(j);
+                points.push(p);
+            }
+        }
+    }
+    points
+}
+
+#[test]
+fn all_that_is_ok_is_enclosed() {
+    let options = [
+        SurfaceOptions::default(),
+        SurfaceOptions::default().with_kernel(Kernel::Wendland).with_horizon(4.0),
+        SurfaceOptions::default().with_bandwidth(Bandwidth::Global).with_support_min(3),
+        SurfaceOptions::default().with_horizon(2.0).with_threshold(0.1).with_support_min(3),
+    ];
+    let grids = [0, 1, 2].map(|axis| flat_grid(axis, 8));
+    let clouds = CloudKind::ALL.map(|kind| arbitrary::cloud(kind, 250, 6));
+    let mut starts = 0;
+    for points in grids.iter().chain(&clouds) {
+        let Ok(cloud) = PointCloud::from_positions(points) else { continue };
+        for (n, surface) in (0_u64..).zip(options) {
+            let options = BuildOptions::default().with_surface(surface).with_leaf_size(8);
+            let scan = PointHierarchy::build(&cloud, &options).unwrap();
+            starts += driven_outwards(&scan, 250, n);
+        }
+    }
+    assert!(starts > 3000, "{starts} starts");
 }
 
 /// Projects `count` places near points of `scan`; how many surface points were found, all of them enclosed.
@@ -35,13 +120,7 @@ fn enclosed(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
             continue;
         }
         found += 1;
-        let p = nearest(scan, foot.point);
-        for (id, node) in scan.nodes().iter().enumerate() {
-            if node.points().contains(&p) {
-                let beyond = outside(&enclosures[id], foot.point);
-                assert!(beyond <= 0.0, "{beyond} outside node {id}, near point {p}");
-            }
-        }
+        check_enclosed(scan, &enclosures, foot.point);
     }
     found
 }

@@ -3,8 +3,8 @@
 
 use nearmiss::hierarchy::Node;
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, PointCloud, Pose,
-    Proof, Scan, Verdict, collide_proving, collide_with,
+    Bandwidth, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence,
+    PointCloud, Pose, Proof, Scan, SurfaceOptions, Verdict, collide_proving, collide_with,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -107,5 +107,62 @@ fn leaves_that_were_compared_are_not_certified() {
             "{:?}",
             answer.verdict
         );
+    }
+}
+
+/// Two grids along the axes that meet at a rim, where a neighbour of a rim point lies exactly across: a zero of either
+/// sign once made its cell vanish.
+#[test]
+fn grids_along_the_axes_are_enclosed_to_their_rims() {
+    let grid: Vec<[f64; 3]> =
+        (0..13).flat_map(|i| (0..6).map(move |j| [f64::from(i), f64::from(j), 0.0])).collect();
+    let scan = scan(&grid);
+    let turned = [
+        -0.080_917_897_015_431_28,
+        0.021_815_976_909_983_124,
+        -0.996_481_990_351_086_8,
+        6.691_529_901_348_915,
+        0.001_774_128_822_682_024_8,
+        -0.999_755_698_185_68,
+        -0.022_031_713_782_276_897,
+        -1.317_422_485_214_487_8,
+        -0.996_719_191_352_068_2,
+        -0.003_550_647_367_273_155,
+        0.080_859_424_272_948_57,
+        6.154_827_342_033_586,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+    ];
+    let pose = Pose::from_row_major(&turned, scan.bounds(), 1e-6).unwrap();
+    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+    let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&pose));
+    let meeting = [6.177_413_816_683_716, -0.653_311_282_612_506_4, 1.26e-7];
+    for view in [&a, &b] {
+        let at = view.evaluate_with(meeting, &mut nearmiss::hierarchy::GatherScratch::default());
+        assert!(at.f.abs() < 1e-6 * at.bandwidth, "a point of either surface: {}", at.f);
+    }
+    let verdict = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict;
+    assert!(!matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. }), "{verdict:?}");
+}
+
+#[test]
+fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
+    let shape = sphere(1.0).sample(Sampling::clean(0.3));
+    let cloud = PointCloud::from_positions(&shape.points).unwrap();
+    for h in [1e3, 1e13, 9e17] {
+        let surface = SurfaceOptions::default().with_bandwidth(Bandwidth::Fixed(h));
+        let scan = Scan::build(&cloud, &BuildOptions::default().with_surface(surface)).unwrap();
+        assert_eq!(scan.sanity_check(), Ok(()), "{h}");
+        let mut bytes = Vec::new();
+        scan.write_to(&mut bytes).unwrap();
+        let scan = Scan::from_bytes(bytes, Check::Full).unwrap();
+        let options = CollideOptions::default().with_evidence(Evidence::Certified);
+        let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+        let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.0, 20.0, 0.0])));
+        let verdict = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict;
+        assert_eq!(verdict, Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated }, "{h}");
     }
 }

@@ -3,9 +3,9 @@
 //! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
 //! children of both, or of the much larger one; the deepest overlap first.
 
-use nearmiss_geometry::NodeId;
-use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Frontier, GatherScratch, NodePair, Relative, Stack, descend};
+use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
+use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_hierarchy::{Frontier, GatherScratch, NodePair, Relative, SLACK, Stack, descend};
 
 use crate::budget::{Budget, Meter};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
@@ -163,7 +163,7 @@ fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
     }
 }
 
-/// Scans whose sizes differ by more than this are not compared in single precision.
+/// Scans whose stored frames differ in scale by more than this are not compared in single precision.
 const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 
 /// The motion of b's stored frame into a's. An error is the distance of balls about the two scans if that is more
@@ -171,30 +171,48 @@ const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<Relative, Option<f64>> {
     let ratio = b.placed().scale() / a.placed().scale();
     let finite = |m: [f64; 16]| m.iter().all(|x| x.is_finite());
-    let proper = finite(a.placed().to_row_major()) && finite(b.placed().to_row_major());
+    let proper = [a, b].iter().all(|view| finite(view.placed().to_row_major()) && is_rotation(view.placed()));
     let positive = a.placed().scale() > 0.0 && b.placed().scale() > 0.0;
     if !(proper && positive && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
         return Err(None);
     }
-    let [(ca, ra), (cb, rb)] = [a, b].map(|view| {
+    let [(ca, ra, own), (cb, rb, _)] = [a, b].map(|view| {
         // The enclosure contains the box.
         let root = match plan.options().semantics {
             Semantics::Surface => view.slices().enclosure(0),
             Semantics::Thickened(_) => view.slices().boxes[0],
         };
         let centre = view.placed().apply(root.centre.map(f64::from));
-        (Vector3::from(centre), f64::from(root.radius()) * view.placed().scale())
+        (Vector3::from(centre), f64::from(root.radius()) * view.placed().scale(), root.centre)
     });
-    let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6);
+    // What double precision loses of places far from the origin of the world.
+    let far = [a, b].map(|view| Vector3::from(view.placed().translation()).norm());
+    let lost = DOUBLE_ROUNDING * (far[0] + far[1] + ca.norm() + cb.norm());
+    let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6) - lost;
+    if gap.is_nan() || gap == f64::INFINITY {
+        return Err(None);
+    }
     if gap > plan.reach() {
         return Err(Some(gap));
     }
     let pose = a.placed().inverse().after(b.placed());
     // Coordinates in a's stored frame: of its own points, and of b's.
-    let own = a.slices().enclosure(0).centre.map(f64::from);
-    let extent = Vector3::from(own).norm() + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
+    let own = Vector3::from(own.map(f64::from)).norm();
+    let extent = own + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
     let shift = Vector3::from(pose.translation()).norm();
-    Ok(Relative::new(&pose, extent + shift))
+    // The slack of the motion is a share of its reach.
+    let lost = lost / a.placed().scale() / f64::from(SLACK);
+    Ok(Relative::new(&pose, extent + shift + lost))
+}
+
+/// Of 2⁻⁵³ each: some ten roundings where poses are composed and applied.
+const DOUBLE_ROUNDING: f64 = 2e-15;
+
+/// Whether the rotation is one, to more than rounding: products of many poses may not be.
+fn is_rotation(pose: &Pose) -> bool {
+    let rotation = pose.rotation();
+    let error = rotation.transpose() * rotation - Matrix3::identity();
+    error.iter().all(|x| x.abs() <= 1e-9)
 }
 
 /// An uncalibrated estimate of the chance that the pairs still open hide a contact: each counts by how deeply

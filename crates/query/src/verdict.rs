@@ -62,7 +62,8 @@ pub enum Reason {
     Undersampled,
     /// They come near each other only where a scan's points do not look like one sheet.
     Ambiguous,
-    /// A pose is not finite, has no positive scale, or makes one scan more than 2⁶⁰ times as large as the other.
+    /// A pose is not finite, no rotation, has no positive scale, leads further than squares of double precision reach,
+    /// or makes one scan's frame more than 2⁶⁰ times as large as the other's.
     Pose,
 }
 

@@ -291,6 +291,7 @@ fn a_pose_that_is_none_is_undecided() {
         Pose::IDENTITY.with_scale(f64::NAN),
         Pose::IDENTITY.with_scale(1e39),
         Pose::from_axis_angle([1.0, 0.0, 0.0], f64::NAN),
+        Pose::from_translation([1e160, 0.0, 0.0]),
     ];
     for pose in poses {
         let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
