@@ -199,10 +199,10 @@ impl Tally {
 }
 
 fn print_sampled(path: &Path, sampled: &Sampled) {
-    let Sampled { starts, points, fill, far, .. } = sampled;
+    let Sampled { starts, points, places, fill, far, .. } = sampled;
     println!(
-        "{}: {points} surface points from {starts} starts, at most {:.2} % out to a face of an enclosure and {far:.3} \
-         local radii from the nearest point",
+        "{}: {points} surface points from {starts} starts, {places} of them of status ok themselves; at most {:.2} % out \
+         to a face of an enclosure and {far:.3} local radii from the nearest point",
         path.display(),
         100.0 * fill
     );

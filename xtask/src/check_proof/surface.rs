@@ -1,8 +1,10 @@
-//! Whether the surface lies in the enclosures: points of the surface, projected from random places, each in the
-//! enclosures of all nodes that have its nearest cloud point.
+//! Whether the surface lies in the enclosures: points of the surface, projected from random places, and those places
+//! themselves where their status is ok, each in the enclosures of all nodes that have its nearest cloud point; and all
+//! cloud points likewise.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use nearmiss::Status;
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::surface::project;
 use rayon::prelude::*;
@@ -27,6 +29,8 @@ const FAR_SHARE: u64 = 5;
 pub(crate) struct Sampled {
     pub(crate) starts: u64,
     pub(crate) points: u64,
+    /// Starts of status ok, on the surface or not.
+    pub(crate) places: u64,
     /// The greatest `|t_k|/half_k` of a point in an enclosure; above 1 it is outside.
     pub(crate) fill: f64,
     /// The greatest distance of a point from its nearest cloud point, in the latter's local radii.
@@ -92,21 +96,25 @@ impl<'a> Tree<'a> {
         Self { subject, neighbours: Neighbours::new(scan.positions()), boxes, parents, leaves }
     }
 
-    /// Counts the surface point `x` (stored frame).
+    /// Checks `x` (stored frame), a place of status ok.
     fn check(&self, x: [f64; 3], sampled: &mut Sampled) {
         let nearest = self.neighbours.nearest(x);
         let point = nearest.index as usize;
         let radius = f64::from(self.subject.scan.radii()[point]);
-        sampled.points += 1;
         sampled.far = sampled.far.max(nearest.distance_sq.sqrt() / radius);
+        self.check_enclosed(x, point, "the place", sampled);
+    }
+
+    /// Whether `x`, which belongs to `point`, is in the enclosures of all nodes above.
+    fn check_enclosed(&self, x: [f64; 3], point: usize, what: &str, sampled: &mut Sampled) {
         let mut id = self.leaves[point];
         loop {
             let fill = self.boxes[id].fill(x);
             sampled.fill = sampled.fill.max(fill);
             if fill.is_nan() || fill > 1.0 {
                 sampled.faults.push(format!(
-                    "the surface point {x:?} (stored frame), nearest to point {point}, is outside the enclosure of \
-                     node {id}: {fill} of its half extent"
+                    "{what} {x:?} (stored frame), nearest to point {point}, is outside the enclosure of node {id}: \
+                     {fill} of its half extent"
                 ));
             }
             if id == 0 {
@@ -129,7 +137,13 @@ impl<'a> Tree<'a> {
             let end = project(start, |x| scan.evaluate_with(x, &mut scratch));
             sampled.starts += 1;
             if end.converged {
+                sampled.points += 1;
                 self.check(end.point, &mut sampled);
+            }
+            // What the enclosures rest on holds off the surface too, and less narrowly.
+            if scan.evaluate_with(start, &mut scratch).status == Status::Ok {
+                sampled.places += 1;
+                self.check(start, &mut sampled);
             }
         }
         sampled
@@ -150,9 +164,13 @@ pub(crate) fn check(subject: &Subject, points: u64, seed: u64, done: &AtomicU64)
         })
         .collect();
     let mut all = Sampled::default();
+    for (point, p) in subject.scan.positions().iter().enumerate() {
+        tree.check_enclosed(p.map(f64::from), point, "the cloud point", &mut all);
+    }
     for chunk in chunks {
         all.starts += chunk.starts;
         all.points += chunk.points;
+        all.places += chunk.places;
         all.fill = all.fill.max(chunk.fill);
         all.far = all.far.max(chunk.far);
         all.faults.extend(chunk.faults);
