@@ -166,3 +166,26 @@ fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
         assert_eq!(verdict, Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated }, "{h}");
     }
 }
+
+#[test]
+fn distances_are_proven_however_far() {
+    let shape = sphere(1.0).sample(Sampling::clean(0.1));
+    let scan = scan(&shape.points);
+    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+    for (away, share) in
+        [(2.9, 0.05), (4.0, 0.4), (10.0, 0.7), (150.0, 0.97), (250.0, 0.97), (1e30, 0.99), (1e60, 0.99)]
+    {
+        let (a, b) =
+            (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.6 * away, 0.0, 0.8 * away])));
+        let mut proof = Proof::default();
+        let scratch = &mut CollideScratch::default();
+        let verdict = collide_proving(&a, &b, &plan, &Budget::UNLIMITED, scratch, &mut proof).verdict;
+        let Verdict::Separated { gap, evidence: Evidence::Certified } = verdict else {
+            panic!("{away}: {verdict:?}")
+        };
+        let distance = away - 2.0;
+        assert!(gap <= distance * (1.0 + 1e-9) && gap >= share * distance, "{gap} of {distance}");
+        assert!(!proof.pairs.is_empty());
+    }
+}

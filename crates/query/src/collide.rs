@@ -118,9 +118,7 @@ fn surfaces(
         _ if ended => Verdict::Undecided(Reason::Budget { likelihood: likelihood(&pair, stack) }),
         (None, Some(reason)) => Verdict::Undecided(reason),
         // Leaves whose boxes overlap have enclosures that overlap.
-        (None, None) if options.evidence == Evidence::Estimated || statistics.leaf_pairs > 0 => {
-            apart(options, 0.0, false)
-        }
+        (None, None) if !options.certifies() || statistics.leaf_pairs > 0 => apart(options, 0.0, false),
         (None, None) => {
             let mut certifier = Certifier::new(pair, reach, proven);
             let whole = certifier.prove(excluded, stack).is_continue();
@@ -156,12 +154,15 @@ fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
         Semantics::Thickened(radius) => {
             Verdict::Separated { gap: (distance - 2.0 * radius).max(0.0), evidence: Evidence::Certified }
         }
-        Semantics::Surface if proven && options.evidence == Evidence::Certified => {
+        Semantics::Surface if proven && options.certifies() => {
             Verdict::Separated { gap: distance.max(0.0), evidence: Evidence::Certified }
         }
         Semantics::Surface => Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
     }
 }
+
+/// From so many radii on the distance of balls is a good bound, and single precision less and less use.
+const FAR_APART: f64 = 100.0;
 
 /// Scans whose stored frames differ in scale by more than this are not compared in single precision.
 const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
@@ -192,7 +193,8 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<Re
     if gap.is_nan() || gap == f64::INFINITY {
         return Err(None);
     }
-    if gap > plan.reach() {
+    // A certificate has more to say, unless they are so far apart that balls say nearly all.
+    if gap > plan.reach() && (!plan.options().certifies() || gap > FAR_APART * (ra + rb)) {
         return Err(Some(gap));
     }
     let pose = a.placed().inverse().after(b.placed());

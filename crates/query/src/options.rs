@@ -76,6 +76,11 @@ impl CollideOptions {
         Self { evidence, ..self }
     }
 
+    /// Whether separations are to be proven; of points they always are.
+    pub(crate) fn certifies(&self) -> bool {
+        self.semantics == Semantics::Surface && self.evidence == Evidence::Certified
+    }
+
     /// The same options with this detail.
     #[must_use]
     pub const fn with_detail(self, detail: Detail) -> Self {

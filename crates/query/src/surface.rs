@@ -76,7 +76,7 @@ impl<'a> Surfaces<'a> {
             detail: options.detail,
             margin: options.margin,
             reach,
-            certify: options.evidence == Evidence::Certified,
+            certify: options.certifies(),
             nearest: f32::INFINITY,
             excluded,
             lanes,
