@@ -42,9 +42,6 @@ const RAYS: [[f32; SECTORS]; 2] = {
 /// wider, never wrong.
 const NEIGHBOURS: f32 = 1.75;
 
-/// Width, height and reach of a cell bound each other; a second round takes a fifth off, a third next to nothing.
-const ROUNDS: usize = 2;
-
 /// What single precision may cost here, relatively: some hundred roundings in differences of nearby numbers.
 const GROWN: f32 = 1.0 + 1e-4;
 
@@ -103,20 +100,10 @@ impl Surroundings {
     pub(crate) fn cell(&self, p: [f32; 3], normal: [f32; 3], radius: f32, near: &Neighbourhood) -> Cell {
         let p = sub(p, self.origin);
         let (u, v) = tangents(normal);
-        let mut reach = self.reach;
-        let mut cell = Cell { across: reach, low: -reach, high: reach };
-        for _ in 0..ROUNDS {
-            let (low, high) = self.heights(p, normal, reach);
-            cell.low = cell.low.max(low);
-            cell.high = cell.high.min(high);
-            let across = across([u, v, normal], &cell, NEIGHBOURS * radius, near);
-            cell.across = cell.across.min(across);
-            let before = reach;
-            reach = reach.min(cell.reach() * GROWN);
-            if reach > 0.9 * before {
-                break;
-            }
-        }
+        let reach = self.reach;
+        let (low, high) = self.heights(p, normal, reach);
+        let mut cell = Cell { across: reach, low: low.max(-reach), high: high.min(reach) };
+        cell.across = across([u, v, normal], &cell, NEIGHBOURS * radius, near).min(reach);
         cell
     }
 
@@ -148,14 +135,6 @@ pub(crate) struct Cell {
     /// Least (not positive) and greatest (not negative) height along the normal.
     low: f32,
     high: f32,
-}
-
-impl Cell {
-    /// The greatest distance from the point.
-    fn reach(&self) -> f32 {
-        let height = self.high.max(-self.low);
-        (self.across * self.across + height * height).sqrt()
-    }
 }
 
 /// Fact 3: how far from its axis a surface point in the cell can be. `near` are the neighbours of the point, of
