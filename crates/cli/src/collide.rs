@@ -42,7 +42,8 @@ pub struct CollideArgs {
     /// Count as meeting what comes nearer than this, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub margin: f64,
-    /// How sure a separation should be: certified is tried for, and proven distances told, at half as much time again, near contact two to three times
+    /// How sure a separation should be: certified is tried for, and proven distances told, for half as much time
+    /// again, near contact two to three times as much
     #[arg(long, value_enum, default_value_t = EvidenceName::Certified)]
     pub evidence: EvidenceName,
     /// Write what certified answers rest on, a line of JSON a query, for an independent check

@@ -12,8 +12,8 @@
 //!
 //! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a cylinder about its
 //! normal, and the leaf's part is in the box about these as well; whichever is less counts. The enclosure of an
-//! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull of J itself (Klein &
-//! Zachmann 2004, §4.2) does not hold (docs/theory).
+//! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull
+//! of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
 
 use nearmiss_surface::{BORDER, Neighbourhood, SurfacePlan};
 
