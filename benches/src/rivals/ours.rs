@@ -47,7 +47,7 @@ impl Method for Ours<'_> {
     }
 
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply {
-        let Answer { verdict, statistics } = self.answer(a, b);
+        let Answer { verdict, statistics, .. } = self.answer(a, b);
         let hit = matches!(verdict, Verdict::Intersecting { .. });
         Reply { hit, evaluations: statistics.evaluations, node_pairs: statistics.node_pairs }
     }

@@ -1,13 +1,16 @@
 //! The descent of a pair of trees: one loop for every query, what differs is the visitor.
 
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
+use serde::{Deserialize, Serialize};
 
 use crate::topology::Node;
 
 /// A node of either tree, still to be looked at together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NodePair {
     /// A node of the first tree.
     pub a: NodeId,
@@ -20,7 +23,19 @@ impl NodePair {
     /// is not split stands there twice. None for two leaves.
     #[inline]
     pub fn split(self, a: &Node, b: &Node, which: impl FnOnce() -> Split) -> Option<[[NodeId; 2]; 2]> {
-        let split = match (a.is_leaf(), b.is_leaf()) {
+        self.split_unless(a, b, [a.is_leaf(), b.is_leaf()], which)
+    }
+
+    /// As [`NodePair::split`], where a node is not split if it is a leaf or `whole` says so.
+    #[inline]
+    pub fn split_unless(
+        self,
+        a: &Node,
+        b: &Node,
+        whole: [bool; 2],
+        which: impl FnOnce() -> Split,
+    ) -> Option<[[NodeId; 2]; 2]> {
+        let split = match (a.is_leaf() || whole[0], b.is_leaf() || whole[1]) {
             (true, true) => return None,
             (true, false) => Split::Second,
             (false, true) => Split::First,
@@ -50,11 +65,17 @@ pub trait Visitor {
     /// pairs are meant (the doubles are ignored).
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4];
 
-    /// Two leaves that were admitted.
+    /// Two leaves that were admitted, or nodes that are [whole](Visitor::whole).
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()>;
 
-    /// Which node to split, given that neither is a leaf.
+    /// Which node to split, given that either can be.
     fn split(&self, pair: NodePair) -> Split;
+
+    /// Which nodes of the pair are not to be split although they are no leaves.
+    #[inline]
+    fn whole(&self, _pair: NodePair) -> [bool; 2] {
+        [false; 2]
+    }
 
     /// Called before each admitted pair is looked at; may end the descent.
     fn go_on(&mut self) -> ControlFlow<()>;
@@ -113,6 +134,55 @@ impl Frontier for Stack {
     }
 }
 
+/// The most urgent of all pairs first: for searches that a budget may end. Pairs equally urgent come in the order of
+/// their nodes, so the order never depends on anything else.
+#[derive(Debug, Clone, Default)]
+pub struct Heap {
+    pairs: BinaryHeap<Urgent>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Urgent(f32, NodePair);
+
+impl Ord for Urgent {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let key = |urgent: &Self| (urgent.1.a, urgent.1.b);
+        self.0.total_cmp(&other.0).then_with(|| key(other).cmp(&key(self)))
+    }
+}
+
+impl PartialOrd for Urgent {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Urgent {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Urgent {}
+
+impl Frontier for Heap {
+    fn clear(&mut self) {
+        self.pairs.clear();
+    }
+
+    fn push(&mut self, pairs: [(Option<f32>, NodePair); 4]) {
+        self.pairs.extend(pairs.into_iter().filter_map(|(urgency, pair)| Some(Urgent(urgency?, pair))));
+    }
+
+    fn pop(&mut self) -> Option<(f32, NodePair)> {
+        self.pairs.pop().map(|Urgent(urgency, pair)| (urgency, pair))
+    }
+
+    fn open(&self) -> impl Iterator<Item = (f32, NodePair)> {
+        self.pairs.iter().map(|&Urgent(urgency, pair)| (urgency, pair))
+    }
+}
+
 /// Visits the pairs of nodes of `a` and `b` that `visitor` admits, from the two roots down.
 ///
 /// Returns whether the visitor ended it; the frontier then holds what was left. Ends for any nodes whose
@@ -143,7 +213,7 @@ pub fn resume<V: Visitor, F: Frontier>(
             return ControlFlow::Break(());
         }
         let (node_a, node_b) = (&a[pair.a.index()], &b[pair.b.index()]);
-        match pair.split(node_a, node_b, || visitor.split(pair)) {
+        match pair.split_unless(node_a, node_b, visitor.whole(pair), || visitor.split(pair)) {
             Some([children_a, children_b]) => enter(visitor, frontier, children_a, children_b),
             None => visitor.leaves(pair)?,
         }

@@ -17,7 +17,7 @@ mod topology;
 
 pub use boxes::{OrientedBox, Relative, SLACK};
 pub use build::{PointHierarchy, Slices};
-pub use descend::{Frontier, NodePair, Split, Stack, Visitor, descend, resume};
+pub use descend::{Frontier, Heap, NodePair, Split, Stack, Visitor, descend, resume};
 pub use gather::{GatherScratch, Vicinity};
 pub use growth::Growth;
 pub use options::{BuildError, BuildOptions};

@@ -30,9 +30,8 @@ pub struct Deadline(Instant);
 impl Deadline {
     /// This long from now.
     #[must_use]
-    #[expect(clippy::disallowed_methods, reason = "this module is where clocks are read")]
     pub fn within(time: Duration) -> Self {
-        let now = Instant::now();
+        let now = now();
         // A time too long to represent is as good as a year.
         Self(now.checked_add(time).unwrap_or(now + Duration::from_secs(31_536_000)))
     }
@@ -43,10 +42,12 @@ impl Deadline {
         Self(instant)
     }
 
-    #[expect(clippy::disallowed_methods, reason = "this module is where clocks are read")]
-    fn is_past(self) -> bool {
-        Instant::now() >= self.0
-    }
+}
+
+/// What the clock says.
+#[expect(clippy::disallowed_methods, reason = "this module is where clocks are read")]
+pub(crate) fn now() -> Instant {
+    Instant::now()
 }
 
 /// How much a query may cost; whatever ends first ends it. The default has no limit but one, and reads no clock.
@@ -62,11 +63,14 @@ pub struct Budget {
     pub work: Option<u64>,
     /// When to stop. Not reproducible.
     pub deadline: Option<Deadline>,
+    /// How fine to look, a length in the world: nodes whose samples are no further from their surface than this
+    /// answer for all that is below them (S0 §1). Reproducible; the evidence is then estimated. None: to the last point.
+    pub resolution: Option<f64>,
 }
 
 impl Budget {
-    /// No limit but that for damaged files.
-    pub const UNLIMITED: Self = Self { work: None, deadline: None };
+    /// No limit but that for damaged files, down to the last point.
+    pub const UNLIMITED: Self = Self { work: None, deadline: None, resolution: None };
 
     /// The same budget with this many work units.
     #[must_use]
@@ -78,6 +82,12 @@ impl Budget {
     #[must_use]
     pub const fn with_deadline(self, deadline: Deadline) -> Self {
         Self { deadline: Some(deadline), ..self }
+    }
+
+    /// The same budget with nothing looked at more finely than `length`.
+    #[must_use]
+    pub const fn with_resolution(self, length: f64) -> Self {
+        Self { resolution: Some(length), ..self }
     }
 }
 
@@ -93,6 +103,11 @@ pub(crate) struct Meter {
     leaf_work: u64,
     /// At this much work something has to be looked at.
     next_look: u64,
+    /// Whether nothing is left.
+    is_spent: bool,
+    /// When the clock was looked at last, and the longest time that it was not.
+    looked: Option<Instant>,
+    pub(crate) longest_stretch: Duration,
     /// What was spent.
     pub(crate) spent: Statistics,
 }
@@ -109,22 +124,32 @@ impl Meter {
             deadline: budget.deadline,
             leaf_work: 0,
             next_look: if budget.deadline.is_some() { 0 } else { most_work },
+            is_spent: false,
+            looked: None,
+            longest_stretch: Duration::ZERO,
             spent: Statistics::default(),
         }
     }
 
     /// Counts two leaves of so many points each.
     #[inline]
-    pub(crate) fn leaf_pair(&mut self, a: u32, b: u32) {
+    pub(crate) fn leaf_pair(&mut self, a: usize, b: usize) {
         self.spent.leaf_pairs += 1;
-        self.leaf_work += u64::from(a) * u64::from(b) / POINTS_A_PAIR;
+        self.leaf_work += (a * b) as u64 / POINTS_A_PAIR;
     }
 
-    /// Whether anything is left.
+    /// Counts leaf work that costs as much as so many node pairs.
+    #[inline]
+    pub(crate) fn leaf_work(&mut self, pairs: u64) {
+        self.leaf_work += pairs;
+    }
+
+    /// Whether anything is left. Once nothing is, nothing ever will be.
     #[inline]
     pub(crate) fn go_on(&mut self) -> ControlFlow<()> {
         let Statistics { evaluations, node_pairs, .. } = self.spent;
         if evaluations + node_pairs >= self.most_units {
+            self.is_spent = true;
             return ControlFlow::Break(());
         }
         let work = PAIRS_AN_EVALUATION * evaluations + node_pairs + self.leaf_work;
@@ -134,10 +159,24 @@ impl Meter {
     #[cold]
     fn look(&mut self, work: u64) -> ControlFlow<()> {
         self.next_look = self.most_work.min(work.saturating_add(PAIRS_A_LOOK));
-        if work >= self.most_work || self.deadline.is_some_and(Deadline::is_past) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
+        let mut is_past = false;
+        if let Some(Deadline(end)) = self.deadline {
+            let now = now();
+            is_past = now >= end;
+            let stretch = self.looked.map_or(Duration::ZERO, |then| now.saturating_duration_since(then));
+            self.longest_stretch = self.longest_stretch.max(stretch);
+            self.looked = Some(now);
         }
+        self.is_spent |= is_past || work >= self.most_work;
+        if self.is_spent {
+            self.next_look = 0;
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Whether [`Meter::go_on`] has said that nothing is left.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.is_spent
     }
 }

@@ -18,12 +18,21 @@ use nearmiss_hierarchy::{Frontier, NodePair, Split, Stack, Visitor, resume};
 
 use crate::posed::Posed;
 
-/// Pairs of either of `a` with either of `b`, of which those in `mask` were excluded.
+/// Pairs of either of `a` with either of `b`, some of which were excluded.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Excluded {
     pub(crate) a: [NodeId; 2],
     pub(crate) b: [NodeId; 2],
-    pub(crate) mask: [bool; 4],
+    /// How far the boxes of those that were excluded are apart.
+    pub(crate) gaps: [Option<f32>; 4],
+}
+
+impl Excluded {
+    /// The pairs that were excluded, with their gaps.
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = (f32, NodePair)> {
+        let pair = |i: usize| NodePair { a: self.a[i >> 1], b: self.b[i & 1] };
+        (0..4).filter_map(move |i| Some((self.gaps[i]?, pair(i))))
+    }
 }
 
 /// A proof that two scans are apart: pairs of nodes with disjoint enclosures, which together cover the pair of the
@@ -88,7 +97,7 @@ impl<'a> Certifier<'a> {
         let (a, b) = (self.pair.a.nodes, self.pair.b.nodes);
         stack.clear();
         for group in excluded.iter().rev() {
-            let admitted = self.overlaps(group.a, group.b, group.mask);
+            let admitted = self.overlaps(group.a, group.b, group.gaps.map(|gap| gap.is_some()));
             let pair = |i: usize| (admitted[i], NodePair { a: group.a[i >> 1], b: group.b[i & 1] });
             stack.push([pair(0), pair(1), pair(2), pair(3)]);
             resume(a, b, self, stack)?;

@@ -3,16 +3,23 @@
 //! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
 //! children of both, or of the much larger one; the deepest overlap first.
 
+use std::ops::ControlFlow;
+use std::time::Duration;
+
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Frontier, GatherScratch, NodePair, Relative, SLACK, Stack, descend};
+use nearmiss_hierarchy::{
+    Frontier, GatherScratch, Heap, NodePair, Relative, SLACK, Stack, Visitor, descend,
+};
 
 use crate::budget::{Budget, Meter};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
 use crate::crossing::Lanes;
-use crate::options::{CollideOptions, CollidePlan, Semantics};
+use crate::hint::{Known, PairHint};
+use crate::likelihood::likelihood;
+use crate::options::{CollideOptions, CollidePlan, Method, Order, Semantics};
 use crate::posed::Posed;
-use crate::surface::Surfaces;
+use crate::surface::{Surfaces, Workspace};
 use crate::thickened::Balls;
 use crate::verdict::{Answer, Evidence, Reason, Statistics, Verdict};
 use crate::view::ScanView;
@@ -21,10 +28,23 @@ use crate::view::ScanView;
 #[derive(Debug, Clone, Default)]
 pub struct CollideScratch {
     stack: Stack,
+    heap: Heap,
     lanes: Lanes,
     gathers: [GatherScratch; 2],
     excluded: Vec<Excluded>,
+    compared: Vec<NodePair>,
+    members: Vec<u32>,
     proven: Vec<Bound>,
+    longest_stretch: Duration,
+}
+
+impl CollideScratch {
+    /// The longest time that the last query with a deadline did not look at the clock; zero without a deadline. What a
+    /// query may be late by, beside what the machine takes away.
+    #[must_use]
+    pub fn longest_stretch(&self) -> Duration {
+        self.longest_stretch
+    }
 }
 
 /// Whether `a` and `b` meet. Allocates a scratch of its own; see [`collide_with`].
@@ -44,7 +64,7 @@ pub fn collide_with(
     budget: &Budget,
     scratch: &mut CollideScratch,
 ) -> Answer {
-    search(a, b, plan, budget, scratch, None)
+    search(a, b, plan, budget, scratch, Extras::default())
 }
 
 /// As [`collide_with`], and leaves in `proof` what a certified separation of surfaces rests on; nothing after any
@@ -58,11 +78,35 @@ pub fn collide_proving(
     proof: &mut Proof,
 ) -> Answer {
     proof.pairs.clear();
-    let answer = search(a, b, plan, budget, scratch, Some(proof));
+    let answer = search(a, b, plan, budget, scratch, Extras { hint: None, proof: Some(proof) });
     if !matches!(answer.verdict, Verdict::Separated { evidence: Evidence::Certified, .. }) {
         proof.pairs.clear();
     }
     answer
+}
+
+/// As [`collide_with`], for two scans that were asked about before in poses not far from these: `hint` remembers where
+/// they met, or what kept them apart.
+///
+/// Changes no verdict but those that a budget ends, whatever `hint` was used for before; a separation may be certified
+/// with a lesser gap than without. What it remembers is worth most for small motions: a step of a tenth of a sampling
+/// radius, as a simulation makes, takes a fraction of a query.
+pub fn collide_hinted(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+    budget: &Budget,
+    hint: &mut PairHint,
+    scratch: &mut CollideScratch,
+) -> Answer {
+    search(a, b, plan, budget, scratch, Extras { hint: Some(hint), proof: None })
+}
+
+/// What is written besides an answer.
+#[derive(Default)]
+struct Extras<'a> {
+    hint: Option<&'a mut PairHint>,
+    proof: Option<&'a mut Proof>,
 }
 
 fn search(
@@ -71,7 +115,7 @@ fn search(
     plan: &CollidePlan,
     budget: &Budget,
     scratch: &mut CollideScratch,
-    proof: Option<&mut Proof>,
+    extras: Extras<'_>,
 ) -> Answer {
     let [leaves, points] = [
         [a, b].map(|view| view.slices().nodes.len().div_ceil(2) as u64),
@@ -79,24 +123,31 @@ fn search(
     ];
     let meter = Meter::new(budget, leaves, points);
     let options = plan.options();
-    let relative = match relative(a, b, plan) {
-        Ok(relative) => relative,
+    let (pose, relative) = match relative(a, b, plan) {
+        Ok(motion) => motion,
         Err(early) => {
             let verdict = early.map_or(Verdict::Undecided(Reason::Pose), |distance| {
-                if let Some(proof) = proof {
+                if let Some(proof) = extras.proof {
                     let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
                     proof.pairs.push((roots, distance));
                 }
                 apart(options, distance, true)
             });
             let statistics = Statistics { node_pairs: 1, ..meter.spent };
-            return Answer { verdict, statistics };
+            return Answer { verdict, distance_estimate: None, statistics };
         }
     };
     let pair = Posed::new([a, b], relative, meter);
+    // What was seen at some resolution says nothing of the rest.
+    let hint = extras.hint.filter(|_| budget.resolution.is_none());
+    let known = hint.map(|hint| hint.recall(&pair, options, pose));
+    if let Some(distance) = known.as_ref().and_then(|known| known.distance(&pair, plan.reach())) {
+        let verdict = apart(options, distance, true);
+        return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
+    }
     match options.semantics {
-        Semantics::Surface => surfaces(pair, options, scratch, proof),
-        Semantics::Thickened(_) => balls(pair, plan, scratch),
+        Semantics::Surface => surfaces(pair, options, budget.resolution, scratch, known, extras.proof),
+        Semantics::Thickened(_) => balls(pair, plan, scratch, known),
     }
 }
 
@@ -104,40 +155,98 @@ fn search(
 fn surfaces(
     pair: Posed<'_>,
     options: &CollideOptions,
+    resolution: Option<f64>,
     scratch: &mut CollideScratch,
+    mut known: Option<&mut Known>,
     proof: Option<&mut Proof>,
 ) -> Answer {
-    let CollideScratch { stack, lanes, gathers, excluded, proven } = scratch;
-    let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
-    let mut search = Surfaces::new(pair, options, lanes, gathers, excluded);
-    let ended = descend(nodes_a, nodes_b, &mut search, stack).is_break();
-    let Surfaces { pair, found, doubt, reach, excluded, .. } = search;
-    let mut statistics = pair.meter.spent;
+    let CollideScratch { stack, heap, lanes, gathers, excluded, compared, members, proven, longest_stretch } =
+        scratch;
+    let workspace = Workspace { lanes, gathers, excluded, compared, members };
+    let mut search = Surfaces::new(pair, options, resolution, known.is_some(), workspace);
+    let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
+    let parted = !ended && search.found.is_none();
+    if let Some(known) = &mut known {
+        if parted { known.parted(&search) } else { known.forget(search.met) }
+    }
+    let Surfaces { pair, found, doubt, reach, estimate, excluded, compared, .. } = search;
+    let mut certifier = Certifier::new(pair, reach, proven);
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
-        _ if ended => Verdict::Undecided(Reason::Budget { likelihood: likelihood(&pair, stack) }),
+        _ if ended => {
+            let likelihood = match options.order {
+                Order::DepthFirst => likelihood(&certifier.pair, stack),
+                _ => likelihood(&certifier.pair, heap),
+            };
+            Verdict::Undecided(Reason::Budget { likelihood })
+        }
         (None, Some(reason)) => Verdict::Undecided(reason),
         // Leaves whose boxes overlap have enclosures that overlap.
-        (None, None) if !options.certifies() || statistics.leaf_pairs > 0 => apart(options, 0.0, false),
-        (None, None) => {
-            let mut certifier = Certifier::new(pair, reach, proven);
+        _ if !options.certifies() || !compared.is_empty() => apart(options, 0.0, false),
+        _ => {
             let whole = certifier.prove(excluded, stack).is_continue();
             let distance = if whole { certifier.tighten() } else { 0.0 };
             if let Some(proof) = proof.filter(|_| whole) {
                 certifier.hand_out(proof);
             }
-            statistics = certifier.pair.meter.spent;
+            if let Some(known) = known.filter(|_| whole) {
+                known.clear_by(distance - options.margin, &certifier.pair);
+            }
             apart(options, distance, whole)
         }
     };
-    Answer { verdict, statistics }
+    *longest_stretch = certifier.pair.meter.longest_stretch;
+    let distance_estimate = Some(estimate).filter(|distance| distance.is_finite());
+    Answer { verdict, distance_estimate, statistics: certifier.pair.meter.spent }
+}
+
+/// Looks for a contact: where there was one, then from what kept the scans apart, or from the roots.
+fn look(
+    search: &mut Surfaces<'_>,
+    options: &CollideOptions,
+    known: Option<&mut Known>,
+    stack: &mut Stack,
+    heap: &mut Heap,
+) -> ControlFlow<()> {
+    stack.clear();
+    heap.clear();
+    if let Method::Sampling(sampling) = options.method
+        && sampling.flat
+    {
+        return search.test_all(&sampling);
+    }
+    if let Some(known) = known {
+        if let Some(pair) = known.met() {
+            search.leaves(pair)?;
+            search.compared.clear();
+        }
+        if known.has_front() && !options.certifies() {
+            return known.look_again(search, stack);
+        }
+        known.forget(None);
+    }
+    let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
+    match options.order {
+        Order::DepthFirst => descend(nodes_a, nodes_b, search, stack),
+        _ => descend(nodes_a, nodes_b, search, heap),
+    }
 }
 
 /// Pairs of points.
-fn balls(pair: Posed<'_>, plan: &CollidePlan, scratch: &mut CollideScratch) -> Answer {
+fn balls(
+    pair: Posed<'_>,
+    plan: &CollidePlan,
+    scratch: &mut CollideScratch,
+    mut known: Option<&mut Known>,
+) -> Answer {
     let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
     let mut search = Balls::new(pair, plan.reach());
-    let ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.stack).is_break();
+    let again = known.as_ref().and_then(|known| known.met());
+    let mut ended = again.is_some_and(|leaves| search.leaves(leaves).is_break());
+    if !ended {
+        search.apart = f64::INFINITY;
+        ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.stack).is_break();
+    }
     let verdict = match search.found {
         Some(contact) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
         None if ended => {
@@ -145,7 +254,14 @@ fn balls(pair: Posed<'_>, plan: &CollidePlan, scratch: &mut CollideScratch) -> A
         }
         None => apart(plan.options(), search.apart, true),
     };
-    Answer { verdict, statistics: search.pair.meter.spent }
+    if let Some(known) = &mut known {
+        known.forget(search.met);
+        if verdict.is_separated() {
+            known.clear_by(search.apart - plan.reach(), &search.pair);
+        }
+    }
+    scratch.longest_stretch = search.pair.meter.longest_stretch;
+    Answer { verdict, distance_estimate: None, statistics: search.pair.meter.spent }
 }
 
 /// Apart, by at least `distance` between surfaces or points if that is `proven`.
@@ -167,9 +283,13 @@ const FAR_APART: f64 = 100.0;
 /// Scans whose stored frames differ in scale by more than this are not compared in single precision.
 const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 
-/// The motion of b's stored frame into a's. An error is the distance of balls about the two scans if that is more
+/// The motion of b's stored frame into a's, in double and in single precision. An error is the distance of balls about the two scans if that is more
 /// than any contact reaches, or `None` for poses that are none.
-fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<Relative, Option<f64>> {
+fn relative(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+) -> Result<(Pose, Relative), Option<f64>> {
     let ratio = b.placed().scale() / a.placed().scale();
     let finite = |m: [f64; 16]| m.iter().all(|x| x.is_finite());
     let proper = [a, b].iter().all(|view| finite(view.placed().to_row_major()) && is_rotation(view.placed()));
@@ -204,7 +324,8 @@ fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<Re
     let shift = Vector3::from(pose.translation()).norm();
     // The slack of the motion is a share of its reach.
     let lost = lost / a.placed().scale() / f64::from(SLACK);
-    Ok(Relative::new(&pose, extent + shift + lost))
+    let relative = Relative::new(&pose, extent + shift + lost);
+    Ok((pose, relative))
 }
 
 /// Of 2⁻⁵³ each: some ten roundings where poses are composed and applied.
@@ -215,17 +336,4 @@ fn is_rotation(pose: &Pose) -> bool {
     let rotation = pose.rotation();
     let error = rotation.transpose() * rotation - Matrix3::identity();
     error.iter().all(|x| x.abs() <= 1e-9)
-}
-
-/// An uncalibrated estimate of the chance that the pairs still open hide a contact: each counts by how deeply
-/// its boxes overlap against their size, the sixteen most urgent ones as if independent.
-fn likelihood(pair: &Posed<'_>, stack: &Stack) -> f64 {
-    let miss = |(depth, nodes): (f32, NodePair)| {
-        let size_a = pair.a.boxes[nodes.a.index()].radius();
-        let size_b = pair.b.boxes[nodes.b.index()].radius() * pair.relative.scale();
-        let size = size_a.min(size_b);
-        // What is no number, as of boxes that overflow, says nothing.
-        if size > 0.0 && depth > 0.0 { 1.0 - f64::from((depth / size).min(1.0)) } else { 1.0 }
-    };
-    1.0 - stack.open().take(16).map(miss).product::<f64>()
 }

@@ -22,6 +22,9 @@ const DISC_ROUNDS: u32 = 16;
 /// Steps along the surfaces; each costs some ten evaluations.
 const SURFACE_ROUNDS: u32 = 4;
 
+/// The distance of two discs costs as much as so many node pairs.
+const PAIRS_A_DISTANCE: u64 = 4;
+
 /// A point of either disc, not further than `enough` from each other, if alternating projection finds such.
 pub(crate) fn near(a: &Disc, b: &Disc, enough: f32) -> Option<[Vector3<f32>; 2]> {
     let mut x = Vector3::from(a.centre);
@@ -54,6 +57,7 @@ impl Surfaces<'_> {
     /// The disc of point `i` against those of a leaf of b that come nearer than the margin.
     pub(crate) fn near_discs(&mut self, i: usize, disc: &Disc, node_b: &Node) -> ControlFlow<()> {
         for j in node_b.points() {
+            self.pair.meter.go_on()?;
             let other = self.disc_b(j);
             let distance = (Vector3::from(disc.centre) - Vector3::from(other.centre)).norm();
             if distance > self.reach + disc.radius + other.radius {
@@ -65,6 +69,7 @@ impl Surfaces<'_> {
                     return self.met([p, q], i, j);
                 }
             }
+            self.pair.meter.leaf_work(PAIRS_A_DISTANCE);
             if let Some([x, y]) = near(disc, &other, self.reach) {
                 match self.doubt_about(i, j) {
                     Some(reason) => _ = self.doubt.get_or_insert(reason),

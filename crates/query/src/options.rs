@@ -28,6 +28,84 @@ pub enum Detail {
     Witness,
 }
 
+/// How two leaves are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Method {
+    /// Whether tangent discs of their points cross.
+    #[default]
+    Traversal,
+    /// How near both surfaces come to random test points: S0 §5.3, for comparison. Slower, and misses what lies
+    /// between the test points.
+    Sampling(Sampling),
+}
+
+/// The random test of two leaves (S0 §5.3, eq. 8): test points in the sphere covering of a's leaf, in which an
+/// intersection is seen when |f_A| + |f_B| is less than a tolerance in any.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[non_exhaustive]
+pub struct Sampling {
+    /// Test points for each pair of leaves, or, [flat](Sampling::flat), for each leaf's worth of points; 1 to 65,536,
+    /// default 128.
+    pub test_points: u32,
+    /// d_ε in sampling radii (of the scan with the greater one): above 0, at most 4; default 0.5.
+    pub tolerance: f64,
+    /// What the random numbers come from, together with the ids of the leaves.
+    pub seed: u64,
+    /// Without hierarchy: test points about those points of a that lie in the box of b.
+    pub flat: bool,
+}
+
+impl Default for Sampling {
+    fn default() -> Self {
+        Self { test_points: 128, tolerance: 0.5, seed: 0, flat: false }
+    }
+}
+
+impl Sampling {
+    /// The same test with so many test points.
+    #[must_use]
+    pub const fn with_test_points(self, test_points: u32) -> Self {
+        Self { test_points, ..self }
+    }
+
+    /// The same test with this tolerance, in sampling radii.
+    #[must_use]
+    pub const fn with_tolerance(self, tolerance: f64) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// The same test with other random numbers.
+    #[must_use]
+    pub const fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// The same test with or without hierarchy.
+    #[must_use]
+    pub const fn with_flat(self, flat: bool) -> Self {
+        Self { flat, ..self }
+    }
+}
+
+/// Which pairs of nodes are looked at first. Changes no verdict unless a budget ends the search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Order {
+    /// Depth first, of siblings the one whose boxes overlap most. Fastest to the end, and the best under budgets of all
+    /// (benches/record).
+    #[default]
+    DepthFirst,
+    /// Of all pairs the one whose boxes overlap most.
+    Overlap,
+    /// The pair with most sample points of a's node on either side of f′ of b's, further from it than its covering
+    /// radius (S0 §5.2).
+    Sides,
+    /// The same, each sample point weighing with the eigenvalue gap of f′ where it is (S0 §7).
+    SidesByGap,
+}
+
 /// What is asked. Plain values; [`CollidePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -45,6 +123,13 @@ pub struct CollideOptions {
     /// two to three times as much, and says a proven distance; where the proof fails, the separation is still answered
     /// as estimated.
     pub evidence: Evidence,
+    /// How two leaves are compared, for [`Semantics::Surface`]. Default: by tangent discs.
+    pub method: Method,
+    /// Which pairs of nodes are looked at first, for [`Semantics::Surface`]. Default: depth first.
+    pub order: Order,
+    /// Whether nodes whose boxes overlap are also parted by their sphere coverings (S0 §5.1), for
+    /// [`Semantics::Surface`]. Default: no, for that costs more than it saves (benches/record).
+    pub coverings: bool,
 }
 
 impl Default for CollideOptions {
@@ -54,6 +139,9 @@ impl Default for CollideOptions {
             detail: Detail::default(),
             margin: 0.0,
             evidence: Evidence::Estimated,
+            method: Method::default(),
+            order: Order::default(),
+            coverings: false,
         }
     }
 }
@@ -82,6 +170,24 @@ impl CollideOptions {
         self.semantics == Semantics::Surface && self.evidence == Evidence::Certified
     }
 
+    /// The same options with this method.
+    #[must_use]
+    pub const fn with_method(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// The same options in this order.
+    #[must_use]
+    pub const fn with_order(self, order: Order) -> Self {
+        Self { order, ..self }
+    }
+
+    /// The same options with or without sphere coverings.
+    #[must_use]
+    pub const fn with_coverings(self, coverings: bool) -> Self {
+        Self { coverings, ..self }
+    }
+
     /// The same options with this detail.
     #[must_use]
     pub const fn with_detail(self, detail: Detail) -> Self {
@@ -99,6 +205,15 @@ pub enum PlanError {
     /// A margin that is no length.
     #[error("a margin of {0}; it must be finite and not negative")]
     Margin(f64),
+    /// Too few or too many test points.
+    #[error("{0} test points; 1 to 65536 are possible")]
+    TestPoints(u32),
+    /// A tolerance that is none.
+    #[error("a tolerance of {0} sampling radii; it must be more than 0 and at most 4")]
+    Tolerance(f64),
+    /// Test points say whether surfaces cross, not how far apart they are.
+    #[error("the method `sampling` compares surfaces, without a margin; leave the margin and the thickness out")]
+    SamplingAlone,
 }
 
 /// A validated question about two scans.
@@ -119,10 +234,22 @@ impl CollidePlan {
     ) -> Result<Self, PlanError> {
         let is_length = |l: f64| l >= 0.0 && l.is_finite();
         match options.semantics {
-            Semantics::Thickened(r) if !is_length(r) => Err(PlanError::Radius(r)),
-            _ if !is_length(options.margin) => Err(PlanError::Margin(options.margin)),
-            _ => Ok(Self { options: *options }),
+            Semantics::Thickened(r) if !is_length(r) => return Err(PlanError::Radius(r)),
+            _ if !is_length(options.margin) => return Err(PlanError::Margin(options.margin)),
+            _ => {}
         }
+        if let Method::Sampling(Sampling { test_points, tolerance, .. }) = options.method {
+            if options.semantics != Semantics::Surface || options.margin > 0.0 {
+                return Err(PlanError::SamplingAlone);
+            }
+            if !(1..=65_536).contains(&test_points) {
+                return Err(PlanError::TestPoints(test_points));
+            }
+            if !(tolerance > 0.0 && tolerance <= 4.0) {
+                return Err(PlanError::Tolerance(tolerance));
+            }
+        }
+        Ok(Self { options: *options })
     }
 
     /// How near points or surfaces must come to meet, in the world.

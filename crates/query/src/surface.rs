@@ -15,7 +15,7 @@ use nearmiss_surface::meet;
 
 use crate::certify::{Excluded, distinct};
 use crate::crossing::{Disc, Lanes};
-use crate::options::{CollideOptions, Detail};
+use crate::options::{CollideOptions, Detail, Method, Order};
 use crate::posed::Posed;
 use crate::verdict::{Contact, Evidence, Reason};
 
@@ -46,48 +46,81 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) margin: f64,
     /// What is further apart than this, in a's stored frame, does not meet.
     pub(crate) reach: f32,
-    /// Whether separations are to be proven.
-    certify: bool,
+    method: Method,
+    pub(crate) order: Order,
+    pub(crate) coverings: bool,
+    /// Nodes whose samples are no further from their surface than this, in a's stored frame, are not split.
+    pub(crate) resolution: f32,
+    /// Whether excluded and compared pairs are noted.
+    notes: bool,
     /// The least gap of any pair excluded.
     nearest: f32,
-    /// The pairs that were excluded, to be proven apart.
+    /// The pairs that were excluded.
     pub(crate) excluded: &'a mut Vec<Excluded>,
-    lanes: &'a mut Lanes,
+    /// The pairs whose points were compared, without a hit.
+    pub(crate) compared: &'a mut Vec<NodePair>,
+    pub(crate) lanes: &'a mut Lanes,
     pub(crate) gathers: &'a mut [GatherScratch; 2],
+    /// The points of a that lie in the box of b.
+    pub(crate) members: &'a mut Vec<u32>,
     tries: u32,
     /// The best contact so far.
     pub(crate) found: Option<(Contact, Evidence)>,
+    /// The leaves of the first.
+    pub(crate) met: Option<NodePair>,
     /// A crossing of discs that are not to be trusted, and why.
     pub(crate) doubt: Option<Reason>,
+    /// The least |f_A| + |f_B| of any test point, in the world.
+    pub(crate) estimate: f64,
+}
+
+/// What a search writes into.
+#[derive(Debug)]
+pub(crate) struct Workspace<'a> {
+    pub(crate) lanes: &'a mut Lanes,
+    pub(crate) gathers: &'a mut [GatherScratch; 2],
+    pub(crate) excluded: &'a mut Vec<Excluded>,
+    pub(crate) compared: &'a mut Vec<NodePair>,
+    pub(crate) members: &'a mut Vec<u32>,
 }
 
 impl<'a> Surfaces<'a> {
+    /// `notes`: whether the pairs that were excluded or compared are wanted although no certificate is.
     pub(crate) fn new(
         pair: Posed<'a>,
         options: &CollideOptions,
-        lanes: &'a mut Lanes,
-        gathers: &'a mut [GatherScratch; 2],
-        excluded: &'a mut Vec<Excluded>,
+        resolution: Option<f64>,
+        notes: bool,
+        workspace: Workspace<'a>,
     ) -> Self {
+        let Workspace { lanes, gathers, excluded, compared, members } = workspace;
         excluded.clear();
-        let reach = pair.stored(options.margin);
+        compared.clear();
         Self {
-            pair,
             detail: options.detail,
             margin: options.margin,
-            reach,
-            certify: options.certifies(),
+            reach: pair.stored(options.margin),
+            method: options.method,
+            order: options.order,
+            coverings: options.coverings,
+            resolution: resolution.map_or(-1.0, |length| pair.stored(length)),
+            pair,
+            notes: notes || options.certifies(),
             nearest: f32::INFINITY,
             excluded,
+            compared,
             lanes,
             gathers,
+            members,
             tries: 0,
             found: None,
+            met: None,
             doubt: None,
+            estimate: f64::INFINITY,
         }
     }
 
-    fn disc_a(&self, i: usize) -> Disc {
+    pub(crate) fn disc_a(&self, i: usize) -> Disc {
         Disc {
             centre: self.pair.a.positions[i],
             normal: self.pair.a.normals[i],
@@ -132,7 +165,13 @@ impl<'a> Surfaces<'a> {
 
     /// Discs of two leaves cross, those of points `i` and `j` first.
     fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
-        let contact = self.estimate(i, j);
+        let radii = [self.pair.a.discs[i], self.pair.b.discs[j]];
+        let contact = self.shared_chord(i, j, radii);
+        self.hit(contact, i, j)
+    }
+
+    /// The surfaces meet at `contact`, to first order, near points `i` and `j`.
+    pub(crate) fn hit(&mut self, contact: Contact, i: usize, j: usize) -> ControlFlow<()> {
         if self.detail == Detail::Verdict {
             self.found = Some((contact, Evidence::Estimated));
             return ControlFlow::Break(());
@@ -143,7 +182,6 @@ impl<'a> Surfaces<'a> {
             return ControlFlow::Break(());
         }
         self.found.get_or_insert((contact, Evidence::Estimated));
-        // Other crossings of the same leaves would fail likewise.
         if self.tries >= TRIES { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
@@ -166,8 +204,8 @@ impl<'a> Surfaces<'a> {
         (distance, [self.pair.a.radii[i], self.pair.b.radii[j] * self.pair.relative.scale()])
     }
 
-    /// The middle of what the chords of two crossing discs share, in the world.
-    fn estimate(&self, i: usize, j: usize) -> Contact {
+    /// The middle of what the chords of two crossing discs share, in the world; `radii` of either in its own stored frame.
+    pub(crate) fn shared_chord(&self, i: usize, j: usize, radii: [f32; 2]) -> Contact {
         let [va, vb] = self.pair.views;
         let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
         let na = Vector3::from(va.placed().rotate(self.pair.a.normals[i].map(f64::from)));
@@ -181,10 +219,8 @@ impl<'a> Surfaces<'a> {
         } else {
             ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
         };
-        let radii = [
-            f64::from(self.pair.a.discs[i]) * va.placed().scale(),
-            f64::from(self.pair.b.discs[j]) * vb.placed().scale(),
-        ];
+        let radii =
+            [f64::from(radii[0]) * va.placed().scale(), f64::from(radii[1]) * vb.placed().scale()];
         let place = middle + step;
         // Along the common line each chord is an interval; for parallel planes the place is as good as any.
         let along = na.cross(&nb).try_normalize(0.03).map_or_else(Vector3::zeros, |line| {
@@ -214,11 +250,15 @@ impl<'a> Surfaces<'a> {
         let start = contact.point;
         let mut near_a = va.scan().vicinity(va.placed().apply_inverse(start), in_a, scratch_a);
         let mut near_b = vb.scan().vicinity(vb.placed().apply_inverse(start), in_b, scratch_b);
+        let meter = &mut self.pair.meter;
         let meeting = meet(start, |x| {
+            if meter.go_on().is_break() {
+                return None;
+            }
+            meter.spent.evaluations += 2;
             let at_a = va.in_world(near_a.evaluate(va.placed().apply_inverse(x)));
-            [at_a, vb.in_world(near_b.evaluate(vb.placed().apply_inverse(x)))]
-        });
-        self.pair.meter.spent.evaluations += 2 * u64::from(meeting.rounds);
+            Some([at_a, vb.in_world(near_b.evaluate(vb.placed().apply_inverse(x)))])
+        })?;
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
         let nearby = NEARBY * radius * va.placed().scale();
         (meeting.verified && moved <= nearby).then(|| Contact {
@@ -241,17 +281,18 @@ fn comes_within(radius: f32, p: [f32; 3], disc: &Disc) -> bool {
 impl Visitor for Surfaces<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
-        let [p, q, r, s] = self.pair.gaps(a, b, count);
+        let gaps = self.pair.gaps(a, b, count);
         let reach = self.reach;
-        let admit = |gap: f32| if gap > reach { None } else { Some(-gap) };
-        let admitted = [admit(p), admit(q), admit(r), admit(s)];
-        if self.certify {
+        let mut admitted = gaps.map(|gap| if gap > reach { None } else { Some(-gap) });
+        if self.coverings || self.order != Order::DepthFirst {
+            self.look_closer(a, b, &mut admitted);
+        }
+        if self.notes {
             let distinct = distinct(a, b);
-            let mask = [0, 1, 2, 3].map(|i| distinct[i] && admitted[i].is_none());
-            if mask.contains(&true) {
-                let gaps = [p, q, r, s];
-                let least = (0..4).filter(|&i| mask[i]).fold(f32::INFINITY, |least, i| least.min(gaps[i]));
-                self.excluded.push(Excluded { a, b, mask });
+            let gaps = [0, 1, 2, 3].map(|i| Some(gaps[i]).filter(|_| distinct[i] && admitted[i].is_none()));
+            if gaps.iter().any(Option::is_some) {
+                let least = gaps.iter().flatten().fold(f32::INFINITY, |least, &gap| least.min(gap));
+                self.excluded.push(Excluded { a, b, gaps });
                 // The nearest come last.
                 if least < self.nearest {
                     self.nearest = least;
@@ -270,13 +311,35 @@ impl Visitor for Surfaces<'_> {
     }
 
     #[inline]
+    fn whole(&self, pair: NodePair) -> [bool; 2] {
+        if self.resolution >= 0.0 { self.is_fine(pair) } else { [false; 2] }
+    }
+
+    #[inline]
     fn go_on(&mut self) -> ControlFlow<()> {
         self.pair.meter.go_on()
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
+        if self.notes {
+            self.compared.push(pair);
+        }
+        let flow = self.compare(pair);
+        if self.found.is_some() {
+            self.met.get_or_insert(pair);
+        }
+        flow
+    }
+}
+
+impl Surfaces<'_> {
+    /// Two leaves, or nodes that answer by their samples.
+    fn compare(&mut self, pair: NodePair) -> ControlFlow<()> {
         let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
-        self.pair.meter.leaf_pair(node_a.count, node_b.count);
+        if !(node_a.is_leaf() && node_b.is_leaf()) {
+            return self.samples_cross(pair);
+        }
+        self.pair.meter.leaf_pair(node_a.count as usize, node_b.count as usize);
         // Most discs of one leaf are out of reach of all of the other.
         let bounds = self.pair.relative.moved(&self.pair.b.boxes[pair.b.index()]);
         let (mut ready, mut sparse) = (false, false);
@@ -295,22 +358,38 @@ impl Visitor for Surfaces<'_> {
             if (ball > 0.0 || sparse) && !is_open && self.comes_near_sparse(&disc, ball, &node_b) {
                 self.doubt = Some(Reason::Undersampled);
             }
-            let mut bits = self.lanes.crossings(&disc);
-            while bits != 0 {
-                let j = node_b.first as usize + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let (distance, [ra, rb]) = self.points(i, j);
-                if distance > FAR * ra.max(rb) {
-                    continue;
-                }
-                match self.doubt_about(i, j) {
-                    Some(reason) => _ = self.doubt.get_or_insert(reason),
-                    None => return self.crossed(i, j),
+            if self.method == Method::Traversal {
+                let tries = self.tries;
+                self.discs_cross(i, &disc, &node_b)?;
+                if self.tries > tries {
+                    // Other crossings of the same leaves would fail likewise.
+                    return ControlFlow::Continue(());
                 }
             }
-            if self.margin > 0.0 {
-                self.near_discs(i, &disc, &node_b)?;
+        }
+        match self.method {
+            Method::Traversal => ControlFlow::Continue(()),
+            Method::Sampling(sampling) => self.test_leaves(pair, &sampling),
+        }
+    }
+
+    /// The disc of point `i` against those of a leaf of b, which stand in the lanes.
+    fn discs_cross(&mut self, i: usize, disc: &Disc, node_b: &Node) -> ControlFlow<()> {
+        let mut bits = self.lanes.crossings(disc);
+        while bits != 0 {
+            let j = node_b.first as usize + bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let (distance, [ra, rb]) = self.points(i, j);
+            if distance > FAR * ra.max(rb) {
+                continue;
             }
+            match self.doubt_about(i, j) {
+                Some(reason) => _ = self.doubt.get_or_insert(reason),
+                None => return self.crossed(i, j),
+            }
+        }
+        if self.margin > 0.0 {
+            self.near_discs(i, disc, node_b)?;
         }
         ControlFlow::Continue(())
     }

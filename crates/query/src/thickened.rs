@@ -18,6 +18,8 @@ pub(crate) struct Balls<'a> {
     reach_stored: f32,
     /// The first such pair.
     pub(crate) found: Option<Contact>,
+    /// The leaves of that pair.
+    pub(crate) met: Option<NodePair>,
     /// A lower bound of the distance of all points looked at or excluded, in the world.
     pub(crate) apart: f64,
 }
@@ -25,7 +27,7 @@ pub(crate) struct Balls<'a> {
 impl<'a> Balls<'a> {
     pub(crate) fn new(pair: Posed<'a>, reach: f64) -> Self {
         let reach_stored = pair.stored(reach);
-        Self { pair, reach, reach_stored, found: None, apart: f64::INFINITY }
+        Self { pair, reach, reach_stored, found: None, met: None, apart: f64::INFINITY }
     }
 }
 
@@ -55,7 +57,7 @@ impl Visitor for Balls<'_> {
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
         let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
-        self.pair.meter.leaf_pair(node_a.count, node_b.count);
+        self.pair.meter.leaf_pair(node_a.count as usize, node_b.count as usize);
         let [va, vb] = self.pair.views;
         let mut points_b = [Vector3::zeros(); MOST_LEAF_POINTS];
         for (q, j) in points_b.iter_mut().zip(node_b.points()) {
@@ -73,6 +75,7 @@ impl Visitor for Balls<'_> {
                         residual: 0.5 * distance,
                         sources: [va.scan().id(i), vb.scan().id(j)],
                     });
+                    self.met = Some(pair);
                     return ControlFlow::Break(());
                 }
             }

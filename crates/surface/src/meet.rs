@@ -32,13 +32,16 @@ impl Meeting {
 /// vanish to that order. Where the normals are nearly parallel, `1 − (n_A·n_B)²` below 1e-3, that is
 /// ill-conditioned and the step goes halfway to either surface instead: the point settles between them, on
 /// both if they touch. Steps are at most h/2. At most 16 rounds, fewer when the distance stops shrinking; a
-/// good start needs three to six.
-pub fn meet(start: [f64; 3], mut evaluate: impl FnMut([f64; 3]) -> [Evaluation; 2]) -> Meeting {
+/// good start needs three to six. None once `evaluate` gives nothing, as when time is up.
+pub fn meet(
+    start: [f64; 3],
+    mut evaluate: impl FnMut([f64; 3]) -> Option<[Evaluation; 2]>,
+) -> Option<Meeting> {
     const ROUNDS: u32 = 16;
     /// So many rounds in a row may bring no point nearer than any before, by at least a fifth.
     const PATIENCE: u32 = 3;
     let mut point = start;
-    let mut at = evaluate(point);
+    let mut at = evaluate(point)?;
     let mut rounds = 1;
     let (mut nearest, mut idle) = (f64::INFINITY, 0);
     loop {
@@ -53,10 +56,10 @@ pub fn meet(start: [f64; 3], mut evaluate: impl FnMut([f64; 3]) -> [Evaluation; 
         }
         if on || lost || idle == PATIENCE || rounds == ROUNDS {
             let verified = on && at.iter().all(|e| e.status == Status::Ok);
-            return Meeting { point, at, rounds, verified };
+            return Some(Meeting { point, at, rounds, verified });
         }
         point = (Vector3::from(point) + step(&at)).into();
-        at = evaluate(point);
+        at = evaluate(point)?;
         rounds += 1;
     }
 }

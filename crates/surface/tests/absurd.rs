@@ -87,7 +87,7 @@ fn projections_and_meetings_end_with_numbers() {
         for start in places() {
             let foot = project(start, |x| sheet.evaluate(x));
             assert!(foot.evaluations <= 12, "{foot:?}");
-            let meeting = meet(start, |x| [sheet.evaluate(x), sound.evaluate(x)]);
+            let meeting = meet(start, |x| Some([sheet.evaluate(x), sound.evaluate(x)])).unwrap();
             assert!(meeting.rounds <= 16, "{meeting:?}");
             if meeting.verified || foot.converged {
                 assert!(

@@ -145,7 +145,7 @@ fn newton_finds_the_common_point_of_two_planes() {
     each_kernel(|kernel| {
         let sheet = Sheet::plane(0.0, 99.0, kernel);
         for angle in [0.05, 0.3, 1.0, 1.5] {
-            let meeting = meet([0.4, 0.2, 0.3], |x| [sheet.at(x), turned(&sheet, angle, 0.0, x)]);
+            let meeting = meet([0.4, 0.2, 0.3], |x| Some([sheet.at(x), turned(&sheet, angle, 0.0, x)])).unwrap();
             assert!(meeting.verified, "{kernel:?}, {angle}: {meeting:?}");
             // The common line is x = z = 0.
             let [x, y, z] = meeting.point;
@@ -160,10 +160,10 @@ fn newton_finds_the_common_point_of_two_planes() {
 fn parallel_planes_meet_only_if_they_coincide() {
     each_kernel(|kernel| {
         let sheet = Sheet::plane(0.0, 99.0, kernel);
-        let apart = meet([0.4, 0.2, 0.1], |x| [sheet.at(x), turned(&sheet, 0.0, 0.2, x)]);
+        let apart = meet([0.4, 0.2, 0.1], |x| Some([sheet.at(x), turned(&sheet, 0.0, 0.2, x)])).unwrap();
         assert!(!apart.verified, "{kernel:?}: {apart:?}");
         assert!((apart.residual() - 0.1).abs() < 1e-3, "{kernel:?}: halfway between: {}", apart.residual());
-        let same = meet([0.4, 0.2, 0.1], |x| [sheet.at(x), turned(&sheet, 0.0, 0.0, x)]);
+        let same = meet([0.4, 0.2, 0.1], |x| Some([sheet.at(x), turned(&sheet, 0.0, 0.0, x)])).unwrap();
         assert!(same.verified, "{kernel:?}: {same:?}");
     });
 }
@@ -180,7 +180,7 @@ fn newton_takes_few_rounds_on_curved_sheets() {
             // A second sphere, 4 to the side: they meet in a circle in the plane half way.
             let length = (y * y + z * z).sqrt().max(0.1);
             let start = [2.0 + 0.1 * x, 3.3 * y / length, 3.3 * z / length];
-            let meeting = meet(start, |p| [sphere.at(p), sphere.at([p[0] - 4.0, p[1], p[2]])]);
+            let meeting = meet(start, |p| Some([sphere.at(p), sphere.at([p[0] - 4.0, p[1], p[2]])])).unwrap();
             if meeting.verified {
                 verified += 1;
                 rounds += meeting.rounds;

@@ -1,0 +1,212 @@
+//! Temporal coherence: what the last query about two scans found helps the next one, a small motion later.
+//!
+//! Where they met they probably still meet, so those two leaves are compared first. Where they were apart, the pairs of
+//! nodes that parted them are a front across the tree of pairs; a pair whose gap was g stays apart until b has travelled
+//! so far. So only pairs whose time has come are compared again, and split where they do not part the scans any more; and as
+//! long as none has come, nothing at all. Travel is the length of b's way in a's frame, at the point that moves most.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::{Frame, Pose};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{Frontier, NodePair, PointHierarchy, Stack, resume};
+use serde::{Deserialize, Serialize};
+
+use crate::certify::Excluded;
+use crate::options::CollideOptions;
+use crate::posed::Posed;
+use crate::surface::Surfaces;
+
+/// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they need be.
+const GROWN: usize = 3;
+
+/// What is remembered between queries about the same two scans; for [`collide_hinted`](crate::collide_hinted). Owned by
+/// the caller, one for each pair of scans.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct PairHint {
+    known: Option<Known>,
+}
+
+/// What was asked: a hint for anything else is none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Question {
+    options: CollideOptions,
+    scans: [Likeness; 2],
+    /// Of a's stored frame in the world.
+    scale: f64,
+}
+
+/// What tells scans apart.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Likeness {
+    frame: Frame,
+    points: usize,
+    leaf_size: u32,
+    sampling_radius: f32,
+    ends: [[f32; 3]; 2],
+}
+
+impl Likeness {
+    fn of(scan: &PointHierarchy) -> Self {
+        let positions = scan.positions();
+        let at = |i: usize| positions.get(i).copied().unwrap_or_default();
+        Self {
+            frame: *scan.frame(),
+            points: scan.len(),
+            leaf_size: scan.leaf_size(),
+            sampling_radius: scan.slices().sampling_radius,
+            ends: [at(0), at(scan.len() - 1)],
+        }
+    }
+}
+
+/// A pair of nodes that parts its scans until b has travelled so far.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+struct Standing {
+    pair: NodePair,
+    until: f64,
+}
+
+/// What is known of a question. Lengths are in a's stored frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Known {
+    question: Question,
+    /// Of b's stored frame in a's, when last asked.
+    pose: Pose,
+    /// How far b has come since the first question.
+    travel: f64,
+    /// The leaves that met.
+    met: Option<NodePair>,
+    /// Until b has travelled so far nothing meets, if that is further than it has.
+    clear: f64,
+    /// Pairs that cover all pairs of points, if whole.
+    front: Vec<Standing>,
+    is_whole: bool,
+    /// How long the front was when it was fresh.
+    fresh: usize,
+}
+
+impl PairHint {
+    /// What is known of this question, with b now at `pose`.
+    pub(crate) fn recall(&mut self, pair: &Posed<'_>, options: &CollideOptions, pose: Pose) -> &mut Known {
+        let question = Question {
+            options: *options,
+            scans: pair.views.map(|view| Likeness::of(view.scan())),
+            scale: pair.views[0].placed().scale(),
+        };
+        let nothing = || Known {
+            question,
+            pose,
+            travel: 0.0,
+            met: None,
+            clear: f64::NEG_INFINITY,
+            front: Vec::new(),
+            is_whole: false,
+            fresh: 0,
+        };
+        let known = self.known.get_or_insert_with(nothing);
+        if known.question == question {
+            known.travel += motion(pair, &known.pose, &pose);
+            known.pose = pose;
+        } else {
+            // The room of the front is kept.
+            let mut front = std::mem::take(&mut known.front);
+            front.clear();
+            *known = Known { front, ..nothing() };
+        }
+        known
+    }
+}
+
+/// How far the motion from one pose to another takes any point of b at most.
+fn motion(pair: &Posed<'_>, from: &Pose, to: &Pose) -> f64 {
+    let root = pair.b.enclosure(0);
+    let centre = root.centre.map(f64::from);
+    let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
+    let turn = (to.rotation() * to.scale() - from.rotation() * from.scale()).norm();
+    let motion = shift + turn * f64::from(root.radius());
+    if motion.is_finite() { motion * (1.0 + 1e-9) } else { f64::INFINITY }
+}
+
+impl Known {
+    /// A lower bound of the distance of the scans in the world, without any search, if there is one beyond reach.
+    pub(crate) fn distance(&self, pair: &Posed<'_>, reach: f64) -> Option<f64> {
+        let left = self.clear - self.travel;
+        (left > 0.0).then(|| reach + left * pair.views[0].placed().scale() * (1.0 - 1e-9))
+    }
+
+    /// The leaves that met last time.
+    pub(crate) fn met(&self) -> Option<NodePair> {
+        self.met
+    }
+
+    /// Whether [`Known::look_again`] can replace a search.
+    pub(crate) fn has_front(&self) -> bool {
+        self.is_whole
+    }
+
+    /// Goes on from the front instead of the roots.
+    pub(crate) fn look_again(&mut self, search: &mut Surfaces<'_>, stack: &mut Stack) -> ControlFlow<()> {
+        stack.clear();
+        let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
+        let mut i = 0;
+        while let Some(&Standing { pair, until }) = self.front.get(i) {
+            if until > self.travel {
+                i += 1;
+                continue;
+            }
+            let gap = search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
+            if gap > search.reach {
+                self.front[i].until = self.until(gap, search);
+                i += 1;
+            } else {
+                self.front.swap_remove(i);
+                let none = (None, pair);
+                stack.push([(Some(-gap), pair), none, none, none]);
+            }
+        }
+        resume(nodes_a, nodes_b, search, stack)
+    }
+
+    /// Until when a pair with this gap parts its scans.
+    fn until(&self, gap: f32, search: &Surfaces<'_>) -> f64 {
+        self.travel + f64::from(gap) - f64::from(search.reach) - 2.0 * f64::from(search.pair.relative.slack())
+    }
+
+    /// The leaves of `pair` meet, or nothing is known.
+    pub(crate) fn forget(&mut self, met: Option<NodePair>) {
+        self.met = met;
+        self.clear = f64::NEG_INFINITY;
+        self.front.clear();
+        self.is_whole = false;
+    }
+
+    /// Nothing meets: adds what `search` has found to the front, or begins a new one.
+    pub(crate) fn parted(&mut self, search: &Surfaces<'_>) {
+        if !self.is_whole {
+            self.front.clear();
+        }
+        let mut front = std::mem::take(&mut self.front);
+        let excluded = search.excluded.iter().flat_map(Excluded::pairs);
+        let standing = |(gap, pair)| Standing { pair, until: self.until(gap, search) };
+        let apart = excluded.map(standing);
+        // Leaves that were compared have to be compared again.
+        let compared = search.compared.iter().map(|&pair| Standing { pair, until: f64::NEG_INFINITY });
+        front.extend(apart.chain(compared));
+        if !self.is_whole {
+            self.fresh = front.len();
+        }
+        self.clear = front.iter().map(|standing| standing.until).fold(f64::INFINITY, f64::min);
+        self.is_whole = front.len() <= GROWN * self.fresh;
+        self.front = front;
+        self.met = None;
+    }
+
+    /// The scans are further apart than `reach` by this, in the world; nothing else is known.
+    pub(crate) fn clear_by(&mut self, distance: f64, pair: &Posed<'_>) {
+        self.forget(None);
+        let slack = 2.0 * f64::from(pair.relative.slack());
+        self.clear = self.travel + distance / pair.views[0].placed().scale() * (1.0 - 1e-9) - slack;
+    }
+}

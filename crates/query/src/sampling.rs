@@ -1,0 +1,156 @@
+//! The random test of two surfaces: S0 §5.3.
+//!
+//! Test points are drawn in the sphere covering of a's leaf; the least |f_A| + |f_B| of those on which both functions
+//! mean something estimates the distance of the surfaces (eq. 8). Unlike S0 we draw again what falls outside the volume of b's
+//! leaf, where nothing can be found, and a witness is looked for from the test point that saw the intersection.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::NodeId;
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{NodePair, OrientedBox};
+use nearmiss_surface::{Evaluation, Status};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+use crate::options::Sampling;
+use crate::surface::Surfaces;
+use crate::verdict::Contact;
+
+/// So many test points are drawn for one that both volumes hold, before that is given up.
+const DRAWS: u32 = 8;
+
+/// What a stream of random numbers is for, when it is for no pair of leaves.
+const FLAT: NodePair = NodePair { a: NodeId(u32::MAX), b: NodeId(u32::MAX) };
+
+/// Random numbers for a pair of leaves, whatever was asked before.
+fn stream(seed: u64, pair: NodePair) -> Xoshiro256PlusPlus {
+    let pair = u64::from(pair.a.0) << 32 | u64::from(pair.b.0);
+    Xoshiro256PlusPlus::seed_from_u64(seed ^ pair.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+}
+
+/// Uniform from 0 to 1.
+#[expect(clippy::cast_precision_loss, reason = "24 bits are exact")]
+fn uniform(rng: &mut impl Rng) -> f32 {
+    (rng.next_u64() >> 40) as f32 / (1_u64 << 24) as f32
+}
+
+/// A place uniform in the ball of `radius` about `centre`.
+fn place_in(rng: &mut impl Rng, centre: [f32; 3], radius: f32) -> [f32; 3] {
+    let mut offset = [0.0_f32; 3];
+    // Half of a cube is in its ball; a generator that never hits it is none.
+    for _ in 0..64 {
+        offset = [0; 3].map(|_| 2.0 * uniform(rng) - 1.0);
+        if offset.iter().map(|x| x * x).sum::<f32>() <= 1.0 {
+            break;
+        }
+    }
+    [0, 1, 2].map(|k| centre[k] + radius * offset[k])
+}
+
+/// Uniform below `count`, which is more than zero.
+fn below(rng: &mut impl Rng, count: usize) -> usize {
+    // The bias, 2⁻³² of it, is none.
+    let share = (rng.next_u64() >> 32) * count as u64 >> 32;
+    usize::try_from(share).unwrap_or(0)
+}
+
+impl Surfaces<'_> {
+    /// d_ε in the world.
+    fn tolerance(&self, sampling: &Sampling) -> f64 {
+        let radius = |side: usize, own: f32| f64::from(own) * self.pair.views[side].placed().scale();
+        sampling.tolerance
+            * radius(0, self.pair.a.sampling_radius).max(radius(1, self.pair.b.sampling_radius))
+    }
+
+    /// Random test points about the points of one leaf, in the volume of the other.
+    pub(crate) fn test_leaves(&mut self, pair: NodePair, sampling: &Sampling) -> ControlFlow<()> {
+        let (a, b) = (pair.a.index(), pair.b.index());
+        let volume = self.pair.relative.moved(&self.pair.b.enclosure(b));
+        let node = self.pair.a.nodes[a];
+        let radius = self.pair.a.covering_radius(a);
+        let mut rng = stream(sampling.seed, pair);
+        let mut draws = DRAWS * sampling.test_points;
+        let mut accepted = 0;
+        while accepted < sampling.test_points && draws > 0 {
+            draws -= 1;
+            let i = node.first as usize + below(&mut rng, node.count as usize);
+            let x = place_in(&mut rng, self.pair.a.positions[i], radius);
+            if volume.distance_sq(x) > 0.0 {
+                continue;
+            }
+            accepted += 1;
+            let of_b = |s: &Self| s.pair.b.nodes[b].points();
+            self.test(x, i, of_b, sampling)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Random test points about all points of a that lie in the box of b.
+    pub(crate) fn test_all(&mut self, sampling: &Sampling) -> ControlFlow<()> {
+        let volume = self.pair.relative.moved(&self.pair.b.enclosure(0));
+        let own = self.pair.a.boxes[0].reach;
+        let within = |bounds: &OrientedBox, p: [f32; 3]| bounds.distance_sq(p) <= own * own;
+        self.members.clear();
+        for (i, &p) in (0_u32..).zip(self.pair.a.positions) {
+            if within(&volume, p) {
+                self.members.push(i);
+            }
+        }
+        if self.members.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let leaf = u64::from(self.pair.views[0].scan().leaf_size());
+        let wanted = (self.members.len() as u64 * u64::from(sampling.test_points)).div_ceil(leaf);
+        let mut rng = stream(sampling.seed, FLAT);
+        self.pair.meter.spent.leaf_pairs += 1;
+        for _ in 0..wanted {
+            let i = self.members[below(&mut rng, self.members.len())] as usize;
+            let x = place_in(&mut rng, self.pair.a.positions[i], self.pair.a.radii[i]);
+            if volume.distance_sq(x) <= 0.0 {
+                self.test(x, i, |s| 0..s.pair.b.positions.len(), sampling)?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// One test point, in a's stored frame, drawn about its point `i`; points of b near it are among `of_b`.
+    fn test(
+        &mut self,
+        x: [f32; 3],
+        i: usize,
+        of_b: impl Fn(&Self) -> std::ops::Range<usize>,
+        sampling: &Sampling,
+    ) -> ControlFlow<()> {
+        self.pair.meter.go_on()?;
+        let [va, vb] = self.pair.views;
+        let x = va.placed().apply(x.map(f64::from));
+        let means = |at: &Evaluation| at.status == Status::Ok;
+        self.pair.meter.spent.evaluations += 1;
+        let at_a = va.evaluate_with(x, &mut self.gathers[0]);
+        if !means(&at_a) {
+            return ControlFlow::Continue(());
+        }
+        self.pair.meter.spent.evaluations += 1;
+        let at_b = vb.evaluate_with(x, &mut self.gathers[1]);
+        if !means(&at_b) {
+            return ControlFlow::Continue(());
+        }
+        let distance = at_a.f.abs() + at_b.f.abs();
+        self.estimate = self.estimate.min(distance);
+        if distance >= self.tolerance(sampling) {
+            return ControlFlow::Continue(());
+        }
+        let from = |j: &usize| (Vector3::from(vb.point(*j)) - Vector3::from(x)).norm_squared();
+        let Some(j) = of_b(self).min_by(|j, k| from(j).total_cmp(&from(k))) else {
+            return ControlFlow::Continue(());
+        };
+        let contact = Contact {
+            point: x,
+            normals: Some([at_a.normal, at_b.normal]),
+            residual: at_a.f.abs().max(at_b.f.abs()),
+            sources: [va.scan().id(i), vb.scan().id(j)],
+        };
+        self.hit(contact, i, j)
+    }
+}
