@@ -5,10 +5,13 @@ use nearmiss_store::Array;
 use nearmiss_surface::{Evaluation, SurfacePlan};
 
 use crate::boxes::OrientedBox;
+use crate::covering::{Covering, Ground, coverings};
 use crate::enclosure::{LeafBounds, Surroundings, growths};
 use crate::gather::{GatherScratch, Index, Vicinity};
 use crate::growth::Growth;
+use crate::levels::samples;
 use crate::options::{BuildError, BuildOptions};
+use crate::samples::lists;
 use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
 use crate::split::{Item, id32, split};
 use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, leaf_surfels};
@@ -33,6 +36,7 @@ pub struct PointHierarchy {
     pub(crate) sampling_radius: f32,
     pub(crate) leaf_size: u32,
     pub(crate) radius_neighbours: u32,
+    pub(crate) samples_a_node: u32,
     pub(crate) plan: SurfacePlan,
     pub(crate) positions: Array<[f32; 3]>,
     pub(crate) normals: Array<[f32; 3]>,
@@ -43,6 +47,8 @@ pub struct PointHierarchy {
     pub(crate) nodes: Array<Node>,
     pub(crate) boxes: Array<OrientedBox>,
     pub(crate) growths: Array<Growth>,
+    pub(crate) sample_lists: Array<u32>,
+    pub(crate) coverings: Array<Covering>,
     pub(crate) cones: Array<NormalCone>,
 }
 
@@ -66,6 +72,17 @@ pub struct Slices<'a> {
     pub boxes: &'a [OrientedBox],
     /// What the boxes must grow by to contain each node's part of the surface.
     pub growths: &'a [Growth],
+    /// The samples of the inner nodes in their order, [`samples_a_node`](Self::samples_a_node) of each; see
+    /// [`Slices::samples`].
+    pub sample_lists: &'a [u32],
+    /// How far the samples of each node reach.
+    pub coverings: &'a [Covering],
+    /// Points of a full leaf.
+    pub leaf_size: u32,
+    /// Samples of an inner node.
+    pub samples_a_node: u32,
+    /// What defines the surface.
+    pub plan: &'a SurfacePlan,
     /// The scan's sampling radius.
     pub sampling_radius: f32,
 }
@@ -152,6 +169,11 @@ impl PointHierarchy {
             nodes: &self.nodes,
             boxes: &self.boxes,
             growths: &self.growths,
+            sample_lists: &self.sample_lists,
+            coverings: &self.coverings,
+            leaf_size: self.leaf_size,
+            samples_a_node: self.samples_a_node,
+            plan: &self.plan,
             sampling_radius: self.sampling_radius,
         }
     }
@@ -219,6 +241,12 @@ impl PointHierarchy {
     #[must_use]
     pub fn radius_neighbours(&self) -> u32 {
         self.radius_neighbours
+    }
+
+    /// Samples of an inner node.
+    #[must_use]
+    pub fn samples_a_node(&self) -> u32 {
+        self.samples_a_node
     }
 
     /// Positions in leaf order.
@@ -337,6 +365,8 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let discs: Vec<f32> = all().map(|s| s.disc).collect();
     let kinds: Vec<u8> = all().map(|s| s.kind.code()).collect();
     let balls: Vec<f32> = all().zip(&radii).map(|(s, &r)| ball(s.kind, r, sampling_radius)).collect();
+    let feet: Vec<[f32; 3]> =
+        all().zip(&positions).map(|(s, p)| [0, 1, 2].map(|k| p[k] + s.height * s.normal[k])).collect();
     let leaves: Vec<LeafBounds> = parts.into_iter().flat_map(|(_, leaves)| leaves).collect();
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
@@ -345,6 +375,21 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     });
     drop(balls);
     let growths = growths(&nodes, &boxes, &leaves);
+    let sample_lists = lists(&positions, &nodes, (options.leaf_size, options.samples));
+    let ground = Ground {
+        nodes: &nodes,
+        boxes: &boxes,
+        growths: &growths,
+        positions: &positions,
+        normals: &normals,
+        discs: &discs,
+        radii: &radii,
+        feet: &feet,
+    };
+    let coverings = coverings(&ground, |id| {
+        samples(&sample_lists, (id, &nodes[id]), (options.leaf_size, options.samples))
+    });
+    drop(feet);
 
     Ok(PointHierarchy {
         frame: cloud.frame(),
@@ -354,6 +399,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         sampling_radius,
         leaf_size: options.leaf_size,
         radius_neighbours: options.radius_neighbours,
+        samples_a_node: options.samples,
         plan,
         positions: positions.into(),
         normals: normals.into(),
@@ -364,6 +410,8 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         nodes: nodes.into(),
         boxes: boxes.into(),
         growths: growths.into(),
+        sample_lists: sample_lists.into(),
+        coverings: coverings.into(),
         cones: cones.into(),
     })
 }

@@ -3,11 +3,14 @@
 
 mod boxes;
 mod build;
+mod covering;
 mod descend;
 mod enclosure;
 mod gather;
 mod growth;
+mod levels;
 mod options;
+mod samples;
 mod sanity;
 mod sections;
 mod spacing;
@@ -17,10 +20,12 @@ mod topology;
 
 pub use boxes::{OrientedBox, Relative, SLACK};
 pub use build::{PointHierarchy, Slices};
+pub use covering::Covering;
 pub use descend::{Frontier, Heap, NodePair, Split, Stack, Visitor, descend, resume};
 pub use gather::{GatherScratch, Vicinity};
 pub use growth::Growth;
 pub use options::{BuildError, BuildOptions};
+pub use samples::Samples;
 pub use sanity::Flaw;
 pub use sections::{HierarchyMeta, LoadError};
 pub use surfels::{NormalCone, PointKind, THICKNESS};

@@ -3,6 +3,8 @@
 use nearmiss_surface::{SurfaceError, SurfaceOptions};
 use thiserror::Error;
 
+use crate::samples::SAMPLES;
+
 /// K of the local radii: fewer span no plane, more say nothing of the spacing.
 pub(crate) const RADIUS_NEIGHBOURS: std::ops::RangeInclusive<u32> = 3..=32;
 
@@ -17,13 +19,22 @@ pub struct BuildOptions {
     pub radius_neighbours: u32,
     /// Points in a leaf, 4 to 64, default 16. Larger leaves make fewer nodes and dearer leaf tests.
     pub leaf_size: u32,
+    /// Sample points of an inner node, 8 to 32, default 16. More make finer levels and tighter coverings, at four bytes
+    /// each.
+    pub samples: u32,
     /// Threads to build on; 0, the default, takes what the process's pool has. Never changes the result.
     pub threads: usize,
 }
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { surface: SurfaceOptions::default(), radius_neighbours: 6, leaf_size: 16, threads: 0 }
+        Self {
+            surface: SurfaceOptions::default(),
+            radius_neighbours: 6,
+            leaf_size: 16,
+            samples: 16,
+            threads: 0,
+        }
     }
 }
 
@@ -46,6 +57,12 @@ impl BuildOptions {
         Self { leaf_size, ..self }
     }
 
+    /// The same options with this many samples of an inner node.
+    #[must_use]
+    pub const fn with_samples(self, samples: u32) -> Self {
+        Self { samples, ..self }
+    }
+
     /// The same options on this many threads.
     #[must_use]
     pub const fn with_threads(self, threads: usize) -> Self {
@@ -58,6 +75,9 @@ impl BuildOptions {
         }
         if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
             return Err(BuildError::RadiusNeighbours(self.radius_neighbours));
+        }
+        if !SAMPLES.contains(&self.samples) {
+            return Err(BuildError::Samples(self.samples));
         }
         Ok(())
     }
@@ -76,6 +96,9 @@ pub enum BuildError {
     /// Too few or too many neighbours for a radius.
     #[error("a local radius from {0} neighbours; 3 to 32 are possible")]
     RadiusNeighbours(u32),
+    /// Too few or too many samples of a node.
+    #[error("{0} samples of a node; 8 to 32 are possible")]
+    Samples(u32),
     /// The kd-tree refused the points; a cloud's points are finite and few enough, so this is a defect.
     #[error("the index of nearest neighbours refuses the points; please report it with the scan")]
     Neighbours,

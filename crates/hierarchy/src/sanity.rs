@@ -7,6 +7,7 @@ mod lies;
 mod metadata;
 mod nodes;
 mod points;
+mod samples;
 
 use thiserror::Error;
 
@@ -105,7 +106,8 @@ impl PointHierarchy {
         check_topology(&self.nodes, self.len(), self.leaf_size)?;
         self.check_metadata()?;
         nodes::check_ranges(&self.boxes)?;
-        nodes::check_growths(&self.growths)
+        nodes::check_growths(&self.growths)?;
+        samples::check_ranges(self)
     }
 
     /// What their answers need besides, given the structure: each box lies within its parent's, and every number of
@@ -113,6 +115,7 @@ impl PointHierarchy {
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
         nodes::check(&self.nodes, &self.boxes)?;
         points::check(self)?;
+        samples::check(self)?;
         self.check_summary()
     }
 

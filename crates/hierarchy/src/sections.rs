@@ -18,6 +18,8 @@ const SOURCE: [u8; 4] = *b"SRCE";
 const NODES: [u8; 4] = *b"NODE";
 const BOXES: [u8; 4] = *b"BOXS";
 const GROWTHS: [u8; 4] = *b"GROW";
+const SAMPLES: [u8; 4] = *b"SMPL";
+const COVERINGS: [u8; 4] = *b"COVR";
 const CONES: [u8; 4] = *b"CONE";
 
 /// What a hierarchy stores beside its arrays.
@@ -30,6 +32,7 @@ pub struct HierarchyMeta {
     sampling_radius: f32,
     leaf_size: u32,
     radius_neighbours: u32,
+    samples: u32,
     surface: SurfaceOptions,
 }
 
@@ -60,6 +63,7 @@ impl PointHierarchy {
             sampling_radius: self.sampling_radius,
             leaf_size: self.leaf_size,
             radius_neighbours: self.radius_neighbours,
+            samples: self.samples_a_node,
             surface: *self.plan.options(),
         }
     }
@@ -73,6 +77,8 @@ impl PointHierarchy {
             .section(NODES, 0, &self.nodes)?
             .section(BOXES, 0, &self.boxes)?
             .section(GROWTHS, 0, &self.growths)?
+            .section(SAMPLES, 0, &self.sample_lists)?
+            .section(COVERINGS, 0, &self.coverings)?
             .section(CONES, 0, &self.cones)?
             .section(POSITIONS, 0, &self.positions)?
             .section(NORMALS, 0, &self.normals)?
@@ -98,6 +104,7 @@ impl PointHierarchy {
             sampling_radius: meta.sampling_radius,
             leaf_size: meta.leaf_size,
             radius_neighbours: meta.radius_neighbours,
+            samples_a_node: meta.samples,
             plan: SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale)?,
             positions: file.array(POSITIONS, 0)?,
             normals: file.array(NORMALS, 0)?,
@@ -108,6 +115,8 @@ impl PointHierarchy {
             nodes: file.array(NODES, 0)?,
             boxes: file.array(BOXES, 0)?,
             growths: file.array(GROWTHS, 0)?,
+            sample_lists: file.array(SAMPLES, 0)?,
+            coverings: file.array(COVERINGS, 0)?,
             cones: file.array(CONES, 0)?,
         };
         hierarchy.check_structure()?;

@@ -102,6 +102,8 @@ pub struct NormalCone {
 pub(crate) struct Surfel {
     pub(crate) normal: [f32; 3],
     pub(crate) disc: f32,
+    /// f at the point: along the normal, where the surface is to first order.
+    pub(crate) height: f32,
     pub(crate) kind: PointKind,
 }
 
@@ -157,7 +159,9 @@ fn surfel(
     // What is further than an ordinary horizon from all points is no surface (S0 eq. 6) but a hole, however sparse
     // the points about it; what a lone point knows of ends with its ball.
     let widest = if kind.is_sparse() { ordinary } else { index.plan.horizon(ordinary) };
-    Surfel { normal, disc: disc.min(widest), kind }
+    #[expect(clippy::cast_possible_truncation, reason = "a first-order estimate")]
+    let height = at.f as f32;
+    Surfel { normal, disc: disc.min(widest), height, kind }
 }
 
 /// The greatest number of neighbouring sectors of the tangent plane in which no point lies.

@@ -61,7 +61,7 @@ impl Surfaces<'_> {
         for i in self.pair.a.samples(pair.a.index()).iter() {
             let x = vb.placed().apply_inverse(va.point(i));
             self.pair.meter.spent.evaluations += 1;
-            let at = vb.scan().evaluate_node_with(pair.b, x, &mut self.gathers[1]);
+            let at = vb.scan().evaluate_node_with(pair.b.index(), x, &mut self.gathers[1]);
             if at.status == Status::Outside || at.f.abs() <= near {
                 continue;
             }

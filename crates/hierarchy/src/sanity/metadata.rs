@@ -5,6 +5,7 @@ use nearmiss_geometry::{Aabb, Frame};
 use super::{FARTHEST, Flaw};
 use crate::build::{PointHierarchy, sampling_rank};
 use crate::options::RADIUS_NEIGHBOURS;
+use crate::samples::SAMPLES;
 
 impl PointHierarchy {
     pub(super) fn check_lengths(&self) -> Result<(), Flaw> {
@@ -19,6 +20,12 @@ impl PointHierarchy {
             ("source", self.source.len(), points),
             ("boxes", self.boxes.len(), nodes),
             ("growths", self.growths.len(), nodes),
+            (
+                "samples",
+                self.sample_lists.len(),
+                leaves.saturating_sub(1).saturating_mul(self.samples_a_node as usize),
+            ),
+            ("coverings", self.coverings.len(), nodes),
             ("cones", self.cones.len(), leaves),
         ];
         match expected.into_iter().find(|(_, found, expected)| found != expected) {
@@ -48,6 +55,9 @@ impl PointHierarchy {
         }
         if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
             return wrong("the number of neighbours for a radius");
+        }
+        if !SAMPLES.contains(&self.samples_a_node) {
+            return wrong("the number of samples of a node");
         }
         if u32::try_from(self.given()).is_err() {
             return wrong("the number of dropped points");

@@ -1,0 +1,104 @@
+//! The samples of nodes as the scan seen from further away: which they are, how far they reach, and f' over them.
+
+use nearmiss_surface::{Centre, Evaluation};
+
+use crate::build::{PointHierarchy, Slices};
+use crate::gather::GatherScratch;
+use crate::samples::{Samples, list_number};
+
+impl<'a> Slices<'a> {
+    /// The sample P' of a node: [`BuildOptions::samples`](crate::BuildOptions::samples) of its points, or all if it
+    /// is a leaf or has no more.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[inline]
+    #[must_use]
+    pub fn samples(&self, node: usize) -> Samples<'a> {
+        samples(self.sample_lists, (node, &self.nodes[node]), (self.leaf_size, self.samples_a_node))
+    }
+
+    /// The covering radius: balls of this radius about the samples of a node contain its part of the surface, its points and discs,
+    /// proven so. Infinite where nothing is proven.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[inline]
+    #[must_use]
+    pub fn covering_radius(&self, node: usize) -> f32 {
+        self.coverings[node].radius
+    }
+
+    /// r(P') of Definition 4 (Klein & Zachmann 2004), measured: balls of this radius about the samples of a node cover
+    /// its surface.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[inline]
+    #[must_use]
+    pub fn sampling_radius_of(&self, node: usize) -> f32 {
+        self.coverings[node].sampling
+    }
+
+    /// How far the samples of a node are heard: m·r(P'), with r(P') by eq. 10 of Klein & Zachmann 2004, that is the
+    /// horizon of points with the node's spacing times √(|P|/|P'|).
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[must_use]
+    pub fn node_horizon(&self, node: usize) -> f32 {
+        self.plan.horizon(self.coverings[node].spacing) * self.thinning(node)
+    }
+
+    /// The bandwidth of the samples of a node, eq. 9 with r(P') by eq. 10; see [`Self::node_horizon`].
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[must_use]
+    pub fn node_bandwidth(&self, node: usize) -> f32 {
+        self.plan.bandwidth(self.coverings[node].spacing) * self.thinning(node)
+    }
+
+    /// √(|P|/|P'|).
+    #[expect(clippy::cast_precision_loss, reason = "a ratio")]
+    fn thinning(&self, node: usize) -> f32 {
+        (self.nodes[node].count as f32 / self.samples(node).len() as f32).sqrt()
+    }
+}
+
+/// The sample of `node`, which has the id `id`.
+#[inline]
+pub(crate) fn samples<'a>(
+    lists: &'a [u32],
+    (id, node): (usize, &crate::Node),
+    (leaf_size, count): (u32, u32),
+) -> Samples<'a> {
+    if node.is_leaf() || node.count <= count {
+        return Samples::all(node);
+    }
+    let start = list_number(id, node, leaf_size) * count as usize;
+    Samples::listed(&lists[start..start + count as usize])
+}
+
+impl PointHierarchy {
+    /// f' of a node at `x`, in the stored frame: f over the node's samples, each with the node's
+    /// [bandwidth](Slices::node_bandwidth) (Klein & Zachmann 2004, §5.5). Costs about as much as f.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    pub fn evaluate_node_with(&self, node: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        let slices = self.slices();
+        let (horizon, bandwidth) = (slices.node_horizon(node), slices.node_bandwidth(node));
+        let near = &mut scratch.near;
+        near.clear();
+        let centre = Centre::new(x);
+        for i in slices.samples(node).iter() {
+            let d = centre.offset(slices.positions[i]);
+            let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            if d_sq < horizon * horizon {
+                near.push(d, self.plan().reach_sq() * (d_sq / (horizon * horizon)), bandwidth);
+            }
+        }
+        near.evaluate(self.plan(), x)
+    }
+}
