@@ -166,13 +166,13 @@ impl Relative {
     }
 
     /// The distance of the centres of a box of a and one of b along the face normal where it is greatest, as a share of how
-    /// far the two reach along that: 0 where they share a centre, 1 where they just touch.
+    /// far the two and `margin` reach along that: 0 where they share a centre, 1 where they are just so far apart.
     #[must_use]
-    pub fn share_of_reach(&self, a: &OrientedBox, b: &OrientedBox) -> f32 {
+    pub fn share_of_reach(&self, a: &OrientedBox, b: &OrientedBox, margin: f32) -> f32 {
         let b = self.moved(b);
         let d = sub(b.centre, a.centre);
         let reach = |of: &OrientedBox, axis| -> f32 { (0..3).map(|k| of.half[k] * dot(axis, of.axes[k]).abs()).sum() };
-        let share = |axis: [f32; 3]| dot(axis, d).abs() / (reach(a, axis) + reach(&b, axis));
+        let share = |axis: [f32; 3]| dot(axis, d).abs() / (reach(a, axis) + reach(&b, axis) + margin);
         a.axes.iter().chain(&b.axes).map(|&axis| share(axis)).fold(0.0, f32::max)
     }
 

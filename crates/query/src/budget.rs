@@ -174,9 +174,4 @@ impl Meter {
         }
         ControlFlow::Continue(())
     }
-
-    /// Whether [`Meter::go_on`] has said that nothing is left.
-    pub(crate) fn is_spent(&self) -> bool {
-        self.is_spent
-    }
 }

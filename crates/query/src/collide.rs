@@ -175,8 +175,8 @@ fn surfaces(
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
             let likelihood = match options.order {
-                Order::DepthFirst => likelihood(&certifier.pair, stack),
-                _ => likelihood(&certifier.pair, heap),
+                Order::DepthFirst => likelihood(&certifier.pair, reach, stack),
+                _ => likelihood(&certifier.pair, reach, heap),
             };
             Verdict::Undecided(Reason::Budget { likelihood })
         }
@@ -250,7 +250,8 @@ fn balls(
     let verdict = match search.found {
         Some(contact) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
         None if ended => {
-            Verdict::Undecided(Reason::Budget { likelihood: likelihood(&search.pair, &scratch.stack) })
+            let likelihood = likelihood(&search.pair, search.reach_stored, &scratch.stack);
+            Verdict::Undecided(Reason::Budget { likelihood })
         }
         None => apart(plan.options(), search.apart, true),
     };

@@ -100,14 +100,15 @@ impl PairHint {
             pose,
             travel: 0.0,
             met: None,
-            clear: f64::NEG_INFINITY,
+            clear: f64::MIN,
             front: Vec::new(),
             is_whole: false,
             fresh: 0,
         };
         let known = self.known.get_or_insert_with(nothing);
-        if known.question == question {
-            known.travel += motion(pair, &known.pose, &pose);
+        let motion = motion(pair, &known.pose, &pose);
+        if known.question == question && motion.is_finite() {
+            known.travel += motion;
             known.pose = pose;
         } else {
             // The room of the front is kept.
@@ -125,8 +126,7 @@ fn motion(pair: &Posed<'_>, from: &Pose, to: &Pose) -> f64 {
     let centre = root.centre.map(f64::from);
     let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
     let turn = (to.rotation() * to.scale() - from.rotation() * from.scale()).norm();
-    let motion = shift + turn * f64::from(root.radius());
-    if motion.is_finite() { motion * (1.0 + 1e-9) } else { f64::INFINITY }
+    (shift + turn * f64::from(root.radius())) * (1.0 + 1e-9)
 }
 
 impl Known {
@@ -177,7 +177,7 @@ impl Known {
     /// The leaves of `pair` meet, or nothing is known.
     pub(crate) fn forget(&mut self, met: Option<NodePair>) {
         self.met = met;
-        self.clear = f64::NEG_INFINITY;
+        self.clear = f64::MIN;
         self.front.clear();
         self.is_whole = false;
     }
@@ -192,12 +192,12 @@ impl Known {
         let standing = |(gap, pair)| Standing { pair, until: self.until(gap, search) };
         let apart = excluded.map(standing);
         // Leaves that were compared have to be compared again.
-        let compared = search.compared.iter().map(|&pair| Standing { pair, until: f64::NEG_INFINITY });
+        let compared = search.compared.iter().map(|&pair| Standing { pair, until: f64::MIN });
         front.extend(apart.chain(compared));
         if !self.is_whole {
             self.fresh = front.len();
         }
-        self.clear = front.iter().map(|standing| standing.until).fold(f64::INFINITY, f64::min);
+        self.clear = front.iter().map(|standing| standing.until).fold(f64::MAX, f64::min);
         self.is_whole = front.len() <= GROWN * self.fresh;
         self.front = front;
         self.met = None;

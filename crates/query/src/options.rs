@@ -97,7 +97,7 @@ pub enum Order {
     /// (benches/record).
     #[default]
     DepthFirst,
-    /// Of all pairs the one whose boxes overlap most.
+    /// Of all pairs the one whose boxes' centres are nearest each other, measured by how far the boxes reach.
     Overlap,
     /// The pair with most sample points of a's node on either side of f′ of b's, further from it than its covering
     /// radius (S0 §5.2).

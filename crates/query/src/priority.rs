@@ -9,6 +9,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::NodePair;
 use nearmiss_surface::Status;
 
+use crate::likelihood::overlap;
 use crate::options::Order;
 use crate::surface::Surfaces;
 
@@ -34,21 +35,14 @@ impl Surfaces<'_> {
     }
 
     fn urgency(&mut self, pair: NodePair, depth: f32) -> f32 {
-        // Below one, so that it decides between pairs of as many sample points.
-        let overlap = depth / (1.0 + depth.abs());
+        // At most one, so that it decides between pairs of as many sample points.
+        let overlap = overlap(&self.pair, pair, self.reach);
         match self.order {
             Order::DepthFirst => depth,
-            Order::Overlap => self.share_of_overlap(pair, depth),
-            Order::Sides => self.sides(pair, |_| 1.0) + overlap.max(0.0),
-            Order::SidesByGap => self.sides(pair, eigenvalue_gap) + overlap.max(0.0),
+            Order::Overlap => overlap,
+            Order::Sides => self.sides(pair, |_| 1.0) + overlap,
+            Order::SidesByGap => self.sides(pair, eigenvalue_gap) + overlap,
         }
-    }
-
-    /// How deeply the boxes of a pair overlap, over the size of the lesser.
-    pub(crate) fn share_of_overlap(&self, pair: NodePair, depth: f32) -> f32 {
-        let size_a = self.pair.a.boxes[pair.a.index()].radius();
-        let size_b = self.pair.b.boxes[pair.b.index()].radius() * self.pair.relative.scale();
-        depth / size_a.min(size_b).max(f32::MIN_POSITIVE)
     }
 
     /// The lesser number, weighted, of a's sample points on one of the sides of f′_B.

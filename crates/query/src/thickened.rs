@@ -15,7 +15,7 @@ pub(crate) struct Balls<'a> {
     pub(crate) pair: Posed<'a>,
     /// 2R + margin in the world, and a little more in a's stored frame.
     reach: f64,
-    reach_stored: f32,
+    pub(crate) reach_stored: f32,
     /// The first such pair.
     pub(crate) found: Option<Contact>,
     /// The leaves of that pair.
