@@ -17,6 +17,7 @@ use crate::error::CliError;
 use crate::posing::{self, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
+use crate::search::SearchArgs;
 use crate::sentence::{hint, sentence};
 use crate::{input, output, picture, proof};
 
@@ -58,6 +59,9 @@ pub struct CollideArgs {
     /// How much to find out about a contact
     #[arg(long, value_enum, default_value_t = DetailName::Witness)]
     pub detail: DetailName,
+    /// How to search
+    #[command(flatten)]
+    pub search: SearchArgs,
     /// Threads, 0 for all cores: to prepare raw inputs, by default all, and to answer --poses, by default one
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
@@ -90,7 +94,7 @@ pub enum EvidenceName {
     Estimated,
 }
 
-fn parse_radius(text: &str) -> Result<f64, String> {
+pub(crate) fn parse_radius(text: &str) -> Result<f64, String> {
     let radius = text.parse().ok().filter(|r: &f64| *r >= 0.0 && r.is_finite());
     radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
 }
@@ -117,6 +121,7 @@ struct Question {
     plan: CollidePlan,
     budget: Option<Duration>,
     work: Option<u64>,
+    resolution: Option<f64>,
     prove: bool,
 }
 
@@ -128,6 +133,9 @@ impl Question {
         let mut budget = Budget::UNLIMITED;
         if let Some(units) = self.work {
             budget = budget.with_work(units);
+        }
+        if let Some(length) = self.resolution {
+            budget = budget.with_resolution(length);
         }
         if let Some(end) = self.budget.and_then(|time| start.checked_add(time)) {
             budget = budget.with_deadline(Deadline::at(end));
@@ -219,9 +227,11 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         .with_detail(detail)
         .with_margin(args.margin)
         .with_evidence(evidence);
+    let options = args.search.apply(options)?;
     let plan = CollidePlan::new(&options, &a, &b)?;
     let prove = args.prove.is_some();
-    let question = Question { a, b, plan, budget: args.budget, work: args.work, prove };
+    let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);
+    let question = Question { a, b, plan, budget, work, resolution, prove };
 
     let mut results = Results::new();
     let mut answer = |out: &mut Outputs<'_, '_>| match &mut poses {

@@ -18,6 +18,7 @@ mod posing;
 mod advice;
 mod digits;
 mod report;
+mod search;
 mod sentence;
 
 mod canvas;
@@ -42,6 +43,7 @@ pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
 pub use posing::PoseRefused;
 pub use preprocess::{FormatChoice, PreprocessArgs, WeightName};
+pub use search::{MethodName, OrderName, SearchArgs};
 
 /// Whether, where and how near scanned things meet, straight from their points.
 ///

@@ -180,7 +180,7 @@ impl AnswerReport {
             source_a: None,
             source_b: None,
             gap: None,
-            distance_estimate: None,
+            distance_estimate: answer.distance_estimate,
             likelihood: None,
             evaluations: answer.statistics.evaluations,
             node_pairs: answer.statistics.node_pairs,

@@ -171,7 +171,9 @@ impl Relative {
     pub fn share_of_reach(&self, a: &OrientedBox, b: &OrientedBox, margin: f32) -> f32 {
         let b = self.moved(b);
         let d = sub(b.centre, a.centre);
-        let reach = |of: &OrientedBox, axis| -> f32 { (0..3).map(|k| of.half[k] * dot(axis, of.axes[k]).abs()).sum() };
+        let reach = |of: &OrientedBox, axis| -> f32 {
+            (0..3).map(|k| of.half[k] * dot(axis, of.axes[k]).abs()).sum()
+        };
         let share = |axis: [f32; 3]| dot(axis, d).abs() / (reach(a, axis) + reach(&b, axis) + margin);
         a.axes.iter().chain(&b.axes).map(|&axis| share(axis)).fold(0.0, f32::max)
     }

@@ -20,8 +20,8 @@ pub use nearmiss_geometry::{Aabb, CloudError, PointCloud, PointId, Pose, PoseErr
 pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
 pub use nearmiss_query::{
     Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Contact, Deadline, Detail, Evidence, Method,
-    Order, PairHint, PlanError, Proof, Reason, Sampling, ScanView, Semantics, Statistics, Verdict, collide,
-    collide_hinted, collide_proving, collide_with,
+    Order, Pacer, PairHint, PlanError, Proof, Reason, Sampling, ScanView, Semantics, Statistics, Verdict,
+    collide, collide_hinted, collide_paced, collide_proving, collide_with,
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Status, SurfaceOptions};

@@ -41,7 +41,6 @@ impl Deadline {
     pub const fn at(instant: Instant) -> Self {
         Self(instant)
     }
-
 }
 
 /// What the clock says.

@@ -7,8 +7,8 @@
 
 use std::ops::ControlFlow;
 
-use nearmiss_geometry::{Frame, Pose};
 use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{Frame, Pose};
 use nearmiss_hierarchy::{Frontier, NodePair, PointHierarchy, Stack, resume};
 use serde::{Deserialize, Serialize};
 

@@ -9,6 +9,7 @@ mod hint;
 mod likelihood;
 mod margin;
 mod options;
+mod pacer;
 mod posed;
 mod priority;
 mod resolution;
@@ -24,5 +25,6 @@ pub use collide::{CollideScratch, collide, collide_hinted, collide_proving, coll
 pub use crossing::{Disc, crossing};
 pub use hint::PairHint;
 pub use options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};
+pub use pacer::{Pacer, collide_paced};
 pub use verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
 pub use view::ScanView;

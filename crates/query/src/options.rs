@@ -57,6 +57,9 @@ pub struct Sampling {
     pub flat: bool,
 }
 
+/// Greatest number of test points.
+pub(crate) const MOST_TEST_POINTS: u32 = 65_536;
+
 impl Default for Sampling {
     fn default() -> Self {
         Self { test_points: 128, tolerance: 0.5, seed: 0, flat: false }
@@ -212,7 +215,9 @@ pub enum PlanError {
     #[error("a tolerance of {0} sampling radii; it must be more than 0 and at most 4")]
     Tolerance(f64),
     /// Test points say whether surfaces cross, not how far apart they are.
-    #[error("the method `sampling` compares surfaces, without a margin; leave the margin and the thickness out")]
+    #[error(
+        "the method `sampling` compares surfaces, without a margin; leave the margin and the thickness out"
+    )]
     SamplingAlone,
 }
 
@@ -242,7 +247,7 @@ impl CollidePlan {
             if options.semantics != Semantics::Surface || options.margin > 0.0 {
                 return Err(PlanError::SamplingAlone);
             }
-            if !(1..=65_536).contains(&test_points) {
+            if !(1..=MOST_TEST_POINTS).contains(&test_points) {
                 return Err(PlanError::TestPoints(test_points));
             }
             if !(tolerance > 0.0 && tolerance <= 4.0) {
@@ -258,6 +263,11 @@ impl CollidePlan {
             Semantics::Thickened(radius) => 2.0 * radius + self.options.margin,
             Semantics::Surface => self.options.margin,
         }
+    }
+
+    /// The same question with other test points, which are in range.
+    pub(crate) fn with_sampling(self, sampling: Sampling) -> Self {
+        Self { options: self.options.with_method(Method::Sampling(sampling)) }
     }
 
     /// The options that were validated.

@@ -17,19 +17,12 @@ impl Surfaces<'_> {
     /// Takes those pairs back that coverings part, and gives the others the urgency of the order. Of `admitted` a
     /// pair's urgency is how deeply its boxes overlap.
     #[cold]
-    pub(crate) fn look_closer(
-        &mut self,
-        a: [NodeId; 2],
-        b: [NodeId; 2],
-        admitted: &mut [Option<f32>; 4],
-    ) {
+    pub(crate) fn look_closer(&mut self, a: [NodeId; 2], b: [NodeId; 2], admitted: &mut [Option<f32>; 4]) {
         for (i, admitted) in admitted.iter_mut().enumerate() {
             let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
             let double = (i >> 1 == 1 && a[0] == a[1]) || (i & 1 == 1 && b[0] == b[1]);
             let Some(depth) = admitted.filter(|_| !double) else { continue };
-            let apart = self.coverings && {
-                false
-            };
+            let apart = self.coverings && { false };
             *admitted = if apart { None } else { Some(self.urgency(pair, depth)) };
         }
     }

@@ -27,8 +27,7 @@ impl Surfaces<'_> {
     /// The samples of two nodes, of which not both are leaves.
     pub(crate) fn samples_cross(&mut self, pair: NodePair) -> ControlFlow<()> {
         let (slices_a, slices_b) = (self.pair.a, self.pair.b);
-        let [samples_a, samples_b] =
-            [slices_a.samples(pair.a.index()), slices_b.samples(pair.b.index())];
+        let [samples_a, samples_b] = [slices_a.samples(pair.a.index()), slices_b.samples(pair.b.index())];
         self.pair.meter.leaf_pair(samples_a.len(), samples_b.len());
         for (lane, j) in samples_b.iter().enumerate() {
             let radius = radius(&slices_b, pair.b.index(), j) * self.pair.relative.scale();

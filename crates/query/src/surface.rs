@@ -219,8 +219,7 @@ impl<'a> Surfaces<'a> {
         } else {
             ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
         };
-        let radii =
-            [f64::from(radii[0]) * va.placed().scale(), f64::from(radii[1]) * vb.placed().scale()];
+        let radii = [f64::from(radii[0]) * va.placed().scale(), f64::from(radii[1]) * vb.placed().scale()];
         let place = middle + step;
         // Along the common line each chord is an interval; for parallel planes the place is as good as any.
         let along = na.cross(&nb).try_normalize(0.03).map_or_else(Vector3::zeros, |line| {

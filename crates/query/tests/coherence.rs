@@ -4,8 +4,8 @@
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Order, PairHint, ScanView, Semantics,
-    Verdict, collide, collide_hinted,
+    Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Order, PairHint, ScanView,
+    Semantics, Verdict, collide, collide_hinted,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -43,7 +43,8 @@ fn kind(verdict: &Verdict) -> (u8, bool) {
 #[test]
 fn hints_change_no_verdict() {
     let mut rng = arbitrary::rng(31);
-    let kinds = [CloudKind::Sphere, CloudKind::Lattice, CloudKind::Clustered, CloudKind::Rings, CloudKind::Coplanar];
+    let kinds =
+        [CloudKind::Sphere, CloudKind::Lattice, CloudKind::Clustered, CloudKind::Rings, CloudKind::Coplanar];
     let (mut seen, mut skipped) = ([0; 3], 0);
     for (n, cloud) in (0_u64..).zip(kinds.iter().cycle().take(10)) {
         let a = prepared(&arbitrary::cloud(*cloud, 400, n));
@@ -67,12 +68,23 @@ fn hints_change_no_verdict() {
                 for pose in walk(&mut rng, 1.6 * size, step, 60) {
                     let views = [ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose)];
                     let cold = collide(&views[0], &views[1], &plan, &Budget::UNLIMITED);
-                    let warm =
-                        collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch);
-                    assert_eq!(kind(&cold.verdict).0, kind(&warm.verdict).0, "{cloud:?} {options:?} {step}: {cold:?} {warm:?}");
+                    let warm = collide_hinted(
+                        &views[0],
+                        &views[1],
+                        &plan,
+                        &Budget::UNLIMITED,
+                        &mut hint,
+                        &mut scratch,
+                    );
+                    assert_eq!(
+                        kind(&cold.verdict).0,
+                        kind(&warm.verdict).0,
+                        "{cloud:?} {options:?} {step}: {cold:?} {warm:?}"
+                    );
                     seen[usize::from(kind(&cold.verdict).0)] += 1;
                     skipped += usize::from(warm.statistics.node_pairs == 0 && warm.verdict.is_separated());
-                    if let (Verdict::Separated { gap: exact, .. }, Semantics::Thickened(_)) = (cold.verdict, options.semantics)
+                    if let (Verdict::Separated { gap: exact, .. }, Semantics::Thickened(_)) =
+                        (cold.verdict, options.semantics)
                         && let Verdict::Separated { gap, .. } = warm.verdict
                     {
                         // Both are lower bounds of the distance of balls.
@@ -98,8 +110,9 @@ fn least_distance([a, b]: &[ScanView<'_>; 2]) -> f64 {
 #[test]
 fn a_hint_for_something_else_is_none() {
     let mut rng = arbitrary::rng(5);
-    let scans: Vec<PointHierarchy> =
-        (0..4_u32).map(|n| prepared(&arbitrary::cloud(CloudKind::Sphere, 300 + 40 * n, u64::from(n)))).collect();
+    let scans: Vec<PointHierarchy> = (0..4_u32)
+        .map(|n| prepared(&arbitrary::cloud(CloudKind::Sphere, 300 + 40 * n, u64::from(n))))
+        .collect();
     let size = scans[0].bounds().half_extents()[0];
     let mut hint = PairHint::default();
     let mut scratch = CollideScratch::default();
@@ -127,7 +140,8 @@ fn small_steps_cost_less_than_half() {
     let mut rng = arbitrary::rng(8);
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 5000, 3));
     let size = scan.bounds().half_extents()[0];
-    let plan = CollidePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan, &scan).unwrap();
+    let plan =
+        CollidePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan, &scan).unwrap();
     let (mut cold, mut warm) = (0, 0);
     for _ in 0..20 {
         let mut hint = PairHint::default();

@@ -145,7 +145,8 @@ fn newton_finds_the_common_point_of_two_planes() {
     each_kernel(|kernel| {
         let sheet = Sheet::plane(0.0, 99.0, kernel);
         for angle in [0.05, 0.3, 1.0, 1.5] {
-            let meeting = meet([0.4, 0.2, 0.3], |x| Some([sheet.at(x), turned(&sheet, angle, 0.0, x)])).unwrap();
+            let meeting =
+                meet([0.4, 0.2, 0.3], |x| Some([sheet.at(x), turned(&sheet, angle, 0.0, x)])).unwrap();
             assert!(meeting.verified, "{kernel:?}, {angle}: {meeting:?}");
             // The common line is x = z = 0.
             let [x, y, z] = meeting.point;

@@ -1,0 +1,143 @@
+//! The same time for every query: S0 §5.4.
+//!
+//! A query that takes longer than it may has fewer test points and a greater tolerance next time; one that has time left
+//! has more and a lesser one, if it came to test any. A time budget cuts off what is too long all the same.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::budget::{Budget, Deadline, now};
+use crate::collide::{CollideScratch, collide_with};
+use crate::options::{CollidePlan, MOST_TEST_POINTS, Method, Sampling};
+use crate::verdict::Answer;
+use crate::view::ScanView;
+
+/// Test points grow and shrink by this share, the tolerance by a quarter of it.
+const STEP: f64 = 0.125;
+
+/// Fewer test points say nothing.
+const LEAST_TEST_POINTS: u32 = 8;
+
+/// Tolerances, in sampling radii, below which nothing would be found and above which everything would.
+const TOLERANCES: std::ops::RangeInclusive<f64> = 0.1..=1.0;
+
+/// A query that took more than this share of its time had enough to do.
+const ENOUGH: f64 = 0.9;
+
+/// How many test points leaves get, so that successive queries take the same time. Owned by the caller, stepped in the order
+/// of the queries: one for each pair of scans, or one for all.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Pacer {
+    target: Duration,
+    sampling: Sampling,
+}
+
+impl Pacer {
+    /// Queries of `target` each (S0's `t_max`), the first of them with the default test.
+    #[must_use]
+    pub fn new(target: Duration) -> Self {
+        Self { target, sampling: Sampling::default() }
+    }
+
+    /// The same pace, next with this test.
+    #[must_use]
+    pub const fn with_sampling(self, sampling: Sampling) -> Self {
+        Self { sampling, ..self }
+    }
+
+    /// What the next query tests leaves with.
+    #[must_use]
+    pub const fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// How long a query is to take.
+    #[must_use]
+    pub const fn target(&self) -> Duration {
+        self.target
+    }
+
+    /// Learns from a query that took so long.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count within bounds")]
+    pub fn adapt(&mut self, spent: Duration, answer: &Answer) {
+        let Sampling { test_points, tolerance, .. } = &mut self.sampling;
+        let step = if spent > self.target {
+            1.0 - STEP
+        } else if spent < self.target.mul_f64(ENOUGH)
+            && answer.statistics.leaf_pairs > 0
+            && !answer.verdict.is_intersecting()
+        {
+            1.0 + STEP
+        } else {
+            return;
+        };
+        let wanted = (f64::from(*test_points) * step).round() as u32;
+        // One test more or less is the least step of small numbers.
+        let wanted = if step > 1.0 { wanted.max(*test_points + 1) } else { wanted.min(*test_points - 1) };
+        *test_points = wanted.clamp(LEAST_TEST_POINTS, MOST_TEST_POINTS);
+        let wider = 1.0 + 0.25 * (1.0 - step);
+        *tolerance = (*tolerance * wider).clamp(*TOLERANCES.start(), *TOLERANCES.end());
+    }
+}
+
+/// As [`collide_with`](crate::collide_with) with a deadline in `pacer`'s time; the test points of
+/// [`Method::Sampling`] are the pacer's, which learns from the query. By other methods there is nothing to adapt.
+pub fn collide_paced(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+    pacer: &mut Pacer,
+    scratch: &mut CollideScratch,
+) -> Answer {
+    let start = now();
+    let budget = Budget::UNLIMITED.with_deadline(Deadline::at(start + pacer.target));
+    let Method::Sampling(Sampling { seed, flat, .. }) = plan.options().method else {
+        return collide_with(a, b, plan, &budget, scratch);
+    };
+    let plan = plan.with_sampling(pacer.sampling.with_seed(seed).with_flat(flat));
+    let answer = collide_with(a, b, &plan, &budget, scratch);
+    pacer.adapt(start.elapsed(), &answer);
+    answer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verdict::{Evidence, Statistics, Verdict};
+
+    fn answer(leaf_pairs: u64) -> Answer {
+        Answer {
+            verdict: Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
+            distance_estimate: None,
+            statistics: Statistics { leaf_pairs, ..Statistics::default() },
+        }
+    }
+
+    #[test]
+    fn a_pacer_settles_where_queries_take_their_time() {
+        // Each test point takes two microseconds.
+        for (target, wanted) in [(2000, 1000), (100, 50), (20, 10)] {
+            let mut pacer = Pacer::new(Duration::from_micros(target));
+            for _ in 0..200 {
+                let spent = Duration::from_micros(2 * u64::from(pacer.sampling().test_points));
+                pacer.adapt(spent, &answer(1));
+            }
+            let points = pacer.sampling().test_points;
+            assert!((wanted * 8 / 10..=wanted * 11 / 10).contains(&points), "{points} for {target} µs");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_adapted_stays() {
+        let mut pacer = Pacer::new(Duration::from_micros(100));
+        let before = pacer.sampling();
+        pacer.adapt(Duration::from_micros(10), &answer(0));
+        assert_eq!(pacer.sampling(), before, "no leaves were tested");
+        for _ in 0..1000 {
+            pacer.adapt(Duration::from_secs(1), &answer(1));
+        }
+        assert_eq!(pacer.sampling().test_points, LEAST_TEST_POINTS);
+        assert!((pacer.sampling().tolerance - 1.0).abs() < 1e-12, "{}", pacer.sampling().tolerance);
+    }
+}
