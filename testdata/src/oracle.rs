@@ -3,6 +3,7 @@
 //! They share no code with the libraries they judge. Everything is O(n) per evaluation and O(n²) per cloud,
 //! which is fine up to some ten thousand points.
 
+mod covering;
 mod disc;
 mod eigen;
 mod radii;
@@ -11,6 +12,7 @@ mod thickened;
 
 pub(crate) use radii::count;
 
+pub use covering::{Solid, clearance, covering_radius, to_nearest};
 pub use disc::{Crossing, Disc, crossing};
 pub use eigen::{Eigen, symmetric_eigen};
 pub use radii::{

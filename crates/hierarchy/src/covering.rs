@@ -83,7 +83,19 @@ impl Centres {
     }
 
     #[inline]
-    pub(crate) fn blocks(&self) -> &[[[f32; WIDTH]; 3]] {
+    pub(crate) fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = [f32; 3]> {
+        (0..self.len).map(|i| {
+            let [x, y, z] = &self.blocks[i / WIDTH];
+            [x[i % WIDTH], y[i % WIDTH], z[i % WIDTH]]
+        })
+    }
+
+    #[inline]
+    fn blocks(&self) -> &[[[f32; WIDTH]; 3]] {
         &self.blocks[..self.len.div_ceil(WIDTH)]
     }
 

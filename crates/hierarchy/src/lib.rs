@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod apart;
 mod boxes;
 mod build;
 mod covering;
@@ -18,6 +19,7 @@ mod split;
 mod surfels;
 mod topology;
 
+pub use apart::apart;
 pub use boxes::{OrientedBox, Relative, SLACK};
 pub use build::{PointHierarchy, Slices};
 pub use covering::Covering;

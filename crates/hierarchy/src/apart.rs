@@ -1,0 +1,50 @@
+//! Whether the coverings of two nodes are apart (Klein & Zachmann 2004, §5.1).
+
+use crate::boxes::{OrientedBox, Relative};
+use crate::build::Slices;
+use crate::covering::Centres;
+use crate::descend::NodePair;
+
+/// What motion and arithmetic may do to the distance of two places, in units of [`Relative::slack`], each of which
+/// bounds a coordinate: √3 for either of two places in motion, as much again for the distance itself and for the radii.
+const ROUNDINGS: f32 = 8.0;
+
+/// Whether the parts of two nodes are further apart than `reach`, as far as their coverings show: `motion` takes the
+/// frame of `b` into that of `a`, in which `reach` is given.
+///
+/// As in the paper, balls that are further than that from the volume of the other node are dropped first; here it is the
+/// [enclosure](Slices::enclosure), so that what is excluded has neither surface nor points or discs within `reach` of each
+/// other, rounding included. Costs some 100 ns and 5 ns for each pair of eight balls with one that are left; does not
+/// allocate.
+///
+/// # Panics
+/// When there are no such nodes.
+#[must_use]
+pub fn apart(a: &Slices<'_>, b: &Slices<'_>, pair: NodePair, motion: &Relative, reach: f32) -> bool {
+    let (node_a, node_b) = (pair.a.index(), pair.b.index());
+    let radius_a = a.covering_radius(node_a);
+    let radius_b = b.covering_radius(node_b) * motion.scale();
+    let reach = reach + ROUNDINGS * motion.slack();
+    let bounds_b = motion.moved(&b.enclosure(node_b));
+    let of_a = a.samples(node_a).iter().map(|i| a.positions[i]);
+    let near_a = within(of_a, &bounds_b, radius_a + reach);
+    let of_b = b.samples(node_b).iter().map(|i| motion.point(b.positions[i]));
+    let near_b = within(of_b, &a.enclosure(node_a), radius_b + reach);
+    let least = radius_a + radius_b + reach;
+    let (few, many) = if near_a.len() < near_b.len() { (&near_a, &near_b) } else { (&near_b, &near_a) };
+    few.iter().all(|p| many.nearest_sq(p) > least * least)
+}
+
+/// Those of `places` that are not further than `distance` from the box.
+#[inline]
+fn within(places: impl Iterator<Item = [f32; 3]>, bounds: &OrientedBox, distance: f32) -> Centres {
+    let mut near = Centres::default();
+    for p in places {
+        // What is no number is near.
+        if bounds.distance_sq(p) > distance * distance {
+            continue;
+        }
+        near.push(p);
+    }
+    near
+}
