@@ -19,9 +19,10 @@ pub use nearmiss_surface as surface;
 pub use nearmiss_geometry::{Aabb, CloudError, PointCloud, PointId, Pose, PoseError, TriangleMesh};
 pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
 pub use nearmiss_query::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Contact, Deadline, Detail, Evidence, Method,
-    Order, Pacer, PairHint, PlanError, Proof, Reason, Sampling, ScanView, Semantics, Statistics, Verdict,
-    collide, collide_hinted, collide_paced, collide_proving, collide_with,
+    Answer, BatchScratch, Bodies, BodyId, Budget, CollideOptions, CollidePlan, CollideScratch, Contact,
+    Deadline, Detail, Evidence, Method, Order, Pacer, PairHint, PlanError, Proof, Reason, Sampling, ScanView,
+    Semantics, Statistics, Until, Verdict, World, answer_each, collide, collide_hinted, collide_many,
+    collide_many_with, collide_paced, collide_poses, collide_poses_with, collide_proving, collide_with,
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Status, SurfaceOptions};

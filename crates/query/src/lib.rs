@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod batch;
 mod budget;
 mod certify;
 mod collide;
@@ -18,7 +19,11 @@ mod surface;
 mod thickened;
 mod verdict;
 mod view;
+mod world;
 
+pub use batch::{
+    BatchScratch, Until, answer_each, collide_many, collide_many_with, collide_poses, collide_poses_with,
+};
 pub use budget::{Budget, Deadline};
 pub use certify::Proof;
 pub use collide::{CollideScratch, collide, collide_hinted, collide_proving, collide_with};
@@ -28,3 +33,4 @@ pub use options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError,
 pub use pacer::{Pacer, collide_paced};
 pub use verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
 pub use view::ScanView;
+pub use world::{Bodies, BodyId, World};

@@ -1,0 +1,336 @@
+//! Many scans in one world, and which of them may meet.
+//!
+//! An R*-tree (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree: an efficient and robust access method for points
+//! and rectangles", SIGMOD 1990; the crate `rstar`) over boxes of the world leaves out the pairs that are further apart
+//! than a plan reaches; batches answer the others.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Deref;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{Aabb, Pose};
+use nearmiss_hierarchy::{PointHierarchy, SLACK};
+use rstar::{AABB, RTree, RTreeObject};
+use serde::{Deserialize, Serialize};
+
+use crate::batch::{BatchScratch, Until, ask_all};
+use crate::budget::Budget;
+use crate::collide::{CollideScratch, collide_with};
+use crate::options::{CollideOptions, CollidePlan};
+use crate::verdict::{Answer, Reason, Statistics, Verdict};
+use crate::view::ScanView;
+
+/// A placed scan of a [`World`]. Never used again, whatever is removed; later ones are greater.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct BodyId(pub u64);
+
+/// Which bodies to ask about.
+#[derive(Debug, Clone, Copy)]
+pub enum Bodies<'a> {
+    /// All: every pair.
+    All,
+    /// These, which may have moved since the last time: pairs with one of them, each once.
+    These(&'a [BodyId]),
+}
+
+/// Placed scans, each a *body* with an id.
+///
+/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc<PointHierarchy>` or a reference. One scan may be placed
+/// many times.
+///
+/// ```
+/// use nearmiss_geometry::{PointCloud, Pose};
+/// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+/// use nearmiss_query::{Bodies, Budget, CollideOptions, CollidePlan, Until, World};
+///
+/// let points: Vec<[f32; 3]> = (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let square = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let plan = CollidePlan::new(&CollideOptions::default(), &square, &square)?;
+///
+/// let mut world = World::new();
+/// let floor = world.insert(&square, &Pose::IDENTITY);
+/// let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], 1.5);
+/// let door = world.insert(&square, &upright.with_translation([0.3, 0.5, -0.4]));
+/// let hinge = world.insert(&square, &upright.with_translation([0.4, 0.4, -0.4]));
+///
+/// // The door and its hinge belong together.
+/// let told = world.collide_many(Bodies::All, |pair| pair != [door, hinge], &plan, &Budget::UNLIMITED, Until::All);
+/// let touching: Vec<_> = told.iter().filter(|(_, answer)| answer.verdict.is_intersecting()).map(|(pair, _)| *pair).collect();
+/// assert_eq!(touching, [[floor, door], [floor, hinge]]);
+///
+/// // Of a body that moved, only its own pairs are asked for.
+/// world.move_to(door, &upright.with_translation([0.3, 0.5, 0.1]));
+/// let pairs = world.near_pairs(Bodies::These(&[door]), &plan);
+/// let answers = world.collide_pairs(&pairs, &plan, &Budget::UNLIMITED, Until::All);
+/// assert!(pairs.iter().zip(&answers).all(|(pair, answer)| pair[0] != floor || answer.verdict.is_separated()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct World<S> {
+    bodies: BTreeMap<BodyId, Body<S>>,
+    /// The boxes of the bodies that have one.
+    tree: RTree<Leaf>,
+    /// The others, which are near everything.
+    unbounded: BTreeSet<BodyId>,
+    next: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Body<S> {
+    scan: S,
+    pose: Pose,
+    bounds: Option<Aabb>,
+}
+
+impl<S: Deref<Target = PointHierarchy>> Body<S> {
+    fn new(scan: S, pose: &Pose) -> Self {
+        let bounds = bounds(&ScanView::new(&scan, pose));
+        Self { scan, pose: *pose, bounds }
+    }
+
+    fn view(&self) -> ScanView<'_> {
+        ScanView::new(&self.scan, &self.pose)
+    }
+}
+
+/// What the tree holds of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Leaf {
+    id: BodyId,
+    bounds: Aabb,
+}
+
+impl RTreeObject for Leaf {
+    type Envelope = AABB<[f64; 3]>;
+
+    fn envelope(&self) -> AABB<[f64; 3]> {
+        AABB::from_corners(self.bounds.min, self.bounds.max)
+    }
+}
+
+impl<S> Default for World<S> {
+    fn default() -> Self {
+        Self { bodies: BTreeMap::new(), tree: RTree::new(), unbounded: BTreeSet::new(), next: 0 }
+    }
+}
+
+impl<S: Deref<Target = PointHierarchy>> World<S> {
+    /// A world without bodies.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Places `scan` in `pose`, which leads from the frame of its input to the world. O(log n).
+    pub fn insert(&mut self, scan: S, pose: &Pose) -> BodyId {
+        let id = BodyId(self.next);
+        self.next += 1;
+        self.place(id, Body::new(scan, pose));
+        id
+    }
+
+    /// Takes a body out; `None` where there is none of this id. O(log n).
+    pub fn remove(&mut self, id: BodyId) -> Option<S> {
+        let body = self.bodies.remove(&id)?;
+        match body.bounds {
+            Some(bounds) => _ = self.tree.remove(&Leaf { id, bounds }),
+            None => _ = self.unbounded.remove(&id),
+        }
+        Some(body.scan)
+    }
+
+    /// Moves a body; returns whether there is one of this id. O(log n).
+    pub fn move_to(&mut self, id: BodyId, pose: &Pose) -> bool {
+        let scan = self.remove(id);
+        scan.map(|scan| self.place(id, Body::new(scan, pose))).is_some()
+    }
+
+    fn place(&mut self, id: BodyId, body: Body<S>) {
+        match body.bounds {
+            Some(bounds) => self.tree.insert(Leaf { id, bounds }),
+            None => _ = self.unbounded.insert(id),
+        }
+        self.bodies.insert(id, body);
+    }
+
+    /// Number of bodies.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.bodies.is_empty()
+    }
+
+    /// The bodies, in the order in which they were inserted.
+    #[must_use]
+    pub fn ids(&self) -> impl ExactSizeIterator<Item = BodyId> {
+        self.bodies.keys().copied()
+    }
+
+    /// A body as queries see it.
+    #[must_use]
+    pub fn view(&self, id: BodyId) -> Option<ScanView<'_>> {
+        self.bodies.get(&id).map(Body::view)
+    }
+
+    /// The broad phase: pairs whose boxes come as near each other as `plan` reaches, lesser id first, in order.
+    /// Allocates; see [`World::near_pairs_with`].
+    #[must_use]
+    pub fn near_pairs(&self, bodies: Bodies<'_>, plan: &CollidePlan) -> Vec<[BodyId; 2]> {
+        let mut pairs = Vec::new();
+        self.near_pairs_with(bodies, plan, &mut pairs);
+        pairs
+    }
+
+    /// As [`World::near_pairs`], into `pairs`.
+    ///
+    /// Of pairs left out a single query would say that they are apart. A body in a pose that is none
+    /// ([`Reason::Pose`]), or at the ends of the range of double precision, is near all others.
+    pub fn near_pairs_with(&self, bodies: Bodies<'_>, plan: &CollidePlan, pairs: &mut Vec<[BodyId; 2]>) {
+        pairs.clear();
+        match bodies {
+            Bodies::All => {
+                for (&id, body) in &self.bodies {
+                    self.visit_near(body.bounds, plan, |other| {
+                        if other > id {
+                            pairs.push([id, other]);
+                        }
+                    });
+                }
+            }
+            Bodies::These(ids) => {
+                for &id in ids {
+                    let Some(body) = self.bodies.get(&id) else { continue };
+                    self.visit_near(body.bounds, plan, |other| {
+                        if other != id {
+                            pairs.push([id.min(other), id.max(other)]);
+                        }
+                    });
+                }
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+    }
+
+    /// The bodies that come as near `view`, which need not be one of them, as `plan` reaches; in order.
+    #[must_use]
+    pub fn near(&self, view: &ScanView<'_>, plan: &CollidePlan) -> Vec<BodyId> {
+        let mut ids = Vec::new();
+        self.visit_near(bounds(view), plan, |id| ids.push(id));
+        ids.sort_unstable();
+        ids
+    }
+
+    fn visit_near(&self, bounds: Option<Aabb>, plan: &CollidePlan, mut visit: impl FnMut(BodyId)) {
+        let Some(bounds) = bounds else { return self.bodies.keys().copied().for_each(visit) };
+        // Single queries take a little more than the reach for near.
+        let reach = plan.reach() * (1.0 + 1e-4);
+        let [min, max] = [bounds.min.map(|x| x - reach), bounds.max.map(|x| x + reach)];
+        let near = self.tree.locate_in_envelope_intersecting(AABB::from_corners(min, max));
+        near.for_each(|leaf| visit(leaf.id));
+        self.unbounded.iter().copied().for_each(visit);
+    }
+}
+
+impl<S: Deref<Target = PointHierarchy> + Sync> World<S> {
+    /// Which bodies meet: the answers to all near pairs that `asked` lets pass, by ids, the lesser first. Two bodies
+    /// that are not told of are apart, or were not asked for.
+    ///
+    /// As [`World::near_pairs`] and then [`World::collide_pairs`].
+    pub fn collide_many(
+        &self,
+        bodies: Bodies<'_>,
+        mut asked: impl FnMut([BodyId; 2]) -> bool,
+        plan: &CollidePlan,
+        budget: &Budget,
+        until: Until,
+    ) -> Vec<([BodyId; 2], Answer)> {
+        let mut pairs = self.near_pairs(bodies, plan);
+        pairs.retain(|&pair| asked(pair));
+        let answers = self.collide_pairs(&pairs, plan, budget, until);
+        pairs.into_iter().zip(answers).collect()
+    }
+
+    /// Whether the bodies of each pair meet. Allocates a scratch of its own; see [`World::collide_pairs_with`].
+    #[must_use]
+    pub fn collide_pairs(
+        &self,
+        pairs: &[[BodyId; 2]],
+        plan: &CollidePlan,
+        budget: &Budget,
+        until: Until,
+    ) -> Vec<Answer> {
+        self.collide_pairs_with(pairs, plan, budget, until, &mut BatchScratch::default()).to_vec()
+    }
+
+    /// Whether the bodies of each pair meet: a batch ([`collide_many_with`](crate::collide_many_with)).
+    ///
+    /// A body that is not there has no pose, and the answer is [`Reason::Pose`].
+    pub fn collide_pairs_with<'s>(
+        &self,
+        pairs: &[[BodyId; 2]],
+        plan: &CollidePlan,
+        budget: &Budget,
+        until: Until,
+        scratch: &'s mut BatchScratch,
+    ) -> &'s [Answer] {
+        let ask = |i: usize, scratch: &mut CollideScratch| match pairs[i].map(|id| self.view(id)) {
+            [Some(a), Some(b)] => collide_with(&a, &b, plan, budget, scratch),
+            _ => {
+                let verdict = Verdict::Undecided(Reason::Pose);
+                Answer { verdict, statistics: Statistics::default() }
+            }
+        };
+        ask_all(pairs.len(), ask, budget.deadline, until, scratch)
+    }
+}
+
+/// What double precision loses of a place far from the origin of the world: twice what a query allows for.
+const DOUBLE_ROUNDING: f64 = 4e-15;
+
+/// Further out, volumes of boxes leave the range of double precision.
+const FARTHEST: f64 = 1e100;
+
+/// Scans whose stored frames are larger or smaller by more than this are bounded by nothing: then the others differ by
+/// no more than single queries allow, 2⁶⁰.
+const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
+
+/// A box of the world about all that a query looks at of a scan; half of the rounding that it allows for included.
+/// None of a scan in a pose that is none, or that is extreme.
+fn bounds(view: &ScanView<'_>) -> Option<Aabb> {
+    let root = view.slices().enclosure(0);
+    let placed = view.placed();
+    let scale = placed.scale();
+    let centre = placed.apply(root.centre.map(f64::from));
+    let edges = [0, 1, 2].map(|j: usize| {
+        let half = f64::from(root.half[j]) * scale;
+        placed.rotate(root.axes[j].map(f64::from)).map(|x| (x * half).abs())
+    });
+    // A query in single precision allows for SLACK times the coordinates of either scan about the other's origin:
+    // for two whose boxes touch, at most twice the distances of both centres from their origins, and four radii of each.
+    let own = Vector3::from(root.centre.map(f64::from)).norm();
+    let single = f64::from(SLACK) * (2.0 * own + 4.0 * f64::from(root.radius())) * scale;
+    let far = Vector3::from(placed.translation()).norm() + Vector3::from(centre).norm();
+    let more = single + DOUBLE_ROUNDING * far;
+    let half = [0, 1, 2].map(|k: usize| edges.iter().map(|edge| edge[k]).sum::<f64>() + more);
+    let bounds =
+        Aabb { min: [0, 1, 2].map(|k| centre[k] - half[k]), max: [0, 1, 2].map(|k| centre[k] + half[k]) };
+    let is_finite = bounds.min.iter().chain(&bounds.max).all(|x| x.abs() <= FARTHEST);
+    let is_moderate = (1.0 / GREATEST_SCALE..=GREATEST_SCALE).contains(&scale);
+    (is_finite && is_moderate && has_pose(view)).then_some(bounds)
+}
+
+/// Whether a question about this scan has an answer: the one whether it meets itself, with no work allowed.
+fn has_pose(view: &ScanView<'_>) -> bool {
+    let Ok(plan) = CollidePlan::new(&CollideOptions::default(), view.scan(), view.scan()) else {
+        return false;
+    };
+    let none = Budget::UNLIMITED.with_work(0);
+    let answer = collide_with(view, view, &plan, &none, &mut CollideScratch::default());
+    answer.verdict != Verdict::Undecided(Reason::Pose)
+}

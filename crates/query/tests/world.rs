@@ -1,0 +1,333 @@
+//! Worlds against the loop over all pairs.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_query::{
+    Answer, Bodies, BodyId, Budget, CollideOptions, CollidePlan, Deadline, Evidence, Reason, ScanView,
+    Semantics, Until, Verdict, World, collide,
+};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+use proptest::prelude::*;
+
+fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
+    let cloud = PointCloud::from_positions(points).unwrap();
+    PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(8)).unwrap()
+}
+
+/// A sphere, noise, rings and a plate about the origin, and a sphere a million of its radii away from it.
+static SCANS: LazyLock<[PointHierarchy; 5]> = LazyLock::new(|| {
+    let cloud = |kind| arbitrary::cloud(kind, 200, 1);
+    let far: Vec<_> = cloud(CloudKind::Sphere).iter().map(|[x, y, z]| [x + 1e6, y - 2e6, z + 3e6]).collect();
+    [
+        prepared(&cloud(CloudKind::Sphere)),
+        prepared(&cloud(CloudKind::Random)),
+        prepared(&cloud(CloudKind::Rings)),
+        prepared(&cloud(CloudKind::Coplanar)),
+        prepared(&far),
+    ]
+});
+
+fn options() -> [CollideOptions; 4] {
+    let options = CollideOptions::default();
+    [
+        options,
+        options.with_evidence(Evidence::Certified),
+        options.with_margin(0.5),
+        options.with_semantics(Semantics::Thickened(0.2)),
+    ]
+}
+
+/// The bodies that a world ought to hold, in the order of their ids.
+type Placed = Vec<(BodyId, usize, Pose)>;
+
+/// A proper pose: b about a place in a cube, whatever the scan's own origin, a third of them far from the world's.
+fn proper_pose(scan: usize, seed: u64) -> Pose {
+    let rng = &mut arbitrary::rng(seed);
+    let scale = [1.0, 0.3, 4.0, 1e3][usize::try_from(seed % 4).unwrap()];
+    let spread = if scan == 2 { 30.0 } else { 6.0 };
+    let turn = arbitrary::rotation(rng).with_scale(scale);
+    let centre = Vector3::from(turn.apply(SCANS[scan].bounds().centre()));
+    let away = if seed.is_multiple_of(3) { 1e6 } else { 0.0 };
+    let place = Vector3::from(arbitrary::point_in(rng, spread)).add_scalar(away);
+    turn.with_translation((place - centre).into())
+}
+
+/// Poses that are none, and such as lead to the ends of the world.
+fn hostile_pose(seed: u64) -> Pose {
+    let nan = f64::NAN;
+    let poses = [
+        Pose::from_translation([nan, 0.0, 0.0]),
+        Pose::from_translation([0.0, f64::INFINITY, 0.0]),
+        Pose::from_translation([0.0, -f64::INFINITY, nan]),
+        Pose::IDENTITY.with_scale(0.0),
+        Pose::IDENTITY.with_scale(-1.0),
+        Pose::IDENTITY.with_scale(nan),
+        Pose::IDENTITY.with_scale(1e39),
+        Pose::IDENTITY.with_scale(1e-300),
+        Pose::from_axis_angle([1.0, 0.0, 0.0], nan),
+        Pose::from_translation([1e160, 0.0, 0.0]),
+        Pose::from_translation([1e120, -1e120, 0.0]),
+        Pose::from_translation([-1e99, 1e99, 1e99]),
+        Pose::from_translation([f64::MAX; 3]).with_scale(f64::MAX),
+        (0..40).fold(Pose::from_axis_angle([1.0, 2.0, 3.0], 1.0), |pose, _| pose.after(&pose)),
+    ];
+    poses[usize::try_from(seed).unwrap() % poses.len()]
+}
+
+fn answer(placed: &Placed, i: usize, j: usize, plan: &CollidePlan) -> Answer {
+    let view = |k: usize| {
+        let (_, scan, pose) = &placed[k];
+        ScanView::new(&SCANS[*scan], pose)
+    };
+    collide(&view(i), &view(j), plan, &Budget::UNLIMITED)
+}
+
+/// Holds what a world tells against the loop over all pairs. Returns how many pairs there are, and are near.
+fn check(world: &World<&'static PointHierarchy>, placed: &Placed, plan: &CollidePlan) -> [usize; 2] {
+    let told = world.collide_many(Bodies::All, |_| true, plan, &Budget::UNLIMITED, Until::All);
+    assert!(told.is_sorted_by_key(|(pair, _)| *pair), "by ids");
+    let mut remaining = told.iter();
+    let mut pairs = 0;
+    for (j, (b, ..)) in placed.iter().enumerate() {
+        pairs += j;
+        let told: Vec<_> = told.iter().filter(|(pair, _)| pair[1] == *b).collect();
+        for (i, (a, ..)) in placed[..j].iter().enumerate() {
+            let expected = answer(placed, i, j, plan);
+            match told.iter().find(|(pair, _)| pair[0] == *a) {
+                Some((_, answer)) => {
+                    assert_eq!(*answer, expected, "{a:?} {b:?}");
+                    remaining.next();
+                }
+                None => {
+                    assert!(expected.verdict.is_separated(), "{a:?} {b:?} are left out, but {expected:?}")
+                }
+            }
+        }
+    }
+    assert!(remaining.next().is_none(), "each pair once, of bodies that are there");
+
+    // What is asked of some is what all say of them.
+    let some: Vec<BodyId> = placed.iter().step_by(3).map(|(id, ..)| *id).collect();
+    let of_some = world.near_pairs(Bodies::These(&some), plan);
+    let all = world.near_pairs(Bodies::All, plan);
+    let expected: Vec<_> =
+        all.iter().filter(|pair| pair.iter().any(|id| some.contains(id))).copied().collect();
+    assert_eq!(of_some, expected);
+    for (id, scan, pose) in placed {
+        let with_itself = world.near(&ScanView::new(&SCANS[*scan], pose), plan);
+        let of_one: Vec<BodyId> = world
+            .near_pairs(Bodies::These(&[*id]), plan)
+            .iter()
+            .map(|pair| if pair[0] == *id { pair[1] } else { pair[0] })
+            .collect();
+        assert!(with_itself.iter().filter(|other| *other != id).copied().eq(of_one), "{id:?}");
+    }
+    [pairs, told.len()]
+}
+
+#[derive(Debug, Clone)]
+enum Change {
+    Insert(usize, u64),
+    Move(usize, u64),
+    Remove(usize),
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    prop_oneof![
+        3 => (0..5_usize, any::<u64>()).prop_map(|(scan, seed)| Change::Insert(scan, seed)),
+        3 => (any::<usize>(), any::<u64>()).prop_map(|(which, seed)| Change::Move(which, seed)),
+        1 => any::<usize>().prop_map(Change::Remove),
+    ]
+}
+
+/// A pose of this scan: one in eight is hostile.
+fn pose(scan: usize, seed: u64) -> Pose {
+    if seed.is_multiple_of(8) { hostile_pose(seed / 8) } else { proper_pose(scan, seed) }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whatever_changes_a_world_equals_the_loop(
+        changes in prop::collection::vec(change(), 1..60),
+        question in 0..4_usize,
+    ) {
+        let plan = CollidePlan::new(&options()[question], &SCANS[0], &SCANS[0]).unwrap();
+        let mut world = World::new();
+        let mut placed: Placed = Vec::new();
+        for change in changes {
+            match change {
+                Change::Insert(scan, seed) => {
+                    let pose = pose(scan, seed);
+                    let id = world.insert(&SCANS[scan], &pose);
+                    prop_assert!(placed.iter().all(|(other, ..)| *other < id), "a new id");
+                    placed.push((id, scan, pose));
+                }
+                Change::Move(which, seed) if !placed.is_empty() => {
+                    let which = which % placed.len();
+                    let (id, scan, pose_now) = &mut placed[which];
+                    *pose_now = pose(*scan, seed);
+                    prop_assert!(world.move_to(*id, pose_now));
+                }
+                Change::Remove(which) if !placed.is_empty() => {
+                    let (id, scan, _) = placed.remove(which % placed.len());
+                    prop_assert!(std::ptr::eq(world.remove(id).unwrap(), &SCANS[scan]));
+                    prop_assert!(world.remove(id).is_none() && !world.move_to(id, &Pose::IDENTITY));
+                    prop_assert!(world.view(id).is_none());
+                }
+                _ => {}
+            }
+            prop_assert_eq!(world.len(), placed.len());
+        }
+        prop_assert!(world.ids().eq(placed.iter().map(|(id, ..)| *id)));
+        check(&world, &placed, &plan);
+    }
+}
+
+/// A world of so many bodies in proper poses.
+fn crowd(count: u64) -> (World<&'static PointHierarchy>, Placed) {
+    let mut world = World::new();
+    let mut placed = Vec::new();
+    for seed in 0..count {
+        let scan = usize::try_from(seed % 5).unwrap();
+        let pose = proper_pose(scan, seed);
+        placed.push((world.insert(&SCANS[scan], &pose), scan, pose));
+    }
+    (world, placed)
+}
+
+#[test]
+fn a_crowd_equals_the_loop_and_much_is_left_out() {
+    for options in options() {
+        let (world, placed) = crowd(120);
+        let plan = CollidePlan::new(&options, &SCANS[0], &SCANS[0]).unwrap();
+        let [pairs, near] = check(&world, &placed, &plan);
+        assert_eq!(pairs, 120 * 119 / 2);
+        assert!(near > 100 && near < pairs / 2, "{near} of {pairs} are near");
+    }
+}
+
+/// The box of the world about the corners of a scan's enclosure, from the formulas alone.
+fn naive_bounds((_, scan, pose): &(BodyId, usize, Pose)) -> [[f64; 3]; 2] {
+    let scan = &SCANS[*scan];
+    let root = scan.enclosures().next().unwrap();
+    let frame = scan.frame();
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for corner in 0..8 {
+        let p = [0, 1, 2].map(|i| {
+            let along = |k: usize| {
+                let sign = if corner >> k & 1 == 0 { -1.0 } else { 1.0 };
+                sign * f64::from(root.half[k]) * f64::from(root.axes[k][i])
+            };
+            let stored = f64::from(root.centre[i]) + along(0) + along(1) + along(2);
+            frame.origin[i] + frame.scale * stored
+        });
+        let p = pose.apply(p);
+        for k in 0..3 {
+            bounds[0][k] = bounds[0][k].min(p[k]);
+            bounds[1][k] = bounds[1][k].max(p[k]);
+        }
+    }
+    bounds
+}
+
+#[test]
+fn boxes_are_those_of_enclosures_and_no_larger() {
+    let (world, placed) = crowd(200);
+    for margin in [0.0, 0.5, 100.0] {
+        let options = CollideOptions::default().with_margin(margin);
+        let plan = CollidePlan::new(&options, &SCANS[0], &SCANS[0]).unwrap();
+        let near = world.near_pairs(Bodies::All, &plan);
+        let mut seen = [0, 0];
+        for (j, b) in placed.iter().enumerate() {
+            for a in &placed[..j] {
+                let (p, q) = (naive_bounds(a), naive_bounds(b));
+                let gap = (0..3).map(|k| (p[0][k] - q[1][k]).max(q[0][k] - p[1][k])).fold(f64::MIN, f64::max);
+                let size = [p, q].iter().map(|x| x[1][0] - x[0][0]).sum::<f64>();
+                let is_near = near.binary_search(&[a.0, b.0]).is_ok();
+                let allowed = 1e-4 * (size + margin) + 1e-7;
+                if gap <= margin {
+                    assert!(is_near, "{gap} apart within {margin}");
+                } else if gap > margin + allowed {
+                    assert!(!is_near, "{gap} apart beyond {margin}");
+                }
+                seen[usize::from(is_near)] += 1;
+            }
+        }
+        assert!(seen.iter().all(|&n| n > 500), "{seen:?} at {margin}");
+    }
+}
+
+#[test]
+fn hostile_poses_are_near_everything_and_undecided() {
+    let (mut world, mut placed) = crowd(12);
+    for seed in 0..14 {
+        let pose = hostile_pose(seed);
+        placed.push((world.insert(&SCANS[0], &pose), 0, pose));
+    }
+    for options in options() {
+        let plan = CollidePlan::new(&options, &SCANS[0], &SCANS[0]).unwrap();
+        check(&world, &placed, &plan);
+        let none = placed[12].0;
+        let told =
+            world.collide_many(Bodies::These(&[none]), |_| true, &plan, &Budget::UNLIMITED, Until::All);
+        assert_eq!(told.len(), placed.len() - 1, "with all others");
+        assert!(
+            told.iter().all(|(_, answer)| answer.verdict == Verdict::Undecided(Reason::Pose)),
+            "{told:?}"
+        );
+    }
+    for (id, ..) in placed {
+        assert!(world.remove(id).is_some());
+    }
+    assert!(world.is_empty());
+}
+
+#[test]
+fn an_empty_world_and_one_of_a_single_body_say_nothing() {
+    let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[0]).unwrap();
+    let mut world: World<&PointHierarchy> = World::new();
+    let told = |world: &World<&PointHierarchy>| {
+        world.collide_many(Bodies::All, |_| true, &plan, &Budget::UNLIMITED, Until::All)
+    };
+    assert_eq!((world.len(), world.is_empty(), told(&world)), (0, true, vec![]));
+    let id = world.insert(&SCANS[0], &Pose::IDENTITY);
+    assert_eq!((world.len(), world.is_empty(), told(&world)), (1, false, vec![]));
+    assert_eq!(world.near(&world.view(id).unwrap(), &plan), [id], "what is not in the world meets what is");
+    world.remove(id);
+    let later = world.insert(&SCANS[0], &Pose::IDENTITY);
+    assert!(later > id, "ids are not used again");
+    assert_eq!(world.near_pairs(Bodies::These(&[id, later]), &plan), [[id; 2]; 0]);
+    let gone = world.collide_pairs(&[[id, later]], &plan, &Budget::UNLIMITED, Until::All);
+    assert_eq!(gone[0].verdict, Verdict::Undecided(Reason::Pose));
+}
+
+#[test]
+fn one_scan_in_one_place_many_times() {
+    let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[0]).unwrap();
+    let mut world = World::new();
+    let ids: Vec<BodyId> = (0..40).map(|_| world.insert(&SCANS[0], &Pose::IDENTITY)).collect();
+    let ask = |bodies, until| world.collide_many(bodies, |_| true, &plan, &Budget::UNLIMITED, until);
+    let told = ask(Bodies::All, Until::All);
+    assert_eq!(told.len(), 40 * 39 / 2);
+    assert!(told.iter().all(|(_, answer)| answer.verdict.is_intersecting()));
+    assert_eq!(ask(Bodies::All, Until::First), told[..1]);
+    let twice = [ids[7], ids[3], ids[7]];
+    assert_eq!(ask(Bodies::These(&twice), Until::All).len(), 39 + 38, "a pair of two of them once");
+
+    // Neighbours in a chain belong together.
+    let apart = |[a, b]: [BodyId; 2]| b.0 - a.0 > 1;
+    let told = world.collide_many(Bodies::All, apart, &plan, &Budget::UNLIMITED, Until::All);
+    assert_eq!(told.len(), 40 * 39 / 2 - 39);
+
+    let past = Budget::UNLIMITED.with_deadline(Deadline::within(Duration::ZERO));
+    let told = world.collide_many(Bodies::All, |_| true, &plan, &past, Until::All);
+    assert_eq!(told.len(), 40 * 39 / 2, "each has an answer");
+    assert!(told.iter().all(|(_, a)| matches!(a.verdict, Verdict::Undecided(Reason::Budget { .. }))));
+}
