@@ -152,7 +152,7 @@ pub fn answer_each<T: Send>(
     scratch: &mut BatchScratch,
 ) -> usize {
     let count = answers.len();
-    let threads = threads();
+    let threads = if count > 1 { threads() } else { 1 };
     let at_once = count.div_ceil(threads * TURNS).clamp(1, MOST_AT_ONCE);
     let workers = threads.min(count.div_ceil(at_once));
     if scratch.workers.len() < workers {

@@ -2,6 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::ops::ControlFlow;
+#[cfg(feature = "rayon")]
+use std::sync::Barrier;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -142,6 +144,29 @@ fn little_is_asked_after_the_first_hit() {
             let asked = asked.into_inner();
             assert!(asked <= told + threads * most_at_once, "{asked} asked for {told} on {threads} threads");
         }
+    }
+}
+
+#[cfg(feature = "rayon")]
+#[test]
+fn of_two_hits_the_lower_ends_it_whichever_is_later() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let (low, high) = (0, 16);
+    for later in [low, high] {
+        let begun = Barrier::new(2);
+        let ask = |i: usize, _: &mut _| {
+            if i != low && i != high {
+                return ControlFlow::Continue(i);
+            }
+            begun.wait();
+            if i == later {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            ControlFlow::Break(i)
+        };
+        let mut answers = vec![0; 1000];
+        let told = pool.install(|| answer_each(&mut answers, None, ask, &mut BatchScratch::default()));
+        assert_eq!(told, low + 1, "{later} is found later");
     }
 }
 

@@ -117,7 +117,7 @@ fn check(world: &World<&'static PointHierarchy>, placed: &Placed, plan: &Collide
     let all = world.near_pairs(Bodies::All, plan);
     let expected: Vec<_> =
         all.iter().filter(|pair| pair.iter().any(|id| some.contains(id))).copied().collect();
-    assert_eq!(of_some, expected);
+    assert_eq!(of_some, expected, "pairs of {some:?}");
     for (id, scan, pose) in placed {
         let with_itself = world.near(&ScanView::new(&SCANS[*scan], pose), plan);
         let of_one: Vec<BodyId> = world
