@@ -4,6 +4,7 @@
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
+//! * `field` — f over a slice of a noisy scan, and how often its normal changes sides.
 //! * `fuzz [TARGET] [SECONDS]` — feed the readers with inputs that a fuzzer makes up; see fuzz/README.md.
 //! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
@@ -11,6 +12,7 @@
 mod check_proof;
 mod checks;
 mod demo;
+mod field;
 mod fuzz;
 mod repository;
 mod tidy;
@@ -26,6 +28,8 @@ of the repository
   tidy, ci       the first of them; all of them
   check-proof PROOF A B [--poses F]
                  whether what `collide A B --prove PROOF` wrote holds, by means of its own
+  field SCAN [--noise 0.1] -o OUT.png
+                 a picture of f over a slice of a noisy scan; --table counts where its normal flips
   fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
@@ -47,6 +51,7 @@ fn main() -> ExitCode {
         ["tidy"] => checks::run(&["tidy"]),
         ["ci"] => checks::run(&[]),
         ["check-proof", ..] => check_proof::run(std::env::args_os().skip(1)),
+        ["field", ..] => field::run(std::env::args_os().skip(1)),
         ["fuzz", words @ ..] => fuzz::run(words),
         ["test", names @ ..] => checks::run(names),
         _ => return nearmiss_cli::run(std::env::args_os()),

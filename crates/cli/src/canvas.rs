@@ -3,19 +3,25 @@
 use nearmiss::geometry::nalgebra::Vector3;
 
 use crate::font;
+use crate::picture::Picture;
 
-pub(crate) type Colour = [u8; 3];
+/// Red, green, blue.
+pub type Colour = [u8; 3];
 
 /// Pixels are painted this much finer than they are kept, in both directions.
-pub(crate) const FINE: usize = 2;
+pub const FINE: usize = 2;
 
 /// A rectangle of fine pixels.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Area {
-    pub(crate) left: usize,
-    pub(crate) top: usize,
-    pub(crate) width: usize,
-    pub(crate) height: usize,
+pub struct Area {
+    /// First column.
+    pub left: usize,
+    /// First row, from the top.
+    pub top: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
 }
 
 /// An orthographic camera that paints into an area.
@@ -73,8 +79,9 @@ const DOT: f64 = 1.4;
 /// No splat is larger than this, in pixels, however near the camera.
 const LARGEST: f64 = 200.0;
 
+/// Fine pixels to paint on, and at last a [`Picture`].
 #[derive(Debug, Clone)]
-pub(crate) struct Canvas {
+pub struct Canvas {
     width: usize,
     height: usize,
     pixels: Vec<Colour>,
@@ -82,15 +89,19 @@ pub(crate) struct Canvas {
 }
 
 impl Canvas {
-    pub(crate) fn new(width: usize, height: usize, ground: Colour) -> Self {
+    /// Fine pixels of one colour.
+    #[must_use]
+    pub fn new(width: usize, height: usize, ground: Colour) -> Self {
         let count = width * height;
         Self { width, height, pixels: vec![ground; count], depth: vec![f64::NEG_INFINITY; count] }
     }
 
-    pub(crate) fn fill(&mut self, area: Area, colour: Colour) {
+    /// Fills what of `area` is on the canvas.
+    pub fn fill(&mut self, area: Area, colour: Colour) {
         for y in area.top..(area.top + area.height).min(self.height) {
             let row = y * self.width;
-            self.pixels[row + area.left..row + (area.left + area.width).min(self.width)].fill(colour);
+            let [left, right] = [area.left, area.left + area.width].map(|x| row + x.min(self.width));
+            self.pixels[left..right].fill(colour);
         }
     }
 
@@ -139,8 +150,8 @@ impl Canvas {
         }
     }
 
-    /// A line of a given width with round ends.
-    pub(crate) fn line(&mut self, area: Area, [from, to]: [[f64; 2]; 2], width: f64, colour: Colour) {
+    /// A line of a given width with round ends, as far as it is in `area`, which is on the canvas.
+    pub fn line(&mut self, area: Area, [from, to]: [[f64; 2]; 2], width: f64, colour: Colour) {
         let middle = [0, 1].map(|k| 0.5 * (from[k] + to[k]));
         let length = distance(from, to);
         self.overlay(area, middle, 0.5 * length + width, colour, |p| {
@@ -159,7 +170,7 @@ impl Canvas {
     }
 
     /// Letters with their upper left corner at `[x, y]`, each pixel of theirs `size` wide.
-    pub(crate) fn text(&mut self, [x, y]: [usize; 2], size: usize, colour: Colour, text: &str) {
+    pub fn text(&mut self, [x, y]: [usize; 2], size: usize, colour: Colour, text: &str) {
         for (i, letter) in text.chars().enumerate() {
             for row in 0..font::HEIGHT {
                 for column in (0..font::ADVANCE).filter(|&c| font::is_set(letter, c, row)) {
@@ -170,8 +181,21 @@ impl Canvas {
         }
     }
 
-    /// Width, height and bytes, red green blue, [`FINE`]² pixels joined to one.
-    pub(crate) fn averaged(&self) -> (usize, usize, Vec<u8>) {
+    /// How wide such letters are.
+    #[must_use]
+    pub fn text_width(size: usize, text: &str) -> usize {
+        text.chars().count() * font::ADVANCE * size
+    }
+
+    /// What was painted, [`FINE`]² pixels joined to one.
+    #[must_use]
+    pub fn picture(&self) -> Picture {
+        let (width, height, pixels) = self.averaged();
+        Picture { width, height, pixels }
+    }
+
+    /// Width, height and bytes, red green blue.
+    fn averaged(&self) -> (usize, usize, Vec<u8>) {
         let (width, height) = (self.width / FINE, self.height / FINE);
         let mut bytes = Vec::with_capacity(3 * width * height);
         for y in 0..height {

@@ -33,6 +33,7 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
 pub use collide::{CollideArgs, DetailName, EvidenceName};
 pub use error::CliError;

@@ -50,10 +50,10 @@ pub(crate) fn check_name(path: &Path) -> Result<(), CliError> {
 /// A picture, ready to be saved.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    width: usize,
-    height: usize,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     /// Red, green, blue, row by row.
-    pixels: Vec<u8>,
+    pub(crate) pixels: Vec<u8>,
 }
 
 impl Picture {
@@ -126,8 +126,7 @@ pub(crate) fn paint(views: [&ScanView<'_>; 2], answer: &Answer, style: &Style) -
         frame(&mut canvas, &whole, close);
     }
     legend(&mut canvas, answer, &style.names);
-    let (width, height, pixels) = canvas.averaged();
-    Picture { width, height, pixels }
+    canvas.picture()
 }
 
 /// The disc of the `i`-th stored point in the world.

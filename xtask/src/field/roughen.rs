@@ -1,0 +1,25 @@
+//! A scan with more noise than it came with.
+
+use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss::{BuildOptions, PointCloud, PointHierarchy, Scan};
+use nearmiss_testdata::arbitrary::{gaussian, rng};
+
+use crate::repository::Outcome;
+
+/// Distance from a point of a square lattice to its sixth neighbour, which is its local radius, in spacings.
+const SIXTH: f64 = std::f64::consts::SQRT_2;
+
+/// The points of `clean`, in its stored frame, each moved along its normal by a normally distributed distance whose
+/// standard deviation is `noise` of the local spacing; prepared with default options. Its own stored frame may have
+/// another origin, but has the same unit: stored positions need no other.
+pub(crate) fn roughened(clean: &PointHierarchy, noise: f64, seed: u64) -> Outcome<Scan> {
+    let rng = &mut rng(seed);
+    let slices = clean.slices();
+    let moved = slices.positions.iter().zip(slices.normals).zip(slices.radii).map(|((p, n), r)| {
+        let along = Vector3::from(n.map(f64::from));
+        let shift = noise * f64::from(*r) / SIXTH * gaussian(rng);
+        <[f64; 3]>::from(Vector3::from(p.map(f64::from)) + shift * along)
+    });
+    let cloud = PointCloud::cleaned(&moved.collect::<Vec<_>>())?;
+    Ok(Scan::build(&cloud, &BuildOptions::default())?)
+}
