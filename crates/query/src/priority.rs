@@ -6,7 +6,7 @@
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::NodePair;
+use nearmiss_hierarchy::{NodePair, apart as coverings_apart};
 use nearmiss_surface::Status;
 
 use crate::likelihood::overlap;
@@ -22,20 +22,21 @@ impl Surfaces<'_> {
             let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
             let double = (i >> 1 == 1 && a[0] == a[1]) || (i & 1 == 1 && b[0] == b[1]);
             let Some(depth) = admitted.filter(|_| !double) else { continue };
-            let apart = self.coverings && { false };
+            let apart = self.coverings
+                && coverings_apart(&self.pair.a, &self.pair.b, pair, &self.pair.relative, self.reach);
             *admitted = if apart { None } else { Some(self.urgency(pair, depth)) };
         }
     }
 
     fn urgency(&mut self, pair: NodePair, depth: f32) -> f32 {
+        let sides = match self.order {
+            Order::DepthFirst => return depth,
+            Order::Overlap => 0.0,
+            Order::Sides => self.sides(pair, |_| 1.0),
+            Order::SidesByGap => self.sides(pair, eigenvalue_gap),
+        };
         // At most one, so that it decides between pairs of as many sample points.
-        let overlap = overlap(&self.pair, pair, self.reach);
-        match self.order {
-            Order::DepthFirst => depth,
-            Order::Overlap => overlap,
-            Order::Sides => self.sides(pair, |_| 1.0) + overlap,
-            Order::SidesByGap => self.sides(pair, eigenvalue_gap) + overlap,
-        }
+        sides + overlap(&self.pair, pair, self.reach)
     }
 
     /// The lesser number, weighted, of a's sample points on one of the sides of f′_B.
@@ -46,6 +47,9 @@ impl Surfaces<'_> {
         let up = Vector3::from(self.pair.b.boxes[pair.b.index()].axes[2].map(f64::from));
         let mut sides = [0.0_f64; 2];
         for i in self.pair.a.samples(pair.a.index()).iter() {
+            if self.pair.meter.go_on().is_break() {
+                break;
+            }
             let x = vb.placed().apply_inverse(va.point(i));
             self.pair.meter.spent.evaluations += 1;
             let at = vb.scan().evaluate_node_with(pair.b.index(), x, &mut self.gathers[1]);

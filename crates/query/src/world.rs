@@ -283,7 +283,7 @@ impl<S: Deref<Target = PointHierarchy> + Sync> World<S> {
             [Some(a), Some(b)] => collide_with(&a, &b, plan, budget, scratch),
             _ => {
                 let verdict = Verdict::Undecided(Reason::Pose);
-                Answer { verdict, statistics: Statistics::default() }
+                Answer { verdict, distance_estimate: None, statistics: Statistics::default() }
             }
         };
         ask_all(pairs.len(), ask, budget.deadline, until, scratch)
