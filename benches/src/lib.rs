@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod arguments;
+pub mod asked;
 pub mod clock;
 pub mod counting;
 pub mod machine;

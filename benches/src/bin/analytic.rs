@@ -1,6 +1,6 @@
 //! Scores verdicts on the shapes with known answers, by family and noise.
 //!
-//! `analytic [--repeats N] [--seed N] [--witness] [--list]`
+//! `analytic [--repeats N] [--seed N] [--list]` and what `asked` reads: `--witness`, `--method`, `--order` …
 //!
 //! Ends with status 1 if a verdict outside the band is wrong or missing, `Ambiguous` on thin pairs apart, which
 //! may be one in twenty of them.
@@ -10,11 +10,11 @@ use std::collections::BTreeMap;
 use std::process::ExitCode;
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, PointCloud, Reason, Scan,
-    Verdict, collide_with,
+    Budget, BuildOptions, CollidePlan, CollideScratch, PointCloud, Reason, Scan, Verdict, collide_with,
 };
 use nearmiss_benches::Failure;
 use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::asked;
 use nearmiss_testdata::pairs::{Pair, SetOptions, analytic_set};
 
 /// One in this many thin pairs may be `Ambiguous`.
@@ -57,7 +57,7 @@ fn main() -> Result<ExitCode, Failure> {
     let mut arguments = Arguments::of_process();
     let repeats = arguments.value("--repeats")?.unwrap_or(3);
     let seed = arguments.value("--seed")?.unwrap_or(1);
-    let detail = if arguments.flag("--witness") { Detail::Witness } else { Detail::Verdict };
+    let asked = asked::options(&mut arguments)?;
     let list = arguments.flag("--list");
     if let Some(word) = arguments.words()?.first() {
         return Err(format!("what is {word:?}?").into());
@@ -73,7 +73,7 @@ fn main() -> Result<ExitCode, Failure> {
     let mut clean = true;
     for pair in &set.pairs {
         let (a, b) = (&scans[pair.a], &scans[pair.b]);
-        let plan = CollidePlan::new(&CollideOptions::default().with_detail(detail), a, b)?;
+        let plan = CollidePlan::new(&asked, a, b)?;
         let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
         let verdict = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
         let row = rows.entry((pair.family, format!("{:4.2}", pair.noise))).or_default();

@@ -1,6 +1,7 @@
 //! Scores verdicts against exact answers.
 //!
-//! `truth CLOUD POSES.jsonl [--witness] [--rival parry|trimesh] [--certified] [--threads N]`
+//! `truth CLOUD POSES.jsonl [--rival parry|trimesh] [--threads N]` and what `asked` reads: `--witness`, `--certified`,
+//! `--method`, `--order`, `--coverings`, `--work`, `--micros`, `--resolution` … Under a budget the best effort is scored.
 //!
 //! Ends with status 1 if a verdict outside the band |gap| ≤ r is wrong or missing, or a deep separation is
 //! certified; with `--certified`, which asks for certificates, also if fewer than 95 % of separations from 6 r on are certified. A rival is
@@ -10,9 +11,10 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use nearmiss::{BuildOptions, CollideOptions, Detail, Evidence, Scan};
+use nearmiss::{BuildOptions, Evidence, Scan};
 use nearmiss_benches::Failure;
 use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::asked::{self, Limits, best_effort};
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::ours::Ours;
@@ -23,8 +25,9 @@ use nearmiss_benches::truth::{self, Question};
 
 fn main() -> Result<ExitCode, Failure> {
     let mut arguments = Arguments::of_process();
-    let detail = if arguments.flag("--witness") { Detail::Witness } else { Detail::Verdict };
-    let certified = arguments.flag("--certified");
+    let asked = asked::options(&mut arguments)?;
+    let limits = Limits::read(&mut arguments)?;
+    let certified = asked.evidence == Evidence::Certified;
     let threads = arguments.value("--threads")?.unwrap_or(0);
     let rivals: Vec<String> = arguments.values("--rival")?;
     let words = arguments.words()?;
@@ -39,9 +42,7 @@ fn main() -> Result<ExitCode, Failure> {
     let (scan, time) = timed(|| Scan::build(&object.cloud, &options));
     let scan = scan?;
     println!("prepared in {time:.2?}, {:.2} % of the points usable", 100.0 * scan.usable());
-    let evidence = if certified { Evidence::Certified } else { Evidence::Estimated };
-    let asked = CollideOptions::default().with_detail(detail).with_evidence(evidence);
-    let score = score(&mut Ours::new(&scan, &asked)?, &questions, object.r);
+    let score = score(&mut Ours::new(&scan, &asked)?.with_limits(limits), &questions, object.r);
     let mut clean = score.is_clean() && (!certified || score.is_certified_enough());
     for name in rivals {
         match rivals::rival(&name, &object)? {
@@ -59,7 +60,7 @@ fn score(ours: &mut Ours<'_>, questions: &[Question], r: f64) -> Score {
     for (index, question) in questions.iter().enumerate() {
         let (answer, time) = timed(|| ours.answer(&question.a, &question.b));
         times.push(nanoseconds(time));
-        score.count(index, question, r, &answer.verdict);
+        score.count(index, question, r, &best_effort(answer.verdict));
         node_pairs += answer.statistics.node_pairs;
         leaf_pairs += answer.statistics.leaf_pairs;
         evaluations += answer.statistics.evaluations;

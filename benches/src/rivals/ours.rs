@@ -1,10 +1,12 @@
 //! Ours, as a user would call it.
 
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Evidence, Pose, Scan, Verdict, collide_with,
+    Answer, CollideOptions, CollidePlan, CollideScratch, Evidence, Method as Search, Order, Pose, Scan,
+    Verdict, collide_with,
 };
 
 use crate::Failure;
+use crate::asked::{Limits, best_effort};
 use crate::rivals::{Method, Reply};
 
 /// A prepared scan against a copy of itself, with a scratch that is kept.
@@ -12,7 +14,7 @@ use crate::rivals::{Method, Reply};
 pub struct Ours<'a> {
     scan: &'a Scan,
     plan: CollidePlan,
-    budget: Budget,
+    limits: Limits,
     scratch: CollideScratch,
 }
 
@@ -23,19 +25,19 @@ impl<'a> Ours<'a> {
     /// When there is no plan for that.
     pub fn new(scan: &'a Scan, options: &CollideOptions) -> Result<Self, Failure> {
         let plan = CollidePlan::new(options, scan, scan)?;
-        Ok(Self { scan, plan, budget: Budget::UNLIMITED, scratch: CollideScratch::default() })
+        Ok(Self { scan, plan, limits: Limits::default(), scratch: CollideScratch::default() })
     }
 
-    /// The same, with this budget for each question.
+    /// The same, each question within `limits`; hits are then best efforts.
     #[must_use]
-    pub fn with_budget(self, budget: Budget) -> Self {
-        Self { budget, ..self }
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
     }
 
     /// The whole answer.
     pub fn answer(&mut self, a: &Pose, b: &Pose) -> Answer {
         let (a, b) = (self.scan.at(a), self.scan.at(b));
-        collide_with(&a, &b, &self.plan, &self.budget, &mut self.scratch)
+        collide_with(&a, &b, &self.plan, &self.limits.begin(), &mut self.scratch)
     }
 }
 
@@ -43,12 +45,21 @@ impl Method for Ours<'_> {
     fn name(&self) -> String {
         let options = self.plan.options();
         let certified = if options.evidence == Evidence::Certified { ", certified" } else { "" };
-        format!("nearmiss ({:?}{certified})", options.detail).to_lowercase()
+        let order = match options.order {
+            Order::DepthFirst => String::new(),
+            order => format!(", {order:?}"),
+        };
+        let method = match options.method {
+            Search::Sampling(sampling) => format!(", sampling {}", sampling.test_points),
+            _ => String::new(),
+        };
+        let coverings = if options.coverings { ", coverings" } else { "" };
+        format!("nearmiss ({:?}{certified}{method}{order}{coverings})", options.detail).to_lowercase()
     }
 
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply {
         let Answer { verdict, statistics, .. } = self.answer(a, b);
-        let hit = matches!(verdict, Verdict::Intersecting { .. });
+        let hit = matches!(best_effort(verdict), Verdict::Intersecting { .. });
         Reply { hit, evaluations: statistics.evaluations, node_pairs: statistics.node_pairs }
     }
 }
