@@ -2,15 +2,15 @@
 
 use std::fs::File;
 use std::io::BufWriter;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence, Pose, Proof,
-    Scan, ScanView, Semantics, collide_proving, collide_with,
+    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence,
+    Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_proving, collide_with,
 };
-use rayon::prelude::*;
 
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
@@ -37,6 +37,9 @@ pub struct CollideArgs {
     /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b", "image"])]
     pub poses: Option<PathBuf>,
+    /// Stop after the first hit of --poses: the last line is the hit, if there is one, and all before it are none
+    #[arg(long, requires = "poses")]
+    pub first: bool,
     /// Compare balls of this radius about the points, in world units, instead of surfaces
     #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
     pub thickened: Option<f64>,
@@ -50,7 +53,7 @@ pub struct CollideArgs {
     /// Write what certified answers rest on, a line of JSON a query, for an independent check
     #[arg(long, value_name = "FILE", conflicts_with = "thickened")]
     pub prove: Option<PathBuf>,
-    /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s
+    /// Time for each query from its start, whatever other threads do, often 50us to 1ms: a number with ns, us, ms or s
     #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
     /// Work units for each query, evaluations of f and node pairs, often 500 to 10000; reproducible, unlike time
@@ -189,6 +192,12 @@ struct Asked {
     micros: f64,
 }
 
+impl Asked {
+    fn is_hit(&self) -> bool {
+        self.answer.verdict.is_intersecting()
+    }
+}
+
 /// Where answers go.
 struct Outputs<'a, 'f> {
     results: &'a mut Results,
@@ -281,10 +290,10 @@ fn names(paths: [&Path; 2]) -> [String; 2] {
     })
 }
 
-/// Poses held at a time when several threads answer.
+/// Lines held at a time when several threads answer.
 const BATCH: usize = 1024;
 
-/// An answer a line, in order; holds no more than a batch.
+/// An answer a line, in order, up to the first hit if no more are wanted; holds no more than a batch.
 fn answer_all(
     question: &Question,
     poses: &mut PoseFile,
@@ -292,58 +301,55 @@ fn answer_all(
     out: &mut Outputs<'_, '_>,
 ) -> Result<(), CliError> {
     let threads = args.threads.unwrap_or(1);
-    if threads == 1 {
-        let mut scratch = CollideScratch::default();
-        while let Some((line, poses)) = next(question, poses, out.results)? {
-            let asked = question.ask(Some(line), poses, &mut scratch);
-            question.tell(out, &asked, args)?;
-        }
-        return Ok(());
-    }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.or(Err(CliError::Threads(threads)))?;
+    // One thread, this one, answers each line before it reads the next.
+    let (pool, most) = if threads == 1 { (None, 1) } else { (Some(pool(threads)?), BATCH) };
+    let (mut lines, mut answers) = (Vec::with_capacity(most), Vec::with_capacity(most));
+    let mut scratch = BatchScratch::default();
     loop {
-        let mut batch = Vec::with_capacity(BATCH);
-        let mut failed = None;
-        while batch.len() < BATCH {
-            match next(question, poses, out.results) {
-                Ok(Some(poses)) => batch.push(poses),
-                Ok(None) => break,
-                Err(error) => {
-                    failed = Some(error);
-                    break;
-                }
+        lines.clear();
+        let read = read_lines(poses, most, &mut lines);
+        let ask = |i: usize, scratch: &mut CollideScratch| {
+            let (line, text): &(u64, String) = &lines[i];
+            let poses = poses.poses(*line, text, [&question.a, &question.b]);
+            let asked = poses.map(|poses| question.ask(Some(*line), poses, scratch));
+            // What comes after a fault, or after the hit that was looked for, is not told.
+            let is_last = asked.as_ref().map_or(true, |asked| args.first && asked.is_hit());
+            if is_last { ControlFlow::Break(Some(asked)) } else { ControlFlow::Continue(Some(asked)) }
+        };
+        answers.clear();
+        answers.resize_with(lines.len(), || None);
+        let mut answer = || answer_each(&mut answers, None, ask, &mut scratch);
+        let told = match &pool {
+            Some(pool) => pool.install(answer),
+            None => answer(),
+        };
+        for asked in answers.drain(..).take(told).flatten().chain(read.err().map(Err)) {
+            // What was answered before a faulty line is told before the fault.
+            let asked = asked.or_else(|fault| out.results.flush().and(Err(fault)))?;
+            question.tell(out, &asked, args)?;
+            if args.first && asked.is_hit() {
+                return Ok(());
             }
         }
-        let ask = |scratch: &mut CollideScratch, (line, poses): &(u64, [Pose; 2])| {
-            question.ask(Some(*line), *poses, scratch)
-        };
-        let answers: Vec<Asked> =
-            pool.install(|| batch.par_iter().map_init(CollideScratch::default, ask).collect());
-        for asked in &answers {
-            question.tell(out, asked, args)?;
-        }
-        if let Some(error) = failed {
-            out.results.flush()?;
-            return Err(error);
-        }
-        if answers.len() < BATCH {
+        if lines.len() < most {
             return Ok(());
         }
     }
 }
 
-/// The next poses with the number of their line; what was answered before a faulty line is told before the fault.
-fn next(
-    question: &Question,
-    poses: &mut PoseFile,
-    results: &mut Results,
-) -> Result<Option<(u64, [Pose; 2])>, CliError> {
-    let next = poses.next(&question.a, &question.b);
-    if next.is_err() {
-        results.flush()?;
+fn pool(threads: usize) -> Result<rayon::ThreadPool, CliError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.or(Err(CliError::Threads(threads)))
+}
+
+/// Reads up to `most` lines; those before a fault are read.
+fn read_lines(poses: &mut PoseFile, most: usize, lines: &mut Vec<(u64, String)>) -> Result<(), CliError> {
+    while lines.len() < most
+        && let Some(line) = poses.next_line()?
+    {
+        lines.push(line);
     }
-    next
+    Ok(())
 }
 
 #[cfg(test)]

@@ -154,7 +154,12 @@ impl TextLines {
 
     /// A fault on the line returned last.
     pub(crate) fn fault(&self, what: impl Into<String>) -> CliError {
-        CliError::Line { path: self.path.clone(), line: self.number, what: what.into() }
+        self.fault_on(self.number, what)
+    }
+
+    /// A fault on the line of this number.
+    pub(crate) fn fault_on(&self, line: u64, what: impl Into<String>) -> CliError {
+        CliError::Line { path: self.path.clone(), line, what: what.into() }
     }
 }
 

@@ -109,7 +109,7 @@ struct PoseLine {
     b: Vec<f64>,
 }
 
-/// A file with a query's two poses on each line.
+/// A file with a query's two poses on each line. Lines are read in order; what they say can be read by many threads.
 #[derive(Debug)]
 pub(crate) struct PoseFile {
     lines: TextLines,
@@ -122,31 +122,33 @@ impl PoseFile {
         Ok(Self { lines: TextLines::open(path)?, is_empty: true })
     }
 
-    /// The poses on the next line that is not blank, and its number, counted from 1.
-    pub(crate) fn next(&mut self, a: &Scan, b: &Scan) -> Result<Option<(u64, [Pose; 2])>, CliError> {
-        let Some((number, text)) = self.lines.next_filled()? else {
-            return if self.is_empty {
-                Err(self.lines.unfit(format!("holds no poses; {POSE_LINE}, as `poses` makes them")))
-            } else {
-                Ok(None)
-            };
-        };
+    /// The next line that is not blank, and its number, counted from 1.
+    pub(crate) fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
+        let line = self.lines.next_filled()?;
+        if line.is_none() && self.is_empty {
+            return Err(self.lines.unfit(format!("holds no poses; {POSE_LINE}, as `poses` makes them")));
+        }
         self.is_empty = false;
-        let line: PoseLine = serde_json::from_str(&text).map_err(|e| {
-            let message = e.to_string();
-            let what = message.split(" at line ").next().unwrap_or_default();
-            self.lines.fault(format!("column {}: {what}; {POSE_LINE}", e.column()))
-        })?;
-        Ok(Some((number, [self.pose("a", &line.a, a)?, self.pose("b", &line.b, b)?])))
+        Ok(line)
     }
 
-    fn pose(&self, name: &str, numbers: &[f64], scan: &Scan) -> Result<Pose, CliError> {
-        let matrix: &Matrix = numbers.try_into().map_err(|_wrong_count| {
-            self.lines.fault(format!(
-                "`{name}` has {} numbers where 16 belong, a row-major 4×4 matrix",
-                numbers.len()
-            ))
+    /// The poses on a line of this number and text.
+    pub(crate) fn poses(&self, number: u64, text: &str, scans: [&Scan; 2]) -> Result<[Pose; 2], CliError> {
+        let line: PoseLine = serde_json::from_str(text).map_err(|e| {
+            let message = e.to_string();
+            let what = message.split(" at line ").next().unwrap_or_default();
+            self.lines.fault_on(number, format!("column {}: {what}; {POSE_LINE}", e.column()))
         })?;
-        of_scan(matrix, scan).map_err(|refused| self.lines.fault(format!("`{name}`: {refused}")))
+        let pose = |name: &str, numbers: &[f64], scan| {
+            pose(numbers, scan).map_err(|what| self.lines.fault_on(number, format!("`{name}`{what}")))
+        };
+        Ok([pose("a", &line.a, scans[0])?, pose("b", &line.b, scans[1])?])
     }
+}
+
+fn pose(numbers: &[f64], scan: &Scan) -> Result<Pose, String> {
+    let matrix: &Matrix = numbers.try_into().map_err(|_wrong_count| {
+        format!(" has {} numbers where 16 belong, a row-major 4×4 matrix", numbers.len())
+    })?;
+    of_scan(matrix, scan).map_err(|refused| format!(": {refused}"))
 }

@@ -209,6 +209,40 @@ fn a_faulty_line_is_named_after_the_answers_before_it() {
 }
 
 #[test]
+fn with_first_the_answers_end_with_the_first_hit() {
+    let place = balls();
+    let line = |x: f64| {
+        let matrix = |x: f64| format!("[{}]", shift(x, 0.0, 0.0).replace(' ', ","));
+        format!("{{\"a\":{},\"b\":{}}}", matrix(0.0), matrix(x))
+    };
+    let (apart, touching) = (line(2.5), line(1.5));
+    let ask = |lines: &[&str], threads: &str| {
+        place.write("poses.jsonl", lines.join("\n"));
+        let args = ["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl", "--json", "--first"];
+        place.run(&[&args[..], &["--threads", threads]].concat())
+    };
+    for threads in ["1", "2"] {
+        for hits in [&[][..], &[0], &[1500, 40, 41], &[1023], &[1024], &[1999]] {
+            let mut lines = vec![apart.as_str(); 2000];
+            hits.iter().for_each(|&i| lines[i] = &touching);
+            let done = ask(&lines, threads);
+            assert_eq!((done.status, done.errors.as_str()), (0, ""));
+            let answers = done.json();
+            let count = hits.iter().min().map_or(2000, |first| first + 1);
+            assert_eq!(answers.len(), count, "{hits:?} on {threads} threads");
+            let is_hit = |answer: &Value| answer["verdict"] == "intersecting";
+            assert_eq!(is_hit(answers.last().unwrap()), !hits.is_empty(), "{hits:?}: the last one");
+            assert!(!answers[..count - 1].iter().any(is_hit), "{hits:?}: no other");
+        }
+        let after = ask(&[&apart, &touching, "nonsense"], threads);
+        assert_eq!((after.status, after.json().len()), (0, 2), "what comes after the hit is not looked at");
+        let before = ask(&[&apart, "nonsense", &touching], threads);
+        assert_eq!((before.status, before.json().len()), (1, 1), "a fault before it counts");
+        assert!(before.errors.starts_with("error: poses.jsonl: line 2: "), "{}", before.errors);
+    }
+}
+
+#[test]
 fn wrong_usage_ends_with_status_2() {
     let place = balls();
     let both = |options: &[&'static str]| [&["collide", "ball.nm", "ball.nm"], options].concat();
@@ -223,6 +257,7 @@ fn wrong_usage_ends_with_status_2() {
         (&["--poses", "p.jsonl", "--pose-a", "x"], "cannot be used with"),
         (&["--image", "ball.nm"], "would replace the input"),
         (&["--detail", "manifold"], "manifold"),
+        (&["--first"], "--poses"),
         (&["--margin", "-1"], "--margin"),
         (&["--evidence", "proven"], "certified"),
         (&["--prove", "ball.nm"], "would replace the input"),
