@@ -112,10 +112,12 @@ pub(crate) struct Meter {
 }
 
 impl Meter {
-    /// For two scans with so many leaves of so many points.
-    pub(crate) fn new(budget: &Budget, leaves: [u64; 2], points: [u64; 2]) -> Self {
-        let leaf_pair = points[0] * points[1] / POINTS_A_PAIR + NODE_PAIRS_A_LEAF_PAIR;
-        let sane = LEAF_PAIRS_A_LEAF * (leaves[0] + leaves[1]) * leaf_pair;
+    /// For two scans with so many leaves of so many points, and so many test points for two leaves.
+    pub(crate) fn new(budget: &Budget, leaves: [u64; 2], points: [u64; 2], test_points: u64) -> Self {
+        let leaf_pair = points[0] * points[1] / POINTS_A_PAIR
+            + NODE_PAIRS_A_LEAF_PAIR
+            + 2 * PAIRS_AN_EVALUATION * test_points;
+        let sane = (LEAF_PAIRS_A_LEAF * (leaves[0] + leaves[1])).saturating_mul(leaf_pair);
         let most_work = if budget.work.is_some() { u64::MAX } else { sane };
         Self {
             most_units: budget.work.unwrap_or(u64::MAX),

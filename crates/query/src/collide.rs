@@ -119,8 +119,12 @@ fn search(
         [a, b].map(|view| view.slices().nodes.len().div_ceil(2) as u64),
         [a, b].map(|view| u64::from(view.scan().leaf_size())),
     ];
-    let meter = Meter::new(budget, leaves, points);
     let options = plan.options();
+    let test_points = match options.method {
+        Method::Traversal => 0,
+        Method::Sampling(sampling) => u64::from(sampling.test_points),
+    };
+    let meter = Meter::new(budget, leaves, points, test_points);
     let (pose, relative) = match relative(a, b, plan) {
         Ok(motion) => motion,
         Err(early) => {

@@ -4,7 +4,7 @@
 //! mean something estimates the distance of the surfaces (eq. 8). Unlike S0 we draw again what falls outside the volume of b's
 //! leaf, where nothing can be found, and a witness is looked for from the test point that saw the intersection.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
@@ -14,8 +14,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 use crate::options::Sampling;
-use crate::surface::Surfaces;
+use crate::surface::{FAR, Surfaces};
 use crate::verdict::Contact;
+use crate::view::ScanView;
 
 /// So many test points are drawn for one that both volumes hold, before that is given up.
 const DRAWS: u32 = 8;
@@ -80,8 +81,7 @@ impl Surfaces<'_> {
                 continue;
             }
             accepted += 1;
-            let of_b = |s: &Self| s.pair.b.nodes[b].points();
-            self.test(x, i, of_b, sampling)?;
+            self.test(x, [node.points(), self.pair.b.nodes[b].points()], sampling)?;
         }
         ControlFlow::Continue(())
     }
@@ -108,20 +108,15 @@ impl Surfaces<'_> {
             let i = self.members[below(&mut rng, self.members.len())] as usize;
             let x = place_in(&mut rng, self.pair.a.positions[i], self.pair.a.radii[i]);
             if volume.distance_sq(x) <= 0.0 {
-                self.test(x, i, |s| 0..s.pair.b.positions.len(), sampling)?;
+                let points = [&self.pair.a, &self.pair.b].map(|slices| 0..slices.positions.len());
+                self.test(x, points, sampling)?;
             }
         }
         ControlFlow::Continue(())
     }
 
-    /// One test point, in a's stored frame, drawn about its point `i`; points of b near it are among `of_b`.
-    fn test(
-        &mut self,
-        x: [f32; 3],
-        i: usize,
-        of_b: impl Fn(&Self) -> std::ops::Range<usize>,
-        sampling: &Sampling,
-    ) -> ControlFlow<()> {
+    /// One test point, in a's stored frame; `points` of either scan are those near which a contact may be.
+    fn test(&mut self, x: [f32; 3], points: [Range<usize>; 2], sampling: &Sampling) -> ControlFlow<()> {
         self.pair.meter.go_on()?;
         let [va, vb] = self.pair.views;
         let x = va.placed().apply(x.map(f64::from));
@@ -137,14 +132,15 @@ impl Surfaces<'_> {
             return ControlFlow::Continue(());
         }
         let distance = at_a.f.abs() + at_b.f.abs();
-        self.estimate = self.estimate.min(distance);
-        if distance >= self.tolerance(sampling) {
+        if distance >= self.estimate.min(self.tolerance(sampling)) {
+            self.estimate = self.estimate.min(distance);
             return ControlFlow::Continue(());
         }
-        let from = |j: &usize| (Vector3::from(vb.point(*j)) - Vector3::from(x)).norm_squared();
-        let Some(j) = of_b(self).min_by(|j, k| from(j).total_cmp(&from(k))) else {
+        let [of_a, of_b] = points;
+        let (Some(i), Some(j)) = (near(va, x, of_a), near(vb, x, of_b)) else {
             return ControlFlow::Continue(());
         };
+        self.estimate = distance;
         let contact = Contact {
             point: x,
             normals: Some([at_a.normal, at_b.normal]),
@@ -153,4 +149,12 @@ impl Surfaces<'_> {
         };
         self.hit(contact, i, j)
     }
+}
+
+/// The point nearest to `x`, if it is so near that there is a surface: between two sheets f vanishes too (docs/theory).
+fn near(view: &ScanView<'_>, x: [f64; 3], points: Range<usize>) -> Option<usize> {
+    let away = |i: usize| (Vector3::from(view.point(i)) - Vector3::from(x)).norm();
+    let nearest = points.map(|i| (i, away(i))).min_by(|p, q| p.1.total_cmp(&q.1));
+    let radius = |i: usize| f64::from(view.slices().radii[i]) * view.placed().scale();
+    nearest.filter(|&(i, away)| away <= f64::from(FAR) * radius(i)).map(|(i, _)| i)
 }

@@ -35,7 +35,7 @@ const NEAR: f32 = 0.65;
 /// Where surfaces cross, samples of either are within some 0.6 local radii of the place, and nearer than this to each
 /// other, in the greater radius. Discs reach up to 1.3; those that stand upright, as noise on thin plates makes them,
 /// would bridge a gap of that width.
-const FAR: f32 = 0.9;
+pub(crate) const FAR: f32 = 0.9;
 
 /// The search for a crossing.
 #[derive(Debug)]
