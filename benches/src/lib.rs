@@ -7,6 +7,7 @@ pub mod counting;
 pub mod machine;
 pub mod object;
 pub mod poses;
+pub mod questions;
 pub mod rivals;
 pub mod sample;
 pub mod scorer;

@@ -49,7 +49,7 @@ pub struct Sampling {
     /// Test points for each pair of leaves, or, [flat](Sampling::flat), for each leaf's worth of points; 1 to 65,536,
     /// default 128.
     pub test_points: u32,
-    /// d_ε in sampling radii (of the scan with the greater one): above 0, at most 4; default 0.5.
+    /// `d_ε` in sampling radii (of the scan with the greater one): above 0, at most 4; default 0.4.
     pub tolerance: f64,
     /// What the random numbers come from, together with the ids of the leaves.
     pub seed: u64,
@@ -62,7 +62,7 @@ pub(crate) const MOST_TEST_POINTS: u32 = 65_536;
 
 impl Default for Sampling {
     fn default() -> Self {
-        Self { test_points: 128, tolerance: 0.5, seed: 0, flat: false }
+        Self { test_points: 128, tolerance: 0.4, seed: 0, flat: false }
     }
 }
 

@@ -52,12 +52,12 @@ fn place_in(rng: &mut impl Rng, centre: [f32; 3], radius: f32) -> [f32; 3] {
 /// Uniform below `count`, which is more than zero.
 fn below(rng: &mut impl Rng, count: usize) -> usize {
     // The bias, 2⁻³² of it, is none.
-    let share = (rng.next_u64() >> 32) * count as u64 >> 32;
+    let share = ((rng.next_u64() >> 32) * count as u64) >> 32;
     usize::try_from(share).unwrap_or(0)
 }
 
 impl Surfaces<'_> {
-    /// d_ε in the world.
+    /// `d_ε` in the world.
     fn tolerance(&self, sampling: &Sampling) -> f64 {
         let radius = |side: usize, own: f32| f64::from(own) * self.pair.views[side].placed().scale();
         sampling.tolerance

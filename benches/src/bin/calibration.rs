@@ -1,0 +1,123 @@
+//! Whether likelihoods are: how often scans meet where a budget ended the search, by decile of the likelihood that was
+//! answered.
+//!
+//! `calibration OBJECT… [--near N] [--swept N] [--seed N]` and what `asked` reads (`--order` …)
+//!
+//! Ends with status 1 if a decile with a hundred answers or more is off by more than 0.15, or the Brier score of all
+//! answers is not below that of the best constant.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::process::ExitCode;
+
+use nearmiss::{BuildOptions, Pose, Reason, Scan, Verdict};
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::asked::{self, Limits};
+use nearmiss_benches::object::Object;
+use nearmiss_benches::rivals::ours::Ours;
+use nearmiss_benches::sample::count;
+use nearmiss_benches::{Failure, machine, questions};
+
+/// Node pairs and evaluations after which a search is ended.
+const BUDGETS: [u64; 8] = [1, 4, 8, 16, 32, 64, 128, 256];
+
+/// Fewer answers in a decile say little.
+const ENOUGH: usize = 100;
+
+/// By how much the frequency of a decile may differ from the mean of its likelihoods.
+const TOLERANCE: f64 = 0.15;
+
+/// Likelihoods, and whether the scans meet.
+#[derive(Debug, Clone, Default)]
+struct Answers(Vec<(f64, bool)>);
+
+impl Answers {
+    fn brier(&self, likelihood: impl Fn(f64) -> f64) -> f64 {
+        let square = |&(p, meets): &(f64, bool)| (likelihood(p) - f64::from(u8::from(meets))).powi(2);
+        self.0.iter().map(square).sum::<f64>() / count(self.0.len().max(1))
+    }
+
+    fn frequency(&self) -> f64 {
+        count(self.0.iter().filter(|(_, meets)| *meets).count()) / count(self.0.len().max(1))
+    }
+
+    /// Those whose likelihood is in the `i`-th tenth.
+    fn decile(&self, i: usize) -> Self {
+        let of = |p: f64| (0..9).rev().find(|&k| p >= 0.1 * count(k + 1)).map_or(0, |k| k + 1);
+        Self(self.0.iter().filter(|(p, _)| of(*p) == i).copied().collect())
+    }
+
+    fn mean(&self) -> f64 {
+        self.0.iter().map(|(p, _)| p).sum::<f64>() / count(self.0.len().max(1))
+    }
+
+    /// The greatest difference of any decile with enough answers.
+    fn worst(&self) -> f64 {
+        let deciles = (0..10).map(|i| self.decile(i)).filter(|decile| decile.0.len() >= ENOUGH);
+        deciles.map(|decile| (decile.mean() - decile.frequency()).abs()).fold(0.0, f64::max)
+    }
+}
+
+fn main() -> Result<ExitCode, Failure> {
+    let mut arguments = Arguments::of_process();
+    let near = arguments.value("--near")?.unwrap_or(1000);
+    let swept = arguments.value("--swept")?.unwrap_or(80);
+    let seed = arguments.value("--seed")?.unwrap_or(2);
+    let options = asked::options(&mut arguments)?;
+    let objects = arguments.words()?;
+    if objects.is_empty() {
+        return Err("usage: calibration OBJECT… [--near N] [--swept N] [--order NAME]".into());
+    }
+    println!("{}", machine::description());
+    println!(
+        "order {:?}; budgets of {BUDGETS:?} units; {near} poses near contact, {swept} at each distance\n",
+        options.order
+    );
+    let mut all = Answers::default();
+    println!(
+        "| object | answers | meet | Brier | constant | worst decile |\n| --- | --: | --: | --: | --: | --: |"
+    );
+    for source in &objects {
+        let object = Object::read(source)?.scaled()?;
+        let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
+        let mut answers = Answers::default();
+        for question in questions::asked(&object, &scan, near, swept, seed)? {
+            for work in BUDGETS {
+                let limits = Limits { work: Some(work), ..Limits::default() };
+                let answer =
+                    Ours::new(&scan, &options)?.with_limits(limits).answer(&Pose::IDENTITY, &question.pose);
+                if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
+                    answers.0.push((likelihood, question.meets));
+                }
+            }
+        }
+        row(&object.name, &answers);
+        all.0.extend(answers.0);
+    }
+    row("all", &all);
+    println!("\n| likelihood | answers | mean likelihood | meet |\n| --- | --: | --: | --: |");
+    for i in 0..10 {
+        let decile = all.decile(i);
+        let (from, to) = (0.1 * count(i), 0.1 * count(i + 1));
+        println!(
+            "| {from:.1} to {to:.1} | {} | {:.3} | {:.3} |",
+            decile.0.len(),
+            decile.mean(),
+            decile.frequency()
+        );
+    }
+    let constant = all.frequency();
+    let good = all.worst() <= TOLERANCE && all.brier(|p| p) < all.brier(|_| constant);
+    println!("\n{}", if good { "calibrated" } else { "NOT calibrated" });
+    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn row(name: &str, answers: &Answers) {
+    let constant = answers.frequency();
+    println!(
+        "| {name} | {} | {constant:.3} | {:.4} | {:.4} | {:.3} |",
+        answers.0.len(),
+        answers.brier(|p| p),
+        answers.brier(|_| constant),
+        answers.worst(),
+    );
+}

@@ -1,0 +1,119 @@
+//! What hints are worth: small motions near contact, each pose asked with a hint and without.
+//!
+//! `hints OBJECT… [--walks N] [--steps N] [--seed N]`
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use nearmiss::{
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, PairHint, Pose,
+    Scan, collide_hinted, collide_with,
+};
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::clock::{nanoseconds, timed};
+use nearmiss_benches::object::Object;
+use nearmiss_benches::sample::{Sample, count};
+use nearmiss_benches::{Failure, machine, poses};
+use nearmiss_testdata::arbitrary::{rng, unit_vector};
+
+/// Steps of a walk, in r: shift and turn together move the furthest point about so far.
+const STEPS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 3.0];
+
+fn main() -> Result<(), Failure> {
+    let mut arguments = Arguments::of_process();
+    let walks = arguments.value("--walks")?.unwrap_or(200);
+    let steps: u32 = arguments.value("--steps")?.unwrap_or(60);
+    let seed = arguments.value("--seed")?.unwrap_or(5);
+    let objects = arguments.words()?;
+    if objects.is_empty() {
+        return Err("usage: hints OBJECT… [--walks N] [--steps N] [--seed N]".into());
+    }
+    println!("{}", machine::description());
+    println!("{walks} walks of {steps} steps from poses within 10 r of first touch, in random directions");
+    for source in &objects {
+        let object = Object::read(source)?.scaled()?;
+        let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
+        let starts = poses::near(&object, walks, seed)?;
+        println!("\n## {}: {} points, r {:.5}\n", object.name, object.cloud.len(), object.r);
+        println!(
+            "| evidence | step, r | meet | apart: cold µs | hinted | meet: cold | hinted | all: cold | hinted | ratio |\n\
+             | --- |{}",
+            " --: |".repeat(9)
+        );
+        for evidence in [Evidence::Estimated, Evidence::Certified] {
+            let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(evidence);
+            let plan = CollidePlan::new(&options, &scan, &scan)?;
+            for step in STEPS {
+                let mut walked = Walked::default();
+                let rng = &mut rng(seed);
+                for start in &starts {
+                    let heading = unit_vector(rng);
+                    walked.walk(&scan, &plan, start.pose, (heading, step * object.r), steps);
+                }
+                walked.tell(evidence, step)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Times by whether the scans meet, cold and hinted.
+#[derive(Debug, Default)]
+struct Walked {
+    times: [[Sample; 2]; 2],
+    differ: usize,
+}
+
+impl Walked {
+    fn walk(
+        &mut self,
+        scan: &Scan,
+        plan: &CollidePlan,
+        start: Pose,
+        (heading, step): ([f64; 3], f64),
+        steps: u32,
+    ) {
+        let (mut hint, mut cold, mut warm) =
+            (PairHint::default(), CollideScratch::default(), CollideScratch::default());
+        let from = start.translation();
+        for i in 0..steps {
+            // Half of the step is a turn, which moves points one unit away.
+            let way = 0.5 * step * f64::from(i);
+            let turned = Pose::from_axis_angle(heading, way).after(&start.with_translation([0.0; 3]));
+            let pose = turned.with_translation([0, 1, 2].map(|k| from[k] + heading[k] * way));
+            let views = [scan.at(&Pose::IDENTITY), scan.at(&pose)];
+            let (one, time) =
+                timed(|| collide_with(&views[0], &views[1], plan, &Budget::UNLIMITED, &mut cold));
+            let (other, hinted) = timed(|| {
+                collide_hinted(&views[0], &views[1], plan, &Budget::UNLIMITED, &mut hint, &mut warm)
+            });
+            let meets = one.verdict.is_intersecting();
+            self.differ += usize::from(other.verdict.is_intersecting() != meets);
+            if i > 0 {
+                let [of_cold, of_hinted] = &mut self.times[usize::from(meets)];
+                of_cold.push(nanoseconds(time));
+                of_hinted.push(nanoseconds(hinted));
+            }
+        }
+    }
+
+    fn tell(&self, evidence: Evidence, step: f64) -> Result<(), Failure> {
+        if self.differ > 0 {
+            return Err(format!("{} verdicts differ with a hint", self.differ).into());
+        }
+        let [apart, meet] = &self.times;
+        let mean = |samples: &[&Sample]| {
+            let all = samples.iter().map(|s| count(s.len())).sum::<f64>();
+            samples.iter().map(|s| s.summary().mean * count(s.len())).sum::<f64>() / all / 1e3
+        };
+        let [cold, hinted] = [0, 1].map(|k| mean(&[&apart[k], &meet[k]]));
+        println!(
+            "| {evidence:?} | {step} | {:.0} % | {:.2} | {:.2} | {:.2} | {:.2} | {cold:.2} | {hinted:.2} | {:.2} |",
+            100.0 * count(meet[0].len()) / count(meet[0].len() + apart[0].len()),
+            mean(&[&apart[0]]),
+            mean(&[&apart[1]]),
+            mean(&[&meet[0]]),
+            mean(&[&meet[1]]),
+            hinted / cold,
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,66 @@
+//! Questions with answers: poses of one object against itself, and whether they meet.
+
+use nearmiss::{CollideOptions, Detail, Pose, Scan};
+
+use crate::Failure;
+use crate::object::Object;
+use crate::poses;
+use crate::rivals::Method;
+use crate::rivals::ours::Ours;
+use crate::rivals::parry::MeshTree;
+
+/// A pose of the second copy, the first one resting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asked {
+    /// The pose.
+    pub pose: Pose,
+    /// Whether the two meet: as the meshes say, or, where there is none, the search to the end.
+    pub meets: bool,
+}
+
+/// `near` poses within 10 r of first touch, and `swept` at each distance of the sweep, of a scaled object.
+///
+/// # Errors
+/// When the object cannot be searched.
+pub fn asked(
+    object: &Object,
+    scan: &Scan,
+    near: usize,
+    swept: usize,
+    seed: u64,
+) -> Result<Vec<Asked>, Failure> {
+    let mut poses: Vec<Pose> = poses::near(object, near, seed)?.iter().map(|near| near.pose).collect();
+    poses.extend(poses::sweep(swept, seed, 0).into_iter().flatten());
+    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let mut judge: Box<dyn Method + '_> = match &object.mesh {
+        Some(mesh) => Box::new(MeshTree::new(mesh)),
+        None => Box::new(Ours::new(scan, &options)?),
+    };
+    let judged = |pose| Asked { pose, meets: judge.ask(&Pose::IDENTITY, &pose).hit };
+    Ok(poses.into_iter().map(judged).collect())
+}
+
+/// The interval in which the share of which `wrong` of `all` is a sample lies, to 95 % (Wilson, "Probable inference, the
+/// law of succession, and statistical inference", JASA 22, 1927).
+#[must_use]
+pub fn interval(wrong: usize, all: usize) -> [f64; 2] {
+    const Z: f64 = 1.959_964;
+    let n = crate::sample::count(all.max(1));
+    let p = crate::sample::count(wrong) / n;
+    let middle = p + Z * Z / (2.0 * n);
+    let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
+    [middle - half, middle + half].map(|x| (x / (1.0 + Z * Z / n)).clamp(0.0, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_those_of_tables() {
+        let close = |[a, b]: [f64; 2], [c, d]: [f64; 2]| (a - c).abs() < 5e-4 && (b - d).abs() < 5e-4;
+        assert!(close(interval(0, 10), [0.0, 0.2775]));
+        assert!(close(interval(5, 10), [0.2366, 0.7634]));
+        assert!(close(interval(10, 1000), [0.0054, 0.0183]));
+    }
+}
