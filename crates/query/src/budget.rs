@@ -13,7 +13,7 @@ const PAIRS_A_LOOK: u64 = 64;
 const PAIRS_AN_EVALUATION: u64 = 64;
 
 /// So many pairs of points cost as much as a node pair.
-const POINTS_A_PAIR: u64 = 4;
+pub(crate) const POINTS_A_PAIR: u64 = 4;
 
 /// A query without a budget of work is ended after so many leaf pairs for each leaf of either scan. Boxes that
 /// lie could otherwise make it compare each leaf with each. Solid noise of 400,000 points in the middle of other such

@@ -13,6 +13,7 @@ use nearmiss_surface::{Evaluation, Status};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
+use crate::budget::{Meter, POINTS_A_PAIR};
 use crate::options::Sampling;
 use crate::surface::{FAR, Surfaces};
 use crate::verdict::Contact;
@@ -20,6 +21,9 @@ use crate::view::ScanView;
 
 /// So many test points are drawn for one that both volumes hold, before that is given up.
 const DRAWS: u32 = 8;
+
+/// Points that are looked through between two looks at the clock.
+const A_STRETCH: u32 = 256;
 
 /// What a stream of random numbers is for, when it is for no pair of leaves.
 const FLAT: NodePair = NodePair { a: NodeId(u32::MAX), b: NodeId(u32::MAX) };
@@ -93,6 +97,10 @@ impl Surfaces<'_> {
         let within = |bounds: &OrientedBox, p: [f32; 3]| bounds.distance_sq(p) <= own * own;
         self.members.clear();
         for (i, &p) in (0_u32..).zip(self.pair.a.positions) {
+            if i % A_STRETCH == 0 {
+                self.pair.meter.leaf_work(u64::from(A_STRETCH) / POINTS_A_PAIR);
+                self.pair.meter.go_on()?;
+            }
             if within(&volume, p) {
                 self.members.push(i);
             }
@@ -137,7 +145,8 @@ impl Surfaces<'_> {
             return ControlFlow::Continue(());
         }
         let [of_a, of_b] = points;
-        let (Some(i), Some(j)) = (near(va, x, of_a), near(vb, x, of_b)) else {
+        let meter = &mut self.pair.meter;
+        let (Some(i), Some(j)) = (near(va, x, of_a, meter), near(vb, x, of_b, meter)) else {
             return ControlFlow::Continue(());
         };
         self.estimate = distance;
@@ -152,9 +161,22 @@ impl Surfaces<'_> {
 }
 
 /// The point nearest to `x`, if it is so near that there is a surface: between two sheets f vanishes too (docs/theory).
-fn near(view: &ScanView<'_>, x: [f64; 3], points: Range<usize>) -> Option<usize> {
-    let away = |i: usize| (Vector3::from(view.point(i)) - Vector3::from(x)).norm();
-    let nearest = points.map(|i| (i, away(i))).min_by(|p, q| p.1.total_cmp(&q.1));
-    let radius = |i: usize| f64::from(view.slices().radii[i]) * view.placed().scale();
-    nearest.filter(|&(i, away)| away <= f64::from(FAR) * radius(i)).map(|(i, _)| i)
+/// None as well when time is up.
+fn near(view: &ScanView<'_>, x: [f64; 3], points: Range<usize>, meter: &mut Meter) -> Option<usize> {
+    let placed = view.placed();
+    let local = placed.apply_inverse(x);
+    let away_sq = |p: [f32; 3]| (Vector3::from(p.map(f64::from)) - Vector3::from(local)).norm_squared();
+    let mut nearest = (f64::INFINITY, points.start);
+    for start in points.clone().step_by(A_STRETCH as usize) {
+        meter.go_on().continue_value()?;
+        let end = points.end.min(start + A_STRETCH as usize);
+        meter.leaf_work((end - start) as u64 / POINTS_A_PAIR);
+        for i in start..end {
+            let away = away_sq(view.slices().positions[i]);
+            nearest = if away < nearest.0 { (away, i) } else { nearest };
+        }
+    }
+    let (away, i) = nearest;
+    let radius = f64::from(FAR * view.slices().radii[i]);
+    (away <= radius * radius).then_some(i)
 }
