@@ -9,4 +9,5 @@ pub mod pairs;
 
 pub mod arbitrary;
 pub mod dragon;
+pub mod matrices;
 pub mod scanner;

@@ -2,14 +2,20 @@
 #![forbid(unsafe_code)]
 
 mod eigen;
+mod eigen_batch;
+mod eigen_cholesky;
 mod fit;
 mod kernel;
+mod lane;
 mod meet;
 mod neighbourhood;
 mod options;
 mod project;
 
 pub use eigen::{Eigen3, symmetric_eigen};
+pub use eigen_batch::{EigenBlock, MatrixBlock, symmetric_eigen_batch};
+pub use eigen_cholesky::{LeastEigen, cubic_cholesky_eigen};
+pub use fearless_simd::Level;
 pub use fit::{BORDER, Evaluation, Status};
 pub use kernel::Kernel;
 pub use meet::{Meeting, meet};
