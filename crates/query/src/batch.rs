@@ -100,6 +100,29 @@ pub fn collide_poses(
 }
 
 /// Whether two scans meet in each of many pairs of poses; otherwise as [`collide_many_with`].
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use nearmiss_geometry::{PointCloud, Pose};
+/// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+/// use nearmiss_query::{BatchScratch, Budget, CollideOptions, CollidePlan, Deadline, Until, collide_poses_with};
+///
+/// let points: Vec<[f32; 3]> = (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let square = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let plan = CollidePlan::new(&CollideOptions::default(), &square, &square)?;
+///
+/// // An upright square is lowered onto a lying one in steps of 0.1: when does it touch?
+/// let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], 1.5);
+/// let lowered = |step: u32| upright.with_translation([0.3, 0.5, 0.55 - 0.1 * f64::from(step)]);
+/// let path: Vec<[Pose; 2]> = (0..20).map(|step| [Pose::IDENTITY, lowered(step)]).collect();
+/// let budget = Budget::UNLIMITED.with_deadline(Deadline::within(Duration::from_secs(10)));
+/// let mut scratch = BatchScratch::default();
+/// let answers = collide_poses_with([&square, &square], &path, &plan, &budget, Until::First, &mut scratch);
+/// assert_eq!(answers.len(), 7, "with step 6");
+/// assert!(answers[6].verdict.is_intersecting() && answers[..6].iter().all(|answer| answer.verdict.is_separated()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn collide_poses_with<'s>(
     scans: [&PointHierarchy; 2],
     poses: &[[Pose; 2]],

@@ -10,7 +10,7 @@ use std::ops::Deref;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Aabb, Pose};
 use nearmiss_hierarchy::{PointHierarchy, SLACK};
-use rstar::{AABB, RTree, RTreeObject};
+use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 use serde::{Deserialize, Serialize};
 
 use crate::batch::{BatchScratch, Until, ask_all};
@@ -97,14 +97,24 @@ impl<S: Deref<Target = PointHierarchy>> Body<S> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Leaf {
     id: BodyId,
-    bounds: Aabb,
+    bounds: Envelope,
+}
+
+/// A box as the tree wants it.
+type Envelope = AABB<[f64; 3]>;
+
+impl Leaf {
+    fn new(id: BodyId, bounds: &Aabb) -> Self {
+        Self { id, bounds: AABB::from_corners(bounds.min, bounds.max) }
+    }
 }
 
 impl RTreeObject for Leaf {
-    type Envelope = AABB<[f64; 3]>;
+    type Envelope = Envelope;
 
-    fn envelope(&self) -> AABB<[f64; 3]> {
-        AABB::from_corners(self.bounds.min, self.bounds.max)
+    #[inline]
+    fn envelope(&self) -> Envelope {
+        self.bounds
     }
 }
 
@@ -133,7 +143,7 @@ impl<S: Deref<Target = PointHierarchy>> World<S> {
     pub fn remove(&mut self, id: BodyId) -> Option<S> {
         let body = self.bodies.remove(&id)?;
         match body.bounds {
-            Some(bounds) => _ = self.tree.remove(&Leaf { id, bounds }),
+            Some(bounds) => _ = self.tree.remove(&Leaf::new(id, &bounds)),
             None => _ = self.unbounded.remove(&id),
         }
         Some(body.scan)
@@ -147,7 +157,7 @@ impl<S: Deref<Target = PointHierarchy>> World<S> {
 
     fn place(&mut self, id: BodyId, body: Body<S>) {
         match body.bounds {
-            Some(bounds) => self.tree.insert(Leaf { id, bounds }),
+            Some(bounds) => self.tree.insert(Leaf::new(id, &bounds)),
             None => _ = self.unbounded.insert(id),
         }
         self.bodies.insert(id, body);
@@ -177,6 +187,12 @@ impl<S: Deref<Target = PointHierarchy>> World<S> {
         self.bodies.get(&id).map(Body::view)
     }
 
+    /// The box of the world about a body that the broad phase goes by; none of one that it takes for boundless.
+    #[must_use]
+    pub fn bounds(&self, id: BodyId) -> Option<Aabb> {
+        self.bodies.get(&id).and_then(|body| body.bounds)
+    }
+
     /// The broad phase: pairs whose boxes come as near each other as `plan` reaches, lesser id first, in order.
     /// Allocates; see [`World::near_pairs_with`].
     #[must_use]
@@ -194,12 +210,10 @@ impl<S: Deref<Target = PointHierarchy>> World<S> {
         pairs.clear();
         match bodies {
             Bodies::All => {
-                for (&id, body) in &self.bodies {
-                    self.visit_near(body.bounds, plan, |other| {
-                        if other > id {
-                            pairs.push([id, other]);
-                        }
-                    });
+                let mut visit = |a: BodyId, b: BodyId| pairs.push([a.min(b), a.max(b)]);
+                visit_pairs(self.tree.root(), reach(plan), &mut visit);
+                for &id in &self.unbounded {
+                    self.bodies.keys().filter(|&&other| other != id).for_each(|&other| visit(id, other));
                 }
             }
             Bodies::These(ids) => {
@@ -228,13 +242,51 @@ impl<S: Deref<Target = PointHierarchy>> World<S> {
 
     fn visit_near(&self, bounds: Option<Aabb>, plan: &CollidePlan, mut visit: impl FnMut(BodyId)) {
         let Some(bounds) = bounds else { return self.bodies.keys().copied().for_each(visit) };
-        // Single queries take a little more than the reach for near.
-        let reach = plan.reach() * (1.0 + 1e-4);
+        let reach = reach(plan);
         let [min, max] = [bounds.min.map(|x| x - reach), bounds.max.map(|x| x + reach)];
         let near = self.tree.locate_in_envelope_intersecting(AABB::from_corners(min, max));
         near.for_each(|leaf| visit(leaf.id));
         self.unbounded.iter().copied().for_each(visit);
     }
+}
+
+/// How near boxes must come: single queries take a little more than their reach for near.
+fn reach(plan: &CollidePlan) -> f64 {
+    plan.reach() * (1.0 + 1e-4)
+}
+
+/// Visits each pair of leaves below `node` whose boxes come within `reach`, once.
+fn visit_pairs(node: &ParentNode<Leaf>, reach: f64, visit: &mut impl FnMut(BodyId, BodyId)) {
+    for (i, a) in node.children().iter().enumerate() {
+        if let RTreeNode::Parent(a) = a {
+            visit_pairs(a, reach, visit);
+        }
+        node.children()[..i].iter().for_each(|b| visit_across(a, b, reach, visit));
+    }
+}
+
+/// Visits each pair of a leaf below `a` and one below `b` whose boxes come within `reach`.
+fn visit_across(
+    a: &RTreeNode<Leaf>,
+    b: &RTreeNode<Leaf>,
+    reach: f64,
+    visit: &mut impl FnMut(BodyId, BodyId),
+) {
+    if !are_near(&a.envelope(), &b.envelope(), reach) {
+        return;
+    }
+    match (a, b) {
+        (RTreeNode::Leaf(a), RTreeNode::Leaf(b)) => visit(a.id, b.id),
+        // In turn, for what is split comes second next time.
+        (RTreeNode::Parent(a), _) => a.children().iter().for_each(|a| visit_across(b, a, reach, visit)),
+        (_, RTreeNode::Parent(b)) => b.children().iter().for_each(|b| visit_across(a, b, reach, visit)),
+    }
+}
+
+#[inline]
+fn are_near(a: &Envelope, b: &Envelope, reach: f64) -> bool {
+    let (low_a, high_a, low_b, high_b) = (a.lower(), a.upper(), b.lower(), b.upper());
+    (0..3).all(|k| low_a[k] <= high_b[k] + reach && low_b[k] <= high_a[k] + reach)
 }
 
 impl<S: Deref<Target = PointHierarchy> + Sync> World<S> {

@@ -248,6 +248,8 @@ fn boxes_are_those_of_enclosures_and_no_larger() {
         for (j, b) in placed.iter().enumerate() {
             for a in &placed[..j] {
                 let (p, q) = (naive_bounds(a), naive_bounds(b));
+                let bounds = world.bounds(a.0).unwrap();
+                assert!(p.iter().all(|&corner| bounds.contains(corner)), "{p:?} in {bounds:?}");
                 let gap = (0..3).map(|k| (p[0][k] - q[1][k]).max(q[0][k] - p[1][k])).fold(f64::MIN, f64::max);
                 let size = [p, q].iter().map(|x| x[1][0] - x[0][0]).sum::<f64>();
                 let is_near = near.binary_search(&[a.0, b.0]).is_ok();
