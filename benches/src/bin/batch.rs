@@ -1,0 +1,202 @@
+//! Many poses of a pair on several threads, and the broad phase of a world of many scans, as Markdown.
+//!
+//! `batch [OBJECT] [--poses N] [--bodies N] [--runs N] [--threads N]…`
+//!
+//! Times are the least of some runs.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::time::Duration;
+
+use nearmiss::{
+    Aabb, Answer, BatchScratch, Bodies, BodyId, Budget, BuildOptions, CollideOptions, CollidePlan,
+    CollideScratch, Detail, Pose, Scan, Until, World, collide_poses_with, collide_with,
+};
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::clock::timed;
+use nearmiss_benches::object::Object;
+use nearmiss_benches::sample::count;
+use nearmiss_benches::{Failure, machine, poses};
+use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
+use parry3d::bounding_volume::Aabb as SingleAabb;
+use parry3d::math::Vector;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
+
+/// Distances of a sweep.
+const DISTANCES: usize = 13;
+
+/// The radius of a scaled object is about 1; bodies lie so far apart that each is near a handful of others.
+const BODIES_A_VOLUME: f64 = 0.125;
+
+struct Options {
+    object: String,
+    poses: usize,
+    bodies: usize,
+    runs: usize,
+    threads: Vec<usize>,
+}
+
+impl Options {
+    fn read() -> Result<Self, Failure> {
+        let mut arguments = Arguments::of_process();
+        let mut options = Self {
+            poses: arguments.value("--poses")?.unwrap_or(1_000_000),
+            bodies: arguments.value("--bodies")?.unwrap_or(1000),
+            runs: arguments.value("--runs")?.unwrap_or(3),
+            threads: arguments.values("--threads")?,
+            object: arguments.words()?.pop().unwrap_or_else(|| "dragon-23k".into()),
+        };
+        if options.threads.is_empty() {
+            options.threads = vec![1, 2];
+        }
+        Ok(options)
+    }
+
+    /// The result of the last of some runs, and the time of the fastest.
+    fn fastest<T>(&self, mut work: impl FnMut() -> T) -> (T, Duration) {
+        let (mut result, mut least) = timed(&mut work);
+        for _ in 1..self.runs {
+            let (again, time) = timed(&mut work);
+            (result, least) = (again, least.min(time));
+        }
+        (result, least)
+    }
+}
+
+fn main() -> Result<(), Failure> {
+    let options = Options::read()?;
+    println!("{}", machine::description());
+    let object = Object::read(&options.object)?.scaled()?;
+    let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
+    let plan = CollidePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan, &scan)?;
+    many_poses(&object.name, &scan, &plan, &options)?;
+    world(&object.name, &scan, &plan, &options)
+}
+
+/// The poses of a sweep, in a single list.
+fn many_poses(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) -> Result<(), Failure> {
+    let sweep = poses::sweep(options.poses.div_ceil(DISTANCES), 1, 0);
+    let poses: Vec<[Pose; 2]> = sweep.into_iter().flatten().map(|b| [Pose::IDENTITY, b]).collect();
+    println!("## {} poses of {name}, {} points\n", poses.len(), scan.len());
+    println!("| | time | µs a pose | speed-up |\n| --- | --: | --: | --: |");
+    let mut scratch = CollideScratch::default();
+    let singly = || -> Vec<Answer> {
+        let ask = |pair: &[Pose; 2]| {
+            let [a, b] = pair.map(|pose| scan.at(&pose));
+            collide_with(&a, &b, plan, &Budget::UNLIMITED, &mut scratch)
+        };
+        poses.iter().map(ask).collect()
+    };
+    let (expected, single) = options.fastest(singly);
+    let row = |what: &str, time: Duration| {
+        let micros = time.as_secs_f64() * 1e6 / count(poses.len());
+        println!("| {what} | {time:.2?} | {micros:.3} | {:.2} |", single.as_secs_f64() / time.as_secs_f64());
+    };
+    row("loop of single queries", single);
+    for &threads in &options.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let mut scratch = BatchScratch::default();
+        let (whole, time) = pool.install(|| {
+            options.fastest(|| {
+                let told = collide_poses_with(
+                    [scan, scan],
+                    &poses,
+                    plan,
+                    &Budget::UNLIMITED,
+                    Until::All,
+                    &mut scratch,
+                );
+                told == expected
+            })
+        });
+        row(&format!("batch, {threads} threads"), time);
+        if !whole {
+            return Err("a batch answers other than single queries".into());
+        }
+    }
+    println!();
+    Ok(())
+}
+
+/// Bodies in a cube, some of them moving.
+fn world(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) -> Result<(), Failure> {
+    let rng = &mut rng(3);
+    let half = 0.5 * (count(options.bodies) / BODIES_A_VOLUME).cbrt();
+    let mut pose = || rotation(rng).with_translation(point_in(rng, half));
+    let [placed, moved] = [0; 2].map(|_| (0..options.bodies).map(|_| pose()).collect::<Vec<Pose>>());
+
+    let (mut world, insert) = options.fastest(|| {
+        let mut world = World::new();
+        placed.iter().for_each(|pose| _ = world.insert(scan.clone(), pose));
+        world
+    });
+    println!("## A world of {} times {name}\n", world.len());
+    println!("| broad phase | time | pairs |\n| --- | --: | --: |");
+    let row = |what: &str, time: Duration, pairs: usize| println!("| {what} | {time:.2?} | {pairs} |");
+    let ids: Vec<BodyId> = world.ids().collect();
+    row("inserting all bodies", insert, 0);
+
+    let mut pairs = Vec::new();
+    let (_, time) = options.fastest(|| world.near_pairs_with(Bodies::All, plan, &mut pairs));
+    row("all near pairs", time, pairs.len());
+    let mut some = Vec::new();
+    let (_, time) = options.fastest(|| {
+        ids.iter().for_each(|&id| world.near_pairs_with(Bodies::These(&[id]), plan, &mut some));
+    });
+    row("near pairs of one body, for each", time, 2 * pairs.len());
+
+    let boxes: Vec<Aabb> = ids.iter().filter_map(|&id| world.bounds(id)).collect();
+    let (brute, time) = options.fastest(|| brute_force(&boxes));
+    row("brute force over boxes", time, brute);
+    let rivals: Vec<SingleAabb> = boxes.iter().map(single).collect();
+    let (tree, time) = options.fastest(|| Bvh::from_leaves(BvhBuildStrategy::Binned, &rivals));
+    row("parry: building the tree at once", time, 0);
+    let mut workspace = BvhWorkspace::default();
+    let (found, time) = options.fastest(|| {
+        let mut found = Vec::new();
+        tree.traverse_bvtt_single_tree::<false>(&mut workspace, &mut |a, b| found.push([a, b]));
+        found.len()
+    });
+    row("parry: all near pairs", time, found);
+
+    let (_, time) = timed(|| {
+        ids.iter().zip(&moved).for_each(|(&id, pose)| _ = world.move_to(id, pose));
+    });
+    row("moving all bodies anywhere", time, 0);
+    let (_, time) = options.fastest(|| world.near_pairs_with(Bodies::All, plan, &mut pairs));
+    row("all near pairs after that", time, pairs.len());
+    for _ in 0..20 {
+        for poses in [&placed, &moved] {
+            ids.iter().zip(poses).for_each(|(&id, pose)| _ = world.move_to(id, pose));
+        }
+    }
+    let (_, time) = options.fastest(|| world.near_pairs_with(Bodies::All, plan, &mut pairs));
+    row("all near pairs after forty more such moves", time, pairs.len());
+
+    println!("\n| narrow phase, its near pairs | time | hits |\n| --- | --: | --: |");
+    for &threads in &options.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let mut scratch = BatchScratch::default();
+        let (hits, time) = pool.install(|| {
+            options.fastest(|| {
+                let answers =
+                    world.collide_pairs_with(&pairs, plan, &Budget::UNLIMITED, Until::All, &mut scratch);
+                answers.iter().filter(|answer| answer.verdict.is_intersecting()).count()
+            })
+        });
+        row(&format!("{threads} threads"), time, hits);
+    }
+    Ok(())
+}
+
+/// How many pairs of boxes overlap.
+fn brute_force(boxes: &[Aabb]) -> usize {
+    let overlap = |a: &Aabb, b: &Aabb| (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k]);
+    let of_one = |i: usize| boxes[..i].iter().filter(|other| overlap(&boxes[i], other)).count();
+    (0..boxes.len()).map(of_one).sum()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a rival in single precision")]
+fn single(bounds: &Aabb) -> SingleAabb {
+    let [min, max] = [bounds.min, bounds.max].map(|[x, y, z]| Vector::new(x as f32, y as f32, z as f32));
+    SingleAabb::new(min, max)
+}

@@ -1,0 +1,66 @@
+//! Once their scratch is warm, batches and broad phases ask for no memory; what rayon takes to spread work over threads
+//! does not grow with the questions.
+//!
+//! One test alone: the counter is of the whole process.
+
+use nearmiss::{
+    BatchScratch, Bodies, Budget, BuildOptions, CollideOptions, CollidePlan, Evidence, Pose, Scan, Until,
+    World, collide_poses_with,
+};
+use nearmiss_benches::counting::Counting;
+use nearmiss_benches::object::Object;
+use nearmiss_benches::poses;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
+
+/// Memory asked for by `work`, in calls.
+fn calls(work: impl FnOnce()) -> usize {
+    let before = ALLOCATOR.calls();
+    work();
+    ALLOCATOR.calls() - before
+}
+
+#[test]
+fn warm_batches_and_broad_phases_allocate_nothing() {
+    let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
+    let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
+    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+    let sweep: Vec<Pose> = poses::sweep(30, 1, 0).into_iter().flatten().collect();
+    let poses: Vec<[Pose; 2]> = sweep.iter().map(|&b| [Pose::IDENTITY, b]).collect();
+    let mut world = World::new();
+    for pose in &sweep[..100] {
+        world.insert(scan.clone(), pose);
+    }
+
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let (mut batch, mut of_world, mut pairs) =
+            (BatchScratch::default(), BatchScratch::default(), Vec::new());
+        pool.install(|| {
+            let mut ask = |count: usize| {
+                let until = Until::All;
+                let budget = Budget::UNLIMITED;
+                collide_poses_with([&scan, &scan], &poses[..count], &plan, &budget, until, &mut batch).len()
+            };
+            // Which thread asks what differs from time to time, so scratches need some rounds to be warm.
+            (0..10).for_each(|_| assert_eq!(ask(poses.len()), poses.len()));
+            let [few, many] = [50, poses.len()].map(|n| calls(|| _ = ask(n)));
+            if threads == 1 {
+                assert_eq!([few, many], [0, 0], "a batch on one thread");
+            } else {
+                assert!(few < 10 && many < 10, "{few} and {many} times, whatever the number of questions");
+            }
+            let mut ask = || {
+                world.near_pairs_with(Bodies::All, &plan, &mut pairs);
+                let budget = Budget::UNLIMITED.with_work(50);
+                world.collide_pairs_with(&pairs, &plan, &budget, Until::All, &mut of_world).len()
+            };
+            assert!(ask() > 1000, "enough pairs");
+            (0..3).for_each(|_| _ = ask());
+            let again = calls(|| _ = ask());
+            assert!(again < if threads == 1 { 1 } else { 10 }, "{again} on {threads} threads");
+        });
+    }
+}
