@@ -9,12 +9,12 @@ use std::time::Duration;
 
 use nearmiss::{
     Aabb, Answer, BatchScratch, Bodies, BodyId, Budget, BuildOptions, CollideOptions, CollidePlan,
-    CollideScratch, Detail, Pose, Scan, Until, World, collide_poses_with, collide_with,
+    CollideScratch, Deadline, Detail, Pose, Scan, Until, World, collide_poses_with, collide_with,
 };
 use nearmiss_benches::arguments::Arguments;
-use nearmiss_benches::clock::timed;
+use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
-use nearmiss_benches::sample::count;
+use nearmiss_benches::sample::{Sample, Summary, count};
 use nearmiss_benches::{Failure, machine, poses};
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
 use parry3d::bounding_volume::Aabb as SingleAabb;
@@ -26,6 +26,10 @@ const DISTANCES: usize = 13;
 
 /// The radius of a scaled object is about 1; bodies lie so far apart that each is near a handful of others.
 const BODIES_A_VOLUME: f64 = 0.125;
+
+/// Poses of a batch that has to end early, and how often it is asked.
+const SHORT_BATCH: usize = 13_000;
+const REPEATS: usize = 1000;
 
 struct Options {
     object: String,
@@ -69,6 +73,7 @@ fn main() -> Result<(), Failure> {
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let plan = CollidePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan, &scan)?;
     many_poses(&object.name, &scan, &plan, &options)?;
+    deadlines(&scan, &plan);
     world(&object.name, &scan, &plan, &options)
 }
 
@@ -115,6 +120,32 @@ fn many_poses(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) ->
     }
     println!();
     Ok(())
+}
+
+/// How much later than asked for a batch ends, on as many threads as there are.
+fn deadlines(scan: &Scan, plan: &CollidePlan) {
+    println!("| deadline of {SHORT_BATCH} poses | answered | too late by: median | p99 | worst |");
+    println!("| --- | --: | --: | --: | --: |");
+    let sweep = poses::sweep(SHORT_BATCH / DISTANCES, 2, 0);
+    let poses: Vec<[Pose; 2]> = sweep.into_iter().flatten().map(|b| [Pose::IDENTITY, b]).collect();
+    let mut scratch = BatchScratch::default();
+    for micros in [100, 1000, 5000] {
+        let (mut overruns, mut answered) = (Sample::default(), 0);
+        for _ in 0..REPEATS {
+            let time = Duration::from_micros(micros);
+            let (answers, taken) = timed(|| {
+                let budget = Budget::UNLIMITED.with_deadline(Deadline::within(time));
+                collide_poses_with([scan, scan], &poses, plan, &budget, Until::All, &mut scratch)
+            });
+            answered += answers.iter().filter(|answer| answer.statistics.node_pairs > 0).count();
+            overruns.push(nanoseconds(taken.saturating_sub(time)));
+        }
+        let Summary { median, p99, worst, .. } = overruns.summary();
+        let [median, p99, worst] = [median, p99, worst].map(|ns| ns / 1e3);
+        let answered = answered / REPEATS;
+        println!("| {micros} µs | {answered} | {median:.1} µs | {p99:.1} µs | {worst:.1} µs |");
+    }
+    println!();
 }
 
 /// Bodies in a cube, some of them moving.
