@@ -13,7 +13,6 @@ use crate::growth::Growth;
 use crate::samples::{Random, Samples};
 use crate::spacing::{fold_nodes, map};
 use crate::split::id32;
-use crate::surfels::tangents;
 use crate::topology::{MOST_LEAF_POINTS, Node};
 
 /// What is known of a node's sample as a whole; lengths in stored units.
@@ -23,8 +22,8 @@ pub struct Covering {
     /// The covering radius: balls of this radius about the samples contain the enclosures of all leaves under the node, and with them
     /// its part of the surface, its points and discs. Infinite where an enclosure is.
     pub radius: f32,
-    /// r(P') of Klein & Zachmann 2004, Definition 4: balls of this radius cover the surface, as far as tangent discs
-    /// show it. At most [`radius`](Self::radius).
+    /// r(P') of Klein & Zachmann 2004, Definition 4, measured on what shows of the surface to first order: each tangent
+    /// disc of a point under the node, moved to the point's foot point, lies in a ball of this radius. At most [`radius`](Self::radius).
     pub sampling: f32,
     /// r(P): the root of the mean square of the local radii of all points under the node, for then the areas that
     /// eq. 10 equates are the sums of the points' own.
@@ -32,7 +31,7 @@ pub struct Covering {
 }
 
 /// Test points that the radius is grown with are the corners of so many random leaves' enclosures.
-const LEAVES_TRIED: usize = 8;
+const LEAVES_TRIED: usize = 4;
 
 /// A radius larger than a test point asks for by this factor needs no closer look.
 const LAX: f32 = 1.05;
@@ -50,7 +49,7 @@ const LOST: f32 = 1e-20;
 /// Samples that are worked on together.
 pub(crate) const WIDTH: usize = 8;
 
-/// Places side by side; where there are fewer than lanes, one of them again.
+/// Places side by side; where there are fewer than lanes, places infinitely far away.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Centres {
     blocks: [[[f32; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH],
@@ -59,7 +58,7 @@ pub(crate) struct Centres {
 
 impl Default for Centres {
     fn default() -> Self {
-        Self { blocks: [[[0.0; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH], len: 0 }
+        Self { blocks: [[[f32::INFINITY; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH], len: 0 }
     }
 }
 
@@ -77,7 +76,7 @@ impl Centres {
     pub(crate) fn push(&mut self, p: [f32; 3]) {
         let (block, lane) = (self.len / WIDTH, self.len % WIDTH);
         for (lanes, x) in self.blocks[block].iter_mut().zip(p) {
-            lanes[lane..].fill(x);
+            lanes[lane] = x;
         }
         self.len += 1;
     }
@@ -113,8 +112,59 @@ impl Centres {
         fold_min(&least)
     }
 
-    /// As seen from the box: relative to its centre, along its axes.
+    /// The same for several places side by side.
     #[inline]
+    fn each_nearest_sq<const N: usize>(&self, [px, py, pz]: &[[f32; N]; 3]) -> [f32; N] {
+        let mut least = [f32::INFINITY; N];
+        for [x, y, z] in self.iter() {
+            for i in 0..N {
+                let d = [x - px[i], y - py[i], z - pz[i]];
+                let d_sq = dot(d, d);
+                least[i] = if d_sq < least[i] { d_sq } else { least[i] };
+            }
+        }
+        least
+    }
+
+    /// The square of the least radius at which one ball alone contains the box; infinite if anything is no number.
+    #[inline]
+    fn far_sq(&self, bounds: &OrientedBox) -> f32 {
+        let OrientedBox { centre: c, half, axes, .. } = bounds;
+        let mut least = [f32::INFINITY; WIDTH];
+        for [x, y, z] in self.blocks() {
+            let mut d_sq = [0.0; WIDTH];
+            for (axis, half) in axes.iter().zip(half) {
+                for i in 0..WIDTH {
+                    let far = dot([x[i] - c[0], y[i] - c[1], z[i] - c[2]], *axis).abs() + half;
+                    d_sq[i] += far * far;
+                }
+            }
+            for i in 0..WIDTH {
+                least[i] = if d_sq[i] < least[i] { d_sq[i] } else { least[i] };
+            }
+        }
+        fold_min(&least)
+    }
+
+    /// For each disc the square of the least radius at which one ball alone contains it.
+    #[inline]
+    fn each_far_sq(&self, discs: &Discs) -> [f32; WIDTH] {
+        let Discs { foot: [px, py, pz], normal: [nx, ny, nz], radius } = discs;
+        let mut least = [f32::INFINITY; WIDTH];
+        for [x, y, z] in self.iter() {
+            for i in 0..WIDTH {
+                let d = [x - px[i], y - py[i], z - pz[i]];
+                let height = dot(d, [nx[i], ny[i], nz[i]]);
+                let across_sq = dot(d, d) - height * height;
+                let across = if across_sq > 0.0 { across_sq } else { 0.0 }.sqrt() + radius[i];
+                let d_sq = height * height + across * across;
+                least[i] = if d_sq < least[i] { d_sq } else { least[i] };
+            }
+        }
+        least
+    }
+
+    /// As seen from the box: relative to its centre, along its axes.
     fn along(&self, bounds: &OrientedBox) -> Self {
         let mut turned = Self { len: self.len, ..Self::default() };
         let c = bounds.centre;
@@ -128,10 +178,9 @@ impl Centres {
         turned
     }
 
-    /// The square of the least radius at which one ball alone contains the box between `middle` ± `half`; infinite
-    /// if anything is no number.
+    /// As [`Self::far_sq`], of the box between `middle` ± `half`.
     #[inline]
-    fn far_sq(&self, middle: [f32; 3], half: [f32; 3]) -> f32 {
+    fn far_part_sq(&self, middle: [f32; 3], half: [f32; 3]) -> f32 {
         let mut least = [f32::INFINITY; WIDTH];
         for [x, y, z] in self.blocks() {
             for i in 0..WIDTH {
@@ -150,7 +199,12 @@ impl Centres {
 
 #[inline]
 fn fold_min(lanes: &[f32; WIDTH]) -> f32 {
-    lanes.iter().fold(f32::INFINITY, |m, &x| if x < m { x } else { m })
+    let less = |a: f32, b: f32| if a < b { a } else { b };
+    let mut four = [0.0; WIDTH / 2];
+    for i in 0..WIDTH / 2 {
+        four[i] = less(lanes[i], lanes[i + WIDTH / 2]);
+    }
+    less(less(four[0], four[2]), less(four[1], four[3]))
 }
 
 /// What coverings are measured against.
@@ -219,65 +273,94 @@ impl Ground<'_> {
                 radius.test(centres, &self.enclosure(self.leaf(node, random.next() >> 32)));
             }
         }
-        let mut stack = [0_u32; TREE_STACK];
-        stack[0] = id32(node);
-        let mut top = 1;
-        while top > 0 {
-            top -= 1;
-            let id = stack[top] as usize;
-            let bounds = self.enclosure(id);
-            let seen = centres.along(&bounds);
-            if radius.admits(seen.far_sq([0.0; 3], bounds.half)) {
-                continue;
-            }
-            if self.nodes[id].is_leaf() {
+        self.descend(
+            node,
+            &mut radius,
+            |id| centres.far_sq(&self.enclosure(id)),
+            Radius::admits,
+            |radius, leaf| {
+                let bounds = self.enclosure(leaf);
                 radius.test(centres, &bounds);
-                radius.cover(&seen, bounds.half);
-            } else {
-                stack[top] = self.nodes[id].right;
-                stack[top + 1] = id32(id) + 1;
-                top += 2;
-            }
-        }
+                radius.cover(&centres.along(&bounds), bounds.half);
+            },
+        );
         radius.certified.sqrt() * GROWN + LOST
     }
 
-    /// A radius at which balls about `centres` cover the discs, moved to the foot points, of all points under `node`,
-    /// as far as four points on the rim of each show. `lifts` are the squares of the furthest ways to a foot point.
+    /// A radius at which each disc of a point under `node`, moved to its foot point, lies in one of the balls about
+    /// `centres`: the least. `lifts` are the squares of the furthest ways to a foot point.
     fn sampling_radius(&self, node: usize, centres: &Centres, lifts: &[f32]) -> f32 {
-        let mut radius = 0.0_f32;
-        let mut stack = [0_u32; TREE_STACK];
-        stack[0] = id32(node);
+        let mut radius_sq = 0.0_f32;
+        self.descend(
+            node,
+            &mut radius_sq,
+            |id| (centres.far_sq(&self.boxes[id]).sqrt() + lifts[id].sqrt()).powi(2),
+            |radius_sq, far_sq| far_sq <= *radius_sq,
+            |radius_sq, leaf| {
+                let points = self.nodes[leaf].points();
+                for start in points.clone().step_by(WIDTH) {
+                    let far_sq = centres.each_far_sq(&self.discs(start, points.end));
+                    *radius_sq = far_sq.iter().fold(*radius_sq, |m, &d_sq| m.max(d_sq));
+                }
+            },
+        );
+        radius_sq.sqrt()
+    }
+
+    /// Visits those leaves under `node` with whose greatest distance, by `far_sq`, `admits` is not content, nor with that of any
+    /// node above; of two children the further first, so that little is left to visit.
+    fn descend<T>(
+        &self,
+        node: usize,
+        state: &mut T,
+        far_sq: impl Fn(usize) -> f32,
+        admits: impl Fn(&mut T, f32) -> bool,
+        mut visit: impl FnMut(&mut T, usize),
+    ) {
+        let mut stack = [(0_u32, 0.0_f32); TREE_STACK];
+        stack[0] = (id32(node), far_sq(node));
         let mut top = 1;
         while top > 0 {
             top -= 1;
-            let id = stack[top] as usize;
-            let bounds = &self.boxes[id];
-            let far = centres.along(bounds).far_sq([0.0; 3], bounds.half).sqrt() + lifts[id].sqrt();
-            if far <= radius {
+            let (id, far) = stack[top];
+            let id = id as usize;
+            if admits(state, far) {
                 continue;
             }
-            let children = &self.nodes[id];
-            if !children.is_leaf() {
-                stack[top] = children.right;
-                stack[top + 1] = id32(id) + 1;
-                top += 2;
+            if self.nodes[id].is_leaf() {
+                visit(state, id);
                 continue;
             }
-            for i in children.points() {
-                let (foot, disc) = (self.feet[i], self.discs[i]);
-                if centres.nearest_sq(foot).sqrt() + disc <= radius {
-                    continue;
-                }
-                let (u, v) = tangents(self.normals[i]);
-                for (axis, length) in [(u, disc), (u, -disc), (v, disc), (v, -disc)] {
-                    let rim = [0, 1, 2].map(|k| foot[k] + length * axis[k]);
-                    radius = radius.max(centres.nearest_sq(rim).sqrt());
-                }
-            }
+            let [left, right] =
+                [id + 1, self.nodes[id].right as usize].map(|child| (id32(child), far_sq(child)));
+            let (near, far) = if left.1 > right.1 { (right, left) } else { (left, right) };
+            stack[top] = near;
+            stack[top + 1] = far;
+            top += 2;
         }
-        radius
     }
+
+    /// The discs from that of point `start` on, moved to their foot points; if there are too few, the last again.
+    #[inline]
+    fn discs(&self, start: usize, end: usize) -> Discs {
+        let mut discs = Discs { foot: [[0.0; WIDTH]; 3], normal: [[0.0; WIDTH]; 3], radius: [0.0; WIDTH] };
+        for lane in 0..WIDTH {
+            let i = (start + lane).min(end - 1);
+            for k in 0..3 {
+                discs.foot[k][lane] = self.feet[i][k];
+                discs.normal[k][lane] = self.normals[i][k];
+            }
+            discs.radius[lane] = self.discs[i];
+        }
+        discs
+    }
+}
+
+/// Discs side by side.
+struct Discs {
+    foot: [[f32; WIDTH]; 3],
+    normal: [[f32; WIDTH]; 3],
+    radius: [f32; WIDTH],
 }
 
 /// Squares of radii.
@@ -291,13 +374,15 @@ struct Radius {
 impl Radius {
     /// Tests the corners of a box.
     fn test(&mut self, centres: &Centres, bounds: &OrientedBox) {
-        let [hx, hy, hz] = bounds.half;
-        let [ux, uy, uz] = bounds.axes;
-        for (x, y, z) in CORNERS {
-            let p = [0, 1, 2].map(|k| bounds.centre[k] + x * hx * ux[k] + y * hy * uy[k] + z * hz * uz[k]);
-            let d_sq = centres.nearest_sq(p);
-            self.tested = if d_sq > self.tested { d_sq } else { self.tested };
-        }
+        let edge = |k: usize| bounds.axes[k].map(|x| x * bounds.half[k]);
+        let [u, v, w] = [edge(0), edge(1), edge(2)];
+        let corners = [0, 1, 2].map(|k| {
+            let (a, b) = (bounds.centre[k] - w[k], bounds.centre[k] + w[k]);
+            let (c, d) = (u[k] + v[k], u[k] - v[k]);
+            [a + c, a - c, a + d, a - d, b + c, b - c, b + d, b - d]
+        });
+        let away = centres.each_nearest_sq(&corners);
+        self.tested = away.iter().fold(self.tested, |m, &d_sq| if d_sq > m { d_sq } else { m });
     }
 
     /// Whether a ball of this squared radius is within what may be certified without a closer look; then it is.
@@ -316,7 +401,7 @@ impl Radius {
         while top > 0 {
             top -= 1;
             let (middle, mut half, depth) = stack[top];
-            let far_sq = centres.far_sq(middle, half);
+            let far_sq = centres.far_part_sq(middle, half);
             if self.admits(far_sq) {
                 continue;
             }
@@ -335,15 +420,3 @@ impl Radius {
         }
     }
 }
-
-/// The signs of a box' corners.
-const CORNERS: [(f32, f32, f32); 8] = [
-    (-1.0, -1.0, -1.0),
-    (-1.0, -1.0, 1.0),
-    (-1.0, 1.0, -1.0),
-    (-1.0, 1.0, 1.0),
-    (1.0, -1.0, -1.0),
-    (1.0, -1.0, 1.0),
-    (1.0, 1.0, -1.0),
-    (1.0, 1.0, 1.0),
-];

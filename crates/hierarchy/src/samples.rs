@@ -22,7 +22,7 @@ pub(crate) const MOST_SAMPLES: usize = 32;
 pub(crate) type List = [u32; MOST_SAMPLES];
 
 /// Draws for each sample. More spread the samples better and cost as much more (docs/decisions/0009).
-const DRAWS: usize = 3;
+const DRAWS: usize = 2;
 
 /// 2⁶⁴ over the golden ratio: its multiples are spread evenly over all of 2⁶⁴, however many there are.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -5,7 +5,7 @@ use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, OrientedBox, PointHierarchy};
 use nearmiss_surface::project;
 use nearmiss_testdata::arbitrary::{self, CloudKind};
-use nearmiss_testdata::oracle::{Solid, covering_radius, to_nearest};
+use nearmiss_testdata::oracle::{Disc, Solid, covering_radius, to_nearest};
 
 const OPTIONS: [(u32, u32); 4] = [(16, 16), (4, 32), (64, 8), (16, 24)];
 
@@ -106,39 +106,31 @@ fn surface_points_are_in_the_coverings_of_every_node_of_their_nearest_point() {
     assert!(found > 5000, "{found} surface points");
 }
 
-/// Definition 4 as it is measured: four points on the rim of each disc, moved to the foot point.
+/// Definition 4 as it is measured: on discs, moved to the foot points.
 #[test]
 fn sampling_radii_equal_the_twin() {
     let mut nodes = 0;
     for (kind, scan) in scans(300) {
-        let mut rims = Vec::new();
-        for i in 0..scan.len() {
-            let n = scan.normals()[i].map(f64::from);
+        let discs = (0..scan.len()).map(|i| {
             let p = scan.positions()[i].map(f64::from);
             let at = scan.evaluate(p);
-            let foot = [0, 1, 2].map(|k| p[k] + at.f * at.normal[k]);
-            // Duff et al. 2017.
-            let sign = 1.0_f64.copysign(n[2]);
-            let a = -1.0 / (sign + n[2]);
-            let b = n[0] * n[1] * a;
-            let u = [1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]];
-            let v = [b, sign + n[1] * n[1] * a, -n[1]];
-            let disc = f64::from(scan.discs()[i]);
-            rims.push(
-                [(u, 1.0), (u, -1.0), (v, 1.0), (v, -1.0)]
-                    .map(|(t, s)| [0, 1, 2].map(|k| foot[k] + s * disc * t[k])),
-            );
-        }
+            let centre = [0, 1, 2].map(|k| p[k] + at.f * at.normal[k]);
+            Disc { centre, normal: scan.normals()[i].map(f64::from), radius: f64::from(scan.discs()[i]) }
+        });
+        let discs: Vec<Disc> = discs.collect();
         for (id, node) in scan.nodes().iter().enumerate() {
             let centres = centres(&scan, id);
-            let distances = rims[node.points()].iter().flatten().map(|x| to_nearest(&centres, *x));
-            let most = f64::from(scan.slices().covering_radius(id));
-            let expected = distances.fold(0.0, f64::max).min(most);
+            let radii = discs[node.points()].iter().map(|disc| {
+                let far = centres.iter().map(|c| disc.furthest(*c));
+                far.fold(f64::INFINITY, f64::min)
+            });
+            let expected = radii.fold(0.0, f64::max).min(f64::from(scan.slices().covering_radius(id)));
             let found = f64::from(scan.slices().sampling_radius_of(id));
-            // Rims have the digits of single precision, far from the origin too.
+            // The way across is a root of a difference; foot points have the digits of single precision, far from
+            // the origin too.
             let reach = centres.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
             let error = (found - expected).abs();
-            assert!(error <= 2e-4 * expected + 2e-7 * reach, "{kind:?}, node {id}: {found}, not {expected}");
+            assert!(error <= 5e-4 * expected + 2e-7 * reach, "{kind:?}, node {id}: {found}, not {expected}");
             nodes += 1;
         }
     }

@@ -13,6 +13,16 @@ pub struct Disc {
     pub radius: f64,
 }
 
+impl Disc {
+    /// The greatest distance of a point of the disc from `x`.
+    #[must_use]
+    pub fn furthest(&self, x: [f64; 3]) -> f64 {
+        let d = Vector3::from(x) - Vector3::from(self.centre);
+        let height = d.dot(&Vector3::from(self.normal));
+        height.hypot((d - height * Vector3::from(self.normal)).norm() + self.radius)
+    }
+}
+
 /// What [`crossing`] finds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
