@@ -4,6 +4,7 @@ pub mod arguments;
 pub mod asked;
 pub mod clock;
 pub mod counting;
+pub mod hulls;
 pub mod machine;
 pub mod object;
 pub mod poses;

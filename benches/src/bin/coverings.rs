@@ -1,0 +1,287 @@
+//! What samples and sphere coverings are worth: how tight, how right, what they exclude.
+//!
+//! `coverings OBJECT… [--samples N] [--points N] [--nodes N] [--draws N] [--poses N] [--seed N]`
+//!
+//! Of each level of each object, over some of its nodes: the covering radius beside the one that the paper's growth alone
+//! ends with; the volume of the balls over that of the hulls and of the enclosures; the sampling radius as it is stored,
+//! as it is on projected surface points, and by eq. 10. Then a million (`--points`) surface points against the
+//! coverings of their leaves and all nodes above; and how many pairs of nodes, whose boxes overlap, coverings exclude.
+//! Ends with status 1 if a surface point is outside.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::ops::ControlFlow;
+use std::process::ExitCode;
+
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nearmiss::geometry::NodeId;
+use nearmiss::hierarchy::{GatherScratch, NodePair, Relative, Slices, Split, Stack, Visitor, apart, descend};
+use nearmiss::surface::project;
+use nearmiss::{BuildOptions, Pose, Scan};
+use nearmiss_benches::hulls::{Hulls, Volumes};
+use nearmiss_benches::object::Object;
+use nearmiss_benches::sample::count;
+use nearmiss_benches::{Failure, arguments::Arguments, machine, poses};
+use nearmiss_testdata::arbitrary::{point_in, rng};
+
+/// How much is drawn.
+#[derive(Debug, Clone, Copy)]
+struct Effort {
+    samples: u32,
+    points: usize,
+    nodes: usize,
+    draws: usize,
+    poses: usize,
+    seed: u64,
+}
+
+fn main() -> Result<ExitCode, Failure> {
+    let mut arguments = Arguments::of_process();
+    let effort = Effort {
+        samples: arguments.value("--samples")?.unwrap_or(BuildOptions::default().samples),
+        points: arguments.value("--points")?.unwrap_or(1_000_000),
+        nodes: arguments.value("--nodes")?.unwrap_or(24),
+        draws: arguments.value("--draws")?.unwrap_or(4000),
+        poses: arguments.value("--poses")?.unwrap_or(4),
+        seed: arguments.value("--seed")?.unwrap_or(1),
+    };
+    let mut names = arguments.words()?;
+    if names.is_empty() {
+        names.push("dragon-23k".into());
+    }
+    println!("{}", machine::description());
+    let mut outside = 0;
+    for name in names {
+        let object = Object::read(&name)?.scaled()?;
+        let scan = Scan::build(&object.cloud, &BuildOptions::default().with_samples(effort.samples))?;
+        println!("\n## {}, {} points, {} samples a node\n", object.name, scan.len(), effort.samples);
+        bytes(&scan);
+        let (found, radii) = surface_points(&scan, effort)?;
+        outside += found;
+        levels(&scan, effort, &radii);
+        exclusions(&object, &scan, effort)?;
+    }
+    Ok(if outside == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn bytes(scan: &Scan) {
+    let slices = scan.slices();
+    let all = size_of_val(slices.nodes)
+        + size_of_val(slices.boxes)
+        + size_of_val(slices.growths)
+        + size_of_val(slices.coverings)
+        + size_of_val(slices.sample_lists)
+        + size_of_val(scan.cones());
+    println!(
+        "{:.1} bytes a node, {:.1} a point for nodes\n",
+        count(all) / count(slices.nodes.len()),
+        count(all) / count(scan.len())
+    );
+}
+
+/// Projects random places near the scan; how many of those that are surface are in no ball of some node that has their
+/// nearest point, and for each node how far the furthest is from its samples.
+fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Failure> {
+    let slices = scan.slices();
+    let tree: ImmutableKdTree<f64, 3> = {
+        let points: Vec<[f64; 3]> = slices.positions.iter().map(|p| p.map(f64::from)).collect();
+        ImmutableKdTree::new_from_slice(&points).map_err(|e| format!("{e:?}"))?
+    };
+    let mut scratch = GatherScratch::default();
+    let mut random = rng(effort.seed);
+    let mut furthest_sq = vec![0.0_f64; slices.nodes.len()];
+    let mut found = 0;
+    for i in 0.. {
+        if found == effort.points || i > 4 * effort.points {
+            break;
+        }
+        let i = i % scan.len();
+        let away = point_in(&mut random, 1.5 * f64::from(slices.radii[i]));
+        let start = [0, 1, 2].map(|k| f64::from(slices.positions[i][k]) + away[k]);
+        let foot = project(start, |x| scan.evaluate_with(x, &mut scratch));
+        if !foot.converged {
+            continue;
+        }
+        found += 1;
+        let nearest = tree.query(&foot.point).nearest_one::<SquaredEuclidean<f64>>().execute();
+        let point = nearest.item;
+        let mut id = 0;
+        loop {
+            let far = slices.samples(id).iter().map(|i| {
+                (0..3).map(|k| (f64::from(slices.positions[i][k]) - foot.point[k]).powi(2)).sum::<f64>()
+            });
+            furthest_sq[id] = furthest_sq[id].max(far.fold(f64::INFINITY, f64::min));
+            let node = &slices.nodes[id];
+            if node.is_leaf() {
+                break;
+            }
+            let right = node.right as usize;
+            id = if point < slices.nodes[right].first { id + 1 } else { right };
+        }
+    }
+    let radii: Vec<f64> = furthest_sq.into_iter().map(f64::sqrt).collect();
+    let outside = (0..radii.len()).filter(|&id| radii[id] > f64::from(slices.covering_radius(id))).count();
+    println!("{found} surface points; {outside} of {} nodes have one outside their balls\n", radii.len());
+    Ok((outside, radii))
+}
+
+/// For each node its depth.
+fn depths(slices: &Slices<'_>) -> Vec<usize> {
+    let mut depths = vec![0; slices.nodes.len()];
+    for (id, node) in slices.nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
+        depths[id + 1] = depths[id] + 1;
+        depths[node.right as usize] = depths[id] + 1;
+    }
+    depths
+}
+
+fn levels(scan: &Scan, effort: Effort, projected: &[f64]) {
+    let slices = scan.slices();
+    let hulls = Hulls::new(scan);
+    let depths = depths(&slices);
+    let mut random = rng(effort.seed);
+    let mut share = || 0.5 + 0.5 * point_in(&mut random, 1.0)[0];
+    println!(
+        "Radii in sampling radii of the scan, means over a level; ratios of sums; `grown` is the paper's radius.\n"
+    );
+    println!(
+        "| depth | nodes | certified | grown | certified/grown | too short | stored r(P′) | projected | eq. 10 | K/H | K/E |"
+    );
+    println!("| --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |");
+    for depth in 0..=depths.iter().copied().max().unwrap_or(0) {
+        let all: Vec<usize> = (0..depths.len()).filter(|&id| depths[id] == depth).collect();
+        let step = all.len().div_ceil(effort.nodes);
+        let some: Vec<usize> = all.iter().copied().step_by(step).collect();
+        let mut sums = [0.0; 5];
+        let (mut volumes, mut short) = (Volumes::default(), 0);
+        for &id in &some {
+            let grown = hulls.grown_radius(&slices, id, &mut share);
+            let own = [
+                f64::from(slices.covering_radius(id)),
+                grown,
+                f64::from(slices.sampling_radius_of(id)),
+                projected[id],
+                f64::from(slices.node_horizon(id)) / scan.plan().options().horizon,
+            ];
+            short += usize::from(grown < projected[id]);
+            for (sum, x) in sums.iter_mut().zip(own) {
+                *sum += x;
+            }
+            let v = hulls.volumes(&slices, id, effort.draws, &mut share);
+            volumes.balls += v.balls;
+            volumes.hulls += v.hulls;
+            volumes.enclosures += v.enclosures;
+        }
+        let [certified, grown, stored, measured, expected] =
+            sums.map(|sum| sum / count(some.len()) / f64::from(slices.sampling_radius));
+        println!(
+            "| {depth} | {} | {certified:.2} | {grown:.2} | {:.2} | {:.0} % | {stored:.2} | {measured:.2} | {expected:.2} | {:.2} | {:.2} |",
+            all.len(),
+            certified / grown,
+            100.0 * count(short) / count(some.len()),
+            volumes.balls / volumes.hulls,
+            volumes.balls / volumes.enclosures,
+        );
+    }
+}
+
+/// Pairs of nodes whose boxes overlap, and what coverings say of them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pairs {
+    inner: [usize; 2],
+    leaves: [usize; 2],
+    /// Not even their enclosures part them.
+    enclosed: [usize; 2],
+}
+
+struct Descent<'a> {
+    a: Slices<'a>,
+    b: Slices<'a>,
+    motion: Relative,
+    /// Whether what coverings part is left out.
+    excludes: bool,
+    pairs: Pairs,
+}
+
+impl Visitor for Descent<'_> {
+    fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
+        let boxes = |slices: &Slices<'_>, ids: [NodeId; 2]| ids.map(|id| slices.boxes[id.index()]);
+        let ([a0, a1], [b0, b1]) = (boxes(&self.a, a), boxes(&self.b, b));
+        let gaps = self.motion.gaps([&a0, &a1], [&b0, &b1]);
+        let mut urgent = [None; 4];
+        for (i, gap) in gaps.into_iter().enumerate() {
+            let doubled = i >> 1 == 1 && a[0] == a[1] || i & 1 == 1 && b[0] == b[1];
+            if doubled || gap > self.motion.slack() {
+                continue;
+            }
+            let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
+            let (node_a, node_b) = (pair.a.index(), pair.b.index());
+            let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0);
+            let leaves = self.a.nodes[node_a].is_leaf() && self.b.nodes[node_b].is_leaf();
+            let kind = if leaves { &mut self.pairs.leaves } else { &mut self.pairs.inner };
+            kind[0] += 1;
+            kind[1] += usize::from(excluded);
+            let (a, b) = (self.a.enclosure(node_a), self.b.enclosure(node_b));
+            if self.motion.gaps([&a; 2], [&b; 2])[0] <= self.motion.slack() {
+                self.pairs.enclosed[0] += 1;
+                self.pairs.enclosed[1] += usize::from(excluded);
+            }
+            urgent[i] = (!(excluded && self.excludes)).then_some(-gap);
+        }
+        debug_assert!(count > 0, "there are pairs to look at");
+        urgent
+    }
+
+    fn leaves(&mut self, _: NodePair) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    fn split(&self, _: NodePair) -> Split {
+        Split::Both
+    }
+
+    fn go_on(&mut self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+fn exclusions(object: &Object, scan: &Scan, effort: Effort) -> Result<(), Failure> {
+    let near: Vec<Pose> =
+        poses::near(object, 13 * effort.poses, effort.seed)?.iter().map(|near| near.pose).collect();
+    let sweep: Vec<Pose> = poses::sweep(effort.poses, effort.seed, 0).into_iter().flatten().collect();
+    println!("\nPairs of nodes that a descent by boxes visits, to the end; `excluded` by coverings.\n");
+    println!(
+        "| poses | inner pairs | excluded | leaf pairs | excluded | beyond enclosures | excluded | leaf pairs left in a descent with coverings |"
+    );
+    println!("| --- | --: | --: | --: | --: | --: | --: | --: |");
+    for (name, poses) in [("sweep", sweep), ("near first touch", near)] {
+        let mut sums = [Pairs::default(); 2];
+        for pose in &poses {
+            for (excludes, sum) in [false, true].into_iter().zip(&mut sums) {
+                let frame = scan.frame();
+                let stored = Pose::IDENTITY.with_scale(frame.scale).with_translation(frame.origin);
+                let motion = Relative::new(&stored.inverse().after(&pose.after(&stored)), 16.0 / frame.scale);
+                let mut descent =
+                    Descent { a: scan.slices(), b: scan.slices(), motion, excludes, pairs: *sum };
+                let nodes = scan.nodes();
+                if descend(nodes, nodes, &mut descent, &mut Stack::default()).is_break() {
+                    return Err("a descent ended early".into());
+                }
+                *sum = descent.pairs;
+            }
+        }
+        let [all, left] = sums;
+        let percent = |[all, some]: [usize; 2]| 100.0 * count(some) / count(all.max(1));
+        println!(
+            "| {} {name} | {} | {:.2} % | {} | {:.2} % | {} | {:.2} % | {:.1} % |",
+            poses.len(),
+            all.inner[0],
+            percent(all.inner),
+            all.leaves[0],
+            percent(all.leaves),
+            all.enclosed[0],
+            percent(all.enclosed),
+            percent([all.leaves[0], left.leaves[0] - left.leaves[1]]),
+        );
+    }
+    Ok(())
+}
