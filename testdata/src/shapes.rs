@@ -7,6 +7,7 @@
 //! Random numbers are the same on every platform; sines and logarithms may differ in their last bit.
 
 mod forms;
+mod mesh;
 mod primitive;
 mod sampling;
 

@@ -2,6 +2,7 @@
 //!
 //! * `demo` — the main job on a real scan, with a table and a picture.
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
+//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, measured.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
 //! * `field` — f over a slice of a noisy scan, and how often its normal changes sides.
@@ -15,6 +16,7 @@ mod demo;
 mod field;
 mod fuzz;
 mod repository;
+mod tables;
 mod tidy;
 
 use std::process::ExitCode;
@@ -30,6 +32,8 @@ of the repository
                  whether what `collide A B --prove PROOF` wrote holds, by means of its own
   field SCAN [--noise 0.1] -o OUT.png
                  a picture of f over a slice of a noisy scan; --table counts where its normal flips
+  tables -o FOLDER [--data FOLDER] [--quick]
+                 Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, measured
   fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
@@ -53,6 +57,7 @@ fn main() -> ExitCode {
         ["check-proof", ..] => check_proof::run(std::env::args_os().skip(1)),
         ["field", ..] => field::run(std::env::args_os().skip(1)),
         ["fuzz", words @ ..] => fuzz::run(words),
+        ["tables", words @ ..] => tables::run(words),
         ["test", names @ ..] => checks::run(names),
         _ => return nearmiss_cli::run(std::env::args_os()),
     };

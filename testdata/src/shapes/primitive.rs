@@ -229,18 +229,18 @@ fn length(v: [f64; 3]) -> f64 {
 }
 
 /// How many steps of about `spacing` make `length`, at least one.
-fn steps(length: f64, spacing: f64) -> usize {
+pub(super) fn steps(length: f64, spacing: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
     let n = (length / spacing).round().max(1.0) as usize;
     n
 }
 
-fn rectangle_point(corner: [f64; 3], u: [f64; 3], v: [f64; 3], [s, t]: [f64; 2]) -> Oriented {
+pub(super) fn rectangle_point(corner: [f64; 3], u: [f64; 3], v: [f64; 3], [s, t]: [f64; 2]) -> Oriented {
     let (u, v) = (Vector3::from(u), Vector3::from(v));
     (Vector3::from(corner) + s * u + t * v, u.cross(&v).normalize())
 }
 
-fn torus_point(major: f64, minor: f64, turn: f64, tube: f64) -> Oriented {
+pub(super) fn torus_point(major: f64, minor: f64, turn: f64, tube: f64) -> Oriented {
     let outwards = Vector3::new(turn.cos(), turn.sin(), 0.0);
     let n = tube.cos() * outwards + tube.sin() * Vector3::z();
     (major * outwards + minor * n, n)

@@ -1,0 +1,199 @@
+//! Figs 9 to 12: time over distance, and differences to an exact test of polygons.
+
+use std::hint::black_box;
+
+use nearmiss::hierarchy::Relative;
+use nearmiss::{Answer, Pose, Reason, Scan, Verdict};
+
+use crate::clock::{nanoseconds, timed};
+use crate::poses::{DISTANCES, distance};
+use crate::rivals::Method;
+use crate::sample::{Sample, count};
+
+/// Distances over which the paper averages differences.
+const AVERAGED: std::ops::RangeInclusive<f64> = 0.6..=2.0;
+
+/// Poses to warm up with before a distance.
+const WARM_UP: usize = 20;
+
+/// How answers compare with the exact test at one distance, of poses at which the boxes of the roots intersect.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Difference {
+    /// Such poses.
+    pub tests: usize,
+    /// Hits that are none, and misses.
+    pub differ: usize,
+    /// No verdict, and no time left to find one: then the better guess is what differs or not.
+    pub unfinished: usize,
+    /// No verdict, for other reasons: neither a difference nor an agreement.
+    pub undecided: usize,
+}
+
+impl Difference {
+    /// In percent of the tests; zero of none.
+    #[must_use]
+    pub fn percent(&self) -> f64 {
+        100.0 * count(self.differ) / count(self.tests.max(1))
+    }
+}
+
+/// What one way to ask did over the distances of the sweep.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Course {
+    /// Times of single queries.
+    pub times: [Sample; DISTANCES],
+    /// Against the exact test; of none where there is no mesh.
+    pub differences: [Difference; DISTANCES],
+}
+
+/// The poses of a course with what is known of them.
+#[derive(Debug, Clone)]
+pub struct Questions {
+    poses: [Vec<Pose>; DISTANCES],
+    /// Whether the meshes intersect.
+    exact: Option<[Vec<bool>; DISTANCES]>,
+    /// Whether the boxes of the roots do.
+    close: [Vec<bool>; DISTANCES],
+}
+
+impl Questions {
+    /// Asks `exact`, of the mesh of the scan, about all poses.
+    #[must_use]
+    pub fn new(poses: [Vec<Pose>; DISTANCES], scan: &Scan, exact: Option<&mut dyn Method>) -> Self {
+        let close = poses.each_ref().map(|poses| poses.iter().map(|pose| roots_meet(scan, pose)).collect());
+        let exact = exact.map(|mesh| {
+            let mut ask =
+                |poses: &Vec<Pose>| poses.iter().map(|p| mesh.ask(&Pose::IDENTITY, p).hit).collect();
+            poses.each_ref().map(&mut ask)
+        });
+        Self { poses, exact, close }
+    }
+}
+
+/// Whether the boxes of the roots overlap, the second copy of the scan being at `pose`. Objects scaled for the sweep are
+/// stored in their own frame.
+fn roots_meet(scan: &Scan, pose: &Pose) -> bool {
+    let root = &scan.boxes()[0];
+    let relative = Relative::new(pose, f64::from(root.radius()));
+    relative.gaps([root; 2], [root; 2])[0] <= relative.slack()
+}
+
+impl Difference {
+    /// Counts an answer, `exact` being the truth about polygons.
+    fn count(&mut self, verdict: &Verdict, exact: bool) {
+        self.tests += 1;
+        let hit = match verdict {
+            Verdict::Undecided(Reason::Budget { likelihood }) => {
+                self.unfinished += 1;
+                *likelihood >= 0.5
+            }
+            Verdict::Undecided(_) => {
+                self.undecided += 1;
+                return;
+            }
+            _ => verdict.is_intersecting(),
+        };
+        self.differ += usize::from(hit != exact);
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.tests += other.tests;
+        self.differ += other.differ;
+        self.unfinished += other.unfinished;
+        self.undecided += other.undecided;
+    }
+}
+
+impl Course {
+    /// Asks all questions `passes` times, distance by distance; the time of a question is the least it took, which leaves out
+    /// what other programs took. Answers that count are the first.
+    ///
+    /// Thousands of other questions come between those that are the same.
+    pub fn run(questions: &Questions, passes: usize, mut ask: impl FnMut(&Pose) -> Answer) -> Self {
+        let mut course = Self::default();
+        let mut least = questions.poses.each_ref().map(|poses| vec![f64::INFINITY; poses.len()]);
+        for pass in 0..passes {
+            for (i, poses) in questions.poses.iter().enumerate() {
+                for pose in poses.iter().take(WARM_UP) {
+                    black_box(ask(pose));
+                }
+                for (k, pose) in poses.iter().enumerate() {
+                    let (answer, time) = timed(|| black_box(ask(black_box(pose))));
+                    least[i][k] = least[i][k].min(nanoseconds(time));
+                    let exact = questions.exact.as_ref().filter(|_| pass == 0 && questions.close[i][k]);
+                    if let Some(exact) = exact {
+                        course.differences[i].count(&answer.verdict, exact[i][k]);
+                    }
+                }
+            }
+        }
+        for (sample, times) in course.times.iter_mut().zip(least) {
+            times.into_iter().for_each(|time| sample.push(time));
+        }
+        course
+    }
+
+    /// Distance and mean time in microseconds.
+    #[must_use]
+    pub fn mean_times(&self) -> Vec<[f64; 2]> {
+        (0..DISTANCES).map(|i| [distance(i), self.times[i].summary().mean / 1e3]).collect()
+    }
+
+    /// Distance and differences in percent, where there were tests.
+    #[must_use]
+    pub fn percents(&self) -> Vec<[f64; 2]> {
+        let tested = (0..DISTANCES).filter(|&i| self.differences[i].tests > 0);
+        tested.map(|i| [distance(i), self.differences[i].percent()]).collect()
+    }
+
+    /// The average of mean times over all distances, in microseconds.
+    #[must_use]
+    pub fn sweep_mean(&self) -> f64 {
+        self.mean_times().iter().map(|p| p[1]).sum::<f64>() / count(DISTANCES)
+    }
+
+    /// All tests at distances of 0.6 to 2 together, as the paper averages them.
+    #[must_use]
+    pub fn averaged(&self) -> Difference {
+        let within = (0..DISTANCES).filter(|&i| AVERAGED.contains(&distance(i)));
+        within.fold(Difference::default(), |mut sum, i| {
+            sum.add(&self.differences[i]);
+            sum
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::object::Object;
+    use crate::poses::sweep;
+    use crate::rivals::parry::MeshTree;
+    use nearmiss::{Budget, BuildOptions, CollideOptions, CollidePlan, collide};
+
+    #[test]
+    fn an_exact_answer_does_not_differ_and_its_contrary_always() {
+        let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
+        let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
+        let mut mesh = MeshTree::new(object.mesh.as_ref().unwrap());
+        let poses = sweep(30, 1, 0);
+        let questions = Questions::new(poses, &scan, Some(&mut mesh));
+        let exact = questions.exact.as_ref().unwrap();
+        // What intersects has boxes that do; some boxes do although nothing else does.
+        let pairs = || exact.iter().flatten().zip(questions.close.iter().flatten());
+        assert!(pairs().all(|(&hit, &close)| close || !hit), "a hit with boxes apart");
+        assert!(pairs().any(|(&hit, &close)| close && !hit), "boxes meet, meshes do not");
+
+        let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
+        let a = scan.at(&Pose::IDENTITY);
+        let course =
+            Course::run(&questions, 2, |pose| collide(&a, &scan.at(pose), &plan, &Budget::UNLIMITED));
+        let Difference { tests, differ, undecided, unfinished } = course.averaged();
+        assert!(tests > 80 && differ * 10 < tests && undecided * 10 < tests && unfinished == 0, "{course:?}");
+        let none = Budget::UNLIMITED.with_work(0);
+        let guessed = Course::run(&questions, 1, |pose| collide(&a, &scan.at(pose), &plan, &none)).averaged();
+        assert!(guessed.tests == tests && guessed.unfinished > tests / 2, "{guessed:?}");
+        let times: usize = course.times.iter().map(Sample::len).sum();
+        assert_eq!(times, 30 * DISTANCES);
+    }
+}

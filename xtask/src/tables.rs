@@ -1,0 +1,27 @@
+//! `cargo xtask tables`: the table and plots of Klein & Zachmann 2004, measured.
+
+use crate::repository::{Outcome, root, run_cargo};
+
+/// Where the objects lie that are no part of the repository, from its root.
+const OBJECTS: &str = "../shared/data";
+
+/// Measures, with these words after the program's name; with the folder of objects, if it is there and none is named.
+pub(crate) fn run(words: &[&str]) -> Outcome {
+    let folder = root().join(OBJECTS);
+    let found = folder.is_dir() && !words.contains(&"--data") && std::env::var_os("NEARMISS_DATA").is_none();
+    let folder = folder.to_string_lossy();
+    let data: &[&str] = if found { &["--data", &folder] } else { &[] };
+    let here = std::env::current_dir()?;
+    // Cargo runs programs in the repository's root, whoever calls.
+    let mut absolute = Vec::new();
+    let mut words = words.iter();
+    while let Some(word) = words.next() {
+        absolute.push((*word).to_owned());
+        if let Some(path) = ["-o", "--data"].contains(word).then(|| words.next()).flatten() {
+            absolute.push(here.join(path).to_string_lossy().into_owned());
+        }
+    }
+    let program = ["run", "--release", "--quiet", "-p", "nearmiss-benches", "--bin", "klein2004", "--"];
+    let words: Vec<&str> = absolute.iter().map(String::as_str).collect();
+    run_cargo(&[&program, words.as_slice(), data].concat())
+}
