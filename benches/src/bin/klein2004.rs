@@ -136,7 +136,7 @@ fn figure_8<'a>(
     options: &Options,
     objects: impl Iterator<Item = &'a Object>,
 ) -> Result<(), Failure> {
-    let runs = if options.quick { 1 } else { 3 };
+    let runs = if options.quick { 1 } else { 5 };
     let mut lines = Vec::new();
     for (colour, object) in objects.enumerate() {
         eprintln!("Fig. 8: {}", object.name);
@@ -361,6 +361,7 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
         writeln!(text, "| {name} | {:.1} | {:.2} | {unfinished:.1} |", course.sweep_mean(), sum.percent())?;
     }
     by_distance(text, "mean µs", both.iter().map(|(name, course, _)| (*name, course.mean_times())))?;
+    by_distance(text, "median µs", both.iter().map(|(name, course, _)| (*name, course.median_times())))?;
     by_distance(text, "differ, %", both.iter().map(|(name, course, _)| (*name, course.percents())))?;
     let across = || Axis::even("distance of the centres, longest side 2");
     let lines = |of: &dyn Fn(&Course) -> Vec<[f64; 2]>| {
@@ -372,7 +373,8 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
         };
         both.iter().map(line).collect::<Vec<_>>()
     };
-    let mut times = lines(&Course::mean_times);
+    // Not means: what other programs take while one waits for the clock would be in them.
+    let mut times = lines(&Course::median_times);
     let level = options.target.as_secs_f64() * 1e6;
     times.push(Line {
         name: "t_max".into(),
@@ -383,7 +385,7 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
     let panels = [
         Panel {
             title: format!("Time of a query: {}", object.name),
-            axes: [across(), Axis::logarithmic("mean µs")],
+            axes: [across(), Axis::logarithmic("median µs")],
             lines: times,
         },
         Panel {

@@ -139,6 +139,12 @@ impl Course {
         (0..DISTANCES).map(|i| [distance(i), self.times[i].summary().mean / 1e3]).collect()
     }
 
+    /// Distance and median time in microseconds.
+    #[must_use]
+    pub fn median_times(&self) -> Vec<[f64; 2]> {
+        (0..DISTANCES).map(|i| [distance(i), self.times[i].summary().median / 1e3]).collect()
+    }
+
     /// Distance and differences in percent, where there were tests.
     #[must_use]
     pub fn percents(&self) -> Vec<[f64; 2]> {
