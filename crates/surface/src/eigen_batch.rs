@@ -11,6 +11,7 @@ const LANES: usize = 8;
 
 /// Eight symmetric matrices side by side.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(align(64))]
 pub struct MatrixBlock {
     entries: [[f64; LANES]; 6],
 }
@@ -33,6 +34,7 @@ impl MatrixBlock {
 
 /// The eigenpairs of eight matrices side by side.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[repr(align(64))]
 pub struct EigenBlock {
     /// Ascending in each lane.
     pub values: [[f64; LANES]; 3],
