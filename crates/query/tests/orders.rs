@@ -1,0 +1,204 @@
+//! Orders, coverings, resolutions and test points: the same verdicts in other ways.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_query::{
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Method, Order, PlanError,
+    Reason, Sampling, ScanView, Semantics, Verdict, collide, collide_with,
+};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+
+const ORDERS: [Order; 4] = [Order::DepthFirst, Order::Overlap, Order::Sides, Order::SidesByGap];
+
+fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
+    let leaf = BuildOptions::default().with_leaf_size(8);
+    PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &leaf).unwrap()
+}
+
+fn sphere(count: u32) -> PointHierarchy {
+    prepared(&arbitrary::cloud(CloudKind::Sphere, count, 7))
+}
+
+fn ask(
+    a: &PointHierarchy,
+    b: &PointHierarchy,
+    pose: &Pose,
+    options: &CollideOptions,
+    budget: &Budget,
+) -> Answer {
+    let plan = CollidePlan::new(options, a, b).unwrap();
+    collide(&ScanView::new(a, &Pose::IDENTITY), &ScanView::new(b, pose), &plan, budget)
+}
+
+fn kind(verdict: &Verdict) -> u8 {
+    match verdict {
+        Verdict::Intersecting { .. } => 0,
+        Verdict::Separated { .. } => 1,
+        Verdict::Undecided(_) => 2,
+    }
+}
+
+#[test]
+fn orders_and_coverings_change_no_verdict() {
+    let mut rng = arbitrary::rng(3);
+    let kinds =
+        [CloudKind::Sphere, CloudKind::Lattice, CloudKind::Clustered, CloudKind::Rings, CloudKind::Outlier];
+    let mut seen = [0; 3];
+    for (n, cloud) in (0_u64..).zip(kinds) {
+        let a = prepared(&arbitrary::cloud(cloud, 500, n));
+        let b = prepared(&arbitrary::cloud(cloud, 400, n + 9));
+        let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        for round in 0..60 {
+            let pose = arbitrary::rotation(&mut rng)
+                .with_translation(arbitrary::point_in(&mut rng, 2.5 * size))
+                .with_scale([1.0, 0.6][round % 2]);
+            let margin = [0.0, 0.05 * size][round / 30];
+            let base = CollideOptions::default()
+                .with_detail([Detail::Verdict, Detail::Witness][round % 2])
+                .with_margin(margin);
+            let certified = base.with_evidence(Evidence::Certified);
+            let expected = ask(&a, &b, &pose, &base, &Budget::UNLIMITED).verdict;
+            let proven = ask(&a, &b, &pose, &certified, &Budget::UNLIMITED).verdict;
+            seen[usize::from(kind(&expected))] += 1;
+            for order in ORDERS {
+                for coverings in [false, true] {
+                    let options = base.with_order(order).with_coverings(coverings);
+                    let verdict = ask(&a, &b, &pose, &options, &Budget::UNLIMITED).verdict;
+                    assert_eq!(kind(&verdict), kind(&expected), "{cloud:?} {round} {options:?}");
+                    let options = options.with_evidence(Evidence::Certified);
+                    let verdict = ask(&a, &b, &pose, &options, &Budget::UNLIMITED).verdict;
+                    let is_proven = |verdict: &Verdict| {
+                        matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
+                    };
+                    // Coverings may part leaves whose boxes overlap, which then need not be compared.
+                    assert!(is_proven(&verdict) || !is_proven(&proven), "{cloud:?} {round} {options:?}");
+                }
+            }
+        }
+    }
+    assert!(seen[0] > 40 && seen[1] > 40, "{seen:?}");
+}
+
+#[test]
+fn work_budgets_are_reproducible_in_every_order() {
+    let scan = sphere(3000);
+    let mut rng = arbitrary::rng(9);
+    let mut scratch = CollideScratch::default();
+    let mut unfinished = 0;
+    for _ in 0..40 {
+        let pose = Pose::from_translation(arbitrary::unit_vector(&mut rng).map(|x| 1.98 * x));
+        for order in ORDERS {
+            let options = CollideOptions::default().with_order(order);
+            let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+            let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+            for work in [0, 1, 7, 60, 500] {
+                let budget = Budget::UNLIMITED.with_work(work);
+                let fresh = collide(&views[0], &views[1], &plan, &budget);
+                let used = collide_with(&views[0], &views[1], &plan, &budget, &mut scratch);
+                assert_eq!(fresh, used, "{order:?} {work}");
+                let spent = fresh.statistics.evaluations + fresh.statistics.node_pairs;
+                assert!(spent <= work + 40, "{spent} of {work}");
+                if let Verdict::Undecided(Reason::Budget { likelihood }) = fresh.verdict {
+                    assert!((0.0..=1.0).contains(&likelihood), "{likelihood}");
+                    unfinished += 1;
+                }
+            }
+        }
+    }
+    assert!(unfinished > 200, "{unfinished}");
+}
+
+#[test]
+fn a_resolution_saves_work_and_errs_towards_contact() {
+    let scan = sphere(20_000);
+    let r = scan.sampling_radius();
+    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let mut before = u64::MAX;
+    for times in [0.0, 2.0, 4.0, 8.0, 16.0] {
+        let budget = Budget::UNLIMITED.with_resolution(times * r);
+        let mut pairs = 0;
+        for (gap, meets) in [(-4.0 * r, true), (-0.5, true), (3.0 * times * r + 2.0 * r, false)] {
+            let pose = Pose::from_axis_angle([1.0, 2.0, 0.5], 0.4).with_translation([0.0, 2.0 + gap, 0.0]);
+            let answer = ask(&scan, &scan, &pose, &options, &budget);
+            assert_eq!(kind(&answer.verdict), u8::from(!meets), "gap {gap} at {times} r: {answer:?}");
+            pairs += answer.statistics.node_pairs;
+        }
+        assert!(pairs <= before, "{pairs} node pairs at {times} r, {before} at a finer resolution");
+        before = pairs;
+    }
+    assert!(before < 60, "{before} at the coarsest");
+    // Nothing is finer than nothing, and all is finer than the whole.
+    let pose = Pose::from_translation([0.0, 2.3, 0.0]);
+    let fine = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED.with_resolution(0.0));
+    assert_eq!(fine, ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED));
+    let coarse = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED.with_resolution(1e3));
+    assert!(coarse.statistics.node_pairs <= 1, "{coarse:?}");
+}
+
+#[test]
+fn test_points_see_what_surfaces_do() {
+    let scan = sphere(4000);
+    let r = scan.sampling_radius();
+    let base = CollideOptions::default().with_detail(Detail::Verdict);
+    for flat in [false, true] {
+        let sampling = Sampling::default().with_flat(flat);
+        let options = base.with_method(Method::Sampling(sampling));
+        for (gap, meets) in [(-0.6, true), (-2.0 * r, true), (2.0 * r, false), (0.5, false)] {
+            let pose = Pose::from_axis_angle([0.3, 1.0, 0.5], 0.7).with_translation([2.0 + gap, 0.0, 0.0]);
+            let answer = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED);
+            assert_eq!(kind(&answer.verdict), u8::from(!meets), "flat {flat}, gap {gap}: {answer:?}");
+            if let Verdict::Intersecting { contact, evidence } = answer.verdict {
+                assert_eq!(evidence, Evidence::Estimated);
+                let away =
+                    |c: [f64; 3]| (0..3).map(|k| (contact.point[k] - c[k]).powi(2)).sum::<f64>().sqrt() - 1.0;
+                let off = away([0.0; 3]).abs().max(away([2.0 + gap, 0.0, 0.0]).abs());
+                assert!(off <= 0.5 * r, "{off} off, r {r}");
+                assert!(answer.distance_estimate.unwrap() < 0.4 * r, "{answer:?}");
+            } else if let Some(estimate) = answer.distance_estimate {
+                assert!(estimate >= 0.4 * r && estimate >= gap - 0.2 * r, "{answer:?}");
+            }
+        }
+    }
+    // A witness from a test point is verified.
+    let options = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
+    let pose = Pose::from_translation([1.5, 0.0, 0.0]);
+    let answer = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED);
+    assert!(
+        matches!(answer.verdict, Verdict::Intersecting { evidence: Evidence::Certified, .. }),
+        "{answer:?}"
+    );
+}
+
+#[test]
+fn test_points_depend_on_seed_and_leaves_alone() {
+    let scan = sphere(2000);
+    let r = scan.sampling_radius();
+    // Nothing is found, so every order tests every pair of leaves.
+    let pose = Pose::from_translation([2.0 + 0.3 * r, 0.0, 0.0]);
+    let estimate = |order, seed| {
+        let sampling = Sampling::default().with_seed(seed).with_tolerance(0.1);
+        let options = CollideOptions::default().with_method(Method::Sampling(sampling)).with_order(order);
+        ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED).distance_estimate
+    };
+    let first = estimate(Order::DepthFirst, 1);
+    assert!(first.is_some_and(|d| d > 0.1 * r && d < 2.0 * r), "{first:?}, r {r}");
+    assert_eq!(first, estimate(Order::Overlap, 1), "another order");
+    assert_ne!(first, estimate(Order::DepthFirst, 2), "another seed");
+}
+
+#[test]
+fn what_cannot_be_sampled_is_refused() {
+    let scan = sphere(100);
+    let method = |sampling| CollideOptions::default().with_method(Method::Sampling(sampling));
+    let refused = |options: CollideOptions| CollidePlan::new(&options, &scan, &scan).unwrap_err();
+    let plain = Sampling::default();
+    assert_eq!(refused(method(plain.with_test_points(0))), PlanError::TestPoints(0));
+    assert_eq!(refused(method(plain.with_test_points(65_537))), PlanError::TestPoints(65_537));
+    for tolerance in [0.0, -1.0, 4.1] {
+        assert_eq!(refused(method(plain.with_tolerance(tolerance))), PlanError::Tolerance(tolerance));
+    }
+    assert!(matches!(refused(method(plain.with_tolerance(f64::NAN))), PlanError::Tolerance(_)));
+    assert_eq!(refused(method(plain).with_margin(0.1)), PlanError::SamplingAlone);
+    assert_eq!(refused(method(plain).with_semantics(Semantics::Thickened(0.1))), PlanError::SamplingAlone);
+}
