@@ -14,7 +14,9 @@ use std::process::ExitCode;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::geometry::NodeId;
-use nearmiss::hierarchy::{GatherScratch, NodePair, Relative, Slices, Split, Stack, Visitor, apart, descend};
+use nearmiss::hierarchy::{
+    Extent, GatherScratch, NodePair, Relative, Slices, Split, Stack, Visitor, apart, descend,
+};
 use nearmiss::surface::project;
 use nearmiss::{BuildOptions, Pose, Scan};
 use nearmiss_benches::hulls::{Hulls, Volumes};
@@ -189,7 +191,7 @@ fn levels(scan: &Scan, effort: Effort, projected: &[f64]) {
 struct Pairs {
     inner: [usize; 2],
     leaves: [usize; 2],
-    /// Not even their enclosures part them.
+    /// Not even their enclosures part them; with the surface excluded.
     enclosed: [usize; 2],
 }
 
@@ -215,7 +217,7 @@ impl Visitor for Descent<'_> {
             }
             let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
             let (node_a, node_b) = (pair.a.index(), pair.b.index());
-            let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0);
+            let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0, Extent::Discs);
             let leaves = self.a.nodes[node_a].is_leaf() && self.b.nodes[node_b].is_leaf();
             let kind = if leaves { &mut self.pairs.leaves } else { &mut self.pairs.inner };
             kind[0] += 1;
@@ -223,6 +225,7 @@ impl Visitor for Descent<'_> {
             let (a, b) = (self.a.enclosure(node_a), self.b.enclosure(node_b));
             if self.motion.gaps([&a; 2], [&b; 2])[0] <= self.motion.slack() {
                 self.pairs.enclosed[0] += 1;
+                let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0, Extent::Surface);
                 self.pairs.enclosed[1] += usize::from(excluded);
             }
             urgent[i] = (!(excluded && self.excludes)).then_some(-gap);

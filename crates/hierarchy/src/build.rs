@@ -5,7 +5,7 @@ use nearmiss_store::Array;
 use nearmiss_surface::{Evaluation, SurfacePlan};
 
 use crate::boxes::OrientedBox;
-use crate::covering::{Covering, Ground, coverings};
+use crate::covering::{Covering, Ground, Solid, coverings};
 use crate::enclosure::{LeafBounds, Surroundings, growths};
 use crate::gather::{GatherScratch, Index, Vicinity};
 use crate::growth::Growth;
@@ -365,8 +365,9 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let discs: Vec<f32> = all().map(|s| s.disc).collect();
     let kinds: Vec<u8> = all().map(|s| s.kind.code()).collect();
     let balls: Vec<f32> = all().zip(&radii).map(|(s, &r)| ball(s.kind, r, sampling_radius)).collect();
-    let feet: Vec<[f32; 3]> =
-        all().zip(&positions).map(|(s, p)| [0, 1, 2].map(|k| p[k] + s.height * s.normal[k])).collect();
+    let flat: Vec<Solid> =
+        discs.iter().zip(&balls).map(|(&disc, &ball)| Solid::of_disc(disc, ball)).collect();
+    let cells: Vec<Solid> = all().zip(&flat).map(|(s, &disc)| Solid::of_cell(&s.cell, disc)).collect();
     let leaves: Vec<LeafBounds> = parts.into_iter().flat_map(|(_, leaves)| leaves).collect();
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
@@ -382,14 +383,14 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         growths: &growths,
         positions: &positions,
         normals: &normals,
-        discs: &discs,
         radii: &radii,
-        feet: &feet,
+        discs: &flat,
+        cells: &cells,
     };
     let coverings = coverings(&ground, |id| {
         samples(&sample_lists, (id, &nodes[id]), (options.leaf_size, options.samples))
     });
-    drop(feet);
+    drop((flat, cells));
 
     Ok(PointHierarchy {
         frame: cloud.frame(),

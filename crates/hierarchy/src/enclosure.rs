@@ -131,10 +131,17 @@ impl Surroundings {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Cell {
     /// Radius.
-    across: f32,
+    pub(crate) across: f32,
     /// Least (not positive) and greatest (not negative) height along the normal.
     low: f32,
     high: f32,
+}
+
+impl Cell {
+    /// The greatest height to either side.
+    pub(crate) fn height(&self) -> f32 {
+        self.high.max(-self.low)
+    }
 }
 
 /// Fact 3: how far from its axis a surface point in the cell can be. `near` are the neighbours of the point, of

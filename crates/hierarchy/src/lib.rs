@@ -19,7 +19,7 @@ mod split;
 mod surfels;
 mod topology;
 
-pub use apart::apart;
+pub use apart::{Extent, apart};
 pub use boxes::{OrientedBox, Relative, SLACK};
 pub use build::{PointHierarchy, Slices};
 pub use covering::Covering;

@@ -11,7 +11,7 @@ use nearmiss_surface::{Evaluation, Neighbourhood, Status, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot, sub};
-use crate::enclosure::{LeafBounds, Surroundings};
+use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::{GatherScratch, Index};
 use crate::spacing::{Look, Spacing};
 use crate::topology::Node;
@@ -102,9 +102,9 @@ pub struct NormalCone {
 pub(crate) struct Surfel {
     pub(crate) normal: [f32; 3],
     pub(crate) disc: f32,
-    /// f at the point: along the normal, where the surface is to first order.
-    pub(crate) height: f32,
     pub(crate) kind: PointKind,
+    /// Where the surface nearest to the point is.
+    pub(crate) cell: Cell,
 }
 
 /// The discs of the points of one leaf, numbered `points`, and bounds of its part of the surface; `about` is its box,
@@ -128,21 +128,20 @@ pub(crate) fn leaf_surfels(
     surroundings.fill(index.plan, places[0], &scratch.surroundings, scratch.reach);
     let mut cells = LeafBounds::new(places, about, surroundings).cells();
     for i in points {
-        let surfel = surfel(index, i, spacings[i], ordinary, scratch);
-        let cell = surroundings.cell(index.positions[i], surfel.normal, index.radii[i], &scratch.near);
-        cells.include(index.positions[i], surfel.normal, &cell);
+        let surfel = surfel(index, i, (spacings[i], ordinary), scratch, surroundings);
+        cells.include(index.positions[i], surfel.normal, &surfel.cell);
         surfels.push(surfel);
     }
     cells.close()
 }
 
-/// The disc of point `i`, about whose leaf `scratch` has collected points.
+/// The disc of point `i`, about whose leaf `scratch` has collected points, and its cell.
 fn surfel(
     index: &Index<'_>,
     i: usize,
-    spacing: Spacing,
-    ordinary: f32,
+    (spacing, ordinary): (Spacing, f32),
     scratch: &mut GatherScratch,
+    surroundings: &Surroundings,
 ) -> Surfel {
     let x = index.positions[i].map(f64::from);
     scratch.gather_collected(index.plan, x);
@@ -159,9 +158,8 @@ fn surfel(
     // What is further than an ordinary horizon from all points is no surface (S0 eq. 6) but a hole, however sparse
     // the points about it; what a lone point knows of ends with its ball.
     let widest = if kind.is_sparse() { ordinary } else { index.plan.horizon(ordinary) };
-    #[expect(clippy::cast_possible_truncation, reason = "a first-order estimate")]
-    let height = at.f as f32;
-    Surfel { normal, disc: disc.min(widest), height, kind }
+    let cell = surroundings.cell(index.positions[i], normal, index.radii[i], near);
+    Surfel { normal, disc: disc.min(widest), kind, cell }
 }
 
 /// The greatest number of neighbouring sectors of the tangent plane in which no point lies.
