@@ -4,6 +4,7 @@
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
 //! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, measured.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
+//! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
 //! * `field` — f over a slice of a noisy scan, and how often its normal changes sides.
 //! * `fuzz [TARGET] [SECONDS]` — feed the readers with inputs that a fuzzer makes up; see fuzz/README.md.
@@ -15,6 +16,7 @@ mod checks;
 mod demo;
 mod field;
 mod fuzz;
+mod level;
 mod repository;
 mod tables;
 mod tidy;
@@ -28,6 +30,8 @@ of the repository
   demo           prepare a real scan, sweep two copies past each other; a table and a picture
   test [CHECK…]  every check, or: tidy, format, tests, lints, docs, features, packages, determinism
   tidy, ci       the first of them; all of them
+  level [SCAN] [--depth L]… [-o FILE.png]
+                 a picture of levels of its hierarchy: samples and the balls that cover their nodes
   check-proof PROOF A B [--poses F]
                  whether what `collide A B --prove PROOF` wrote holds, by means of its own
   field SCAN [--noise 0.1] -o OUT.png
@@ -56,6 +60,7 @@ fn main() -> ExitCode {
         ["ci"] => checks::run(&[]),
         ["check-proof", ..] => check_proof::run(std::env::args_os().skip(1)),
         ["field", ..] => field::run(std::env::args_os().skip(1)),
+        ["level", words @ ..] => level::run(words),
         ["fuzz", words @ ..] => fuzz::run(words),
         ["tables", words @ ..] => tables::run(words),
         ["test", names @ ..] => checks::run(names),

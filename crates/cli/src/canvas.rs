@@ -131,6 +131,46 @@ impl Canvas {
         }
     }
 
+    /// A ball, lit and in front of what lies behind it.
+    pub(crate) fn ball(&mut self, camera: &Camera, centre: Vector3<f64>, radius: f64, colour: Colour) {
+        let [x, y, z] = camera.project(centre);
+        let radius = camera.scale * radius;
+        let (columns, rows) = pixels_about(camera.area, [x, y], radius);
+        for row in rows {
+            for column in columns.clone() {
+                let [u, v] = centre_of(column, row);
+                let (dx, dy) = ((u - x) / radius, (y - v) / radius);
+                let up_sq = 1.0 - dx * dx - dy * dy;
+                if up_sq <= 0.0 {
+                    continue;
+                }
+                let n = [dx, -dy, up_sq.sqrt()];
+                let near = z + radius * n[2];
+                let i = row * self.width + column;
+                if near > self.depth[i] {
+                    let lambert = (0..3).map(|k| n[k] * LIGHT[k]).sum::<f64>().max(0.0);
+                    self.depth[i] = near;
+                    self.pixels[i] = shade(colour, AMBIENT + (1.0 - AMBIENT) * lambert);
+                }
+            }
+        }
+    }
+
+    /// Width and height in fine pixels.
+    pub(crate) fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// Lays what is painted on `other`, of the same size, over this, with some opacity.
+    pub(crate) fn veil(&mut self, other: &Self, area: Area, opacity: f64) {
+        for y in area.top..area.top + area.height {
+            let row = y * self.width + area.left..y * self.width + area.left + area.width;
+            for i in row.filter(|&i| other.depth[i] > f64::NEG_INFINITY) {
+                self.pixels[i] = blend(self.pixels[i], other.pixels[i], opacity);
+            }
+        }
+    }
+
     /// Blends `colour` over every pixel of `area` as far as `cover`, of a place, says.
     fn overlay(
         &mut self,

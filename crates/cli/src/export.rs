@@ -1,11 +1,12 @@
 //! `export`: look inside a prepared scan.
 
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nearmiss::Scan;
-use nearmiss::io::{PlyPoints, WriteError};
+use nearmiss::geometry::Frame;
+use nearmiss::io::{Column, PlyPoints, WriteError};
 
 use crate::console::Console;
 use crate::error::CliError;
@@ -13,7 +14,8 @@ use crate::{input, output, report};
 
 /// Options of `export`. At least one output is asked for.
 #[derive(Debug, Clone, Args)]
-#[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "boxes", "radii"]))]
+#[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "samples", "boxes", "radii"]))]
+#[command(group = clap::ArgGroup::new("levelled").multiple(true).args(["samples", "boxes"]))]
 pub struct ExportArgs {
     /// Prepared scan, or a raw input, prepared on the fly
     #[arg(value_name = "FILE.nm")]
@@ -21,19 +23,22 @@ pub struct ExportArgs {
     /// Points with normals in the order of the prepared file, and their index in its input as `source`
     #[arg(long, value_name = "P.ply")]
     pub points: Option<PathBuf>,
+    /// Samples of the nodes at one depth (--level), of each its node, the node's covering radius and sampling radius
+    #[arg(long, value_name = "S.ply", requires = "level")]
+    pub samples: Option<PathBuf>,
     /// Boxes of the hierarchy's nodes, as lines
     #[arg(long, value_name = "B.obj")]
     pub boxes: Option<PathBuf>,
     /// Sampling radius and bandwidth of each point: i,r,h
     #[arg(long, value_name = "R.csv")]
     pub radii: Option<PathBuf>,
-    /// Only boxes at this depth, the root's being 0, and of leaves above it
-    #[arg(long, value_name = "L", requires = "boxes")]
+    /// Only nodes at this depth, the root's being 0, and leaves above it
+    #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
 }
 
 pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
-    let outputs = [&args.points, &args.boxes, &args.radii].map(Option::as_ref);
+    let outputs = [&args.points, &args.samples, &args.boxes, &args.radii].map(Option::as_ref);
     for (i, path) in outputs.iter().enumerate().filter_map(|(i, p)| p.map(|p| (i, p))) {
         output::check_apart(path, &[&args.file])?;
         if outputs[..i].contains(&Some(path)) {
@@ -42,12 +47,10 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     }
     let scan = input::open(&args.file, 0, Console::new(false))?;
     if let Some(path) = &args.points {
-        output::replace(path, |out| {
-            points(&scan, out).map_err(|e| match e {
-                WriteError::Io { cause } => CliError::writing(path)(cause),
-                e => CliError::Unfit { path: path.clone(), what: e.to_string() },
-            })
-        })?;
+        output::replace(path, |out| points(&scan, out).map_err(|e| refused(path, e)))?;
+    }
+    if let (Some(path), Some(level)) = (&args.samples, args.level) {
+        output::replace(path, |out| samples(&scan, level, out).map_err(|e| refused(path, e)))?;
     }
     if let Some(path) = &args.boxes {
         output::replace_plain(path, |out| boxes(&scan, args.level, out))?;
@@ -58,15 +61,59 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     Ok(())
 }
 
+fn refused(path: &Path, error: WriteError) -> CliError {
+    match error {
+        WriteError::Io { cause } => CliError::writing(path)(cause),
+        error => CliError::Unfit { path: path.into(), what: error.to_string() },
+    }
+}
+
 /// In the frame of the input: in single precision where that is what is stored, else in double.
 fn points(scan: &Scan, out: &mut impl Write) -> Result<(), WriteError> {
     let frame = scan.frame();
-    if *frame == nearmiss::geometry::Frame::default() {
+    if *frame == Frame::default() {
         let ply = PlyPoints::single(scan.positions());
         return ply.with_normals(scan.normals()).with_source(scan.source()).write(out);
     }
     let positions: Vec<[f64; 3]> = scan.positions().iter().map(|&p| frame.to_world(p)).collect();
     PlyPoints::double(&positions).with_normals(scan.normals()).with_source(scan.source()).write(out)
+}
+
+/// The nodes at a depth, and leaves above it; all of them if no depth is given.
+pub(crate) fn at_depth<'a>(
+    scan: &'a Scan,
+    depths: &'a [u32],
+    level: Option<u32>,
+) -> impl Iterator<Item = usize> + 'a {
+    let is_wanted = move |i: usize| match level {
+        Some(level) => depths[i] == level || scan.nodes()[i].is_leaf() && depths[i] < level,
+        None => true,
+    };
+    (0..depths.len()).filter(move |&i| is_wanted(i))
+}
+
+/// The samples of all nodes at a depth, and of leaves above it; lengths in the units of the input.
+fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), WriteError> {
+    let (slices, frame) = (scan.slices(), scan.frame());
+    let (mut positions, mut source, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut covering, mut sampling) = (Vec::new(), Vec::new());
+    #[expect(clippy::cast_possible_truncation, reason = "radii are single precision")]
+    let length = |stored: f32| (f64::from(stored) * frame.scale) as f32;
+    for node in at_depth(scan, &report::depths(scan), Some(level)) {
+        for i in slices.samples(node).iter() {
+            positions.push(frame.to_world(slices.positions[i]));
+            source.push(scan.source()[i]);
+            nodes.push(u32::try_from(node).unwrap_or(u32::MAX));
+            covering.push(length(slices.covering_radius(node)));
+            sampling.push(length(slices.sampling_radius_of(node)));
+        }
+    }
+    let columns = [
+        Column::Uint("node", &nodes),
+        Column::Float("covering_radius", &covering),
+        Column::Float("sampling_radius", &sampling),
+    ];
+    PlyPoints::double(&positions).with_source(&source).with_columns(&columns).write(out)
 }
 
 /// Corners of a box that an edge joins: those that differ in one bit.
@@ -77,11 +124,8 @@ fn boxes(scan: &Scan, level: Option<u32>, out: &mut impl Write) -> io::Result<()
     let depths = report::depths(scan);
     writeln!(out, "# node boxes, eight corners and twelve edges each")?;
     let mut first = 1_u64;
-    for (i, (node, b)) in scan.nodes().iter().zip(scan.boxes()).enumerate() {
-        let wanted = level.is_none_or(|level| depths[i] == level || node.is_leaf() && depths[i] < level);
-        if !wanted {
-            continue;
-        }
+    for i in at_depth(scan, &depths, level) {
+        let b = &scan.boxes()[i];
         writeln!(out, "o node{i}_depth{}", depths[i])?;
         for corner in 0..8 {
             let mut p = b.centre.map(f64::from);

@@ -23,6 +23,7 @@ mod sentence;
 
 mod canvas;
 mod font;
+mod level;
 mod picture;
 
 use std::ffi::OsString;
@@ -40,6 +41,7 @@ pub use error::CliError;
 pub use eval::EvalArgs;
 pub use export::ExportArgs;
 pub use inspect::InspectArgs;
+pub use level::level_picture;
 pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
 pub use posing::PoseRefused;
@@ -94,7 +96,7 @@ pub enum Command {
     /// Make poses to ask `collide` about: a sweep, or poses about first contact
     #[command(after_long_help = POSES_EXAMPLES)]
     Poses(PosesArgs),
-    /// Look inside a prepared scan: points with normals, node boxes, radii
+    /// Look inside a prepared scan: points with normals, samples, node boxes, radii
     #[command(
         after_long_help = "Example:\n  nearmiss export dragon.nm --points normals.ply --boxes level-6.obj --level 6"
     )]

@@ -57,6 +57,11 @@ pub struct Picture {
 }
 
 impl Picture {
+    #[cfg(test)]
+    pub(crate) fn pixels(&self) -> &[u8] {
+        &self.pixels
+    }
+
     /// Width and height in pixels.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
@@ -130,7 +135,7 @@ pub(crate) fn paint(views: [&ScanView<'_>; 2], answer: &Answer, style: &Style) -
 }
 
 /// The disc of the `i`-th stored point in the world.
-fn splat(view: &ScanView<'_>, i: usize) -> Splat {
+pub(crate) fn splat(view: &ScanView<'_>, i: usize) -> Splat {
     let scan = view.scan();
     Splat {
         centre: view.point(i).into(),
@@ -284,6 +289,11 @@ fn whole_camera(views: [&ScanView<'_>; 2], close: Option<&Close>, area: Area) ->
     camera
 }
 
+/// A view of one scan.
+pub(crate) fn scan_camera(view: &ScanView<'_>, area: Area) -> Camera {
+    whole_camera([view, view], None, area)
+}
+
 /// The direction of greatest extent, and the unit direction from one scan's middle to the other's, or zero.
 fn extent(points: &[Vector3<f64>], views: [&ScanView<'_>; 2]) -> (Vector3<f64>, Vector3<f64>) {
     #[expect(clippy::cast_precision_loss, reason = "a count")]
@@ -369,7 +379,7 @@ fn frame(canvas: &mut Canvas, camera: &Camera, close: &Close) {
 }
 
 /// A length of 1, 2 or 5 times a power of ten, a sixth to a third of the panel's height.
-fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
+pub(crate) fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let longest = camera.area.height as f64 / 3.0 / camera.scale;
     let power = 10.0_f64.powf(longest.log10().floor());

@@ -22,4 +22,4 @@ pub use error::{At, Fault, Foreign, Item, Place, ReadError};
 pub use format::{Format, UnknownFormatName};
 pub use read::{read, read_bytes, read_mesh, read_mesh_bytes};
 pub use sink::Model;
-pub use write::{PlyPoints, WriteError};
+pub use write::{Column, PlyPoints, WriteError};

@@ -44,10 +44,42 @@ impl From<io::Error> for WriteError {
     }
 }
 
+/// A further number of each point, with its name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Column<'a> {
+    /// In single precision.
+    Float(&'a str, &'a [f32]),
+    /// Not negative.
+    Uint(&'a str, &'a [u32]),
+}
+
+impl Column<'_> {
+    const fn len(&self) -> usize {
+        match self {
+            Self::Float(_, values) => values.len(),
+            Self::Uint(_, values) => values.len(),
+        }
+    }
+
+    fn property(&self) -> (&str, &str) {
+        match self {
+            Self::Float(name, _) => ("float", name),
+            Self::Uint(name, _) => ("uint", name),
+        }
+    }
+
+    fn bytes(&self, i: usize) -> [u8; 4] {
+        match self {
+            Self::Float(_, values) => values[i].to_le_bytes(),
+            Self::Uint(_, values) => values[i].to_le_bytes(),
+        }
+    }
+}
+
 /// Points and what belongs to them, to be written as binary little endian PLY.
 ///
 /// Positions are `float` or `double` as given, normals `float nx ny nz`, colours `uchar red green blue`, the
-/// source `uint source`. The same content gives the same bytes.
+/// source `uint source`; further columns follow. The same content gives the same bytes.
 #[derive(Debug, Clone, Copy)]
 #[must_use = "nothing is written before `write`"]
 pub struct PlyPoints<'a> {
@@ -55,6 +87,7 @@ pub struct PlyPoints<'a> {
     normals: Option<&'a [[f32; 3]]>,
     colours: Option<&'a [[u8; 3]]>,
     source: Option<&'a [u32]>,
+    columns: &'a [Column<'a>],
     edges: &'a [[u32; 2]],
     triangles: &'a [[u32; 3]],
 }
@@ -77,7 +110,15 @@ impl<'a> PlyPoints<'a> {
     }
 
     const fn of(positions: Positions<'a>) -> Self {
-        Self { positions, normals: None, colours: None, source: None, edges: &[], triangles: &[] }
+        Self {
+            positions,
+            normals: None,
+            colours: None,
+            source: None,
+            columns: &[],
+            edges: &[],
+            triangles: &[],
+        }
     }
 
     /// With a normal for each point.
@@ -98,6 +139,12 @@ impl<'a> PlyPoints<'a> {
         self
     }
 
+    /// With further numbers of each point.
+    pub const fn with_columns(mut self, columns: &'a [Column<'a>]) -> Self {
+        self.columns = columns;
+        self
+    }
+
     /// With lines between points, as the element `edge`.
     pub const fn with_edges(mut self, edges: &'a [[u32; 2]]) -> Self {
         self.edges = edges;
@@ -113,8 +160,8 @@ impl<'a> PlyPoints<'a> {
     /// Writes header and content; `out` need not be buffered.
     ///
     /// # Errors
-    /// When the output fails; and, before anything is written, when there is not one normal, colour or source
-    /// for each point, or when an edge or triangle names a point that is not there.
+    /// When the output fails; and, before anything is written, when there is not one normal, colour, source or
+    /// further number for each point, or when an edge or triangle names a point that is not there.
     pub fn write(&self, out: &mut impl Write) -> Result<(), WriteError> {
         self.check()?;
         let mut out = BufWriter::with_capacity(1 << 16, out);
@@ -132,6 +179,9 @@ impl<'a> PlyPoints<'a> {
             }
             if let Some(source) = self.source {
                 out.write_all(&source[i].to_le_bytes())?;
+            }
+            for column in self.columns {
+                out.write_all(&column.bytes(i))?;
             }
         }
         for edge in self.edges {
@@ -163,6 +213,9 @@ impl<'a> PlyPoints<'a> {
                 return Err(WriteError::Count { what, given, points });
             }
         }
+        if let Some(column) = self.columns.iter().find(|column| column.len() != points) {
+            return Err(WriteError::Count { what: "numbers of a column", given: column.len(), points });
+        }
         let edges = self.edges.iter().map(<[u32; 2]>::as_slice);
         let faces = self.triangles.iter().map(<[u32; 3]>::as_slice);
         let edges = edges.enumerate().map(|e| ("edge", e));
@@ -191,6 +244,10 @@ impl<'a> PlyPoints<'a> {
         }
         if self.source.is_some() {
             properties(out, "uint", &["source"])?;
+        }
+        for column in self.columns {
+            let (kind, name) = column.property();
+            properties(out, kind, &[name])?;
         }
         if !self.edges.is_empty() {
             writeln!(out, "element edge {}", self.edges.len())?;

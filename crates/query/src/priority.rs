@@ -6,7 +6,7 @@
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, apart as coverings_apart};
+use nearmiss_hierarchy::{Extent, NodePair, apart as coverings_apart};
 use nearmiss_surface::Status;
 
 use crate::likelihood::overlap;
@@ -23,7 +23,14 @@ impl Surfaces<'_> {
             let double = (i >> 1 == 1 && a[0] == a[1]) || (i & 1 == 1 && b[0] == b[1]);
             let Some(depth) = admitted.filter(|_| !double) else { continue };
             let apart = self.coverings
-                && coverings_apart(&self.pair.a, &self.pair.b, pair, &self.pair.relative, self.reach);
+                && coverings_apart(
+                    &self.pair.a,
+                    &self.pair.b,
+                    pair,
+                    &self.pair.relative,
+                    self.reach,
+                    Extent::Discs,
+                );
             *admitted = if apart { None } else { Some(self.urgency(pair, depth)) };
         }
     }
