@@ -162,25 +162,26 @@ fn neighbourhood<R: Rng>(rng: &mut R) -> [f64; 6] {
 
 /// The largest component of B n − λ n over the largest entry of B, NaN if anything is; 0 where B is 0 and λ too.
 ///
-/// Where the eigenvalue is beyond the range of `f64`, its end is as near as can be: such a one fits if B n
-/// points along n and is as long or longer.
+/// What the last bit of a subnormal λ explains is not counted. Where the eigenvalue is beyond the range of `f64`
+/// its end is as near as can be: that fits if B n points along n and is as long or longer.
 #[must_use]
 pub fn residual(matrix: [f64; 6], value: f64, vector: [f64; 3]) -> f64 {
+    /// The least positive number.
+    const LEAST: f64 = 5e-324;
     let largest = matrix.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    // Twice, as the inverse of a subnormal number is beyond the range.
-    let (first, second) = if largest < 1e-290 { (1e200, largest * 1e200) } else { (1.0, largest) };
-    let relative = |x: f64| if largest > 0.0 { x * first / second } else { x };
+    // In two steps, as the inverse of a subnormal number is beyond the range.
+    let first = if largest < 1e-290 { 1e200 } else { 1.0 };
+    let relative = |x: f64| if largest > 0.0 { x * first / (largest * first) } else { x };
     let [xx, xy, xz, yy, yz, zz] = matrix.map(relative);
     let [x, y, z] = vector;
     let image = [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z];
     let along = image[0] * x + image[1] * y + image[2] * z;
-    let mut value_of = relative(value);
-    if value.abs() >= f64::MAX && value.is_finite() && along / value_of > 1.0 {
-        value_of = along;
-    }
-    (0..3)
-        .map(|k| (image[k] - value_of * vector[k]).abs())
-        .fold(0.0, |worst, x| if x > worst { x } else { worst + 0.0 * x })
+    let at_end = value.abs() >= f64::MAX && value.is_finite() && along / relative(value) > 1.0;
+    let value = if at_end { along } else { relative(value) };
+    let errors = [0, 1, 2].map(|k| (image[k] - value * vector[k]).abs());
+    // Not f64::max, which skips NaN.
+    let worst = errors.into_iter().fold(0.0, |worst, error| if error <= worst { worst } else { error });
+    if worst.is_nan() { worst } else { (worst - relative(LEAST)).max(0.0) }
 }
 
 /// The largest difference of the dot products of three vectors from those of a frame, NaN if any is.

@@ -21,8 +21,8 @@ pub struct LeastEigen {
 /// The least eigenpair of the symmetric matrix with rows [xx xy xz], [xy yy yz], [xz yz zz], by the cubic and
 /// pivoted Cholesky.
 ///
-/// Accurate to rounding where the least eigenvalue is well apart, as on a sheet; to some 1e-8 of the largest
-/// entry, values and residual, where it is not. Finite for every finite matrix, NaN for others. S0 takes the
+/// Accurate to rounding where the least eigenvalue is well apart, as on a sheet; to some 1e-8 of the largest entry,
+/// values and residual, where it is close to another, 1e-5 where all three are. Finite for every finite matrix, NaN for others. S0 takes the
 /// roots by arc cosine; we take the one of largest magnitude as [`symmetric_eigen`](crate::symmetric_eigen) does,
 /// and the others by the quadratic that it leaves, which is as accurate and the same on every machine.
 #[must_use]
