@@ -63,7 +63,7 @@ pub fn collide_many(
 }
 
 /// Whether the two scans of each question meet, as `plan` means it: the answers of
-/// [`collide_with`](crate::collide_with), in order.
+/// [`collide_with`], in order.
 ///
 /// With [`Until::First`] they end with the first hit. A budget of work holds for each question. A deadline holds for
 /// all: questions not begun by then are undecided, with a likelihood of a half and no work spent.
