@@ -2,26 +2,24 @@
 
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
 use nearmiss_store::Array;
-use nearmiss_surface::{Evaluation, SurfacePlan};
+use nearmiss_surface::{PointBlock, SurfacePlan};
 
 use crate::boxes::OrientedBox;
 use crate::covering::{Covering, Ground, Solid, coverings};
-use crate::enclosure::{LeafBounds, Surroundings, growths};
-use crate::gather::{GatherScratch, Index, Vicinity};
+use crate::enclosure::{LeafBounds, growths};
+use crate::gather::Index;
 use crate::growth::Growth;
 use crate::levels::samples;
+use crate::neighbours::{NeighbourList, chunks, groups, neighbours};
 use crate::options::{BuildError, BuildOptions};
 use crate::samples::lists;
 use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
 use crate::split::{Item, id32, split};
-use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, leaf_surfels};
+use crate::surfels::{Leaf, LeafScratch, NormalCone, PointKind, Surfel, align, box_of_discs};
 use crate::topology::Node;
 
 /// Share of the points whose local radius is at most the scan's sampling radius.
 const SAMPLING_QUANTILE: f64 = 0.9;
-
-/// Leaves that a thread fits at once: enough to hide the hand-over.
-const LEAVES_A_TASK: usize = 16;
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
 ///
@@ -50,6 +48,10 @@ pub struct PointHierarchy {
     pub(crate) sample_lists: Array<u32>,
     pub(crate) coverings: Array<Covering>,
     pub(crate) cones: Array<NormalCone>,
+    pub(crate) blocks: Array<PointBlock>,
+    pub(crate) groups: Array<PointBlock>,
+    pub(crate) lists: Array<NeighbourList>,
+    pub(crate) listed: Array<u32>,
 }
 
 /// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not at every
@@ -134,29 +136,6 @@ impl PointHierarchy {
         build(cloud, options)
     }
 
-    /// f at `x`, in the stored frame.
-    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        self.index().gather(x, &mut scratch.near);
-        scratch.near.evaluate(&self.plan, x)
-    }
-
-    /// f at `x`, in the stored frame; allocates a scratch of its own.
-    #[must_use]
-    pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
-        self.evaluate_with(x, &mut GatherScratch::default())
-    }
-
-    /// The scan near `centre`, for several evaluations within `radius` of it (stored frame). Collecting the
-    /// points costs about as much as two evaluations; each then costs a third.
-    pub fn vicinity<'a>(
-        &'a self,
-        centre: [f64; 3],
-        radius: f64,
-        scratch: &'a mut GatherScratch,
-    ) -> Vicinity<'a> {
-        Vicinity::new(self.index(), centre, radius, scratch)
-    }
-
     /// The arrays that a query reads.
     #[must_use]
     pub fn slices(&self) -> Slices<'_> {
@@ -175,16 +154,6 @@ impl PointHierarchy {
             samples_a_node: self.samples_a_node,
             plan: &self.plan,
             sampling_radius: self.sampling_radius,
-        }
-    }
-
-    fn index(&self) -> Index<'_> {
-        Index {
-            nodes: &self.nodes,
-            boxes: &self.boxes,
-            positions: &self.positions,
-            radii: &self.radii,
-            plan: &self.plan,
         }
     }
 
@@ -357,8 +326,19 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         bounds.reach = reach;
     }
 
-    let index = Index { nodes: &nodes, boxes: &boxes, positions: &positions, radii: &radii, plan: &plan };
-    let parts = surfels(&index, &spacings, sampling_radius, leaf_size);
+    let blocks: Vec<PointBlock> = PointBlock::all(&plan, &positions, &radii).collect();
+    let groups = groups(&blocks);
+    let index = Index {
+        nodes: &nodes,
+        boxes: &boxes,
+        blocks: &blocks,
+        groups: &groups,
+        lists: &[],
+        listed: &[],
+        plan: &plan,
+    };
+    let lists_of_blocks = neighbours(&index, &positions, &radii);
+    let parts = surfels(&index, &positions, &radii, (&spacings, sampling_radius));
     drop(spacings);
     let all = || parts.iter().flat_map(|(surfels, _)| surfels);
     let mut normals: Vec<[f32; 3]> = all().map(|s| s.normal).collect();
@@ -414,43 +394,40 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         sample_lists: sample_lists.into(),
         coverings: coverings.into(),
         cones: cones.into(),
+        blocks: blocks.into(),
+        groups: groups.into(),
+        lists: lists_of_blocks.lists.into(),
+        listed: lists_of_blocks.entries.into(),
     })
 }
 
-/// The discs of all points and the bounds of all leaves, in order, some leaves at a time.
+/// The discs of all points and the bounds of all leaves, in order.
 fn surfels(
     index: &Index<'_>,
-    spacings: &[Spacing],
-    ordinary: f32,
-    leaf_size: usize,
+    positions: &[[f32; 3]],
+    radii: &[f32],
+    (spacings, ordinary): (&[Spacing], f32),
 ) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
-    let leaves: Vec<(&Node, &OrientedBox)> =
-        index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).collect();
-    let fit = |leaves: &[(&Node, &OrientedBox)]| {
-        let (mut scratch, mut surroundings) = (GatherScratch::default(), Surroundings::default());
-        let mut surfels = Vec::with_capacity(leaves.len() * leaf_size);
+    let leaf = |(node, about): (&Node, &'_ OrientedBox)| (node.points(), *about);
+    let leaves: Vec<_> =
+        index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).map(leaf).collect();
+    chunks(&leaves, |leaves| {
+        let (mut scratch, mut surfels) = (LeafScratch::default(), Vec::new());
         let bounds = leaves
             .iter()
-            .map(|(leaf, about)| {
-                leaf_surfels(
-                    index,
-                    leaf.points(),
+            .map(|(points, about)| {
+                let leaf = Leaf {
+                    positions: &positions[points.clone()],
+                    radii: &radii[points.clone()],
+                    spacings: &spacings[points.clone()],
                     about,
-                    (spacings, ordinary),
-                    (&mut scratch, &mut surroundings),
-                    &mut surfels,
-                )
+                    ordinary,
+                };
+                leaf.surfels(index, &mut scratch, &mut surfels)
             })
             .collect();
         (surfels, bounds)
-    };
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        leaves.par_chunks(LEAVES_A_TASK).map(fit).collect()
-    }
-    #[cfg(not(feature = "rayon"))]
-    leaves.chunks(LEAVES_A_TASK).map(fit).collect()
+    })
 }
 
 fn quantile(radii: &[f32]) -> f32 {

@@ -15,10 +15,12 @@
 //! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull
 //! of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
 
-use nearmiss_surface::{BORDER, Neighbourhood, SurfacePlan};
+use nearmiss_surface::{BORDER, PointBlock};
 
 use crate::boxes::{OrientedBox, dot, sub};
+use crate::gather::Index;
 use crate::growth::Growth;
+use crate::neighbours::Locality;
 use crate::spacing::map;
 use crate::split::id32;
 use crate::surfels::{cross, tangents};
@@ -46,71 +48,61 @@ const NEIGHBOURS: f32 = 1.75;
 const GROWN: f32 = 1.0 + 1e-4;
 
 /// Points that are worked on together.
-const WIDTH: usize = 8;
+const WIDTH: usize = PointBlock::WIDTH;
 
 /// What may reach a leaf's part of the surface, relative to a point of the leaf, in lanes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Surroundings {
     origin: [f32; 3],
-    blocks: Vec<Block>,
+    blocks: Vec<PointBlock>,
     /// How far a surface point can be from its nearest point: fact 2.
     reach: f32,
     /// 0.56 h over the horizon.
     border: f32,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    position: [[f32; WIDTH]; 3],
-    horizon: [f32; WIDTH],
-}
-
-/// Far from everything, and heard nowhere.
-const NOWHERE: Block = Block { position: [[1e18; WIDTH]; 3], horizon: [0.0; WIDTH] };
-
 impl Surroundings {
-    /// Those of a leaf with a point `origin`, from the `points` collected about it with their radii.
-    pub(crate) fn fill(
-        &mut self,
-        plan: &SurfacePlan,
-        origin: [f32; 3],
-        points: &[([f32; 3], f32)],
-        reach: f32,
-    ) {
+    /// Those of a leaf with a point `origin`.
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, index: &Index<'_>, origin: [f32; 3], locality: &Locality) {
         self.origin = origin;
-        self.reach = reach * GROWN;
+        self.reach = locality.reach * GROWN;
         #[expect(clippy::cast_possible_truncation, reason = "a constant")]
         let border = BORDER as f32 * GROWN;
-        self.border = border * plan.bandwidth(1.0) / plan.horizon(1.0);
+        self.border = border * index.plan.bandwidth(1.0) / index.plan.horizon(1.0);
         self.blocks.clear();
-        for chunk in points.chunks(WIDTH) {
-            let mut block = NOWHERE;
-            for (lane, &(p, radius)) in chunk.iter().enumerate() {
-                let d = sub(p, origin);
-                for k in 0..3 {
-                    block.position[k][lane] = d[k];
-                }
-                block.horizon[lane] = plan.horizon(radius) * GROWN;
+        for &id in &locality.blocks {
+            let mut block = index.blocks[id as usize];
+            for k in 0..3 {
+                block.position[k].iter_mut().for_each(|x| *x -= origin[k]);
             }
+            block.horizon.iter_mut().for_each(|h| *h *= GROWN);
             self.blocks.push(block);
         }
     }
 
-    /// Where the surface points nearest to the point `p` can be, whose neighbours are `near`.
-    pub(crate) fn cell(&self, p: [f32; 3], normal: [f32; 3], radius: f32, near: &Neighbourhood) -> Cell {
-        let p = sub(p, self.origin);
+    /// Where the surface points nearest to the point `p` can be, whose neighbours are in the blocks `near`.
+    #[inline(always)]
+    pub(crate) fn cell<'a>(
+        &self,
+        p: [f32; 3],
+        normal: [f32; 3],
+        radius: f32,
+        near: impl Iterator<Item = &'a PointBlock>,
+    ) -> Cell {
         let (u, v) = tangents(normal);
         let reach = self.reach;
-        let (low, high) = self.heights(p, normal, reach);
+        let (low, high) = self.heights(sub(p, self.origin), normal, reach);
         let mut cell = Cell { across: reach, low: low.max(-reach), high: high.min(reach) };
-        cell.across = across([u, v, normal], &cell, NEIGHBOURS * radius, near).min(reach);
+        cell.across = across(p, [u, v, normal], &cell, NEIGHBOURS * radius, near).min(reach);
         cell
     }
 
     /// Fact 1 along the normal of `p`: the least and greatest height of a surface point within `reach` of it.
+    #[inline(always)]
     fn heights(&self, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
         let (mut low, mut high, mut most) = ([0.0_f32; WIDTH], [0.0_f32; WIDTH], [0.0_f32; WIDTH]);
-        for Block { position: [x, y, z], horizon } in &self.blocks {
+        for PointBlock { position: [x, y, z], horizon } in &self.blocks {
             for i in 0..WIDTH {
                 let d = [x[i] - p[0], y[i] - p[1], z[i] - p[2]];
                 let within = horizon[i] + reach;
@@ -127,8 +119,62 @@ impl Surroundings {
     }
 }
 
+/// Fact 3: how far from its axis a surface point in the cell of `p` can be. Of the points in the blocks `near`
+/// those `within` some distance of it are looked at; the last axis is the normal.
+#[inline(always)]
+fn across<'a>(
+    p: [f32; 3],
+    axes: [[f32; 3]; 3],
+    cell: &Cell,
+    within: f32,
+    near: impl Iterator<Item = &'a PointBlock>,
+) -> f32 {
+    // Per sector the greatest reciprocal of a bound.
+    let mut closed = [0.0_f32; SECTORS];
+    for PointBlock { position: [x, y, z], .. } in near {
+        let mut d = [[0.0_f32; WIDTH]; 3];
+        let mut bits = 0;
+        for i in 0..WIDTH {
+            (d[0][i], d[1][i], d[2][i]) = (x[i] - p[0], y[i] - p[1], z[i] - p[2]);
+            let d_sq = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
+            bits |= u32::from(d_sq > 0.0 && d_sq <= within * within) << i;
+        }
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize % WIDTH;
+            bits &= bits - 1;
+            close(&mut closed, axes, cell, [d[0][i], d[1][i], d[2][i]]);
+        }
+    }
+    let least = closed.into_iter().fold(f32::INFINITY, f32::min);
+    if least > 0.0 { GROWN / least } else { f32::INFINITY }
+}
+
+/// Bounds the sectors by the neighbour `q` of the middle of a cell.
+#[inline(always)]
+fn close(closed: &mut [f32; SECTORS], axes: [[f32; 3]; 3], cell: &Cell, q: [f32; 3]) {
+    // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, and any height z.
+    let height = dot(q, axes[2]);
+    let c = 0.5 * dot(q, q) + (-cell.low * height).max(-cell.high * height).max(0.0);
+    if c < f32::MIN_POSITIVE {
+        return;
+    }
+    let (x, y) = (dot(q, axes[0]) / c, dot(q, axes[1]) / c);
+    let mut side = [0.0_f32; SECTORS];
+    for k in 0..SECTORS {
+        side[k] = x * RAYS[0][k] + y * RAYS[1][k];
+    }
+    // What holds at both rays of a sector holds between them.
+    let mut next = [side[0]; SECTORS];
+    next[..SECTORS - 1].copy_from_slice(&side[1..]);
+    for k in 0..SECTORS {
+        let least = if side[k] < next[k] { side[k] } else { next[k] };
+        // What is no number, or a zero of either sign, leaves a sector open.
+        closed[k] = if least > closed[k] { least } else { closed[k] };
+    }
+}
+
 /// Where the surface points nearest to a point can be: a cylinder about its normal.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Cell {
     /// Radius.
     pub(crate) across: f32,
@@ -144,40 +190,6 @@ impl Cell {
     }
 }
 
-/// Fact 3: how far from its axis a surface point in the cell can be. `near` are the neighbours of the point, of
-/// which those `within` some distance are looked at; the last axis is the normal.
-fn across(axes: [[f32; 3]; 3], cell: &Cell, within: f32, near: &Neighbourhood) -> f32 {
-    // Per sector the greatest reciprocal of a bound.
-    let mut closed = [0.0_f32; SECTORS];
-    for q in near.offsets() {
-        let d_sq = dot(q, q);
-        if d_sq > within * within || d_sq <= 0.0 {
-            continue;
-        }
-        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, and any height z.
-        let height = dot(q, axes[2]);
-        let c = 0.5 * d_sq + (-cell.low * height).max(-cell.high * height).max(0.0);
-        if c < f32::MIN_POSITIVE {
-            continue;
-        }
-        let (x, y) = (dot(q, axes[0]) / c, dot(q, axes[1]) / c);
-        let mut side = [0.0_f32; SECTORS];
-        for k in 0..SECTORS {
-            side[k] = x * RAYS[0][k] + y * RAYS[1][k];
-        }
-        // What holds at both rays of a sector holds between them.
-        let mut next = [side[0]; SECTORS];
-        next[..SECTORS - 1].copy_from_slice(&side[1..]);
-        for k in 0..SECTORS {
-            let least = if side[k] < next[k] { side[k] } else { next[k] };
-            // What is no number, or a zero of either sign, leaves a sector open.
-            closed[k] = if least > closed[k] { least } else { closed[k] };
-        }
-    }
-    let least = closed.into_iter().fold(f32::INFINITY, f32::min);
-    if least > 0.0 { GROWN / least } else { f32::INFINITY }
-}
-
 /// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LeafBounds {
@@ -189,6 +201,7 @@ pub(crate) struct LeafBounds {
 
 impl LeafBounds {
     /// Facts 1 and 2 for a leaf with these points and box.
+    #[inline(always)]
     pub(crate) fn new(points: &[[f32; 3]], about: &OrientedBox, surroundings: &Surroundings) -> Self {
         let (axes, origin, reach) = (about.axes, points[0], surroundings.reach);
         let mut own = [[0.0_f32; 3]; 2];
@@ -197,7 +210,7 @@ impl LeafBounds {
         }
         let mut hull = own;
         let mut greatest = 0.0_f32;
-        for Block { position: [x, y, z], horizon } in &surroundings.blocks {
+        for PointBlock { position: [x, y, z], horizon } in &surroundings.blocks {
             for i in 0..WIDTH {
                 let at = axes.map(|axis| dot(axis, [x[i], y[i], z[i]]));
                 let far = (0..3).map(|k| (own[0][k] - at[k]).max(at[k] - own[1][k]).max(0.0));

@@ -1,8 +1,12 @@
-//! The points that f(x) needs: those whose horizon reaches x, by a short descent in canonical order.
+//! The points that f(x) needs: those whose horizon reaches x, from the neighbour list of a leaf near x, or by a
+//! descent where no list holds.
 
-use nearmiss_surface::{Centre, Evaluation, Neighbourhood, PointBlock, SurfacePlan};
+use fearless_simd::{Level, Simd, dispatch};
+use nearmiss_surface::{Centre, Evaluation, Moments, Neighbourhood, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
+use crate::build::PointHierarchy;
+use crate::neighbours::{GROUP, GROWN, NeighbourList};
 use crate::split::id32;
 use crate::topology::Node;
 
@@ -10,182 +14,198 @@ use crate::topology::Node;
 pub(crate) const TREE_STACK: usize = 64;
 
 /// Reused between evaluations; never influences a result.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct GatherScratch {
-    pub(crate) near: Neighbourhood,
-    /// Points that may reach some point of a ball, in canonical order.
-    candidates: Vec<([f32; 3], f32)>,
-    /// The candidates side by side.
-    blocks: Vec<PointBlock>,
-    /// The same about a larger ball: the points that may reach a surface point nearest to one of the smaller.
-    pub(crate) surroundings: Vec<([f32; 3], f32)>,
-    /// How much larger.
-    pub(crate) reach: f32,
+    pub(crate) level: Level,
+    /// The block near which f was evaluated last.
+    pub(crate) block: usize,
+    /// Groups that a descent found.
+    found: Vec<u32>,
+    /// Blocks that are heard at x.
+    heard: Vec<u32>,
+}
+
+impl Default for GatherScratch {
+    fn default() -> Self {
+        Self::at(Level::new())
+    }
 }
 
 impl GatherScratch {
-    /// Keeps the points whose horizon may reach the ball of `radius` about `centre`.
-    pub(crate) fn collect(&mut self, index: &Index<'_>, centre: [f32; 3], radius: f32) {
-        let Self { candidates, .. } = self;
-        candidates.clear();
-        let within = |d_sq: f32, reach: f32| {
-            let far = (index.plan.horizon(reach) + radius) * (1.0 + 1e-5);
-            d_sq < far * far
-        };
-        index.descend(
-            |id| within(index.boxes[id].distance_sq(centre), index.boxes[id].reach),
-            |node| {
-                for i in node.points() {
-                    let d = sub(index.positions[i], centre);
-                    if within(dot(d, d), index.radii[i]) {
-                        candidates.push((index.positions[i], index.radii[i]));
-                    }
-                }
-            },
-        );
-    }
-
-    /// As [`Self::collect`], and collects what may reach a surface point nearest to one of the ball; `guess` is what
-    /// the greatest local radius near it may be.
-    pub(crate) fn collect_widely(
-        &mut self,
-        index: &Index<'_>,
-        centre: [f32; 3],
-        radius: f32,
-        mut guess: f32,
-    ) {
-        // The wider collection comes first, for the narrower is part of it. A good guess saves a second descent.
-        loop {
-            self.collect(index, centre, radius + 0.5 * index.plan.horizon(guess));
-            let Self { candidates, surroundings, .. } = self;
-            std::mem::swap(candidates, surroundings);
-            candidates.clear();
-            let mut greatest = 0.0_f32;
-            for &(p, own) in &*surroundings {
-                let d = sub(p, centre);
-                let far = (index.plan.horizon(own) + radius) * (1.0 + 1e-5);
-                if dot(d, d) < far * far {
-                    candidates.push((p, own));
-                    greatest = greatest.max(own);
-                }
-            }
-            self.reach = 0.5 * index.plan.horizon(greatest);
-            if greatest <= guess {
-                self.pack(index.plan);
-                return;
-            }
-            guess = greatest;
-        }
-    }
-
-    /// Puts the candidates side by side.
-    pub(crate) fn pack(&mut self, plan: &SurfacePlan) {
-        let Self { candidates, blocks, .. } = self;
-        blocks.clear();
-        for chunk in candidates.chunks(PointBlock::WIDTH) {
-            let mut block = PointBlock::EMPTY;
-            for (lane, &(p, radius)) in chunk.iter().enumerate() {
-                block.set(lane, plan, p, radius);
-            }
-            blocks.push(block);
-        }
-    }
-
-    /// As [`Index::gather`], from the points collected about a ball in which `x` lies.
-    pub(crate) fn gather_collected(&mut self, plan: &SurfacePlan, x: [f64; 3]) {
-        let Self { near, blocks, .. } = self;
-        near.clear();
-        let centre = Centre::new(x);
-        for block in &*blocks {
-            near.offer_block(plan, &centre, block);
-        }
+    /// One whose evaluations use the instructions of `level`: no result depends on it.
+    #[must_use]
+    pub fn at(level: Level) -> Self {
+        Self { level, block: 0, found: Vec::new(), heard: Vec::new() }
     }
 }
 
-/// A scan near some place: several evaluations there share one descent.
-#[derive(Debug)]
-pub struct Vicinity<'a> {
-    index: Index<'a>,
-    scratch: &'a mut GatherScratch,
-    centre: [f64; 3],
-    radius: f64,
-}
-
-impl<'a> Vicinity<'a> {
-    pub(crate) fn new(
-        index: Index<'a>,
-        centre: [f64; 3],
-        radius: f64,
-        scratch: &'a mut GatherScratch,
-    ) -> Self {
-        let rounded = Centre::new(centre).rounded();
-        // Grown by more than the rounding of the centre.
-        let reach = centre.iter().fold(radius, |m, c| m.max(c.abs()));
-        #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
-        scratch.collect(&index, rounded, (radius + 1e-6 * reach) as f32);
-        scratch.pack(index.plan);
-        Self { index, scratch, centre, radius }
-    }
-
-    /// f at `x`: the same to the last bit as [`crate::PointHierarchy::evaluate`], anywhere.
-    pub fn evaluate(&mut self, x: [f64; 3]) -> Evaluation {
-        let away = (0..3).map(|k| (x[k] - self.centre[k]).powi(2)).sum::<f64>();
-        if away <= self.radius * self.radius {
-            self.scratch.gather_collected(self.index.plan, x);
-        } else {
-            self.index.gather(x, &mut self.scratch.near);
-        }
-        self.scratch.near.evaluate(self.index.plan, x)
-    }
-}
-
-/// What a descent to neighbours reads.
+/// What a search for neighbours reads.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Index<'a> {
     pub(crate) nodes: &'a [Node],
     pub(crate) boxes: &'a [OrientedBox],
-    pub(crate) positions: &'a [[f32; 3]],
-    pub(crate) radii: &'a [f32],
+    pub(crate) blocks: &'a [PointBlock],
+    pub(crate) groups: &'a [PointBlock],
+    pub(crate) lists: &'a [NeighbourList],
+    pub(crate) listed: &'a [u32],
     pub(crate) plan: &'a SurfacePlan,
 }
 
 impl Index<'_> {
-    /// Fills `near` with the points whose horizon reaches `x`, in canonical order.
-    pub(crate) fn gather(&self, x: [f64; 3], near: &mut Neighbourhood) {
-        near.clear();
+    /// f at `x`.
+    pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
-        let rounded = centre.rounded();
-        self.descend(
-            |id| {
-                let horizon = self.plan.horizon(self.boxes[id].reach);
-                self.boxes[id].distance_sq(rounded) < horizon * horizon
-            },
-            |node| {
-                for i in node.points() {
-                    near.offer(self.plan, &centre, self.positions[i], self.radii[i]);
-                }
-            },
-        );
+        let place = centre.rounded();
+        let GatherScratch { level, block, found, heard } = scratch;
+        let mut list = self.list(*block, place);
+        if list.is_none() {
+            *block = self.nearest_block(place);
+            list = self.list(*block, place);
+        }
+        let list = list.unwrap_or_else(|| {
+            self.collect(place, 0.0, found);
+            &*found
+        });
+        let moments = dispatch!(*level, simd => self.moments(simd, &centre, list, heard));
+        moments.evaluate(self.plan, x)
     }
 
-    /// Calls `visit` for every leaf that `admit` lets through together with all its ancestors, in order.
-    pub(crate) fn descend(&self, admit: impl Fn(usize) -> bool, mut visit: impl FnMut(&Node)) {
+    /// The groups that may be heard at `x`, if the list of this block is complete there.
+    #[inline]
+    fn list(&self, block: usize, x: [f32; 3]) -> Option<&[u32]> {
+        let list = self.lists.get(block)?;
+        let d = sub(x, self.middle(block)?);
+        let first = list.first as usize;
+        let complete = list.within > 0.0 && dot(d, d) <= list.within * list.within;
+        if complete { self.listed.get(first..first + list.count as usize) } else { None }
+    }
+
+    /// The middle of the ball about a block.
+    #[inline]
+    pub(crate) fn middle(&self, block: usize) -> Option<[f32; 3]> {
+        let [x, y, z] = &self.groups.get(block / PointBlock::WIDTH)?.position;
+        let lane = block % PointBlock::WIDTH;
+        Some([x[lane], y[lane], z[lane]])
+    }
+
+    /// A block of the leaf whose box is near `x`: always into the nearer child.
+    fn nearest_block(&self, x: [f32; 3]) -> usize {
+        let mut id = 0;
+        while !self.nodes[id].is_leaf() {
+            let [left, right] = [id + 1, self.nodes[id].right as usize];
+            let nearer = self.boxes[left].distance_sq(x) <= self.boxes[right].distance_sq(x);
+            id = if nearer { left } else { right };
+        }
+        self.nodes[id].first as usize / PointBlock::WIDTH
+    }
+
+    /// The groups of which a point may be heard within `distance` of `x`, ascending.
+    pub(crate) fn collect(&self, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
+        found.clear();
         let mut stack = [0_u32; TREE_STACK];
         let mut top = 1;
+        // Leaves come in order, and many in one group.
+        let mut next = 0;
         while top > 0 {
             top -= 1;
             let id = stack[top] as usize;
-            if !admit(id) {
+            let node = &self.nodes[id];
+            let far = (self.plan.horizon(self.boxes[id].reach) + distance) * GROWN;
+            let is_near = self.boxes[id].distance_sq(x) < far * far;
+            let (first, end) =
+                (node.first as usize / GROUP, (node.first as usize + node.count as usize).div_ceil(GROUP));
+            if !is_near || end <= next {
                 continue;
             }
-            let node = &self.nodes[id];
             if node.is_leaf() {
-                visit(node);
+                found.extend((first.max(next)..end).map(id32));
+                next = end;
             } else if top + 2 <= TREE_STACK {
                 stack[top] = node.right;
                 stack[top + 1] = id32(id) + 1;
                 top += 2;
             }
+        }
+    }
+
+    /// The blocks of these groups, which ascend, that may be heard within `distance` of `x`: written to the front of
+    /// `heard`, of which they are returned.
+    #[inline(always)]
+    pub(crate) fn heard<'b, S: Simd>(
+        &self,
+        simd: S,
+        groups: &[u32],
+        x: [f32; 3],
+        distance: f32,
+        heard: &'b mut Vec<u32>,
+    ) -> &'b [u32] {
+        let most = (groups.len() + 1) * PointBlock::WIDTH;
+        if heard.len() < most {
+            heard.resize(most, 0);
+        }
+        let mut count = 0;
+        for &group in groups {
+            let balls = self.groups.get(group as usize);
+            let room = heard.get_mut(count..).and_then(<[u32]>::first_chunk_mut);
+            if let (Some(balls), Some(room)) = (balls, room) {
+                count += balls.heard(simd, x, distance, group * id32(PointBlock::WIDTH), room);
+            }
+        }
+        &heard[..count]
+    }
+
+    /// The sums over all points of `groups`, which ascend, about x.
+    #[inline(always)]
+    pub(crate) fn moments<S: Simd>(
+        &self,
+        simd: S,
+        x: &Centre,
+        groups: &[u32],
+        heard: &mut Vec<u32>,
+    ) -> Moments {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut near = Neighbourhood::new(simd, self.plan, x);
+                for &block in self.heard(simd, groups, x.rounded(), 0.0, heard) {
+                    if let Some(block) = self.blocks.get(block as usize) {
+                        near.offer(simd, block);
+                    }
+                }
+                near.moments()
+            },
+        )
+    }
+}
+
+impl PointHierarchy {
+    /// f at `x`, in the stored frame.
+    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        self.index().evaluate(x, scratch)
+    }
+
+    /// As [`Self::evaluate_with`], faster where `x` is within a local radius or so of the stored point `i`: the
+    /// list of that point is looked at first.
+    pub fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        scratch.block = i / PointBlock::WIDTH;
+        self.index().evaluate(x, scratch)
+    }
+
+    /// f at `x`, in the stored frame; allocates a scratch of its own.
+    #[must_use]
+    pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
+        self.evaluate_with(x, &mut GatherScratch::default())
+    }
+
+    pub(crate) fn index(&self) -> Index<'_> {
+        Index {
+            nodes: &self.nodes,
+            boxes: &self.boxes,
+            blocks: &self.blocks,
+            groups: &self.groups,
+            lists: &self.lists,
+            listed: &self.listed,
+            plan: &self.plan,
         }
     }
 }

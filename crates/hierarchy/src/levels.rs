@@ -1,6 +1,6 @@
 //! The samples of nodes as the scan seen from further away: which they are, how far they reach, and f' over them.
 
-use nearmiss_surface::{Centre, Evaluation};
+use nearmiss_surface::{Evaluation, Moments, PointBlock};
 
 use crate::build::{PointHierarchy, Slices};
 use crate::gather::GatherScratch;
@@ -88,17 +88,18 @@ impl PointHierarchy {
     /// When there is no such node.
     pub fn evaluate_node_with(&self, node: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let slices = self.slices();
-        let (horizon, bandwidth) = (slices.node_horizon(node), slices.node_bandwidth(node));
-        let near = &mut scratch.near;
-        near.clear();
-        let centre = Centre::new(x);
-        for i in slices.samples(node).iter() {
-            let d = centre.offset(slices.positions[i]);
-            let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            if d_sq < horizon * horizon {
-                near.push(d, self.plan().reach_sq() * (d_sq / (horizon * horizon)), bandwidth);
+        let (samples, horizon) = (slices.samples(node), slices.node_horizon(node));
+        let mut samples = samples.iter();
+        let blocks = std::iter::from_fn(|| {
+            let mut block = PointBlock::EMPTY;
+            for (lane, i) in samples.by_ref().take(PointBlock::WIDTH).enumerate() {
+                for k in 0..3 {
+                    block.position[k][lane] = slices.positions[i][k];
+                }
+                block.horizon[lane] = horizon;
             }
-        }
-        near.evaluate(self.plan(), x)
+            (block.horizon[0] > 0.0).then_some(block)
+        });
+        Moments::about(scratch.level, self.plan(), x, blocks).evaluate(self.plan(), x)
     }
 }

@@ -4,6 +4,7 @@
 
 #[cfg(test)]
 mod lies;
+mod lists;
 mod metadata;
 mod nodes;
 mod points;
@@ -99,15 +100,16 @@ pub(crate) fn check_topology(nodes: &[Node], points: usize, leaf_size: u32) -> R
 }
 
 impl PointHierarchy {
-    /// What queries need to stay within their arrays: lengths, tree, metadata, and numbers of boxes in their ranges.
-    /// One pass over the nodes; the points are not read.
+    /// What queries need to stay within their arrays: lengths, tree, metadata, numbers of boxes in their ranges, and
+    /// neighbour lists that are there. One pass over the nodes; the points are not read.
     pub(crate) fn check_structure(&self) -> Result<(), Flaw> {
         self.check_lengths()?;
         check_topology(&self.nodes, self.len(), self.leaf_size)?;
         self.check_metadata()?;
         nodes::check_ranges(&self.boxes)?;
         nodes::check_growths(&self.growths)?;
-        samples::check_ranges(self)
+        samples::check_ranges(self)?;
+        lists::check_ranges(&self.lists, self.listed.len())
     }
 
     /// What their answers need besides, given the structure: each box lies within its parent's, and every number of
@@ -116,11 +118,12 @@ impl PointHierarchy {
         nodes::check(&self.nodes, &self.boxes)?;
         points::check(self)?;
         samples::check(self)?;
+        lists::check(self)?;
         self.check_summary()
     }
 
     /// Checks every invariant: what a load checks, that each box of each node holds the discs of all points under it,
-    /// and that no point of the input is stored twice. O(n log n); for tests.
+    /// that neighbour lists are complete, and that no point of the input is stored twice. O(n log n); for tests.
     ///
     /// # Errors
     /// Names the first that does not hold.
@@ -138,6 +141,7 @@ impl PointHierarchy {
                 }
             }
         }
+        lists::check_complete(self)?;
         let mut sources: Vec<u32> = self.source.to_vec();
         sources.sort_unstable();
         match sources.windows(2).find(|two| two[0] == two[1]) {

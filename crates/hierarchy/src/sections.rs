@@ -21,6 +21,10 @@ const GROWTHS: [u8; 4] = *b"GROW";
 const SAMPLES: [u8; 4] = *b"SMPL";
 const COVERINGS: [u8; 4] = *b"COVR";
 const CONES: [u8; 4] = *b"CONE";
+const BLOCKS: [u8; 4] = *b"BLOK";
+const GROUPS: [u8; 4] = *b"GRUP";
+const LISTS: [u8; 4] = *b"LIST";
+const LISTED: [u8; 4] = *b"NEAR";
 
 /// What a hierarchy stores beside its arrays.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -80,6 +84,10 @@ impl PointHierarchy {
             .section(SAMPLES, 0, &self.sample_lists)?
             .section(COVERINGS, 0, &self.coverings)?
             .section(CONES, 0, &self.cones)?
+            .section(BLOCKS, 0, &self.blocks)?
+            .section(GROUPS, 0, &self.groups)?
+            .section(LISTS, 0, &self.lists)?
+            .section(LISTED, 0, &self.listed)?
             .section(POSITIONS, 0, &self.positions)?
             .section(NORMALS, 0, &self.normals)?
             .section(RADII, 0, &self.radii)?
@@ -90,7 +98,7 @@ impl PointHierarchy {
     }
 
     /// The hierarchy in `file`, its arrays in place. With either `check` the structure is looked through: lengths
-    /// agree, every node's children and points are there, numbers of boxes lie in their ranges. With [`Check::Full`]
+    /// agree, every node's children and points are there, numbers of boxes and lists lie in their ranges. With [`Check::Full`]
     /// each box also lies within its parent's, and the numbers of every point are looked at.
     ///
     /// # Errors
@@ -118,6 +126,10 @@ impl PointHierarchy {
             sample_lists: file.array(SAMPLES, 0)?,
             coverings: file.array(COVERINGS, 0)?,
             cones: file.array(CONES, 0)?,
+            blocks: file.array(BLOCKS, 0)?,
+            groups: file.array(GROUPS, 0)?,
+            lists: file.array(LISTS, 0)?,
+            listed: file.array(LISTED, 0)?,
         };
         hierarchy.check_structure()?;
         if check == Check::Full {

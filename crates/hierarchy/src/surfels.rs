@@ -6,13 +6,15 @@
 //! sampling radius apart must not meet.
 
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_surface::{Evaluation, Neighbourhood, Status, symmetric_eigen};
+use nearmiss_surface::{Centre, Evaluation, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
-use crate::boxes::{OrientedBox, dot, sub};
+use crate::boxes::{OrientedBox, dot};
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
-use crate::gather::{GatherScratch, Index};
+use crate::gather::Index;
+use crate::neighbours::Locality;
 use crate::spacing::{Look, Spacing};
 use crate::topology::Node;
 
@@ -107,71 +109,137 @@ pub(crate) struct Surfel {
     pub(crate) cell: Cell,
 }
 
-/// The discs of the points of one leaf, numbered `points`, and bounds of its part of the surface; `about` is its box,
-/// `ordinary` the scan's sampling radius.
-pub(crate) fn leaf_surfels(
-    index: &Index<'_>,
-    points: std::ops::Range<usize>,
-    about: &OrientedBox,
-    (spacings, ordinary): (&[Spacing], f32),
-    (scratch, surroundings): (&mut GatherScratch, &mut Surroundings),
-    surfels: &mut Vec<Surfel>,
-) -> LeafBounds {
-    let places = &index.positions[points.clone()];
-    #[expect(clippy::cast_precision_loss, reason = "a leaf has at most 64 points")]
-    let share = 1.0 / places.len() as f32;
-    let sum = places.iter().fold([0.0; 3], |s, p| [s[0] + p[0], s[1] + p[1], s[2] + p[2]]);
-    let centre = sum.map(|c| c * share);
-    let radius_sq = places.iter().map(|p| sub(*p, centre)).map(|d| dot(d, d)).fold(0.0, f32::max);
-    // Radii grow by at most 0.3 per length, and few as fast.
-    scratch.collect_widely(index, centre, radius_sq.sqrt(), 1.3 * about.reach);
-    surroundings.fill(index.plan, places[0], &scratch.surroundings, scratch.reach);
-    let mut cells = LeafBounds::new(places, about, surroundings).cells();
-    for i in points {
-        let surfel = surfel(index, i, (spacings[i], ordinary), scratch, surroundings);
-        cells.include(index.positions[i], surfel.normal, &surfel.cell);
-        surfels.push(surfel);
-    }
-    cells.close()
+/// Reused from leaf to leaf.
+#[derive(Debug)]
+pub(crate) struct LeafScratch {
+    level: Level,
+    locality: Locality,
+    surroundings: Surroundings,
+    /// The blocks that are heard at a point.
+    near: Vec<u32>,
+    fits: Vec<Moments>,
 }
 
-/// The disc of point `i`, about whose leaf `scratch` has collected points, and its cell.
-fn surfel(
-    index: &Index<'_>,
-    i: usize,
-    (spacing, ordinary): (Spacing, f32),
-    scratch: &mut GatherScratch,
-    surroundings: &Surroundings,
-) -> Surfel {
-    let x = index.positions[i].map(f64::from);
-    scratch.gather_collected(index.plan, x);
-    let near = &scratch.near;
-    let at = near.evaluate(index.plan, x);
-    let n = Vector3::from(at.normal);
+impl Default for LeafScratch {
+    fn default() -> Self {
+        Self {
+            level: Level::new(),
+            locality: Locality::default(),
+            surroundings: Surroundings::default(),
+            near: Vec::new(),
+            fits: Vec::new(),
+        }
+    }
+}
+
+/// The points of a leaf, and what of them is known already.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Leaf<'a> {
+    pub(crate) positions: &'a [[f32; 3]],
+    pub(crate) radii: &'a [f32],
+    pub(crate) spacings: &'a [Spacing],
+    pub(crate) about: &'a OrientedBox,
+    /// The scan's sampling radius.
+    pub(crate) ordinary: f32,
+}
+
+impl Leaf<'_> {
+    /// The discs of the points, and bounds of their part of the surface.
+    pub(crate) fn surfels(
+        &self,
+        index: &Index<'_>,
+        scratch: &mut LeafScratch,
+        surfels: &mut Vec<Surfel>,
+    ) -> LeafBounds {
+        let level = scratch.level;
+        dispatch!(level, simd => self.add_up(simd, index, scratch));
+        let first = surfels.len();
+        for (i, moments) in scratch.fits.iter().enumerate() {
+            let at = moments.evaluate(index.plan, self.positions[i].map(f64::from));
+            surfels.push(surfel(&at, index.plan, self.radii[i], self.spacings[i], self.ordinary));
+        }
+        let surfels = &mut surfels[first..];
+        dispatch!(level, simd => self.look_about(simd, index, scratch, surfels))
+    }
+
+    /// The sums of every point.
+    #[inline(always)]
+    fn add_up<S: Simd>(&self, simd: S, index: &Index<'_>, scratch: &mut LeafScratch) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let LeafScratch { locality, near, fits, .. } = scratch;
+                // Radii grow by at most 0.3 per length, and few as fast.
+                locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
+                fits.clear();
+                for p in self.positions {
+                    let x = Centre::new(p.map(f64::from));
+                    fits.push(index.moments(simd, &x, &locality.groups, near));
+                }
+            },
+        );
+    }
+
+    /// Narrows the discs at borders, and bounds the surface about them.
+    #[inline(always)]
+    fn look_about<S: Simd>(
+        &self,
+        simd: S,
+        index: &Index<'_>,
+        scratch: &mut LeafScratch,
+        surfels: &mut [Surfel],
+    ) -> LeafBounds {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let LeafScratch { locality, surroundings, near, .. } = scratch;
+                surroundings.fill(index, self.positions[0], locality);
+                let mut cells = LeafBounds::new(self.positions, self.about, surroundings).cells();
+                for ((p, radius), surfel) in self.positions.iter().zip(self.radii).zip(surfels) {
+                    let near = index.heard(simd, &locality.groups, *p, 0.0, near);
+                    let blocks = || near.iter().map(|&block| &index.blocks[block as usize]);
+                    surfel.disc = surfel.disc.min(radius * disc(widest_gap(*p, surfel.normal, blocks())));
+                    surfel.cell = surroundings.cell(*p, surfel.normal, *radius, blocks());
+                    cells.include(*p, surfel.normal, &surfel.cell);
+                }
+                cells.close()
+            },
+        )
+    }
+}
+
+/// The disc of a point at which f is `at`, as if it were in the interior, without its cell.
+fn surfel(at: &Evaluation, plan: &SurfacePlan, radius: f32, spacing: Spacing, ordinary: f32) -> Surfel {
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-    let normal = n.map(|c| c as f32).into();
-    let gap = widest_gap(near, normal).clamp(INTERIOR_GAP, BORDER_GAP) - INTERIOR_GAP;
-    #[expect(clippy::cast_precision_loss, reason = "a small number")]
-    let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
-    let disc = index.radii[i] * (DISC - (DISC - DISC_AT_BORDER) * border);
-    let kind = kind(&at, spacing.look == Look::Line);
+    let normal = at.normal.map(|c| c as f32);
+    let kind = kind(at, spacing.look == Look::Line);
     // What is further than an ordinary horizon from all points is no surface (S0 eq. 6) but a hole, however sparse
     // the points about it; what a lone point knows of ends with its ball.
-    let widest = if kind.is_sparse() { ordinary } else { index.plan.horizon(ordinary) };
-    let cell = surroundings.cell(index.positions[i], normal, index.radii[i], near);
-    Surfel { normal, disc: disc.min(widest), kind, cell }
+    let widest = if kind.is_sparse() { ordinary } else { plan.horizon(ordinary) };
+    Surfel { normal, disc: (radius * DISC).min(widest), kind, cell: Cell::default() }
 }
 
-/// The greatest number of neighbouring sectors of the tangent plane in which no point lies.
-fn widest_gap(near: &Neighbourhood, normal: [f32; 3]) -> u32 {
+/// The radius of a disc over the local sampling radius, given how many sectors beside each other are empty.
+fn disc(gap: u32) -> f32 {
+    let gap = gap.clamp(INTERIOR_GAP, BORDER_GAP) - INTERIOR_GAP;
+    #[expect(clippy::cast_precision_loss, reason = "a small number")]
+    let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
+    DISC - (DISC - DISC_AT_BORDER) * border
+}
+
+/// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at `p`.
+#[inline(always)]
+fn widest_gap<'a>(p: [f32; 3], normal: [f32; 3], blocks: impl Iterator<Item = &'a PointBlock>) -> u32 {
     let (u, v) = tangents(normal);
-    let mut taken = 0_u64;
-    for offset in near.offsets() {
-        let (x, y) = (dot(offset, u), dot(offset, v));
-        let length = x.abs() + y.abs();
-        if length > 0.0 {
+    let mut taken = [0_u32; PointBlock::WIDTH];
+    for PointBlock { position: [px, py, pz], horizon } in blocks {
+        for i in 0..PointBlock::WIDTH {
+            let d = [px[i] - p[0], py[i] - p[1], pz[i] - p[2]];
+            let (x, y) = (dot(d, u), dot(d, v));
+            let length = x.abs() + y.abs();
             // The angle of the diamond |x| + |y| = 1, 0 to 4: a quarter turn each 1, without trigonometry.
-            let quarter = if y >= 0.0 { 1.0 - x / length } else { 3.0 + x / length };
+            let share = x / length;
+            let quarter = if y >= 0.0 { 1.0 - share } else { 3.0 + share };
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -179,15 +247,19 @@ fn widest_gap(near: &Neighbourhood, normal: [f32; 3]) -> u32 {
                 reason = "0 to 24"
             )]
             let sector = (quarter * (SECTORS as f32 / 4.0)) as u32;
-            taken |= 1 << (sector % SECTORS);
+            let sector = if sector < SECTORS { sector } else { 0 };
+            let counts = (dot(d, d) < horizon[i] * horizon[i]) & (length > 0.0);
+            taken[i] |= if counts { 1 << sector } else { 0 };
         }
     }
+    let taken = u64::from(taken.into_iter().fold(0, |all, bits| all | bits));
     // Twice round, so that a run across the start counts whole.
     let round = taken | taken << SECTORS;
-    let (mut widest, mut run) = (0, 0);
-    for sector in 0..2 * SECTORS {
-        run = if round >> sector & 1 == 0 { run + 1 } else { 0 };
-        widest = widest.max(run);
+    // Runs of k are left where k − 1 more follow.
+    let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
+    while runs != 0 {
+        runs &= runs >> 1;
+        widest += 1;
     }
     widest.min(SECTORS)
 }

@@ -2,8 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::PointCloud;
-use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_surface::{Bandwidth, Kernel, Status, SurfaceOptions};
+use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy};
+use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 
@@ -169,21 +169,88 @@ fn near_an_interior_sheet_the_function_is_ok() {
     assert!(ok >= 950, "{ok} of 1000");
 }
 
+/// Every instruction set there is here.
+fn levels() -> Vec<Level> {
+    let best = Level::new();
+    let mut levels = vec![best, Level::baseline()];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(best.as_avx2().map(Level::Avx2));
+        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
+    }
+    levels
+}
+
+/// f at `x` with all points of the scan offered.
+fn by_all_points(scan: &PointHierarchy, x: [f64; 3]) -> Evaluation {
+    Moments::about(Level::baseline(), scan.plan(), x, scan.blocks().iter().copied()).evaluate(scan.plan(), x)
+}
+
 #[test]
-fn a_vicinity_changes_no_bit() {
-    let scan = prepared(&arbitrary::cloud(CloudKind::Clustered, 3000, 2), &BuildOptions::default());
-    let mut rng = arbitrary::rng(6);
-    let mut scratch = nearmiss_hierarchy::GatherScratch::default();
-    for i in (0..scan.len()).step_by(37) {
-        let radius = 2.0 * f64::from(scan.radii()[i]);
-        let centre = scan.positions()[i].map(f64::from);
-        let mut vicinity = scan.vicinity(centre, radius, &mut scratch);
-        for _ in 0..5 {
-            // Some of them outside the ball.
-            let offset = arbitrary::point_in(&mut rng, radius);
-            let x = [0, 1, 2].map(|k| centre[k] + offset[k]);
-            assert_eq!(vicinity.evaluate(x), scan.evaluate(x), "at {x:?}");
+fn lists_and_instructions_change_no_bit() {
+    let dragon = nearmiss_testdata::dragon::dragon_mesh(nearmiss_testdata::dragon::Dragon::Points5k).unwrap();
+    let clouds =
+        KINDS.map(|kind| arbitrary::cloud(kind, 3000, 2)).into_iter().chain([dragon.vertices().to_vec()]);
+    let (mut listed, mut compared) = (0, 0);
+    for points in clouds {
+        for (leaf_size, bandwidth) in
+            [(16, Bandwidth::Local), (4, Bandwidth::Local), (60, Bandwidth::Local), (16, Bandwidth::Global)]
+        {
+            let surface = SurfaceOptions::default().with_bandwidth(bandwidth);
+            let scan =
+                prepared(&points, &BuildOptions::default().with_leaf_size(leaf_size).with_surface(surface));
+            let mut scratches: Vec<GatherScratch> = levels().into_iter().map(GatherScratch::at).collect();
+            let mut rng = arbitrary::rng(6);
+            for i in (0..scan.len()).step_by(97) {
+                listed += usize::from(scan.neighbours(i / PointBlock::WIDTH).is_some());
+                // On the surface, near it, beyond what the list is complete for, and far off.
+                for reach in [0.0, 0.5, 2.0, 6.0, 40.0] {
+                    let offset = arbitrary::point_in(&mut rng, reach * f64::from(scan.radii()[i]));
+                    let x = [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + offset[k]);
+                    let expected = by_all_points(&scan, x);
+                    for scratch in &mut scratches {
+                        // The block that the one before left in the scratch is near, or not.
+                        assert_eq!(scan.evaluate_with(x, scratch), expected, "anywhere, at {x:?}");
+                        assert_eq!(scan.evaluate_near(i, x, scratch), expected, "at a leaf, at {x:?}");
+                        compared += 1;
+                    }
+                }
+            }
         }
+    }
+    assert!(compared > 20_000 && listed > 1000, "{listed} of {compared} by lists");
+}
+
+#[test]
+fn a_list_is_complete_where_it_is_said_to_be() {
+    for kind in KINDS {
+        let scan = prepared(&arbitrary::cloud(kind, 3000, 4), &BuildOptions::default());
+        for i in (0..scan.len()).step_by(53) {
+            let block = i / PointBlock::WIDTH;
+            let Some((within, groups)) = scan.neighbours(block) else { continue };
+            let lane = block % PointBlock::WIDTH;
+            let middle = scan.groups()[block / PointBlock::WIDTH].position.map(|c| f64::from(c[lane]));
+            for (j, (p, r)) in scan.positions().iter().zip(scan.radii()).enumerate() {
+                let away = (0..3).map(|k| (f64::from(p[k]) - middle[k]).powi(2)).sum::<f64>().sqrt();
+                if away < f64::from(scan.plan().horizon(*r)) + f64::from(within) {
+                    let group = u32::try_from(j / PointBlock::WIDTH.pow(2)).unwrap();
+                    assert!(groups.contains(&group), "{kind:?}: point {j} is heard near block {block}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scratch_of_another_scan_does_no_harm() {
+    let large = prepared(&arbitrary::cloud(CloudKind::Sphere, 5000, 1), &BuildOptions::default());
+    let small = prepared(&arbitrary::cloud(CloudKind::Sphere, 40, 1), &BuildOptions::default());
+    let mut scratch = GatherScratch::default();
+    for i in (0..large.len()).step_by(37) {
+        let x = large.positions()[i].map(f64::from);
+        assert_eq!(large.evaluate_near(i, x, &mut scratch), large.evaluate(x), "the large one");
+        assert_eq!(small.evaluate_with(x, &mut scratch), small.evaluate(x), "the small one after it");
+        assert_eq!(small.evaluate_near(usize::MAX, x, &mut scratch), small.evaluate(x), "no such point");
     }
 }
 
@@ -200,5 +267,8 @@ fn threads_and_order_of_work_do_not_matter() {
         assert_eq!(one.radii(), other.radii(), "radii");
         assert_eq!(one.boxes(), other.boxes(), "boxes");
         assert_eq!(one.meta(), other.meta(), "the rest");
+        for block in 0..one.blocks().len() {
+            assert_eq!(one.neighbours(block), other.neighbours(block), "the list of block {block}");
+        }
     }
 }

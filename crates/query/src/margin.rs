@@ -124,7 +124,7 @@ impl Surfaces<'_> {
         let mut evaluations = 0;
         let mut land = |side: usize, x: Vector3<f64>| {
             let scratch = &mut self.gathers[side];
-            let foot = project(x.into(), |y| views[side].evaluate_with(y, scratch));
+            let foot = project(x.into(), |y| views[side].evaluate_near([i, j][side], y, scratch));
             evaluations += u64::from(foot.evaluations);
             foot
         };

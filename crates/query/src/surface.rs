@@ -22,9 +22,6 @@ use crate::verdict::{Contact, Evidence, Reason};
 /// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
 const TRIES: u32 = 4;
 
-/// Newton's steps hardly ever lead further than this from the crossing, in local radii.
-const NEWTON: f64 = 1.0;
-
 /// A verified point further than this from the crossing, in the greater of the two local radii, is some other place.
 const NEARBY: f64 = 4.0;
 
@@ -245,18 +242,14 @@ impl<'a> Surfaces<'a> {
         let [scratch_a, scratch_b] = &mut *self.gathers;
         let scale = vb.placed().scale() / va.placed().scale();
         let radius = f64::from(self.pair.a.radii[i]).max(f64::from(self.pair.b.radii[j]) * scale);
-        let (in_a, in_b) = (NEWTON * radius, NEWTON * radius / scale);
         let start = contact.point;
-        let mut near_a = va.scan().vicinity(va.placed().apply_inverse(start), in_a, scratch_a);
-        let mut near_b = vb.scan().vicinity(vb.placed().apply_inverse(start), in_b, scratch_b);
         let meter = &mut self.pair.meter;
         let meeting = meet(start, |x| {
             if meter.go_on().is_break() {
                 return None;
             }
             meter.spent.evaluations += 2;
-            let at_a = va.in_world(near_a.evaluate(va.placed().apply_inverse(x)));
-            Some([at_a, vb.in_world(near_b.evaluate(vb.placed().apply_inverse(x)))])
+            Some([va.evaluate_near(i, x, scratch_a), vb.evaluate_near(j, x, scratch_b)])
         })?;
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
         let nearby = NEARBY * radius * va.placed().scale();

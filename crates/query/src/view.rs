@@ -55,6 +55,11 @@ impl<'a> ScanView<'a> {
         self.in_world(self.scan.evaluate_with(self.placed.apply_inverse(x), scratch))
     }
 
+    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`.
+    pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        self.in_world(self.scan.evaluate_near(i, self.placed.apply_inverse(x), scratch))
+    }
+
     /// What holds in the stored frame, in the world.
     pub(crate) fn in_world(&self, at: Evaluation) -> Evaluation {
         let scale = self.placed.scale();

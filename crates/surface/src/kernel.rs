@@ -9,6 +9,7 @@
 //! either of its directions, so that every condition in terms of h means the same for both. For Wendland's
 //! function ∫q³w / ∫qw = 5/36, hence h² = 5/36 of the squared horizon.
 
+use fearless_simd::{Bytes, Simd, SimdBase, SimdFloat, SimdFrom, f32x16, u32x16};
 use serde::{Deserialize, Serialize};
 
 /// How the weight of a point falls off with its distance.
@@ -44,6 +45,42 @@ impl Kernel {
             Self::Wendland => wendland(t),
         }
     }
+
+    /// [`Self::weight`] in lanes, the same to the last bit for 0 ≤ t ≤ 80.
+    #[inline(always)]
+    #[must_use]
+    pub fn weights<S: Simd>(self, simd: S, t: f32x16<S>) -> f32x16<S> {
+        match self {
+            Self::Gaussian => exp_neg_lanes(t),
+            Self::Wendland => wendland_lanes(simd, t),
+        }
+    }
+}
+
+/// As [`wendland`].
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "a constant that f32 holds closely enough")]
+fn wendland_lanes<S: Simd>(simd: S, t: f32x16<S>) -> f32x16<S> {
+    const INVERSE: f32 = (1.0 / WENDLAND_REACH_SQ) as f32;
+    let q = (t * INVERSE).sqrt();
+    let (s, zero) = (1.0 - q, f32x16::simd_from(simd, 0.0));
+    let s = simd.select_f32x16(s.simd_gt(zero), s, zero);
+    (s * s) * (s * s) * (q * 4.0 + 1.0)
+}
+
+/// As [`exp_neg`].
+#[inline(always)]
+fn exp_neg_lanes<S: Simd>(t: f32x16<S>) -> f32x16<S> {
+    let y = -t;
+    let shifted = y * std::f32::consts::LOG2_E + ROUND;
+    let k = shifted - ROUND;
+    let r = (y - k * LN2_HIGH) - k * LN2_LOW;
+    let square = r * r;
+    let high = (r * TAYLOR[0] + TAYLOR[1]) * square + (r * TAYLOR[2] + TAYLOR[3]);
+    let low = (r * TAYLOR[4] + TAYLOR[5]) * square + (r * TAYLOR[6] + TAYLOR[7]);
+    let p = high * (square * square) + low;
+    let exponent = shifted.bitcast::<u32x16<S>>() - ROUND.to_bits() + 127;
+    p * (exponent << 23).bitcast::<f32x16<S>>()
 }
 
 #[inline]
@@ -55,35 +92,38 @@ fn wendland(t: f32) -> f32 {
     (s * s) * (s * s) * (4.0 * q + 1.0)
 }
 
+/// Adding this to a number below 2²² rounds it to an integer, which then stands in the low bits.
+const ROUND: f32 = 12_582_912.0;
+
+/// ln 2 in two parts, the first of which times an integer below 256 is exact.
+const LN2_HIGH: f32 = 0.693_359_4;
+const LN2_LOW: f32 = -2.121_944_4e-4;
+
+/// The exponential's coefficients: for |r| ≤ ln 2 / 2 the first term left out is 1.2e-7 · 2^-1 relative to 1.
+const TAYLOR: [f32; 8] = [1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0];
+
 /// exp(−t) for 0 ≤ t ≤ 80, to 2 units in the last place; the same bits on every machine, and without a call,
 /// so that it vectorises. Beyond 80 the value at 80.
 #[inline]
 #[must_use]
 pub(crate) fn exp_neg(t: f32) -> f32 {
-    /// Adding this to a number below 2²² rounds it to an integer, which then stands in the low bits.
-    const ROUND: f32 = 12_582_912.0;
-    /// ln 2 in two parts, the first of which times an integer below 256 is exact.
-    const LN2_HIGH: f32 = 0.693_359_4;
-    const LN2_LOW: f32 = -2.121_944_4e-4;
     let y = -t.min(80.0);
     let shifted = y * std::f32::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
     let r = (y - k * LN2_HIGH) - k * LN2_LOW;
-    // Taylor, |r| ≤ ln 2 / 2: the first term left out is 1.2e-7 · 2^-1 relative to 1.
-    let mut p = 1.0 / 5040.0;
-    p = p * r + 1.0 / 720.0;
-    p = p * r + 1.0 / 120.0;
-    p = p * r + 1.0 / 24.0;
-    p = p * r + 1.0 / 6.0;
-    p = p * r + 0.5;
-    p = p * r + 1.0;
-    p = p * r + 1.0;
+    // By halves, which leaves shorter chains of operations that wait for each other.
+    let square = r * r;
+    let high = (r * TAYLOR[0] + TAYLOR[1]) * square + (r * TAYLOR[2] + TAYLOR[3]);
+    let low = (r * TAYLOR[4] + TAYLOR[5]) * square + (r * TAYLOR[6] + TAYLOR[7]);
+    let p = high * (square * square) + low;
     let exponent = shifted.to_bits().wrapping_sub(ROUND.to_bits()).wrapping_add(127);
     p * f32::from_bits(exponent << 23)
 }
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::*;
 
     #[test]
@@ -97,6 +137,24 @@ mod tests {
         }
         assert!(worst < 2.4e-7, "{worst}");
         assert_eq!(exp_neg(0.0).to_bits(), 1.0_f32.to_bits(), "exactly one at zero");
+    }
+
+    #[test]
+    fn lanes_weigh_as_one_by_one_at_every_level() {
+        fn in_lanes<S: Simd>(simd: S, kernel: Kernel, t: &[f32; 16]) -> [f32; 16] {
+            kernel.weights(simd, f32x16::load_array_ref(simd, t)).to_array()
+        }
+        for i in 0..50_000_u16 {
+            let t = std::array::from_fn(|lane| f32::from(i) * 1e-4 * f32::from(u8::try_from(lane).unwrap()));
+            for kernel in [Kernel::Gaussian, Kernel::Wendland] {
+                let expected = t.map(|t| kernel.weight(t).to_bits());
+                let best = Level::new();
+                let found = dispatch!(best, simd => in_lanes(simd, kernel, &t));
+                assert_eq!(found.map(f32::to_bits), expected, "{kernel:?} at {t:?}");
+                let found = dispatch!(Level::baseline(), simd => in_lanes(simd, kernel, &t));
+                assert_eq!(found.map(f32::to_bits), expected, "{kernel:?} at {t:?}, baseline");
+            }
+        }
     }
 
     #[test]

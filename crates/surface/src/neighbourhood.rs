@@ -1,24 +1,49 @@
-//! The points that f(x) needs, relative to x, and their weighted moments.
+//! The points in whose horizon x lies, as weighted sums relative to x.
 
-use crate::{Kernel, SurfacePlan};
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, Simd, SimdBase, SimdFrom, SimdMask, dispatch, f32x16, mask32x16};
 
-/// Lanes of the sums: enough for one AVX register, two of SSE2 or NEON. Their order is fixed, so the sums are
-/// the same whatever the machine.
-const LANES: usize = 8;
+use crate::SurfacePlan;
 
-/// Weighted sums over a neighbourhood, relative to the point it was gathered about.
+/// Weighted sums over a neighbourhood, relative to the point x it was gathered about.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Moments {
+pub struct Moments {
     /// Σw.
     pub(crate) weight: f64,
     /// Σw(p−x).
     pub(crate) first: [f64; 3],
     /// Σw(p−x)(p−x)ᵀ as xx xy xz yy yz zz.
     pub(crate) second: [f64; 6],
-    /// Σw·h.
-    pub(crate) bandwidth: f64,
-    /// The least d²/h².
+    /// Σw·horizon.
+    pub(crate) horizon: f64,
+    /// The least d²/horizon².
     pub(crate) nearest: f32,
+    /// How many points there are.
+    pub(crate) support: u32,
+}
+
+impl Moments {
+    /// Those of the points of all `blocks` whose horizon reaches `x`, by the instructions of `level`, which change no
+    /// bit.
+    #[must_use]
+    pub fn about(
+        level: Level,
+        plan: &SurfacePlan,
+        x: [f64; 3],
+        blocks: impl IntoIterator<Item = PointBlock>,
+    ) -> Self {
+        let x = Centre::new(x);
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut near = Neighbourhood::new(simd, plan, &x);
+                for block in blocks {
+                    near.offer(simd, &block);
+                }
+                near.moments()
+            },
+        ))
+    }
 }
 
 /// A point split into the nearest `f32` and the rest, so that differences from stored points keep their
@@ -32,19 +57,12 @@ pub struct Centre {
 impl Centre {
     /// The split of `x`.
     #[must_use]
+    #[inline]
     #[expect(clippy::cast_possible_truncation, reason = "the rest is kept in `low`")]
     pub fn new(x: [f64; 3]) -> Self {
         let high = x.map(|c| c as f32);
         let low = [0, 1, 2].map(|k| (x[k] - f64::from(high[k])) as f32);
         Self { high, low }
-    }
-
-    /// p − x.
-    #[inline]
-    #[must_use]
-    pub fn offset(&self, p: [f32; 3]) -> [f32; 3] {
-        let ([x, y, z], [lx, ly, lz]) = (self.high, self.low);
-        [(p[0] - x) - lx, (p[1] - y) - ly, (p[2] - z) - lz]
     }
 
     /// x in single precision.
@@ -55,198 +73,200 @@ impl Centre {
     }
 }
 
-/// Eight points side by side, to be offered together.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How many points a block holds: a register of AVX-512, two of AVX2, four of SSE2 or NEON.
+const WIDTH: usize = 16;
+
+/// Points side by side: those of a scan whose index divided by [`Self::WIDTH`] is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
 pub struct PointBlock {
-    position: [[f32; LANES]; 3],
-    radius: [f32; LANES],
-    /// Squared; 0 where there is no point.
-    horizon_sq: [f32; LANES],
+    /// Coordinates; 1e30 where there is no point, which is nobody's neighbour.
+    pub position: [[f32; WIDTH]; 3],
+    /// How far a point is heard; zero where there is none.
+    pub horizon: [f32; WIDTH],
 }
 
 impl PointBlock {
     /// How many points fit.
-    pub const WIDTH: usize = LANES;
+    pub const WIDTH: usize = WIDTH;
 
     /// No points.
-    pub const EMPTY: Self =
-        Self { position: [[0.0; LANES]; 3], radius: [0.0; LANES], horizon_sq: [0.0; LANES] };
+    pub const EMPTY: Self = Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH] };
 
-    /// Puts the point `p` of local sampling radius `radius` into a lane.
-    ///
-    /// # Panics
-    /// When there is no such lane.
-    #[inline]
-    pub fn set(&mut self, lane: usize, plan: &SurfacePlan, p: [f32; 3], radius: f32) {
-        for k in 0..3 {
-            self.position[k][lane] = p[k];
-        }
-        let horizon = plan.horizon(radius);
-        self.radius[lane] = radius;
-        self.horizon_sq[lane] = horizon * horizon;
+    /// All points of a scan, given their positions and local sampling radii.
+    pub fn all(
+        plan: &SurfacePlan,
+        positions: &[[f32; 3]],
+        radii: &[f32],
+    ) -> impl ExactSizeIterator<Item = Self> {
+        positions.chunks(Self::WIDTH).zip(radii.chunks(Self::WIDTH)).map(|(positions, radii)| {
+            let mut block = Self::EMPTY;
+            for (lane, (p, r)) in positions.iter().zip(radii).enumerate() {
+                for k in 0..3 {
+                    block.position[k][lane] = p[k];
+                }
+                block.horizon[lane] = plan.horizon(*r);
+            }
+            block
+        })
     }
 }
 
-/// Points side by side: what is filled in is added up, the rest has no weight.
+impl PointBlock {
+    /// Writes the lanes of the points that are heard within `distance` of `x`, ascending and each added to `first`,
+    /// to the front of `lanes`; what follows them there means nothing. Returns how many they are. No branch depends
+    /// on the outcome, which no processor could predict.
+    #[inline(always)]
+    pub fn heard<S: Simd>(
+        &self,
+        simd: S,
+        x: [f32; 3],
+        distance: f32,
+        first: u32,
+        lanes: &mut [u32; WIDTH],
+    ) -> usize {
+        let [px, py, pz] = &self.position;
+        let (dx, dy, dz) = (
+            f32x16::load_array_ref(simd, px) - x[0],
+            f32x16::load_array_ref(simd, py) - x[1],
+            f32x16::load_array_ref(simd, pz) - x[2],
+        );
+        let far = f32x16::load_array_ref(simd, &self.horizon) + distance;
+        let heard: mask32x16<S> = (dx * dx + dy * dy + dz * dz).simd_lt(far * far);
+        let [low, high, ..] = heard.to_bitmask().to_le_bytes();
+        let count = low.count_ones() as usize;
+        for i in 0..8 {
+            lanes[i] = first + u32::from(BITS[usize::from(low)][i]);
+        }
+        for i in 0..8 {
+            lanes[count + i] = first + 8 + u32::from(BITS[usize::from(high)][i]);
+        }
+        count + high.count_ones() as usize
+    }
+}
+
+/// The places of the bits of each byte, ascending; zeros follow.
+const BITS: [[u8; 8]; 256] = {
+    let mut places = [[0; 8]; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut bit, mut count) = (0_u8, 0);
+        while bit < 8 {
+            if byte >> bit & 1 != 0 {
+                places[byte][count] = bit;
+                count += 1;
+            }
+            bit += 1;
+        }
+        byte += 1;
+    }
+    places
+};
+
+/// d²/horizon² of what does not reach x: more than 1, with rounding to spare.
+const BEYOND: f32 = 2.0;
+
+/// Sums over the points in whose horizon x lies, in the lanes of the blocks they come in.
+///
+/// A point adds to the lane of its index; what does not reach x adds zero. Blocks come in ascending order, so the
+/// sums do not depend on which were offered besides, nor on the width of a machine's registers. Everything is inlined
+/// into a caller that has it compiled for an instruction set.
 #[derive(Debug, Clone, Copy)]
-struct Block {
-    offset: [[f32; LANES]; 3],
-    /// d²/h².
-    exponent: [f32; LANES],
-    bandwidth: [f32; LANES],
+pub struct Neighbourhood<'a, S: Simd> {
+    plan: &'a SurfacePlan,
+    high: [f32x16<S>; 3],
+    low: [f32x16<S>; 3],
+    weight: f32x16<S>,
+    first: [f32x16<S>; 3],
+    second: [f32x16<S>; 6],
+    horizon: f32x16<S>,
+    nearest: f32x16<S>,
+    support: u32,
 }
 
-const EMPTY: Block =
-    Block { offset: [[0.0; LANES]; 3], exponent: [f32::MAX; LANES], bandwidth: [0.0; LANES] };
-
-/// The points in whose horizon x lies, as offsets from x with d²/h² and h. Reused: no allocation once warm.
-#[derive(Debug, Clone, Default)]
-pub struct Neighbourhood {
-    blocks: Vec<Block>,
-    count: usize,
-}
-
-impl Neighbourhood {
-    /// Forgets all points.
-    pub fn clear(&mut self) {
-        self.blocks.clear();
-        self.count = 0;
+impl<'a, S: Simd> Neighbourhood<'a, S> {
+    /// No points about `x`.
+    #[inline(always)]
+    #[must_use]
+    pub fn new(simd: S, plan: &'a SurfacePlan, x: &Centre) -> Self {
+        let zero = f32x16::simd_from(simd, 0.0);
+        Self {
+            plan,
+            high: splat(simd, x.high),
+            low: splat(simd, x.low),
+            weight: zero,
+            first: [zero; 3],
+            second: [zero; 6],
+            horizon: zero,
+            nearest: f32x16::simd_from(simd, BEYOND),
+            support: 0,
+        }
     }
 
-    /// Adds point `p` of local sampling radius `radius` if its horizon reaches `x`.
-    ///
-    /// Written without a branch on the outcome, which no processor could predict: the point always goes into the
-    /// next lane, and stays there only if it counts.
-    #[inline]
-    pub fn offer(&mut self, plan: &SurfacePlan, x: &Centre, p: [f32; 3], radius: f32) {
-        let d = x.offset(p);
-        let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let horizon = plan.horizon(radius);
+    /// Adds those points of a block whose horizon reaches x.
+    #[inline(always)]
+    pub fn offer(&mut self, simd: S, block: &PointBlock) {
+        let [px, py, pz] = &block.position;
+        let (high, low) = (&self.high, &self.low);
+        let x = (f32x16::load_array_ref(simd, px) - high[0]) - low[0];
+        let y = (f32x16::load_array_ref(simd, py) - high[1]) - low[1];
+        let z = (f32x16::load_array_ref(simd, pz) - high[2]) - low[2];
+        let horizon = f32x16::load_array_ref(simd, &block.horizon);
         let horizon_sq = horizon * horizon;
-        let counts = d_sq < horizon_sq;
-        let exponent = if counts { plan.reach_sq() * (d_sq / horizon_sq) } else { f32::MAX };
-        self.put(d, exponent, plan.bandwidth(radius));
-        self.count += usize::from(counts);
+        let d_sq = x * x + y * y + z * z;
+        let counts: mask32x16<S> = d_sq.simd_lt(horizon_sq);
+        let share = simd.select_f32x16(counts, d_sq / horizon_sq, f32x16::simd_from(simd, BEYOND));
+        let w = self.plan.kernel().weights(simd, share * self.plan.reach_sq());
+        let w = simd.select_f32x16(counts, w, f32x16::simd_from(simd, 0.0));
+        self.support += counts.to_bitmask().count_ones();
+        self.nearest = simd.select_f32x16(share.simd_lt(self.nearest), share, self.nearest);
+        let (wx, wy, wz) = (w * x, w * y, w * z);
+        self.weight += w;
+        self.first[0] += wx;
+        self.first[1] += wy;
+        self.first[2] += wz;
+        self.second[0] += wx * x;
+        self.second[1] += wx * y;
+        self.second[2] += wx * z;
+        self.second[3] += wy * y;
+        self.second[4] += wy * z;
+        self.second[5] += wz * z;
+        self.horizon += w * horizon;
     }
 
-    /// As [`Self::offer`], of all points of a block, in order.
-    #[inline]
-    pub fn offer_block(&mut self, plan: &SurfacePlan, x: &Centre, block: &PointBlock) {
-        let mut d = [[0.0_f32; LANES]; 3];
-        for k in 0..3 {
-            for i in 0..LANES {
-                d[k][i] = (block.position[k][i] - x.high[k]) - x.low[k];
-            }
-        }
-        let mut exponent = [0.0_f32; LANES];
-        let mut counts = [0_u32; LANES];
-        for i in 0..LANES {
-            let d_sq = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
-            counts[i] = u32::from(d_sq < block.horizon_sq[i]) << i;
-            exponent[i] = plan.reach_sq() * (d_sq / block.horizon_sq[i]);
-        }
-        let mut bits: u32 = counts.iter().sum();
-        while bits != 0 {
-            let i = bits.trailing_zeros() as usize % LANES;
-            bits &= bits - 1;
-            self.push([d[0][i], d[1][i], d[2][i]], exponent[i], plan.bandwidth(block.radius[i]));
-        }
-    }
-
-    /// Adds a point at `offset` from x, with its d²/h² and its h.
-    #[inline]
-    pub fn push(&mut self, offset: [f32; 3], exponent: f32, bandwidth: f32) {
-        self.put(offset, exponent, bandwidth);
-        self.count += 1;
-    }
-
-    /// Fills the lane after the last point that counts.
-    #[inline]
-    fn put(&mut self, offset: [f32; 3], exponent: f32, bandwidth: f32) {
-        let (block, lane) = (self.count / LANES, self.count % LANES);
-        if block == self.blocks.len() {
-            self.blocks.push(EMPTY);
-        }
-        if let Some(block) = self.blocks.get_mut(block) {
-            block.offset[0][lane] = offset[0];
-            block.offset[1][lane] = offset[1];
-            block.offset[2][lane] = offset[2];
-            block.exponent[lane] = exponent;
-            block.bandwidth[lane] = bandwidth;
-        }
-    }
-
-    /// How many points there are.
+    /// The sums of all lanes.
+    #[inline(always)]
     #[must_use]
-    pub fn len(&self) -> usize {
-        self.count
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
-    /// The points relative to x.
-    pub fn offsets(&self) -> impl Iterator<Item = [f32; 3]> {
-        let lane = |i: usize| {
-            let [x, y, z] = &self.blocks[i / LANES].offset;
-            [x[i % LANES], y[i % LANES], z[i % LANES]]
-        };
-        (0..self.count).map(lane)
-    }
-
-    /// The weighted sums, with the weights of the plan's kernel.
-    pub(crate) fn moments(&self, plan: &SurfacePlan) -> Moments {
-        let mut sums = [[0.0_f32; LANES]; 11];
-        let mut nearest = [f32::MAX; LANES];
-        for block in &self.blocks {
-            add_block(&mut sums, block, plan);
-            for (least, t) in nearest.iter_mut().zip(&block.exponent) {
-                *least = if t < least { *t } else { *least };
-            }
-        }
-        let s = sums.map(sum_lanes);
+    pub fn moments(&self) -> Moments {
+        let [a, b, c] = self.first;
+        let [d, e, f, g, h, i] = self.second;
         Moments {
-            weight: s[0],
-            first: [s[1], s[2], s[3]],
-            second: [s[4], s[5], s[6], s[7], s[8], s[9]],
-            bandwidth: s[10],
-            nearest: nearest.into_iter().fold(f32::MAX, f32::min),
+            weight: total(self.weight),
+            first: [total(a), total(b), total(c)],
+            second: [total(d), total(e), total(f), total(g), total(h), total(i)],
+            horizon: total(self.horizon),
+            nearest: self
+                .nearest
+                .as_array()
+                .iter()
+                .fold(BEYOND, |least, &x| if x < least { x } else { least }),
+            support: self.support,
         }
     }
 }
 
-/// One block of lanes into the eleven sums.
-#[inline]
-fn add_block(sums: &mut [[f32; LANES]; 11], block: &Block, plan: &SurfacePlan) {
-    let end = plan.reach_sq();
-    let Block { offset: [x, y, z], exponent: t, bandwidth: h } = block;
-    let mut w = [0.0_f32; LANES];
-    match plan.kernel() {
-        Kernel::Gaussian => (0..LANES).for_each(|i| w[i] = Kernel::Gaussian.weight(t[i])),
-        kernel => (0..LANES).for_each(|i| w[i] = kernel.weight(t[i])),
-    }
-    for i in 0..LANES {
-        w[i] = if t[i] <= end { w[i] } else { 0.0 };
-    }
-    for i in 0..LANES {
-        let (wx, wy, wz) = (w[i] * x[i], w[i] * y[i], w[i] * z[i]);
-        sums[0][i] += w[i];
-        sums[1][i] += wx;
-        sums[2][i] += wy;
-        sums[3][i] += wz;
-        sums[4][i] += wx * x[i];
-        sums[5][i] += wx * y[i];
-        sums[6][i] += wx * z[i];
-        sums[7][i] += wy * y[i];
-        sums[8][i] += wy * z[i];
-        sums[9][i] += wz * z[i];
-        sums[10][i] += w[i] * h[i];
-    }
+/// Each coordinate in all lanes.
+#[inline(always)]
+fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
+    [f32x16::simd_from(simd, x), f32x16::simd_from(simd, y), f32x16::simd_from(simd, z)]
 }
 
-fn sum_lanes(lanes: [f32; LANES]) -> f64 {
-    lanes.iter().map(|&x| f64::from(x)).sum()
+/// The sum of all lanes: halves onto each other, the last four in double precision.
+#[inline(always)]
+fn total<S: Simd>(lanes: f32x16<S>) -> f64 {
+    let simd = fearless_simd::ExtractToken::token(&lanes);
+    let (low, high) = simd.split_f32x16(lanes);
+    let (low, high) = simd.split_f32x8(low + high);
+    let four = (low + high).to_array().map(f64::from);
+    (four[0] + four[1]) + (four[2] + four[3])
 }

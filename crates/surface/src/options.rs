@@ -161,7 +161,7 @@ impl SurfacePlan {
     }
 
     /// How far a point of local sampling radius `radius` is heard.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn horizon(&self, radius: f32) -> f32 {
         self.slope * radius + self.level
@@ -172,6 +172,12 @@ impl SurfacePlan {
     #[must_use]
     pub fn bandwidth(&self, radius: f32) -> f32 {
         self.horizon(radius) * self.per_horizon
+    }
+
+    /// h/horizon.
+    #[inline]
+    pub(crate) fn per_horizon(&self) -> f32 {
+        self.per_horizon
     }
 
     /// (horizon/h)², the value of d²/h² at which weights end.

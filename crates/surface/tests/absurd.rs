@@ -1,8 +1,8 @@
 //! Numbers that no scan has: every function ends, and calls nothing a surface that is not a number.
 
 use nearmiss_surface::{
-    Bandwidth, Centre, Evaluation, Kernel, Neighbourhood, Status, SurfaceOptions, SurfacePlan, meet, project,
-    symmetric_eigen,
+    Bandwidth, Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions, SurfacePlan, meet,
+    project, symmetric_eigen,
 };
 
 const ABSURD: [f32; 12] = [
@@ -58,12 +58,9 @@ impl Sheet {
     }
 
     fn evaluate(&self, x: [f64; 3]) -> Evaluation {
-        let mut near = Neighbourhood::default();
-        let centre = Centre::new(x);
-        for &(p, radius) in &self.points {
-            near.offer(&self.plan, &centre, p, radius);
-        }
-        let at = near.evaluate(&self.plan, x);
+        let (points, radii): (Vec<[f32; 3]>, Vec<f32>) = self.points.iter().copied().unzip();
+        let blocks = PointBlock::all(&self.plan, &points, &radii);
+        let at = Moments::about(Level::new(), &self.plan, x, blocks).evaluate(&self.plan, x);
         assert!(at.f.is_finite() && at.bandwidth.is_finite(), "{at:?}");
         if at.status == Status::Ok {
             let unit = at.normal.iter().map(|c| c * c).sum::<f64>();

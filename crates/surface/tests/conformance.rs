@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_surface::{
-    Centre, Evaluation, Kernel, Neighbourhood, Status, SurfaceOptions, SurfacePlan, meet, project,
+    Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions, SurfacePlan, meet, project,
 };
 use nearmiss_testdata::arbitrary;
 
@@ -43,12 +43,9 @@ impl Sheet {
     }
 
     fn at(&self, x: [f64; 3]) -> Evaluation {
-        let mut near = Neighbourhood::default();
-        let centre = Centre::new(x);
-        for &p in &self.points {
-            near.offer(&self.plan, &centre, p, self.radius);
-        }
-        near.evaluate(&self.plan, x)
+        let radii = vec![self.radius; self.points.len()];
+        let blocks = PointBlock::all(&self.plan, &self.points, &radii);
+        Moments::about(Level::new(), &self.plan, x, blocks).evaluate(&self.plan, x)
     }
 
     fn h(&self) -> f64 {

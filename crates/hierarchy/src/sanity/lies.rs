@@ -114,6 +114,56 @@ fn cones_that_are_none() {
 }
 
 #[test]
+fn blocks_that_are_not_the_points() {
+    // The last block is not full: what stands in its empty lanes counts too.
+    for (block, lane) in [(0, 3), (7, 15), (18, 12), (18, 13)] {
+        let copy = format!("the copy of the points of block {block}");
+        deep(&copy, |scan| scan.blocks.to_mut()[block].position[1][lane] = 7.0);
+        deep(&copy, |scan| scan.blocks.to_mut()[block].horizon[lane] += 0.5);
+    }
+    for value in NONE.into_iter().chain([0.0, -1.0]) {
+        deep("the ball about block 5", |scan| scan.groups.to_mut()[0].horizon[5] = value);
+    }
+    deep("the ball about block 5", |scan| scan.groups.to_mut()[0].horizon[5] *= 0.99);
+    deep("the ball about block 5", |scan| scan.groups.to_mut()[0].position[2][5] += 0.5);
+    deep("the ball about block 5", |scan| scan.groups.to_mut()[0].position[2][5] = f32::NAN);
+}
+
+#[test]
+fn lists_that_are_none() {
+    let words = "the neighbour list of block 4";
+    for value in NONE {
+        plain(&format!("{words} is wrong"), |scan| scan.lists.to_mut()[4].within = value);
+    }
+    for value in [129, u32::MAX] {
+        plain(&format!("{words} is wrong"), |scan| scan.lists.to_mut()[4].count = value);
+    }
+    for value in [1 << 20, u32::MAX] {
+        plain(&format!("{words} is wrong"), |scan| scan.lists.to_mut()[4].first = value);
+    }
+    let at = honest().lists[4].first as usize;
+    deep(words, |scan| scan.listed.to_mut()[at + 1] = scan.listed[at]);
+    deep(words, |scan| {
+        let last = at + scan.lists[4].count as usize - 1;
+        scan.listed.to_mut()[last] = 19;
+    });
+    plain("lists has 18 entries where 19 belong", |scan| {
+        scan.lists = scan.lists[1..].to_vec().into();
+    });
+}
+
+#[test]
+fn a_list_that_leaves_a_block_out_is_for_the_thorough_check() {
+    for block in [0, 4, 18] {
+        let mut scan = honest();
+        scan.lists.to_mut()[block].count = 1;
+        assert_eq!(scan.check_contents(), Ok(()), "one pass does not see it");
+        let found = scan.sanity_check();
+        assert!(matches!(found, Err(Flaw::Value { index, .. }) if index == block), "{found:?}");
+    }
+}
+
+#[test]
 fn metadata_that_no_build_writes() {
     for value in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e-320, f64::MAX] {
         plain("the frame of the stored positions is wrong", |scan| scan.frame.scale = value);

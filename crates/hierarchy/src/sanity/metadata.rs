@@ -1,6 +1,7 @@
 //! The numbers about a whole scan: how many entries its arrays have, and what the metadata say.
 
 use nearmiss_geometry::{Aabb, Frame};
+use nearmiss_surface::PointBlock;
 
 use super::{FARTHEST, Flaw};
 use crate::build::{PointHierarchy, sampling_rank};
@@ -12,6 +13,7 @@ impl PointHierarchy {
         let points = self.positions.len();
         let leaves = points.div_ceil(self.leaf_size.max(1) as usize);
         let nodes = self.nodes.len();
+        let blocks = points.div_ceil(PointBlock::WIDTH);
         let expected = [
             ("normals", self.normals.len(), points),
             ("radii", self.radii.len(), points),
@@ -27,6 +29,9 @@ impl PointHierarchy {
             ),
             ("coverings", self.coverings.len(), nodes),
             ("cones", self.cones.len(), leaves),
+            ("blocks", self.blocks.len(), blocks),
+            ("groups", self.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
+            ("lists", self.lists.len(), blocks),
         ];
         match expected.into_iter().find(|(_, found, expected)| found != expected) {
             Some((array, found, expected)) => Err(Flaw::Length { array, found, expected }),

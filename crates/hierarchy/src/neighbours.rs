@@ -1,0 +1,217 @@
+//! Neighbour lists: what is heard near each block of points, so that f there needs no descent.
+//!
+//! The lists of molecular dynamics (Verlet 1967), kept for blocks of points instead of particles. About every block
+//! there is a ball outside of which none of its points is heard; the balls of [`PointBlock::WIDTH`] blocks, a group,
+//! stand side by side like points with horizons. The list of a block names groups. It is complete for every place
+//! within some distance of the middle of the block's ball, far enough for every surface point whose nearest stored
+//! point is the block's (`docs/theory/certificates.md`, fact 2).
+
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, Simd, dispatch};
+use nearmiss_surface::PointBlock;
+
+use crate::boxes::{ROUNDING, dot, sub};
+use crate::build::PointHierarchy;
+use crate::gather::Index;
+
+/// Points of a group of blocks.
+pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
+
+/// No list is longer; a block that hears more has none, and f near it is found by descent. Blocks on surfaces hear
+/// some seven; where the scan is sparse beside dense, or a bandwidth large, lists would be of everything.
+pub(crate) const MOST_LISTED: usize = 64;
+
+/// What rounding may cost a comparison of distances, relatively.
+pub(crate) const GROWN: f32 = 1.0 + 1e-5;
+
+/// For every group of blocks the balls outside of which no point of a block is heard, given the blocks.
+pub(crate) fn groups(blocks: &[PointBlock]) -> Vec<PointBlock> {
+    let ball = |block: &PointBlock| {
+        let PointBlock { position: [x, y, z], horizon } = block;
+        let points = || (0..PointBlock::WIDTH).filter(|&i| horizon[i] > 0.0).map(|i| [x[i], y[i], z[i]]);
+        let (sum, count) =
+            points().fold(([0.0; 3], 0.0), |(s, n), p| ([s[0] + p[0], s[1] + p[1], s[2] + p[2]], n + 1.0));
+        let centre = sum.map(|c: f32| c / count);
+        let heard = |p: [f32; 3], horizon: &f32| {
+            let d = sub(p, centre);
+            dot(d, d).sqrt() + horizon
+        };
+        let radius = points().zip(horizon).map(|(p, h)| heard(p, h)).fold(0.0, f32::max);
+        let far = centre.iter().fold(radius, |far, c| far.max(c.abs()));
+        (centre, radius * GROWN + ROUNDING * far)
+    };
+    let group = |blocks: &[PointBlock]| {
+        let mut group = PointBlock::EMPTY;
+        for (lane, block) in blocks.iter().enumerate() {
+            let (centre, radius) = ball(block);
+            for k in 0..3 {
+                group.position[k][lane] = centre[k];
+            }
+            group.horizon[lane] = radius;
+        }
+        group
+    };
+    blocks.chunks(PointBlock::WIDTH).map(group).collect()
+}
+
+/// Which entries of the array of all lists are a block's, and where they are complete.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct NeighbourList {
+    /// At places no further than this from the middle of the block's ball; negative where there is no list.
+    pub within: f32,
+    /// The first entry.
+    pub first: u32,
+    /// Number of entries.
+    pub count: u32,
+}
+
+/// The lists of all blocks, as they are found one after the other.
+#[derive(Debug, Default)]
+pub(crate) struct Lists {
+    pub(crate) lists: Vec<NeighbourList>,
+    pub(crate) entries: Vec<u32>,
+}
+
+impl Lists {
+    /// The list of the next block, complete `within` some distance of the middle of its ball.
+    pub(crate) fn push(&mut self, within: f32, entries: impl ExactSizeIterator<Item = u32>) {
+        let end = |entries: &[u32]| u32::try_from(entries.len()).unwrap_or(u32::MAX);
+        let first = end(&self.entries);
+        let fits = entries.len() <= MOST_LISTED && self.entries.len() + entries.len() < u32::MAX as usize;
+        if fits {
+            self.entries.extend(entries);
+        }
+        let within = if fits { within } else { -1.0 };
+        self.lists.push(NeighbourList { within, first, count: end(&self.entries) - first });
+    }
+
+    /// Those of later blocks after these.
+    pub(crate) fn append(&mut self, mut later: Self) {
+        let shift = u32::try_from(self.entries.len()).unwrap_or(u32::MAX);
+        for list in &mut later.lists {
+            list.first = list.first.saturating_add(shift);
+        }
+        self.lists.append(&mut later.lists);
+        self.entries.append(&mut later.entries);
+    }
+}
+
+/// What is heard near some points. Reused.
+#[derive(Debug, Default)]
+pub(crate) struct Locality {
+    /// The groups, ascending.
+    pub(crate) groups: Vec<u32>,
+    /// Their blocks that are heard, ascending.
+    pub(crate) blocks: Vec<u32>,
+    /// What is not among them is not heard within this distance of the middle.
+    pub(crate) within: f32,
+    /// No surface point whose nearest point is one of the points is further from that than this.
+    pub(crate) reach: f32,
+}
+
+impl Locality {
+    /// Collects all that is heard where surface points can be whose nearest point is one of `points`, about their
+    /// `middle`; `guess` is what the greatest local radius heard there may be.
+    #[inline(always)]
+    pub(crate) fn collect<S: Simd>(
+        &mut self,
+        simd: S,
+        index: &Index<'_>,
+        points: &[[f32; 3]],
+        middle: [f32; 3],
+        guess: f32,
+    ) {
+        let own = points.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d)).fold(0.0, f32::max).sqrt();
+        let mut half = 0.5 * index.plan.horizon(guess);
+        // A good guess saves a second descent.
+        loop {
+            self.within = (own + half) * GROWN;
+            index.collect(middle, self.within, &mut self.groups);
+            let count = index.heard(simd, &self.groups, middle, self.within, &mut self.blocks).len();
+            self.blocks.truncate(count);
+            self.reach = 0.5 * self.greatest_heard(index, middle, own * GROWN);
+            if self.reach <= half {
+                return;
+            }
+            half = self.reach;
+        }
+    }
+
+    /// The greatest horizon of a point that is heard within `distance` of `x`.
+    #[inline(always)]
+    fn greatest_heard(&self, index: &Index<'_>, x: [f32; 3], distance: f32) -> f32 {
+        let mut greatest = [0.0_f32; PointBlock::WIDTH];
+        for &block in &self.blocks {
+            let PointBlock { position: [px, py, pz], horizon } = &index.blocks[block as usize];
+            for i in 0..PointBlock::WIDTH {
+                let d = [px[i] - x[0], py[i] - x[1], pz[i] - x[2]];
+                let far = (horizon[i] + distance) * GROWN;
+                let heard = if dot(d, d) < far * far { horizon[i] } else { 0.0 };
+                greatest[i] = if heard > greatest[i] { heard } else { greatest[i] };
+            }
+        }
+        greatest.into_iter().fold(0.0, f32::max)
+    }
+}
+
+/// The neighbour lists of all blocks.
+pub(crate) fn neighbours(index: &Index<'_>, positions: &[[f32; 3]], radii: &[f32]) -> Lists {
+    let points = positions.chunks(PointBlock::WIDTH).zip(radii.chunks(PointBlock::WIDTH));
+    let blocks: Vec<_> = points.enumerate().collect();
+    let level = Level::new();
+    let list = |blocks: &[(usize, (&[[f32; 3]], &[f32]))]| {
+        let (mut locality, mut lists) = (Locality::default(), Lists::default());
+        for &(block, (positions, radii)) in blocks {
+            let guess = 1.3 * radii.iter().copied().fold(0.0, f32::max);
+            let middle = index.middle(block).unwrap_or(positions[0]);
+            dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || locality.collect(simd, index, positions, middle, guess)
+            ));
+            lists.push(locality.within, locality.groups.iter().copied());
+        }
+        lists
+    };
+    let mut all = Lists::default();
+    chunks(&blocks, list).into_iter().for_each(|some| all.append(some));
+    all
+}
+
+/// Items that a thread works on at once: enough to hide the hand-over.
+const ITEMS_A_TASK: usize = 16;
+
+/// `f` of some items at a time, in order, on all cores where there are several.
+pub(crate) fn chunks<T: Sync, R: Send>(items: &[T], f: impl Fn(&[T]) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        items.par_chunks(ITEMS_A_TASK).map(f).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    items.chunks(ITEMS_A_TASK).map(f).collect()
+}
+
+impl PointHierarchy {
+    /// The points in blocks: `i` stands in lane `i` % 16 of block `i` / 16.
+    #[must_use]
+    pub fn blocks(&self) -> &[PointBlock] {
+        &self.blocks
+    }
+
+    /// The balls outside of which no point of a block is heard, like points with horizons: that of block `i` stands in
+    /// lane `i` % 16 of group `i` / 16.
+    #[must_use]
+    pub fn groups(&self) -> &[PointBlock] {
+        &self.groups
+    }
+
+    /// The groups of which a point may be heard within some distance of the middle of the ball of `block`, ascending,
+    /// with that distance; `None` where they are too many, or there is no such block.
+    #[must_use]
+    pub fn neighbours(&self, block: usize) -> Option<(f32, &[u32])> {
+        let list = self.lists.get(block).filter(|list| list.within > 0.0)?;
+        let entries = self.listed.get(list.first as usize..)?.get(..list.count as usize)?;
+        Some((list.within, entries))
+    }
+}
