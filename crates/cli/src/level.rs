@@ -26,8 +26,9 @@ const OF_NODES: [Colour; 6] =
 /// How much of the scan a ball hides.
 const OPACITY: f64 = 0.55;
 
-/// The dot at a sample, in fine pixels.
-const DOT: f64 = 4.5;
+/// The dot at a sample, in fine pixels; half as wide where there are many.
+const DOT: f64 = 9.0;
+const MANY: usize = 1000;
 
 /// `scan` once for each of `depths`, the root's being 0, under the balls that cover the nodes there, and leaves above it:
 /// each node has a colour, its samples are the dots, all its balls have its covering radius.
@@ -35,56 +36,63 @@ const DOT: f64 = 4.5;
 pub fn level_picture(scan: &Scan, depths: &[u32]) -> Picture {
     let width = depths.len() * (PANEL + GAP) + GAP;
     let mut canvas = Canvas::new(width, PANEL + 2 * GAP + 3 * LINE, GROUND);
-    for (k, &depth) in depths.iter().enumerate() {
+    let all = report::depths(scan);
+    let levels = depths.iter().map(|&depth| (depth, at_depth(scan, &all, Some(depth)).collect()));
+    let levels: Vec<(u32, Vec<usize>)> = levels.collect();
+    let nodes = levels.iter().flat_map(|(_, nodes)| nodes);
+    let most = nodes.map(|&node| radius(scan, node)).fold(0.0, f64::max);
+    for (k, (depth, nodes)) in levels.iter().enumerate() {
         let area = Area { left: GAP + k * (PANEL + GAP), top: GAP, width: PANEL, height: PANEL };
-        paint(&mut canvas, scan, depth, area);
+        canvas.fill(area, PANEL_GROUND);
+        paint(&mut canvas, scan, nodes, most, area);
+        caption(&mut canvas, scan, *depth, nodes, area);
     }
     canvas.picture()
 }
 
-fn paint(canvas: &mut Canvas, scan: &Scan, depth: u32, area: Area) {
+/// The covering radius of a node, in the units of the input.
+fn radius(scan: &Scan, node: usize) -> f64 {
+    f64::from(scan.slices().covering_radius(node)) * scan.frame().scale
+}
+
+/// The scan and the balls of `nodes`, with room for balls of radius `most`.
+fn paint(canvas: &mut Canvas, scan: &Scan, nodes: &[usize], most: f64, area: Area) {
     let view = scan.at(&Pose::IDENTITY);
     let mut camera = scan_camera(&view, area);
-    // Room for balls that stick out.
-    camera.scale *= 0.82;
-    canvas.fill(area, PANEL_GROUND);
+    #[expect(clippy::cast_precision_loss, reason = "pixels")]
+    let width = PANEL as f64;
+    camera.scale *= width / (width + 2.0 * most * camera.scale);
     for i in 0..scan.len() {
         canvas.splat(&camera, &splat(&view, i), OF_SCAN);
     }
-    let slices = scan.slices();
-    let scale = scan.frame().scale;
-    let mut balls = Canvas::new(canvas.size().0, canvas.size().1, GROUND);
+    let (columns, rows) = canvas.size();
+    let mut balls = Canvas::new(columns, rows, GROUND);
     let mut dots = Vec::new();
-    let mut radii = Vec::new();
-    let nodes: Vec<usize> = at_depth(scan, &report::depths(scan), Some(depth)).collect();
     for (k, &node) in nodes.iter().enumerate() {
-        let radius = f64::from(slices.covering_radius(node)) * scale;
-        let colour = OF_NODES[k % OF_NODES.len()];
-        radii.push(radius / scan.sampling_radius());
-        for i in slices.samples(node).iter() {
+        for i in scan.slices().samples(node).iter() {
             let centre = Vector3::from(view.point(i));
-            balls.ball(&camera, centre, radius, colour);
+            balls.ball(&camera, centre, radius(scan, node), OF_NODES[k % OF_NODES.len()]);
             dots.push(centre);
         }
     }
     canvas.veil(&balls, area, OPACITY);
-    for &centre in &dots {
+    let dot = if dots.len() > MANY { 0.5 * DOT } else { DOT };
+    for centre in dots {
         let [x, y, _] = camera.project(centre);
-        canvas.line(area, [[x, y]; 2], 2.0 * DOT, INK);
+        canvas.line(area, [[x, y]; 2], dot, INK);
     }
     scale_bar(canvas, &camera);
-    caption(canvas, depth, [nodes.len(), dots.len()], &mut radii, area);
 }
 
-fn caption(canvas: &mut Canvas, depth: u32, [nodes, samples]: [usize; 2], radii: &mut [f64], area: Area) {
+fn caption(canvas: &mut Canvas, scan: &Scan, depth: u32, nodes: &[usize], area: Area) {
+    let mut radii: Vec<f64> = nodes.iter().map(|&node| radius(scan, node) / scan.sampling_radius()).collect();
     radii.sort_unstable_by(f64::total_cmp);
+    let median = radii.get(radii.len() / 2).map_or_else(String::new, |&r| short(r));
+    let samples: usize = nodes.iter().map(|&node| scan.slices().samples(node).len()).sum();
     let lines = [
-        format!("DEPTH {depth}: {nodes} NODES"),
-        format!("{samples} SAMPLES, THE DOTS; EACH NODE'S IN ITS COLOUR"),
-        format!(
-            "BALLS CONTAIN THE SURFACE: RADIUS {} R, THE MEDIAN NODE'S",
-            radii.get(radii.len() / 2).map_or_else(String::new, |&r| short(r))
-        ),
+        format!("DEPTH {depth}: {} NODES, A COLOUR EACH", nodes.len()),
+        format!("DOTS: THEIR {samples} SAMPLES"),
+        format!("BALLS ABOUT SAMPLES: RADIUS {median} R, MEDIAN"),
     ];
     for (k, line) in lines.iter().enumerate() {
         let top = area.top + area.height + GAP / 2 + k * LINE;

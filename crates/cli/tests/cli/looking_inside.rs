@@ -120,3 +120,30 @@ fn an_export_comes_back() {
     assert!((share - 0.9).abs() < 0.02, "the 0.9-quantile: {share}");
     place.refused(2, &["export", "ball.nm", "--points", "x", "--radii", "x"], &["two outputs"]);
 }
+
+#[test]
+fn the_samples_of_a_level_come_with_their_coverings() {
+    let place = Place::new();
+    let input = place.cloud("ball.xyz", sphere(2.0), 0.3);
+    let given = nearmiss::io::read(&input, None).unwrap().cloud;
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet", "--leaf", "8"]);
+    place.ok(&["export", "ball.nm", "--samples", "s.ply", "--level", "2"]);
+    let back = nearmiss::io::read(&place.path("s.ply"), None).unwrap().cloud;
+    assert_eq!(back.len(), 4 * 16, "four nodes of sixteen samples");
+    let ply = std::fs::read(place.path("s.ply")).unwrap();
+    // Three values of eight bytes, then source, node, covering radius and sampling radius.
+    let rows = &ply[ply.len() - 40 * back.len()..];
+    let mut nodes = Vec::new();
+    for (i, row) in rows.chunks(40).enumerate() {
+        let words: Vec<[u8; 4]> = row[24..].chunks(4).map(|word| word.try_into().unwrap()).collect();
+        let source = u32::from_le_bytes(words[0]) as usize;
+        assert_eq!(back.point(i), given.point(source), "row {i}");
+        nodes.push(u32::from_le_bytes(words[1]));
+        let [covering, sampling] = [words[2], words[3]].map(f32::from_le_bytes);
+        assert!(0.0 < sampling && sampling < covering && covering < 3.0, "{sampling}, {covering}");
+    }
+    nodes.dedup();
+    assert_eq!(nodes.len(), 4, "{nodes:?}");
+    place.refused(2, &["export", "ball.nm", "--samples", "s.ply"], &["--level"]);
+    place.refused(2, &["export", "ball.nm", "--points", "p.ply", "--level", "1"], &["--samples"]);
+}

@@ -5,7 +5,9 @@ use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 use super::Flaw;
 use crate::build::PointHierarchy;
+use crate::covering::Covering;
 use crate::options::BuildOptions;
+use crate::samples::list_number;
 
 fn honest() -> PointHierarchy {
     let points = arbitrary::cloud(CloudKind::Sphere, 301, 1);
@@ -160,6 +162,35 @@ fn a_list_that_leaves_a_block_out_is_for_the_thorough_check() {
         assert_eq!(scan.check_contents(), Ok(()), "one pass does not see it");
         let found = scan.sanity_check();
         assert!(matches!(found, Err(Flaw::Value { index, .. }) if index == block), "{found:?}");
+    }
+}
+
+#[test]
+fn samples_and_coverings_that_are_none() {
+    let scan = honest();
+    let (id, node) = scan.nodes.iter().enumerate().rfind(|(_, node)| !node.is_leaf()).unwrap();
+    let at = list_number(id, node, scan.leaf_size) * scan.samples_a_node as usize;
+    let (first, end) = (node.first, node.first + node.count);
+    for value in [first.wrapping_sub(1), end, 301, u32::MAX] {
+        plain(&format!("a sample of node {id} is wrong"), |scan| scan.sample_lists.to_mut()[at + 3] = value);
+    }
+    deep(&format!("a sample of node {id}"), |scan| {
+        scan.sample_lists.to_mut()[at + 3] = scan.sample_lists[at + 2]
+    });
+    for value in [f32::NAN, -1.0, f32::NEG_INFINITY] {
+        plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].radius = value);
+        plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].sampling = value);
+        plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].spacing = value);
+    }
+    plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].sampling = 1e3);
+    plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].spacing = 2e12);
+    deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].spacing *= 10.0);
+    deep("the covering of node 0", |scan| {
+        scan.coverings.to_mut()[0] = Covering { radius: 0.1, sampling: 0.1, ..scan.coverings[0] };
+    });
+    for value in [0, 7, 33, u32::MAX] {
+        let [structure, full] = found(|scan| scan.samples_a_node = value);
+        assert!(structure.is_some() && full.is_some(), "{value} samples a node");
     }
 }
 

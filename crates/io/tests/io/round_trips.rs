@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::samples::{Encoding, colours, csv, normals, obj, pcd, ply, points, triangles};
-use nearmiss_io::{Format, Model, PlyPoints, read, read_bytes, read_mesh};
+use nearmiss_io::{Column, Format, Model, PlyPoints, read, read_bytes, read_mesh};
 
 fn model(bytes: &[u8], name: &str) -> Model {
     read_bytes(bytes, None, Path::new(name)).unwrap_or_else(|e| panic!("{e}"))
@@ -168,6 +168,10 @@ fn what_we_write_we_read_byte_for_byte_alike() {
     assert_eq!(read(&path, None).unwrap().mesh, Some(mesh));
 }
 
+fn source_of(count: u32) -> Vec<u32> {
+    (100..100 + count).collect()
+}
+
 #[test]
 fn what_does_not_fit_the_points_is_not_written() {
     let points = points();
@@ -176,7 +180,14 @@ fn what_does_not_fit_the_points_is_not_written() {
     assert_eq!(short.unwrap_err().to_string(), "2 source indices for 20 points; give one for each");
     let missing = PlyPoints::single(&points).with_edges(&[[0, 1], [2, 20]]).write(&mut out);
     assert_eq!(missing.unwrap_err().to_string(), "edge 1 names point 20, but there are 20 points");
+    let columns = [Column::Uint("node", &source_of(20)), Column::Float("radius", &[0.5; 19])];
+    let short = PlyPoints::single(&points).with_columns(&columns).write(&mut out);
+    assert_eq!(short.unwrap_err().to_string(), "19 numbers of a column for 20 points; give one for each");
     assert!(out.is_empty(), "nothing written before the checks");
+    PlyPoints::single(&points).with_columns(&columns[..1]).write(&mut out).unwrap();
+    assert_eq!(out[out.len() - 4..], 119_u32.to_le_bytes(), "the last of the last point");
+    let text = String::from_utf8_lossy(&out);
+    assert!(text.contains("property uint node\nend_header"), "{text}");
     let mut full: &mut [u8] = &mut [0; 10];
     let failed = PlyPoints::single(&points).write(&mut full).unwrap_err();
     assert!(failed.to_string().starts_with("writing PLY: "), "{failed}");
