@@ -36,7 +36,7 @@ of the repository
                  whether what `collide A B --prove PROOF` wrote holds, by means of its own
   field SCAN [--noise 0.1] -o OUT.png
                  a picture of f over a slice of a noisy scan; --table counts where its normal flips
-  tables -o FOLDER [--data FOLDER] [--quick]
+  tables -o FOLDER [--data FOLDER] [--only NUMBER] [--quick]
                  Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, measured
   fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
 

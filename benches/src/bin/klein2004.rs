@@ -1,6 +1,7 @@
 //! Table 1 and Figs 8–12 of Klein & Zachmann 2004 on today's machine: `klein2004.md` and SVGs in a folder.
 //!
-//! `klein2004 -o FOLDER [--data FOLDER] [--poses N] [--seed N] [--target MICROSECONDS] [--quick]`
+//! `klein2004 -o FOLDER [--data FOLDER] [--poses N] [--seed N] [--target MICROSECONDS] [--only NUMBER]
+//! [--quick]`
 //!
 //! Without the folder of objects, the dragon that comes with the tests stands in for them; the artificial models are made.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
@@ -46,6 +47,8 @@ struct Options {
     poses: usize,
     seed: u64,
     target: Duration,
+    /// One figure, or Table 1, of all.
+    only: Option<u32>,
     quick: bool,
 }
 
@@ -55,15 +58,22 @@ impl Options {
         let quick = arguments.flag("--quick");
         let named: Option<PathBuf> = arguments.value("--data")?;
         let options = Self {
-            out: arguments.value("-o")?.ok_or("usage: klein2004 -o FOLDER [--data FOLDER] [--poses N]")?,
+            out: arguments
+                .value("-o")?
+                .ok_or("usage: klein2004 -o FOLDER [--data FOLDER] [--poses N] [--only NUMBER]")?,
             data: named.or_else(|| std::env::var_os("NEARMISS_DATA").map(PathBuf::from)),
             poses: arguments.value("--poses")?.unwrap_or(if quick { 40 } else { 1000 }),
             seed: arguments.value("--seed")?.unwrap_or(1),
             target: Duration::from_micros(arguments.value("--target")?.unwrap_or(200)),
+            only: arguments.value("--only")?,
             quick,
         };
         let words = arguments.words()?;
         if words.is_empty() { Ok(options) } else { Err(format!("what is {words:?}?").into()) }
+    }
+
+    fn wants(&self, figure: u32) -> bool {
+        self.only.is_none_or(|only| only == figure)
     }
 
     fn grid(&self) -> u32 {
@@ -83,18 +93,23 @@ fn main() -> Result<(), Failure> {
     let artificial = artificial(options.grid())?;
     let mut text =
         format!("# Klein & Zachmann 2004, Table 1 and Figs 8 to 12\n\n{}\n", machine::description());
-    table_1(&mut text, all.iter().chain(&artificial))?;
-    figure_8(&mut text, &options, all.iter().chain(&artificial))?;
-    for (number, what, objects) in [
+    if options.wants(1) {
+        table_1(&mut text, all.iter().chain(&artificial))?;
+    }
+    if options.wants(8) {
+        figure_8(&mut text, &options, all.iter().chain(&artificial))?;
+    }
+    let groups = [
         (9, "objects", &all[..]),
         (10, "sizes of one object", &sizes[..]),
         (11, "artificial models", &artificial[..]),
-    ] {
-        let courses =
-            objects.iter().map(|object| measure(object, &options)).collect::<Result<Vec<_>, _>>()?;
-        courses_of(&mut text, &options, (number, what), &courses)?;
+    ];
+    for (number, what, objects) in groups.into_iter().filter(|group| options.wants(group.0)) {
+        let courses = objects.iter().map(|object| measure(object, &options));
+        courses_of(&mut text, &options, (number, what), &courses.collect::<Result<Vec<_>, _>>()?)?;
     }
-    if let Some(object) = all.iter().rfind(|object| object.mesh.is_some()) {
+    let last = all.iter().rfind(|object| object.mesh.is_some());
+    if let Some(object) = last.filter(|_| options.wants(12)) {
         figure_12(&mut text, &options, object)?;
     }
     let path = options.out.join("klein2004.md");
@@ -136,58 +151,48 @@ fn figure_8<'a>(
     options: &Options,
     objects: impl Iterator<Item = &'a Object>,
 ) -> Result<(), Failure> {
-    let runs = if options.quick { 1 } else { 5 };
     let mut lines = Vec::new();
     for (colour, object) in objects.enumerate() {
         eprintln!("Fig. 8: {}", object.name);
         let mut points = Vec::new();
         for share in SHARES {
             let cloud = subset(object, object.cloud.len() / share, options.seed)?;
-            points.push([count(cloud.len()), 1e3 * build_seconds(&cloud, 1, runs)?]);
+            points.push([count(cloud.len()), 1e3 * build_seconds(&cloud)?]);
         }
         lines.push(Line { name: object.name.clone(), points, colour, dashed: false });
     }
     let large: &[u32] =
         if options.quick { &[10_000, 40_000] } else { &[10_000, 31_623, 100_000, 316_228, 1_000_000] };
-    let mut bumpy = [1, 0].map(|threads| (threads, Vec::new()));
+    let mut one = Vec::new();
     for &n in large {
         eprintln!("Fig. 8: {n} points");
         let cloud = nearmiss::PointCloud::from_positions(&bumpy_sphere(n))?;
-        for (threads, points) in &mut bumpy {
-            points.push([f64::from(n), 1e3 * build_seconds(&cloud, *threads, runs)?]);
-        }
+        one.push([f64::from(n), 1e3 * build_seconds(&cloud)?]);
     }
-    let [(_, one), (_, all)] = bumpy;
     // The same time for each point and level as at the first size.
     let first = one[0];
     let scale = first[1] / (first[0] * first[0].log2());
     let expected = one.iter().map(|p| [p[0], scale * p[0] * p[0].log2()]).collect();
-    text.push_str("\n## Fig. 8: time to build\n\n![](figure-8.svg)\n\n| object | points | ms, one thread | ns a point |\n|---|--:|--:|--:|\n");
+    text.push_str("\n## Fig. 8: time to build\n\n![](figure-8.svg)\n\n| object | points | ms of processor time | ns a point |\n|---|--:|--:|--:|\n");
     for line in &lines {
         for [n, ms] in &line.points {
             writeln!(text, "| {} | {n} | {ms:.1} | {:.0} |", line.name, 1e6 * ms / n)?;
         }
     }
-    for (name, points) in [("bumpy sphere", &one), ("bumpy sphere, all cores", &all)] {
-        for [n, ms] in points {
-            writeln!(text, "| {name} | {n} | {ms:.1} | {:.0} |", 1e6 * ms / n)?;
-        }
+    for [n, ms] in &one {
+        writeln!(text, "| bumpy sphere | {n} | {ms:.1} | {:.0} |", 1e6 * ms / n)?;
     }
     let line = |name: &str, points, colour, dashed| Line { name: name.into(), points, colour, dashed };
     let panels = [
         Panel {
-            title: "Build time, one thread".into(),
+            title: "Processor time of a build".into(),
             axes: [Axis::even("points"), Axis::even("ms")],
             lines,
         },
         Panel {
-            title: "Build time, bumpy sphere".into(),
+            title: "Processor time of a build, larger".into(),
             axes: [Axis::logarithmic("points"), Axis::logarithmic("ms")],
-            lines: vec![
-                line("one thread", one, 0, false),
-                line("all cores", all, 1, false),
-                line("n log n", expected, 6, true),
-            ],
+            lines: vec![line("bumpy sphere", one, 0, false), line("n log n", expected, 6, true)],
         },
     ];
     options.save("figure-8.svg", &panels)

@@ -1,9 +1,12 @@
 //! Table 1 and Fig. 8: what hierarchies consist of, and how long it takes to build them.
 
+use std::hint::black_box;
+use std::time::Duration;
+
 use nearmiss::{BuildOptions, PointCloud, Scan};
 
 use crate::Failure;
-use crate::clock::timed;
+use crate::clock::processor_time;
 use crate::sample::count;
 
 /// Bytes that a scan keeps for each point, whatever the hierarchy: position, normal, radius, disc, kind, source.
@@ -53,19 +56,24 @@ impl Makeup {
     }
 }
 
-/// The least seconds of `runs` builds on so many threads, 0 for all cores: what other programs took is least in it.
+/// Builds go on until they have taken so long, so that a hundredth of a second is little.
+const LONG_ENOUGH: Duration = Duration::from_millis(500);
+
+/// Seconds of processor time that a build takes, on one thread.
 ///
 /// # Errors
 /// When it cannot be built.
-pub fn build_seconds(cloud: &PointCloud, threads: usize, runs: usize) -> Result<f64, Failure> {
-    let options = BuildOptions::default().with_threads(threads);
-    let mut least = f64::INFINITY;
-    for _ in 0..runs.max(1) {
-        let (scan, time) = timed(|| Scan::build(cloud, &options));
-        scan?;
-        least = least.min(time.as_secs_f64());
+pub fn build_seconds(cloud: &PointCloud) -> Result<f64, Failure> {
+    let options = BuildOptions::default().with_threads(1);
+    let (start, mut builds) = (processor_time(), 0);
+    loop {
+        black_box(Scan::build(cloud, &options)?);
+        builds += 1;
+        let spent = processor_time().saturating_sub(start);
+        if spent >= LONG_ENOUGH {
+            return Ok(spent.as_secs_f64() / f64::from(builds));
+        }
     }
-    Ok(least)
 }
 
 #[cfg(test)]
