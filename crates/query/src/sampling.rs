@@ -85,7 +85,8 @@ impl Surfaces<'_> {
                 continue;
             }
             accepted += 1;
-            self.test(x, [node.points(), self.pair.b.nodes[b].points()], sampling)?;
+            let points = [node.points(), self.pair.b.nodes[b].points()];
+            self.test(x, [i, points[1].start], points, sampling)?;
         }
         ControlFlow::Continue(())
     }
@@ -117,25 +118,32 @@ impl Surfaces<'_> {
             let x = place_in(&mut rng, self.pair.a.positions[i], self.pair.a.radii[i]);
             if volume.distance_sq(x) <= 0.0 {
                 let points = [&self.pair.a, &self.pair.b].map(|slices| 0..slices.positions.len());
-                self.test(x, points, sampling)?;
+                self.test(x, [i, 0], points, sampling)?;
             }
         }
         ControlFlow::Continue(())
     }
 
-    /// One test point, in a's stored frame; `points` of either scan are those near which a contact may be.
-    fn test(&mut self, x: [f32; 3], points: [Range<usize>; 2], sampling: &Sampling) -> ControlFlow<()> {
+    /// One test point, in a's stored frame, probably not far from the points `about` of either scan; `points` of either
+    /// are those near which a contact may be.
+    fn test(
+        &mut self,
+        x: [f32; 3],
+        about: [usize; 2],
+        points: [Range<usize>; 2],
+        sampling: &Sampling,
+    ) -> ControlFlow<()> {
         self.pair.meter.go_on()?;
         let [va, vb] = self.pair.views;
         let x = va.placed().apply(x.map(f64::from));
         let means = |at: &Evaluation| at.status == Status::Ok;
         self.pair.meter.spent.evaluations += 1;
-        let at_a = va.evaluate_with(x, &mut self.gathers[0]);
+        let at_a = va.evaluate_near(about[0], x, &mut self.gathers[0]);
         if !means(&at_a) {
             return ControlFlow::Continue(());
         }
         self.pair.meter.spent.evaluations += 1;
-        let at_b = vb.evaluate_with(x, &mut self.gathers[1]);
+        let at_b = vb.evaluate_near(about[1], x, &mut self.gathers[1]);
         if !means(&at_b) {
             return ControlFlow::Continue(());
         }
