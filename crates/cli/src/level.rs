@@ -115,8 +115,8 @@ mod tests {
         let [one, two] = [&[2][..], &[1, 3]].map(|depths| level_picture(&scan, depths));
         let panel = (PANEL + GAP) / FINE;
         assert_eq!(two.size().0, one.size().0 + panel);
-        let reddish = |p: &Picture| p.pixels().chunks(3).filter(|p| p[0] > p[2] + 40).count();
-        let bluish = |p: &Picture| p.pixels().chunks(3).filter(|p| p[2] > p[0] + 40).count();
+        let reddish = |p: &Picture| p.pixels().chunks(3).filter(|p| p[0] > p[2].saturating_add(40)).count();
+        let bluish = |p: &Picture| p.pixels().chunks(3).filter(|p| p[2] > p[0].saturating_add(40)).count();
         assert!(reddish(&one) > 1000 && bluish(&one) > 1000, "nodes of several colours");
     }
 }
