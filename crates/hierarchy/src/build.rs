@@ -328,15 +328,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
 
     let blocks: Vec<PointBlock> = PointBlock::all(&plan, &positions, &radii).collect();
     let groups = groups(&blocks);
-    let index = Index {
-        nodes: &nodes,
-        boxes: &boxes,
-        blocks: &blocks,
-        groups: &groups,
-        lists: &[],
-        listed: &[],
-        plan: &plan,
-    };
+    let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);
     let parts = surfels(&index, &positions, &radii, (&spacings, sampling_radius));
     drop(spacings);

@@ -51,6 +51,17 @@ pub(crate) struct Index<'a> {
     pub(crate) plan: &'a SurfacePlan,
 }
 
+impl<'a> Index<'a> {
+    /// One by which lists are made: all is found by descent.
+    pub(crate) fn without_lists(
+        (nodes, boxes): (&'a [Node], &'a [OrientedBox]),
+        (blocks, groups): (&'a [PointBlock], &'a [PointBlock]),
+        plan: &'a SurfacePlan,
+    ) -> Self {
+        Self { nodes, boxes, blocks, groups, lists: &[], listed: &[], plan }
+    }
+}
+
 impl Index<'_> {
     /// f at `x`.
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {

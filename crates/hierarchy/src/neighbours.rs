@@ -157,17 +157,18 @@ impl Locality {
 
 /// The neighbour lists of all blocks.
 pub(crate) fn neighbours(index: &Index<'_>, positions: &[[f32; 3]], radii: &[f32]) -> Lists {
-    let points = positions.chunks(PointBlock::WIDTH).zip(radii.chunks(PointBlock::WIDTH));
-    let blocks: Vec<_> = points.enumerate().collect();
+    let blocks: Vec<usize> = (0..index.blocks.len()).collect();
     let level = Level::new();
-    let list = |blocks: &[(usize, (&[[f32; 3]], &[f32]))]| {
+    let list = |blocks: &[usize]| {
         let (mut locality, mut lists) = (Locality::default(), Lists::default());
-        for &(block, (positions, radii)) in blocks {
-            let guess = 1.3 * radii.iter().copied().fold(0.0, f32::max);
-            let middle = index.middle(block).unwrap_or(positions[0]);
+        for &block in blocks {
+            let first = block * PointBlock::WIDTH;
+            let points = first..(first + PointBlock::WIDTH).min(positions.len());
+            let guess = 1.3 * radii[points.clone()].iter().copied().fold(0.0, f32::max);
+            let middle = index.middle(block).unwrap_or(positions[first]);
             dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || locality.collect(simd, index, positions, middle, guess)
+                || locality.collect(simd, index, &positions[points], middle, guess)
             ));
             lists.push(locality.within, locality.groups.iter().copied());
         }

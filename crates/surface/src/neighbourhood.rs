@@ -94,6 +94,7 @@ impl PointBlock {
     pub const EMPTY: Self = Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH] };
 
     /// All points of a scan, given their positions and local sampling radii.
+    #[must_use]
     pub fn all(
         plan: &SurfacePlan,
         positions: &[[f32; 3]],
