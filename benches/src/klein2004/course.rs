@@ -178,6 +178,38 @@ mod tests {
     use nearmiss::{Budget, BuildOptions, CollideOptions, CollidePlan, collide};
 
     #[test]
+    fn boxes_that_hold_a_corner_of_each_other_meet() {
+        let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
+        let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
+        let root = scan.boxes()[0];
+        let [centre, half] = [root.centre, root.half].map(|v| v.map(f64::from));
+        let axes = root.axes.map(|axis| axis.map(f64::from));
+        let corner = |bits: u32| {
+            let side = [0, 1, 2].map(|k| if bits >> k & 1 == 0 { half[k] } else { -half[k] });
+            [0, 1, 2].map(|c| centre[c] + (0..3).map(|k| side[k] * axes[k][c]).sum::<f64>())
+        };
+        let is_inside = |p: [f64; 3]| {
+            (0..3).all(|k| (0..3).map(|c| axes[k][c] * (p[c] - centre[c])).sum::<f64>().abs() <= half[k])
+        };
+        let (mut held, mut far) = (0, 0);
+        for pose in sweep(200, 3, 0).iter().flatten() {
+            let meet = roots_meet(&scan, pose);
+            let back = pose.inverse();
+            if (0..8).any(|i| is_inside(pose.apply(corner(i))) || is_inside(back.apply(corner(i)))) {
+                held += 1;
+                assert!(meet, "{pose:?}");
+            }
+            let apart =
+                pose.apply(centre).iter().zip(centre).map(|(p, q)| (p - q).powi(2)).sum::<f64>().sqrt();
+            if apart > 2.0 * f64::from(root.radius()) {
+                far += 1;
+                assert!(!meet, "{pose:?}");
+            }
+        }
+        assert!(held > 1000 && far > 100, "{held} hold a corner, {far} are far apart");
+    }
+
+    #[test]
     fn an_exact_answer_does_not_differ_and_its_contrary_always() {
         let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
         let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
