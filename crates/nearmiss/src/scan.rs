@@ -18,7 +18,7 @@ pub use nearmiss_store::WriteError as SaveError;
 const KIND: [u8; 4] = *b"SCAN";
 
 /// Version of the layout of a scan's sections and metadata. Older versions are refused by name.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// What a scan's file holds beside arrays.
 #[derive(Debug, Serialize, Deserialize)]

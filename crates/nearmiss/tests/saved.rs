@@ -40,15 +40,17 @@ fn what_is_saved_is_what_opens() {
 }
 
 #[test]
-fn the_golden_file_of_version_one_is_refused_by_name() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v1.nm");
-    let refused = Scan::open(path, Check::Full).unwrap_err().to_string();
-    assert!(refused.contains("version 1") && refused.contains("prepare"), "{refused}");
+fn golden_files_of_older_versions_are_refused_by_name() {
+    for version in [1, 2] {
+        let path = format!("{}/tests/golden/sphere-v{version}.nm", env!("CARGO_MANIFEST_DIR"));
+        let refused = Scan::open(path, Check::Full).unwrap_err().to_string();
+        assert!(refused.contains(&format!("version {version}")) && refused.contains("prepare"), "{refused}");
+    }
 }
 
 #[test]
-fn the_golden_file_of_version_two_opens() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v2.nm");
+fn the_golden_file_of_version_three_opens() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v3.nm");
     let golden = Scan::open(path, Check::Full).unwrap();
     assert_eq!(golden.sanity_check(), Ok(()), "a valid scan");
     same(&golden, &small());
@@ -107,7 +109,17 @@ fn absurd_numbers_do_not_panic() {
     };
     let sound = scan.at(&nearmiss::Pose::IDENTITY);
     for value in [0.0, 1e20, -1.0, f32::MAX, f32::NAN, f32::INFINITY] {
-        for tags in [&[b"DISC"][..], &[b"NRML"], &[b"BOXS"], &[b"RADI"], &[b"PNTS"], &[b"DISC", b"NRML"]] {
+        for tags in [
+            &[b"DISC"][..],
+            &[b"NRML"],
+            &[b"BOXS"],
+            &[b"RADI"],
+            &[b"PNTS"],
+            &[b"DISC", b"NRML"],
+            &[b"BLOK"],
+            &[b"GRUP"],
+            &[b"COVR"],
+        ] {
             let mut absurd = bytes.clone();
             for tag in tags {
                 fill(&mut absurd, tag, value);
