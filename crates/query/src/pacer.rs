@@ -97,7 +97,7 @@ pub fn collide_paced(
     };
     let plan = plan.with_sampling(pacer.sampling.with_seed(seed).with_flat(flat));
     let answer = collide_with(a, b, &plan, &budget, scratch);
-    pacer.adapt(start.elapsed(), &answer);
+    pacer.adapt(now().saturating_duration_since(start), &answer);
     answer
 }
 
