@@ -20,6 +20,15 @@ use nearmiss_benches::{Failure, machine, poses};
 /// Deadlines, in microseconds from the start of the query.
 const MICROS: [u64; 6] = [20, 50, 100, 200, 500, 1000];
 
+/// Runs of which the least stretch counts.
+const REPEATS: usize = 5;
+
+/// Poses that are run so.
+const STRETCHED: usize = 100;
+
+/// Time for either run: longer ones meet the machine in each.
+const LONG: Duration = Duration::from_millis(1);
+
 fn main() -> Result<(), Failure> {
     let mut arguments = Arguments::of_process();
     let queries = arguments.value("--queries")?.unwrap_or(4000);
@@ -31,7 +40,7 @@ fn main() -> Result<(), Failure> {
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let poses: Vec<Pose> = poses::near(&object, 500, seed)?.iter().map(|near| near.pose).collect();
     let certified = CollideOptions::default().with_evidence(Evidence::Certified);
-    let sampling = Method::Sampling(Sampling::default().with_test_points(4096));
+    let sampling = Method::Sampling(Sampling::default().with_test_points(1024));
     let margin = 8.0 * object.r;
     let asked = [
         ("traversal, certified, witness", certified),
@@ -41,16 +50,15 @@ fn main() -> Result<(), Failure> {
         ("order by sides", certified.with_order(Order::Sides)),
     ];
     println!(
-        "| query | deadline µs | ended by it | late: median µs | p99 | p99.9 | a spin: p99 | p99.9 | longest stretch between \
-         looks: median µs | p99.9 |\n| --- |{}",
-        " --: |".repeat(9)
+        "| query | deadline µs | ended by it | late: median µs | p99 | p99.9 | a spin: p99 | p99.9 |\n| --- |{}",
+        " --: |".repeat(7)
     );
     for (name, options) in asked {
         let plan = CollidePlan::new(&options, &scan, &scan)?;
         for micros in MICROS {
             let time = Duration::from_micros(micros);
             let mut scratch = CollideScratch::default();
-            let (mut late, mut spun, mut stretches) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut late, mut spun) = (Vec::new(), Vec::new());
             for i in 0..queries {
                 let views = [scan.at(&Pose::IDENTITY), scan.at(&poses[i % poses.len()])];
                 let end = now() + time;
@@ -60,7 +68,6 @@ fn main() -> Result<(), Failure> {
                 if matches!(answer.verdict, Verdict::Undecided(Reason::Budget { .. })) {
                     late.push(after);
                 }
-                stretches.push(scratch.longest_stretch().as_secs_f64() * 1e6);
                 let end = now() + time;
                 while now() < end {}
                 spun.push(micros_since(end));
@@ -70,23 +77,46 @@ fn main() -> Result<(), Failure> {
                 continue;
             }
             let of = |sorted: &[f64], share| quantile(sorted, share);
-            for times in [&mut late, &mut spun, &mut stretches] {
+            for times in [&mut late, &mut spun] {
                 times.sort_unstable_by(f64::total_cmp);
             }
             println!(
-                "| {name} | {micros} | {:.0} % | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |",
+                "| {name} | {micros} | {:.0} % | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |",
                 100.0 * count(ended) / count(queries),
                 of(&late, 0.5),
                 of(&late, 0.99),
                 of(&late, 0.999),
                 of(&spun, 0.99),
                 of(&spun, 0.999),
-                of(&stretches, 0.5),
-                of(&stretches, 0.999),
             );
         }
     }
+    println!(
+        "\nLongest stretch of a query between two looks at the clock, the least of {REPEATS} runs of a millisecond, which leaves out \
+         what the machine takes away\n\n| query | median µs | p99 | p99.9 | longest |\n| --- |{}",
+        " --: |".repeat(4)
+    );
+    for (name, options) in asked {
+        let plan = CollidePlan::new(&options, &scan, &scan)?;
+        let mut stretches: Vec<f64> =
+            poses.iter().take(STRETCHED).map(|pose| stretch(&scan, &plan, pose)).collect();
+        stretches.sort_unstable_by(f64::total_cmp);
+        let [median, most, more, longest] = [0.5, 0.99, 0.999, 1.0].map(|share| quantile(&stretches, share));
+        println!("| {name} | {median:.2} | {most:.2} | {more:.2} | {longest:.2} |");
+    }
     Ok(())
+}
+
+/// The longest time that a query does not look at the clock, in microseconds.
+fn stretch(scan: &Scan, plan: &CollidePlan, pose: &Pose) -> f64 {
+    let mut scratch = CollideScratch::default();
+    let ask = |scratch: &mut CollideScratch| {
+        let views = [scan.at(&Pose::IDENTITY), scan.at(pose)];
+        let budget = Budget::UNLIMITED.with_deadline(Deadline::within(LONG));
+        collide_with(&views[0], &views[1], plan, &budget, scratch);
+        1e6 * scratch.longest_stretch().as_secs_f64()
+    };
+    (0..REPEATS).map(|_| ask(&mut scratch)).fold(f64::INFINITY, f64::min)
 }
 
 fn flat(method: Method) -> Method {

@@ -22,6 +22,9 @@ use crate::view::ScanView;
 /// So many test points are drawn for one that both volumes hold, before that is given up.
 const DRAWS: u32 = 8;
 
+/// A draw costs as much as so many node pairs.
+const PAIRS_A_DRAW: u64 = 2;
+
 /// Points that are looked through between two looks at the clock.
 const A_STRETCH: u32 = 256;
 
@@ -79,6 +82,7 @@ impl Surfaces<'_> {
         let mut accepted = 0;
         while accepted < sampling.test_points && draws > 0 {
             draws -= 1;
+            self.draw()?;
             let i = node.first as usize + below(&mut rng, node.count as usize);
             let x = place_in(&mut rng, self.pair.a.positions[i], radius);
             if volume.distance_sq(x) > 0.0 {
@@ -114,6 +118,7 @@ impl Surfaces<'_> {
         let mut rng = stream(sampling.seed, FLAT);
         self.pair.meter.spent.leaf_pairs += 1;
         for _ in 0..wanted {
+            self.draw()?;
             let i = self.members[below(&mut rng, self.members.len())] as usize;
             let x = place_in(&mut rng, self.pair.a.positions[i], self.pair.a.radii[i]);
             if volume.distance_sq(x) <= 0.0 {
@@ -122,6 +127,12 @@ impl Surfaces<'_> {
             }
         }
         ControlFlow::Continue(())
+    }
+
+    /// Counts a draw, whether or not it becomes a test point.
+    fn draw(&mut self) -> ControlFlow<()> {
+        self.pair.meter.leaf_work(PAIRS_A_DRAW);
+        self.pair.meter.go_on()
     }
 
     /// One test point, in a's stored frame, probably not far from the points `about` of either scan; `points` of either
@@ -133,7 +144,6 @@ impl Surfaces<'_> {
         points: [Range<usize>; 2],
         sampling: &Sampling,
     ) -> ControlFlow<()> {
-        self.pair.meter.go_on()?;
         let [va, vb] = self.pair.views;
         let x = va.placed().apply(x.map(f64::from));
         let means = |at: &Evaluation| at.status == Status::Ok;
