@@ -38,15 +38,23 @@ pub fn options(arguments: &mut Arguments) -> Result<CollideOptions, Failure> {
         Some("sampling") => Method::Sampling(sampling),
         Some(other) => return Err(format!("no method {other:?}").into()),
     };
-    let name = arguments.value("--order")?.unwrap_or_else(|| String::from("depth"));
-    let order = ORDERS.iter().find(|(known, _)| *known == name);
-    let order = order.ok_or_else(|| format!("no order {name:?}"))?.1;
-    Ok(CollideOptions::default()
+    let order = order(arguments)?;
+    let options = CollideOptions::default()
         .with_detail(detail)
         .with_evidence(evidence)
         .with_method(method)
-        .with_order(order)
-        .with_coverings(arguments.flag("--coverings")))
+        .with_coverings(arguments.flag("--coverings"));
+    Ok(order.map_or(options, |order| options.with_order(order)))
+}
+
+/// Reads `--order NAME`.
+///
+/// # Errors
+/// When there is no such order.
+pub fn order(arguments: &mut Arguments) -> Result<Option<Order>, Failure> {
+    let Some(name) = arguments.value::<String>("--order")? else { return Ok(None) };
+    let order = ORDERS.iter().find(|(known, _)| *known == name);
+    Ok(Some(order.ok_or_else(|| format!("no order {name:?}"))?.1))
 }
 
 /// What a query may cost.

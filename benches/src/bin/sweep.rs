@@ -1,13 +1,14 @@
 //! The sweep of measured queries, ours and rivals' in the same run, as Markdown.
 //!
 //! `sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival parry|trimesh|kiddo]… [--witness]
-//! [--certified] [--seed N] [--threads N]`
+//! [--certified] [--order NAME] [--seed N] [--threads N]`
 //!
 //! An object is a file of points, with or without a mesh, or one that `Object::read` knows by name.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
-use nearmiss::{BuildOptions, CollideOptions, Detail, Evidence, Scan};
+use nearmiss::{BuildOptions, CollideOptions, Detail, Evidence, Order, Scan};
 use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::asked;
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::ours::Ours;
@@ -24,6 +25,7 @@ struct Options {
     rivals: Vec<String>,
     witness: bool,
     certified: bool,
+    order: Option<Order>,
     seed: u64,
     threads: usize,
 }
@@ -38,6 +40,7 @@ impl Options {
             rivals: arguments.values("--rival")?,
             witness: arguments.flag("--witness"),
             certified: arguments.flag("--certified"),
+            order: asked::order(&mut arguments)?,
             seed: arguments.value("--seed")?.unwrap_or(1),
             threads: arguments.value("--threads")?.unwrap_or(0),
             objects: arguments.words()?,
@@ -62,13 +65,15 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     let build = BuildOptions::default().with_threads(options.threads);
     let (scan, time) = timed(|| Scan::build(&object.cloud, &build));
     let scan = scan?;
-    let verdict = CollideOptions::default().with_detail(Detail::Verdict);
+    let asked = CollideOptions::default();
+    let asked = options.order.map_or(asked, |order| asked.with_order(order));
+    let verdict = asked.with_detail(Detail::Verdict);
     let mut methods: Vec<Box<dyn Method + '_>> = vec![Box::new(Ours::new(&scan, &verdict)?)];
     if options.certified {
         methods.push(Box::new(Ours::new(&scan, &verdict.with_evidence(Evidence::Certified))?));
     }
     if options.witness {
-        methods.push(Box::new(Ours::new(&scan, &CollideOptions::default())?));
+        methods.push(Box::new(Ours::new(&scan, &asked)?));
     }
     let mut left_out = Vec::new();
     for name in &options.rivals {

@@ -1,8 +1,8 @@
 //! Ours, as a user would call it.
 
 use nearmiss::{
-    Answer, CollideOptions, CollidePlan, CollideScratch, Evidence, Method as Search, Order, Pose, Scan,
-    Verdict, collide_with,
+    Answer, CollideOptions, CollidePlan, CollideScratch, Evidence, Method as Search, Pose, Scan, Verdict,
+    collide_with,
 };
 
 use crate::Failure;
@@ -46,8 +46,8 @@ impl Method for Ours<'_> {
         let options = self.plan.options();
         let certified = if options.evidence == Evidence::Certified { ", certified" } else { "" };
         let order = match options.order {
-            Order::DepthFirst => String::new(),
-            order => format!(", {order:?}"),
+            None => String::new(),
+            Some(order) => format!(", {order:?}"),
         };
         let method = match options.method {
             Search::Sampling(sampling) => format!(", sampling {}", sampling.test_points),

@@ -24,9 +24,9 @@ pub struct SearchArgs {
     /// What random test points come from
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Which pairs of nodes are looked at first; what matters under a budget
-    #[arg(long, value_enum, default_value_t = OrderName::Depth)]
-    pub order: OrderName,
+    /// Which pairs of nodes are looked at first; by default depth first, or by overlap under a budget
+    #[arg(long, value_enum)]
+    pub order: Option<OrderName>,
     /// Let sphere coverings part nodes whose boxes overlap
     #[arg(long)]
     pub coverings: bool,
@@ -73,12 +73,13 @@ impl SearchArgs {
             MethodName::Traversal => Method::Traversal,
             MethodName::Sampling => Method::Sampling(sampling),
         };
-        let order = match self.order {
+        let order = self.order.map(|order| match order {
             OrderName::Depth => Order::DepthFirst,
             OrderName::Overlap => Order::Overlap,
             OrderName::Sides => Order::Sides,
             OrderName::SidesByGap => Order::SidesByGap,
-        };
-        Ok(options.with_method(method).with_order(order).with_coverings(self.coverings))
+        });
+        let options = options.with_method(method).with_coverings(self.coverings);
+        Ok(order.map_or(options, |order| options.with_order(order)))
     }
 }

@@ -141,6 +141,33 @@ impl Relative {
     #[inline]
     #[must_use]
     pub fn gaps(&self, a: [&OrientedBox; 2], b: [&OrientedBox; 2]) -> [f32; 4] {
+        let mut gap = [f32::MIN; 4];
+        self.along_normals(a, b, |distance, reach| gap = greater(gap, minus(distance, reach)));
+        gap
+    }
+
+    /// The gaps, and for each pair how much of each other the boxes overlap, with `margin` about them: 1 less the distance of
+    /// their centres along a face normal as a share of how far the two and `margin` reach along that, the least of the six. 1
+    /// where they share a centre, 0 where they are just so far apart.
+    #[inline]
+    #[must_use]
+    pub fn gaps_and_overlaps(
+        &self,
+        a: [&OrientedBox; 2],
+        b: [&OrientedBox; 2],
+        margin: f32,
+    ) -> ([f32; 4], [f32; 4]) {
+        let (mut gap, mut share) = ([f32::MIN; 4], [0.0; 4]);
+        self.along_normals(a, b, |distance, reach| {
+            gap = greater(gap, minus(distance, reach));
+            share = greater(share, lanes(|i| distance[i] / (reach[i] + margin)));
+        });
+        (gap, lanes(|i| 1.0 - share[i]))
+    }
+
+    /// Tells of four pairs of boxes, along each of the six face normals, the distance of their centres and how far both reach.
+    #[inline]
+    fn along_normals(&self, a: [&OrientedBox; 2], b: [&OrientedBox; 2], mut tell: impl FnMut(Quad, Quad)) {
         let a = Quads::new([a[0], a[0], a[1], a[1]]);
         let (b0, b1) = (self.moved(b[0]), self.moved(b[1]));
         let b = Quads::new([&b0, &b1, &b0, &b1]);
@@ -148,7 +175,6 @@ impl Relative {
         for k in 0..3 {
             d[k] = minus(b.centre[k], a.centre[k]);
         }
-        let mut gap = [f32::MIN; 4];
         let mut reach_b = b.half;
         for i in 0..3 {
             let mut reach_a = a.half[i];
@@ -157,25 +183,11 @@ impl Relative {
                 reach_a = plus(reach_a, times(b.half[j], cosine));
                 reach_b[j] = plus(reach_b[j], times(a.half[i], cosine));
             }
-            gap = greater(gap, minus(magnitude(product(&a.axes[i], &d)), reach_a));
+            tell(magnitude(product(&a.axes[i], &d)), reach_a);
         }
         for j in 0..3 {
-            gap = greater(gap, minus(magnitude(product(&b.axes[j], &d)), reach_b[j]));
+            tell(magnitude(product(&b.axes[j], &d)), reach_b[j]);
         }
-        gap
-    }
-
-    /// The distance of the centres of a box of a and one of b along the face normal where it is greatest, as a share of how
-    /// far the two and `margin` reach along that: 0 where they share a centre, 1 where they are just so far apart.
-    #[must_use]
-    pub fn share_of_reach(&self, a: &OrientedBox, b: &OrientedBox, margin: f32) -> f32 {
-        let b = self.moved(b);
-        let d = sub(b.centre, a.centre);
-        let reach = |of: &OrientedBox, axis| -> f32 {
-            (0..3).map(|k| of.half[k] * dot(axis, of.axes[k]).abs()).sum()
-        };
-        let share = |axis: [f32; 3]| dot(axis, d).abs() / (reach(a, axis) + reach(&b, axis) + margin);
-        a.axes.iter().chain(&b.axes).map(|&axis| share(axis)).fold(0.0, f32::max)
     }
 
     /// A box of b's frame in a's.

@@ -148,7 +148,7 @@ fn search(
         return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
     }
     match options.semantics {
-        Semantics::Surface => surfaces(pair, options, budget.resolution, scratch, known, extras.proof),
+        Semantics::Surface => surfaces(pair, options, budget, scratch, known, extras.proof),
         Semantics::Thickened(_) => balls(pair, plan, scratch, known),
     }
 }
@@ -157,7 +157,7 @@ fn search(
 fn surfaces(
     pair: Posed<'_>,
     options: &CollideOptions,
-    resolution: Option<f64>,
+    budget: &Budget,
     scratch: &mut CollideScratch,
     mut known: Option<&mut Known>,
     proof: Option<&mut Proof>,
@@ -165,18 +165,18 @@ fn surfaces(
     let CollideScratch { stack, heap, lanes, gathers, excluded, compared, members, proven, longest_stretch } =
         scratch;
     let workspace = Workspace { lanes, gathers, excluded, compared, members };
-    let mut search = Surfaces::new(pair, options, resolution, known.is_some(), workspace);
+    let mut search = Surfaces::new(pair, options, budget, known.is_some(), workspace);
     let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
     let parted = !ended && search.found.is_none();
     if let Some(known) = &mut known {
         if parted { known.parted(&search) } else { known.forget(search.met) }
     }
-    let Surfaces { pair, found, doubt, reach, estimate, excluded, compared, .. } = search;
+    let Surfaces { pair, found, doubt, reach, estimate, order, excluded, compared, .. } = search;
     let mut certifier = Certifier::new(pair, reach, proven);
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
-            let likelihood = match options.order {
+            let likelihood = match order {
                 Order::DepthFirst => likelihood(&certifier.pair, reach, stack),
                 _ => likelihood(&certifier.pair, reach, heap),
             };
@@ -228,7 +228,7 @@ fn look(
         known.forget(None);
     }
     let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
-    match options.order {
+    match search.order {
         Order::DepthFirst => descend(nodes_a, nodes_b, search, stack),
         _ => descend(nodes_a, nodes_b, search, heap),
     }

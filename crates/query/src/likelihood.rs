@@ -19,15 +19,11 @@ const OFFSET: f64 = 4.65;
 
 /// The chance that the pairs still open hide a contact, or what is within `reach`.
 pub(crate) fn likelihood(pair: &Posed<'_>, reach: f32, open: &impl Frontier) -> f64 {
-    let together = |(_, nodes): (f32, NodePair)| f64::from(overlap(pair, nodes, reach));
+    let together = |(_, nodes): (f32, NodePair)| {
+        let (a, b) = (&pair.a.boxes[nodes.a.index()], &pair.b.boxes[nodes.b.index()]);
+        f64::from(pair.relative.gaps_and_overlaps([a; 2], [b; 2], reach).1[0])
+    };
     // What is no number, as of boxes that overflow, says nothing.
     let most = open.open().take(LOOKED_AT).map(together).filter(|s| s.is_finite()).fold(0.0, f64::max);
     1.0 / (1.0 + (OFFSET - SLOPE * most).exp())
-}
-
-/// How much of each other the boxes of two nodes, or what is within `reach` of them, overlap: 1 where they share a centre, 0
-/// where they just touch.
-pub(crate) fn overlap(pair: &Posed<'_>, nodes: NodePair, reach: f32) -> f32 {
-    let (a, b) = (&pair.a.boxes[nodes.a.index()], &pair.b.boxes[nodes.b.index()]);
-    1.0 - pair.relative.share_of_reach(a, b, reach)
 }

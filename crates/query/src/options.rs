@@ -93,14 +93,12 @@ impl Sampling {
 }
 
 /// Which pairs of nodes are looked at first. Changes no verdict unless a budget ends the search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Order {
-    /// Depth first, of siblings the one whose boxes overlap most. Fastest to the end, and the best under budgets of all
-    /// (benches/record).
-    #[default]
+    /// Depth first, of siblings the one whose boxes overlap most: fastest to the end.
     DepthFirst,
-    /// Of all pairs the one whose boxes' centres are nearest each other, measured by how far the boxes reach.
+    /// Of all pairs the one whose boxes overlap most of each other: best under budgets.
     Overlap,
     /// The pair with most sample points of a's node on either side of f′ of b's, further from it than its covering
     /// radius (S0 §5.2).
@@ -128,8 +126,9 @@ pub struct CollideOptions {
     pub evidence: Evidence,
     /// How two leaves are compared, for [`Semantics::Surface`]. Default: by tangent discs.
     pub method: Method,
-    /// Which pairs of nodes are looked at first, for [`Semantics::Surface`]. Default: depth first.
-    pub order: Order,
+    /// Which pairs of nodes are looked at first, for [`Semantics::Surface`]. None, the default: what measuring found best
+    /// (benches/record), depth first, or by overlap where a budget of work or time may end the search.
+    pub order: Option<Order>,
     /// Whether nodes whose boxes overlap are also parted by their sphere coverings (S0 §5.1), for
     /// [`Semantics::Surface`]. Default: no, for that costs more than it saves (benches/record).
     pub coverings: bool,
@@ -143,7 +142,7 @@ impl Default for CollideOptions {
             margin: 0.0,
             evidence: Evidence::Estimated,
             method: Method::default(),
-            order: Order::default(),
+            order: None,
             coverings: false,
         }
     }
@@ -182,7 +181,7 @@ impl CollideOptions {
     /// The same options in this order.
     #[must_use]
     pub const fn with_order(self, order: Order) -> Self {
-        Self { order, ..self }
+        Self { order: Some(order), ..self }
     }
 
     /// The same options with or without sphere coverings.

@@ -38,6 +38,21 @@ impl<'a> Posed<'a> {
         self.relative.gaps(boxes_a, boxes_b)
     }
 
+    /// The same, with how much of each other the boxes overlap when `margin` is about them.
+    #[inline]
+    pub(crate) fn gaps_and_overlaps(
+        &mut self,
+        a: [NodeId; 2],
+        b: [NodeId; 2],
+        count: u8,
+        margin: f32,
+    ) -> ([f32; 4], [f32; 4]) {
+        self.meter.spent.node_pairs += u64::from(count);
+        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
+        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
+        self.relative.gaps_and_overlaps(boxes_a, boxes_b, margin)
+    }
+
     /// Both nodes, unless one is more than twice as long as the other: then that one.
     #[inline]
     pub(crate) fn split(&self, pair: NodePair) -> Split {

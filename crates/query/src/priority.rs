@@ -9,41 +9,32 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Extent, NodePair, apart as coverings_apart};
 use nearmiss_surface::Status;
 
-use crate::likelihood::overlap;
 use crate::options::Order;
 use crate::surface::Surfaces;
 
 impl Surfaces<'_> {
-    /// Takes those pairs back that coverings part, and gives the others the urgency of the order. Of `admitted` a
-    /// pair's urgency is how deeply its boxes overlap.
+    /// Takes those pairs back that coverings part, and adds to the urgencies of the others what their sample points say. At
+    /// most one before, an urgency then decides between pairs of as many sample points.
     #[cold]
     pub(crate) fn look_closer(&mut self, a: [NodeId; 2], b: [NodeId; 2], admitted: &mut [Option<f32>; 4]) {
         for (i, admitted) in admitted.iter_mut().enumerate() {
             let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
             let double = (i >> 1 == 1 && a[0] == a[1]) || (i & 1 == 1 && b[0] == b[1]);
-            let Some(depth) = admitted.filter(|_| !double) else { continue };
-            let apart = self.coverings
-                && coverings_apart(
-                    &self.pair.a,
-                    &self.pair.b,
-                    pair,
-                    &self.pair.relative,
-                    self.reach,
-                    Extent::Discs,
-                );
-            *admitted = if apart { None } else { Some(self.urgency(pair, depth)) };
+            let Some(urgency) = admitted.filter(|_| !double) else { continue };
+            let (slices_a, slices_b) = (&self.pair.a, &self.pair.b);
+            if self.coverings
+                && coverings_apart(slices_a, slices_b, pair, &self.pair.relative, self.reach, Extent::Discs)
+            {
+                *admitted = None;
+                continue;
+            }
+            let sides = match self.order {
+                Order::Sides => self.sides(pair, |_| 1.0),
+                Order::SidesByGap => self.sides(pair, eigenvalue_gap),
+                _ => 0.0,
+            };
+            *admitted = Some(urgency + sides);
         }
-    }
-
-    fn urgency(&mut self, pair: NodePair, depth: f32) -> f32 {
-        let sides = match self.order {
-            Order::DepthFirst => return depth,
-            Order::Overlap => 0.0,
-            Order::Sides => self.sides(pair, |_| 1.0),
-            Order::SidesByGap => self.sides(pair, eigenvalue_gap),
-        };
-        // At most one, so that it decides between pairs of as many sample points.
-        sides + overlap(&self.pair, pair, self.reach)
     }
 
     /// The lesser number, weighted, of a's sample points on one of the sides of f′_B.

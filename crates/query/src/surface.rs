@@ -13,6 +13,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{GatherScratch, Node, NodePair, PointKind, Split, Visitor};
 use nearmiss_surface::meet;
 
+use crate::budget::Budget;
 use crate::certify::{Excluded, distinct};
 use crate::crossing::{Disc, Lanes};
 use crate::options::{CollideOptions, Detail, Method, Order};
@@ -46,6 +47,8 @@ pub(crate) struct Surfaces<'a> {
     method: Method,
     pub(crate) order: Order,
     pub(crate) coverings: bool,
+    /// Whether more than boxes is looked at.
+    looks_closer: bool,
     /// Nodes whose samples are no further from their surface than this, in a's stored frame, are not split.
     pub(crate) resolution: f32,
     /// Whether excluded and compared pairs are noted.
@@ -86,21 +89,24 @@ impl<'a> Surfaces<'a> {
     pub(crate) fn new(
         pair: Posed<'a>,
         options: &CollideOptions,
-        resolution: Option<f64>,
+        budget: &Budget,
         notes: bool,
         workspace: Workspace<'a>,
     ) -> Self {
         let Workspace { lanes, gathers, excluded, compared, members } = workspace;
         excluded.clear();
         compared.clear();
+        let may_end = budget.work.is_some() || budget.deadline.is_some();
+        let order = options.order.unwrap_or(if may_end { Order::Overlap } else { Order::DepthFirst });
         Self {
             detail: options.detail,
             margin: options.margin,
             reach: pair.stored(options.margin),
             method: options.method,
-            order: options.order,
+            order,
             coverings: options.coverings,
-            resolution: resolution.map_or(-1.0, |length| pair.stored(length)),
+            looks_closer: options.coverings || matches!(order, Order::Sides | Order::SidesByGap),
+            resolution: budget.resolution.map_or(-1.0, |length| pair.stored(length)),
             pair,
             notes: notes || options.certifies(),
             nearest: f32::INFINITY,
@@ -273,10 +279,15 @@ fn comes_within(radius: f32, p: [f32; 3], disc: &Disc) -> bool {
 impl Visitor for Surfaces<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
-        let gaps = self.pair.gaps(a, b, count);
         let reach = self.reach;
-        let mut admitted = gaps.map(|gap| if gap > reach { None } else { Some(-gap) });
-        if self.coverings || self.order != Order::DepthFirst {
+        let (gaps, urgencies) = if self.order == Order::DepthFirst {
+            let gaps = self.pair.gaps(a, b, count);
+            (gaps, gaps.map(|gap| -gap))
+        } else {
+            self.pair.gaps_and_overlaps(a, b, count, reach)
+        };
+        let mut admitted = [0, 1, 2, 3].map(|i| if gaps[i] > reach { None } else { Some(urgencies[i]) });
+        if self.looks_closer {
             self.look_closer(a, b, &mut admitted);
         }
         if self.notes {
