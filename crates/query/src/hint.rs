@@ -8,8 +8,8 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{Frame, Pose};
-use nearmiss_hierarchy::{Frontier, NodePair, PointHierarchy, Stack, resume};
+use nearmiss_geometry::{Frame, NodeId, Pose};
+use nearmiss_hierarchy::{Frontier, Node, NodePair, PointHierarchy, Stack, descend, resume};
 use serde::{Deserialize, Serialize};
 
 use crate::certify::Excluded;
@@ -107,7 +107,7 @@ impl PairHint {
         };
         let known = self.known.get_or_insert_with(nothing);
         let motion = motion(pair, &known.pose, &pose);
-        if known.question == question && motion.is_finite() {
+        if known.question == question && motion.is_finite() && known.is_of(pair) {
             known.travel += motion;
             known.pose = pose;
         } else {
@@ -130,6 +130,12 @@ fn motion(pair: &Posed<'_>, from: &Pose, to: &Pose) -> f64 {
 }
 
 impl Known {
+    /// Whether the leaves that met are leaves of these scans: what was read from somewhere may say anything.
+    fn is_of(&self, pair: &Posed<'_>) -> bool {
+        let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
+        self.met.is_none_or(|met| is_leaf(pair.a.nodes, met.a) && is_leaf(pair.b.nodes, met.b))
+    }
+
     /// A lower bound of the distance of the scans in the world, without any search, if there is one beyond reach.
     pub(crate) fn distance(&self, pair: &Posed<'_>, reach: f64) -> Option<f64> {
         let left = self.clear - self.travel;
@@ -155,6 +161,11 @@ impl Known {
             if until > self.travel {
                 i += 1;
                 continue;
+            }
+            if pair.a.index() >= nodes_a.len() || pair.b.index() >= nodes_b.len() {
+                // No front that was ever parted: it goes from the roots.
+                self.forget(None);
+                return descend(nodes_a, nodes_b, search, stack);
             }
             let gap = search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
             if gap > search.reach {

@@ -346,6 +346,7 @@ impl Surfaces<'_> {
         // Most discs of one leaf are out of reach of all of the other.
         let bounds = self.pair.relative.moved(&self.pair.b.boxes[pair.b.index()]);
         let (mut ready, mut sparse) = (false, false);
+        let by_discs = matches!(self.method, Method::Traversal);
         for i in node_a.points() {
             let disc = self.disc_a(i);
             let ball = self.pair.a.ball(i);
@@ -361,7 +362,7 @@ impl Surfaces<'_> {
             if (ball > 0.0 || sparse) && !is_open && self.comes_near_sparse(&disc, ball, &node_b) {
                 self.doubt = Some(Reason::Undersampled);
             }
-            if self.method == Method::Traversal {
+            if by_discs {
                 let tries = self.tries;
                 self.discs_cross(i, &disc, &node_b)?;
                 if self.tries > tries {
@@ -377,6 +378,7 @@ impl Surfaces<'_> {
     }
 
     /// The disc of point `i` against those of a leaf of b, which stand in the lanes.
+    #[inline]
     fn discs_cross(&mut self, i: usize, disc: &Disc, node_b: &Node) -> ControlFlow<()> {
         let mut bits = self.lanes.crossings(disc);
         while bits != 0 {

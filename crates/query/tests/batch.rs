@@ -10,9 +10,9 @@ use std::time::Duration;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Deadline, Detail, Evidence, Reason, ScanView,
-    Semantics, Until, Verdict, answer_each, collide, collide_many, collide_many_with, collide_poses,
-    collide_poses_with,
+    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Deadline, Detail, Evidence, Order, Reason,
+    ScanView, Semantics, Until, Verdict, answer_each, collide, collide_many, collide_many_with,
+    collide_poses, collide_poses_with,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use rayon::ThreadPool;
@@ -191,7 +191,7 @@ fn every_question_is_asked_once() {
 #[test]
 fn a_deadline_spans_the_batch() {
     let scan = prepared(CloudKind::Sphere, 2000, 1);
-    let plan = plan(CollideOptions::default(), &scan);
+    let plan = plan(CollideOptions::default().with_order(Order::DepthFirst), &scan);
     let poses = poses(100_000, 2.0, 3);
     let unasked = |answer: &Answer| answer.statistics.node_pairs == 0;
     let mut scratch = BatchScratch::default();

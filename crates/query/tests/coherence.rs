@@ -176,3 +176,35 @@ fn a_hint_survives_being_saved() {
         assert_eq!(one, other, "step {i}");
     }
 }
+
+/// What stands in a hint that was read from somewhere must not lead out of the arrays.
+#[test]
+fn foreign_nodes_in_a_hint_do_not_panic() {
+    let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 1000, 3));
+    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
+    let mut scratch = CollideScratch::default();
+    for away in [1.5, 2.1] {
+        let pose = Pose::from_translation([away, 0.0, 0.0]);
+        let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+        let mut hint = PairHint::default();
+        let cold = collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch);
+        let mut value = serde_json::to_value(&hint).unwrap();
+        for id in [1_u32, 200_000, u32::MAX] {
+            if let Some(met) = value["met"].as_object_mut() {
+                met.insert("a".into(), id.into());
+            }
+            for standing in value["front"].as_array_mut().unwrap() {
+                standing["until"] = (-1.0).into();
+                standing["pair"]["b"] = id.into();
+            }
+            value["clear"] = (-1.0).into();
+            let mut foreign: PairHint = serde_json::from_value(value.clone()).unwrap();
+            let answer =
+                collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut foreign, &mut scratch);
+            // Ids that exist may stand for other parts of the scan; those that do not begin anew.
+            if id > 1 {
+                assert_eq!(kind(&answer.verdict).0, kind(&cold.verdict).0, "{away} {id}");
+            }
+        }
+    }
+}
