@@ -10,15 +10,15 @@ use crate::view::ScanView;
 #[derive(Debug)]
 pub(crate) struct Posed<'a> {
     pub(crate) views: [&'a ScanView<'a>; 2],
-    pub(crate) a: Slices<'a>,
-    pub(crate) b: Slices<'a>,
+    pub(crate) a: &'a Slices<'a>,
+    pub(crate) b: &'a Slices<'a>,
     pub(crate) relative: Relative,
     pub(crate) meter: Meter,
 }
 
 impl<'a> Posed<'a> {
     pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, meter: Meter) -> Self {
-        let [a, b] = views.map(|view| *view.slices());
+        let [a, b] = views.map(ScanView::slices);
         Self { views, a, b, relative, meter }
     }
 

@@ -21,7 +21,7 @@ impl Surfaces<'_> {
             let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
             let double = (i >> 1 == 1 && a[0] == a[1]) || (i & 1 == 1 && b[0] == b[1]);
             let Some(urgency) = admitted.filter(|_| !double) else { continue };
-            let (slices_a, slices_b) = (&self.pair.a, &self.pair.b);
+            let (slices_a, slices_b) = (self.pair.a, self.pair.b);
             if self.coverings
                 && coverings_apart(slices_a, slices_b, pair, &self.pair.relative, self.reach, Extent::Discs)
             {

@@ -30,16 +30,16 @@ impl Surfaces<'_> {
         let [samples_a, samples_b] = [slices_a.samples(pair.a.index()), slices_b.samples(pair.b.index())];
         self.pair.meter.leaf_pair(samples_a.len(), samples_b.len());
         for (lane, j) in samples_b.iter().enumerate() {
-            let radius = radius(&slices_b, pair.b.index(), j) * self.pair.relative.scale();
+            let radius = radius(slices_b, pair.b.index(), j) * self.pair.relative.scale();
             let disc = Disc { radius, ..self.disc_b(j) };
             self.lanes.set(lane, &disc);
         }
         self.lanes.close(samples_b.len());
         for i in samples_a.iter() {
-            let disc = Disc { radius: radius(&slices_a, pair.a.index(), i), ..self.disc_a(i) };
+            let disc = Disc { radius: radius(slices_a, pair.a.index(), i), ..self.disc_a(i) };
             let bits = self.lanes.crossings(&disc);
             if let Some(j) = samples_b.iter().nth(bits.trailing_zeros() as usize) {
-                let radii = [disc.radius, radius(&slices_b, pair.b.index(), j)];
+                let radii = [disc.radius, radius(slices_b, pair.b.index(), j)];
                 self.found = Some((self.shared_chord(i, j, radii), Evidence::Estimated));
                 return ControlFlow::Break(());
             }

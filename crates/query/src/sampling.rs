@@ -122,7 +122,7 @@ impl Surfaces<'_> {
             let i = self.members[below(&mut rng, self.members.len())] as usize;
             let x = place_in(&mut rng, self.pair.a.positions[i], self.pair.a.radii[i]);
             if volume.distance_sq(x) <= 0.0 {
-                let points = [&self.pair.a, &self.pair.b].map(|slices| 0..slices.positions.len());
+                let points = [self.pair.a, self.pair.b].map(|slices| 0..slices.positions.len());
                 self.test(x, [i, 0], points, sampling)?;
             }
         }
