@@ -69,12 +69,7 @@ fn main() -> Result<ExitCode, Failure> {
 
 fn bytes(scan: &Scan) {
     let slices = scan.slices();
-    let all = size_of_val(slices.nodes)
-        + size_of_val(slices.boxes)
-        + size_of_val(slices.growths)
-        + size_of_val(slices.coverings)
-        + size_of_val(slices.sample_lists)
-        + size_of_val(scan.cones());
+    let all = scan.bytes_of_nodes();
     println!(
         "{:.1} bytes a node, {:.1} a point for nodes\n",
         count(all) / count(slices.nodes.len()),

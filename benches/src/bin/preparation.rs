@@ -100,7 +100,7 @@ fn main() -> Result<(), Failure> {
         "\nfile: {bytes} bytes, {:.1} a point; {} nodes, {:.1} bytes a node",
         size / count(n),
         scan.nodes().len(),
-        size / count(scan.nodes().len())
+        count(scan.bytes_of_nodes()) / count(scan.nodes().len())
     );
     println!(
         "{:.2} % of the points usable, sampling radius {:.6}",

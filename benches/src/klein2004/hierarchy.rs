@@ -9,9 +9,6 @@ use crate::Failure;
 use crate::clock::processor_time;
 use crate::sample::count;
 
-/// Bytes that a scan keeps for each point, whatever the hierarchy: position, normal, radius, disc, kind, source.
-const POINT_BYTES: usize = 37;
-
 /// What a hierarchy consists of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Makeup {
@@ -51,7 +48,7 @@ impl Makeup {
             nodes: nodes.len(),
             depth: depths.iter().map(|&d| f64::from(d)).sum::<f64>() / count(nodes.len()),
             bytes_a_point: count(bytes) / count(scan.len()),
-            bytes_a_node: count(bytes.saturating_sub(POINT_BYTES * scan.len())) / count(nodes.len()),
+            bytes_a_node: count(scan.bytes_of_nodes()) / count(nodes.len()),
         })
     }
 }

@@ -20,6 +20,7 @@ pub(crate) struct ScanReport {
     leaves: usize,
     depth_mean: f64,
     bytes: u64,
+    /// Of what nodes take; what points do is not in it.
     bytes_per_node: f64,
     usable: f64,
     kinds: KindsReport,
@@ -66,7 +67,7 @@ impl ScanReport {
             leaves,
             depth_mean,
             bytes,
-            bytes_per_node: bytes as f64 / nodes as f64,
+            bytes_per_node: scan.bytes_of_nodes() as f64 / nodes as f64,
             usable: scan.usable(),
             kinds: KindsReport {
                 surface: scan.share(PointKind::Surface),

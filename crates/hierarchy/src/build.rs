@@ -300,6 +300,18 @@ impl PointHierarchy {
         (0..self.nodes.len()).map(move |id| slices.enclosure(id))
     }
 
+    /// Bytes of all that is stored for nodes: tree, boxes, enclosures, cones, samples and coverings (S0 §6.1); what points keep,
+    /// and their neighbour lists, is not counted.
+    #[must_use]
+    pub fn bytes_of_nodes(&self) -> usize {
+        size_of_val::<[_]>(&self.nodes)
+            + size_of_val::<[_]>(&self.boxes)
+            + size_of_val::<[_]>(&self.growths)
+            + size_of_val::<[_]>(&self.cones)
+            + size_of_val::<[_]>(&self.sample_lists)
+            + size_of_val::<[_]>(&self.coverings)
+    }
+
     /// The directions of a leaf's normals. Leaves are numbered in the order of their points.
     #[must_use]
     pub fn cones(&self) -> &[NormalCone] {
