@@ -22,7 +22,7 @@ pub struct Makeup {
     pub depth: f64,
     /// Bytes of the file for each point.
     pub bytes_a_point: f64,
-    /// Bytes of the file beside what each point keeps, for each node.
+    /// Bytes that nodes take, for each.
     pub bytes_a_node: f64,
 }
 

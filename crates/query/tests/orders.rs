@@ -160,6 +160,17 @@ fn test_points_see_what_surfaces_do() {
             }
         }
     }
+    // Without volumes nothing is proven, not even of what is far apart; with them it is.
+    for (flat, away, proven) in [(true, 3.0, false), (false, 3.0, true), (true, 2.1, false)] {
+        let sampling = Sampling::default().with_flat(flat);
+        let options = base.with_method(Method::Sampling(sampling)).with_evidence(Evidence::Certified);
+        let verdict =
+            ask(&scan, &scan, &Pose::from_translation([away, 0.0, 0.0]), &options, &Budget::UNLIMITED)
+                .verdict;
+        let Verdict::Separated { gap, evidence } = verdict else { panic!("{verdict:?}") };
+        assert_eq!(evidence == Evidence::Certified, proven, "flat {flat}, {away}");
+        assert!(gap <= away - 2.0 + 1e-6 && (gap > 0.0) == proven, "{gap}");
+    }
     // A witness from a test point is verified.
     let options = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
     let pose = Pose::from_translation([1.5, 0.0, 0.0]);
