@@ -46,10 +46,13 @@ impl Pacer {
         Self { sampling, ..self }
     }
 
-    /// What the next query tests leaves with.
+    /// What the next query tests leaves with: 8 to 65,536 test points, a tolerance of 0.1 to 1, whatever was wanted.
     #[must_use]
-    pub const fn sampling(&self) -> Sampling {
-        self.sampling
+    pub fn sampling(&self) -> Sampling {
+        // `clamp` would let through what is no number.
+        let tolerance = self.sampling.tolerance.max(*TOLERANCES.start()).min(*TOLERANCES.end());
+        let test_points = self.sampling.test_points.clamp(LEAST_TEST_POINTS, MOST_TEST_POINTS);
+        self.sampling.with_tolerance(tolerance).with_test_points(test_points)
     }
 
     /// How long a query is to take.
@@ -61,7 +64,7 @@ impl Pacer {
     /// Learns from a query that took so long.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count within bounds")]
     pub fn adapt(&mut self, spent: Duration, answer: &Answer) {
-        let Sampling { test_points, tolerance, .. } = &mut self.sampling;
+        let Sampling { test_points, tolerance, .. } = self.sampling();
         let step = if spent > self.target {
             1.0 - STEP
         } else if spent < self.target.mul_f64(ENOUGH)
@@ -72,12 +75,12 @@ impl Pacer {
         } else {
             return;
         };
-        let wanted = (f64::from(*test_points) * step).round() as u32;
+        let wanted = (f64::from(test_points) * step).round() as u32;
         // One test more or less is the least step of small numbers.
-        let wanted = if step > 1.0 { wanted.max(*test_points + 1) } else { wanted.min(*test_points - 1) };
-        *test_points = wanted.clamp(LEAST_TEST_POINTS, MOST_TEST_POINTS);
+        let wanted = if step > 1.0 { wanted.max(test_points + 1) } else { wanted.min(test_points - 1) };
         let wider = 1.0 + 0.25 * (1.0 - step);
-        *tolerance = (*tolerance * wider).clamp(*TOLERANCES.start(), *TOLERANCES.end());
+        self.sampling = self.sampling.with_test_points(wanted).with_tolerance(tolerance * wider);
+        self.sampling = self.sampling();
     }
 }
 
@@ -91,11 +94,11 @@ pub fn collide_paced(
     scratch: &mut CollideScratch,
 ) -> Answer {
     let start = now();
-    let budget = Budget::UNLIMITED.with_deadline(Deadline::at(start + pacer.target));
+    let budget = Budget::UNLIMITED.with_deadline(Deadline::within(pacer.target));
     let Method::Sampling(Sampling { seed, flat, .. }) = plan.options().method else {
         return collide_with(a, b, plan, &budget, scratch);
     };
-    let plan = plan.with_sampling(pacer.sampling.with_seed(seed).with_flat(flat));
+    let plan = plan.with_sampling(pacer.sampling().with_seed(seed).with_flat(flat));
     let answer = collide_with(a, b, &plan, &budget, scratch);
     pacer.adapt(now().saturating_duration_since(start), &answer);
     answer
