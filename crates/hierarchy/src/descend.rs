@@ -206,16 +206,19 @@ pub fn resume<V: Visitor, F: Frontier>(
     frontier: &mut F,
 ) -> ControlFlow<()> {
     while let Some((urgency, pair)) = frontier.pop() {
-        if visitor.go_on().is_break() {
-            // It was not looked at, so it is still open.
+        let mut flow = visitor.go_on();
+        if flow.is_continue() {
+            let (node_a, node_b) = (&a[pair.a.index()], &b[pair.b.index()]);
+            match pair.split_unless(node_a, node_b, visitor.whole(pair), || visitor.split(pair)) {
+                Some([children_a, children_b]) => enter(visitor, frontier, children_a, children_b),
+                None => flow = visitor.leaves(pair),
+            }
+        }
+        if flow.is_break() {
+            // It was not looked at, or not to the end, so it is still open.
             let none = (None, pair);
             frontier.push([(Some(urgency), pair), none, none, none]);
-            return ControlFlow::Break(());
-        }
-        let (node_a, node_b) = (&a[pair.a.index()], &b[pair.b.index()]);
-        match pair.split_unless(node_a, node_b, visitor.whole(pair), || visitor.split(pair)) {
-            Some([children_a, children_b]) => enter(visitor, frontier, children_a, children_b),
-            None => visitor.leaves(pair)?,
+            return flow;
         }
     }
     ControlFlow::Continue(())

@@ -87,7 +87,8 @@ pub fn collide_proving(
 /// they met, or what kept them apart.
 ///
 /// Changes no verdict but those that a budget ends, whatever `hint` was used for before; a separation may be certified
-/// with a lesser gap than without. What it remembers is worth most for small motions: a step of a tenth of a sampling
+/// with a lesser gap than without. It is believed, so one read from a file must be one that was written. Searches with a
+/// resolution and those by [`Method::Sampling`] do without. What it remembers is worth most for small motions: a step of a tenth of a sampling
 /// radius, as a simulation makes, takes a fraction of a query.
 pub fn collide_hinted(
     a: &ScanView<'_>,
@@ -140,8 +141,10 @@ fn search(
         }
     };
     let pair = Posed::new([a, b], relative, meter);
-    // What was seen at some resolution says nothing of the rest.
-    let hint = extras.hint.filter(|_| budget.resolution.is_none());
+    // What was seen at some resolution says nothing of the rest, and which leaves are tested by points, which see more
+    // than crossings, depends on the way to them.
+    let is_exact = budget.resolution.is_none() && options.method == Method::Traversal;
+    let hint = extras.hint.filter(|_| is_exact);
     let known = hint.map(|hint| hint.recall(&pair, options, pose));
     if let Some(distance) = known.as_ref().and_then(|known| known.distance(&pair, plan.reach())) {
         let verdict = apart(options, distance, true);
@@ -169,17 +172,16 @@ fn surfaces(
     let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
     let parted = !ended && search.found.is_none();
     if let Some(known) = &mut known {
-        if parted { known.parted(&search) } else { known.forget(search.met) }
+        // Boxes of discs certify nothing: what does is remembered below.
+        if parted && !options.certifies() { known.parted(&search) } else { known.forget(search.met) }
     }
-    let Surfaces { pair, found, doubt, reach, estimate, order, excluded, compared, .. } = search;
+    let Surfaces { pair, found, doubt, reach, estimate, excluded, compared, .. } = search;
     let mut certifier = Certifier::new(pair, reach, proven);
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
-            let likelihood = match order {
-                Order::DepthFirst => likelihood(&certifier.pair, reach, stack),
-                _ => likelihood(&certifier.pair, reach, heap),
-            };
+            // A search goes on from a front depth first, whatever its order.
+            let likelihood = likelihood(&certifier.pair, reach, stack.open().chain(heap.open()));
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         (None, Some(reason)) => Verdict::Undecided(reason),
@@ -192,7 +194,7 @@ fn surfaces(
                 certifier.hand_out(proof);
             }
             if let Some(known) = known.filter(|_| whole) {
-                known.clear_by(distance - options.margin, &certifier.pair);
+                known.clear_to(distance, &certifier.pair);
             }
             apart(options, distance, whole)
         }
@@ -218,11 +220,11 @@ fn look(
         return search.test_all(&sampling);
     }
     if let Some(known) = known {
-        if let Some(pair) = known.met() {
+        if let Some(pair) = known.met(&search.pair) {
             search.leaves(pair)?;
             search.compared.clear();
         }
-        if known.has_front() && !options.certifies() {
+        if known.has_front(&search.pair) && !options.certifies() {
             return known.look_again(search, stack);
         }
         known.forget(None);
@@ -243,7 +245,7 @@ fn balls(
 ) -> Answer {
     let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
     let mut search = Balls::new(pair, plan.reach());
-    let again = known.as_ref().and_then(|known| known.met());
+    let again = known.as_ref().and_then(|known| known.met(&search.pair));
     let mut ended = again.is_some_and(|leaves| search.leaves(leaves).is_break());
     if !ended {
         search.apart = f64::INFINITY;
@@ -252,7 +254,7 @@ fn balls(
     let verdict = match search.found {
         Some(contact) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
         None if ended => {
-            let likelihood = likelihood(&search.pair, search.reach_stored, &scratch.stack);
+            let likelihood = likelihood(&search.pair, search.reach_stored, scratch.stack.open());
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         None => apart(plan.options(), search.apart, true),
@@ -260,7 +262,7 @@ fn balls(
     if let Some(known) = &mut known {
         known.forget(search.met);
         if verdict.is_separated() {
-            known.clear_by(search.apart - plan.reach(), &search.pair);
+            known.clear_to(search.apart, &search.pair);
         }
     }
     scratch.longest_stretch = search.pair.meter.longest_stretch;

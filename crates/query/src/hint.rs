@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Frame, NodeId, Pose};
-use nearmiss_hierarchy::{Frontier, Node, NodePair, PointHierarchy, Stack, descend, resume};
+use nearmiss_hierarchy::{Frontier, Node, NodePair, OrientedBox, PointHierarchy, Stack, resume};
 use serde::{Deserialize, Serialize};
 
 use crate::certify::Excluded;
@@ -19,6 +19,9 @@ use crate::surface::Surfaces;
 
 /// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they need be.
 const GROWN: usize = 3;
+
+/// A travel of more slacks than this is begun anew: gaps beside it would lose their digits.
+const LONGEST: f64 = (1_u64 << 40) as f64;
 
 /// What is remembered between queries about the same two scans; for [`collide_hinted`](crate::collide_hinted). Owned by
 /// the caller, one for each pair of scans.
@@ -37,7 +40,7 @@ struct Question {
     scale: f64,
 }
 
-/// What tells scans apart.
+/// What tells scans apart: most of it moves when any point does.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Likeness {
     frame: Frame,
@@ -45,23 +48,32 @@ struct Likeness {
     leaf_size: u32,
     sampling_radius: f32,
     ends: [[f32; 3]; 2],
+    /// Bits of the numbers of the root: its box, and its bandwidth, to which all local radii add.
+    root: [u32; 16],
 }
 
 impl Likeness {
     fn of(scan: &PointHierarchy) -> Self {
         let positions = scan.positions();
         let at = |i: usize| positions.get(i).copied().unwrap_or_default();
+        let slices = scan.slices();
+        let OrientedBox { centre, half, axes: [u, v, w], .. } = slices.boxes[0];
+        let mut root = [slices.node_bandwidth(0).to_bits(); 16];
+        for (bits, x) in root.iter_mut().zip([centre, half, u, v, w].into_iter().flatten()) {
+            *bits = x.to_bits();
+        }
         Self {
             frame: *scan.frame(),
             points: scan.len(),
             leaf_size: scan.leaf_size(),
-            sampling_radius: scan.slices().sampling_radius,
+            sampling_radius: slices.sampling_radius,
             ends: [at(0), at(scan.len() - 1)],
+            root,
         }
     }
 }
 
-/// A pair of nodes that parts its scans until b has travelled so far.
+/// A pair of nodes that are no nearer each other than b has still to travel until then.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Standing {
     pair: NodePair,
@@ -78,7 +90,7 @@ pub(crate) struct Known {
     travel: f64,
     /// The leaves that met.
     met: Option<NodePair>,
-    /// Until b has travelled so far nothing meets, if that is further than it has.
+    /// The scans are no nearer each other than b has still to travel until then.
     clear: f64,
     /// Pairs that cover all pairs of points, if whole.
     front: Vec<Standing>,
@@ -107,8 +119,11 @@ impl PairHint {
         };
         let known = self.known.get_or_insert_with(nothing);
         let motion = motion(pair, &known.pose, &pose);
-        if known.question == question && motion.is_finite() && known.is_of(pair) {
-            known.travel += motion;
+        // Rounded so that no step is lost.
+        let travel = if motion > 0.0 { (known.travel + motion).next_up() } else { known.travel };
+        if known.question == question && motion >= 0.0 && travel <= LONGEST * f64::from(pair.relative.slack())
+        {
+            known.travel = travel;
             known.pose = pose;
         } else {
             // The room of the front is kept.
@@ -130,42 +145,36 @@ fn motion(pair: &Posed<'_>, from: &Pose, to: &Pose) -> f64 {
 }
 
 impl Known {
-    /// Whether the leaves that met are leaves of these scans: what was read from somewhere may say anything.
-    fn is_of(&self, pair: &Posed<'_>) -> bool {
-        let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
-        self.met.is_none_or(|met| is_leaf(pair.a.nodes, met.a) && is_leaf(pair.b.nodes, met.b))
-    }
-
-    /// A lower bound of the distance of the scans in the world, without any search, if there is one beyond reach.
+    /// A lower bound of the distance of the scans in the world, without any search, if it is beyond `reach`.
     pub(crate) fn distance(&self, pair: &Posed<'_>, reach: f64) -> Option<f64> {
         let left = self.clear - self.travel;
-        (left > 0.0).then(|| reach + left * pair.views[0].placed().scale() * (1.0 - 1e-9))
+        (left > beyond(pair, pair.stored(reach)))
+            .then(|| left * pair.views[0].placed().scale() * (1.0 - 1e-9))
     }
 
-    /// The leaves that met last time.
-    pub(crate) fn met(&self) -> Option<NodePair> {
-        self.met
+    /// The leaves that met last time, if there are such: files lie.
+    pub(crate) fn met(&self, pair: &Posed<'_>) -> Option<NodePair> {
+        let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
+        self.met.filter(|met| is_leaf(pair.a.nodes, met.a) && is_leaf(pair.b.nodes, met.b))
     }
 
     /// Whether [`Known::look_again`] can replace a search.
-    pub(crate) fn has_front(&self) -> bool {
-        self.is_whole
+    pub(crate) fn has_front(&self, pair: &Posed<'_>) -> bool {
+        let (nodes_a, nodes_b) = (pair.a.nodes.len(), pair.b.nodes.len());
+        let is_there = |at: &Standing| at.pair.a.index() < nodes_a && at.pair.b.index() < nodes_b;
+        self.is_whole && self.front.iter().all(is_there)
     }
 
     /// Goes on from the front instead of the roots.
     pub(crate) fn look_again(&mut self, search: &mut Surfaces<'_>, stack: &mut Stack) -> ControlFlow<()> {
         stack.clear();
         let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
+        let parted = self.travel + beyond(&search.pair, search.reach);
         let mut i = 0;
         while let Some(&Standing { pair, until }) = self.front.get(i) {
-            if until > self.travel {
+            if until > parted {
                 i += 1;
                 continue;
-            }
-            if pair.a.index() >= nodes_a.len() || pair.b.index() >= nodes_b.len() {
-                // No front that was ever parted: it goes from the roots.
-                self.forget(None);
-                return descend(nodes_a, nodes_b, search, stack);
             }
             let gap = search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
             if gap > search.reach {
@@ -180,9 +189,9 @@ impl Known {
         resume(nodes_a, nodes_b, search, stack)
     }
 
-    /// Until when a pair with this gap parts its scans.
+    /// Until when a pair with this gap is some way apart.
     fn until(&self, gap: f32, search: &Surfaces<'_>) -> f64 {
-        self.travel + f64::from(gap) - f64::from(search.reach) - 2.0 * f64::from(search.pair.relative.slack())
+        (self.travel + (f64::from(gap) - f64::from(search.pair.relative.slack()))).next_down()
     }
 
     /// The leaves of `pair` meet, or nothing is known.
@@ -209,15 +218,20 @@ impl Known {
             self.fresh = front.len();
         }
         self.clear = front.iter().map(|standing| standing.until).fold(f64::MAX, f64::min);
-        self.is_whole = front.len() <= GROWN * self.fresh;
+        self.is_whole = front.len() <= self.fresh.saturating_mul(GROWN);
         self.front = front;
         self.met = None;
     }
 
-    /// The scans are further apart than `reach` by this, in the world; nothing else is known.
-    pub(crate) fn clear_by(&mut self, distance: f64, pair: &Posed<'_>) {
+    /// The scans are so far apart, in the world; nothing else is known.
+    pub(crate) fn clear_to(&mut self, distance: f64, pair: &Posed<'_>) {
         self.forget(None);
-        let slack = 2.0 * f64::from(pair.relative.slack());
-        self.clear = self.travel + distance / pair.views[0].placed().scale() * (1.0 - 1e-9) - slack;
+        let distance = distance / pair.views[0].placed().scale() * (1.0 - 1e-9);
+        self.clear = (self.travel + (distance - f64::from(pair.relative.slack()))).next_down();
     }
+}
+
+/// What is further apart than this, in a's stored frame, no search finds within `reach` there: poses far out round more.
+fn beyond(pair: &Posed<'_>, reach: f32) -> f64 {
+    f64::from(reach) + f64::from(pair.relative.slack())
 }

@@ -4,8 +4,8 @@
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Order, PairHint, ScanView,
-    Semantics, Verdict, collide, collide_hinted,
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Method, Order, PairHint,
+    Reason, Sampling, ScanView, Semantics, Verdict, collide, collide_hinted,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -177,34 +177,185 @@ fn a_hint_survives_being_saved() {
     }
 }
 
-/// What stands in a hint that was read from somewhere must not lead out of the arrays.
+/// A flat square of uneven points, some 1 apart.
+fn plate(side: u32) -> Vec<[f64; 3]> {
+    let mut rng = arbitrary::rng(4);
+    let mut point = |i: u32| {
+        let [x, y, _] = arbitrary::point_in(&mut rng, 0.2);
+        [f64::from(i % side) + x, f64::from(i / side) + y, 0.0]
+    };
+    (0..side * side).map(&mut point).collect()
+}
+
+/// Asked without a hint and with one.
+fn both(
+    scans: [&PointHierarchy; 2],
+    poses: [Pose; 2],
+    options: &CollideOptions,
+    budget: &Budget,
+    hint: &mut PairHint,
+) -> [Answer; 2] {
+    let plan = CollidePlan::new(options, scans[0], scans[1]).unwrap();
+    let [a, b] = [0, 1].map(|k: usize| ScanView::new(scans[k], &poses[k]));
+    let cold = collide(&a, &b, &plan, budget);
+    [cold, collide_hinted(&a, &b, &plan, budget, hint, &mut CollideScratch::default())]
+}
+
+fn lifted(height: f64) -> [Pose; 2] {
+    [Pose::IDENTITY, Pose::from_translation([0.3, 0.2, height])]
+}
+
 #[test]
-fn foreign_nodes_in_a_hint_do_not_panic() {
-    let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 1000, 3));
-    let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
-    let mut scratch = CollideScratch::default();
-    for away in [1.5, 2.1] {
-        let pose = Pose::from_translation([away, 0.0, 0.0]);
-        let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+fn a_hint_certifies_nothing_that_was_not_proven() {
+    let scan = prepared(&plate(20));
+    let r = scan.sampling_radius();
+    let options = CollideOptions::default().with_evidence(Evidence::Certified);
+    let mut seen = [0; 2];
+    for step in 1..20 {
+        // Boxes of discs part the plates long before enclosures do.
+        let poses = lifted(0.1 * f64::from(step) * r);
         let mut hint = PairHint::default();
-        let cold = collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch);
-        let mut value = serde_json::to_value(&hint).unwrap();
-        for id in [1_u32, 200_000, u32::MAX] {
-            if let Some(met) = value["met"].as_object_mut() {
-                met.insert("a".into(), id.into());
+        for _ in 0..3 {
+            let [cold, warm] = both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+            assert_eq!(kind(&cold.verdict), kind(&warm.verdict), "step {step}: {cold:?} {warm:?}");
+            seen[usize::from(kind(&cold.verdict).1)] += 1;
+        }
+    }
+    assert!(seen[0] > 10 && seen[1] > 10, "{seen:?}");
+}
+
+#[test]
+fn test_points_see_the_same_with_a_hint() {
+    let scan = prepared(&plate(20));
+    let r = scan.sampling_radius();
+    let method = Method::Sampling(Sampling::default());
+    let mut seen = [0; 3];
+    for coverings in [false, true] {
+        let base = CollideOptions::default().with_detail(Detail::Verdict).with_method(method);
+        let options = base.with_coverings(coverings);
+        let mut hint = PairHint::default();
+        for step in 0..100 {
+            let turn = Pose::from_axis_angle([1.0, 0.3, 0.0], 0.002 * f64::from(step % 7));
+            let poses =
+                [Pose::IDENTITY, turn.with_translation([0.3, 0.2, 0.4 * r * (0.2 * f64::from(step)).sin()])];
+            let [cold, warm] = both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+            assert_eq!(cold, warm, "step {step}, coverings {coverings}");
+            seen[usize::from(kind(&cold.verdict).0)] += 1;
+        }
+    }
+    assert!(seen[0] > 20 && seen[1] > 20, "{seen:?}");
+}
+
+#[test]
+fn a_hint_that_names_what_is_not_there_is_none() {
+    let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 1000, 3));
+    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    for (away, semantics) in [
+        (1.0, Semantics::Surface),
+        (2.03, Semantics::Surface),
+        (2.2, Semantics::Surface),
+        (1.0, Semantics::Thickened(0.1)),
+    ] {
+        let options = options.with_semantics(semantics);
+        let poses = [Pose::IDENTITY, Pose::from_translation([away, 0.1, 0.0])];
+        let mut hint = PairHint::default();
+        both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+        let written = serde_json::to_value(&hint).unwrap();
+        for id in [0_u32, 5, 99_999, u32::MAX] {
+            let mut damaged = written.clone();
+            damaged["clear"] = (-1e30).into();
+            damaged["fresh"] = u64::MAX.into();
+            if !damaged["met"].is_null() {
+                damaged["met"]["a"] = id.into();
             }
-            for standing in value["front"].as_array_mut().unwrap() {
-                standing["until"] = (-1.0).into();
+            for standing in damaged["front"].as_array_mut().unwrap() {
                 standing["pair"]["b"] = id.into();
+                standing["until"] = (-1e30).into();
             }
-            value["clear"] = (-1.0).into();
-            let mut foreign: PairHint = serde_json::from_value(value.clone()).unwrap();
-            let answer =
-                collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut foreign, &mut scratch);
-            // Ids that exist may stand for other parts of the scan; those that do not begin anew.
-            if id > 1 {
-                assert_eq!(kind(&answer.verdict).0, kind(&cold.verdict).0, "{away} {id}");
+            let mut hint: PairHint = serde_json::from_value(damaged).unwrap();
+            let [cold, warm] = both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+            // Node 5 is there: its front no longer covers all, which nothing can tell.
+            if id != 5 {
+                assert_eq!(kind(&cold.verdict), kind(&warm.verdict), "{away} {semantics:?} {id}");
             }
         }
     }
+}
+
+#[test]
+fn far_from_the_origin_a_hint_knows_no_better() {
+    let scan = prepared(&plate(20));
+    let options = CollideOptions::default().with_margin(0.5).with_detail(Detail::Verdict);
+    let mut rounded = 0;
+    for away in [0.0, 2.0_f64.powi(40), 2.0_f64.powi(45)] {
+        for step in 1..30 {
+            let gap = 0.5 + f64::from(step) / 64.0;
+            let poses = [[0.0; 3], [0.0, 0.0, gap]].map(Pose::from_translation);
+            let mut hint = PairHint::default();
+            let [near, _] = both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+            // The same motion, but poses so far out are rounded.
+            let poses = [[away, 0.0, 0.0], [away, 0.0, gap]].map(Pose::from_translation);
+            let [cold, warm] = both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+            assert_eq!(kind(&cold.verdict), kind(&warm.verdict), "gap {gap} {away} away");
+            rounded += u32::from(kind(&near.verdict) != kind(&cold.verdict));
+        }
+    }
+    assert!(rounded > 5, "{rounded} verdicts differ far out");
+}
+
+#[test]
+fn a_scan_of_which_a_point_moved_is_another() {
+    let finger: Vec<_> = plate(4).iter().map(|p| p.map(|x| (x - 1.5) * 1e-4)).collect();
+    let finger = prepared(&finger);
+    let options = CollideOptions::default().with_semantics(Semantics::Thickened(0.001));
+    let points = arbitrary::cloud(CloudKind::Coplanar, 1000, 1);
+    let scan = prepared(&points);
+    let mut hits = 0;
+    for i in (0..points.len()).step_by(20) {
+        let mut moved = points.clone();
+        moved[i] = moved[i].map(|x| 0.9 * x);
+        let poses = [Pose::from_translation(moved[i]), Pose::IDENTITY];
+        let moved = prepared(&moved);
+        let mut hint = PairHint::default();
+        both([&finger, &scan], poses, &options, &Budget::UNLIMITED, &mut hint);
+        let [cold, warm] = both([&finger, &moved], poses, &options, &Budget::UNLIMITED, &mut hint);
+        assert_eq!(kind(&cold.verdict), kind(&warm.verdict), "point {i}");
+        hits += u32::from(cold.verdict.is_intersecting());
+    }
+    assert!(hits > 40, "{hits}");
+}
+
+#[test]
+fn a_hinted_search_that_a_budget_ends_is_as_likely_to_hit_as_what_it_leaves_open() {
+    let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 3));
+    let mut hint = PairHint::default();
+    let pose = |away: f64| [Pose::IDENTITY, Pose::from_translation([away, 0.1, 0.0])];
+    let options = CollideOptions::default();
+    both([&scan; 2], pose(2.05), &options, &Budget::UNLIMITED, &mut hint);
+    let few = Budget::UNLIMITED.with_work(60);
+    let [_, warm] = both([&scan; 2], pose(2.04), &options, &few, &mut hint);
+    let Verdict::Undecided(Reason::Budget { likelihood }) = warm.verdict else { panic!("{warm:?}") };
+    assert!(likelihood > 0.1, "{likelihood} where overlapping boxes are left");
+}
+
+#[test]
+fn small_steps_count_after_a_leap() {
+    let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 500, 3));
+    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let mut hint = PairHint::default();
+    let near = Pose::from_translation([2.3, 0.0, 0.0]);
+    both([&scan; 2], [Pose::IDENTITY, near], &options, &Budget::UNLIMITED, &mut hint);
+    let mut hits = 0;
+    for exponent in [20, 47, 48, 49, 50, 51, 52, 53, 58] {
+        let large = Pose::IDENTITY.with_scale(2.0_f64.powi(exponent));
+        both([&scan; 2], [Pose::IDENTITY, large], &options, &Budget::UNLIMITED, &mut hint);
+        for step in 0..100 {
+            let place = Pose::from_translation([2.6 - 0.01 * f64::from(step % 100), 0.0, 0.0]);
+            let [cold, warm] =
+                both([&scan; 2], [Pose::IDENTITY, place], &options, &Budget::UNLIMITED, &mut hint);
+            assert_eq!(kind(&cold.verdict), kind(&warm.verdict), "step {step} after 2^{exponent}");
+            hits += u32::from(cold.verdict.is_intersecting());
+        }
+    }
+    assert!(hits > 100, "{hits}");
 }

@@ -1,11 +1,13 @@
 //! Orders, coverings, resolutions and test points: the same verdicts in other ways.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+use std::time::Duration;
+
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Method, Order, PlanError,
-    Reason, Sampling, ScanView, Semantics, Verdict, collide, collide_with,
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Method, Order, Pacer,
+    PlanError, Reason, Sampling, ScanView, Semantics, Verdict, collide, collide_paced, collide_with,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -212,4 +214,56 @@ fn what_cannot_be_sampled_is_refused() {
     assert!(matches!(refused(method(plain.with_tolerance(f64::NAN))), PlanError::Tolerance(_)));
     assert_eq!(refused(method(plain).with_margin(0.1)), PlanError::SamplingAlone);
     assert_eq!(refused(method(plain).with_semantics(Semantics::Thickened(0.1))), PlanError::SamplingAlone);
+}
+
+#[test]
+fn ended_searches_by_test_points_are_as_likely_to_hit_as_what_they_leave_open() {
+    let scan = sphere(3000);
+    // Deep in each other, but no test point is near enough to both.
+    let pose = Pose::from_translation([1.0, 0.1, 0.0]);
+    for flat in [false, true] {
+        let sampling = Sampling::default().with_flat(flat).with_tolerance(1e-9);
+        let options = CollideOptions::default().with_method(Method::Sampling(sampling));
+        for work in [0, 10, 100, 1000] {
+            let answer = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED.with_work(work));
+            let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict else {
+                panic!("{answer:?}")
+            };
+            assert!(likelihood > 0.8, "flat {flat}, work {work}: {likelihood}");
+        }
+    }
+}
+
+#[test]
+fn paces_that_are_none_are_mended() {
+    let scan = sphere(1000);
+    let r = scan.sampling_radius();
+    let options = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
+    let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+    let apart = Pose::from_translation([2.0 + 2.0 * r, 0.0, 0.0]);
+    let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &apart)];
+    let plain = Sampling::default();
+    for target in [Duration::ZERO, Duration::from_secs(1), Duration::MAX] {
+        for test_points in [0, 128, u32::MAX] {
+            for tolerance in [0.4, 0.0, -1.0, f64::NAN] {
+                let sampling = plain.with_test_points(test_points).with_tolerance(tolerance);
+                let mut pacer = Pacer::new(target).with_sampling(sampling);
+                for _ in 0..2 {
+                    if pacer.sampling().test_points > 1000 && !target.is_zero() {
+                        break;
+                    }
+                    let answer = collide_paced(
+                        &views[0],
+                        &views[1],
+                        &plan,
+                        &mut pacer,
+                        &mut CollideScratch::default(),
+                    );
+                    assert!(!answer.verdict.is_intersecting(), "{target:?} {sampling:?} {answer:?}");
+                }
+                let Sampling { test_points, tolerance, .. } = pacer.sampling();
+                assert!((8..=65_536).contains(&test_points) && (0.1..=1.0).contains(&tolerance), "{pacer:?}");
+            }
+        }
+    }
 }
