@@ -84,7 +84,7 @@ impl Pacer {
     }
 }
 
-/// As [`collide_with`](crate::collide_with) with a deadline in `pacer`'s time; the test points of
+/// As [`collide_with`] with a deadline in `pacer`'s time; the test points of
 /// [`Method::Sampling`] are the pacer's, which learns from the query. By other methods there is nothing to adapt.
 pub fn collide_paced(
     a: &ScanView<'_>,
