@@ -2,7 +2,7 @@
 //! descent where no list holds.
 
 use fearless_simd::{Level, Simd, dispatch};
-use nearmiss_surface::{Centre, Evaluation, Moments, Neighbourhood, PointBlock, SurfacePlan};
+use nearmiss_surface::{Centre, Evaluation, Moments, Neighbourhood, PointBlock, Shares, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::build::PointHierarchy;
@@ -23,6 +23,8 @@ pub struct GatherScratch {
     found: Vec<u32>,
     /// Blocks that are heard at x.
     heard: Vec<u32>,
+    /// How near they are.
+    shares: Vec<Shares>,
 }
 
 impl Default for GatherScratch {
@@ -35,7 +37,7 @@ impl GatherScratch {
     /// One whose evaluations use the instructions of `level`: no result depends on it.
     #[must_use]
     pub fn at(level: Level) -> Self {
-        Self { level, block: 0, found: Vec::new(), heard: Vec::new() }
+        Self { level, block: 0, found: Vec::new(), heard: Vec::new(), shares: Vec::new() }
     }
 }
 
@@ -67,7 +69,7 @@ impl Index<'_> {
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
         let place = centre.rounded();
-        let GatherScratch { level, block, found, heard } = scratch;
+        let GatherScratch { level, block, found, heard, shares } = scratch;
         let mut list = self.list(*block, place);
         if list.is_none() {
             *block = self.nearest_block(place);
@@ -77,7 +79,7 @@ impl Index<'_> {
             self.collect(place, 0.0, found);
             &*found
         });
-        let moments = dispatch!(*level, simd => self.moments(simd, &centre, list, heard));
+        let moments = dispatch!(*level, simd => self.moments(simd, &centre, list, heard, shares));
         moments.evaluate(self.plan, x)
     }
 
@@ -149,7 +151,7 @@ impl Index<'_> {
         x: [f32; 3],
         distance: f32,
         heard: &'b mut Vec<u32>,
-    ) -> &'b [u32] {
+    ) -> &'b mut [u32] {
         let most = (groups.len() + 1) * PointBlock::WIDTH;
         if heard.len() < most {
             heard.resize(most, 0);
@@ -162,7 +164,7 @@ impl Index<'_> {
                 count += balls.heard(simd, x, distance, group * id32(PointBlock::WIDTH), room);
             }
         }
-        &heard[..count]
+        &mut heard[..count]
     }
 
     /// The sums over all points of `groups`, which ascend, about x.
@@ -173,16 +175,14 @@ impl Index<'_> {
         x: &Centre,
         groups: &[u32],
         heard: &mut Vec<u32>,
+        shares: &mut Vec<Shares>,
     ) -> Moments {
         simd.vectorize(
             #[inline(always)]
             || {
                 let mut near = Neighbourhood::new(simd, self.plan, x);
-                for &block in self.heard(simd, groups, x.rounded(), 0.0, heard) {
-                    if let Some(block) = self.blocks.get(block as usize) {
-                        near.offer(simd, block);
-                    }
-                }
+                let heard = self.heard(simd, groups, x.rounded(), 0.0, heard);
+                near.offer_all(simd, self.blocks, heard, shares);
                 near.moments()
             },
         )

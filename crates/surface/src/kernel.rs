@@ -71,16 +71,13 @@ fn wendland_lanes<S: Simd>(simd: S, t: f32x16<S>) -> f32x16<S> {
 /// As [`exp_neg`].
 #[inline(always)]
 fn exp_neg_lanes<S: Simd>(t: f32x16<S>) -> f32x16<S> {
-    let y = -t;
-    let shifted = y * std::f32::consts::LOG2_E + ROUND;
-    let k = shifted - ROUND;
-    let r = (y - k * LN2_HIGH) - k * LN2_LOW;
+    let y = t * -std::f32::consts::LOG2_E;
+    let shifted = y + ROUND;
+    let r = y - (shifted - ROUND);
     let square = r * r;
-    let high = (r * TAYLOR[0] + TAYLOR[1]) * square + (r * TAYLOR[2] + TAYLOR[3]);
-    let low = (r * TAYLOR[4] + TAYLOR[5]) * square + (r * TAYLOR[6] + TAYLOR[7]);
-    let p = high * (square * square) + low;
-    let exponent = shifted.bitcast::<u32x16<S>>() - ROUND.to_bits() + 127;
-    p * (exponent << 23).bitcast::<f32x16<S>>()
+    let low = (r * EXP2[1] + EXP2[0]) + (r * EXP2[3] + EXP2[2]) * square;
+    let p = low + (r * EXP2[5] + EXP2[4]) * (square * square);
+    (p.bitcast::<u32x16<S>>() + (shifted.bitcast::<u32x16<S>>() << 23)).bitcast()
 }
 
 #[inline]
@@ -95,29 +92,23 @@ fn wendland(t: f32) -> f32 {
 /// Adding this to a number below 2²² rounds it to an integer, which then stands in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// ln 2 in two parts, the first of which times an integer below 256 is exact.
-const LN2_HIGH: f32 = 0.693_359_4;
-const LN2_LOW: f32 = -2.121_944_4e-4;
+/// 2^r for |r| ≤ 1/2, that of r⁰ first: the polynomial with 1 at 0 whose greatest relative error, 9.2e-8, is least.
+const EXP2: [f32; 6] = [1.0, 0.693_146_98, 0.240_222_42, 0.055_507_34, 0.009_671_513, 0.001_326_472];
 
-/// The exponential's coefficients: for |r| ≤ ln 2 / 2 the first term left out is 1.2e-7 · 2^-1 relative to 1.
-const TAYLOR: [f32; 8] = [1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0];
-
-/// exp(−t) for 0 ≤ t ≤ 80, to 2 units in the last place; the same bits on every machine, and without a call,
-/// so that it vectorises. Beyond 80 the value at 80.
+/// exp(−t) for 0 ≤ t ≤ 80, with a relative error of 2e-7 + 8e-8 t, which is what the rounding of t makes anyway; the
+/// same bits on every machine, and without a call, so that it vectorises. Beyond 80 the value at 80.
 #[inline]
 #[must_use]
 pub(crate) fn exp_neg(t: f32) -> f32 {
-    let y = -t.min(80.0);
-    let shifted = y * std::f32::consts::LOG2_E + ROUND;
-    let k = shifted - ROUND;
-    let r = (y - k * LN2_HIGH) - k * LN2_LOW;
-    // By halves, which leaves shorter chains of operations that wait for each other.
+    let y = t.min(80.0) * -std::f32::consts::LOG2_E;
+    let shifted = y + ROUND;
+    let r = y - (shifted - ROUND);
+    // By thirds, which leaves shorter chains of operations that wait for each other.
     let square = r * r;
-    let high = (r * TAYLOR[0] + TAYLOR[1]) * square + (r * TAYLOR[2] + TAYLOR[3]);
-    let low = (r * TAYLOR[4] + TAYLOR[5]) * square + (r * TAYLOR[6] + TAYLOR[7]);
-    let p = high * (square * square) + low;
-    let exponent = shifted.to_bits().wrapping_sub(ROUND.to_bits()).wrapping_add(127);
-    p * f32::from_bits(exponent << 23)
+    let low = (r * EXP2[1] + EXP2[0]) + (r * EXP2[3] + EXP2[2]) * square;
+    let p = low + (r * EXP2[5] + EXP2[4]) * (square * square);
+    // Times a power of two: its exponent is added to that of p.
+    f32::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 23))
 }
 
 #[cfg(test)]
@@ -133,9 +124,10 @@ mod tests {
             #[expect(clippy::cast_precision_loss, reason = "below 2^24")]
             let t = i as f32 * 1e-4;
             let exact = (-f64::from(t)).exp();
-            worst = worst.max((f64::from(exp_neg(t)) / exact - 1.0).abs());
+            let allowed = 2e-7 + 8e-8 * f64::from(t);
+            worst = worst.max((f64::from(exp_neg(t)) / exact - 1.0).abs() / allowed);
         }
-        assert!(worst < 2.4e-7, "{worst}");
+        assert!(worst < 1.0, "{worst} of what is allowed");
         assert_eq!(exp_neg(0.0).to_bits(), 1.0_f32.to_bits(), "exactly one at zero");
     }
 
