@@ -2,7 +2,7 @@
 //! descent where no list holds.
 
 use fearless_simd::{Level, Simd, dispatch};
-use nearmiss_surface::{Centre, Evaluation, Moments, Neighbourhood, PointBlock, Shares, SurfacePlan};
+use nearmiss_surface::{Centre, Distances, Evaluation, Moments, Neighbourhood, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::build::PointHierarchy;
@@ -24,7 +24,7 @@ pub struct GatherScratch {
     /// Blocks that are heard at x.
     heard: Vec<u32>,
     /// How near they are.
-    shares: Vec<Shares>,
+    distances: Vec<Distances>,
 }
 
 impl Default for GatherScratch {
@@ -37,7 +37,7 @@ impl GatherScratch {
     /// One whose evaluations use the instructions of `level`: no result depends on it.
     #[must_use]
     pub fn at(level: Level) -> Self {
-        Self { level, block: 0, found: Vec::new(), heard: Vec::new(), shares: Vec::new() }
+        Self { level, block: 0, found: Vec::new(), heard: Vec::new(), distances: Vec::new() }
     }
 }
 
@@ -69,7 +69,7 @@ impl Index<'_> {
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
         let place = centre.rounded();
-        let GatherScratch { level, block, found, heard, shares } = scratch;
+        let GatherScratch { level, block, found, heard, distances } = scratch;
         let mut list = self.list(*block, place);
         if list.is_none() {
             *block = self.nearest_block(place);
@@ -79,8 +79,10 @@ impl Index<'_> {
             self.collect(place, 0.0, found);
             &*found
         });
-        let moments = dispatch!(*level, simd => self.moments(simd, &centre, list, heard, shares));
-        moments.evaluate(self.plan, x)
+        dispatch!(*level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.moments(simd, &centre, list, heard, distances).evaluate(self.plan, x),
+        ))
     }
 
     /// The groups that may be heard at `x`, if the list of this block is complete there.
@@ -175,17 +177,12 @@ impl Index<'_> {
         x: &Centre,
         groups: &[u32],
         heard: &mut Vec<u32>,
-        shares: &mut Vec<Shares>,
+        distances: &mut Vec<Distances>,
     ) -> Moments {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let mut near = Neighbourhood::new(simd, self.plan, x);
-                let heard = self.heard(simd, groups, x.rounded(), 0.0, heard);
-                near.offer_all(simd, self.blocks, heard, shares);
-                near.moments()
-            },
-        )
+        let mut near = Neighbourhood::new(simd, self.plan, x);
+        let heard = self.heard(simd, groups, x.rounded(), 0.0, heard);
+        near.offer_all(simd, self.blocks, heard, distances);
+        near.moments()
     }
 }
 

@@ -8,7 +8,7 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_surface::{Centre, Evaluation, Moments, PointBlock, Shares, Status, SurfacePlan, symmetric_eigen};
+use nearmiss_surface::{Centre, Distances, Evaluation, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot};
@@ -117,7 +117,7 @@ pub(crate) struct LeafScratch {
     surroundings: Surroundings,
     /// The blocks that are heard at a point.
     near: Vec<u32>,
-    shares: Vec<Shares>,
+    distances: Vec<Distances>,
     fits: Vec<Moments>,
 }
 
@@ -128,7 +128,7 @@ impl Default for LeafScratch {
             locality: Locality::default(),
             surroundings: Surroundings::default(),
             near: Vec::new(),
-            shares: Vec::new(),
+            distances: Vec::new(),
             fits: Vec::new(),
         }
     }
@@ -170,13 +170,13 @@ impl Leaf<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let LeafScratch { locality, near, shares, fits, .. } = scratch;
+                let LeafScratch { locality, near, distances, fits, .. } = scratch;
                 // Radii grow by at most 0.3 per length, and few as fast.
                 locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
                 fits.clear();
                 for p in self.positions {
                     let x = Centre::new(p.map(f64::from));
-                    fits.push(index.moments(simd, &x, &locality.groups, near, shares));
+                    fits.push(index.moments(simd, &x, &locality.groups, near, distances));
                 }
             },
         );

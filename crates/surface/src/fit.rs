@@ -63,6 +63,7 @@ pub struct Evaluation {
 
 impl Moments {
     /// f at `x`, about which these sums were taken: one eigen solve.
+    #[inline(always)]
     #[must_use]
     pub fn evaluate(&self, plan: &SurfacePlan, x: [f64; 3]) -> Evaluation {
         let (m, support) = (self, self.support);
@@ -78,14 +79,15 @@ impl Moments {
         if m.weight <= 0.0 {
             return nothing;
         }
-        let mean = m.first.map(|s| s / m.weight);
-        let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s / m.weight);
+        let per_weight = 1.0 / m.weight;
+        let mean = m.first.map(|s| s * per_weight);
+        let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s * per_weight);
         let [ax, ay, az] = mean;
         let covariance = [xx - ax * ax, xy - ax * ay, xz - ax * az, yy - ay * ay, yz - ay * az, zz - az * az];
         let eigen = symmetric_eigen(covariance);
         let normal = with_positive_largest(eigen.vectors[0]);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
-        let bandwidth = m.horizon / m.weight * f64::from(plan.per_horizon());
+        let bandwidth = m.horizon * per_weight * f64::from(plan.per_horizon());
         // Points that are none, as in a damaged file, make sums that are none.
         if !(f.is_finite() && bandwidth.is_finite()) {
             return nothing;

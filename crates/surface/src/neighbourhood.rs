@@ -167,10 +167,10 @@ const BITS: [[u8; 8]; 256] = {
 /// d²/horizon² of what does not reach x: more than 1, with rounding to spare.
 const BEYOND: f32 = 2.0;
 
-/// d²/horizon² of the points of a block: room for it between the two steps of [`Neighbourhood::offer_all`].
+/// Squared distances of the points of a block, between the two steps of [`Neighbourhood::offer_all`].
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub struct Shares([f32; WIDTH]);
+pub struct Distances([f32; WIDTH]);
 
 /// Sums over the points in whose horizon x lies, in the lanes of the blocks they come in.
 ///
@@ -212,40 +212,40 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// Adds those points of a block whose horizon reaches x.
     #[inline(always)]
     pub fn offer(&mut self, simd: S, block: &PointBlock) {
-        let (share, _) = self.shares(simd, block);
-        self.add(simd, block, share);
+        let (distances, _) = self.distances(simd, block);
+        self.add(simd, block, distances);
     }
 
-    /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what both hold afterwards means
-    /// nothing.
+    /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what that and `distances` hold
+    /// afterwards means nothing.
     ///
-    /// Distances come first, for all blocks: that of the blocks in balls a third has no point that reaches x takes no
-    /// branch, and the chain of operations that wait for each other, which is longer than what a processor looks
-    /// ahead, is cut in two.
+    /// Distances come first, for all blocks. So no branch is taken by whether a block has a point that reaches x,
+    /// which a third has not whose ball holds x; and a chain of operations that wait for each other is cut in two
+    /// that are shorter than what processors look ahead.
     #[inline(always)]
     pub fn offer_all(
         &mut self,
         simd: S,
         blocks: &[PointBlock],
         heard: &mut [u32],
-        shares: &mut Vec<Shares>,
+        distances: &mut Vec<Distances>,
     ) {
-        if shares.len() < heard.len() {
-            shares.resize(heard.len(), Shares([BEYOND; WIDTH]));
+        if distances.len() < heard.len() {
+            distances.resize(heard.len(), Distances([0.0; WIDTH]));
         }
         let mut count = 0;
         for i in 0..heard.len() {
             let id = heard[i];
-            if let (Some(block), Some(to)) = (blocks.get(id as usize), shares.get_mut(count)) {
-                let (share, any) = self.shares(simd, block);
-                to.0 = share.to_array();
+            if let (Some(block), Some(to)) = (blocks.get(id as usize), distances.get_mut(count)) {
+                let (distances, any) = self.distances(simd, block);
+                to.0 = distances.to_array();
                 heard[count] = id;
                 count += usize::from(any);
             }
         }
-        for (&id, share) in heard[..count].iter().zip(&*shares) {
+        for (&id, distances) in heard[..count].iter().zip(&*distances) {
             if let Some(block) = blocks.get(id as usize) {
-                self.add(simd, block, f32x16::load_array_ref(simd, &share.0));
+                self.add(simd, block, f32x16::load_array_ref(simd, &distances.0));
             }
         }
     }
@@ -262,28 +262,29 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         ]
     }
 
-    /// d²/horizon² of the points of a block, [`BEYOND`] where it does not reach x, and whether any does. They are counted.
+    /// d² of the points of a block, and whether any of them reaches x. Those that do are counted.
     #[inline(always)]
-    fn shares(&mut self, simd: S, block: &PointBlock) -> (f32x16<S>, bool) {
+    fn distances(&mut self, simd: S, block: &PointBlock) -> (f32x16<S>, bool) {
         let [x, y, z] = self.relative(simd, block);
         let horizon = f32x16::load_array_ref(simd, &block.horizon);
-        let (d_sq, horizon_sq) = (x * x + y * y + z * z, horizon * horizon);
-        let counts: mask32x16<S> = d_sq.simd_lt(horizon_sq);
-        let share = simd.select_f32x16(counts, d_sq / horizon_sq, f32x16::simd_from(simd, BEYOND));
+        let d_sq = x * x + y * y + z * z;
+        let counts: mask32x16<S> = d_sq.simd_lt(horizon * horizon);
         let count = counts.to_bitmask().count_ones();
         self.support += count;
-        self.nearest = self.nearest.min(share);
-        (share, count > 0)
+        (d_sq, count > 0)
     }
 
-    /// Adds the points of a block given their [`Self::shares`].
+    /// Adds the points of a block, given their [`Self::distances`].
     #[inline(always)]
-    fn add(&mut self, simd: S, block: &PointBlock, share: f32x16<S>) {
+    fn add(&mut self, simd: S, block: &PointBlock, d_sq: f32x16<S>) {
         let [x, y, z] = self.relative(simd, block);
         let horizon = f32x16::load_array_ref(simd, &block.horizon);
+        let horizon_sq = horizon * horizon;
+        let counts: mask32x16<S> = d_sq.simd_lt(horizon_sq);
+        let share = simd.select_f32x16(counts, d_sq / horizon_sq, f32x16::simd_from(simd, BEYOND));
         let w = self.plan.kernel().weights(simd, share * self.plan.reach_sq());
-        let counts: mask32x16<S> = share.simd_lt(f32x16::simd_from(simd, BEYOND));
         let w = simd.select_f32x16(counts, w, f32x16::simd_from(simd, 0.0));
+        self.nearest = self.nearest.min(share);
         let (wx, wy, wz) = (w * x, w * y, w * z);
         self.weight += w;
         self.first[0] += wx;
