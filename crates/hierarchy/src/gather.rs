@@ -158,9 +158,9 @@ impl Index<'_> {
         if heard.len() < most {
             heard.resize(most, 0);
         }
-        let mut count = 0;
+        let (balls, heard, mut count) = (self.groups, &mut heard[..most], 0);
         for &group in groups {
-            let balls = self.groups.get(group as usize);
+            let balls = balls.get(group as usize);
             let room = heard.get_mut(count..).and_then(<[u32]>::first_chunk_mut);
             if let (Some(balls), Some(room)) = (balls, room) {
                 count += balls.heard(simd, x, distance, group * id32(PointBlock::WIDTH), room);
@@ -182,7 +182,7 @@ impl Index<'_> {
         let mut near = Neighbourhood::new(simd, self.plan, x);
         let heard = self.heard(simd, groups, x.rounded(), 0.0, heard);
         near.offer_all(simd, self.blocks, heard, distances);
-        near.moments()
+        near.moments(simd)
     }
 }
 

@@ -111,8 +111,12 @@ fn is_one_sheet([l1, l2, l3]: [f64; 3], h: f64) -> bool {
     l1 < SHEET_RATIO * 0.5 * h * h && l2 - l1 > EIGENVALUE_GAP * (l1 + l2 + l3)
 }
 
-/// `v` or −`v`: the one whose component of largest magnitude (the first of equals) is positive.
-pub(crate) fn with_positive_largest(v: [f64; 3]) -> [f64; 3] {
-    let largest = v.iter().fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
-    if largest < 0.0 { v.map(|x| -x) } else { v }
+/// `v` or −`v`: the one whose component of largest magnitude (the first of equals) is positive. No branch, as signs
+/// cannot be predicted.
+#[inline(always)]
+pub(crate) fn with_positive_largest([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let largest = if y.abs() > x.abs() { y } else { x };
+    let largest = if z.abs() > largest.abs() { z } else { largest };
+    let sign = 1.0_f64.copysign(largest);
+    [x * sign, y * sign, z * sign]
 }

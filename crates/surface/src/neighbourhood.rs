@@ -1,7 +1,7 @@
 //! The points in whose horizon x lies, as weighted sums relative to x.
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, Simd, SimdBase, SimdFrom, SimdMask, dispatch, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, SimdBase, SimdFrom, SimdMask, dispatch, f32x4, f32x16, mask32x16};
 
 use crate::SurfacePlan;
 
@@ -40,7 +40,7 @@ impl Moments {
                 for block in blocks {
                     near.offer(simd, &block);
                 }
-                near.moments()
+                near.moments(simd)
             },
         ))
     }
@@ -233,12 +233,12 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         if distances.len() < heard.len() {
             distances.resize(heard.len(), Distances([0.0; WIDTH]));
         }
-        let mut count = 0;
+        let (distances, mut count) = (&mut distances[..heard.len()], 0);
         for i in 0..heard.len() {
             let id = heard[i];
             if let (Some(block), Some(to)) = (blocks.get(id as usize), distances.get_mut(count)) {
-                let (distances, any) = self.distances(simd, block);
-                to.0 = distances.to_array();
+                let (d_sq, any) = self.distances(simd, block);
+                to.0 = d_sq.to_array();
                 heard[count] = id;
                 count += usize::from(any);
             }
@@ -302,21 +302,18 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// The sums of all lanes.
     #[inline(always)]
     #[must_use]
-    pub fn moments(&self) -> Moments {
-        let [a, b, c] = self.first;
-        let [d, e, f, g, h, i] = self.second;
-        Moments {
-            weight: total(self.weight),
-            first: [total(a), total(b), total(c)],
-            second: [total(d), total(e), total(f), total(g), total(h), total(i)],
-            horizon: total(self.horizon),
-            nearest: self
-                .nearest
-                .as_array()
-                .iter()
-                .fold(BEYOND, |least, &x| if x < least { x } else { least }),
-            support: self.support,
-        }
+    pub fn moments(&self, simd: S) -> Moments {
+        let [x, y, z] = self.first;
+        let [xx, xy, xz, yy, yz, zz] = self.second;
+        let [weight, x, y, z] = totals(simd, [self.weight, x, y, z]);
+        let [xx, xy, xz, yy] = totals(simd, [xx, xy, xz, yy]);
+        let [yz, zz, horizon, _] = totals(simd, [yz, zz, self.horizon, self.horizon]);
+        let (low, high) = simd.split_f32x16(self.nearest);
+        let (low, high) = simd.split_f32x8(low.min(high));
+        let [a, b, c, d] = low.min(high).to_array();
+        let nearest = a.min(b).min(c.min(d));
+        let (first, second) = ([x, y, z], [xx, xy, xz, yy, yz, zz]);
+        Moments { weight, first, second, horizon, nearest, support: self.support }
     }
 }
 
@@ -326,12 +323,20 @@ fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
     [f32x16::simd_from(simd, x), f32x16::simd_from(simd, y), f32x16::simd_from(simd, z)]
 }
 
-/// The sum of all lanes: halves onto each other, the last four in double precision.
+/// The sum of all lanes of each: halves onto each other, the last four lanes of four registers at once.
 #[inline(always)]
-fn total<S: Simd>(lanes: f32x16<S>) -> f64 {
-    let simd = fearless_simd::ExtractToken::token(&lanes);
+fn totals<S: Simd>(simd: S, [a, b, c, d]: [f32x16<S>; 4]) -> [f64; 4] {
+    let (a, b, c, d) = (quarter(simd, a), quarter(simd, b), quarter(simd, c), quarter(simd, d));
+    let ac = simd.zip_low_f32x4(a, c) + simd.zip_high_f32x4(a, c);
+    let bd = simd.zip_low_f32x4(b, d) + simd.zip_high_f32x4(b, d);
+    let [a, b, c, d] = (simd.zip_low_f32x4(ac, bd) + simd.zip_high_f32x4(ac, bd)).to_array();
+    [f64::from(a), f64::from(b), f64::from(c), f64::from(d)]
+}
+
+/// Four lanes with the sum of all: halves onto each other, twice.
+#[inline(always)]
+fn quarter<S: Simd>(simd: S, lanes: f32x16<S>) -> f32x4<S> {
     let (low, high) = simd.split_f32x16(lanes);
     let (low, high) = simd.split_f32x8(low + high);
-    let four = (low + high).to_array().map(f64::from);
-    (four[0] + four[1]) + (four[2] + four[3])
+    low + high
 }
