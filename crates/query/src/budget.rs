@@ -21,7 +21,7 @@ pub(crate) const POINTS_A_PAIR: u64 = 4;
 const LEAF_PAIRS_A_LEAF: u64 = 128;
 
 /// Node pairs that lead to a leaf pair: two to eight where boxes overlap much.
-const NODE_PAIRS_A_LEAF_PAIR: u64 = 4;
+pub(crate) const NODE_PAIRS_A_LEAF_PAIR: u64 = 4;
 
 /// A point in time at which to stop; absolute, so that one can span all queries of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -112,11 +112,11 @@ pub(crate) struct Meter {
 }
 
 impl Meter {
-    /// For two scans with so many leaves of so many points, and so many test points for two leaves.
-    pub(crate) fn new(budget: &Budget, leaves: [u64; 2], points: [u64; 2], test_points: u64) -> Self {
+    /// For two scans with so many leaves of so many points, and so many evaluations for two leaves.
+    pub(crate) fn new(budget: &Budget, leaves: [u64; 2], points: [u64; 2], evaluations: u64) -> Self {
         let leaf_pair = points[0] * points[1] / POINTS_A_PAIR
             + NODE_PAIRS_A_LEAF_PAIR
-            + 2 * PAIRS_AN_EVALUATION * test_points;
+            + PAIRS_AN_EVALUATION * evaluations;
         let sane = (LEAF_PAIRS_A_LEAF * (leaves[0] + leaves[1])).saturating_mul(leaf_pair);
         let most_work = if budget.work.is_some() { u64::MAX } else { sane };
         Self {

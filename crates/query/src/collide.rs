@@ -10,7 +10,7 @@ use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
 use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{Frontier, GatherScratch, Heap, NodePair, Relative, SLACK, Stack, Visitor, descend};
 
-use crate::budget::{Budget, Meter};
+use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
 use crate::crossing::Lanes;
 use crate::hint::{Known, PairHint};
@@ -125,7 +125,12 @@ fn search(
         Method::Traversal => 0,
         Method::Sampling(sampling) => u64::from(sampling.test_points),
     };
-    let meter = Meter::new(budget, leaves, points, test_points);
+    let looked_at = match options.order {
+        Some(Order::Sides | Order::SidesByGap) => a.slices().samples(0).len() as u64,
+        _ => 0,
+    };
+    let evaluations = 2 * test_points + NODE_PAIRS_A_LEAF_PAIR * looked_at;
+    let meter = Meter::new(budget, leaves, points, evaluations);
     let (pose, relative) = match relative(a, b, plan) {
         Ok(motion) => motion,
         Err(early) => {

@@ -267,3 +267,19 @@ fn paces_that_are_none_are_mended() {
         }
     }
 }
+
+#[test]
+fn closer_looks_do_not_use_up_what_damaged_files_are_allowed() {
+    let cloud = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Coplanar, 400, 1)).unwrap();
+    let build = BuildOptions::default().with_leaf_size(4).with_samples(32);
+    let scan = PointHierarchy::build(&cloud, &build).unwrap();
+    let margin = scan.sampling_radius();
+    // Parallel to itself, just out of reach: thousands of pairs of nodes, and not one that meets.
+    let height = 1.02 * margin / f64::sqrt(0.09 + 0.49 + 1.0);
+    let pose = Pose::from_translation([0.3, -0.7, -1.0].map(|x| x * height));
+    let options = CollideOptions::default().with_margin(margin);
+    for order in ORDERS {
+        let answer = ask(&scan, &scan, &pose, &options.with_order(order), &Budget::UNLIMITED);
+        assert!(answer.verdict.is_separated(), "{order:?}: {answer:?}");
+    }
+}
