@@ -8,7 +8,9 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_surface::{Centre, Distances, Evaluation, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen};
+use nearmiss_surface::{
+    Centre, Distances, Evaluation, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot};

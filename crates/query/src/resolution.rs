@@ -1,20 +1,15 @@
 //! A resolution of the search: nodes that are fine enough answer by their samples (S0 §1).
 //!
-//! A node's sample points stand for all below it: their tangent discs are made as wide as spheres about them must be to
-//! cover the surface (S0 Definition 4), and cross, or not, as those of points do in leaves.
+//! A node's sample points stand for all below it: the balls about them that cover its tangent discs (S0 Definition 4). Where
+//! no two balls overlap no discs cross; where two do, the surfaces come within the sum of four radii of each other.
 
 use std::ops::ControlFlow;
 
-use nearmiss_hierarchy::{NodePair, Slices};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::NodePair;
 
-use crate::crossing::Disc;
 use crate::surface::Surfaces;
-use crate::verdict::Evidence;
-
-/// The radius of the disc of a sample point of `node`, which is point `i`.
-fn radius(slices: &Slices<'_>, node: usize, i: usize) -> f32 {
-    if slices.nodes[node].is_leaf() { slices.discs[i] } else { slices.sampling_radius_of(node) }
-}
+use crate::verdict::{Contact, Evidence};
 
 impl Surfaces<'_> {
     /// Which nodes of a pair are not to be looked at more finely.
@@ -25,22 +20,35 @@ impl Surfaces<'_> {
     }
 
     /// The samples of two nodes, of which not both are leaves.
-    pub(crate) fn samples_cross(&mut self, pair: NodePair) -> ControlFlow<()> {
-        let (slices_a, slices_b) = (self.pair.a, self.pair.b);
-        let [samples_a, samples_b] = [slices_a.samples(pair.a.index()), slices_b.samples(pair.b.index())];
+    pub(crate) fn samples_meet(&mut self, pair: NodePair) -> ControlFlow<()> {
+        let (a, b) = (self.pair.a, self.pair.b);
+        let relative = self.pair.relative;
+        let [samples_a, samples_b] = [a.samples(pair.a.index()), b.samples(pair.b.index())];
         self.pair.meter.leaf_pair(samples_a.len(), samples_b.len());
-        for (lane, j) in samples_b.iter().enumerate() {
-            let radius = radius(slices_b, pair.b.index(), j) * self.pair.relative.scale();
-            let disc = Disc { radius, ..self.disc_b(j) };
-            self.lanes.set(lane, &disc);
-        }
-        self.lanes.close(samples_b.len());
-        for i in samples_a.iter() {
-            let disc = Disc { radius: radius(slices_a, pair.a.index(), i), ..self.disc_a(i) };
-            let bits = self.lanes.crossings(&disc);
-            if let Some(j) = samples_b.iter().nth(bits.trailing_zeros() as usize) {
-                let radii = [disc.radius, radius(slices_b, pair.b.index(), j)];
-                self.found = Some((self.shared_chord(i, j, radii), Evidence::Estimated));
+        let radius_a = a.sampling_radius_of(pair.a.index());
+        let radius_b = b.sampling_radius_of(pair.b.index()) * relative.scale();
+        let reach = radius_a + radius_b + self.reach + relative.slack();
+        for j in samples_b.iter() {
+            let q = Vector3::from(relative.point(b.positions[j]));
+            for i in samples_a.iter() {
+                let p = Vector3::from(a.positions[i]);
+                // What is no number is near.
+                if (p - q).norm() > reach {
+                    continue;
+                }
+                let [va, vb] = self.pair.views;
+                let between = p + (q - p) * (radius_a / (radius_a + radius_b).max(f32::MIN_POSITIVE));
+                let scale = va.placed().scale();
+                let contact = Contact {
+                    point: va.placed().apply(between.map(f64::from).into()),
+                    normals: Some([
+                        va.placed().rotate(a.normals[i].map(f64::from)),
+                        vb.placed().rotate(b.normals[j].map(f64::from)),
+                    ]),
+                    residual: f64::from(radius_a.max(radius_b)) * scale,
+                    sources: [va.scan().id(i), vb.scan().id(j)],
+                };
+                self.found = Some((contact, Evidence::Estimated));
                 return ControlFlow::Break(());
             }
         }

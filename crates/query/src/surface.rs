@@ -59,7 +59,7 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) excluded: &'a mut Vec<Excluded>,
     /// The pairs whose points were compared, without a hit.
     pub(crate) compared: &'a mut Vec<NodePair>,
-    pub(crate) lanes: &'a mut Lanes,
+    lanes: &'a mut Lanes,
     pub(crate) gathers: &'a mut [GatherScratch; 2],
     /// The points of a that lie in the box of b.
     pub(crate) members: &'a mut Vec<u32>,
@@ -123,7 +123,7 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    pub(crate) fn disc_a(&self, i: usize) -> Disc {
+    fn disc_a(&self, i: usize) -> Disc {
         Disc {
             centre: self.pair.a.positions[i],
             normal: self.pair.a.normals[i],
@@ -208,7 +208,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// The middle of what the chords of two crossing discs share, in the world; `radii` of either in its own stored frame.
-    pub(crate) fn shared_chord(&self, i: usize, j: usize, radii: [f32; 2]) -> Contact {
+    fn shared_chord(&self, i: usize, j: usize, radii: [f32; 2]) -> Contact {
         let [va, vb] = self.pair.views;
         let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
         let na = Vector3::from(va.placed().rotate(self.pair.a.normals[i].map(f64::from)));
@@ -340,7 +340,7 @@ impl Surfaces<'_> {
     fn compare(&mut self, pair: NodePair) -> ControlFlow<()> {
         let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
         if !(node_a.is_leaf() && node_b.is_leaf()) {
-            return self.samples_cross(pair);
+            return self.samples_meet(pair);
         }
         self.pair.meter.leaf_pair(node_a.count as usize, node_b.count as usize);
         // Most discs of one leaf are out of reach of all of the other.

@@ -120,7 +120,7 @@ fn a_resolution_saves_work_and_errs_towards_contact() {
     for times in [0.0, 2.0, 4.0, 8.0, 16.0] {
         let budget = Budget::UNLIMITED.with_resolution(times * r);
         let mut pairs = 0;
-        for (gap, meets) in [(-4.0 * r, true), (-0.5, true), (3.0 * times * r + 2.0 * r, false)] {
+        for (gap, meets) in [(-4.0 * r, true), (-0.5, true), (4.0 * times * r + 2.0 * r, false)] {
             let pose = Pose::from_axis_angle([1.0, 2.0, 0.5], 0.4).with_translation([0.0, 2.0 + gap, 0.0]);
             let answer = ask(&scan, &scan, &pose, &options, &budget);
             assert_eq!(kind(&answer.verdict), u8::from(!meets), "gap {gap} at {times} r: {answer:?}");
@@ -282,4 +282,35 @@ fn closer_looks_do_not_use_up_what_damaged_files_are_allowed() {
         let answer = ask(&scan, &scan, &pose, &options.with_order(order), &Budget::UNLIMITED);
         assert!(answer.verdict.is_separated(), "{order:?}: {answer:?}");
     }
+}
+
+#[test]
+fn no_resolution_misses_what_meets() {
+    let mut rng = arbitrary::rng(17);
+    let kinds =
+        [CloudKind::Sphere, CloudKind::Lattice, CloudKind::Clustered, CloudKind::Rings, CloudKind::Random];
+    let (mut met, mut erred) = (0, 0);
+    for (n, cloud) in (0_u64..).zip(kinds) {
+        let a = prepared(&arbitrary::cloud(cloud, 700, n));
+        let b = prepared(&arbitrary::cloud(cloud, 300, n + 30));
+        let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        for round in 0..120 {
+            let pose = arbitrary::rotation(&mut rng)
+                .with_translation(arbitrary::point_in(&mut rng, 2.5 * size))
+                .with_scale([1.0, 0.3][round % 2]);
+            let options = CollideOptions::default().with_detail(Detail::Verdict);
+            let fine = ask(&a, &b, &pose, &options, &Budget::UNLIMITED).verdict;
+            for times in [0.5, 2.0, 5.0, 20.0] {
+                let budget = Budget::UNLIMITED.with_resolution(times * a.sampling_radius());
+                let coarse = ask(&a, &b, &pose, &options, &budget).verdict;
+                if fine.is_intersecting() {
+                    met += 1;
+                    assert!(coarse.is_intersecting(), "{cloud:?} {round} at {times} r: {coarse:?}");
+                } else {
+                    erred += usize::from(coarse.is_intersecting());
+                }
+            }
+        }
+    }
+    assert!(met > 300 && erred > 20, "{met} meet, {erred} seem to");
 }
