@@ -46,8 +46,18 @@ const ISOTROPIC: f64 = 1e-40;
 #[inline(always)]
 pub(crate) fn solve<L: Lane>(matrix: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     let (down, up) = largest(matrix).powers_of_two();
-    let [xx, xy, xz, yy, yz, zz] = down.scale_all(matrix);
+    let (mut values, vectors) = solve_scaled(down.scale_all(matrix));
+    let third = up * (1.0 / 3.0);
+    for x in &mut values {
+        *x = (*x * third).within(f64::MIN, f64::MAX);
+    }
+    (values, vectors)
+}
 
+/// Three times the eigenvalues, and the eigenvectors, of a matrix in units in which its largest entry is about 1, or
+/// much less where all directions may be eigenvectors.
+#[inline(always)]
+pub(crate) fn solve_scaled<L: Lane>([xx, xy, xz, yy, yz, zz]: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     // Three times the matrix less a third of its trace. Differences first: their errors are relative to how
     // far the matrix is from a multiple of the identity.
     let (x_y, y_z, z_x) = (xx - yy, yy - zz, zz - xx);
@@ -56,10 +66,10 @@ pub(crate) fn solve<L: Lane>(matrix: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     let squares = (a[3] * a[3] - a[0] * a[5]) + ((a[1] * a[1] + a[2] * a[2]) + a[4] * a[4]);
 
     // In units of √squares the characteristic polynomial is y³ − y = det.
-    let zero = down.splat(0.0);
+    let zero = squares.splat(0.0);
     let scale = squares.sqrt();
-    let inverse = down.splat(1.0) / squares;
-    let inverse = L::select(down.splat(ISOTROPIC).is_less(squares), inverse, zero);
+    let inverse = squares.splat(1.0) / squares;
+    let inverse = L::select(squares.splat(ISOTROPIC).is_less(squares), inverse, zero);
     let det = determinant(a) * inverse * inverse * scale;
     let a = (inverse * scale).scale_all(a);
     let is_least = det.is_less(zero);
@@ -73,9 +83,9 @@ pub(crate) fn solve<L: Lane>(matrix: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
         L::select_all(is_least, high, v),
     ];
     let mut values = L::select_all(is_least, [single, l, m], [l, m, single]);
-    let (third, trace) = (up * (1.0 / 3.0), xx + yy + zz);
+    let trace = xx + yy + zz;
     for x in &mut values {
-        *x = ((trace + *x * scale) * third).within(f64::MIN, f64::MAX);
+        *x = trace + *x * scale;
     }
     (values, vectors)
 }

@@ -9,7 +9,8 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::{Moments, SurfacePlan, symmetric_eigen};
+use crate::eigen::solve_scaled;
+use crate::{Moments, SurfacePlan};
 
 /// A surface point is within this many bandwidths of a(x). On a half plane the weighted mean is h/√π = 0.564 h
 /// away from the border; beyond the border it is further.
@@ -81,13 +82,18 @@ impl Moments {
         }
         let per_weight = 1.0 / m.weight;
         let mean = m.first.map(|s| s * per_weight);
-        let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s * per_weight);
-        let [ax, ay, az] = mean;
-        let covariance = [xx - ax * ax, xy - ax * ay, xz - ax * az, yy - ay * ay, yz - ay * az, zz - az * az];
-        let eigen = symmetric_eigen(covariance);
-        let normal = with_positive_largest(eigen.vectors[0]);
+        let horizon = m.horizon * per_weight;
+        // The covariance over the squared horizon: these are the units the solver wants, and no division waits for
+        // another.
+        let [wx, wy, wz] = m.first;
+        let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s * m.weight);
+        let per_square = 1.0 / (m.horizon * m.horizon);
+        let covariance = [xx - wx * wx, xy - wx * wy, xz - wx * wz, yy - wy * wy, yz - wy * wz, zz - wz * wz];
+        let (thrice, vectors) = solve_scaled(covariance.map(|c| c * per_square));
+        let eigenvalues = thrice.map(|l| l * (horizon * horizon * (1.0 / 3.0)));
+        let normal = with_positive_largest(vectors[0]);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
-        let bandwidth = m.horizon * per_weight * f64::from(plan.per_horizon());
+        let bandwidth = horizon * f64::from(plan.per_horizon());
         // Points that are none, as in a damaged file, make sums that are none.
         if !(f.is_finite() && bandwidth.is_finite()) {
             return nothing;
@@ -97,13 +103,13 @@ impl Moments {
             Status::Outside
         } else if Vector3::from(mean).norm() > BORDER * bandwidth {
             Status::Border
-        } else if !is_one_sheet(eigen.values, bandwidth) {
+        } else if !is_one_sheet(eigenvalues, bandwidth) {
             Status::Ambiguous
         } else {
             Status::Ok
         };
         let centroid = [0, 1, 2].map(|k| x[k] + mean[k]);
-        Evaluation { f, normal, centroid, support, bandwidth, eigenvalues: eigen.values, status }
+        Evaluation { f, normal, centroid, support, bandwidth, eigenvalues, status }
     }
 }
 
