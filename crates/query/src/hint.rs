@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Frame, NodeId, Pose};
-use nearmiss_hierarchy::{Frontier, Node, NodePair, OrientedBox, PointHierarchy, Stack, resume};
+use nearmiss_hierarchy::{Frontier, Node, NodePair, OrientedBox, PointHierarchy, Stack, descend, resume};
 use serde::{Deserialize, Serialize};
 
 use crate::certify::Excluded;
@@ -19,6 +19,9 @@ use crate::surface::Surfaces;
 
 /// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they need be.
 const GROWN: usize = 3;
+
+/// Where more than one in so many pairs of the front has expired, a search from the roots is cheaper.
+const MOST_EXPIRED: usize = 4;
 
 /// A travel of more slacks than this is begun anew: gaps beside it would lose their digits.
 const LONGEST: f64 = (1_u64 << 40) as f64;
@@ -170,6 +173,12 @@ impl Known {
         stack.clear();
         let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
         let parted = self.travel + beyond(&search.pair, search.reach);
+        let expired = self.front.iter().filter(|standing| standing.until <= parted).count();
+        if expired * MOST_EXPIRED > self.front.len() {
+            // After a long way the roots are nearer than what was the front.
+            self.forget(None);
+            return descend(nodes_a, nodes_b, search, stack);
+        }
         let mut i = 0;
         while let Some(&Standing { pair, until }) = self.front.get(i) {
             if until > parted {
