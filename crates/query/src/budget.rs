@@ -102,8 +102,6 @@ pub(crate) struct Meter {
     leaf_work: u64,
     /// At this much work something has to be looked at.
     next_look: u64,
-    /// Whether nothing is left.
-    is_spent: bool,
     /// When the clock was looked at last, and the longest time that it was not.
     looked: Option<Instant>,
     pub(crate) longest_stretch: Duration,
@@ -125,7 +123,6 @@ impl Meter {
             deadline: budget.deadline,
             leaf_work: 0,
             next_look: if budget.deadline.is_some() { 0 } else { most_work },
-            is_spent: false,
             looked: None,
             longest_stretch: Duration::ZERO,
             spent: Statistics::default(),
@@ -150,7 +147,6 @@ impl Meter {
     pub(crate) fn go_on(&mut self) -> ControlFlow<()> {
         let Statistics { evaluations, node_pairs, .. } = self.spent;
         if evaluations + node_pairs >= self.most_units {
-            self.is_spent = true;
             return ControlFlow::Break(());
         }
         let work = PAIRS_AN_EVALUATION * evaluations + node_pairs + self.leaf_work;
@@ -168,8 +164,8 @@ impl Meter {
             self.longest_stretch = self.longest_stretch.max(stretch);
             self.looked = Some(now);
         }
-        self.is_spent |= is_past || work >= self.most_work;
-        if self.is_spent {
+        if is_past || work >= self.most_work {
+            // Whoever asks again looks again.
             self.next_look = 0;
             return ControlFlow::Break(());
         }

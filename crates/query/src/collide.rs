@@ -341,5 +341,5 @@ const DOUBLE_ROUNDING: f64 = 2e-15;
 fn is_rotation(pose: &Pose) -> bool {
     let rotation = pose.rotation();
     let error = rotation.transpose() * rotation - Matrix3::identity();
-    error.iter().all(|x| x.abs() <= 1e-9)
+    error.iter().all(|x| x.abs() <= 1e-9) && rotation.determinant() > 0.0
 }

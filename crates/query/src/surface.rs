@@ -168,8 +168,7 @@ impl<'a> Surfaces<'a> {
 
     /// Discs of two leaves cross, those of points `i` and `j` first.
     fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
-        let radii = [self.pair.a.discs[i], self.pair.b.discs[j]];
-        let contact = self.shared_chord(i, j, radii);
+        let contact = self.shared_chord(i, j);
         self.hit(contact, i, j)
     }
 
@@ -207,8 +206,8 @@ impl<'a> Surfaces<'a> {
         (distance, [self.pair.a.radii[i], self.pair.b.radii[j] * self.pair.relative.scale()])
     }
 
-    /// The middle of what the chords of two crossing discs share, in the world; `radii` of either in its own stored frame.
-    fn shared_chord(&self, i: usize, j: usize, radii: [f32; 2]) -> Contact {
+    /// The middle of what the chords of two crossing discs share, in the world.
+    fn shared_chord(&self, i: usize, j: usize) -> Contact {
         let [va, vb] = self.pair.views;
         let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
         let na = Vector3::from(va.placed().rotate(self.pair.a.normals[i].map(f64::from)));
@@ -222,7 +221,10 @@ impl<'a> Surfaces<'a> {
         } else {
             ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
         };
-        let radii = [f64::from(radii[0]) * va.placed().scale(), f64::from(radii[1]) * vb.placed().scale()];
+        let radii = [
+            f64::from(self.pair.a.discs[i]) * va.placed().scale(),
+            f64::from(self.pair.b.discs[j]) * vb.placed().scale(),
+        ];
         let place = middle + step;
         // Along the common line each chord is an interval; for parallel planes the place is as good as any.
         let along = na.cross(&nb).try_normalize(0.03).map_or_else(Vector3::zeros, |line| {

@@ -294,6 +294,7 @@ fn a_pose_that_is_none_is_undecided() {
         Pose::IDENTITY.with_scale(1e39),
         Pose::from_axis_angle([1.0, 0.0, 0.0], f64::NAN),
         Pose::from_translation([1e160, 0.0, 0.0]),
+        mirrored(),
     ];
     for pose in poses {
         let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
@@ -305,6 +306,13 @@ fn a_pose_that_is_none_is_undecided() {
             }
         }
     }
+}
+
+/// A mirror, as only a file can hold it.
+fn mirrored() -> Pose {
+    let mut pose = serde_json::to_value(Pose::IDENTITY).unwrap();
+    pose["rotation"][0] = (-1.0).into();
+    serde_json::from_value(pose).unwrap()
 }
 
 #[test]
