@@ -102,7 +102,7 @@ impl Surroundings {
     #[inline(always)]
     fn heights(&self, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
         let (mut low, mut high, mut most) = ([0.0_f32; WIDTH], [0.0_f32; WIDTH], [0.0_f32; WIDTH]);
-        for PointBlock { position: [x, y, z], horizon } in &self.blocks {
+        for PointBlock { position: [x, y, z], horizon, .. } in &self.blocks {
             for i in 0..WIDTH {
                 let d = [x[i] - p[0], y[i] - p[1], z[i] - p[2]];
                 let within = horizon[i] + reach;
@@ -210,7 +210,7 @@ impl LeafBounds {
         }
         let mut hull = own;
         let mut greatest = 0.0_f32;
-        for PointBlock { position: [x, y, z], horizon } in &surroundings.blocks {
+        for PointBlock { position: [x, y, z], horizon, .. } in &surroundings.blocks {
             for i in 0..WIDTH {
                 let at = axes.map(|axis| dot(axis, [x[i], y[i], z[i]]));
                 let far = (0..3).map(|k| (own[0][k] - at[k]).max(at[k] - own[1][k]).max(0.0));

@@ -2,7 +2,7 @@
 //! descent where no list holds.
 
 use fearless_simd::{Level, Simd, dispatch};
-use nearmiss_surface::{Centre, Distances, Evaluation, Moments, Neighbourhood, PointBlock, SurfacePlan};
+use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::build::PointHierarchy;
@@ -24,7 +24,7 @@ pub struct GatherScratch {
     /// Blocks that are heard at x.
     heard: Vec<u32>,
     /// How near they are.
-    distances: Vec<Distances>,
+    halves: Vec<HalfBlock>,
 }
 
 impl Default for GatherScratch {
@@ -37,7 +37,7 @@ impl GatherScratch {
     /// One whose evaluations use the instructions of `level`: no result depends on it.
     #[must_use]
     pub fn at(level: Level) -> Self {
-        Self { level, block: 0, found: Vec::new(), heard: Vec::new(), distances: Vec::new() }
+        Self { level, block: 0, found: Vec::new(), heard: Vec::new(), halves: Vec::new() }
     }
 }
 
@@ -69,7 +69,7 @@ impl Index<'_> {
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
         let place = centre.rounded();
-        let GatherScratch { level, block, found, heard, distances } = scratch;
+        let GatherScratch { level, block, found, heard, halves } = scratch;
         let mut list = self.list(*block, place);
         if list.is_none() {
             *block = self.nearest_block(place);
@@ -81,7 +81,7 @@ impl Index<'_> {
         });
         dispatch!(*level, simd => simd.vectorize(
             #[inline(always)]
-            || self.moments(simd, &centre, list, heard, distances).evaluate(self.plan, x),
+            || self.moments(simd, &centre, list, heard, halves).evaluate(self.plan, x),
         ))
     }
 
@@ -177,11 +177,11 @@ impl Index<'_> {
         x: &Centre,
         groups: &[u32],
         heard: &mut Vec<u32>,
-        distances: &mut Vec<Distances>,
+        halves: &mut Vec<HalfBlock>,
     ) -> Moments {
         let mut near = Neighbourhood::new(simd, self.plan, x);
         let heard = self.heard(simd, groups, x.rounded(), 0.0, heard);
-        near.offer_all(simd, self.blocks, heard, distances);
+        near.offer_all(simd, self.blocks, heard, halves);
         near.moments(simd)
     }
 }

@@ -93,10 +93,7 @@ impl PointHierarchy {
         let blocks = std::iter::from_fn(|| {
             let mut block = PointBlock::EMPTY;
             for (lane, i) in samples.by_ref().take(PointBlock::WIDTH).enumerate() {
-                for k in 0..3 {
-                    block.position[k][lane] = slices.positions[i][k];
-                }
-                block.horizon[lane] = horizon;
+                block.set(lane, slices.positions[i], horizon, self.plan());
             }
             (block.horizon[0] > 0.0).then_some(block)
         });

@@ -27,7 +27,7 @@ pub(crate) const GROWN: f32 = 1.0 + 1e-5;
 /// For every group of blocks the balls outside of which no point of a block is heard, given the blocks.
 pub(crate) fn groups(blocks: &[PointBlock]) -> Vec<PointBlock> {
     let ball = |block: &PointBlock| {
-        let PointBlock { position: [x, y, z], horizon } = block;
+        let PointBlock { position: [x, y, z], horizon, .. } = block;
         let points = || (0..PointBlock::WIDTH).filter(|&i| horizon[i] > 0.0).map(|i| [x[i], y[i], z[i]]);
         let (sum, count) =
             points().fold(([0.0; 3], 0.0), |(s, n), p| ([s[0] + p[0], s[1] + p[1], s[2] + p[2]], n + 1.0));
@@ -143,7 +143,7 @@ impl Locality {
     fn greatest_heard(&self, index: &Index<'_>, x: [f32; 3], distance: f32) -> f32 {
         let mut greatest = [0.0_f32; PointBlock::WIDTH];
         for &block in &self.blocks {
-            let PointBlock { position: [px, py, pz], horizon } = &index.blocks[block as usize];
+            let PointBlock { position: [px, py, pz], horizon, .. } = &index.blocks[block as usize];
             for i in 0..PointBlock::WIDTH {
                 let d = [px[i] - x[0], py[i] - x[1], pz[i] - x[2]];
                 let far = (horizon[i] + distance) * GROWN;

@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{
-    Centre, Distances, Evaluation, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen,
+    Centre, Evaluation, HalfBlock, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen,
 };
 use serde::{Deserialize, Serialize};
 
@@ -119,7 +119,7 @@ pub(crate) struct LeafScratch {
     surroundings: Surroundings,
     /// The blocks that are heard at a point.
     near: Vec<u32>,
-    distances: Vec<Distances>,
+    halves: Vec<HalfBlock>,
     fits: Vec<Moments>,
 }
 
@@ -130,7 +130,7 @@ impl Default for LeafScratch {
             locality: Locality::default(),
             surroundings: Surroundings::default(),
             near: Vec::new(),
-            distances: Vec::new(),
+            halves: Vec::new(),
             fits: Vec::new(),
         }
     }
@@ -172,13 +172,13 @@ impl Leaf<'_> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let LeafScratch { locality, near, distances, fits, .. } = scratch;
+                let LeafScratch { locality, near, halves, fits, .. } = scratch;
                 // Radii grow by at most 0.3 per length, and few as fast.
                 locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
                 fits.clear();
                 for p in self.positions {
                     let x = Centre::new(p.map(f64::from));
-                    fits.push(index.moments(simd, &x, &locality.groups, near, distances));
+                    fits.push(index.moments(simd, &x, &locality.groups, near, halves));
                 }
             },
         );
@@ -236,7 +236,7 @@ fn disc(gap: u32) -> f32 {
 fn widest_gap<'a>(p: [f32; 3], normal: [f32; 3], blocks: impl Iterator<Item = &'a PointBlock>) -> u32 {
     let (u, v) = tangents(normal);
     let mut taken = [0_u32; PointBlock::WIDTH];
-    for PointBlock { position: [px, py, pz], horizon } in blocks {
+    for PointBlock { position: [px, py, pz], horizon, .. } in blocks {
         for i in 0..PointBlock::WIDTH {
             let d = [px[i] - p[0], py[i] - p[1], pz[i] - p[2]];
             let (x, y) = (dot(d, u), dot(d, v));

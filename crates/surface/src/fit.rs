@@ -98,7 +98,7 @@ impl Moments {
         if !(f.is_finite() && bandwidth.is_finite()) {
             return nothing;
         }
-        let is_near = m.nearest <= NEAR_SQ;
+        let is_near = m.nearest <= NEAR_SQ * plan.reach_sq();
         let status = if support < plan.options().support_min || !is_near {
             Status::Outside
         } else if Vector3::from(mean).norm() > BORDER * bandwidth {

@@ -9,7 +9,7 @@
 //! either of its directions, so that every condition in terms of h means the same for both. For Wendland's
 //! function ∫q³w / ∫qw = 5/36, hence h² = 5/36 of the squared horizon.
 
-use fearless_simd::{Bytes, Simd, SimdBase, SimdFloat, SimdFrom, f32x16, u32x16};
+use fearless_simd::{Bytes, Simd, SimdBase, SimdFloat, SimdFrom, f32x8, u32x8};
 use serde::{Deserialize, Serialize};
 
 /// How the weight of a point falls off with its distance.
@@ -49,7 +49,7 @@ impl Kernel {
     /// [`Self::weight`] in lanes, the same to the last bit for 0 ≤ t ≤ 80.
     #[inline(always)]
     #[must_use]
-    pub fn weights<S: Simd>(self, simd: S, t: f32x16<S>) -> f32x16<S> {
+    pub fn weights<S: Simd>(self, simd: S, t: f32x8<S>) -> f32x8<S> {
         match self {
             Self::Gaussian => exp_neg_lanes(t),
             Self::Wendland => wendland_lanes(simd, t),
@@ -60,24 +60,24 @@ impl Kernel {
 /// As [`wendland`].
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "a constant that f32 holds closely enough")]
-fn wendland_lanes<S: Simd>(simd: S, t: f32x16<S>) -> f32x16<S> {
+fn wendland_lanes<S: Simd>(simd: S, t: f32x8<S>) -> f32x8<S> {
     const INVERSE: f32 = (1.0 / WENDLAND_REACH_SQ) as f32;
     let q = (t * INVERSE).sqrt();
-    let (s, zero) = (1.0 - q, f32x16::simd_from(simd, 0.0));
-    let s = simd.select_f32x16(s.simd_gt(zero), s, zero);
+    let (s, zero) = (1.0 - q, f32x8::simd_from(simd, 0.0));
+    let s = simd.select_f32x8(s.simd_gt(zero), s, zero);
     (s * s) * (s * s) * (q * 4.0 + 1.0)
 }
 
 /// As [`exp_neg`].
 #[inline(always)]
-fn exp_neg_lanes<S: Simd>(t: f32x16<S>) -> f32x16<S> {
+fn exp_neg_lanes<S: Simd>(t: f32x8<S>) -> f32x8<S> {
     let y = t * -std::f32::consts::LOG2_E;
     let shifted = y + ROUND;
     let r = y - (shifted - ROUND);
     let square = r * r;
     let low = (r * EXP2[1] + EXP2[0]) + (r * EXP2[3] + EXP2[2]) * square;
     let p = low + (r * EXP2[5] + EXP2[4]) * (square * square);
-    (p.bitcast::<u32x16<S>>() + (shifted.bitcast::<u32x16<S>>() << 23)).bitcast()
+    (p.bitcast::<u32x8<S>>() + (shifted.bitcast::<u32x8<S>>() << 23)).bitcast()
 }
 
 #[inline]
@@ -135,8 +135,8 @@ mod tests {
 
     #[test]
     fn lanes_weigh_as_one_by_one_at_every_level() {
-        fn in_lanes<S: Simd>(simd: S, kernel: Kernel, t: &[f32; 16]) -> [f32; 16] {
-            kernel.weights(simd, f32x16::load_array_ref(simd, t)).to_array()
+        fn in_lanes<S: Simd>(simd: S, kernel: Kernel, t: &[f32; 8]) -> [f32; 8] {
+            kernel.weights(simd, f32x8::load_array_ref(simd, t)).to_array()
         }
         for i in 0..50_000_u16 {
             let t = std::array::from_fn(|lane| f32::from(i) * 1e-4 * f32::from(u8::try_from(lane).unwrap()));

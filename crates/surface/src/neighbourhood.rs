@@ -1,7 +1,9 @@
 //! The points in whose horizon x lies, as weighted sums relative to x.
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, Simd, SimdBase, SimdFrom, SimdMask, dispatch, f32x4, f32x16, mask32x16};
+use fearless_simd::{
+    Level, Simd, SimdBase, SimdFrom, SimdMask, dispatch, f32x4, f32x8, f32x16, mask32x8, mask32x16, u32x16,
+};
 
 use crate::SurfacePlan;
 
@@ -16,7 +18,7 @@ pub struct Moments {
     pub(crate) second: [f64; 6],
     /// Σw·horizon.
     pub(crate) horizon: f64,
-    /// The least d²/horizon².
+    /// The least d²/h².
     pub(crate) nearest: f32,
     /// How many points there are.
     pub(crate) support: u32,
@@ -84,6 +86,8 @@ pub struct PointBlock {
     pub position: [[f32; WIDTH]; 3],
     /// How far a point is heard; zero where there is none.
     pub horizon: [f32; WIDTH],
+    /// 1/h² of a point, by which its weight falls off; one where there is none.
+    pub decay: [f32; WIDTH],
 }
 
 impl PointBlock {
@@ -91,7 +95,8 @@ impl PointBlock {
     pub const WIDTH: usize = WIDTH;
 
     /// No points.
-    pub const EMPTY: Self = Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH] };
+    pub const EMPTY: Self =
+        Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH], decay: [1.0; Self::WIDTH] };
 
     /// All points of a scan, given their positions and local sampling radii.
     #[must_use]
@@ -103,13 +108,23 @@ impl PointBlock {
         positions.chunks(Self::WIDTH).zip(radii.chunks(Self::WIDTH)).map(|(positions, radii)| {
             let mut block = Self::EMPTY;
             for (lane, (p, r)) in positions.iter().zip(radii).enumerate() {
-                for k in 0..3 {
-                    block.position[k][lane] = p[k];
-                }
-                block.horizon[lane] = plan.horizon(*r);
+                block.set(lane, *p, plan.horizon(*r), plan);
             }
             block
         })
+    }
+
+    /// Puts a point that is heard as far as `horizon` into a lane.
+    ///
+    /// # Panics
+    /// When there is no such lane.
+    #[inline]
+    pub fn set(&mut self, lane: usize, position: [f32; 3], horizon: f32, plan: &SurfacePlan) {
+        for k in 0..3 {
+            self.position[k][lane] = position[k];
+        }
+        self.horizon[lane] = horizon;
+        self.decay[lane] = plan.reach_sq() / (horizon * horizon);
     }
 }
 
@@ -134,6 +149,11 @@ impl PointBlock {
         );
         let far = f32x16::load_array_ref(simd, &self.horizon) + distance;
         let heard: mask32x16<S> = (dx * dx + dy * dy + dz * dz).simd_lt(far * far);
+        if let Level::Avx512(_) = simd.level() {
+            let ids = u32x16::load_array_ref(simd, &LANES) + first;
+            simd.compress_u32x16(ids, heard).store_slice(&mut lanes[..]);
+            return heard.to_bitmask().count_ones() as usize;
+        }
         let [low, high, ..] = heard.to_bitmask().to_le_bytes();
         let count = low.count_ones() as usize;
         for i in 0..8 {
@@ -145,6 +165,8 @@ impl PointBlock {
         count + high.count_ones() as usize
     }
 }
+
+const LANES: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// The places of the bits of each byte, ascending; zeros follow.
 const BITS: [[u8; 8]; 256] = {
@@ -164,29 +186,35 @@ const BITS: [[u8; 8]; 256] = {
     places
 };
 
-/// d²/horizon² of what does not reach x: more than 1, with rounding to spare.
-const BEYOND: f32 = 2.0;
-
-/// Squared distances of the points of a block, between the two steps of [`Neighbourhood::offer_all`].
-#[derive(Debug, Clone, Copy)]
+/// Half a block, between the two steps of [`Neighbourhood::offer_all`].
+#[derive(Debug, Clone, Copy, Default)]
 #[repr(align(64))]
-pub struct Distances([f32; WIDTH]);
+pub struct HalfBlock {
+    /// d²/h² of its points.
+    t: [f32; HALF],
+    /// The lower half of block b is 2b, the upper one 2b + 1.
+    id: u32,
+}
 
-/// Sums over the points in whose horizon x lies, in the lanes of the blocks they come in.
+/// Points of half a block: what a register of AVX2 holds. More of the halves than of the blocks near x hold no point
+/// that reaches it, and so many sums stay in the registers there are.
+const HALF: usize = WIDTH / 2;
+
+/// Sums over the points in whose horizon x lies, in the lanes of the half blocks they come in.
 ///
-/// A point adds to the lane of its index; what does not reach x adds zero. Blocks come in ascending order, so the
-/// sums do not depend on which were offered besides, nor on the width of a machine's registers. Everything is inlined
-/// into a caller that has it compiled for an instruction set.
+/// A point adds to the lane of its index modulo 8; what does not reach x adds zero. Blocks come in ascending order, so
+/// the sums do not depend on which were offered besides, nor on the width of a machine's registers. Everything is
+/// inlined into a caller that has it compiled for an instruction set.
 #[derive(Debug, Clone, Copy)]
 pub struct Neighbourhood<'a, S: Simd> {
     plan: &'a SurfacePlan,
-    high: [f32x16<S>; 3],
-    low: [f32x16<S>; 3],
-    weight: f32x16<S>,
-    first: [f32x16<S>; 3],
-    second: [f32x16<S>; 6],
-    horizon: f32x16<S>,
-    nearest: f32x16<S>,
+    high: [f32; 3],
+    low: [f32; 3],
+    weight: f32x8<S>,
+    first: [f32x8<S>; 3],
+    second: [f32x8<S>; 6],
+    horizon: f32x8<S>,
+    nearest: f32x8<S>,
     support: u32,
 }
 
@@ -195,16 +223,16 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     #[inline(always)]
     #[must_use]
     pub fn new(simd: S, plan: &'a SurfacePlan, x: &Centre) -> Self {
-        let zero = f32x16::simd_from(simd, 0.0);
+        let zero = f32x8::simd_from(simd, 0.0);
         Self {
             plan,
-            high: splat(simd, x.high),
-            low: splat(simd, x.low),
+            high: x.high,
+            low: x.low,
             weight: zero,
             first: [zero; 3],
             second: [zero; 6],
             horizon: zero,
-            nearest: f32x16::simd_from(simd, BEYOND),
+            nearest: f32x8::simd_from(simd, f32::INFINITY),
             support: 0,
         }
     }
@@ -212,79 +240,75 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// Adds those points of a block whose horizon reaches x.
     #[inline(always)]
     pub fn offer(&mut self, simd: S, block: &PointBlock) {
-        let (distances, _) = self.distances(simd, block);
-        self.add(simd, block, distances);
+        let (t, _) = self.distances(simd, block);
+        let (low, high) = simd.split_f32x16(t);
+        self.add(simd, block, 0, low);
+        self.add(simd, block, 1, high);
     }
 
-    /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what that and `distances` hold
-    /// afterwards means nothing.
+    /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what `halves` holds afterwards
+    /// means nothing.
     ///
-    /// Distances come first, for all blocks. So no branch is taken by whether a block has a point that reaches x,
-    /// which a third has not whose ball holds x; and a chain of operations that wait for each other is cut in two
-    /// that are shorter than what processors look ahead.
+    /// Distances come first, for all blocks. So no branch is taken by whether half a block has a point that reaches x,
+    /// which every other has not whose block's ball holds x; and a chain of operations that wait for each other is cut
+    /// in two that are shorter than what processors look ahead.
     #[inline(always)]
-    pub fn offer_all(
-        &mut self,
-        simd: S,
-        blocks: &[PointBlock],
-        heard: &mut [u32],
-        distances: &mut Vec<Distances>,
-    ) {
-        if distances.len() < heard.len() {
-            distances.resize(heard.len(), Distances([0.0; WIDTH]));
+    pub fn offer_all(&mut self, simd: S, blocks: &[PointBlock], heard: &[u32], halves: &mut Vec<HalfBlock>) {
+        let most = 2 * heard.len() + 1;
+        if halves.len() < most {
+            halves.resize(most, HalfBlock::default());
         }
-        let (distances, mut count) = (&mut distances[..heard.len()], 0);
-        for i in 0..heard.len() {
-            let id = heard[i];
-            if let (Some(block), Some(to)) = (blocks.get(id as usize), distances.get_mut(count)) {
-                let (d_sq, any) = self.distances(simd, block);
-                to.0 = d_sq.to_array();
-                heard[count] = id;
-                count += usize::from(any);
+        let (halves, mut count) = (&mut halves[..most], 0);
+        for &id in heard {
+            if let (Some(block), Some([one, other, ..])) =
+                (blocks.get(id as usize), halves.get_mut(count..).and_then(<[_]>::first_chunk_mut::<2>))
+            {
+                let (t, [any_low, any_high]) = self.distances(simd, block);
+                let (low, high) = simd.split_f32x16(t);
+                *one = HalfBlock { t: low.to_array(), id: 2 * id };
+                let next = if any_low { other } else { one };
+                *next = HalfBlock { t: high.to_array(), id: 2 * id + 1 };
+                count += usize::from(any_low) + usize::from(any_high);
             }
         }
-        for (&id, distances) in heard[..count].iter().zip(&*distances) {
-            if let Some(block) = blocks.get(id as usize) {
-                self.add(simd, block, f32x16::load_array_ref(simd, &distances.0));
+        for half in &halves[..count] {
+            if let Some(block) = blocks.get(half.id as usize / 2) {
+                self.add(simd, block, half.id as usize % 2, f32x8::load_array_ref(simd, &half.t));
             }
         }
     }
 
-    /// The points of a block relative to x.
+    /// d²/h² of the points of a block, and whether any in either half reaches x. Those that do are counted.
     #[inline(always)]
-    fn relative(&self, simd: S, block: &PointBlock) -> [f32x16<S>; 3] {
+    fn distances(&mut self, simd: S, block: &PointBlock) -> (f32x16<S>, [bool; 2]) {
         let [px, py, pz] = &block.position;
-        let (high, low) = (&self.high, &self.low);
-        [
-            (f32x16::load_array_ref(simd, px) - high[0]) - low[0],
-            (f32x16::load_array_ref(simd, py) - high[1]) - low[1],
-            (f32x16::load_array_ref(simd, pz) - high[2]) - low[2],
-        ]
+        let (high, low) = (self.high, self.low);
+        let x = (f32x16::load_array_ref(simd, px) - high[0]) - low[0];
+        let y = (f32x16::load_array_ref(simd, py) - high[1]) - low[1];
+        let z = (f32x16::load_array_ref(simd, pz) - high[2]) - low[2];
+        let t = (x * x + y * y + z * z) * f32x16::load_array_ref(simd, &block.decay);
+        let counts: mask32x16<S> = t.simd_lt(self.plan.reach_sq());
+        let bits = counts.to_bitmask();
+        self.support += bits.count_ones();
+        (t, [bits & 0xff != 0, bits >> HALF != 0])
     }
 
-    /// d² of the points of a block, and whether any of them reaches x. Those that do are counted.
+    /// Adds the points of half a block, given their d²/h².
     #[inline(always)]
-    fn distances(&mut self, simd: S, block: &PointBlock) -> (f32x16<S>, bool) {
-        let [x, y, z] = self.relative(simd, block);
-        let horizon = f32x16::load_array_ref(simd, &block.horizon);
-        let d_sq = x * x + y * y + z * z;
-        let counts: mask32x16<S> = d_sq.simd_lt(horizon * horizon);
-        let count = counts.to_bitmask().count_ones();
-        self.support += count;
-        (d_sq, count > 0)
-    }
-
-    /// Adds the points of a block, given their [`Self::distances`].
-    #[inline(always)]
-    fn add(&mut self, simd: S, block: &PointBlock, d_sq: f32x16<S>) {
-        let [x, y, z] = self.relative(simd, block);
-        let horizon = f32x16::load_array_ref(simd, &block.horizon);
-        let horizon_sq = horizon * horizon;
-        let counts: mask32x16<S> = d_sq.simd_lt(horizon_sq);
-        let share = simd.select_f32x16(counts, d_sq / horizon_sq, f32x16::simd_from(simd, BEYOND));
-        let w = self.plan.kernel().weights(simd, share * self.plan.reach_sq());
-        let w = simd.select_f32x16(counts, w, f32x16::simd_from(simd, 0.0));
-        self.nearest = self.nearest.min(share);
+    fn add(&mut self, simd: S, block: &PointBlock, half: usize, t: f32x8<S>) {
+        let load = |lanes: &[f32; WIDTH]| {
+            let halves: &[[f32; HALF]; 2] = bytemuck::cast_ref(lanes);
+            f32x8::load_array_ref(simd, &halves[half])
+        };
+        let [px, py, pz] = &block.position;
+        let (high, low) = (self.high, self.low);
+        let x = (load(px) - high[0]) - low[0];
+        let y = (load(py) - high[1]) - low[1];
+        let z = (load(pz) - high[2]) - low[2];
+        let counts: mask32x8<S> = t.simd_lt(self.plan.reach_sq());
+        let w = self.plan.kernel().weights(simd, t);
+        let w = simd.select_f32x8(counts, w, f32x8::simd_from(simd, 0.0));
+        self.nearest = self.nearest.min(t);
         let (wx, wy, wz) = (w * x, w * y, w * z);
         self.weight += w;
         self.first[0] += wx;
@@ -296,7 +320,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         self.second[3] += wy * y;
         self.second[4] += wy * z;
         self.second[5] += wz * z;
-        self.horizon += w * horizon;
+        self.horizon += w * load(&block.horizon);
     }
 
     /// The sums of all lanes.
@@ -308,8 +332,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let [weight, x, y, z] = totals(simd, [self.weight, x, y, z]);
         let [xx, xy, xz, yy] = totals(simd, [xx, xy, xz, yy]);
         let [yz, zz, horizon, _] = totals(simd, [yz, zz, self.horizon, self.horizon]);
-        let (low, high) = simd.split_f32x16(self.nearest);
-        let (low, high) = simd.split_f32x8(low.min(high));
+        let (low, high) = simd.split_f32x8(self.nearest);
         let [a, b, c, d] = low.min(high).to_array();
         let nearest = a.min(b).min(c.min(d));
         let (first, second) = ([x, y, z], [xx, xy, xz, yy, yz, zz]);
@@ -317,26 +340,18 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     }
 }
 
-/// Each coordinate in all lanes.
-#[inline(always)]
-fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
-    [f32x16::simd_from(simd, x), f32x16::simd_from(simd, y), f32x16::simd_from(simd, z)]
-}
-
 /// The sum of all lanes of each: halves onto each other, the last four lanes of four registers at once.
 #[inline(always)]
-fn totals<S: Simd>(simd: S, [a, b, c, d]: [f32x16<S>; 4]) -> [f64; 4] {
-    let (a, b, c, d) = (quarter(simd, a), quarter(simd, b), quarter(simd, c), quarter(simd, d));
+fn totals<S: Simd>(simd: S, [a, b, c, d]: [f32x8<S>; 4]) -> [f64; 4] {
+    let (a, b, c, d) = (half(simd, a), half(simd, b), half(simd, c), half(simd, d));
     let ac = simd.zip_low_f32x4(a, c) + simd.zip_high_f32x4(a, c);
     let bd = simd.zip_low_f32x4(b, d) + simd.zip_high_f32x4(b, d);
     let [a, b, c, d] = (simd.zip_low_f32x4(ac, bd) + simd.zip_high_f32x4(ac, bd)).to_array();
     [f64::from(a), f64::from(b), f64::from(c), f64::from(d)]
 }
 
-/// Four lanes with the sum of all: halves onto each other, twice.
 #[inline(always)]
-fn quarter<S: Simd>(simd: S, lanes: f32x16<S>) -> f32x4<S> {
-    let (low, high) = simd.split_f32x16(lanes);
-    let (low, high) = simd.split_f32x8(low + high);
+fn half<S: Simd>(simd: S, lanes: f32x8<S>) -> f32x4<S> {
+    let (low, high) = simd.split_f32x8(lanes);
     low + high
 }

@@ -29,7 +29,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         let group = &scan.groups[number / PointBlock::WIDTH];
         let lane = number % PointBlock::WIDTH;
         let ([cx, cy, cz], radius) = (group.position.map(|c| c[lane]), group.horizon[lane]);
-        let PointBlock { position: [x, y, z], horizon } = block;
+        let PointBlock { position: [x, y, z], horizon, .. } = block;
         let mut held = [0_u32; PointBlock::WIDTH];
         for i in 0..PointBlock::WIDTH {
             let (dx, dy, dz) = (x[i] - cx, y[i] - cy, z[i] - cz);
@@ -63,7 +63,7 @@ pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
             return false;
         };
         index.collect([cx, cy, cz], within, &mut found);
-        let is_heard = |PointBlock { position: [x, y, z], horizon }: &PointBlock| {
+        let is_heard = |PointBlock { position: [x, y, z], horizon, .. }: &PointBlock| {
             (0..PointBlock::WIDTH).any(|i| {
                 let d = [x[i] - cx, y[i] - cy, z[i] - cz];
                 d.map(|d| f64::from(d).powi(2)).iter().sum::<f64>().sqrt() < f64::from(horizon[i] + within)
