@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod block_tree;
 mod eigen;
 mod eigen_batch;
 mod eigen_cholesky;
@@ -12,6 +13,7 @@ mod neighbourhood;
 mod options;
 mod project;
 
+pub use block_tree::{BlockTree, Heard, Nearest, Neighbour};
 pub use eigen::{Eigen3, symmetric_eigen};
 pub use eigen_batch::{EigenBlock, MatrixBlock, symmetric_eigen_batch};
 pub use eigen_cholesky::{LeastEigen, cubic_cholesky_eigen};
