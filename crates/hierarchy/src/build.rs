@@ -328,7 +328,8 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
     drop(items);
 
-    let spacings = spacings(&positions, options.radius_neighbours as usize)?;
+    let mut blocks: Vec<PointBlock> = PointBlock::silent(&positions).collect();
+    let spacings = spacings(&positions, &blocks, options.radius_neighbours as usize);
     let radii = smooth(&positions, &spacings, &nodes, &boxes);
     let sampling_radius = quantile(&radii);
     let unit = 1.0 / cloud.frame().scale;
@@ -338,7 +339,9 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         bounds.reach = reach;
     }
 
-    let blocks: Vec<PointBlock> = PointBlock::all(&plan, &positions, &radii).collect();
+    for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
+        block.tune(&plan, radii);
+    }
     let groups = groups(&blocks);
     let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);

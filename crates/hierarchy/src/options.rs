@@ -99,9 +99,6 @@ pub enum BuildError {
     /// Too few or too many samples of a node.
     #[error("{0} samples of a node; 8 to 32 are possible")]
     Samples(u32),
-    /// The kd-tree refused the points; a cloud's points are finite and few enough, so this is a defect.
-    #[error("the index of nearest neighbours refuses the points; please report it with the scan")]
-    Neighbours,
     /// The threads could not be started.
     #[error("cannot start {0} threads")]
     Threads(usize),

@@ -5,15 +5,14 @@
 //! `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region; lines without
 //! another beside them and bends in rings, whose distances say nothing of a surface, are no such j.
 
-use std::num::NonZero;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use nearmiss_surface::symmetric_eigen;
+use fearless_simd::Level;
+use nearmiss_surface::{BlockTree, Nearest, PointBlock, symmetric_eigen};
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::gather::TREE_STACK;
-use crate::options::BuildError;
+use crate::neighbours::chunks;
 use crate::split::id32;
 use crate::topology::Node;
 
@@ -52,21 +51,48 @@ pub(crate) enum Look {
     Bend,
 }
 
-/// The spacing of every one of the distinct `points`.
-pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Result<Vec<Spacing>, BuildError> {
-    let turned = map(points, |p| turn(*p));
-    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&turned).or(Err(BuildError::Neighbours))?;
-    let nearest = |i: usize, count| nearest(&tree, points, &turned, i, count);
-    let ids: Vec<u32> = (0..id32(points.len())).collect();
-    let mut spacings = map(&ids, |&i| spacing(points, neighbours, |count| nearest(i as usize, count)));
+/// The spacing of every one of the distinct `points`, which stand in `blocks` too.
+pub(crate) fn spacings(points: &[[f32; 3]], blocks: &[PointBlock], neighbours: usize) -> Vec<Spacing> {
+    let tree = BlockTree::new(blocks, points.len());
+    let numbers: Vec<usize> = (0..blocks.len()).collect();
+    let mut spacings = Vec::with_capacity(points.len());
+    spacings.extend(
+        chunks(&numbers, |blocks| {
+            let (mut search, mut spacings) = (Search::new(&tree, points), Vec::new());
+            for &block in blocks {
+                search.start(block);
+                let first = block * PointBlock::WIDTH;
+                let points = first..(first + PointBlock::WIDTH).min(points.len());
+                spacings.extend(points.map(|i| search.spacing(i, neighbours)));
+            }
+            spacings
+        })
+        .into_iter()
+        .flatten(),
+    );
 
-    let rings: Vec<u32> = ids.into_iter().filter(|&i| spacings[i as usize].look != Look::Area).collect();
-    let votes: Vec<AtomicU32> =
-        (0..if rings.is_empty() { 0 } else { points.len() }).map(|_| 0.into()).collect();
+    let numbers: Vec<usize> = numbers
+        .into_iter()
+        .zip(spacings.chunks(PointBlock::WIDTH))
+        .filter_map(|(block, spacings)| spacings.iter().any(|s| s.look != Look::Area).then_some(block))
+        .collect();
+    if numbers.is_empty() {
+        return spacings;
+    }
+    let votes: Vec<AtomicU32> = spacings.iter().map(|_| 0.into()).collect();
     // A sum does not depend on its order.
-    map(&rings, |&i| {
-        for (_, j) in nearest(i as usize, neighbours) {
-            votes[j].fetch_add(1, Ordering::Relaxed);
+    chunks(&numbers, |blocks| {
+        let mut search = Search::new(&tree, points);
+        for &block in blocks {
+            search.start(block);
+            let first = block * PointBlock::WIDTH;
+            let points = first..(first + PointBlock::WIDTH).min(points.len());
+            for i in points.filter(|&i| spacings[i].look != Look::Area) {
+                search.look(i, neighbours);
+                for &(_, j) in &search.near {
+                    votes[j].fetch_add(1, Ordering::Relaxed);
+                }
+            }
         }
     });
     for (spacing, votes) in spacings.iter_mut().zip(votes) {
@@ -74,53 +100,83 @@ pub(crate) fn spacings(points: &[[f32; 3]], neighbours: usize) -> Result<Vec<Spa
             spacing.look = Look::Bend;
         }
     }
-    Ok(spacings)
+    spacings
 }
 
-/// The spacing of a point whose `nearest(count)` neighbours, itself first, are asked for as far as needed.
-fn spacing(points: &[[f32; 3]], neighbours: usize, nearest: impl Fn(usize) -> Vec<(f64, usize)>) -> Spacing {
-    let mut near = nearest(neighbours);
-    let radius = near.last().map_or(0.0, length);
-    let mut sums = Sums::default();
-    near.iter().for_each(|n| sums.add(points, near[0].1, n.1));
-    if near.len() <= neighbours || !sums.is_line() {
-        return Spacing { radius, look: Look::Area };
+/// A search for the neighbours of the points of a block.
+struct Search<'a> {
+    tree: &'a BlockTree<'a>,
+    points: &'a [[f32; 3]],
+    level: Level,
+    block: usize,
+    found: Nearest,
+    /// How many neighbours of each point of the block `found` has.
+    count: usize,
+    /// Squared distance and index of a point itself and of its nearest others, by distance, then index.
+    near: Vec<(f64, usize)>,
+}
+
+impl<'a> Search<'a> {
+    fn new(tree: &'a BlockTree<'a>, points: &'a [[f32; 3]]) -> Self {
+        let (found, near) = (Nearest::default(), Vec::new());
+        Self { tree, points, level: Level::new(), block: 0, found, count: 0, near }
     }
-    let mut count = LINE_NEIGHBOURS;
-    while sums.count < MOST_NEIGHBOURS {
-        let known = near.len();
-        near = nearest(count);
-        for k in known..near.len() {
-            sums.add(points, near[0].1, near[k].1);
-            if !sums.is_line() && sums.lies_across(points, &near[..=k]) {
-                return Spacing { radius: length(&near[k]), look: Look::Ring };
+
+    /// Turns to a block.
+    fn start(&mut self, block: usize) {
+        (self.block, self.count) = (block, 0);
+    }
+
+    /// Makes `near` hold point `i` of the block and the nearest `count` others. Those of the whole block are found at
+    /// once.
+    fn look(&mut self, i: usize, count: usize) {
+        if count > self.count {
+            self.tree.nearest(self.level, self.block, count, &mut self.found);
+            self.count = count;
+        }
+        let points = self.points;
+        let exact = |j: usize| {
+            let d = [0, 1, 2].map(|k| f64::from(points[j][k]) - f64::from(points[i][k]));
+            (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
+        };
+        let found = self.found.of(i % PointBlock::WIDTH).take(count).map(|n| exact(n.id as usize));
+        self.near.clear();
+        self.near.push((0.0, i));
+        self.near.extend(found);
+    }
+
+    /// The spacing of point `i` of the block: as many neighbours are looked at as are needed.
+    fn spacing(&mut self, i: usize, neighbours: usize) -> Spacing {
+        self.look(i, neighbours);
+        let radius = self.near.last().map_or(0.0, length);
+        let mut sums = Sums::default();
+        self.near.iter().for_each(|n| sums.add(self.points, i, n.1));
+        if self.near.len() <= neighbours || !sums.is_line() {
+            return Spacing { radius, look: Look::Area };
+        }
+        let mut count = LINE_NEIGHBOURS;
+        while sums.count < MOST_NEIGHBOURS {
+            let known = self.near.len();
+            self.look(i, count);
+            for k in known..self.near.len() {
+                sums.add(self.points, i, self.near[k].1);
+                if !sums.is_line() && sums.lies_across(self.points, &self.near[..=k]) {
+                    return Spacing { radius: length(&self.near[k]), look: Look::Ring };
+                }
             }
+            if self.near.len() <= count {
+                break;
+            }
+            count *= 2;
         }
-        if near.len() <= count {
-            break;
-        }
-        count *= 2;
+        Spacing { radius, look: Look::Line }
     }
-    Spacing { radius, look: Look::Line }
 }
 
 /// The distance of a neighbour: at least 1e-18, whose square single precision still holds.
 #[expect(clippy::cast_possible_truncation, reason = "radii are stored in single precision")]
 fn length(near: &(f64, usize)) -> f32 {
     near.0.sqrt().max(1e-18) as f32
-}
-
-/// A fixed rotation, by 1, 0.7 and 0.3 radians about the axes: a kd-tree whose points share a coordinate, or
-/// two, has leaves without end, and scans like walls and lines along an axis. Nothing scanned lies along these.
-/// In double precision, so that no neighbour changes its rank.
-#[inline]
-fn turn(p: [f32; 3]) -> [f64; 3] {
-    let [x, y, z] = p.map(f64::from);
-    [
-        0.730_681_649_935_512 * x + 0.358_208_578_049_394 * y + 0.581_197_850_184_727 * z,
-        0.226_026_321_249_623 * x + 0.676_369_202_093_991 * y - 0.701_025_537_738_177 * z,
-        -0.644_217_687_237_691 * x + 0.643_592_508_556_904 * y + 0.413_245_997_415_041 * z,
-    ]
 }
 
 /// `f` of every item, in order, on all cores where there are several.
@@ -132,25 +188,6 @@ pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Se
     }
     #[cfg(not(feature = "rayon"))]
     items.iter().map(f).collect()
-}
-
-/// Squared distance and index of point `i` itself and of the nearest `count` others, by distance, then index.
-fn nearest(
-    tree: &ImmutableKdTree<f64, 3>,
-    points: &[[f32; 3]],
-    turned: &[[f64; 3]],
-    i: usize,
-    count: usize,
-) -> Vec<(f64, usize)> {
-    let wanted = NonZero::new(count + 1).unwrap_or(NonZero::<usize>::MIN);
-    let found = tree.query(&turned[i]).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
-    let exact = |j: usize| {
-        let d = [0, 1, 2].map(|k| f64::from(points[j][k]) - f64::from(points[i][k]));
-        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
-    };
-    let mut near: Vec<(f64, usize)> = found.iter().map(|n| exact(n.item as usize)).collect();
-    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    near
 }
 
 /// Sums over some points, relative to one of them.

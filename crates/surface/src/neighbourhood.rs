@@ -105,13 +105,32 @@ impl PointBlock {
         positions: &[[f32; 3]],
         radii: &[f32],
     ) -> impl ExactSizeIterator<Item = Self> {
-        positions.chunks(Self::WIDTH).zip(radii.chunks(Self::WIDTH)).map(|(positions, radii)| {
+        Self::silent(positions).zip(radii.chunks(Self::WIDTH)).map(|(mut block, radii)| {
+            block.tune(plan, radii);
+            block
+        })
+    }
+
+    /// All points of a scan as long as none is heard.
+    #[must_use]
+    pub fn silent(positions: &[[f32; 3]]) -> impl ExactSizeIterator<Item = Self> {
+        positions.chunks(Self::WIDTH).map(|positions| {
             let mut block = Self::EMPTY;
-            for (lane, (p, r)) in positions.iter().zip(radii).enumerate() {
-                block.set(lane, *p, plan.horizon(*r), plan);
+            for (lane, p) in positions.iter().enumerate() {
+                for k in 0..3 {
+                    block.position[k][lane] = p[k];
+                }
             }
             block
         })
+    }
+
+    /// Lets the first points be heard as their local sampling radii want it.
+    pub fn tune(&mut self, plan: &SurfacePlan, radii: &[f32]) {
+        for ((horizon, decay), radius) in self.horizon.iter_mut().zip(&mut self.decay).zip(radii) {
+            *horizon = plan.horizon(*radius);
+            *decay = plan.decay(*horizon);
+        }
     }
 
     /// Puts a point that is heard as far as `horizon` into a lane.
@@ -124,7 +143,7 @@ impl PointBlock {
             self.position[k][lane] = position[k];
         }
         self.horizon[lane] = horizon;
-        self.decay[lane] = plan.reach_sq() / (horizon * horizon);
+        self.decay[lane] = plan.decay(horizon);
     }
 }
 

@@ -174,6 +174,12 @@ impl SurfacePlan {
         self.horizon(radius) * self.per_horizon
     }
 
+    /// 1/h² of a point that is heard as far as `horizon`.
+    #[inline(always)]
+    pub(crate) fn decay(&self, horizon: f32) -> f32 {
+        self.reach_sq / (horizon * horizon)
+    }
+
     /// h/horizon.
     #[inline]
     pub(crate) fn per_horizon(&self) -> f32 {
