@@ -155,20 +155,15 @@ impl Leaf<'_> {
         scratch: &mut LeafScratch,
         surfels: &mut Vec<Surfel>,
     ) -> LeafBounds {
-        let level = scratch.level;
-        dispatch!(level, simd => self.add_up(simd, index, scratch));
-        let first = surfels.len();
-        for (i, moments) in scratch.fits.iter().enumerate() {
-            let at = moments.evaluate(index.plan, self.positions[i].map(f64::from));
-            surfels.push(surfel(&at, index.plan, self.radii[i], self.spacings[i], self.ordinary));
-        }
+        let (level, first) = (scratch.level, surfels.len());
+        dispatch!(level, simd => self.fit(simd, index, scratch, surfels));
         let surfels = &mut surfels[first..];
         dispatch!(level, simd => self.look_about(simd, index, scratch, surfels))
     }
 
-    /// The sums of every point.
+    /// The surface at every point.
     #[inline(always)]
-    fn add_up<S: Simd>(&self, simd: S, index: &Index<'_>, scratch: &mut LeafScratch) {
+    fn fit<S: Simd>(&self, simd: S, index: &Index<'_>, scratch: &mut LeafScratch, surfels: &mut Vec<Surfel>) {
         simd.vectorize(
             #[inline(always)]
             || {
@@ -180,6 +175,9 @@ impl Leaf<'_> {
                     let x = Centre::new(p.map(f64::from));
                     fits.push(index.moments(simd, &x, &locality.groups, near, halves));
                 }
+                Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| {
+                    surfels.push(surfel(&at, index.plan, self.radii[i], self.spacings[i], self.ordinary));
+                });
             },
         );
     }

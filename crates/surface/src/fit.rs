@@ -6,6 +6,8 @@
 //! the surface where its samples end, and that the points about x look like one sheet (docs/theory). The
 //! sign of n is fixed by its largest component, until a graph orients normals.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f64x8};
 use nearmiss_geometry::nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +69,62 @@ impl Moments {
     #[inline(always)]
     #[must_use]
     pub fn evaluate(&self, plan: &SurfacePlan, x: [f64; 3]) -> Evaluation {
+        let (thrice, vectors) = solve_scaled(self.scaled_covariance());
+        self.conclude(plan, x, thrice, vectors[0])
+    }
+
+    /// f at each of `places`, about which `moments` were taken, in order: eight eigen solves at a time, and the same
+    /// bits as by [`Self::evaluate`].
+    #[inline(always)]
+    pub fn evaluate_all<S: Simd>(
+        simd: S,
+        plan: &SurfacePlan,
+        places: &[[f32; 3]],
+        moments: &[Self],
+        mut each: impl FnMut(usize, Evaluation),
+    ) {
+        const LANES: usize = 8;
+        for (block, (places, moments)) in places.chunks(LANES).zip(moments.chunks(LANES)).enumerate() {
+            let mut entries = [[0.0; LANES]; 6];
+            for (lane, moments) in moments.iter().enumerate() {
+                for (entries, c) in entries.iter_mut().zip(moments.scaled_covariance()) {
+                    entries[lane] = c;
+                }
+            }
+            let [xx, xy, xz, yy, yz, zz] = &entries;
+            let load = f64x8::load_array_ref;
+            let matrices = [
+                load(simd, xx),
+                load(simd, xy),
+                load(simd, xz),
+                load(simd, yy),
+                load(simd, yz),
+                load(simd, zz),
+            ];
+            let ([a, b, c], [[x, y, z], ..]) = solve_scaled(matrices);
+            let (a, b, c) = (a.to_array(), b.to_array(), c.to_array());
+            let (x, y, z) = (x.to_array(), y.to_array(), z.to_array());
+            for (lane, (place, moments)) in places.iter().zip(moments).enumerate() {
+                let (thrice, normal) = ([a[lane], b[lane], c[lane]], [x[lane], y[lane], z[lane]]);
+                each(block * LANES + lane, moments.conclude(plan, place.map(f64::from), thrice, normal));
+            }
+        }
+    }
+
+    /// The covariance times the square of the weight, over the square of Σw·horizon: these are the units the solver
+    /// wants, and no division waits for another.
+    #[inline(always)]
+    fn scaled_covariance(&self) -> [f64; 6] {
+        let [wx, wy, wz] = self.first;
+        let [xx, xy, xz, yy, yz, zz] = self.second.map(|s| s * self.weight);
+        let per_square = 1.0 / (self.horizon * self.horizon);
+        let covariance = [xx - wx * wx, xy - wx * wy, xz - wx * wz, yy - wy * wy, yz - wy * wz, zz - wz * wz];
+        covariance.map(|c| c * per_square)
+    }
+
+    /// f at `x`, given three times the eigenvalues of the scaled covariance, and the vector of the least.
+    #[inline(always)]
+    fn conclude(&self, plan: &SurfacePlan, x: [f64; 3], thrice: [f64; 3], least: [f64; 3]) -> Evaluation {
         let (m, support) = (self, self.support);
         let nothing = Evaluation {
             f: 0.0,
@@ -83,15 +141,8 @@ impl Moments {
         let per_weight = 1.0 / m.weight;
         let mean = m.first.map(|s| s * per_weight);
         let horizon = m.horizon * per_weight;
-        // The covariance over the squared horizon: these are the units the solver wants, and no division waits for
-        // another.
-        let [wx, wy, wz] = m.first;
-        let [xx, xy, xz, yy, yz, zz] = m.second.map(|s| s * m.weight);
-        let per_square = 1.0 / (m.horizon * m.horizon);
-        let covariance = [xx - wx * wx, xy - wx * wy, xz - wx * wz, yy - wy * wy, yz - wy * wz, zz - wz * wz];
-        let (thrice, vectors) = solve_scaled(covariance.map(|c| c * per_square));
         let eigenvalues = thrice.map(|l| l * (horizon * horizon * (1.0 / 3.0)));
-        let normal = with_positive_largest(vectors[0]);
+        let normal = with_positive_largest(least);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
         let bandwidth = horizon * f64::from(plan.per_horizon());
         // Points that are none, as in a damaged file, make sums that are none.
