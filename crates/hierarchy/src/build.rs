@@ -328,20 +328,8 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
     drop(items);
 
-    let mut blocks: Vec<PointBlock> = PointBlock::silent(&positions).collect();
-    let spacings = spacings(&positions, &blocks, options.radius_neighbours as usize);
-    let radii = smooth(&positions, &spacings, &nodes, &boxes);
-    let sampling_radius = quantile(&radii);
-    let unit = 1.0 / cloud.frame().scale;
-    let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
-    let reaches = fold_nodes(&nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
-    for (bounds, reach) in boxes.iter_mut().zip(reaches) {
-        bounds.reach = reach;
-    }
-
-    for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
-        block.tune(&plan, radii);
-    }
+    let Sampling { spacings, radii, sampling_radius, plan, blocks } =
+        Sampling::of(&positions, (&nodes, &mut boxes), options, 1.0 / cloud.frame().scale)?;
     let groups = groups(&blocks);
     let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);
@@ -406,6 +394,40 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         lists: lists_of_blocks.lists.into(),
         listed: lists_of_blocks.entries.into(),
     })
+}
+
+/// How densely points lie, and what follows from it.
+struct Sampling {
+    spacings: Vec<Spacing>,
+    radii: Vec<f32>,
+    sampling_radius: f32,
+    plan: SurfacePlan,
+    /// The points with their horizons.
+    blocks: Vec<PointBlock>,
+}
+
+impl Sampling {
+    /// That of points under `nodes`, in whose boxes the reaches are set; `unit` of the points' are one of the caller's.
+    fn of(
+        positions: &[[f32; 3]],
+        (nodes, boxes): (&[Node], &mut [OrientedBox]),
+        options: &BuildOptions,
+        unit: f64,
+    ) -> Result<Self, BuildError> {
+        let mut blocks: Vec<PointBlock> = PointBlock::silent(positions).collect();
+        let spacings = spacings(positions, &blocks, options.radius_neighbours as usize);
+        let radii = smooth(positions, &spacings, nodes, boxes);
+        let sampling_radius = quantile(&radii);
+        let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
+        let reaches = fold_nodes(nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
+        for (bounds, reach) in boxes.iter_mut().zip(reaches) {
+            bounds.reach = reach;
+        }
+        for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
+            block.tune(&plan, radii);
+        }
+        Ok(Self { spacings, radii, sampling_radius, plan, blocks })
+    }
 }
 
 /// The discs of all points and the bounds of all leaves, in order.

@@ -47,8 +47,8 @@ pub struct Proof {
 /// greatest.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bound {
-    gap: f32,
-    pair: NodePair,
+    pub(crate) gap: f32,
+    pub(crate) pair: NodePair,
     /// The pair, or one of its ancestors, whose enclosures show it.
     shown_by: NodePair,
 }
@@ -81,15 +81,17 @@ const LEAST_SPLITS: u64 = 16;
 pub(crate) struct Certifier<'a> {
     pub(crate) pair: Posed<'a>,
     /// Enclosures must be further apart than this, in a's stored frame.
-    reach: f32,
+    pub(crate) reach: f32,
     /// What was proven.
-    proven: &'a mut Vec<Bound>,
+    pub(crate) proven: &'a mut Vec<Bound>,
+    /// Leaves whose enclosures are not apart.
+    pub(crate) doubtful: Option<NodePair>,
 }
 
 impl<'a> Certifier<'a> {
     pub(crate) fn new(pair: Posed<'a>, reach: f32, proven: &'a mut Vec<Bound>) -> Self {
         proven.clear();
-        Self { pair, reach, proven }
+        Self { pair, reach, proven, doubtful: None }
     }
 
     /// Proves all of `excluded`, or breaks.
@@ -117,7 +119,7 @@ impl<'a> Certifier<'a> {
             if self.pair.meter.spent.node_pairs >= most || self.pair.meter.go_on().is_break() {
                 break;
             }
-            let (gaps, mask) = (self.gaps(a, b), distinct(a, b));
+            let (gaps, mask) = (self.pair.gaps_of_enclosures(a, b), distinct(a, b));
             self.pair.meter.spent.node_pairs += mask.iter().map(|&counts| u64::from(counts)).sum::<u64>();
             heap.pop();
             for i in (0..4).filter(|&i| mask[i]) {
@@ -148,17 +150,10 @@ impl<'a> Certifier<'a> {
         f64::from(gap - slack) * self.pair.views[0].placed().scale() * (1.0 - 1e-9)
     }
 
-    #[inline]
-    fn gaps(&self, a: [NodeId; 2], b: [NodeId; 2]) -> [f32; 4] {
-        let [a0, a1] = a.map(|id| self.pair.a.enclosure(id.index()));
-        let [b0, b1] = b.map(|id| self.pair.b.enclosure(id.index()));
-        self.pair.relative.gaps([&a0, &a1], [&b0, &b1])
-    }
-
     /// The depth of overlap of those pairs in `mask` whose enclosures are not apart.
     #[inline]
     fn overlaps(&mut self, a: [NodeId; 2], b: [NodeId; 2], mask: [bool; 4]) -> [Option<f32>; 4] {
-        let gaps = self.gaps(a, b);
+        let gaps = self.pair.gaps_of_enclosures(a, b);
         let mut overlaps = [None; 4];
         for i in 0..4 {
             if !mask[i] {
@@ -183,7 +178,8 @@ impl Visitor for Certifier<'_> {
     }
 
     /// Two leaves that nothing parts.
-    fn leaves(&mut self, _pair: NodePair) -> ControlFlow<()> {
+    fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
+        self.doubtful = Some(pair);
         ControlFlow::Break(())
     }
 

@@ -172,15 +172,23 @@ fn surfaces(
 ) -> Answer {
     let CollideScratch { stack, heap, lanes, gathers, excluded, compared, members, proven, longest_stretch } =
         scratch;
+    let reach = pair.stored(options.margin);
+    let mut certifier = Certifier::new(pair, reach, proven);
+    // Enclosures hold the boxes: what they part has no contact.
+    if let Some(known) = &mut known
+        && let Some(distance) = known.prove_again(&mut certifier, stack)
+    {
+        *longest_stretch = certifier.pair.meter.longest_stretch;
+        let (verdict, statistics) = (apart(options, distance, true), certifier.pair.meter.spent);
+        return Answer { verdict, distance_estimate: None, statistics };
+    }
+    let Certifier { pair, proven, .. } = certifier;
     let workspace = Workspace { lanes, gathers, excluded, compared, members };
     let mut search = Surfaces::new(pair, options, budget, known.is_some(), workspace);
     let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
     let parted = !ended && search.found.is_none();
-    if let Some(known) = &mut known {
-        // Boxes of discs certify nothing: what does is remembered below.
-        if parted && !options.certifies() { known.parted(&search) } else { known.forget(search.met) }
-    }
-    let Surfaces { pair, found, doubt, reach, estimate, excluded, compared, .. } = search;
+    let Surfaces { pair, found, doubt, estimate, excluded, compared, met, .. } = search;
+    let slack = pair.relative.slack();
     let mut certifier = Certifier::new(pair, reach, proven);
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
@@ -190,20 +198,35 @@ fn surfaces(
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         (None, Some(reason)) => Verdict::Undecided(reason),
+        _ if !options.certifies() => apart(options, 0.0, false),
         // Leaves whose boxes overlap have enclosures that overlap.
-        _ if !options.certifies() || !compared.is_empty() => apart(options, 0.0, false),
+        _ if !compared.is_empty() || known.as_ref().is_some_and(|known| known.is_doubtful()) => {
+            certifier.doubtful = compared.first().copied();
+            apart(options, 0.0, false)
+        }
         _ => {
             let whole = certifier.prove(excluded, stack).is_continue();
             let distance = if whole { certifier.tighten() } else { 0.0 };
             if let Some(proof) = proof.filter(|_| whole) {
                 certifier.hand_out(proof);
             }
-            if let Some(known) = known.filter(|_| whole) {
-                known.clear_to(distance, &certifier.pair);
+            if let Some(known) = &mut known
+                && whole
+            {
+                known.proven(distance, certifier.proven, &certifier.pair);
             }
             apart(options, distance, whole)
         }
     };
+    if let Some(known) = known
+        && !matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
+    {
+        if parted {
+            known.parted((excluded, compared), slack, options.certifies(), certifier.doubtful);
+        } else {
+            known.forget(met);
+        }
+    }
     *longest_stretch = certifier.pair.meter.longest_stretch;
     let distance_estimate = Some(estimate).filter(|distance| distance.is_finite());
     Answer { verdict, distance_estimate, statistics: certifier.pair.meter.spent }
@@ -229,7 +252,7 @@ fn look(
             search.leaves(pair)?;
             search.compared.clear();
         }
-        if known.has_front(&search.pair) && !options.certifies() {
+        if known.has_front(&search.pair, search.reach, options.certifies()) {
             return known.look_again(search, stack);
         }
         known.forget(None);

@@ -12,7 +12,7 @@ use nearmiss_geometry::{Frame, NodeId, Pose};
 use nearmiss_hierarchy::{Frontier, Node, NodePair, OrientedBox, PointHierarchy, Stack, descend, resume};
 use serde::{Deserialize, Serialize};
 
-use crate::certify::Excluded;
+use crate::certify::{Bound, Certifier, Excluded};
 use crate::options::CollideOptions;
 use crate::posed::Posed;
 use crate::surface::Surfaces;
@@ -98,8 +98,12 @@ pub(crate) struct Known {
     /// Pairs that cover all pairs of points, if whole.
     front: Vec<Standing>,
     is_whole: bool,
+    /// Whether it is enclosures that are apart, not boxes.
+    is_proof: bool,
     /// How long the front was when it was fresh.
     fresh: usize,
+    /// Leaves at which a proof failed.
+    doubtful: Option<NodePair>,
 }
 
 impl PairHint {
@@ -118,7 +122,9 @@ impl PairHint {
             clear: f64::MIN,
             front: Vec::new(),
             is_whole: false,
+            is_proof: false,
             fresh: 0,
+            doubtful: None,
         };
         let known = self.known.get_or_insert_with(nothing);
         let motion = motion(pair, &known.pose, &pose);
@@ -157,12 +163,24 @@ impl Known {
 
     /// The leaves that met last time, if there are such: files lie.
     pub(crate) fn met(&self, pair: &Posed<'_>) -> Option<NodePair> {
-        let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
-        self.met.filter(|met| is_leaf(pair.a.nodes, met.a) && is_leaf(pair.b.nodes, met.b))
+        self.met.filter(|&met| are_leaves(pair, met))
     }
 
-    /// Whether [`Known::look_again`] can replace a search.
-    pub(crate) fn has_front(&self, pair: &Posed<'_>) -> bool {
+    /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail again.
+    pub(crate) fn has_front(&self, pair: &Posed<'_>, reach: f32, certifies: bool) -> bool {
+        let fails = |&leaves: &NodePair| {
+            are_leaves(pair, leaves) && pair.gaps_of_enclosures([leaves.a; 2], [leaves.b; 2])[0] <= reach
+        };
+        self.is_there(pair) && !self.is_proof && (!certifies || self.doubtful.as_ref().is_some_and(fails))
+    }
+
+    /// Whether a proof is known to fail, at leaves that [`Known::has_front`] has looked at.
+    pub(crate) fn is_doubtful(&self) -> bool {
+        self.doubtful.is_some()
+    }
+
+    /// Whether the front is whole, and of nodes that there are.
+    fn is_there(&self, pair: &Posed<'_>) -> bool {
         let (nodes_a, nodes_b) = (pair.a.nodes.len(), pair.b.nodes.len());
         let is_there = |at: &Standing| at.pair.a.index() < nodes_a && at.pair.b.index() < nodes_b;
         self.is_whole && self.front.iter().all(is_there)
@@ -172,12 +190,52 @@ impl Known {
     pub(crate) fn look_again(&mut self, search: &mut Surfaces<'_>, stack: &mut Stack) -> ControlFlow<()> {
         stack.clear();
         let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
-        let parted = self.travel + beyond(&search.pair, search.reach);
-        let expired = self.front.iter().filter(|standing| standing.until <= parted).count();
-        if expired * MOST_EXPIRED > self.front.len() {
+        let (reach, slack) = (search.reach, search.pair.relative.slack());
+        let gap = |pair: NodePair| search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
+        if !self.advance(reach, slack, stack, gap) {
             // After a long way the roots are nearer than what was the front.
             self.forget(None);
             return descend(nodes_a, nodes_b, search, stack);
+        }
+        resume(nodes_a, nodes_b, search, stack)
+    }
+
+    /// Goes on from the front of a proof, if there is one: how far the scans are apart at least, if it can be made
+    /// whole again.
+    pub(crate) fn prove_again(&mut self, certifier: &mut Certifier<'_>, stack: &mut Stack) -> Option<f64> {
+        if !self.is_proof || !self.is_there(&certifier.pair) {
+            return None;
+        }
+        stack.clear();
+        let (nodes_a, nodes_b) = (certifier.pair.a.nodes, certifier.pair.b.nodes);
+        let (reach, slack) = (certifier.reach, certifier.pair.relative.slack());
+        let gap = |pair: NodePair| {
+            certifier.pair.meter.spent.node_pairs += 1;
+            certifier.pair.gaps_of_enclosures([pair.a; 2], [pair.b; 2])[0]
+        };
+        let whole = self.advance(reach, slack, stack, gap)
+            && resume(nodes_a, nodes_b, certifier, stack).is_continue();
+        if !whole {
+            self.forget(None);
+            return None;
+        }
+        self.add(certifier.proven.iter().map(|bound| (bound.gap, bound.pair)), slack);
+        self.distance(&certifier.pair, 0.0)
+    }
+
+    /// Looks at the pairs of the front whose time has come: those that are still apart wait again, the others leave it
+    /// for the stack. False if they are too many.
+    fn advance(
+        &mut self,
+        reach: f32,
+        slack: f32,
+        stack: &mut Stack,
+        mut gap: impl FnMut(NodePair) -> f32,
+    ) -> bool {
+        let parted = self.travel + (f64::from(reach) + f64::from(slack));
+        let expired = self.front.iter().filter(|standing| standing.until <= parted).count();
+        if expired * MOST_EXPIRED > self.front.len() {
+            return false;
         }
         let mut i = 0;
         while let Some(&Standing { pair, until }) = self.front.get(i) {
@@ -185,9 +243,9 @@ impl Known {
                 i += 1;
                 continue;
             }
-            let gap = search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
-            if gap > search.reach {
-                self.front[i].until = self.until(gap, search);
+            let gap = gap(pair);
+            if gap > reach {
+                self.front[i].until = self.until(gap, slack);
                 i += 1;
             } else {
                 self.front.swap_remove(i);
@@ -195,12 +253,12 @@ impl Known {
                 stack.push([(Some(-gap), pair), none, none, none]);
             }
         }
-        resume(nodes_a, nodes_b, search, stack)
+        true
     }
 
     /// Until when a pair with this gap is some way apart.
-    fn until(&self, gap: f32, search: &Surfaces<'_>) -> f64 {
-        (self.travel + (f64::from(gap) - f64::from(search.pair.relative.slack()))).next_down()
+    fn until(&self, gap: f32, slack: f32) -> f64 {
+        (self.travel + (f64::from(gap) - f64::from(slack))).next_down()
     }
 
     /// The leaves of `pair` meet, or nothing is known.
@@ -209,20 +267,45 @@ impl Known {
         self.clear = f64::MIN;
         self.front.clear();
         self.is_whole = false;
+        self.is_proof = false;
+        self.doubtful = None;
     }
 
-    /// Nothing meets: adds what `search` has found to the front, or begins a new one.
-    pub(crate) fn parted(&mut self, search: &Surfaces<'_>) {
+    /// Nothing meets: adds what a search has excluded and compared to the front, or begins a new one. A proof that is
+    /// wanted has failed, at the leaves `doubtful` if that is known.
+    pub(crate) fn parted(
+        &mut self,
+        (excluded, compared): (&[Excluded], &[NodePair]),
+        slack: f32,
+        proof_failed: bool,
+        doubtful: Option<NodePair>,
+    ) {
+        let apart = excluded.iter().flat_map(Excluded::pairs);
+        // Leaves that were compared have to be compared again.
+        let compared = compared.iter().map(|&pair| (f32::NEG_INFINITY, pair));
+        self.add(apart.chain(compared), slack);
+        self.doubtful = doubtful.or(self.doubtful);
+        if proof_failed {
+            // Boxes of discs prove nothing.
+            self.clear = f64::MIN;
+        }
+    }
+
+    /// The scans are proven to be so far apart, in the world, by these pairs.
+    pub(crate) fn proven(&mut self, distance: f64, bounds: &[Bound], pair: &Posed<'_>) {
+        self.forget(None);
+        self.add(bounds.iter().map(|bound| (bound.gap, bound.pair)), pair.relative.slack());
+        self.is_proof = true;
+        self.clear_to(distance, pair);
+    }
+
+    /// Adds pairs with their gaps to the front, or begins a new one.
+    fn add(&mut self, pairs: impl Iterator<Item = (f32, NodePair)>, slack: f32) {
         if !self.is_whole {
             self.front.clear();
         }
         let mut front = std::mem::take(&mut self.front);
-        let excluded = search.excluded.iter().flat_map(Excluded::pairs);
-        let standing = |(gap, pair)| Standing { pair, until: self.until(gap, search) };
-        let apart = excluded.map(standing);
-        // Leaves that were compared have to be compared again.
-        let compared = search.compared.iter().map(|&pair| Standing { pair, until: f64::MIN });
-        front.extend(apart.chain(compared));
+        front.extend(pairs.map(|(gap, pair)| Standing { pair, until: self.until(gap, slack).max(f64::MIN) }));
         if !self.is_whole {
             self.fresh = front.len();
         }
@@ -234,7 +317,6 @@ impl Known {
 
     /// The scans are so far apart, in the world; nothing else is known.
     pub(crate) fn clear_to(&mut self, distance: f64, pair: &Posed<'_>) {
-        self.forget(None);
         let distance = distance / pair.views[0].placed().scale() * (1.0 - 1e-9);
         self.clear = (self.travel + (distance - f64::from(pair.relative.slack()))).next_down();
     }
@@ -243,4 +325,10 @@ impl Known {
 /// What is further apart than this, in a's stored frame, no search finds within `reach` there: poses far out round more.
 fn beyond(pair: &Posed<'_>, reach: f32) -> f64 {
     f64::from(reach) + f64::from(pair.relative.slack())
+}
+
+/// Whether these are leaves.
+fn are_leaves(pair: &Posed<'_>, leaves: NodePair) -> bool {
+    let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
+    is_leaf(pair.a.nodes, leaves.a) && is_leaf(pair.b.nodes, leaves.b)
 }

@@ -38,7 +38,15 @@ impl<'a> Posed<'a> {
         self.relative.gaps(boxes_a, boxes_b)
     }
 
-    /// The same, with how much of each other the boxes overlap when `margin` is about them.
+    /// The gaps between the enclosures of either of `a` and either of `b`.
+    #[inline]
+    pub(crate) fn gaps_of_enclosures(&self, a: [NodeId; 2], b: [NodeId; 2]) -> [f32; 4] {
+        let [a0, a1] = a.map(|id| self.a.enclosure(id.index()));
+        let [b0, b1] = b.map(|id| self.b.enclosure(id.index()));
+        self.relative.gaps([&a0, &a1], [&b0, &b1])
+    }
+
+    /// The gaps of boxes, with how much of each other the boxes overlap when `margin` is about them.
     #[inline]
     pub(crate) fn gaps_and_overlaps(
         &mut self,

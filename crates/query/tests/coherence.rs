@@ -45,7 +45,7 @@ fn hints_change_no_verdict() {
     let mut rng = arbitrary::rng(31);
     let kinds =
         [CloudKind::Sphere, CloudKind::Lattice, CloudKind::Clustered, CloudKind::Rings, CloudKind::Coplanar];
-    let (mut seen, mut skipped) = ([0; 3], 0);
+    let (mut seen, mut skipped, mut proven, mut evident) = ([0; 3], 0, 0, 0);
     for (n, cloud) in (0_u64..).zip(kinds.iter().cycle().take(10)) {
         let a = prepared(&arbitrary::cloud(*cloud, 400, n));
         let b = prepared(&arbitrary::cloud(*cloud, 300, n + 50));
@@ -81,6 +81,20 @@ fn hints_change_no_verdict() {
                         kind(&warm.verdict).0,
                         "{cloud:?} {options:?} {step}: {cold:?} {warm:?}"
                     );
+                    if let (Verdict::Separated { gap, evidence: Evidence::Certified }, Semantics::Surface) =
+                        (warm.verdict, options.semantics)
+                    {
+                        // Enclosures hold the points.
+                        let least = least_distance(&views);
+                        assert!(
+                            gap <= least && options.evidence == Evidence::Certified,
+                            "{cloud:?} {options:?}: {gap} {least}"
+                        );
+                        proven += 1;
+                    }
+                    if options.semantics == Semantics::Surface {
+                        evident += usize::from(kind(&cold.verdict).1 != kind(&warm.verdict).1);
+                    }
                     seen[usize::from(kind(&cold.verdict).0)] += 1;
                     skipped += usize::from(warm.statistics.node_pairs == 0 && warm.verdict.is_separated());
                     if let (Verdict::Separated { gap: exact, .. }, Semantics::Thickened(_)) =
@@ -97,6 +111,8 @@ fn hints_change_no_verdict() {
     }
     assert!(seen[0] > 1000 && seen[1] > 3000, "{seen:?}");
     assert!(skipped > 1000, "{skipped} answers came without any search");
+    assert!(proven > 1000, "{proven} separations were certified");
+    assert!(evident == 0, "the evidence of {evident} separations differs");
 }
 
 /// The least distance of any two points.
@@ -137,28 +153,30 @@ fn a_hint_for_something_else_is_none() {
 
 #[test]
 fn small_steps_cost_less_than_half() {
-    let mut rng = arbitrary::rng(8);
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 5000, 3));
     let size = scan.bounds().half_extents()[0];
-    let plan =
-        CollidePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan, &scan).unwrap();
-    let (mut cold, mut warm) = (0, 0);
-    for _ in 0..20 {
-        let mut hint = PairHint::default();
-        let mut scratch = CollideScratch::default();
-        let start = arbitrary::unit_vector(&mut rng);
-        let step = 0.1 * scan.sampling_radius();
-        for i in 0..400_u32 {
-            let away = 2.0 * size + step * (f64::from(i) - 200.0);
-            let pose = Pose::from_translation(start.map(|x| x * away));
-            let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
-            cold += collide(&views[0], &views[1], &plan, &Budget::UNLIMITED).statistics.node_pairs;
-            let answer =
-                collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch);
-            warm += answer.statistics.node_pairs;
+    for evidence in [Evidence::Estimated, Evidence::Certified] {
+        let mut rng = arbitrary::rng(8);
+        let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(evidence);
+        let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+        let (mut cold, mut warm) = (0, 0);
+        for _ in 0..20 {
+            let mut hint = PairHint::default();
+            let mut scratch = CollideScratch::default();
+            let start = arbitrary::unit_vector(&mut rng);
+            let step = 0.1 * scan.sampling_radius();
+            for i in 0..400_u32 {
+                let away = 2.0 * size + step * (f64::from(i) - 200.0);
+                let pose = Pose::from_translation(start.map(|x| x * away));
+                let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+                cold += collide(&views[0], &views[1], &plan, &Budget::UNLIMITED).statistics.node_pairs;
+                let answer =
+                    collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch);
+                warm += answer.statistics.node_pairs;
+            }
         }
+        assert!(2 * warm < cold, "{evidence:?}: {warm} node pairs with hints, {cold} without");
     }
-    assert!(2 * warm < cold, "{warm} node pairs with hints, {cold} without");
 }
 
 #[test]
