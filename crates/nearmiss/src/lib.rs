@@ -9,6 +9,7 @@ mod scan;
 struct FrontPage;
 
 pub use nearmiss_geometry as geometry;
+pub use nearmiss_graph as graph;
 pub use nearmiss_hierarchy as hierarchy;
 #[cfg(feature = "io")]
 pub use nearmiss_io as io;
