@@ -6,6 +6,7 @@
 mod covering;
 mod disc;
 mod eigen;
+mod proximity;
 mod radii;
 mod surface;
 mod thickened;
@@ -15,6 +16,7 @@ pub(crate) use radii::count;
 pub use covering::{Solid, clearance, covering_radius, to_nearest};
 pub use disc::{Crossing, Disc, crossing};
 pub use eigen::{Eigen, symmetric_eigen};
+pub use proximity::{Proximity, proximity};
 pub use radii::{
     GREATEST_RANK, LINE_RATIO, RANK, SLOPE, Spacing, looks_like_a_line, quantile, radii, smoothed, spacing,
     spacings,

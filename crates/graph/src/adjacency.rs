@@ -2,13 +2,30 @@
 
 use nearmiss_store::Array;
 
+use crate::options::GraphError;
+
 /// An undirected graph over points by their indices: each edge stands with both of its ends.
 #[derive(Debug, Clone)]
 pub struct Adjacency {
     /// Where the neighbours of each point begin, and where the last ones' end.
-    starts: Array<u32>,
+    pub(crate) starts: Array<u32>,
     /// The neighbours of all points, those of each ascending.
-    neighbours: Array<u32>,
+    pub(crate) neighbours: Array<u32>,
+}
+
+/// The neighbours of some consecutive points, each ascending.
+#[derive(Debug, Default)]
+pub(crate) struct Lists {
+    ends: Vec<usize>,
+    neighbours: Vec<u32>,
+}
+
+impl Lists {
+    /// Adds those of the next point.
+    pub(crate) fn push(&mut self, neighbours: impl Iterator<Item = u32>) {
+        self.neighbours.extend(neighbours);
+        self.ends.push(self.neighbours.len());
+    }
 }
 
 impl Adjacency {
@@ -32,6 +49,23 @@ impl Adjacency {
         Self { starts: starts.into(), neighbours: neighbours.into() }
     }
 
+    /// The graph whose lists of neighbours these are, one part after the other; each edge stands in both lists.
+    pub(crate) fn from_lists(parts: Vec<Lists>) -> Result<Self, GraphError> {
+        let ends = parts.iter().map(|part| part.neighbours.len()).sum();
+        if u32::try_from(ends).is_err() {
+            return Err(GraphError::TooLarge { ends });
+        }
+        let mut starts = Vec::with_capacity(parts.iter().map(|part| part.ends.len()).sum::<usize>() + 1);
+        starts.push(0);
+        let mut neighbours = Vec::with_capacity(ends);
+        for part in parts {
+            #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32")]
+            starts.extend(part.ends.iter().map(|end| (neighbours.len() + end) as u32));
+            neighbours.extend(part.neighbours);
+        }
+        Ok(Self { starts: starts.into(), neighbours: neighbours.into() })
+    }
+
     /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -48,6 +82,20 @@ impl Adjacency {
     #[must_use]
     pub fn edge_count(&self) -> usize {
         self.neighbours.len() / 2
+    }
+
+    /// All edges once, the lesser end first, ascending.
+    pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> {
+        (0_u32..).zip(0..self.len()).flat_map(|(a, i)| {
+            let later = self.of(i).iter().copied().filter(move |&b| a < b);
+            later.map(move |b| [a, b])
+        })
+    }
+
+    /// Bytes of its arrays.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val::<[_]>(&self.starts) + size_of_val::<[_]>(&self.neighbours)
     }
 
     /// The neighbours of point `i`, ascending.

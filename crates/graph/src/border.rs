@@ -1,0 +1,94 @@
+//! Points at the border of a surface: their neighbours lie to one side.
+//!
+//! The mean of what is two edges away or less, each place counted as often as walks lead there, lies off the point, along the
+//! surface, by a share of those places' standard deviation. Inside a surface that share is sampling noise, at a
+//! straight border it is about 0.6 (docs/theory/graph.md). The part of it along the normal, the least principal direction of these places,
+//! is curvature's and not counted. "Approximating Bounded, Non-orientable Surfaces from Points" (Adamson & Alexa 2004) tell
+//! borders by the weighted mean too, for places off the points.
+
+use nearmiss_surface::symmetric_eigen;
+
+use crate::adjacency::Adjacency;
+use crate::parallel::{map, ranges};
+
+/// From which share on a point is at the border.
+const SHARE: f64 = 0.45;
+
+/// Fewer neighbours surround nothing.
+const LEAST_NEIGHBOURS: usize = 3;
+
+/// Which points are at a border.
+pub(crate) fn borders(positions: &[[f32; 3]], graph: &Adjacency) -> Vec<u8> {
+    let sums = map(graph.len(), |i| {
+        let near = graph.of(i).iter().map(|&j| Sums::at(minus(positions[j as usize], positions[i])));
+        near.fold(Sums::at([0.0; 3]), |sum, next| sum.plus(&next))
+    });
+    let parts = ranges(graph.len(), |range| {
+        let is_border = |i: usize| {
+            let near = graph.of(i).iter().map(|&j| {
+                let j = j as usize;
+                sums[j].moved(minus(positions[j], positions[i]))
+            });
+            let about = near.fold(sums[i], |sum, next| sum.plus(&next));
+            u8::from(graph.of(i).len() < LEAST_NEIGHBOURS || about.eccentricity() > SHARE)
+        };
+        range.map(is_border).collect::<Vec<u8>>()
+    });
+    parts.into_iter().flatten().collect()
+}
+
+fn minus(a: [f32; 3], b: [f32; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| f64::from(a[k]) - f64::from(b[k]))
+}
+
+/// Number, sum and sum of squares, as xx xy xz yy yz zz, of some places.
+#[derive(Debug, Clone, Copy)]
+struct Sums {
+    count: f64,
+    first: [f64; 3],
+    second: [f64; 6],
+}
+
+impl Sums {
+    /// Those of one place.
+    fn at(d: [f64; 3]) -> Self {
+        let [x, y, z] = d;
+        Self { count: 1.0, first: d, second: [x * x, x * y, x * z, y * y, y * z, z * z] }
+    }
+
+    fn plus(mut self, other: &Self) -> Self {
+        self.count += other.count;
+        for k in 0..3 {
+            self.first[k] += other.first[k];
+        }
+        for k in 0..6 {
+            self.second[k] += other.second[k];
+        }
+        self
+    }
+
+    /// Those of the same places, each moved by `d`.
+    fn moved(&self, d: [f64; 3]) -> Self {
+        let mut sums = *self;
+        for (k, (a, b)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate() {
+            sums.second[k] += self.first[a] * d[b] + self.first[b] * d[a] + self.count * d[a] * d[b];
+        }
+        for k in 0..3 {
+            sums.first[k] += self.count * d[k];
+        }
+        sums
+    }
+
+    /// How far the mean is off zero along the surface, in standard deviations of the places along it.
+    fn eccentricity(&self) -> f64 {
+        let [x, y, z] = self.first.map(|c| c / self.count);
+        let [xx, xy, xz, yy, yz, zz] = self.second.map(|c| c / self.count);
+        let about = [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z];
+        let [nx, ny, nz] = symmetric_eigen(about).vectors[0];
+        let along = nx * x + ny * y + nz * z;
+        let off_sq = x * x + y * y + z * z - along * along;
+        let spread_sq = xx + yy + zz
+            - (nx * (nx * xx + 2.0 * (ny * xy + nz * xz)) + ny * (ny * yy + 2.0 * nz * yz) + nz * nz * zz);
+        (off_sq.max(0.0) / spread_sq).sqrt()
+    }
+}

@@ -1,0 +1,24 @@
+//! Work on all cores, whose results come in order.
+
+use std::ops::Range;
+
+/// Items that a thread works on at once: enough to hide the hand-over.
+const ITEMS_A_TASK: usize = 1024;
+
+/// `f` of consecutive ranges that make up `0..count`, in order, on all cores where there are several.
+pub(crate) fn ranges<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Send) -> Vec<R> {
+    let tasks = count.div_ceil(ITEMS_A_TASK);
+    let range = |task: usize| task * ITEMS_A_TASK..((task + 1) * ITEMS_A_TASK).min(count);
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        (0..tasks).into_par_iter().map(|task| f(range(task))).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    (0..tasks).map(|task| f(range(task))).collect()
+}
+
+/// `f` of each of `0..count`, in order.
+pub(crate) fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
+    ranges(count, |range| range.map(&f).collect::<Vec<R>>()).into_iter().flatten().collect()
+}
