@@ -6,6 +6,7 @@
 use std::hint::black_box;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nearmiss::graph::{GraphOptions, PointGraph, Prune};
 use nearmiss::surface::{BlockTree, Level, Nearest, PointBlock};
 use nearmiss::{BuildOptions, PointHierarchy};
 use nearmiss_benches::clock::timed;
@@ -58,6 +59,52 @@ fn neighbours(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Building the graph on one thread, two, and so on.
+fn speed(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
+    println!("\n| threads | points/s |\n| --: | --: |");
+    let mut threads = 1;
+    while threads <= std::thread::available_parallelism()?.get() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let mut best = f64::INFINITY;
+        for _ in 0..runs {
+            let build = || PointGraph::build(positions, &GraphOptions::default());
+            let (graph, time) = timed(|| pool.install(build));
+            black_box(graph?);
+            best = best.min(time.as_secs_f64());
+        }
+        println!("| {threads} | {:.0} |", count(positions.len()) / best);
+        threads *= 2;
+    }
+    Ok(())
+}
+
+/// What the graph looks like, by how it is pruned.
+fn looks(positions: &[[f32; 3]]) -> Result<(), Failure> {
+    println!("\n| pruning | degree | virtual % | components | in the largest % | border % | bytes a point |");
+    println!("| --- | --: | --: | --: | --: | --: | --: |");
+    let n = count(positions.len());
+    for prune in [Prune::Never, Prune::Quartiles(0.5), Prune::Quartiles(1.0), Prune::Quartiles(1.5)] {
+        let graph = PointGraph::build(positions, &GraphOptions::default().with_prune(prune))?;
+        let counts = graph.counts();
+        let mut sizes = vec![0_usize; positions.len()];
+        for &least in graph.components() {
+            sizes[least as usize] += 1;
+        }
+        let largest = sizes.into_iter().max().unwrap_or_default();
+        let all = count(counts.edges + counts.virtual_edges);
+        println!(
+            "| {prune:?} | {:.2} | {:.2} | {} | {:.2} | {:.2} | {:.1} |",
+            2.0 * count(counts.edges) / n,
+            100.0 * count(counts.virtual_edges) / all,
+            counts.components,
+            100.0 * count(largest) / n,
+            100.0 * count(counts.border) / n,
+            count(graph.bytes()) / n,
+        );
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Failure> {
     let mut arguments = Arguments::of_process();
     let runs = arguments.value("--runs")?.unwrap_or(3_usize).max(1);
@@ -66,5 +113,7 @@ fn main() -> Result<(), Failure> {
     let hierarchy = PointHierarchy::build(&object.cloud, &BuildOptions::default())?;
     let positions = hierarchy.positions();
     println!("{}\n## {}, {} points\n", machine::description(), object.name, positions.len());
-    neighbours(positions, runs)
+    neighbours(positions, runs)?;
+    speed(positions, runs)?;
+    looks(positions)
 }

@@ -9,7 +9,11 @@ mod influence;
 mod options;
 mod parallel;
 mod prune;
+mod sanity;
+mod sections;
 
 pub use adjacency::Adjacency;
 pub use graph::{GraphCounts, PointGraph};
 pub use options::{GraphError, GraphOptions, Prune};
+pub use sanity::Flaw;
+pub use sections::{GraphMeta, LoadError};

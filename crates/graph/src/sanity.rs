@@ -1,0 +1,140 @@
+//! What must hold of a stored graph: what its users need to stay within its arrays whenever one is loaded, what their
+//! answers need when the whole file is checked.
+
+use thiserror::Error;
+
+use crate::adjacency::Adjacency;
+use crate::graph::PointGraph;
+
+/// What is wrong with a graph.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Flaw {
+    /// Two arrays do not fit each other.
+    #[error("{array} has {found} entries where {expected} belong; prepare the scan again")]
+    Length {
+        /// Which array.
+        array: &'static str,
+        /// How many entries it has.
+        found: usize,
+        /// How many it should have.
+        expected: usize,
+    },
+    /// A number is none that a build writes, or contradicts what it says about others.
+    #[error("{what} {index} is wrong; prepare the scan again")]
+    Value {
+        /// Which number, and of what.
+        what: &'static str,
+        /// Whose.
+        index: usize,
+    },
+    /// A number about the whole graph contradicts the arrays.
+    #[error("{what} is wrong; prepare the scan again")]
+    Metadata {
+        /// Which number.
+        what: &'static str,
+    },
+}
+
+const EDGES: &str = "the edges of point";
+const VIRTUAL: &str = "the virtual edges of point";
+const COMPONENT: &str = "the component of point";
+
+impl Adjacency {
+    /// Checks that lists are there for `points` points, each ascending, of other points that are there. One pass.
+    pub(crate) fn check_structure(&self, points: usize, what: &'static str) -> Result<(), Flaw> {
+        let wrong = |index| Err(Flaw::Value { what, index });
+        let found = self.starts.len();
+        if found != points + 1 {
+            return Err(Flaw::Length { array: what, found, expected: points + 1 });
+        }
+        let end = self.starts[points] as usize;
+        if self.starts[0] != 0 || end != self.neighbours.len() {
+            return Err(Flaw::Length { array: what, found: self.neighbours.len(), expected: end });
+        }
+        for i in 0..points {
+            let (first, end) = (self.starts[i] as usize, self.starts[i + 1] as usize);
+            let Some(list) = self.neighbours.get(first..end) else { return wrong(i) };
+            let ascends = list.windows(2).all(|two| two[0] < two[1]);
+            if !ascends || list.iter().any(|&j| j as usize >= points || j as usize == i) {
+                return wrong(i);
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that each edge stands with both of its ends, given the structure. One pass.
+    fn check_symmetry(&self, what: &'static str) -> Result<(), Flaw> {
+        // Ascending i come to each list of theirs in the order of that list.
+        let mut next: Vec<u32> = self.starts[..self.len()].to_vec();
+        for (i, point) in (0..self.len()).zip(0_u32..) {
+            for &j in self.of(i) {
+                let place = &mut next[j as usize];
+                if *place >= self.starts[j as usize + 1] || self.neighbours[*place as usize] != point {
+                    return Err(Flaw::Value { what, index: i });
+                }
+                *place += 1;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl PointGraph {
+    /// What users of the graph need to stay within its arrays. One pass over points and edges.
+    pub(crate) fn check_structure(&self, points: usize) -> Result<(), Flaw> {
+        let lengths = [
+            ("the radii of influence", self.radii.len()),
+            ("the longest edges", self.reaches.len()),
+            ("the components", self.components.len()),
+            ("the borders", self.borders.len()),
+        ];
+        for (array, found) in lengths {
+            if found != points {
+                return Err(Flaw::Length { array, found, expected: points });
+            }
+        }
+        self.edges.check_structure(points, EDGES)?;
+        self.virtual_edges.check_structure(points, VIRTUAL)?;
+        // The name of a component is its first point's.
+        let mut count = 0;
+        for (i, &least) in self.components.iter().enumerate() {
+            let named = self.components[..=i].get(least as usize);
+            if named != Some(&least) {
+                return Err(Flaw::Value { what: COMPONENT, index: i });
+            }
+            count += u32::from(least as usize == i);
+        }
+        if count != self.component_count {
+            return Err(Flaw::Metadata { what: "the number of components" });
+        }
+        Ok(())
+    }
+
+    /// What their answers need besides, given the structure. One pass over points and edges.
+    pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
+        let wrong = |what, index| Err(Flaw::Value { what, index });
+        self.edges.check_symmetry(EDGES)?;
+        self.virtual_edges.check_symmetry(VIRTUAL)?;
+        let is_length = |length: f32| length.is_finite() && length >= 0.0;
+        for i in 0..self.len() {
+            if !is_length(self.radii[i]) {
+                return wrong("the radius of influence of point", i);
+            }
+            if !is_length(self.reaches[i]) {
+                return wrong("the longest edge of point", i);
+            }
+            if self.borders[i] > 1 {
+                return wrong("the border at point", i);
+            }
+            let own = self.components[i];
+            if self.edges.of(i).iter().any(|&j| self.components[j as usize] != own) {
+                return wrong(COMPONENT, i);
+            }
+            if self.virtual_edges.of(i).iter().any(|j| self.edges.of(i).binary_search(j).is_ok()) {
+                return wrong(VIRTUAL, i);
+            }
+        }
+        Ok(())
+    }
+}
