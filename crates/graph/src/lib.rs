@@ -4,6 +4,7 @@
 mod adjacency;
 mod border;
 mod components;
+mod dynamic;
 mod graph;
 mod influence;
 mod options;
@@ -13,6 +14,7 @@ mod sanity;
 mod sections;
 
 pub use adjacency::Adjacency;
+pub use dynamic::{DynamicGraph, Touched};
 pub use graph::{GraphCounts, PointGraph};
 pub use options::{GraphError, GraphOptions, Prune};
 pub use sanity::Flaw;
