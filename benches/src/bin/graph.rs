@@ -1,12 +1,13 @@
 //! What proximity graphs cost, and what they look like.
 //!
-//! `graph [OBJECT] [--runs N]`; the object is `bumpy:1000000` unless told otherwise.
+//! `graph [OBJECT] [--runs N]`; the object is `bumpy:1000000` unless told otherwise. With `--updates` instead what it costs to
+//! insert, remove and move one point among 10³ to 10⁶.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use nearmiss::graph::{GraphOptions, PointGraph, Prune};
+use nearmiss::graph::{DynamicGraph, GraphOptions, PointGraph, Prune, Touched};
 use nearmiss::surface::{BlockTree, Level, Nearest, PointBlock};
 use nearmiss::{BuildOptions, PointHierarchy};
 use nearmiss_benches::clock::timed;
@@ -105,9 +106,73 @@ fn looks(positions: &[[f32; 3]]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// How many updates a row of the table averages.
+const UPDATES: usize = 1000;
+
+/// A row of the table of updates.
+fn row(
+    size: u32,
+    what: &str,
+    mut update: impl FnMut(usize) -> Result<Touched, Failure>,
+) -> Result<(), Failure> {
+    let (mut spheres, mut touched, mut most) = (0, 0, 0);
+    let (result, time) = timed(|| -> Result<(), Failure> {
+        for i in 0..UPDATES {
+            let one = update(i)?;
+            spheres += one.spheres;
+            touched += one.points;
+            most = most.max(one.points);
+        }
+        Ok(())
+    });
+    result?;
+    let [spheres, touched] = [spheres, touched].map(|n| count(n) / count(UPDATES));
+    let micros = time.as_secs_f64() * 1e6 / count(UPDATES);
+    println!("| {size} | {what} | {spheres:.1} | {touched:.1} | {most} | {micros:.1} |");
+    Ok(())
+}
+
+/// What one update touches and takes, on surfaces of more and more points.
+fn updates() -> Result<(), Failure> {
+    println!("{}\n", machine::description());
+    println!(
+        "| points | update | spheres | points touched | most | µs |\n| --: | --- | --: | --: | --: | --: |"
+    );
+    for exponent in 3..=6 {
+        let size = 10_u32.pow(exponent);
+        let object = Object::read(&format!("bumpy:{}", size as usize + UPDATES))?;
+        let hierarchy = PointHierarchy::build(&object.cloud, &BuildOptions::default())?;
+        // Those left out come from all over the surface.
+        let (mut there, mut spare) = (Vec::new(), Vec::new());
+        let every = object.cloud.len() / UPDATES;
+        for (i, &p) in hierarchy.positions().iter().enumerate() {
+            let list = if i % every == 0 && spare.len() < UPDATES { &mut spare } else { &mut there };
+            list.push(p);
+        }
+        let mut graph = DynamicGraph::new(&there, &GraphOptions::default())?;
+        let mut ids = Vec::new();
+        row(size, "insert", |i| {
+            let (id, touched) = graph.insert(spare[i])?;
+            ids.push(id);
+            Ok(touched)
+        })?;
+        row(size, "move", |i| {
+            // A third of the way to a neighbour.
+            let to = graph.of(ids[i]).first().and_then(|&j| graph.position(j)).ok_or("no neighbour")?;
+            let to = [0, 1, 2].map(|k| spare[i][k] + (to[k] - spare[i][k]) / 3.0);
+            Ok(graph.relocate(ids[i], to)?.ok_or("no such point")?)
+        })?;
+        row(size, "remove", |i| Ok(graph.remove(ids[i]).ok_or("no such point")?))?;
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Failure> {
     let mut arguments = Arguments::of_process();
     let runs = arguments.value("--runs")?.unwrap_or(3_usize).max(1);
+    if arguments.flag("--updates") {
+        return updates();
+    }
     let words = arguments.words()?;
     let object = Object::read(words.first().map_or("bumpy:1000000", String::as_str))?;
     let hierarchy = PointHierarchy::build(&object.cloud, &BuildOptions::default())?;

@@ -74,3 +74,17 @@ fn no_byte_changed_leads_out_of_the_arrays() {
     }
     assert!(refused * 2 > tried, "{refused} of {tried} refused by structure alone");
 }
+
+#[cfg(feature = "rayon")]
+#[test]
+#[expect(clippy::cast_possible_truncation, reason = "points are stored in single precision")]
+fn the_number_of_threads_changes_no_byte() {
+    let points: Vec<[f32; 3]> =
+        cloud(CloudKind::Sphere, 20_000, 1).iter().map(|p| p.map(|x| x as f32)).collect();
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        stored(&pool.install(|| PointGraph::build(&points, &GraphOptions::default()).unwrap()))
+    };
+    let one = on(1);
+    assert!(one == on(2) && one == on(5), "bytes differ");
+}
