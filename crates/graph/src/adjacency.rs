@@ -5,7 +5,7 @@ use nearmiss_store::Array;
 use crate::options::GraphError;
 
 /// An undirected graph over points by their indices: each edge stands with both of its ends.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Adjacency {
     /// Where the neighbours of each point begin, and where the last ones' end.
     pub(crate) starts: Array<u32>,
@@ -105,5 +105,11 @@ impl Adjacency {
     #[must_use]
     pub fn of(&self, i: usize) -> &[u32] {
         &self.neighbours[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+
+    /// Where the neighbours of each point begin among all, and they: to be taken once, outside of loops.
+    #[must_use]
+    pub(crate) fn slices(&self) -> (&[u32], &[u32]) {
+        (&self.starts, &self.neighbours)
     }
 }

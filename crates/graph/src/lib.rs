@@ -3,19 +3,32 @@
 
 mod adjacency;
 mod border;
+mod close_pairs;
 mod components;
 mod dynamic;
+mod geodesic;
 mod graph;
 mod influence;
+mod kernel;
+mod length;
+mod levels;
 mod options;
+mod orient;
 mod parallel;
+mod path_sections;
 mod prune;
 mod sanity;
 mod sections;
 
 pub use adjacency::Adjacency;
+pub use close_pairs::{Close, ClosePairs, Paths};
 pub use dynamic::{DynamicGraph, Touched};
+pub use geodesic::{GeodesicScratch, Reached};
 pub use graph::{GraphCounts, PointGraph};
+pub use kernel::{Foot, GeodesicKernel, KernelScratch};
+pub use length::{Network, edge_lengths};
+pub use levels::{Cells, LevelScratch, Levels};
 pub use options::{GraphError, GraphOptions, Prune};
+pub use orient::{Decision, Orientation, OrientedPart, Sides, orient};
 pub use sanity::Flaw;
 pub use sections::{GraphMeta, LoadError};

@@ -22,3 +22,35 @@ pub(crate) fn ranges<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync
 pub(crate) fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
     ranges(count, |range| range.map(&f).collect::<Vec<R>>()).into_iter().flatten().collect()
 }
+
+/// As [`ranges`], `length` items each but the last, with scratch that a thread makes once for several of them.
+pub(crate) fn ranges_with<S, R: Send>(
+    count: usize,
+    length: usize,
+    scratch: impl Fn() -> S + Sync + Send,
+    f: impl Fn(&mut S, Range<usize>) -> R + Sync + Send,
+) -> Vec<R> {
+    let range = |k: usize| k * length..((k + 1) * length).min(count);
+    let tasks = 0..count.div_ceil(length);
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        tasks.into_par_iter().map_init(scratch, |scratch, k| f(scratch, range(k))).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    {
+        let mut scratch = scratch();
+        tasks.map(|k| f(&mut scratch, range(k))).collect()
+    }
+}
+
+/// `f` of every item.
+pub(crate) fn for_each<T: Send>(items: Vec<T>, f: impl Fn(T) + Sync + Send) {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        items.into_par_iter().for_each(f);
+    }
+    #[cfg(not(feature = "rayon"))]
+    items.into_iter().for_each(f);
+}

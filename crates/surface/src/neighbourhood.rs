@@ -48,6 +48,51 @@ impl Moments {
     }
 }
 
+/// A point, and how far it is from x in a metric of the caller's, such as along a graph.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KernelPoint {
+    /// Where it is.
+    pub position: [f32; 3],
+    /// How far; beyond the horizon it counts for nothing.
+    pub distance: f32,
+    /// How far it is heard.
+    pub horizon: f32,
+}
+
+impl Moments {
+    /// Those of `points` about `x`, each weighing by its own distance. How near the nearest is remains a matter of
+    /// straight distance: it says whether x is where the surface can be, and some metrics tell no heights. In double precision, in the order
+    /// of `points`.
+    #[must_use]
+    pub fn of_points(plan: &SurfacePlan, x: [f64; 3], points: impl IntoIterator<Item = KernelPoint>) -> Self {
+        let mut sums = Self { nearest: f32::INFINITY, ..Self::default() };
+        for KernelPoint { position, distance, horizon } in points {
+            let share = (distance / horizon) * (distance / horizon);
+            // Nor is what is no number heard.
+            let is_heard = share < 1.0;
+            if !is_heard {
+                continue;
+            }
+            let w = f64::from(plan.kernel().weight(share * plan.reach_sq()));
+            let [x, y, z] = [0, 1, 2].map(|k| f64::from(position[k]) - x[k]);
+            #[expect(clippy::cast_possible_truncation, reason = "compared, not added")]
+            let straight = ((x * x + y * y + z * z) / f64::from(horizon).powi(2)) as f32 * plan.reach_sq();
+            let (wx, wy, wz) = (w * x, w * y, w * z);
+            sums.weight += w;
+            for (sum, v) in sums.first.iter_mut().zip([wx, wy, wz]) {
+                *sum += v;
+            }
+            for (sum, v) in sums.second.iter_mut().zip([wx * x, wx * y, wx * z, wy * y, wy * z, wz * z]) {
+                *sum += v;
+            }
+            sums.horizon += w * f64::from(horizon);
+            sums.nearest = sums.nearest.min(straight);
+            sums.support += 1;
+        }
+        sums
+    }
+}
+
 /// A point split into the nearest `f32` and the rest, so that differences from stored points keep their
 /// digits: (p − high) is exact for a near p, and the rest is then taken off.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,426 @@
+//! Coarser graphs over nested subsets of the points, for distances and paths of any length.
+//!
+//! A level keeps points, centres, no two of which are nearer than a distance along the graph that doubles from level to level, and of which every
+//! other point is within that of one. Each point belongs to the cell of the nearest centre (a Voronoi diagram along the
+//! graph); two cells that an edge joins are joined by an edge as long as the shortest way through one such edge,
+//! which is remembered, so that a path between centres is a path of points. A shortest path is searched among the few cells of the coarsest level,
+//! then, level by level, only in the cells near the path found on the level before.
+
+use nearmiss_store::Array;
+
+use crate::Adjacency;
+use crate::close_pairs::id32;
+use crate::geodesic::{GeodesicScratch, Reached};
+use crate::length::Network;
+
+/// Centres keep 1.2 times the distance of a point's sixth neighbour from each other: a quarter of the points.
+const APART: f32 = 1.2;
+
+/// Distances between centres from level to level.
+const GROWTH: f32 = 2.0;
+
+/// A level of so few cells is searched whole.
+const FEW: usize = 256;
+
+/// A level that keeps more than this share of the points brings nothing: parts are down to one cell each.
+const MOST_KEPT: f64 = 0.7;
+
+/// Ways on the coarsest level that are so much longer than the shortest are looked at again.
+const DETOUR: f32 = 0.15;
+
+/// And so much of that on the next level.
+const SURER: f32 = 0.4;
+
+/// A path is searched in the cells of the coarser one, and so many cells around.
+const RINGS: usize = 1;
+
+/// The cells of a level, about some of the points of the finer one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells {
+    /// Of each point of the finer level its cell.
+    pub(crate) owner: Array<u32>,
+    /// How far it is from the centre of its cell.
+    pub(crate) to_centre: Array<f32>,
+    /// The point after it on the way to the centre; itself there.
+    pub(crate) inwards: Array<u32>,
+    /// Of each cell its centre, as a point of the finer level.
+    pub(crate) centres: Array<u32>,
+    /// Which cells touch.
+    pub(crate) graph: Adjacency,
+    /// How far their centres are from each other.
+    pub(crate) lengths: Array<f32>,
+    /// The edge of the finer level on the way: the end in the cell itself, then that in the other.
+    pub(crate) crossings: Array<[u32; 2]>,
+    /// The local sampling radii among the centres.
+    pub(crate) radii: Array<f32>,
+}
+
+/// Coarser and coarser levels over a graph.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Levels {
+    pub(crate) cells: Vec<Cells>,
+}
+
+/// Memory for searches, used again by the next.
+#[derive(Debug, Clone, Default)]
+pub struct LevelScratch {
+    search: GeodesicScratch,
+    /// Which cells are open to a search, by the number of the search.
+    open: Vec<u32>,
+    number: u32,
+    /// Opened cells.
+    opened: Vec<u32>,
+    /// What is how far from the one end on the coarsest level.
+    far: Vec<Reached>,
+    ancestors: Vec<[u32; 2]>,
+    reached: usize,
+}
+
+impl LevelScratch {
+    /// How many points and cells the last search reached, on all levels.
+    #[must_use]
+    pub fn reached(&self) -> usize {
+        self.reached
+    }
+
+    /// Opens the cells of `graph` that `self.opened` holds, and those around.
+    fn open_about(&mut self, graph: &Adjacency) {
+        if self.open.len() < graph.len() {
+            self.open.resize(graph.len(), 0);
+        }
+        self.number = self.number.checked_add(1).unwrap_or_else(|| {
+            self.open.fill(0);
+            1
+        });
+        for &cell in &self.opened {
+            self.open[cell as usize] = self.number;
+        }
+        let (starts, neighbours) = graph.slices();
+        let mut ring = 0..0;
+        for _ in 0..RINGS {
+            ring = ring.end..self.opened.len();
+            for k in ring.clone() {
+                let cell = self.opened[k] as usize;
+                for &other in &neighbours[starts[cell] as usize..starts[cell + 1] as usize] {
+                    if std::mem::replace(&mut self.open[other as usize], self.number) != self.number {
+                        self.opened.push(other);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Searches from `a` and from `b` where it is open, and has those cells opened next by which ways lead from the one
+    /// to the other that are not `detour` longer than the shortest, as a share: which of them is, finer levels tell.
+    fn survey(
+        &mut self,
+        network: Network<'_>,
+        [a, b]: [u32; 2],
+        detour: f32,
+        is_open: impl Fn(&[u32], u32) -> bool,
+    ) -> Option<f32> {
+        let open = &self.open[..];
+        self.search.search(network, [(a, 0.0)], f32::MAX, |i| is_open(open, i), |_| false);
+        let shortest = self.search.found(b)?;
+        let most = (1.0 + detour) * shortest;
+        self.reached += self.search.reached();
+        self.far.clear();
+        self.far.extend(self.search.all_reached());
+        self.search.search(network, [(b, 0.0)], most, |i| is_open(open, i), |_| false);
+        self.reached += self.search.reached();
+        self.opened.clear();
+        let ways =
+            self.far.iter().filter_map(|far| Some((far.point, far.distance + self.search.found(far.point)?)));
+        self.opened.extend(ways.filter(|(_, length)| *length <= most).map(|(cell, _)| cell));
+        Some(shortest)
+    }
+}
+
+impl Cells {
+    /// The next level over a graph whose points have these local sampling radii. O(n log n), on one core.
+    fn over(network: Network<'_>, radii: &[f32], scratch: &mut GeodesicScratch) -> Self {
+        let centres = centres(network, radii, scratch);
+        scratch.search(network, centres.iter().map(|&c| (c, 0.0)), f32::MAX, |_| true, |_| false);
+        let count = network.len();
+        let (mut owner, mut to_centre, mut inwards) = (vec![0; count], vec![0.0; count], vec![0; count]);
+        for (cell, &centre) in centres.iter().enumerate() {
+            owner[centre as usize] = id32(cell);
+        }
+        for found in scratch.all_reached() {
+            let point = found.point as usize;
+            let before = scratch.before(found.point);
+            (to_centre[point], inwards[point]) = (found.distance, before);
+            owner[point] = owner[before as usize];
+        }
+        let touching = touching(network, &owner, &to_centre, centres.len());
+        let edges: Vec<[u32; 2]> = touching.iter().map(|touch| touch.cells).collect();
+        let graph = Adjacency::from_edges(centres.len(), &edges);
+        // In the order of the graph's entries.
+        let mut ends: Vec<Touch> = touching.iter().flat_map(|&touch| [touch, touch.turned()]).collect();
+        ends.sort_unstable_by_key(|touch| touch.cells);
+        let radii: Vec<f32> = centres.iter().map(|&centre| GROWTH * radii[centre as usize]).collect();
+        Self {
+            owner: owner.into(),
+            to_centre: to_centre.into(),
+            inwards: inwards.into(),
+            centres: centres.into(),
+            graph,
+            lengths: ends.iter().map(|touch| touch.length).collect::<Vec<f32>>().into(),
+            crossings: ends.iter().map(|touch| touch.crossing).collect::<Vec<[u32; 2]>>().into(),
+            radii: radii.into(),
+        }
+    }
+
+    /// The graph of the cells with the distances of their centres.
+    #[must_use]
+    pub fn network(&self) -> Network<'_> {
+        Network::new(&self.graph, &self.lengths)
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.centres.len()
+    }
+
+    /// Whether there is no cell.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.centres.is_empty()
+    }
+
+    /// Of each cell its centre, as a point of the finer level, ascending.
+    #[must_use]
+    pub fn centres(&self) -> &[u32] {
+        &self.centres
+    }
+
+    /// Of each point of the finer level its cell.
+    #[must_use]
+    pub fn owners(&self) -> &[u32] {
+        &self.owner
+    }
+
+    /// How far each point of the finer level is from the centre of its cell, along that level's graph.
+    #[must_use]
+    pub fn distances(&self) -> &[f32] {
+        &self.to_centre
+    }
+
+    /// The local sampling radii of the points at the centres, doubled with each level: times the surface's horizon what a
+    /// [`ClosePairs`](crate::ClosePairs) of this level reaches.
+    #[must_use]
+    pub fn radii(&self) -> &[f32] {
+        &self.radii
+    }
+
+    /// What all of it takes, in bytes.
+    #[must_use]
+    pub fn byte_len(&self) -> usize {
+        let (starts, neighbours) = self.graph.slices();
+        4 * (3 * self.owner.len() + 2 * self.centres.len() + starts.len() + 4 * neighbours.len())
+    }
+
+    /// The points of the finer level on the way along a path of cells, from the centre of its first to that of its last.
+    ///
+    /// # Panics
+    /// When `cells` is no path of touching cells.
+    pub fn expand(&self, cells: &[u32], path: &mut Vec<u32>) {
+        path.clear();
+        path.extend(cells.first().map(|&cell| self.centres[cell as usize]));
+        for two in cells.windows(2) {
+            let place = self.graph.of(two[0] as usize).iter().position(|&cell| cell == two[1]);
+            let Some(place) = place else { panic!("cells {two:?} do not touch") };
+            let (starts, _) = self.graph.slices();
+            let [near, far] = self.crossings[starts[two[0] as usize] as usize + place];
+            // From the centre out, its last point being there already.
+            let first = path.len();
+            self.walk_in(near, path);
+            path.pop();
+            path[first..].reverse();
+            self.walk_in(far, path);
+        }
+    }
+
+    /// Appends the points from `point` to the centre of its cell.
+    fn walk_in(&self, mut point: u32, path: &mut Vec<u32>) {
+        path.push(point);
+        while self.inwards[point as usize] != point {
+            point = self.inwards[point as usize];
+            path.push(point);
+        }
+    }
+}
+
+/// Each point, in order, that no centre before it is nearer to than its own distance.
+fn centres(network: Network<'_>, radii: &[f32], scratch: &mut GeodesicScratch) -> Vec<u32> {
+    let mut is_near = vec![false; network.len()];
+    let mut centres = Vec::new();
+    for point in 0..id32(network.len()) {
+        if is_near[point as usize] {
+            continue;
+        }
+        centres.push(point);
+        let apart = APART * radii[point as usize];
+        for found in scratch.within(network, point, apart) {
+            is_near[found.point as usize] |= found.distance < apart;
+        }
+    }
+    centres
+}
+
+/// Two cells that touch.
+#[derive(Debug, Clone, Copy)]
+struct Touch {
+    cells: [u32; 2],
+    length: f32,
+    crossing: [u32; 2],
+}
+
+impl Touch {
+    fn turned(self) -> Self {
+        let ([a, b], [u, v]) = (self.cells, self.crossing);
+        Self { cells: [b, a], crossing: [v, u], ..self }
+    }
+}
+
+/// All pairs of cells that an edge joins, the lesser first, ascending, each with the shortest way; of equally long ones the first.
+fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize) -> Vec<Touch> {
+    let mut starts = vec![0_u32; cells + 1];
+    for cell in owner {
+        starts[*cell as usize + 1] += 1;
+    }
+    for cell in 0..cells {
+        starts[cell + 1] += starts[cell];
+    }
+    let mut members = vec![0_u32; owner.len()];
+    let mut next = starts.clone();
+    for (point, cell) in (0..).zip(owner) {
+        members[next[*cell as usize] as usize] = point;
+        next[*cell as usize] += 1;
+    }
+    let mut all: Vec<Touch> = Vec::new();
+    // Where the pair with each cell stands in `all`, if it is this cell's.
+    let mut place = vec![usize::MAX; cells];
+    for cell in 0..id32(cells) {
+        let first = all.len();
+        for &near in &members[starts[cell as usize] as usize..starts[cell as usize + 1] as usize] {
+            for (far, edge) in network.edges(near as usize) {
+                let other = owner[far as usize];
+                if other <= cell {
+                    continue;
+                }
+                let length = to_centre[near as usize] + to_centre[far as usize] + edge;
+                let touch = Touch { cells: [cell, other], length, crossing: [near, far] };
+                let known = &mut place[other as usize];
+                if *known == usize::MAX || *known < first {
+                    *known = all.len();
+                    all.push(touch);
+                } else if length < all[*known].length {
+                    all[*known] = touch;
+                }
+            }
+        }
+        all[first..].sort_unstable_by_key(|touch| touch.cells[1]);
+    }
+    all
+}
+
+impl Levels {
+    /// The levels over a graph whose points have these local sampling radii, such as the distances of their sixth neighbours, until one has
+    /// few cells. O(n log n) time, O(n) space.
+    ///
+    /// # Panics
+    /// When there is not a radius for each point.
+    #[must_use]
+    pub fn build(network: Network<'_>, radii: &[f32]) -> Self {
+        assert_eq!(network.len(), radii.len(), "a radius a point");
+        let mut scratch = GeodesicScratch::default();
+        let mut cells: Vec<Cells> = Vec::new();
+        loop {
+            let (finer, radii) =
+                cells.last().map_or((network, radii), |cells| (cells.network(), &cells.radii));
+            if finer.len() <= FEW {
+                break;
+            }
+            let next = Cells::over(finer, radii, &mut scratch);
+            #[expect(clippy::cast_precision_loss, reason = "a share")]
+            if next.len() as f64 > MOST_KEPT * finer.len() as f64 {
+                break;
+            }
+            cells.push(next);
+        }
+        Self { cells }
+    }
+
+    /// The levels, the finest first.
+    #[must_use]
+    pub fn cells(&self) -> &[Cells] {
+        &self.cells
+    }
+
+    /// What all of it takes, in bytes.
+    #[must_use]
+    pub fn byte_len(&self) -> usize {
+        self.cells.iter().map(Cells::byte_len).sum()
+    }
+
+    /// The length of a path from `a` to `b` in the graph that the levels are over, or nothing where no way leads there. No path
+    /// is shorter in the cells that were searched; how much shorter one elsewhere can be is measured (`benches`).
+    ///
+    /// # Panics
+    /// When there is no such point.
+    pub fn distance(&self, network: Network<'_>, a: u32, b: u32, scratch: &mut LevelScratch) -> Option<f32> {
+        scratch.reached = 0;
+        scratch.ancestors.clear();
+        scratch.ancestors.push([a, b]);
+        for cells in &self.cells {
+            let [a, b] = scratch.ancestors[scratch.ancestors.len() - 1];
+            scratch.ancestors.push([cells.owner[a as usize], cells.owner[b as usize]]);
+        }
+        let coarsest = self.cells.len();
+        let mut detour = DETOUR;
+        for level in (1..=coarsest).rev() {
+            let finer = self.cells[level - 1].network();
+            match self.cells.get(level) {
+                None => scratch.survey(finer, scratch.ancestors[level], detour, |_, _| true)?,
+                Some(cells) => {
+                    scratch.open_about(&cells.graph);
+                    let (owner, number): (&[u32], _) = (&cells.owner, scratch.number);
+                    let is_open = |open: &[u32], i: u32| open[owner[i as usize] as usize] == number;
+                    scratch.survey(finer, scratch.ancestors[level], detour, is_open)?
+                }
+            };
+            detour *= SURER;
+        }
+        match self.cells.first() {
+            None => scratch.search.search(network, [(a, 0.0)], f32::MAX, |_| true, |i| i == b),
+            Some(cells) => {
+                scratch.open_about(&cells.graph);
+                let (owner, open, number): (&[u32], _, _) = (&cells.owner, &scratch.open, scratch.number);
+                let is_open = |i: u32| open[owner[i as usize] as usize] == number;
+                scratch.search.search(network, [(a, 0.0)], f32::MAX, is_open, |i| i == b);
+            }
+        }
+        scratch.reached += scratch.search.reached();
+        scratch.search.found(b)
+    }
+
+    /// As [`Self::distance`]; `path` holds the points from `a` to `b` afterwards, both included, or none.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    pub fn path(
+        &self,
+        network: Network<'_>,
+        [a, b]: [u32; 2],
+        scratch: &mut LevelScratch,
+        path: &mut Vec<u32>,
+    ) -> Option<f32> {
+        path.clear();
+        let distance = self.distance(network, a, b, scratch)?;
+        scratch.search.trace(b, path);
+        path.reverse();
+        Some(distance)
+    }
+}

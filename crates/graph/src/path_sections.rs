@@ -1,0 +1,204 @@
+//! Close pairs and coarser levels in a container, and what must hold of them there.
+
+use bytemuck::Pod;
+use nearmiss_store::{Array, Check, File, OpenError, WriteError, Writer};
+
+use crate::close_pairs::{Close, ClosePairs};
+use crate::levels::{Cells, Levels};
+use crate::{Adjacency, Flaw, LoadError};
+
+/// Part 0 is of the points, part k of the cells of level k.
+const LIST_STARTS: [u8; 4] = *b"CPST";
+const PAIRS: [u8; 4] = *b"CPSP";
+const ONWARD: [u8; 4] = *b"CPON";
+/// Part k is what makes level k from the one before.
+const OWNERS: [u8; 4] = *b"CELL";
+const TO_CENTRE: [u8; 4] = *b"CDST";
+const INWARDS: [u8; 4] = *b"CWAY";
+const CENTRES: [u8; 4] = *b"CNTR";
+const STARTS: [u8; 4] = *b"CEST";
+const NEIGHBOURS: [u8; 4] = *b"CEDG";
+const LENGTHS: [u8; 4] = *b"CLEN";
+const CROSSINGS: [u8; 4] = *b"CCRS";
+const RADII: [u8; 4] = *b"CRAD";
+
+const LISTS: &str = "the list of close pairs of point";
+const CELL: &str = "the cell of point";
+const EDGES: &str = "the edges of cell";
+
+fn length(array: &'static str, found: usize, expected: usize) -> Result<(), Flaw> {
+    if found == expected { Ok(()) } else { Err(Flaw::Length { array, found, expected }) }
+}
+
+fn first_wrong(what: &'static str, index: Option<usize>) -> Result<(), Flaw> {
+    index.map_or(Ok(()), |index| Err(Flaw::Value { what, index }))
+}
+
+impl ClosePairs {
+    /// Adds the arrays to a container, `part` telling several maps apart.
+    ///
+    /// # Errors
+    /// When the container has sections of these names already.
+    pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>, part: u32) -> Result<(), WriteError> {
+        writer.section(LIST_STARTS, part, &self.starts)?.section(PAIRS, part, &self.pairs)?;
+        if !self.onward.is_empty() {
+            writer.section(ONWARD, part, &self.onward)?;
+        }
+        Ok(())
+    }
+
+    /// The map in `file` of points with these horizons, its arrays in place. With either `check` every list is there, so
+    /// that no use of it fails. With [`Check::Full`] each is also one that a build writes: of points that are there, by distance,
+    /// then index, itself first, and none further than it is heard.
+    ///
+    /// # Errors
+    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    pub fn load(file: &File, part: u32, horizons: &[f32], check: Check) -> Result<Self, LoadError> {
+        let onward = if file.has(ONWARD, part) { file.array(ONWARD, part)? } else { Array::default() };
+        let map = Self { starts: file.array(LIST_STARTS, part)?, pairs: file.array(PAIRS, part)?, onward };
+        map.check_structure(horizons.len())?;
+        if check == Check::Full {
+            map.check_contents(horizons)?;
+        }
+        Ok(map)
+    }
+
+    fn check_structure(&self, points: usize) -> Result<(), Flaw> {
+        length(LISTS, self.starts.len(), points + 1)?;
+        length(LISTS, self.pairs.len(), self.starts[points] as usize)?;
+        if !self.onward.is_empty() {
+            length("steps of paths", self.onward.len(), self.pairs.len())?;
+        }
+        let starts: &[u32] = &self.starts;
+        let descends = starts.windows(2).position(|two| two[0] > two[1]);
+        first_wrong(LISTS, descends.or((starts[0] != 0).then_some(0)))
+    }
+
+    fn check_contents(&self, horizons: &[f32]) -> Result<(), Flaw> {
+        let view = self.view();
+        let is_sound = |i: usize| {
+            let list = view.of(i);
+            let first = list.first().is_some_and(|c| c.point as usize == i && c.distance.to_bits() == 0);
+            let is_heard = |c: &Close| {
+                let horizon = horizons.get(c.point as usize);
+                horizon.is_some_and(|&h| c.distance <= h) || c.point as usize == i
+            };
+            let rank = |c: &Close| (c.distance.to_bits(), c.point);
+            first && list.iter().all(is_heard) && list.windows(2).all(|two| rank(&two[0]) < rank(&two[1]))
+        };
+        first_wrong(LISTS, (0..self.len()).position(|i| !is_sound(i)))
+    }
+}
+
+fn put<'a, T: Pod>(
+    writer: &mut Writer<'a>,
+    tag: [u8; 4],
+    part: u32,
+    array: &'a [T],
+) -> Result<(), WriteError> {
+    writer.section(tag, part, array).map(|_| ())
+}
+
+impl Levels {
+    /// Adds the arrays to a container.
+    ///
+    /// # Errors
+    /// When the container has sections of these names already.
+    pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
+        for (part, cells) in (1..).zip(&self.cells) {
+            put(writer, OWNERS, part, &cells.owner)?;
+            put(writer, TO_CENTRE, part, &cells.to_centre)?;
+            put(writer, INWARDS, part, &cells.inwards)?;
+            put(writer, CENTRES, part, &cells.centres)?;
+            put(writer, STARTS, part, &cells.graph.starts)?;
+            put(writer, NEIGHBOURS, part, &cells.graph.neighbours)?;
+            put(writer, LENGTHS, part, &cells.lengths)?;
+            put(writer, CROSSINGS, part, &cells.crossings)?;
+            put(writer, RADII, part, &cells.radii)?;
+        }
+        Ok(())
+    }
+
+    /// The levels over `points` points in `file`, their arrays in place. With either `check` everything that is named is there,
+    /// every way inwards ends at the centre of its cell, and edges cross between the cells they join, so that no search fails. With [`Check::Full`] distances
+    /// also are such as a build writes.
+    ///
+    /// # Errors
+    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    pub fn load(file: &File, points: usize, check: Check) -> Result<Self, LoadError> {
+        let mut cells: Vec<Cells> = Vec::new();
+        let mut finer = points;
+        for part in (1..).take_while(|&part| file.has(OWNERS, part)) {
+            let next = load_cells(file, part)?;
+            next.check_structure(finer)?;
+            if check == Check::Full {
+                next.check_contents()?;
+            }
+            // Each level is smaller than the one before, so that they end.
+            if next.len() >= finer {
+                return Err(Flaw::Metadata { what: "the number of cells" }.into());
+            }
+            finer = next.len();
+            cells.push(next);
+        }
+        Ok(Self { cells })
+    }
+}
+
+fn load_cells(file: &File, part: u32) -> Result<Cells, OpenError> {
+    Ok(Cells {
+        owner: file.array(OWNERS, part)?,
+        to_centre: file.array(TO_CENTRE, part)?,
+        inwards: file.array(INWARDS, part)?,
+        centres: file.array(CENTRES, part)?,
+        graph: Adjacency { starts: file.array(STARTS, part)?, neighbours: file.array(NEIGHBOURS, part)? },
+        lengths: file.array(LENGTHS, part)?,
+        crossings: file.array(CROSSINGS, part)?,
+        radii: file.array(RADII, part)?,
+    })
+}
+
+impl Cells {
+    fn check_structure(&self, finer: usize) -> Result<(), Flaw> {
+        length("cells", self.owner.len(), finer)?;
+        length("distances within cells", self.to_centre.len(), finer)?;
+        length("ways within cells", self.inwards.len(), finer)?;
+        length("radii of cells", self.radii.len(), self.len())?;
+        self.graph.check_structure(self.len(), EDGES)?;
+        length("lengths of edges between cells", self.lengths.len(), self.graph.neighbours.len())?;
+        length("crossings between cells", self.crossings.len(), self.graph.neighbours.len())?;
+        let (owner, inwards, centres): (&[u32], &[u32], &[u32]) = (&self.owner, &self.inwards, &self.centres);
+        let is_owned = |point: u32, cell: u32| owner.get(point as usize) == Some(&cell);
+        let stray = (0..)
+            .zip(centres)
+            .position(|(cell, &centre)| !is_owned(centre, cell) || inwards[centre as usize] != centre);
+        first_wrong("the centre of cell", stray)?;
+        // The way inwards comes nearer with every step, so it ends; only at a centre it may.
+        let to_centre: &[f32] = &self.to_centre;
+        let lost = (0..).zip(owner).position(|(point, &cell)| {
+            let next = inwards[point as usize];
+            let ends = next == point;
+            let goes = is_owned(next, cell) && to_centre[next as usize] < to_centre[point as usize];
+            let is_centre = centres.get(cell as usize) == Some(&point);
+            !(if ends { is_centre } else { goes })
+        });
+        first_wrong(CELL, lost)?;
+        let mut crossings = self.crossings.iter();
+        let (starts, neighbours) = self.graph.slices();
+        let wrong = (0_u32..).zip(starts.windows(2)).position(|(cell, two)| {
+            let others = &neighbours[two[0] as usize..two[1] as usize];
+            others
+                .iter()
+                .zip(&mut crossings)
+                .any(|(&other, &[near, far])| !is_owned(near, cell) || !is_owned(far, other))
+        });
+        first_wrong(EDGES, wrong)
+    }
+
+    fn check_contents(&self) -> Result<(), Flaw> {
+        let is_length = |d: &f32| d.is_finite() && *d >= 0.0;
+        first_wrong(CELL, self.to_centre.iter().position(|d| !is_length(d)))?;
+        first_wrong("the length of edge", self.lengths.iter().position(|d| !is_length(d)))?;
+        first_wrong("the radius of cell", self.radii.iter().position(|r| !is_length(r)))
+    }
+}
