@@ -10,6 +10,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use nearmiss_store::Array;
+use serde::{Deserialize, Serialize};
 
 use crate::Adjacency;
 use crate::geodesic::GeodesicScratch;
@@ -36,7 +37,7 @@ pub struct Close {
 }
 
 /// What is kept of paths.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Paths {
     /// Nothing: each step is looked for among the neighbours.
     #[default]

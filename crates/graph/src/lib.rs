@@ -19,6 +19,7 @@ mod path_sections;
 mod prune;
 mod sanity;
 mod sections;
+mod surface_graph;
 
 pub use adjacency::Adjacency;
 pub use close_pairs::{Close, ClosePairs, Paths};
@@ -32,3 +33,4 @@ pub use options::{GraphError, GraphOptions, Prune};
 pub use orient::{Decision, Orientation, OrientedPart, Sides, orient};
 pub use sanity::Flaw;
 pub use sections::{GraphMeta, LoadError};
+pub use surface_graph::{Samples, SurfaceGraph, SurfaceGraphMeta};

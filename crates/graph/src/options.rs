@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::Paths;
+
 /// r of the r-SIG: more would join what lies beside each other on no surface.
 const NEIGHBOURS: std::ops::RangeInclusive<u32> = 1..=32;
 
@@ -32,11 +34,13 @@ pub struct GraphOptions {
     pub neighbours: u32,
     /// What becomes of long edges. Default: [`Prune::Quartiles`] with k = 1.
     pub prune: Prune,
+    /// Whether the map of close pairs is made, and what of its paths is kept. Default: made, paths rebuilt.
+    pub close_pairs: Option<Paths>,
 }
 
 impl Default for GraphOptions {
     fn default() -> Self {
-        Self { neighbours: 4, prune: Prune::Quartiles(1.0) }
+        Self { neighbours: 4, prune: Prune::Quartiles(1.0), close_pairs: Some(Paths::Rebuilt) }
     }
 }
 
@@ -51,6 +55,12 @@ impl GraphOptions {
     #[must_use]
     pub const fn with_prune(self, prune: Prune) -> Self {
         Self { prune, ..self }
+    }
+
+    /// The same options with this map of close pairs, or none.
+    #[must_use]
+    pub const fn with_close_pairs(self, close_pairs: Option<Paths>) -> Self {
+        Self { close_pairs, ..self }
     }
 
     /// Checks every range.

@@ -4,7 +4,7 @@ use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
 use nearmiss_store::Array;
 use nearmiss_surface::{PointBlock, SurfacePlan};
 
-use crate::boxes::OrientedBox;
+use crate::boxes::{OrientedBox, dot};
 use crate::covering::{Covering, Ground, Solid, coverings};
 use crate::enclosure::{LeafBounds, growths};
 use crate::gather::Index;
@@ -35,6 +35,7 @@ pub struct PointHierarchy {
     pub(crate) leaf_size: u32,
     pub(crate) radius_neighbours: u32,
     pub(crate) samples_a_node: u32,
+    pub(crate) is_oriented: bool,
     pub(crate) plan: SurfacePlan,
     pub(crate) positions: Array<[f32; 3]>,
     pub(crate) normals: Array<[f32; 3]>,
@@ -60,7 +61,7 @@ pub struct PointHierarchy {
 pub struct Slices<'a> {
     /// Positions in leaf order.
     pub positions: &'a [[f32; 3]],
-    /// Unit normals.
+    /// Unit normals; see [`PointHierarchy::normals`].
     pub normals: &'a [[f32; 3]],
     /// Local sampling radii.
     pub radii: &'a [f32],
@@ -224,10 +225,33 @@ impl PointHierarchy {
         &self.positions
     }
 
-    /// Unit normals; within a leaf all on the side of its cone's axis.
+    /// Unit normals: of either sign, within a leaf all on the side of its cone's axis, until they
+    /// [are turned](Self::turn_normals).
     #[must_use]
     pub fn normals(&self) -> &[[f32; 3]] {
         &self.normals
+    }
+
+    /// Whether neighbouring normals are on the same side.
+    #[must_use]
+    pub fn is_oriented(&self) -> bool {
+        self.is_oriented
+    }
+
+    /// Turns normals round that `oriented`, which differs from them in signs alone, has the other way. So neighbours are on
+    /// the same side afterwards, as a graph over the points can tell it; f takes its sign from them ([`Self::evaluate_oriented_with`]),
+    /// and no box, nor any verdict, depends on it.
+    ///
+    /// # Panics
+    /// When there is not one for each point.
+    pub fn turn_normals(&mut self, oriented: &[[f32; 3]]) {
+        assert_eq!(oriented.len(), self.len(), "a normal a point");
+        for (normal, to) in self.normals.to_mut().iter_mut().zip(oriented) {
+            if dot(*normal, *to) < 0.0 {
+                *normal = normal.map(|c| -c);
+            }
+        }
+        self.is_oriented = true;
     }
 
     /// Local sampling radii r_i.
@@ -376,6 +400,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         leaf_size: options.leaf_size,
         radius_neighbours: options.radius_neighbours,
         samples_a_node: options.samples,
+        is_oriented: false,
         plan,
         positions: positions.into(),
         normals: normals.into(),

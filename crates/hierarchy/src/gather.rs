@@ -199,6 +199,36 @@ impl PointHierarchy {
         self.index().evaluate(x, scratch)
     }
 
+    /// As [`Self::evaluate_with`], with n, and so the sign of f, on the side of Σ wᵢ nᵢ, the stored normals of the points
+    /// that reach x: positive below the surface. Where these disagree, as between two sheets, the place is ambiguous;
+    /// unless they [are oriented](Self::is_oriented) all is as there.
+    pub fn evaluate_oriented_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        let at = self.evaluate_with(x, scratch);
+        if !self.is_oriented || at.support == 0 {
+            return at;
+        }
+        self.index().collect(Centre::new(x).rounded(), 0.0, &mut scratch.found);
+        let (blocks, normals): (&[PointBlock], &[[f32; 3]]) = (&self.blocks, &self.normals);
+        let (mut sum, mut total) = ([0.0; 3], 0.0);
+        for &group in &scratch.found {
+            let first = group as usize * GROUP;
+            for (i, normal) in (first..).zip(&normals[first..(first + GROUP).min(normals.len())]) {
+                let (block, lane) = (&blocks[i / PointBlock::WIDTH], i % PointBlock::WIDTH);
+                let d = [0, 1, 2].map(|k| f64::from(block.position[k][lane]) - x[k]);
+                let t = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * f64::from(block.decay[lane]);
+                if t < f64::from(self.plan.reach_sq()) {
+                    #[expect(clippy::cast_possible_truncation, reason = "weights are single precision")]
+                    let w = f64::from(self.plan.kernel().weight(t as f32));
+                    total += w;
+                    for (sum, n) in sum.iter_mut().zip(normal) {
+                        *sum += w * f64::from(*n);
+                    }
+                }
+            }
+        }
+        at.turned_to(sum, total)
+    }
+
     /// f at `x`, in the stored frame; allocates a scratch of its own.
     #[must_use]
     pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {

@@ -37,6 +37,7 @@ pub struct HierarchyMeta {
     leaf_size: u32,
     radius_neighbours: u32,
     samples: u32,
+    is_oriented: bool,
     surface: SurfaceOptions,
 }
 
@@ -68,6 +69,7 @@ impl PointHierarchy {
             leaf_size: self.leaf_size,
             radius_neighbours: self.radius_neighbours,
             samples: self.samples_a_node,
+            is_oriented: self.is_oriented,
             surface: *self.plan.options(),
         }
     }
@@ -113,6 +115,7 @@ impl PointHierarchy {
             leaf_size: meta.leaf_size,
             radius_neighbours: meta.radius_neighbours,
             samples_a_node: meta.samples,
+            is_oriented: meta.is_oriented,
             plan: SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale)?,
             positions: file.array(POSITIONS, 0)?,
             normals: file.array(NORMALS, 0)?,

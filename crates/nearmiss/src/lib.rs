@@ -18,6 +18,7 @@ pub use nearmiss_store as store;
 pub use nearmiss_surface as surface;
 
 pub use nearmiss_geometry::{Aabb, CloudError, PointCloud, PointId, Pose, PoseError, TriangleMesh};
+pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
 pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Budget, CollideOptions, CollidePlan, CollideScratch, Contact,
@@ -27,4 +28,4 @@ pub use nearmiss_query::{
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Status, SurfaceOptions};
-pub use scan::{LoadError, SaveError, Scan};
+pub use scan::{LoadError, SaveError, Scan, ScanError};

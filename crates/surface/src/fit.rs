@@ -164,6 +164,22 @@ impl Moments {
     }
 }
 
+/// Oriented normals whose weighted mean is shorter than this are of more than one sheet.
+const AGREEMENT: f64 = 0.5;
+
+impl Evaluation {
+    /// The same with n on the side of `sum`, the sum of oriented normals that weigh `total` together; ambiguous where these
+    /// are not of one side, |`sum`| < `total` / 2.
+    #[must_use]
+    pub fn turned_to(self, sum: [f64; 3], total: f64) -> Self {
+        let sum = Vector3::from(sum);
+        let sign = 1.0_f64.copysign(sum.dot(&Vector3::from(self.normal)));
+        let agree = sum.norm() >= AGREEMENT * total;
+        let status = if agree || self.status != Status::Ok { self.status } else { Status::Ambiguous };
+        Self { f: self.f * sign, normal: self.normal.map(|c| c * sign), status, ..self }
+    }
+}
+
 fn is_one_sheet([l1, l2, l3]: [f64; 3], h: f64) -> bool {
     l1 < SHEET_RATIO * 0.5 * h * h && l2 - l1 > EIGENVALUE_GAP * (l1 + l2 + l3)
 }

@@ -171,7 +171,7 @@ impl Leaf<'_> {
         }
         for i in 0..LANES {
             let aside = nx[i] * ax + ny[i] * ay + nz[i] * az;
-            sound[6][i] = u32::from(aside >= self.cone.cosine - NORMAL);
+            sound[6][i] = u32::from(aside.abs() >= self.cone.cosine - NORMAL);
         }
         sound[7] = self.in_box(p);
         sound

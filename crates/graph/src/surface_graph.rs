@@ -1,0 +1,225 @@
+//! All that a scan keeps of its graph.
+
+use std::sync::OnceLock;
+
+use bytemuck::{Pod, Zeroable};
+use nearmiss_store::{Array, Check, File, WriteError, Writer};
+use nearmiss_surface::SurfacePlan;
+use serde::{Deserialize, Serialize};
+
+use crate::orient::{Decision, OrientedPart, Sides, orient};
+use crate::{
+    ClosePairs, Flaw, GeodesicKernel, GraphCounts, GraphError, GraphMeta, GraphOptions, Levels, LoadError,
+    Network, PointGraph, edge_lengths,
+};
+
+const CONFIDENCE: [u8; 4] = *b"CNFD";
+const PARTS: [u8; 4] = *b"PART";
+
+/// The samples of a surface that a graph is made of, in the order of the hierarchy's leaves.
+#[derive(Debug, Clone, Copy)]
+pub struct Samples<'a> {
+    /// What defines the surface.
+    pub plan: &'a SurfacePlan,
+    /// Where they are.
+    pub positions: &'a [[f32; 3]],
+    /// Their local sampling radii.
+    pub radii: &'a [f32],
+}
+
+impl Samples<'_> {
+    fn horizons(&self) -> Vec<f32> {
+        self.radii.iter().map(|&r| self.plan.horizon(r)).collect()
+    }
+}
+
+/// Who is whose neighbour on a surface, which side of it is out, and how far it is along it.
+#[derive(Debug, Clone)]
+pub struct SurfaceGraph {
+    points: PointGraph,
+    confidence: Array<u8>,
+    parts: Array<StoredPart>,
+    close_pairs: Option<ClosePairs>,
+    levels: Levels,
+    /// Made when first wanted.
+    lengths: OnceLock<Vec<f32>>,
+}
+
+/// What is stored of a graph beside arrays.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SurfaceGraphMeta {
+    points: GraphMeta,
+    has_close_pairs: bool,
+}
+
+/// A part as it is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+struct StoredPart {
+    first: u32,
+    points: u32,
+    /// 1 if orientable, and twice the number of the decision.
+    flags: u32,
+}
+
+/// By number.
+const DECISIONS: [Decision; 4] =
+    [Decision::Normals, Decision::Scanner, Decision::Volume, Decision::Convention];
+
+impl StoredPart {
+    fn of(part: &OrientedPart) -> Self {
+        let decision = (0..).zip(DECISIONS).find_map(|(i, d)| (d == part.decision).then_some(i)).unwrap_or(3);
+        Self { first: part.first, points: part.points, flags: u32::from(part.orientable) | decision << 1 }
+    }
+
+    fn part(self) -> OrientedPart {
+        let decision = DECISIONS.get(self.flags as usize >> 1).copied().unwrap_or(Decision::Convention);
+        OrientedPart { first: self.first, points: self.points, orientable: self.flags & 1 != 0, decision }
+    }
+}
+
+impl SurfaceGraph {
+    /// The graph of `samples`, whose `normals`, of any sign, are turned so that they agree along it, and outwards as far as
+    /// that can be told (see [`orient`]). O(n log n), on all cores with the feature `rayon`; the same on any number of them.
+    ///
+    /// # Errors
+    /// When an option is out of range, a coordinate is no number that can be squared, or there is too much to number.
+    ///
+    /// # Panics
+    /// When there is not a radius and a normal for each point, and one of its own if `sides` has these.
+    pub fn build(
+        samples: Samples<'_>,
+        sides: Sides<'_>,
+        normals: &mut [[f32; 3]],
+        options: &GraphOptions,
+    ) -> Result<Self, GraphError> {
+        let points = PointGraph::build(samples.positions, options)?;
+        let oriented = orient(points.edges(), samples.positions, samples.radii, sides, normals);
+        let lengths = edge_lengths(points.edges(), samples.positions);
+        let network = Network::new(points.edges(), &lengths);
+        let close_pairs =
+            options.close_pairs.map(|paths| ClosePairs::build(network, &samples.horizons(), paths));
+        let levels = Levels::build(network, samples.radii);
+        let parts: Vec<StoredPart> = oriented.parts.iter().map(StoredPart::of).collect();
+        Ok(Self {
+            points,
+            confidence: oriented.confidence.into(),
+            parts: parts.into(),
+            close_pairs,
+            levels,
+            lengths: lengths.into(),
+        })
+    }
+
+    /// Who is joined to whom.
+    #[must_use]
+    pub fn points(&self) -> &PointGraph {
+        &self.points
+    }
+
+    /// For each point 255 where the side of its normal is certain, 0 where it might as well be the other.
+    #[must_use]
+    pub fn confidence(&self) -> &[u8] {
+        &self.confidence
+    }
+
+    /// The parts that edges connect, by their first points.
+    pub fn parts(&self) -> impl ExactSizeIterator<Item = OrientedPart> {
+        self.parts.iter().map(|part| part.part())
+    }
+
+    /// The map of close pairs, if it was asked for.
+    #[must_use]
+    pub fn close_pairs(&self) -> Option<&ClosePairs> {
+        self.close_pairs.as_ref()
+    }
+
+    /// Coarser graphs over ever fewer of the points.
+    #[must_use]
+    pub fn levels(&self) -> &Levels {
+        &self.levels
+    }
+
+    /// The edges with their lengths, for searches; these are made when first wanted.
+    #[must_use]
+    pub fn network(&self, positions: &[[f32; 3]]) -> Network<'_> {
+        let lengths = self.lengths.get_or_init(|| edge_lengths(self.points.edges(), positions));
+        Network::new(self.points.edges(), lengths)
+    }
+
+    /// The geodesic kernel over these samples, if there is a map of close pairs.
+    ///
+    /// # Panics
+    /// When these are not the samples that the graph is of.
+    #[must_use]
+    pub fn kernel<'a>(&'a self, samples: Samples<'a>) -> Option<GeodesicKernel<'a>> {
+        let Samples { plan, positions, radii } = samples;
+        let pairs = self.close_pairs.as_ref()?;
+        Some(GeodesicKernel::new(plan, positions, radii, self.points.edges(), pairs))
+    }
+
+    /// How many there are of what.
+    #[must_use]
+    pub fn counts(&self) -> GraphCounts {
+        self.points.counts()
+    }
+
+    /// Bytes of all its arrays: of the graph with its orientation, of the map, and of the levels.
+    #[must_use]
+    pub fn byte_lens(&self) -> [usize; 3] {
+        let graph = self.points.bytes() + self.confidence.len() + size_of_val::<[_]>(&self.parts);
+        [graph, self.close_pairs.as_ref().map_or(0, ClosePairs::byte_len), self.levels.byte_len()]
+    }
+
+    /// What is stored beside the arrays.
+    #[must_use]
+    pub fn meta(&self) -> SurfaceGraphMeta {
+        SurfaceGraphMeta { points: self.points.meta(), has_close_pairs: self.close_pairs.is_some() }
+    }
+
+    /// Adds the arrays to a container.
+    ///
+    /// # Errors
+    /// When the container has sections of these names already.
+    pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
+        self.points.add_to(writer)?;
+        writer.section(CONFIDENCE, 0, &self.confidence)?.section(PARTS, 0, &self.parts)?;
+        if let Some(pairs) = &self.close_pairs {
+            pairs.add_to(writer, 0)?;
+        }
+        self.levels.add_to(writer)
+    }
+
+    /// The graph of `samples` in `file`, its arrays in place. With either `check` no use of it fails; with
+    /// [`Check::Full`] every number is one that a build writes.
+    ///
+    /// # Errors
+    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    pub fn load(
+        file: &File,
+        meta: SurfaceGraphMeta,
+        samples: Samples<'_>,
+        check: Check,
+    ) -> Result<Self, LoadError> {
+        let count = samples.positions.len();
+        let points = PointGraph::load(file, meta.points, count, check)?;
+        let confidence: Array<u8> = file.array(CONFIDENCE, 0)?;
+        if confidence.len() != count {
+            let array = "the confidence of normals";
+            return Err(Flaw::Length { array, found: confidence.len(), expected: count }.into());
+        }
+        let parts: Array<StoredPart> = file.array(PARTS, 0)?;
+        let is_sound = |part: &StoredPart| {
+            let known = part.flags as usize >> 1 < DECISIONS.len();
+            known && points.components().get(part.first as usize) == Some(&part.first)
+        };
+        if let Some(index) = parts.iter().position(|part| !is_sound(part)) {
+            return Err(Flaw::Value { what: "the side of part", index }.into());
+        }
+        let horizons = || samples.horizons();
+        let close_pairs =
+            meta.has_close_pairs.then(|| ClosePairs::load(file, 0, &horizons(), check)).transpose()?;
+        let levels = Levels::load(file, count, check)?;
+        Ok(Self { points, confidence, parts, close_pairs, levels, lengths: OnceLock::new() })
+    }
+}
