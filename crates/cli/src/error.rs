@@ -4,7 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nearmiss::io::ReadError;
-use nearmiss::{BuildError, LoadError, PlanError, SaveError};
+use nearmiss::{BuildError, GraphError, LoadError, PlanError, SaveError};
 use thiserror::Error;
 
 use crate::posing::PoseRefused;
@@ -42,6 +42,14 @@ pub enum CliError {
         path: PathBuf,
         /// Why not.
         cause: BuildError,
+    },
+    /// A graph could not be built.
+    #[error("{}: {cause}", path.display())]
+    Graph {
+        /// The input.
+        path: PathBuf,
+        /// Why not.
+        cause: GraphError,
     },
     /// A prepared scan could not be saved.
     #[error(transparent)]

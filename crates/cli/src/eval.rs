@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use nearmiss::graph::{GeodesicKernel, KernelScratch};
 use nearmiss::hierarchy::GatherScratch;
-use nearmiss::{Evaluation, Pose, Status};
+use nearmiss::{Evaluation, Pose, Scan, ScanView, Status};
 use serde::Serialize;
 
 use crate::console::{Console, Results};
@@ -21,9 +22,21 @@ pub struct EvalArgs {
     /// Where to evaluate: a point a line, x y z, in the frame of the scan's input
     #[arg(long, value_name = "FILE")]
     pub points: PathBuf,
+    /// How far points are from where f is asked for: straight, or along the surface by the graph
+    #[arg(long, value_enum, default_value_t = KernelName::Euclidean)]
+    pub kernel: KernelName,
     /// One object of JSON a line instead of sentences
     #[arg(long)]
     pub json: bool,
+}
+
+/// A metric, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum KernelName {
+    /// Straight distances
+    Euclidean,
+    /// Distances along the graph (needs a scan prepared with graph and close pairs)
+    Geodesic,
 }
 
 #[derive(Debug, Serialize)]
@@ -48,13 +61,16 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     if next.is_none() {
         return Err(lines.unfit("holds no points; a line is x y z"));
     }
-    let scan = input::open(&args.file, 0, Console::new(false))?;
-    let view = scan.at(&Pose::IDENTITY);
+    let console = Console::new(false);
+    let scan = match args.kernel {
+        KernelName::Euclidean => input::open(&args.file, 0, console)?,
+        KernelName::Geodesic => input::open_with_graph(&args.file, console)?,
+    };
     let unit = scan.sampling_radius() / 100.0;
-    let mut scratch = GatherScratch::default();
+    let mut f = Function::new(&scan, args)?;
     let mut results = Results::new();
     while let Some(x) = next {
-        let at = view.evaluate_with(x, &mut scratch);
+        let at = f.at(x);
         if args.json {
             let defined = at.status == Status::Ok;
             results.json(&Report {
@@ -70,6 +86,37 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
         next = next_point(&mut lines)?;
     }
     results.flush()
+}
+
+/// The implicit function of a scan.
+struct Function<'a> {
+    view: ScanView<'a>,
+    scratch: GatherScratch,
+    geodesic: Option<(GeodesicKernel<'a>, KernelScratch)>,
+}
+
+impl<'a> Function<'a> {
+    fn new(scan: &'a Scan, args: &EvalArgs) -> Result<Self, CliError> {
+        let geodesic = match args.kernel {
+            KernelName::Euclidean => None,
+            KernelName::Geodesic => {
+                let missing = || {
+                    let what = "this scan was prepared without a map of close pairs, along which the geodesic \
+                                kernel measures; prepare it again without `--no-close-pairs`";
+                    CliError::Unfit { path: args.file.clone(), what: what.into() }
+                };
+                Some((scan.geodesic_kernel().ok_or_else(missing)?, KernelScratch::default()))
+            }
+        };
+        Ok(Self { view: scan.at(&Pose::IDENTITY), scratch: GatherScratch::default(), geodesic })
+    }
+
+    fn at(&mut self, x: [f64; 3]) -> Evaluation {
+        match &mut self.geodesic {
+            None => self.view.evaluate_with(x, &mut self.scratch),
+            Some((kernel, scratch)) => self.view.evaluate_by(kernel, x, scratch),
+        }
+    }
 }
 
 fn sentence(at: &Evaluation, unit: f64) -> String {

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nearmiss::Scan;
 use nearmiss::geometry::Frame;
+use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss::graph::{ClosePairs, PointGraph};
 use nearmiss::io::{Column, PlyPoints, WriteError};
 
 use crate::console::Console;
@@ -14,7 +16,7 @@ use crate::{input, output, report};
 
 /// Options of `export`. At least one output is asked for.
 #[derive(Debug, Clone, Args)]
-#[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "samples", "boxes", "radii"]))]
+#[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "samples", "boxes", "radii", "edges", "close_pairs"]))]
 #[command(group = clap::ArgGroup::new("levelled").multiple(true).args(["samples", "boxes"]))]
 pub struct ExportArgs {
     /// Prepared scan, or a raw input, prepared on the fly
@@ -32,20 +34,44 @@ pub struct ExportArgs {
     /// Sampling radius and bandwidth of each point: i,r,h
     #[arg(long, value_name = "R.csv")]
     pub radii: Option<PathBuf>,
+    /// Edges of the graph: i,j,length,virtual with i < j, indices into the exported points; virtual is 1 for those too long for
+    /// the surface
+    #[arg(long, value_name = "E.csv")]
+    pub edges: Option<PathBuf>,
+    /// Points that are heard at each point i: i,j,distance along the graph, nearest first
+    #[arg(long, value_name = "C.csv")]
+    pub close_pairs: Option<PathBuf>,
     /// Only nodes at this depth, the root's being 0, and leaves above it
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
 }
 
 pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
-    let outputs = [&args.points, &args.samples, &args.boxes, &args.radii].map(Option::as_ref);
+    let outputs = [&args.points, &args.samples, &args.boxes, &args.radii, &args.edges, &args.close_pairs]
+        .map(Option::as_ref);
     for (i, path) in outputs.iter().enumerate().filter_map(|(i, p)| p.map(|p| (i, p))) {
         output::check_apart(path, &[&args.file])?;
         if outputs[..i].contains(&Some(path)) {
             return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
         }
     }
-    let scan = input::open(&args.file, 0, Console::new(false))?;
+    let console = Console::new(false);
+    let scan = if args.edges.is_some() || args.close_pairs.is_some() {
+        input::open_with_graph(&args.file, console)?
+    } else {
+        input::open(&args.file, 0, console)?
+    };
+    if let (Some(path), Some(graph)) = (&args.edges, scan.graph()) {
+        output::replace_plain(path, |out| edges(&scan, graph.points(), out))?;
+    }
+    if let (Some(path), Some(graph)) = (&args.close_pairs, scan.graph()) {
+        let Some(pairs) = graph.close_pairs() else {
+            let what = "this scan was prepared without a map of close pairs; prepare it again without \
+                        `--no-close-pairs`";
+            return Err(CliError::Unfit { path: args.file.clone(), what: what.into() });
+        };
+        output::replace_plain(path, |out| close_pairs(&scan, pairs, out))?;
+    }
     if let Some(path) = &args.points {
         output::replace(path, |out| points(&scan, out).map_err(|e| refused(path, e)))?;
     }
@@ -153,6 +179,32 @@ fn radii(scan: &Scan, out: &mut impl Write) -> io::Result<()> {
     for (i, &r) in scan.radii().iter().enumerate() {
         let h = f64::from(scan.plan().bandwidth(r)) * scale;
         writeln!(out, "{i},{},{h}", f64::from(r) * scale)?;
+    }
+    Ok(())
+}
+
+fn edges(scan: &Scan, graph: &PointGraph, out: &mut impl Write) -> io::Result<()> {
+    let scale = scan.frame().scale;
+    let length = |[i, j]: [u32; 2]| {
+        let [p, q] = [i, j].map(|i| Vector3::from(scan.positions()[i as usize].map(f64::from)));
+        (p - q).norm() * scale
+    };
+    writeln!(out, "i,j,length,virtual")?;
+    for (mark, edges) in [(0, graph.edges()), (1, graph.virtual_edges())] {
+        for [i, j] in edges.edges() {
+            writeln!(out, "{i},{j},{},{mark}", length([i, j]))?;
+        }
+    }
+    Ok(())
+}
+
+fn close_pairs(scan: &Scan, pairs: &ClosePairs, out: &mut impl Write) -> io::Result<()> {
+    let scale = scan.frame().scale;
+    writeln!(out, "i,j,distance")?;
+    for i in 0..pairs.len() {
+        for close in pairs.of(i) {
+            writeln!(out, "{i},{},{}", close.point, f64::from(close.distance) * scale)?;
+        }
     }
     Ok(())
 }

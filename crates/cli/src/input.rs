@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use nearmiss::io::{Format, Model};
-use nearmiss::{BuildOptions, Check, Scan};
+use nearmiss::{BuildOptions, Check, GraphOptions, Scan};
 
 use crate::console::{self, Console};
 use crate::digits::short;
@@ -53,6 +53,33 @@ pub(crate) fn open(path: &Path, threads: usize, console: Console) -> Result<Scan
     let scan = build(path, &model, &BuildOptions::default().with_threads(threads))?;
     drop(bar);
     Ok(scan)
+}
+
+/// As [`open`], for what cannot do without a graph.
+pub(crate) fn open_with_graph(path: &Path, console: Console) -> Result<Scan, CliError> {
+    if is_prepared(path) {
+        let scan = open(path, 0, console)?;
+        if scan.graph().is_none() {
+            let what = "this scan was prepared without a graph; prepare it again without `--no-graph`";
+            return Err(CliError::Unfit { path: path.to_owned(), what: what.into() });
+        }
+        return Ok(scan);
+    }
+    let model = read(path, None)?;
+    let scan = build(path, &model, &BuildOptions::default())?;
+    with_graph(path, scan, &model, &GraphOptions::default(), None)
+}
+
+/// The scan with a graph over its points.
+pub(crate) fn with_graph(
+    path: &Path,
+    scan: Scan,
+    model: &Model,
+    options: &GraphOptions,
+    scanner: Option<[f64; 3]>,
+) -> Result<Scan, CliError> {
+    scan.with_graph(&model.cloud, options, scanner)
+        .map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
 }
 
 /// Reads a raw input.

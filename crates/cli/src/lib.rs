@@ -38,14 +38,14 @@ pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
 pub use collide::{CollideArgs, DetailName, EvidenceName};
 pub use error::CliError;
-pub use eval::EvalArgs;
+pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
 pub use inspect::InspectArgs;
 pub use level::level_picture;
 pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
 pub use posing::PoseRefused;
-pub use preprocess::{FormatChoice, PreprocessArgs, WeightName};
+pub use preprocess::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
 pub use search::{MethodName, OrderName, SearchArgs};
 
 /// Whether, where and how near scanned things meet, straight from their points.

@@ -4,14 +4,15 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use nearmiss::io::Format;
-use nearmiss::{Bandwidth, BuildOptions, Kernel, SurfaceOptions};
+use nearmiss::{Bandwidth, BuildOptions, GraphOptions, Kernel, Paths, SurfaceOptions};
 use serde::Serialize;
 
 use crate::advice::health;
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
+use crate::input::{self, pieces};
+use crate::output;
 use crate::report::ScanReport;
-use crate::{input, output};
 
 /// Options of `preprocess`.
 #[derive(Debug, Clone, Args)]
@@ -36,6 +37,21 @@ pub struct PreprocessArgs {
     /// Points in a leaf of the hierarchy, 4 to 64
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(4..=64))]
     pub leaf: u32,
+    /// R: two points are neighbours if the spheres about them that reach their R-th nearest points meet; 1 to 32
+    #[arg(long, value_name = "R", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=32))]
+    pub neighbours: u32,
+    /// No graph: normals keep either sign, and nothing is known of distances along the surface
+    #[arg(long, conflicts_with_all = ["neighbours", "paths", "no_close_pairs", "scanner"])]
+    pub no_graph: bool,
+    /// No map of close pairs, which takes most of the file; the geodesic kernel needs it
+    #[arg(long, conflicts_with = "paths")]
+    pub no_close_pairs: bool,
+    /// Whether shortest paths are stored, a byte a pair, or rebuilt when wanted
+    #[arg(long, value_enum, default_value_t = PathsName::Rebuilt)]
+    pub paths: PathsName,
+    /// Where the scanner stood, in the frame of the input: normals are turned towards it
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse_place)]
+    pub scanner: Option<Place>,
     /// Threads to work on, 0 for all cores; the result is the same
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub threads: usize,
@@ -61,6 +77,30 @@ pub enum WeightName {
     Gaussian,
     /// Wendland's C² function, zero from a finite distance on
     Wendland,
+}
+
+/// What becomes of shortest paths, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PathsName {
+    /// Kept in the file
+    Stored,
+    /// Found again when wanted
+    Rebuilt,
+}
+
+/// A place in the frame of the input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place(
+    /// Its coordinates.
+    pub [f64; 3],
+);
+
+fn parse_place(text: &str) -> Result<Place, String> {
+    let numbers: Vec<f64> = pieces(text).map_while(|piece| piece.parse().ok()).collect();
+    match <[f64; 3]>::try_from(numbers) {
+        Ok(place) if pieces(text).count() == 3 && place.iter().all(|c| c.is_finite()) => Ok(Place(place)),
+        _ => Err("expected three numbers, x,y,z".into()),
+    }
 }
 
 fn parse_format(name: &str) -> Result<FormatChoice, String> {
@@ -122,12 +162,22 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     let hierarchy = start.elapsed().as_secs_f64();
 
     let start = now();
+    let scan = match graph_options(args) {
+        Some((options, scanner)) => {
+            let _bar = console.spinner(format_args!("joining {} points", scan.len()));
+            input::with_graph(&args.input, scan, &model, &options, scanner)?
+        }
+        None => scan,
+    };
+    let graph = start.elapsed().as_secs_f64();
+
+    let start = now();
     let bar = console.spinner(format_args!("writing {}", args.output.display()));
     let bytes = scan.save(&args.output)?;
     drop(bar);
     let write = start.elapsed().as_secs_f64();
 
-    let seconds = Seconds { read, hierarchy, graph: 0.0, write };
+    let seconds = Seconds { read, hierarchy, graph, write };
     let report = Report { scan: ScanReport::new(&scan, bytes), seconds };
     let mut results = Results::new();
     if args.json {
@@ -136,9 +186,10 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
         for line in report.scan.lines() {
             results.line(line)?;
         }
-        let Seconds { read, hierarchy, write, .. } = report.seconds;
-        results
-            .line(format_args!("seconds    read {read:.2}, hierarchy {hierarchy:.2}, write {write:.2}"))?;
+        let Seconds { read, hierarchy, graph, write } = report.seconds;
+        results.line(format_args!(
+            "seconds    read {read:.2}, hierarchy {hierarchy:.2}, graph {graph:.2}, write {write:.2}"
+        ))?;
         for line in health(&scan) {
             results.line(line)?;
         }
@@ -156,4 +207,18 @@ fn options(args: &PreprocessArgs) -> BuildOptions {
         .with_radius_neighbours(args.radius_neighbours)
         .with_leaf_size(args.leaf)
         .with_threads(args.threads)
+}
+
+/// What graph is wanted, if any, and where the scanner stood.
+fn graph_options(args: &PreprocessArgs) -> Option<(GraphOptions, Option<[f64; 3]>)> {
+    if args.no_graph {
+        return None;
+    }
+    let paths = match args.paths {
+        PathsName::Stored => Paths::Stored,
+        PathsName::Rebuilt => Paths::Rebuilt,
+    };
+    let pairs = (!args.no_close_pairs).then_some(paths);
+    let options = GraphOptions::default().with_neighbours(args.neighbours).with_close_pairs(pairs);
+    Some((options, args.scanner.map(|place| place.0)))
 }

@@ -1,9 +1,10 @@
 //! What scripts are told, the fields of the JSON lines, and the same in rows for people.
 
-use nearmiss::{Answer, Evidence, PointKind, Reason, Scan, Verdict};
+use nearmiss::graph::ClosePairs;
+use nearmiss::{Answer, Evidence, PointKind, Reason, Scan, SurfaceGraph, Verdict};
 use serde::Serialize;
 
-use crate::digits::{bytes, count, place, short};
+use crate::digits::{bytes, count, percent, place, short};
 
 /// What a prepared scan holds.
 #[derive(Debug, Serialize)]
@@ -24,8 +25,40 @@ pub(crate) struct ScanReport {
     bytes_per_node: f64,
     usable: f64,
     kinds: KindsReport,
-    /// None is built yet.
-    graph: Option<()>,
+    /// If there is one.
+    graph: Option<GraphReport>,
+}
+
+/// What a graph holds.
+#[derive(Debug, Serialize)]
+struct GraphReport {
+    edges: usize,
+    virtual_edges: usize,
+    components: usize,
+    close_pairs: usize,
+    border: f64,
+    /// Share of the points whose normals are on one side for certain.
+    oriented: f64,
+}
+
+/// From this confidence on a normal's side is certain.
+const CERTAIN: u8 = 128;
+
+impl GraphReport {
+    #[expect(clippy::cast_precision_loss, reason = "statistics")]
+    fn new(graph: &SurfaceGraph) -> Self {
+        let counts = graph.counts();
+        let certain = graph.confidence().iter().filter(|&&confidence| confidence >= CERTAIN).count();
+        let share = |count: usize| count as f64 / counts.points as f64;
+        Self {
+            edges: counts.edges,
+            virtual_edges: counts.virtual_edges,
+            components: counts.components,
+            close_pairs: graph.close_pairs().map_or(0, ClosePairs::pair_count),
+            border: share(counts.border),
+            oriented: share(certain),
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -76,7 +109,7 @@ impl ScanReport {
                 isolated: scan.share(PointKind::Isolated),
                 ambiguous: scan.share(PointKind::Ambiguous),
             },
-            graph: None,
+            graph: scan.graph().map(GraphReport::new),
         }
     }
 
@@ -102,6 +135,19 @@ impl ScanReport {
             format!(
                 "hierarchy  {} nodes, {} leaves, mean depth {:.1}",
                 self.nodes, self.leaves, self.depth_mean
+            ),
+            self.graph.as_ref().map_or_else(
+                || "graph      none".to_owned(),
+                |graph| {
+                    format!(
+                        "graph      {} edges, {} virtual, {} components, {} close pairs, {} of the normals oriented",
+                        graph.edges,
+                        graph.virtual_edges,
+                        graph.components,
+                        graph.close_pairs,
+                        percent(graph.oriented)
+                    )
+                },
             ),
             format!(
                 "file       {}, {:.0} bytes a point",

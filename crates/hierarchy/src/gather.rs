@@ -229,10 +229,47 @@ impl PointHierarchy {
         at.turned_to(sum, total)
     }
 
+    /// The stored point that is nearest to `x`, in the stored frame; of equally near ones the first.
+    #[must_use]
+    pub fn nearest_point(&self, x: [f64; 3]) -> u32 {
+        let place = Centre::new(x).rounded();
+        let distance_sq = |p: [f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
+        let (nodes, boxes, positions): (&[Node], &[OrientedBox], &[[f32; 3]]) =
+            (&self.nodes, &self.boxes, &self.positions);
+        // Boxes hold the points; how far off they are is told in single precision.
+        let lost = place.iter().fold(self.bounds_radius(), |far, c| far.max(f64::from(c.abs()))) * 4e-6;
+        let bound = |id: usize| (f64::from(boxes[id].distance_sq(place).sqrt()) - lost).max(0.0).powi(2);
+        let mut best = (f64::INFINITY, 0);
+        let mut stack = vec![(0.0, 0_usize)];
+        while let Some((least, id)) = stack.pop() {
+            let node = &nodes[id];
+            if least > best.0 {
+                continue;
+            }
+            if node.is_leaf() {
+                for i in node.points() {
+                    let own = (distance_sq(positions[i]), i);
+                    best = if own < best { own } else { best };
+                }
+                continue;
+            }
+            let [left, right] = [id + 1, node.right as usize].map(|id| (bound(id), id));
+            let (near, far) = if left.0 <= right.0 { (left, right) } else { (right, left) };
+            stack.extend([far, near]);
+        }
+        id32(best.1)
+    }
+
     /// f at `x`, in the stored frame; allocates a scratch of its own.
     #[must_use]
     pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
         self.evaluate_with(x, &mut GatherScratch::default())
+    }
+
+    /// No stored coordinate is greater.
+    fn bounds_radius(&self) -> f64 {
+        let OrientedBox { centre, .. } = self.boxes[0];
+        f64::from(self.boxes[0].radius()) + f64::from(centre.iter().fold(0.0_f32, |far, c| far.max(c.abs())))
     }
 
     pub(crate) fn index(&self) -> Index<'_> {

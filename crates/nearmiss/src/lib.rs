@@ -28,4 +28,4 @@ pub use nearmiss_query::{
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Status, SurfaceOptions};
-pub use scan::{LoadError, SaveError, Scan, ScanError};
+pub use scan::{LoadError, SaveError, Scan};

@@ -1,6 +1,7 @@
 //! A prepared scan somewhere in the world.
 
 use nearmiss_geometry::Pose;
+use nearmiss_graph::{GeodesicKernel, KernelScratch};
 use nearmiss_hierarchy::{GatherScratch, PointHierarchy, Slices};
 use nearmiss_surface::Evaluation;
 
@@ -50,9 +51,29 @@ impl<'a> ScanView<'a> {
         self.placed.apply(self.slices.positions[i].map(f64::from))
     }
 
-    /// The implicit function at `x`, all in the world; the sign of f and of the normal as in the stored frame.
+    /// The implicit function at `x`, all in the world; the sign of f and of the normal as in the stored frame, from oriented normals if
+    /// the scan has them.
     pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        self.in_world(self.scan.evaluate_with(self.placed.apply_inverse(x), scratch))
+        self.in_world(self.scan.evaluate_oriented_with(self.placed.apply_inverse(x), scratch))
+    }
+
+    /// The same with distances along the graph of this scan, that of `kernel`; outside further than the greatest horizon from all points.
+    /// The sign is that of the nearest point's normal (Klein & Zachmann 2005, §3.2).
+    pub fn evaluate_by(
+        &self,
+        kernel: &GeodesicKernel<'_>,
+        x: [f64; 3],
+        scratch: &mut KernelScratch,
+    ) -> Evaluation {
+        let x = self.placed.apply_inverse(x);
+        let nearest = self.scan.nearest_point(x);
+        let at = kernel.evaluate(x, nearest, scratch);
+        let at = if self.scan.is_oriented() {
+            at.turned_to(self.slices.normals[nearest as usize].map(f64::from), 1.0)
+        } else {
+            at
+        };
+        self.in_world(at)
     }
 
     /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`.
