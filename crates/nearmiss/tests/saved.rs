@@ -2,12 +2,19 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::store::Fault;
-use nearmiss::{BuildOptions, Check, PointCloud, Scan};
+use nearmiss::{BuildOptions, Check, GraphOptions, Paths, PointCloud, Pose, Scan, Status, SurfaceGraph};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 fn small() -> Scan {
-    let points = arbitrary::cloud(CloudKind::Sphere, 100, 1);
-    Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+    let cloud = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 100, 1)).unwrap();
+    let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
+    scan.with_graph(&cloud, &GraphOptions::default(), None).unwrap()
+}
+
+fn bytes(scan: &Scan) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    scan.write_to(&mut bytes).unwrap();
+    bytes
 }
 
 fn same(a: &Scan, b: &Scan) {
@@ -21,6 +28,8 @@ fn same(a: &Scan, b: &Scan) {
     assert_eq!(a.boxes(), b.boxes(), "boxes");
     assert!(a.enclosures().eq(b.enclosures()), "enclosures");
     assert_eq!(a.cones(), b.cones(), "cones");
+    assert_eq!(a.graph().map(SurfaceGraph::counts), b.graph().map(SurfaceGraph::counts), "graph");
+    assert!(bytes(a) == bytes(b), "all of it");
 }
 
 #[test]
@@ -41,7 +50,7 @@ fn what_is_saved_is_what_opens() {
 
 #[test]
 fn golden_files_of_older_versions_are_refused_by_name() {
-    for version in [1, 2] {
+    for version in [1, 2, 3] {
         let path = format!("{}/tests/golden/sphere-v{version}.nm", env!("CARGO_MANIFEST_DIR"));
         let refused = Scan::open(path, Check::Full).unwrap_err().to_string();
         assert!(refused.contains(&format!("version {version}")) && refused.contains("prepare"), "{refused}");
@@ -49,11 +58,76 @@ fn golden_files_of_older_versions_are_refused_by_name() {
 }
 
 #[test]
-fn the_golden_file_of_version_three_opens() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v3.nm");
+fn the_golden_file_of_version_four_opens() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v4.nm");
     let golden = Scan::open(path, Check::Full).unwrap();
     assert_eq!(golden.sanity_check(), Ok(()), "a valid scan");
     same(&golden, &small());
+}
+
+/// Without a graph, with one and no map, with paths or without.
+#[test]
+fn a_graph_is_kept_as_it_was_asked_for() {
+    let cloud = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 500, 3)).unwrap();
+    let bare = Scan::build(&cloud, &BuildOptions::default()).unwrap();
+    assert!(bare.graph().is_none() && bare.geodesic_kernel().is_none() && !bare.is_oriented());
+    let mut sizes = vec![bytes(&bare).len()];
+    for pairs in [None, Some(Paths::Rebuilt), Some(Paths::Stored)] {
+        let options = GraphOptions::default().with_close_pairs(pairs);
+        let scan = bare.clone().with_graph(&cloud, &options, None).unwrap();
+        let bytes = bytes(&scan);
+        sizes.push(bytes.len());
+        for check in [Check::Full, Check::Structure] {
+            let read = Scan::from_bytes(bytes.clone(), check).unwrap();
+            same(&read, &scan);
+            assert_eq!(read.graph().unwrap().close_pairs().map(|map| map.paths()), pairs);
+            assert_eq!(read.geodesic_kernel().is_some(), pairs.is_some());
+            assert!(read.is_oriented(), "normals were turned");
+        }
+    }
+    assert!(sizes.is_sorted_by(|a, b| a < b), "{sizes:?}");
+}
+
+/// Whatever sign normals had: those of a closed surface point outwards, those of an open one to the scanner, or as the
+/// cloud's own; and f has their sign.
+#[test]
+fn normals_are_turned_outwards_to_the_scanner_or_as_given() {
+    let ball = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 2000, 5)).unwrap();
+    let scan = |cloud: &PointCloud, scanner| {
+        let scan = Scan::build(cloud, &BuildOptions::default()).unwrap();
+        scan.with_graph(cloud, &GraphOptions::default(), scanner).unwrap()
+    };
+    let outwards = |scan: &Scan| {
+        let along = |(p, n): (&[f32; 3], &[f32; 3])| (0..3).map(|k| p[k] * n[k]).sum::<f32>();
+        scan.positions().iter().zip(scan.normals()).filter(|&pair| along(pair) > 0.0).count()
+    };
+    let closed = scan(&ball, None);
+    assert_eq!(outwards(&closed), closed.len(), "out of the ball");
+    assert_eq!(outwards(&scan(&ball, Some([0.0; 3]))), 0, "to the scanner within");
+    #[expect(clippy::cast_possible_truncation, reason = "normals are single precision")]
+    let inwards: Vec<[f32; 3]> = (0..ball.len()).map(|i| ball.point(i).map(|c| -c as f32)).collect();
+    let given = ball.clone().with_normals(&inwards).unwrap();
+    assert_eq!(outwards(&scan(&given, Some([9.0, 0.0, 0.0]))), 0, "the cloud's own come first");
+
+    let view = closed.at(&Pose::IDENTITY);
+    let (mut scratch, mut geodesic) = (Default::default(), Default::default());
+    let (kernel, mut seen) = (closed.geodesic_kernel().unwrap(), 0);
+    for i in 0..closed.len() {
+        let p = closed.positions()[i].map(f64::from);
+        for share in [0.95, 1.03] {
+            let x = p.map(|c| c * share);
+            for at in [view.evaluate_with(x, &mut scratch), view.evaluate_by(&kernel, x, &mut geodesic)] {
+                // Beside a gap between samples there is no surface.
+                if at.status == Status::Ok {
+                    assert_eq!(at.f > 0.0, share < 1.0, "positive within: {at:?}");
+                    let along: f64 = (0..3).map(|k| at.normal[k] * p[k]).sum();
+                    assert!(along > 0.9 * p.iter().map(|c| c * c).sum::<f64>().sqrt(), "{at:?}");
+                    seen += 1;
+                }
+            }
+        }
+    }
+    assert!(seen > 7000, "{seen} places of 8000");
 }
 
 #[test]

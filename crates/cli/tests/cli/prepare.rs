@@ -17,7 +17,13 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
     assert_eq!(keys(report), sorted(&format!("{FIELDS} seconds")));
     assert_eq!(keys(&report["dropped"]), ["duplicate", "not_finite"]);
     assert_eq!(keys(&report["seconds"]), ["graph", "hierarchy", "read", "write"]);
-    assert!(report["graph"].is_null(), "no graph yet");
+    let graph = &report["graph"];
+    assert_eq!(keys(graph), sorted("edges virtual_edges components close_pairs border oriented"));
+    assert_eq!(graph["components"].as_u64(), Some(1), "{graph}");
+    let of_graph = |field: &str| graph[field].as_f64().unwrap() / report["points"].as_f64().unwrap();
+    assert!((6.0..12.0).contains(&of_graph("edges")), "{graph}");
+    assert!((30.0..80.0).contains(&of_graph("close_pairs")), "{graph}");
+    assert!(graph["oriented"].as_f64().unwrap() > 0.99, "{graph}");
     assert_eq!(done.errors, "", "nothing but results, off a terminal");
 
     let number = |field: &str| report[field].as_f64().unwrap();
@@ -40,10 +46,75 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
 
     let mut seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
     let version = seen.as_object_mut().unwrap().remove("format_version").unwrap();
-    assert_eq!(version.as_u64(), Some(3));
+    assert_eq!(version.as_u64(), Some(4));
     let mut told = report.clone();
     told.as_object_mut().unwrap().remove("seconds");
     assert_eq!(seen, told, "inspect sees what preprocess told");
+}
+
+#[test]
+fn a_graph_is_left_out_where_nobody_wants_it() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.1);
+    let mut sizes = Vec::new();
+    for asked in [&["--no-graph"][..], &["--no-close-pairs"], &[], &["--paths", "stored"]] {
+        let mut words = vec!["preprocess", "ball.xyz", "-o", "ball.nm", "--json"];
+        words.extend(asked);
+        let report = place.ok(&words).json().remove(0);
+        sizes.push(report["bytes"].as_u64().unwrap());
+        let seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
+        assert_eq!(seen["graph"], report["graph"], "{asked:?}");
+        assert_eq!(report["graph"].is_null(), asked == ["--no-graph"], "{asked:?}");
+    }
+    assert!(sizes.is_sorted_by(|a, b| a < b), "{sizes:?}");
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--no-graph"]);
+    place.refused(1, &["export", "ball.nm", "--edges", "e.csv"], &["ball.nm", "--no-graph"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--no-close-pairs"]);
+    for asked in [
+        &["export", "ball.nm", "--close-pairs", "c.csv"][..],
+        &["eval", "ball.nm", "--points", "ball.xyz", "--kernel", "geodesic"],
+    ] {
+        place.refused(1, asked, &["ball.nm", "--no-close-pairs"]);
+    }
+    place.refused(2, &["preprocess", "ball.xyz", "-o", "ball.nm", "--scanner", "1,2"], &["--scanner"]);
+    place.refused(
+        2,
+        &["preprocess", "ball.xyz", "-o", "b.nm", "--no-graph", "--paths", "stored"],
+        &["--paths"],
+    );
+}
+
+/// Edges and close pairs name exported points, and their lengths are those between these.
+#[test]
+fn edges_and_close_pairs_are_exported() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.1);
+    let asked = ["export", "ball.xyz", "--points", "p.ply", "--edges", "e.csv", "--close-pairs", "c.csv"];
+    place.ok(&asked);
+    let points = nearmiss::io::read(&place.path("p.ply"), None).unwrap().cloud;
+    let rows = |name: &str, header: &str| {
+        let text = std::fs::read_to_string(place.path(name)).unwrap();
+        let (first, rest) = text.split_once('\n').unwrap();
+        assert_eq!(first, header);
+        let row = |line: &str| line.split(',').map(|c| c.parse::<f64>().unwrap()).collect::<Vec<_>>();
+        rest.lines().map(row).collect::<Vec<_>>()
+    };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "indices")]
+    let straight = |i: f64, j: f64| {
+        let [p, q] = [i, j].map(|i| points.point(i as usize));
+        (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()
+    };
+    let edges = rows("e.csv", "i,j,length,virtual");
+    assert!(edges.len() > 5 * points.len(), "{} edges of {} points", edges.len(), points.len());
+    for edge in &edges {
+        assert!(edge[0] < edge[1] && (edge[3] == 0.0 || edge[3] == 1.0), "{edge:?}");
+        assert!((straight(edge[0], edge[1]) - edge[2]).abs() < 1e-5, "{edge:?}");
+    }
+    let pairs = rows("c.csv", "i,j,distance");
+    assert!(pairs.len() > 30 * points.len(), "{} pairs", pairs.len());
+    for pair in pairs.iter().step_by(17) {
+        assert!(pair[2] >= straight(pair[0], pair[1]) - 1e-5, "no way is shorter: {pair:?}");
+    }
 }
 
 #[test]
