@@ -17,7 +17,7 @@ use crate::options::{GraphError, GraphOptions, check_positions};
 type Point = GeomWithData<[f32; 3], u32>;
 type Ball = GeomWithData<Rectangle<[f32; 3]>, u32>;
 
-/// How much an update changed.
+/// How much an update changed. A move is a removal and an insertion: what both touch counts twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Touched {
     /// Points whose sphere of influence was found anew.

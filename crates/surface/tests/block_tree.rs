@@ -27,6 +27,14 @@ fn blocks(points: &[Point], horizon: impl Fn(usize) -> f32) -> Vec<PointBlock> {
     blocks
 }
 
+/// The instruction sets that can be chosen here.
+fn levels() -> Vec<Level> {
+    let mut levels = vec![Level::new(), Level::baseline()];
+    #[cfg(target_arch = "x86_64")]
+    levels.extend(Level::new().as_avx2().map(Level::Avx2));
+    levels
+}
+
 fn distance_sq(a: Point, b: Point) -> f32 {
     let [x, y, z] = [0, 1, 2].map(|k| a[k] - b[k]);
     x * x + y * y + z * z
@@ -44,7 +52,7 @@ fn compare_nearest(points: &[Point], counts: &[usize], what: &str) {
     let blocks = blocks(points, |_| 0.0);
     let tree = BlockTree::new(&blocks, points.len());
     let mut found = Nearest::default();
-    for level in [Level::new(), Level::baseline()] {
+    for level in levels() {
         for &count in counts {
             for block in 0..blocks.len() {
                 tree.nearest(level, block, count, &mut found);
@@ -90,7 +98,7 @@ fn compare_heard(points: &[Point], horizon: impl Fn(usize) -> f32, what: &str) {
     let blocks = blocks(points, &horizon);
     let tree = BlockTree::new(&blocks, points.len());
     let mut found = Heard::default();
-    for level in [Level::new(), Level::baseline()] {
+    for level in levels() {
         for block in 0..blocks.len() {
             tree.heard(level, block, &mut found);
             for lane in 0..16.min(points.len() - block * 16) {
