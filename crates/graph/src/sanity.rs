@@ -138,3 +138,42 @@ impl PointGraph {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lists(lists: [&[u32]; 4]) -> Adjacency {
+        let ends = lists.iter().scan(0, |end, list| {
+            *end += u32::try_from(list.len()).unwrap();
+            Some(*end)
+        });
+        let starts: Vec<u32> = std::iter::once(0).chain(ends).collect();
+        Adjacency { starts: starts.into(), neighbours: lists.concat().into() }
+    }
+
+    #[test]
+    fn lists_that_are_no_graph_are_refused() {
+        fn structure(of: [&[u32]; 4]) -> bool {
+            lists(of).check_structure(4, EDGES).is_ok()
+        }
+        assert!(structure([&[1, 2], &[0], &[0], &[]]), "a graph");
+        for wrong in [[1, 1], [2, 1], [0, 1], [1, 4]] {
+            assert!(!structure([&wrong, &[0], &[0], &[]]), "{wrong:?}");
+        }
+        let symmetric = |of| lists(of).check_symmetry(EDGES).is_ok();
+        assert!(symmetric([&[1, 2], &[0], &[0, 3], &[2]]), "a graph");
+        assert!(!symmetric([&[1], &[], &[3], &[2]]), "an edge with one end");
+        assert!(!symmetric([&[1], &[2], &[3], &[0]]), "as many edges in as out");
+    }
+
+    #[test]
+    fn starts_that_lead_astray_are_refused() {
+        for starts in
+            [vec![0, 2, 1, 2, 2], vec![1, 1, 1, 1, 2], vec![0, 3, 1, 1, 2], vec![0, 1, 2, 2], vec![]]
+        {
+            let adjacency = Adjacency { starts: starts.clone().into(), neighbours: vec![1, 0].into() };
+            assert!(adjacency.check_structure(4, EDGES).is_err(), "{starts:?}");
+        }
+    }
+}
