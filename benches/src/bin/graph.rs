@@ -11,9 +11,13 @@ use nearmiss::graph::{DynamicGraph, GraphOptions, PointGraph, Prune, Touched};
 use nearmiss::surface::{BlockTree, Level, Nearest, PointBlock};
 use nearmiss::{BuildOptions, PointHierarchy};
 use nearmiss_benches::clock::timed;
+use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, arguments::Arguments, machine};
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting::new();
 
 /// Prints the least time of `runs` of `work`, in nanoseconds a point.
 fn measure<T>(what: &str, points: usize, runs: usize, mut work: impl FnMut() -> T) -> T {
@@ -62,18 +66,21 @@ fn neighbours(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
 
 /// Building the graph on one thread, two, and so on.
 fn speed(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
-    println!("\n| threads | points/s |\n| --: | --: |");
+    println!("\n| threads | points/s | peak bytes a point |\n| --: | --: | --: |");
     let mut threads = 1;
     while threads <= std::thread::available_parallelism()?.get() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         let mut best = f64::INFINITY;
+        let before = ALLOCATOR.live();
+        ALLOCATOR.restart();
         for _ in 0..runs {
             let build = || PointGraph::build(positions, &GraphOptions::default());
             let (graph, time) = timed(|| pool.install(build));
             black_box(graph?);
             best = best.min(time.as_secs_f64());
         }
-        println!("| {threads} | {:.0} |", count(positions.len()) / best);
+        let (n, peak) = (count(positions.len()), ALLOCATOR.peak().saturating_sub(before));
+        println!("| {threads} | {:.0} | {:.0} |", n / best, count(peak) / n);
         threads *= 2;
     }
     Ok(())
