@@ -86,7 +86,7 @@ struct Search<S: Simd> {
 impl BlockTree<'_> {
     /// Finds for each point of a block its `count` nearest others, ties by lower id.
     ///
-    /// Six of each take 80 to 190 ns a point on scans with AVX-512, a kd-tree six times as long (`benches/src/bin/graph.rs`). A rank more costs
+    /// Six of each take 80 to 190 ns a point on scans with AVX-512, by a kd-tree five to ten times that (`benches/src/bin/graph.rs`). A rank more costs
     /// four instructions for each point that improves a list; the less the order is one of places, the more are looked at.
     ///
     /// # Panics
