@@ -93,3 +93,54 @@ impl Sums {
         (off_sq.max(0.0) / spread_sq).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GraphOptions, PointGraph};
+    use nalgebra::Matrix3;
+    use nearmiss_testdata::arbitrary::{CloudKind, cloud};
+    use nearmiss_testdata::oracle;
+
+    /// The share, from every walk of two steps.
+    fn naive(positions: &[[f32; 3]], graph: &Adjacency, i: usize) -> f64 {
+        let stay_or_step = |i: usize| {
+            let mut all = vec![i];
+            all.extend(graph.of(i).iter().map(|&j| j as usize));
+            all
+        };
+        let ends: Vec<[f64; 3]> = stay_or_step(i)
+            .into_iter()
+            .flat_map(stay_or_step)
+            .map(|k| minus(positions[k], positions[i]))
+            .collect();
+        let count = ends.iter().map(|_| 1.0).sum::<f64>();
+        let mean = [0, 1, 2].map(|k| ends.iter().map(|d| d[k]).sum::<f64>() / count);
+        let product = |k: usize, l: usize| {
+            ends.iter().map(|d| (d[k] - mean[k]) * (d[l] - mean[l])).sum::<f64>() / count
+        };
+        let n = oracle::symmetric_eigen(&Matrix3::from_fn(product)).vectors[0];
+        let across = |d: [f64; 3]| {
+            let along: f64 = (0..3).map(|k| d[k] * n[k]).sum();
+            (0..3).map(|k| (d[k] - along * n[k]).powi(2)).sum::<f64>()
+        };
+        (across(mean) / (ends.iter().map(|&d| across(d)).sum::<f64>() / count)).sqrt()
+    }
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "points are stored in single precision")]
+    fn sums_moved_are_sums_over_walks() {
+        for kind in [CloudKind::Sphere, CloudKind::Coplanar, CloudKind::Outlier, CloudKind::Rings] {
+            let positions: Vec<[f32; 3]> = cloud(kind, 400, 1).iter().map(|p| p.map(|x| x as f32)).collect();
+            let graph = PointGraph::build(&positions, &GraphOptions::default()).unwrap();
+            let edges = graph.edges();
+            for i in 0..positions.len() {
+                let share = naive(&positions, edges, i);
+                let few = edges.of(i).len() < LEAST_NEIGHBOURS;
+                if few || (share - SHARE).abs() > 1e-9 {
+                    assert_eq!(graph.is_border(i), few || share > SHARE, "{kind:?}: point {i}, {share}");
+                }
+            }
+        }
+    }
+}
