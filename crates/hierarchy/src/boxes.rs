@@ -5,6 +5,8 @@
 //! (benches/record).
 
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
 
@@ -82,6 +84,7 @@ pub struct Relative {
     rotation: Axes,
     translation: [f32; 3],
     scale: f32,
+    scale_back: f32,
     slack: f32,
 }
 
@@ -98,6 +101,7 @@ impl Relative {
             rotation,
             translation: pose.translation().map(|x| x as f32),
             scale,
+            scale_back: pose.scale().recip() as f32,
             slack: SLACK * reach as f32,
         }
     }
@@ -117,6 +121,40 @@ impl Relative {
     pub fn direction(&self, v: [f32; 3]) -> [f32; 3] {
         let [rx, ry, rz] = self.rotation;
         [dot(rx, v), dot(ry, v), dot(rz, v)]
+    }
+
+    /// Points of a's frame in b's.
+    #[inline(always)]
+    #[must_use]
+    pub fn points_back<S: Simd>(&self, simd: S, points: &[[f32; 16]; 3]) -> [f32x16<S>; 3] {
+        let [tx, ty, tz] = self.translation;
+        let (x, y, z) = (
+            f32x16::load_array_ref(simd, &points[0]) - tx,
+            f32x16::load_array_ref(simd, &points[1]) - ty,
+            f32x16::load_array_ref(simd, &points[2]) - tz,
+        );
+        let [rx, ry, rz] = self.rotation;
+        let back = self.scale_back();
+        [
+            (x * rx[0] + y * ry[0] + z * rz[0]) * back,
+            (x * rx[1] + y * ry[1] + z * rz[1]) * back,
+            (x * rx[2] + y * ry[2] + z * rz[2]) * back,
+        ]
+    }
+
+    /// A direction of a's frame in b's.
+    #[inline]
+    #[must_use]
+    pub fn direction_back(&self, v: [f32; 3]) -> [f32; 3] {
+        let [rx, ry, rz] = self.rotation;
+        [0, 1, 2].map(|k| rx[k] * v[0] + ry[k] * v[1] + rz[k] * v[2])
+    }
+
+    /// Length in b's frame of a unit of a's.
+    #[inline]
+    #[must_use]
+    pub fn scale_back(&self) -> f32 {
+        self.scale_back
     }
 
     /// Length in a's frame of a unit of b's.

@@ -75,6 +75,8 @@ pub struct Slices<'a> {
     pub boxes: &'a [OrientedBox],
     /// What the boxes must grow by to contain each node's part of the surface.
     pub growths: &'a [Growth],
+    /// The points in blocks: see [`PointHierarchy::blocks`].
+    pub blocks: &'a [PointBlock],
     /// The samples of the inner nodes in their order, [`samples_a_node`](Self::samples_a_node) of each; see
     /// [`Slices::samples`].
     pub sample_lists: &'a [u32],
@@ -149,6 +151,7 @@ impl PointHierarchy {
             nodes: &self.nodes,
             boxes: &self.boxes,
             growths: &self.growths,
+            blocks: &self.blocks,
             sample_lists: &self.sample_lists,
             coverings: &self.coverings,
             leaf_size: self.leaf_size,

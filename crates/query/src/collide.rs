@@ -12,8 +12,8 @@ use nearmiss_hierarchy::{Frontier, GatherScratch, Heap, NodePair, Relative, SLAC
 
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
-use crate::crossing::Lanes;
 use crate::hint::{Known, PairHint};
+use crate::leaf_pair::Instructions;
 use crate::likelihood::likelihood;
 use crate::options::{CollideOptions, CollidePlan, Method, Order, Semantics};
 use crate::posed::Posed;
@@ -27,7 +27,7 @@ use crate::view::ScanView;
 pub struct CollideScratch {
     stack: Stack,
     heap: Heap,
-    lanes: Lanes,
+    instructions: Instructions,
     gathers: [GatherScratch; 2],
     excluded: Vec<Excluded>,
     compared: Vec<NodePair>,
@@ -170,8 +170,17 @@ fn surfaces(
     mut known: Option<&mut Known>,
     proof: Option<&mut Proof>,
 ) -> Answer {
-    let CollideScratch { stack, heap, lanes, gathers, excluded, compared, members, proven, longest_stretch } =
-        scratch;
+    let CollideScratch {
+        stack,
+        heap,
+        instructions,
+        gathers,
+        excluded,
+        compared,
+        members,
+        proven,
+        longest_stretch,
+    } = scratch;
     let reach = pair.stored(options.margin);
     let mut certifier = Certifier::new(pair, reach, proven);
     // Enclosures hold the boxes: what they part has no contact.
@@ -183,7 +192,7 @@ fn surfaces(
         return Answer { verdict, distance_estimate: None, statistics };
     }
     let Certifier { pair, proven, .. } = certifier;
-    let workspace = Workspace { lanes, gathers, excluded, compared, members };
+    let workspace = Workspace { instructions: *instructions, gathers, excluded, compared, members };
     let mut search = Surfaces::new(pair, options, budget, known.is_some(), workspace);
     let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
     let parted = !ended && search.found.is_none();

@@ -5,7 +5,7 @@
 //! chords are `√(ρ_a² − v²/g)` and `√(ρ_b² − u²/g)`, and their midpoints lie `√(d² − (u² + v² − 2cuv)/g)` apart
 //! along the line. Multiplied by g nothing is divided by, and no sign of a normal matters (docs/theory/discs.md).
 
-use nearmiss_hierarchy::{MOST_LEAF_POINTS, THICKNESS};
+use nearmiss_hierarchy::THICKNESS;
 
 /// A point's tangent disc.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,95 +16,6 @@ pub struct Disc {
     pub normal: [f32; 3],
     /// Radius.
     pub radius: f32,
-}
-
-/// Discs as arrays of lanes.
-#[derive(Debug, Clone)]
-pub(crate) struct Lanes {
-    pub(crate) count: usize,
-    pub(crate) centre: [[f32; MOST]; 3],
-    pub(crate) normal: [[f32; MOST]; 3],
-    pub(crate) radius: [f32; MOST],
-}
-
-/// Room for the points of a leaf.
-const MOST: usize = MOST_LEAF_POINTS;
-
-/// Lanes that are worked on together.
-const WIDTH: usize = 8;
-
-impl Default for Lanes {
-    fn default() -> Self {
-        Self { count: 0, centre: [[0.0; MOST]; 3], normal: [[0.0; MOST]; 3], radius: [0.0; MOST] }
-    }
-}
-
-impl Lanes {
-    /// Puts `disc` into lane `j`.
-    pub(crate) fn set(&mut self, j: usize, disc: &Disc) {
-        for k in 0..3 {
-            self.centre[k][j] = disc.centre[k];
-            self.normal[k][j] = disc.normal[k];
-        }
-        self.radius[j] = disc.radius;
-    }
-
-    /// Fills up to a full width with discs that cross nothing.
-    pub(crate) fn close(&mut self, count: usize) {
-        self.count = count;
-        for j in count..count.next_multiple_of(WIDTH) {
-            self.set(j, &Disc { centre: [f32::MAX.sqrt() * 0.1; 3], normal: [0.0; 3], radius: 0.0 });
-        }
-    }
-
-    /// The lanes that cross `disc`, as bits.
-    pub(crate) fn crossings(&self, disc: &Disc) -> u64 {
-        let mut bits = 0;
-        for start in (0..self.count).step_by(WIDTH) {
-            bits |= u64::from(self.block(disc, start)) << start;
-        }
-        // Lanes that were only filled up never count, whatever their neighbours hold.
-        bits & u64::MAX.unbounded_shr(u64::BITS - u32::try_from(self.count).unwrap_or(u64::BITS))
-    }
-
-    /// Eight lanes at once. Written with arrays of lanes throughout, so that it compiles to vector code.
-    #[inline]
-    fn block(&self, disc: &Disc, start: usize) -> u8 {
-        let Some((x, y, z, r)) = self.places(start) else { return 0 };
-        let mut d = [[0.0_f32; WIDTH]; 3];
-        let mut d_sq = [0.0_f32; WIDTH];
-        let mut near = [false; WIDTH];
-        for i in 0..WIDTH {
-            d[0][i] = disc.centre[0] - x[i];
-            d[1][i] = disc.centre[1] - y[i];
-            d[2][i] = disc.centre[2] - z[i];
-            d_sq[i] = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
-            let reach = disc.radius + r[i];
-            near[i] = d_sq[i] <= reach * reach;
-        }
-        if near == [false; WIDTH] {
-            return 0;
-        }
-        let mut bits = 0;
-        for i in 0..WIDTH {
-            let normal = [self.normal[0][start + i], self.normal[1][start + i], self.normal[2][start + i]];
-            let hit = near[i] && cross(disc, [d[0][i], d[1][i], d[2][i]], normal, r[i]);
-            bits |= u8::from(hit) << i;
-        }
-        bits
-    }
-
-    #[inline]
-    #[expect(clippy::type_complexity, reason = "four lists of lanes")]
-    fn places(&self, start: usize) -> Option<(&[f32; WIDTH], &[f32; WIDTH], &[f32; WIDTH], &[f32; WIDTH])> {
-        let [x, y, z] = &self.centre;
-        Some((
-            x[start..].first_chunk()?,
-            y[start..].first_chunk()?,
-            z[start..].first_chunk()?,
-            self.radius[start..].first_chunk()?,
-        ))
-    }
 }
 
 /// Whether the discs cross.

@@ -7,6 +7,7 @@ mod certify;
 mod collide;
 mod crossing;
 mod hint;
+mod leaf_pair;
 mod likelihood;
 mod margin;
 mod options;

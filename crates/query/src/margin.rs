@@ -4,10 +4,9 @@
 //! decide, whose distance alternating projection finds (both are convex: Cheney & Goldstein, "Proximity maps for
 //! convex sets", Proc. AMS 10, 1959). For a witness a point of either implicit surface walks towards the other.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::Node;
 use nearmiss_surface::{Projection, project};
 
 use crate::crossing::Disc;
@@ -54,9 +53,10 @@ fn nearest(disc: &Disc, p: Vector3<f32>) -> Vector3<f32> {
 }
 
 impl Surfaces<'_> {
-    /// The disc of point `i` against those of a leaf of b that come nearer than the margin.
-    pub(crate) fn near_discs(&mut self, i: usize, disc: &Disc, node_b: &Node) -> ControlFlow<()> {
-        for j in node_b.points() {
+    /// The disc of point `i` against those of some points of b that come nearer than the margin.
+    pub(crate) fn near_discs(&mut self, i: usize, of_b: Range<usize>) -> ControlFlow<()> {
+        let disc = self.disc_a(i);
+        for j in of_b {
             self.pair.meter.go_on()?;
             let other = self.disc_b(j);
             let distance = (Vector3::from(disc.centre) - Vector3::from(other.centre)).norm();
@@ -70,7 +70,7 @@ impl Surfaces<'_> {
                 }
             }
             self.pair.meter.leaf_work(PAIRS_A_DISTANCE);
-            if let Some([x, y]) = near(disc, &other, self.reach) {
+            if let Some([x, y]) = near(&disc, &other, self.reach) {
                 match self.doubt_about(i, j) {
                     Some(reason) => _ = self.doubt.get_or_insert(reason),
                     None => {

@@ -6,16 +6,17 @@
 //! implicit surfaces; it adds a witness and certainty, and does not overrule: the weighted fit rounds off tips
 //! and ends early at borders, where discs of points still tell (docs/decisions).
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{GatherScratch, Node, NodePair, PointKind, Split, Visitor};
-use nearmiss_surface::meet;
+use nearmiss_hierarchy::{GatherScratch, Node, NodePair, PointKind, Slices, Split, Visitor};
+use nearmiss_surface::{PointBlock, meet};
 
 use crate::budget::Budget;
 use crate::certify::{Excluded, distinct};
-use crate::crossing::{Disc, Lanes};
+use crate::crossing::Disc;
+use crate::leaf_pair::{Discs, Instructions, LeafPair, Near, padded};
 use crate::options::{CollideOptions, Detail, Method, Order};
 use crate::posed::Posed;
 use crate::verdict::{Contact, Evidence, Reason};
@@ -59,7 +60,7 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) excluded: &'a mut Vec<Excluded>,
     /// The pairs whose points were compared, without a hit.
     pub(crate) compared: &'a mut Vec<NodePair>,
-    lanes: &'a mut Lanes,
+    instructions: Instructions,
     pub(crate) gathers: &'a mut [GatherScratch; 2],
     /// The points of a that lie in the box of b.
     pub(crate) members: &'a mut Vec<u32>,
@@ -77,7 +78,7 @@ pub(crate) struct Surfaces<'a> {
 /// What a search writes into.
 #[derive(Debug)]
 pub(crate) struct Workspace<'a> {
-    pub(crate) lanes: &'a mut Lanes,
+    pub(crate) instructions: Instructions,
     pub(crate) gathers: &'a mut [GatherScratch; 2],
     pub(crate) excluded: &'a mut Vec<Excluded>,
     pub(crate) compared: &'a mut Vec<NodePair>,
@@ -93,7 +94,7 @@ impl<'a> Surfaces<'a> {
         notes: bool,
         workspace: Workspace<'a>,
     ) -> Self {
-        let Workspace { lanes, gathers, excluded, compared, members } = workspace;
+        let Workspace { instructions, gathers, excluded, compared, members } = workspace;
         excluded.clear();
         compared.clear();
         let may_end = budget.work.is_some() || budget.deadline.is_some();
@@ -112,7 +113,7 @@ impl<'a> Surfaces<'a> {
             nearest: f32::INFINITY,
             excluded,
             compared,
-            lanes,
+            instructions,
             gathers,
             members,
             tries: 0,
@@ -123,7 +124,7 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    fn disc_a(&self, i: usize) -> Disc {
+    pub(crate) fn disc_a(&self, i: usize) -> Disc {
         Disc {
             centre: self.pair.a.positions[i],
             normal: self.pair.a.normals[i],
@@ -139,26 +140,14 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Puts the discs of a leaf of b into the lanes. Returns whether any point there is sparse.
-    fn fill(&mut self, node: &Node) -> bool {
-        let mut sparse = false;
-        for (lane, j) in node.points().enumerate() {
-            let disc = self.disc_b(j);
-            self.lanes.set(lane, &disc);
-            sparse |= self.pair.b.ball(j) > 0.0;
-        }
-        self.lanes.close(node.count as usize);
-        sparse
-    }
-
-    /// Whether a disc of leaf `node` of b comes into the `ball` about the centre of `disc` of a, or that disc into
-    /// one of its balls. A point with a ball has no disc here.
-    fn comes_near_sparse(&self, disc: &Disc, ball: f32, node: &Node) -> bool {
+    /// Whether a disc of some points of b comes into the `ball` about the centre of `disc` of a, or that disc into
+    /// one of their balls. A point with a ball has no disc here.
+    fn comes_near_sparse(&self, disc: &Disc, ball: f32, mut points: Range<usize>) -> bool {
         let point =
             |disc: &Disc, ball: f32| Disc { radius: if ball > 0.0 { 0.0 } else { disc.radius }, ..*disc };
         // Within a margin of a ball is as good as within it.
         let reach = |ball: f32| if ball > 0.0 { ball + self.reach } else { 0.0 };
-        node.points().any(|j| {
+        points.any(|j| {
             let other = self.disc_b(j);
             let ball_b = self.pair.b.ball(j) * self.pair.relative.scale();
             comes_within(reach(ball), disc.centre, &point(&other, ball_b))
@@ -355,28 +344,11 @@ impl Surfaces<'_> {
             return self.samples_meet(pair);
         }
         self.pair.meter.leaf_pair(node_a.count as usize, node_b.count as usize);
-        // Most discs of one leaf are out of reach of all of the other.
-        let bounds = self.pair.relative.moved(&self.pair.b.boxes[pair.b.index()]);
-        let (mut ready, mut sparse) = (false, false);
         let by_discs = matches!(self.method, Method::Traversal);
-        for i in node_a.points() {
-            let disc = self.disc_a(i);
-            let ball = self.pair.a.ball(i);
-            let reach = disc.radius.max(ball) + self.reach;
-            if bounds.distance_sq(disc.centre) > reach * reach {
-                continue;
-            }
-            if !ready {
-                sparse = self.fill(&node_b);
-                ready = true;
-            }
-            let is_open = self.doubt == Some(Reason::Undersampled);
-            if (ball > 0.0 || sparse) && !is_open && self.comes_near_sparse(&disc, ball, &node_b) {
-                self.doubt = Some(Reason::Undersampled);
-            }
-            if by_discs {
+        for of_a in blocks(&node_a) {
+            for of_b in blocks(&node_b) {
                 let tries = self.tries;
-                self.discs_cross(i, &disc, &node_b)?;
+                self.compare_blocks(pair.b, of_a.clone(), of_b, by_discs)?;
                 if self.tries > tries {
                     // Other crossings of the same leaves would fail likewise.
                     return ControlFlow::Continue(());
@@ -389,13 +361,73 @@ impl Surfaces<'_> {
         }
     }
 
-    /// The disc of point `i` against those of a leaf of b, which stand in the lanes.
+    /// Points of a leaf of a that lie in one block against points of the leaf `node` of b that do.
+    fn compare_blocks(
+        &mut self,
+        node: NodeId,
+        of_a: Range<usize>,
+        of_b: Range<usize>,
+        by_discs: bool,
+    ) -> ControlFlow<()> {
+        let (a, b) = (self.pair.a, self.pair.b);
+        let (first_a, first_b) =
+            (of_a.start & !(PointBlock::WIDTH - 1), of_b.start & !(PointBlock::WIDTH - 1));
+        let is_sparse = |kinds: &[u8]| kinds.iter().any(|&code| PointKind::from_code(code).is_sparse());
+        let (sparse_a, sparse_b) = (is_sparse(&a.kinds[of_a.clone()]), is_sparse(&b.kinds[of_b.clone()]));
+        let is_looked_about = sparse_a || sparse_b;
+        if !by_discs && !is_looked_about {
+            return ControlFlow::Continue(());
+        }
+        let discs_a = discs(a, first_a, &of_a);
+        let mut reaches = padded(discs_a.radii);
+        if sparse_a {
+            for i in of_a {
+                let reach = &mut reaches[i - first_a];
+                *reach = reach.max(a.ball(i));
+            }
+        }
+        let reach = self.reach;
+        let test = LeafPair {
+            a: discs_a,
+            b: discs(b, first_b, &of_b),
+            reaches: reaches.map(|own| own + reach),
+            bounds: &b.boxes[node.index()],
+            relative: &self.pair.relative.clone(),
+        };
+        // Where nothing but crossings counts, only points with some are looked at.
+        let each = is_looked_about || self.margin > 0.0;
+        let mut from = 0;
+        while let Some(Near { lane, crossings }) = test.next(self.instructions, from, each) {
+            from = lane + 1;
+            let i = first_a + lane as usize;
+            let ball = if sparse_a { a.ball(i) } else { 0.0 };
+            let is_open = self.doubt == Some(Reason::Undersampled);
+            if (ball > 0.0 || sparse_b)
+                && !is_open
+                && self.comes_near_sparse(&self.disc_a(i), ball, of_b.clone())
+            {
+                self.doubt = Some(Reason::Undersampled);
+            }
+            if by_discs {
+                let tries = self.tries;
+                self.discs_cross(i, crossings, first_b)?;
+                if self.tries > tries {
+                    return ControlFlow::Continue(());
+                }
+                if self.margin > 0.0 {
+                    self.near_discs(i, of_b.clone())?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The disc of point `i` crosses those of b from point `first` on that have a bit in `crossings`.
     #[inline]
-    fn discs_cross(&mut self, i: usize, disc: &Disc, node_b: &Node) -> ControlFlow<()> {
-        let mut bits = self.lanes.crossings(disc);
-        while bits != 0 {
-            let j = node_b.first as usize + bits.trailing_zeros() as usize;
-            bits &= bits - 1;
+    fn discs_cross(&mut self, i: usize, mut crossings: u32, first: usize) -> ControlFlow<()> {
+        while crossings != 0 {
+            let j = first + crossings.trailing_zeros() as usize;
+            crossings &= crossings - 1;
             let (distance, [ra, rb]) = self.points(i, j);
             if distance > FAR * ra.max(rb) {
                 continue;
@@ -405,9 +437,29 @@ impl Surfaces<'_> {
                 None => return self.crossed(i, j),
             }
         }
-        if self.margin > 0.0 {
-            self.near_discs(i, disc, node_b)?;
-        }
         ControlFlow::Continue(())
+    }
+}
+
+/// The points of a leaf, those of a block at a time.
+fn blocks(leaf: &Node) -> impl Iterator<Item = Range<usize>> + use<> {
+    let Range { mut start, end } = leaf.points();
+    std::iter::from_fn(move || {
+        let first = start;
+        start = end.min((first / PointBlock::WIDTH + 1) * PointBlock::WIDTH);
+        (first < end).then_some(first..start)
+    })
+}
+
+/// Points of a leaf that lie in the block from point `first` on.
+#[inline]
+fn discs<'a>(scan: &'a Slices<'a>, first: usize, points: &Range<usize>) -> Discs<'a> {
+    let end = scan.positions.len().min(first + PointBlock::WIDTH);
+    let below = |i: usize| (1_u32 << (i - first)) - 1;
+    Discs {
+        points: &scan.blocks[first / PointBlock::WIDTH],
+        normals: &scan.normals[first..end],
+        radii: &scan.discs[first..end],
+        lanes: below(points.end) & !below(points.start),
     }
 }

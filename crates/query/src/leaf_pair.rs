@@ -1,0 +1,311 @@
+//! Which tangent discs of two leaves cross: sixteen of one against sixteen of the other, in the frame of the other.
+//!
+//! Most discs of a leaf are out of reach of the other's box, and most of the others of all but a few there. So the points of a
+//! are moved into b's frame, all at once, and held against the box; each that is left is held against all of b's, whose
+//! positions stand side by side already; and normals are looked at where points are near.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_hierarchy::{OrientedBox, Relative, THICKNESS};
+use nearmiss_surface::PointBlock;
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// What leaves are compared by.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Instructions(Level);
+
+impl Default for Instructions {
+    fn default() -> Self {
+        Self(Level::new())
+    }
+}
+
+/// Points of a block that belong to a leaf, as tangent discs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Discs<'a> {
+    pub(crate) points: &'a PointBlock,
+    /// Of the block's points from the first; there may be fewer than lanes.
+    pub(crate) normals: &'a [[f32; 3]],
+    pub(crate) radii: &'a [f32],
+    /// The lanes that are the leaf's, as bits.
+    pub(crate) lanes: u32,
+}
+
+/// Discs of a and b, and what is between them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeafPair<'a> {
+    pub(crate) a: Discs<'a>,
+    pub(crate) b: Discs<'a>,
+    /// How far what is at the points of a reaches, in a's frame.
+    pub(crate) reaches: [f32; WIDTH],
+    /// That of b's leaf, in its own frame.
+    pub(crate) bounds: &'a OrientedBox,
+    pub(crate) relative: &'a Relative,
+}
+
+/// A point of a that reaches b's box, and which discs of b cross its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Near {
+    pub(crate) lane: u32,
+    /// Lanes of b, as bits.
+    pub(crate) crossings: u32,
+}
+
+impl LeafPair<'_> {
+    /// The first from lane `from` on that crosses something, or, if `each`, that reaches the box at all; the same by any
+    /// instructions.
+    #[inline]
+    pub(crate) fn next(&self, by: Instructions, from: u32, each: bool) -> Option<Near> {
+        dispatch!(by.0, simd => simd.vectorize(
+            #[inline(always)]
+            || self.next_by(simd, from, each),
+        ))
+    }
+
+    #[inline(always)]
+    fn next_by<S: Simd>(&self, simd: S, from: u32, each: bool) -> Option<Near> {
+        let centres = self.relative.points_back(simd, &self.a.points.position);
+        let mut candidates = self.near_box(simd, &centres) & self.a.lanes & u32::MAX.unbounded_shl(from);
+        if candidates == 0 {
+            return None;
+        }
+        let [x, y, z] = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
+        let per_scale = self.relative.scale_back();
+        let [px, py, pz] = &self.b.points.position;
+        let (px, py, pz) = (
+            f32x16::load_array_ref(simd, px),
+            f32x16::load_array_ref(simd, py),
+            f32x16::load_array_ref(simd, pz),
+        );
+        let radii = f32x16::load_array_ref(simd, &padded(self.b.radii));
+        let mut normals = None;
+        while candidates != 0 {
+            let number = candidates.trailing_zeros();
+            let lane = number as usize;
+            candidates &= candidates - 1;
+            let d = [-(px - x[lane]), -(py - y[lane]), -(pz - z[lane])];
+            let radius = self.a.radii.get(lane).copied().unwrap_or(0.0) * per_scale;
+            let d_sq = product(&d, &d);
+            let reach = radii + radius;
+            let near: mask32x16<S> = d_sq.simd_le(reach * reach);
+            let near_bits = bits(near) & self.b.lanes;
+            let mut crossings = 0;
+            if near_bits != 0 {
+                // A closure given to the standard library would not be compiled for the instruction set.
+                let of_b = match normals {
+                    Some(normals) => normals,
+                    None => side_by_side(simd, self.b.normals),
+                };
+                normals = Some(of_b);
+                let normal = self.a.normals.get(lane).copied().unwrap_or_default();
+                let normal = self.relative.direction_back(normal);
+                crossings = near_bits & bits(cross(simd, (&d, d_sq), (normal, radius), (&of_b, radii)));
+            }
+            if each || crossings != 0 {
+                return Some(Near { lane: number, crossings });
+            }
+        }
+        None
+    }
+
+    /// The points of a, which are `centres` in b's frame, that reach b's box.
+    #[inline(always)]
+    fn near_box<S: Simd>(&self, simd: S, centres: &[f32x16<S>; 3]) -> u32 {
+        let OrientedBox { centre, half, axes, .. } = self.bounds;
+        let d = [centres[0] - centre[0], centres[1] - centre[1], centres[2] - centre[2]];
+        let mut beyond_sq = f32x16::simd_from(simd, 0.0);
+        for k in 0..3 {
+            let [ax, ay, az] = axes[k];
+            let along = (d[0] * ax + d[1] * ay + d[2] * az).abs();
+            let beyond = (along - half[k]).max(0.0);
+            beyond_sq += beyond * beyond;
+        }
+        let reach = f32x16::load_array_ref(simd, &self.reaches) * self.relative.scale_back();
+        bits(beyond_sq.simd_le(reach * reach))
+    }
+}
+
+/// The test of [`crossing`](crate::crossing()) in lanes: a disc of a against those of b, whose centres are `d` away.
+#[inline(always)]
+fn cross<S: Simd>(
+    simd: S,
+    (d, d_sq): (&[f32x16<S>; 3], f32x16<S>),
+    ([nx, ny, nz], radius): ([f32; 3], f32),
+    (normals, radii): (&[f32x16<S>; 3], f32x16<S>),
+) -> mask32x16<S> {
+    let zero = f32x16::simd_from(simd, 0.0);
+    let u = d[0] * nx + d[1] * ny + d[2] * nz;
+    let v = product(d, normals);
+    let c = normals[0] * nx + normals[1] * ny + normals[2] * nz;
+    let g = -(c * c) + 1.0;
+    let chord_a = g * (radius * radius) - v * v;
+    let chord_b = radii * radii * g - u * u;
+    let apart = d_sq * g - (u * u + v * v - c * 2.0 * u * v);
+    let both = chord_a.max(zero).sqrt() * chord_b.max(zero).sqrt();
+    let chords: mask32x16<S> = chord_a.min(chord_b).simd_ge(zero);
+    let meet: mask32x16<S> = apart.simd_le(chord_a + chord_b + both * 2.0);
+    let thin: mask32x16<S> = u.abs().max(v.abs()).simd_le(radii.min(radius) * THICKNESS);
+    (chords & meet) | thin
+}
+
+#[inline(always)]
+fn product<S: Simd>(a: &[f32x16<S>; 3], b: &[f32x16<S>; 3]) -> f32x16<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
+    mask.to_bitmask() as u32
+}
+
+/// The first lanes; zero where there are none.
+#[inline(always)]
+pub(crate) fn padded(values: &[f32]) -> [f32; WIDTH] {
+    values.first_chunk().copied().unwrap_or_else(|| {
+        let mut lanes = [0.0; WIDTH];
+        lanes[..values.len()].copy_from_slice(values);
+        lanes
+    })
+}
+
+#[inline(always)]
+fn side_by_side<S: Simd>(simd: S, vectors: &[[f32; 3]]) -> [f32x16<S>; 3] {
+    let mut rows = [[0.0_f32; WIDTH]; 3];
+    for (lane, vector) in vectors.iter().take(WIDTH).enumerate() {
+        for k in 0..3 {
+            rows[k][lane] = vector[k];
+        }
+    }
+    let [x, y, z] = &rows;
+    [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_geometry::Pose;
+    use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+
+    use super::*;
+    use crate::crossing::{Disc, crossing};
+
+    /// Some discs about the origin, in one block.
+    struct Leaf {
+        block: PointBlock,
+        normals: Vec<[f32; 3]>,
+        radii: Vec<f32>,
+        lanes: u32,
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    fn single(v: [f64; 3]) -> [f32; 3] {
+        v.map(|c| c as f32)
+    }
+
+    impl Leaf {
+        fn new(rng: &mut impl rand::Rng, count: usize, flat: bool) -> Self {
+            let positions: Vec<[f32; 3]> = (0..count)
+                .map(|_| {
+                    let [x, y, z] = single(point_in(rng, 1.0));
+                    [x, y, if flat { 0.01 * z } else { z }]
+                })
+                .collect();
+            let normal = |_| if flat { [0.0, 0.0, 1.0] } else { single(unit_vector(rng)) };
+            let normals = (0..count).map(normal).collect();
+            let radii = (0..16_u8).map(|i| 0.2 + 0.02 * f32::from(i)).take(count).collect();
+            let block = PointBlock::silent(&positions).next().unwrap();
+            Self { block, normals, radii, lanes: (1 << count) - 1 }
+        }
+
+        fn discs(&self) -> Discs<'_> {
+            Discs { points: &self.block, normals: &self.normals, radii: &self.radii, lanes: self.lanes }
+        }
+
+        fn disc(&self, lane: usize) -> Disc {
+            Disc {
+                centre: self.block.position.map(|c| c[lane]),
+                normal: self.normals[lane],
+                radius: self.radii[lane],
+            }
+        }
+    }
+
+    /// Who reaches the box and what it crosses there, one by one.
+    fn one_by_one(test: &LeafPair<'_>, a: &Leaf, b: &Leaf) -> Vec<Near> {
+        let back = test.relative.scale_back();
+        let lanes = |leaf: &Leaf| (0..16_u32).filter(|lane| leaf.lanes >> lane & 1 != 0).collect::<Vec<_>>();
+        let [tx, ty, tz] = test.relative.point([0.0; 3]);
+        let near = |&lane: &u32| {
+            let disc = a.disc(lane as usize);
+            let [x, y, z] = disc.centre;
+            let moved = Disc {
+                centre: test.relative.direction_back([x - tx, y - ty, z - tz]).map(|c| c * back),
+                normal: test.relative.direction_back(disc.normal),
+                radius: disc.radius * back,
+            };
+            let reach = test.reaches[lane as usize] * back;
+            let crosses = |j: &u32| crossing(&moved, &b.disc(*j as usize));
+            let crossings = lanes(b).iter().filter(|j| crosses(j)).fold(0, |bits, j| bits | 1 << j);
+            (test.bounds.distance_sq(moved.centre) <= reach * reach).then_some(Near { lane, crossings })
+        };
+        lanes(a).iter().filter_map(near).collect()
+    }
+
+    fn levels() -> Vec<Level> {
+        let mut levels = vec![Level::new(), Level::baseline()];
+        #[cfg(target_arch = "x86_64")]
+        {
+            levels.extend(Level::new().as_avx2().map(Level::Avx2));
+            levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
+        }
+        levels
+    }
+
+    #[test]
+    fn lanes_find_what_one_by_one_is_found() {
+        let rng = &mut rng(17);
+        let (mut reached, mut crossed, mut missed) = (0, 0, 0);
+        for round in 0..4000_usize {
+            let flat = round % 3 == 0;
+            let (mut a, b) =
+                (Leaf::new(rng, 1 + round % 16, flat), Leaf::new(rng, 1 + (round / 16) % 16, flat));
+            a.lanes &= !(round as u32 % 5);
+            let axis = unit_vector(rng);
+            let angle = if flat { 1e-3 } else { 2.0 };
+            let scale = [1.0, 0.5, 3.0][round % 3];
+            let shift = point_in(rng, if flat { 0.2 } else { 2.5 });
+            let pose = Pose::from_axis_angle(axis, angle).with_scale(scale).with_translation(shift);
+            let relative = Relative::new(&pose, 8.0);
+            let bounds = OrientedBox {
+                centre: [0.0; 3],
+                half: [0.9, 0.8, if flat { 0.05 } else { 0.7 }],
+                axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                reach: 1.0,
+            };
+            let test = LeafPair {
+                a: a.discs(),
+                b: b.discs(),
+                reaches: padded(&a.radii).map(|r| r + 0.01),
+                bounds: &bounds,
+                relative: &relative,
+            };
+            let expected = one_by_one(&test, &a, &b);
+            for level in levels() {
+                for each in [true, false] {
+                    let (mut found, mut from) = (Vec::new(), 0);
+                    while let Some(near) = test.next(Instructions(level), from, each) {
+                        from = near.lane + 1;
+                        found.push(near);
+                    }
+                    let wanted = expected.iter().filter(|near| each || near.crossings != 0);
+                    assert!(found.iter().eq(wanted), "round {round}, {level:?}: {found:?} for {expected:?}");
+                }
+            }
+            reached += expected.len();
+            crossed += expected.iter().filter(|near| near.crossings != 0).count();
+            missed += a.lanes.count_ones() as usize - expected.len();
+        }
+        assert!(reached > 5000 && crossed > 1000 && missed > 5000, "{reached} {crossed} {missed}");
+    }
+}
