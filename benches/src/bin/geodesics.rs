@@ -1,69 +1,258 @@
-//! The map of close pairs: speed and size.
+//! What follows from proximity graphs: oriented normals, close pairs, coarser levels, the geodesic kernel. Speed, size
+//! and accuracy.
 //!
-//! `geodesics [OBJECT]… [--runs N]`; the objects are the shipped dragon's unless told otherwise.
+//! `geodesics [OBJECT]… [--runs N] [--pairs N] [--plates]`; the objects are the shipped dragon's unless told otherwise;
+//! `--plates` shows what both kernels make of two sheets instead.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use nearmiss::graph::{Adjacency, ClosePairs, Network, Paths, edge_lengths};
-use nearmiss::{BuildOptions, Scan};
+use std::hint::black_box;
+
+use nearmiss::graph::{
+    ClosePairs, GeodesicKernel, GeodesicScratch, GraphOptions, KernelScratch, LevelScratch, Levels, Network,
+    Paths, PointGraph, Sides, edge_lengths, orient,
+};
+use nearmiss::hierarchy::GatherScratch;
+use nearmiss::surface::project;
+use nearmiss::{BuildOptions, Evaluation, PointCloud, Scan, Status, TriangleMesh};
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, arguments::Arguments, machine};
+use nearmiss_testdata::arbitrary::{point_in, rng};
+use nearmiss_testdata::shapes::{Order, Sampling, plates};
 
-/// The spheres of influence of the fourth neighbour, by kiddo's tree.
-fn spheres_of_influence(points: &[[f32; 3]]) -> Result<Adjacency, Failure> {
-    let wide: Vec<[f64; 3]> = points.iter().map(|p| p.map(f64::from)).collect();
-    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&wide).map_err(|e| format!("{e:?}"))?;
-    let five = std::num::NonZero::new(5).ok_or("five is nothing")?;
-    let fourth: Vec<f64> = wide
-        .iter()
-        .map(|p| {
-            let found = tree.query(p).nearest_n::<SquaredEuclidean<f64>>(five).execute();
-            found.iter().map(|near| near.distance.sqrt()).fold(0.0, f64::max)
-        })
-        .collect();
-    let mut edges = Vec::new();
-    for (i, p) in wide.iter().enumerate() {
-        let reach = 4.0 * fourth[i] * fourth[i] * 1.000_001;
-        for near in tree.query(p).within::<SquaredEuclidean<f64>>(reach).execute() {
-            let j = near.item as usize;
-            if j != i && (fourth[i], i) > (fourth[j], j) && near.distance.sqrt() <= fourth[i] + fourth[j] {
-                edges.push([u32::try_from(i)?, u32::try_from(j)?]);
+/// The least time of `runs` of `work`, in seconds, and what it returned last.
+fn least<T>(runs: usize, mut work: impl FnMut() -> T) -> (T, f64) {
+    let (mut result, mut best) = timed(&mut work);
+    for _ in 1..runs {
+        let (again, time) = timed(&mut work);
+        (result, best) = (again, best.min(time));
+    }
+    (result, best.as_secs_f64())
+}
+
+fn horizons(scan: &Scan) -> Vec<f32> {
+    scan.radii().iter().map(|&r| scan.plan().horizon(r)).collect()
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Sums of the normals of the faces about each vertex.
+fn vertex_normals(mesh: &TriangleMesh) -> Vec<[f64; 3]> {
+    let mut normals = vec![[0.0; 3]; mesh.vertices().len()];
+    for corners in mesh.triangles() {
+        let [a, b, c] = corners.map(|i| mesh.vertices()[i as usize]);
+        let (u, v) = ([0, 1, 2].map(|k| b[k] - a[k]), [0, 1, 2].map(|k| c[k] - a[k]));
+        let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        for i in corners {
+            for k in 0..3 {
+                normals[*i as usize][k] += cross[k];
             }
         }
     }
-    Ok(Adjacency::from_edges(points.len(), &edges))
+    normals
 }
 
-fn measure(object: &Object, runs: usize) -> Result<(), Failure> {
-    let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
-    let graph = spheres_of_influence(scan.positions())?;
-    let n = count(scan.len());
+/// Orients the normals, and compares them with those of the mesh where there is one.
+fn orientation(object: &Object, scan: &Scan, graph: &PointGraph, runs: usize) {
+    let ((normals, found), time) = least(runs, || {
+        let mut normals = scan.normals().to_vec();
+        let found = orient(graph.edges(), scan.positions(), scan.radii(), Sides::default(), &mut normals);
+        (normals, found)
+    });
+    let doubtful = found.confidence.iter().filter(|&&c| c < 128).count();
+    let largest = found.parts.iter().max_by_key(|part| part.points);
     println!(
-        "\n## {}, {} points, {:.1} edges a point\n",
-        object.name,
-        scan.len(),
-        count(graph.edge_count()) / n
+        "* orientation: {:.2} µs a point; {} parts, {} of one side; doubtful {:.2} %; the largest by {:?}",
+        time * 1e6 / count(scan.len()),
+        found.parts.len(),
+        found.parts.iter().filter(|part| !part.orientable).count(),
+        100.0 * count(doubtful) / count(scan.len()),
+        largest.map(|part| part.decision),
     );
-    let horizons: Vec<f32> = scan.radii().iter().map(|&r| scan.plan().horizon(r)).collect();
-    for paths in [Paths::Rebuilt, Paths::Stored] {
-        let mut least = f64::INFINITY;
-        let mut size = (0, 0);
-        for _ in 0..runs {
-            let (pairs, time) = timed(|| {
-                let lengths = edge_lengths(&graph, scan.positions());
-                ClosePairs::build(Network::new(&graph, &lengths), &horizons, paths)
-            });
-            least = least.min(time.as_secs_f64());
-            size = (pairs.pair_count(), pairs.byte_len());
+    let Some(mesh) = &object.mesh else { return };
+    let expected = vertex_normals(mesh);
+    let (mut wrong, mut sure, mut judged) = (0, 0, 0);
+    for (i, &source) in scan.source().iter().enumerate() {
+        let Some(&expected) = expected.get(source as usize).filter(|n| dot(**n, **n) > 0.0) else { continue };
+        judged += 1;
+        if dot(normals[i].map(f64::from), expected) <= 0.0 {
+            wrong += 1;
+            sure += usize::from(found.confidence[i] >= 128);
         }
+    }
+    println!(
+        "* against the mesh: {wrong} of {judged} wrong, {:.3} % right; {sure} of the wrong ones not doubtful",
+        100.0 - 100.0 * count(wrong) / count(judged)
+    );
+}
+
+fn close_pairs(scan: &Scan, graph: &PointGraph, runs: usize) {
+    let n = count(scan.len());
+    let horizons = horizons(scan);
+    for paths in [Paths::Rebuilt, Paths::Stored] {
+        let (pairs, time) = least(runs, || {
+            let lengths = edge_lengths(graph.edges(), scan.positions());
+            ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons, paths)
+        });
         println!(
-            "close pairs, {paths:?}: {:.0} points/s, {:.1} a point, {:.0} bytes a point",
-            n / least,
-            count(size.0) / n,
-            count(size.1) / n
+            "* close pairs, paths {paths:?}: {:.0} points/s, {:.1} heard at a point, {:.0} bytes a point",
+            n / time,
+            count(pairs.pair_count()) / n,
+            count(pairs.byte_len()) / n
         );
+    }
+}
+
+/// Builds the levels, and compares distances with those that a search of the whole finds.
+fn levels(scan: &Scan, graph: &PointGraph, runs: usize, pairs: usize) {
+    let n = scan.len();
+    let lengths = edge_lengths(graph.edges(), scan.positions());
+    let network = Network::new(graph.edges(), &lengths);
+    let (levels, time) = least(runs, || Levels::build(network, scan.radii()));
+    let factor = scan.plan().horizon(1.0);
+    let maps = levels.cells().iter().map(|cells| {
+        let horizons: Vec<f32> = cells.radii().iter().map(|r| factor * r).collect();
+        ClosePairs::build(cells.network(), &horizons, Paths::Rebuilt).byte_len()
+    });
+    let maps: usize = maps.sum();
+    let cells: Vec<String> = levels.cells().iter().map(|cells| cells.len().to_string()).collect();
+    println!(
+        "* levels of {} cells: {:.0} points/s; {:.0} bytes a point, their close pairs {:.0}",
+        cells.join(", "),
+        count(n) / time,
+        count(levels.byte_len()) / count(n),
+        count(maps) / count(n),
+    );
+    let (mut scratch, mut whole) = (LevelScratch::default(), GeodesicScratch::default());
+    let [mut excess, mut worst, mut reached, mut reached_whole, mut ours, mut theirs, mut found] =
+        [0.0_f64; 7];
+    for k in 0..pairs {
+        let ends = [k * 7919 % n, (k * 104_729 + n / 2) % n].map(|i| u32::try_from(i).unwrap_or(0));
+        let (distance, time) = timed(|| levels.distance(network, ends[0], ends[1], &mut scratch));
+        let (exact, time_whole) = timed(|| whole.distance(network, ends[0], ends[1]));
+        ours += time.as_secs_f64();
+        theirs += time_whole.as_secs_f64();
+        reached += count(scratch.reached());
+        reached_whole += count(whole.reached());
+        if let (Some(distance), Some(exact)) = (distance, exact.filter(|d| *d > 0.0)) {
+            let over = (f64::from(distance) / f64::from(exact) - 1.0).max(0.0);
+            (excess, worst, found) = (excess + over, worst.max(over), found + 1.0);
+        }
+    }
+    println!(
+        "* {found} distances over the whole: {:.3} % too long in the mean, {:.2} % at worst; {:.2} of the points that Dijkstra's \
+         algorithm reaches, {:.0} µs for its {:.0}",
+        100.0 * excess / found,
+        100.0 * worst,
+        reached / reached_whole,
+        ours * 1e6 / count(pairs),
+        theirs * 1e6 / count(pairs),
+    );
+}
+
+/// One evaluation near points of the scan, with either kernel.
+fn kernels(scan: &Scan, graph: &PointGraph, runs: usize) {
+    let lengths = edge_lengths(graph.edges(), scan.positions());
+    let pairs = ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons(scan), Paths::Rebuilt);
+    let kernel = GeodesicKernel::new(scan.plan(), scan.positions(), scan.radii(), graph.edges(), &pairs);
+    let rng = &mut rng(1);
+    let places: Vec<(usize, [f64; 3])> = (0..4096)
+        .map(|k| {
+            let i = k * 7919 % scan.len();
+            let (p, r) = (scan.positions()[i].map(f64::from), f64::from(scan.radii()[i]));
+            let d = point_in(rng, 0.1 * r);
+            (i, [0, 1, 2].map(|k| p[k] + d[k]))
+        })
+        .collect();
+    let (mut scratch, mut gather) = (KernelScratch::default(), GatherScratch::default());
+    let (_, geodesic) = least(runs, || {
+        let at =
+            places.iter().map(|&(i, x)| kernel.evaluate(x, u32::try_from(i).unwrap_or(0), &mut scratch).f);
+        black_box(at.sum::<f64>())
+    });
+    let (_, straight) = least(runs, || {
+        black_box(places.iter().map(|&(i, x)| scan.evaluate_near(i, x, &mut gather).f).sum::<f64>())
+    });
+    let each = 1e9 / count(places.len());
+    println!("* f near a point: geodesic {:.0} ns, straight {:.0} ns", geodesic * each, straight * each);
+}
+
+fn measure(object: &Object, runs: usize, pairs: usize) -> Result<(), Failure> {
+    let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
+    let graph = PointGraph::build(scan.positions(), &GraphOptions::default())?;
+    let edges = count(graph.edges().edge_count()) / count(scan.len());
+    println!("\n## {}, {} points, {edges:.1} edges a point\n", object.name, scan.len());
+    orientation(object, &scan, &graph, runs);
+    close_pairs(&scan, &graph, runs);
+    levels(&scan, &graph, runs, pairs);
+    kernels(&scan, &graph, runs);
+    Ok(())
+}
+
+/// How far the sheets that a kernel shows are from the plates, in bandwidths, and how many places show one.
+#[derive(Debug, Clone, Copy, Default)]
+struct Recovered {
+    off: f64,
+    found: usize,
+}
+
+impl Recovered {
+    /// Projects onto the surface from a place on a plate.
+    fn add(&mut self, start: [f64; 3], at: impl FnMut([f64; 3]) -> Evaluation, h: f64) {
+        let mut at = at;
+        let foot = project(start, &mut at);
+        if foot.converged && at(foot.point).status == Status::Ok {
+            self.off += (foot.point[2] - start[2]).abs() / h;
+            self.found += 1;
+        }
+    }
+}
+
+/// Two parallel plates, evenly and randomly sampled, at `gap` bandwidths: what both kernels make of them.
+fn two_plates(gap: f64, order: Order) -> Result<[Recovered; 2], Failure> {
+    const SPACING: f64 = 0.05;
+    let sample = |distance: f64| {
+        let sampling = Sampling { spacing: SPACING, noise: 0.0, order, seed: 1 };
+        PointCloud::from_positions(&plates(2.0, 2.0, distance).sample(sampling).points)
+    };
+    let apart = Scan::build(&sample(1.0)?, &BuildOptions::default())?;
+    let mut bandwidths: Vec<f32> = apart.radii().iter().map(|&r| apart.plan().bandwidth(r)).collect();
+    bandwidths.sort_unstable_by(f32::total_cmp);
+    let h = f64::from(bandwidths[bandwidths.len() / 2]) / apart.frame().scale;
+    let scan = Scan::build(&sample(gap * h)?, &BuildOptions::default())?;
+    let h = h * scan.frame().scale;
+    let graph = PointGraph::build(scan.positions(), &GraphOptions::default())?;
+    let lengths = edge_lengths(graph.edges(), scan.positions());
+    let pairs = ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons(&scan), Paths::Rebuilt);
+    let kernel = GeodesicKernel::new(scan.plan(), scan.positions(), scan.radii(), graph.edges(), &pairs);
+    let (mut scratch, mut gather) = (KernelScratch::default(), GatherScratch::default());
+    let mut recovered = [Recovered::default(); 2];
+    let inner = 0.6 * scan.frame().scale;
+    let middle = scan.positions().iter().fold([0.0; 3], |s, p| [0, 1, 2].map(|k| s[k] + f64::from(p[k])));
+    let middle = middle.map(|c| c / count(scan.len()));
+    for i in 0..scan.len() {
+        let start = scan.positions()[i].map(f64::from);
+        if (0..2).any(|k| (start[k] - middle[k]).abs() > inner) {
+            continue;
+        }
+        recovered[0].add(start, |x| scan.evaluate_near(i, x, &mut gather), h);
+        recovered[1].add(start, |x| kernel.evaluate(x, u32::try_from(i).unwrap_or(0), &mut scratch), h);
+    }
+    Ok(recovered)
+}
+
+fn plates_table() -> Result<(), Failure> {
+    println!("| s/h | order | straight: off by, of h | found | geodesic: off by, of h | found |");
+    println!("| --: | --- | --: | --: | --: | --: |");
+    for order in [Order::Regular, Order::Random] {
+        for gap in [1.5, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5, 4.0] {
+            let cells = two_plates(gap, order)?
+                .map(|found| format!("{:.4} | {}", found.off / count(found.found.max(1)), found.found));
+            println!("| {gap} | {order:?} | {} |", cells.join(" | "));
+        }
     }
     Ok(())
 }
@@ -71,13 +260,18 @@ fn measure(object: &Object, runs: usize) -> Result<(), Failure> {
 fn main() -> Result<(), Failure> {
     let mut arguments = Arguments::of_process();
     let runs = arguments.value("--runs")?.unwrap_or(3_usize).max(1);
+    let pairs = arguments.value("--pairs")?.unwrap_or(200_usize).max(1);
+    let shows_plates = arguments.flag("--plates");
     let mut objects = arguments.words()?;
+    println!("{}", machine::description());
+    if shows_plates {
+        return plates_table();
+    }
     if objects.is_empty() {
         objects = vec!["dragon-5k".into(), "dragon-23k".into()];
     }
-    println!("{}", machine::description());
     for object in &objects {
-        measure(&Object::read(object)?, runs)?;
+        measure(&Object::read(object)?, runs, pairs)?;
     }
     Ok(())
 }
