@@ -13,7 +13,7 @@ use nearmiss_store::Array;
 use serde::{Deserialize, Serialize};
 
 use crate::Adjacency;
-use crate::geodesic::GeodesicScratch;
+use crate::geodesic::Reached;
 use crate::length::{Network, distance, step};
 use crate::parallel::{for_each, ranges_with};
 
@@ -22,6 +22,10 @@ const STRETCHES: usize = 64;
 
 /// Lists that are sorted together.
 const SORTED: usize = 1024;
+
+/// Points that are reached are sorted into as many shells.
+const SHELLS: usize = 32;
+const SHELLS_F32: f32 = 32.0;
 
 /// Where the way goes on is not stored: it stands among too many neighbours.
 const ELSEWHERE: u8 = u8::MAX;
@@ -74,15 +78,20 @@ impl ClosePairs {
         let count = network.len();
         assert_eq!(count, horizons.len(), "a horizon a point");
         let length = count.div_ceil(STRETCHES).max(1);
-        let stretches = ranges_with(count, length, GeodesicScratch::default, |scratch, sources| {
-            let mut ends = Vec::with_capacity(sources.len());
-            let mut reached = Vec::new();
-            for source in sources {
-                reached.extend_from_slice(scratch.within(network, id32(source), horizons[source]));
-                ends.push(reached.len());
-            }
-            (ends, reached)
-        });
+        let stretches = ranges_with(
+            count,
+            length,
+            || Spread::new(count),
+            |spread, sources| {
+                let mut ends = Vec::with_capacity(sources.len());
+                let mut reached = Vec::new();
+                for source in sources {
+                    spread.within(network, id32(source), horizons[source], &mut reached);
+                    ends.push(reached.len());
+                }
+                (ends, reached)
+            },
+        );
         let mut starts = vec![0_u32; count + 1];
         let mut total = 0;
         for (_, reached) in &stretches {
@@ -222,17 +231,27 @@ impl ClosePairs {
         let stretches = ranges_with(
             self.len(),
             length,
-            || (),
-            |(), points| {
+            || vec![0_u32; self.len()],
+            |place, points| {
                 let mut ranks = Vec::new();
                 for i in points {
-                    ranks.extend(view.of(i).iter().map(|close| {
-                        let comes = |(k, edge): (u32, f32)| {
-                            view.distance(k, close.point).is_some_and(|d| step(d, edge) == close.distance)
-                        };
-                        let rank = network.edges(i).position(comes);
-                        rank.and_then(|rank| u8::try_from(rank).ok()).unwrap_or(ELSEWHERE)
-                    }));
+                    let (list, first) = (view.of(i), ranks.len());
+                    ranks.resize(first + list.len(), ELSEWHERE);
+                    for (k, close) in (1..).zip(list) {
+                        place[close.point as usize] = k;
+                    }
+                    for (rank, (k, edge)) in (0..ELSEWHERE).zip(network.edges(i)) {
+                        for close in view.of(k as usize) {
+                            let here = place[close.point as usize] as usize;
+                            if here > 0 && step(close.distance, edge) == list[here - 1].distance {
+                                let to = &mut ranks[first + here - 1];
+                                *to = rank.min(*to);
+                            }
+                        }
+                    }
+                    for close in list {
+                        place[close.point as usize] = 0;
+                    }
                 }
                 ranks
             },
@@ -277,6 +296,59 @@ impl<'a> Lists<'a> {
             let nearer = self.distance(k, j)?;
             (step(nearer, edge(k)) == left).then_some((k, nearer))
         })
+    }
+}
+
+/// Searches that reach the same points at the same distances as [`GeodesicScratch::within`](crate::GeodesicScratch::within), in
+/// any order. A shortest distance is the least over all ways, in whichever order they are tried; so nothing has
+/// to be kept sorted but roughly, and a point whose way is improved after it was left is left once more.
+struct Spread {
+    /// The least distance known; infinite between searches.
+    least: Vec<f32>,
+    touched: Vec<u32>,
+    /// Points to be left, by their distances.
+    shells: [Vec<Reached>; SHELLS],
+}
+
+impl Spread {
+    fn new(count: usize) -> Self {
+        Self {
+            least: vec![f32::INFINITY; count],
+            touched: Vec::new(),
+            shells: [const { Vec::new() }; SHELLS],
+        }
+    }
+
+    /// Appends all points within `reach` of `source`.
+    fn within(&mut self, network: Network<'_>, source: u32, reach: f32, reached: &mut Vec<Reached>) {
+        let per_length = SHELLS_F32 / reach;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
+        let shell_of = |distance: f32| ((distance * per_length) as usize).min(SHELLS - 1);
+        self.least[source as usize] = 0.0;
+        self.touched.push(source);
+        self.shells[0].push(Reached { point: source, distance: 0.0 });
+        for shell in 0..SHELLS {
+            while let Some(Reached { point, distance: along }) = self.shells[shell].pop() {
+                if self.least[point as usize] < along {
+                    continue;
+                }
+                for (to, length) in network.edges(point as usize) {
+                    let distance = step(along, length);
+                    let least = &mut self.least[to as usize];
+                    if distance <= reach && distance < *least {
+                        if *least == f32::INFINITY {
+                            self.touched.push(to);
+                        }
+                        *least = distance;
+                        self.shells[shell_of(distance)].push(Reached { point: to, distance });
+                    }
+                }
+            }
+        }
+        reached.extend(self.touched.drain(..).map(|point| {
+            let distance = std::mem::replace(&mut self.least[point as usize], f32::INFINITY);
+            Reached { point, distance }
+        }));
     }
 }
 

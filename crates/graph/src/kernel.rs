@@ -10,7 +10,7 @@
 //! point, the other end takes its distance from there along the edge, instead of none: or points would
 //! fall silent as soon as x left p1, those too that weigh a tenth.
 
-use nearmiss_surface::{Evaluation, KernelPoint, Moments, SurfacePlan};
+use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, PointBlock, SurfacePlan};
 
 use crate::Adjacency;
 use crate::close_pairs::{Close, ClosePairs, Lists};
@@ -47,12 +47,29 @@ struct Both {
 }
 
 /// Memory for evaluations, used again by the next: four bytes a point, and what is heard.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct KernelScratch {
+    /// The instructions that weigh.
+    level: Level,
     /// One more than where a point stands among `both`, 0 for none.
     place: Vec<u32>,
     both: Vec<Both>,
     heard: Vec<Close>,
+    blocks: Vec<MeasuredBlock>,
+}
+
+impl Default for KernelScratch {
+    fn default() -> Self {
+        Self::at(Level::new())
+    }
+}
+
+impl KernelScratch {
+    /// For evaluations by the instructions of `level`, which change no bit.
+    #[must_use]
+    pub fn at(level: Level) -> Self {
+        Self { level, place: Vec::new(), both: Vec::new(), heard: Vec::new(), blocks: Vec::new() }
+    }
 }
 
 impl<'a> GeodesicKernel<'a> {
@@ -108,45 +125,42 @@ impl<'a> GeodesicKernel<'a> {
     /// # Panics
     /// When its ends are no points.
     pub fn hear<'s>(&self, foot: &Foot, scratch: &'s mut KernelScratch) -> &'s [Close] {
-        let KernelScratch { place, both, heard } = scratch;
+        let KernelScratch { place, both, heard, .. } = scratch;
         both.clear();
         heard.clear();
+        let horizon = |point: u32| self.radii.get(point as usize).map_or(0.0, |&r| self.plan.horizon(r));
+        let first = self.lists.of(foot.ends[0] as usize);
+        if foot.share <= 0.0 {
+            heard.extend(first.iter().filter(|close| close.distance < horizon(close.point)));
+            return heard;
+        }
         if place.len() < self.positions.len() {
             place.resize(self.positions.len(), 0);
         }
-        for close in self.lists.of(foot.ends[0] as usize) {
+        for (place_of, close) in (1..).zip(first) {
             both.push(Both { point: close.point, distances: [close.distance, f32::INFINITY] });
+            if let Some(to) = place.get_mut(close.point as usize) {
+                *to = place_of;
+            }
         }
-        if foot.ends[1] != foot.ends[0] {
-            for (place_of, both) in (1..).zip(&*both) {
-                if let Some(to) = place.get_mut(both.point as usize) {
-                    *to = place_of;
-                }
+        for close in self.lists.of(foot.ends[1] as usize) {
+            match place.get(close.point as usize) {
+                Some(&known) if known > 0 => both[known as usize - 1].distances[1] = close.distance,
+                _ => both.push(Both { point: close.point, distances: [f32::INFINITY, close.distance] }),
             }
-            let first = both.len();
-            for close in self.lists.of(foot.ends[1] as usize) {
-                match place.get(close.point as usize) {
-                    Some(&known) if known > 0 => both[known as usize - 1].distances[1] = close.distance,
-                    _ => both.push(Both { point: close.point, distances: [f32::INFINITY, close.distance] }),
-                }
-            }
-            for both in &both[..first] {
-                if let Some(to) = place.get_mut(both.point as usize) {
-                    *to = 0;
-                }
+        }
+        for close in first {
+            if let Some(to) = place.get_mut(close.point as usize) {
+                *to = 0;
             }
         }
         #[expect(clippy::cast_possible_truncation, reason = "a share")]
         let share = foot.share as f32;
-        for &Both { point, distances: [a, b] } in &*both {
+        heard.extend(both.iter().filter_map(|&Both { point, distances: [a, b] }| {
             let along = |own: f32, other: f32| if own < f32::INFINITY { own } else { other + foot.length };
-            let (a, b) = (along(a, b), along(b, a));
-            let distance = (1.0 - share) * a + share * b;
-            let radius = self.radii.get(point as usize).copied().unwrap_or(0.0);
-            if distance < self.plan.horizon(radius) {
-                heard.push(Close { point, distance });
-            }
-        }
+            let distance = (1.0 - share) * along(a, b) + share * along(b, a);
+            (distance < horizon(point)).then_some(Close { point, distance })
+        }));
         heard
     }
 
@@ -158,13 +172,20 @@ impl<'a> GeodesicKernel<'a> {
     /// When there is no such point.
     pub fn evaluate(&self, x: [f64; 3], nearest: u32, scratch: &mut KernelScratch) -> Evaluation {
         let foot = self.foot(x, nearest);
-        let heard = self.hear(&foot, scratch);
-        let points = heard.iter().filter_map(|close| {
-            let position = *self.positions.get(close.point as usize)?;
-            let horizon = self.plan.horizon(self.radii[close.point as usize]);
-            Some(KernelPoint { position, distance: close.distance, horizon })
-        });
-        Moments::of_points(self.plan, x, points).evaluate(self.plan, x)
+        self.hear(&foot, scratch);
+        let KernelScratch { level, heard, blocks, .. } = scratch;
+        blocks.clear();
+        for some in heard.chunks(PointBlock::WIDTH) {
+            let mut block = MeasuredBlock::EMPTY;
+            for (lane, close) in some.iter().enumerate() {
+                // What is heard has a radius, so it has a position.
+                let i = close.point as usize;
+                block.points.set(lane, self.positions[i], self.plan.horizon(self.radii[i]), self.plan);
+                block.distance[lane] = close.distance;
+            }
+            blocks.push(block);
+        }
+        Moments::measured(*level, self.plan, x, &*blocks).evaluate(self.plan, x)
     }
 
     /// The local sampling radius that the graph alone suggests at `foot`: the longest edges at its ends, interpolated. It stands for

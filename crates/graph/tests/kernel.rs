@@ -5,7 +5,7 @@ mod clouds;
 
 use clouds::Cloud;
 use nearmiss_geometry::Pose;
-use nearmiss_graph::{ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, Network, Paths};
+use nearmiss_graph::{Close, ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, Network, Paths};
 use nearmiss_surface::{
     Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions, SurfacePlan, project,
 };
@@ -161,6 +161,46 @@ fn distances_from_the_foot_are_those_of_its_ends_and_go_over_smoothly() {
             assert!(a.1 >= p.min(q) - 1e-6, "{} between {p} and {q}", a.1);
         }
     }
+}
+
+#[test]
+fn weights_are_those_of_the_formulas_at_every_level() {
+    each_kernel(|kernel| {
+        let ring = Sheet::new(Cloud::of_form(torus(1.0, 0.4), 0.1, 0.2, 4), kernel);
+        let (h, rng) = (ring.h(), &mut arbitrary::rng(8));
+        let (mut best, mut base) = (KernelScratch::default(), KernelScratch::at(Level::baseline()));
+        for i in (0..ring.cloud.points.len()).step_by(5) {
+            let d = arbitrary::point_in(rng, 0.4 * h);
+            let x = [0, 1, 2].map(|k| f64::from(ring.cloud.points[i][k]) + d[k]);
+            let nearest = ring.nearest(x);
+            let found = ring.kernel().evaluate(x, nearest, &mut best);
+            let again = ring.kernel().evaluate(x, nearest, &mut base);
+            assert_eq!(found.f.to_bits(), again.f.to_bits(), "{kernel:?} at {i}");
+            // Klein & Zachmann 2005, eq. 1 to 5.
+            let foot = ring.kernel().foot(x, nearest);
+            let weigh = |c: &Close| {
+                let horizon = f64::from(ring.plan.horizon(ring.cloud.radii[c.point as usize]));
+                let t = (f64::from(c.distance) / horizon).powi(2);
+                let q = t.sqrt();
+                let w = match kernel {
+                    Kernel::Gaussian => 1e-4_f64.powf(t),
+                    _ => (1.0 - q).powi(4) * (4.0 * q + 1.0),
+                };
+                (w, ring.cloud.points[c.point as usize].map(f64::from))
+            };
+            let heard: Vec<_> = ring.kernel().hear(&foot, &mut best).iter().map(weigh).collect();
+            let total: f64 = heard.iter().map(|(w, _)| w).sum();
+            let mean = [0, 1, 2].map(|k| heard.iter().map(|(w, p)| w * p[k]).sum::<f64>() / total);
+            let about = |j: usize, k: usize| {
+                heard.iter().map(|(w, p)| w * (p[j] - mean[j]) * (p[k] - mean[k])).sum::<f64>() / total
+            };
+            let c = [about(0, 0), about(0, 1), about(0, 2), about(1, 1), about(1, 2), about(2, 2)];
+            let normal = nearmiss_surface::symmetric_eigen(c).vectors[0];
+            let f: f64 = (0..3).map(|k| normal[k] * (mean[k] - x[k])).sum();
+            assert!((f.abs() - found.f.abs()).abs() < 1e-4 * h, "{kernel:?} at {i}: {} for {f}", found.f);
+            assert_eq!(found.support as usize, heard.len());
+        }
+    });
 }
 
 fn foot_between(sheet: &Sheet, [a, b]: [u32; 2], share: f64) -> nearmiss_graph::Foot {

@@ -21,6 +21,6 @@ pub use fearless_simd::Level;
 pub use fit::{BORDER, Evaluation, Status};
 pub use kernel::Kernel;
 pub use meet::{Meeting, meet};
-pub use neighbourhood::{Centre, HalfBlock, KernelPoint, Moments, Neighbourhood, PointBlock};
+pub use neighbourhood::{Centre, HalfBlock, MeasuredBlock, Moments, Neighbourhood, PointBlock};
 pub use options::{Bandwidth, SurfaceError, SurfaceOptions, SurfacePlan};
 pub use project::{Projection, project};

@@ -48,48 +48,42 @@ impl Moments {
     }
 }
 
-/// A point, and how far it is from x in a metric of the caller's, such as along a graph.
+/// Points side by side with distances of their own, such as along a graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KernelPoint {
-    /// Where it is.
-    pub position: [f32; 3],
-    /// How far; beyond the horizon it counts for nothing.
-    pub distance: f32,
-    /// How far it is heard.
-    pub horizon: f32,
+pub struct MeasuredBlock {
+    /// The points; of those that are none the horizon is zero.
+    pub points: PointBlock,
+    /// How far x is from each; a point weighs by this, if it is within its horizon.
+    pub distance: [f32; WIDTH],
+}
+
+impl MeasuredBlock {
+    /// No points.
+    pub const EMPTY: Self = Self { points: PointBlock::EMPTY, distance: [f32::INFINITY; WIDTH] };
 }
 
 impl Moments {
-    /// Those of `points` about `x`, each weighing by its own distance. How near the nearest is remains a matter of
-    /// straight distance: it says whether x is where the surface can be, and some metrics tell no heights. In double precision, in the order
-    /// of `points`.
+    /// Those of the points of all `blocks` about `x`, each weighing by the distance given for it. How near the nearest is remains
+    /// a matter of straight distance: it says whether x is where the surface can be, and a way along the surface tells no
+    /// height above it. The instructions of `level` change no bit, the order of the points may.
     #[must_use]
-    pub fn of_points(plan: &SurfacePlan, x: [f64; 3], points: impl IntoIterator<Item = KernelPoint>) -> Self {
-        let mut sums = Self { nearest: f32::INFINITY, ..Self::default() };
-        for KernelPoint { position, distance, horizon } in points {
-            let share = (distance / horizon) * (distance / horizon);
-            // Nor is what is no number heard.
-            let is_heard = share < 1.0;
-            if !is_heard {
-                continue;
-            }
-            let w = f64::from(plan.kernel().weight(share * plan.reach_sq()));
-            let [x, y, z] = [0, 1, 2].map(|k| f64::from(position[k]) - x[k]);
-            #[expect(clippy::cast_possible_truncation, reason = "compared, not added")]
-            let straight = ((x * x + y * y + z * z) / f64::from(horizon).powi(2)) as f32 * plan.reach_sq();
-            let (wx, wy, wz) = (w * x, w * y, w * z);
-            sums.weight += w;
-            for (sum, v) in sums.first.iter_mut().zip([wx, wy, wz]) {
-                *sum += v;
-            }
-            for (sum, v) in sums.second.iter_mut().zip([wx * x, wx * y, wx * z, wy * y, wy * z, wz * z]) {
-                *sum += v;
-            }
-            sums.horizon += w * f64::from(horizon);
-            sums.nearest = sums.nearest.min(straight);
-            sums.support += 1;
-        }
-        sums
+    pub fn measured<'b>(
+        level: Level,
+        plan: &SurfacePlan,
+        x: [f64; 3],
+        blocks: impl IntoIterator<Item = &'b MeasuredBlock>,
+    ) -> Self {
+        let x = Centre::new(x);
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut near = Neighbourhood::new(simd, plan, &x);
+                for block in blocks {
+                    near.offer_measured(simd, block);
+                }
+                near.moments(simd)
+            },
+        ))
     }
 }
 
@@ -340,6 +334,23 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
                 self.add(simd, block, half.id as usize % 2, f32x8::load_array_ref(simd, &half.t));
             }
         }
+    }
+
+    /// Adds those points of a block that are no further than their horizon by the distances given.
+    #[inline(always)]
+    fn offer_measured(&mut self, simd: S, block: &MeasuredBlock) {
+        let distance = f32x16::load_array_ref(simd, &block.distance);
+        let t = distance * distance * f32x16::load_array_ref(simd, &block.points.decay);
+        let counts: mask32x16<S> = t.simd_lt(self.plan.reach_sq());
+        let support = self.support + counts.to_bitmask().count_ones();
+        let (straight, _) = self.distances(simd, &block.points);
+        let straight = simd.select_f32x16(counts, straight, f32x16::simd_from(simd, f32::INFINITY));
+        let (low, high) = simd.split_f32x16(straight);
+        let nearest = self.nearest.min(low.min(high));
+        let (low, high) = simd.split_f32x16(t);
+        self.add(simd, &block.points, 0, low);
+        self.add(simd, &block.points, 1, high);
+        (self.nearest, self.support) = (nearest, support);
     }
 
     /// d²/h² of the points of a block, and whether any in either half reaches x. Those that do are counted.

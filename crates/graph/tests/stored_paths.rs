@@ -1,0 +1,93 @@
+//! Close pairs and levels in a container, and containers that lie.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+mod clouds;
+
+use clouds::Cloud;
+use nearmiss_graph::{
+    ClosePairs, Flaw, GeodesicKernel, KernelScratch, LevelScratch, Levels, LoadError, Network, Paths,
+};
+use nearmiss_store::{Check, File, Writer};
+use nearmiss_surface::{SurfaceOptions, SurfacePlan};
+use nearmiss_testdata::shapes::torus;
+
+struct Stored {
+    cloud: Cloud,
+    horizons: Vec<f32>,
+    pairs: ClosePairs,
+    levels: Levels,
+    bytes: Vec<u8>,
+}
+
+fn stored() -> Stored {
+    let cloud = Cloud::of_form(torus(1.0, 0.4), 0.15, 0.1, 3);
+    let network = Network::new(&cloud.graph, &cloud.lengths);
+    let horizons: Vec<f32> = cloud.radii.iter().map(|r| 3.0 * r).collect();
+    let pairs = ClosePairs::build(network, &horizons, Paths::Stored);
+    let levels = Levels::build(network, &cloud.radii);
+    let mut writer = Writer::new(*b"TEST", 1);
+    pairs.add_to(&mut writer, 0).unwrap();
+    levels.add_to(&mut writer).unwrap();
+    let mut bytes = Vec::new();
+    writer.write_to(&mut bytes).unwrap();
+    Stored { cloud, horizons, pairs, levels, bytes }
+}
+
+#[test]
+fn what_is_stored_comes_back() {
+    let Stored { cloud, horizons, pairs, levels, bytes } = stored();
+    let file = File::from_bytes(bytes, Check::Full).unwrap();
+    let again = ClosePairs::load(&file, 0, &horizons, Check::Full).unwrap();
+    assert_eq!((&again, again.paths()), (&pairs, Paths::Stored));
+    assert_eq!(Levels::load(&file, cloud.points.len(), Check::Full).unwrap(), levels);
+    assert!(!levels.cells().is_empty());
+    let wrong = ClosePairs::load(&file, 0, &horizons[1..], Check::Structure).unwrap_err();
+    assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { .. })), "{wrong}");
+    let wrong = Levels::load(&file, cloud.points.len() + 1, Check::Structure).unwrap_err();
+    assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { .. })), "{wrong}");
+    assert!(matches!(ClosePairs::load(&file, 1, &horizons, Check::Structure), Err(LoadError::Open(_))));
+}
+
+#[test]
+fn no_byte_changed_leads_out_of_the_arrays() {
+    let Stored { cloud, horizons, bytes, .. } = stored();
+    let network = Network::new(&cloud.graph, &cloud.lengths);
+    let plan = SurfacePlan::new(&SurfaceOptions::default(), 1.0, 1.0).unwrap();
+    let n = u32::try_from(cloud.points.len()).unwrap();
+    let (mut scratch, mut search, mut path) = (KernelScratch::default(), LevelScratch::default(), Vec::new());
+    let (mut refused, mut tried) = (0, 0);
+    let file = File::from_bytes(bytes.clone(), Check::Full).unwrap();
+    for section in file.sections() {
+        let first = usize::try_from(section.offset).unwrap();
+        let last = first + usize::try_from(section.length).unwrap();
+        let step = ((last - first) / 97).max(1) | 1;
+        for place in (first..last).step_by(step) {
+            let mut changed = bytes.clone();
+            changed[place] ^= 0x81;
+            // Checksums are not looked at here.
+            let file = File::from_bytes(changed, Check::Structure).unwrap();
+            tried += 1;
+            match ClosePairs::load(&file, 0, &horizons, Check::Structure) {
+                Ok(lying) => {
+                    let kernel =
+                        GeodesicKernel::new(&plan, &cloud.points, &cloud.radii, &cloud.graph, &lying);
+                    for i in (0..n).step_by(5) {
+                        let x = cloud.points[i as usize].map(|c| f64::from(c) + 0.01);
+                        assert!(kernel.evaluate(x, i, &mut scratch).f.is_finite(), "byte {place}");
+                        lying.path(&cloud.graph, &cloud.points, i, (i + 1) % n, &mut path);
+                    }
+                }
+                Err(_) => refused += 1,
+            }
+            match Levels::load(&file, cloud.points.len(), Check::Structure) {
+                Ok(lying) => {
+                    for i in (0..n).step_by(101) {
+                        lying.path(network, [i, (i + n / 2) % n], &mut search, &mut path);
+                    }
+                }
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    assert!(refused * 4 > tried, "{refused} of {tried} refused by structure alone");
+}
