@@ -14,7 +14,7 @@ use nearmiss::graph::{
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::surface::project;
 use nearmiss::{BuildOptions, Evaluation, PointCloud, Scan, Status, TriangleMesh};
-use nearmiss_benches::clock::timed;
+use nearmiss_benches::clock::{processor_time, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, arguments::Arguments, machine};
@@ -93,13 +93,16 @@ fn close_pairs(scan: &Scan, graph: &PointGraph, runs: usize) {
     let n = count(scan.len());
     let horizons = horizons(scan);
     for paths in [Paths::Rebuilt, Paths::Stored] {
+        let spent = processor_time();
         let (pairs, time) = least(runs, || {
             let lengths = edge_lengths(graph.edges(), scan.positions());
             ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons, paths)
         });
         println!(
-            "* close pairs, paths {paths:?}: {:.0} points/s, {:.1} heard at a point, {:.0} bytes a point",
+            "* close pairs, paths {paths:?}: {:.0} points/s, {:.2} µs of processor time a point; {:.1} heard at a point, {:.0} \
+             bytes a point",
             n / time,
+            (processor_time() - spent).as_secs_f64() * 1e6 / n / count(runs),
             count(pairs.pair_count()) / n,
             count(pairs.byte_len()) / n
         );
@@ -173,11 +176,23 @@ fn kernels(scan: &Scan, graph: &PointGraph, runs: usize) {
             places.iter().map(|&(i, x)| kernel.evaluate(x, u32::try_from(i).unwrap_or(0), &mut scratch).f);
         black_box(at.sum::<f64>())
     });
+    let (_, at_points) = least(runs, || {
+        let at = places.iter().map(|&(i, _)| {
+            let x = scan.positions()[i].map(f64::from);
+            kernel.evaluate(x, u32::try_from(i).unwrap_or(0), &mut scratch).f
+        });
+        black_box(at.sum::<f64>())
+    });
     let (_, straight) = least(runs, || {
         black_box(places.iter().map(|&(i, x)| scan.evaluate_near(i, x, &mut gather).f).sum::<f64>())
     });
     let each = 1e9 / count(places.len());
-    println!("* f near a point: geodesic {:.0} ns, straight {:.0} ns", geodesic * each, straight * each);
+    println!(
+        "* f near a point: geodesic {:.0} ns, at one {:.0} ns; straight {:.0} ns",
+        geodesic * each,
+        at_points * each,
+        straight * each
+    );
 }
 
 fn measure(object: &Object, runs: usize, pairs: usize) -> Result<(), Failure> {

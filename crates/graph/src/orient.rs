@@ -1,13 +1,15 @@
 //! Which side is out: one sign for each normal, so that neighbours agree.
 //!
 //! As in Hoppe et al. 1992, a spanning tree of the edges along which normals agree best carries the sign from point to
-//! point. We differ in what agrees. Theirs are normals that are parallel, which fails at sharp edges and through thin plates.
-//! Ours are normals that mirror each other in the plane half way between the points, as two normals of one circle do, or of a
-//! sphere, a plane, an edge with a ridge or a groove between the points, or both sides of a plate:
-//! with e the direction of the edge, n_j is held against n_i − 2 (n_i·e) e. Edges along the surface say more than edges off it,
-//! on which two sheets that merely come close look like a plate; so they count first.
+//! point. We differ twice.
 //!
-//! The tree is grown by Kruskal's algorithm, over sets that know the sign of each member relative to their first.
+//! They hold normals to agree that are parallel, which fails at sharp edges and through thin plates. Ours mirror each
+//! other in the plane half way between the points, as two normals of one circle do, of a sphere, a plane, of both sides of
+//! a ridge, a groove or a plate: with e the direction of the edge, n' is held against n − 2 (n·e) e.
+//!
+//! And their tree lets one edge decide between two sides of a doubtful place. Only along smooth sheets do we grow it
+//! edge by edge (Kruskal's algorithm); the patches that this leaves are joined by what all edges between two of them say
+//! together, each patch to the one that it is surest of, until no edge is left. `benches` (`geodesics`) counts what comes out wrong.
 
 use crate::Adjacency;
 use crate::parallel::ranges;
@@ -15,9 +17,8 @@ use crate::parallel::ranges;
 /// Steps of agreement that are told apart; edges of one step are taken in the order of their points.
 const STEPS: u16 = 1024;
 
-/// Normals that agree like this lie on one smooth sheet: if a ring of such edges still turns a normal round, the sheet has
-/// one side only.
-const SMOOTH: f32 = 0.9;
+/// Normals that agree like this lie on one smooth sheet. If a ring of such edges still turns a normal round, the sheet has one side only.
+const SMOOTH: f32 = 0.95;
 
 /// Which side is out, where something says so.
 #[derive(Debug, Clone, Copy, Default)]
@@ -59,17 +60,18 @@ pub struct OrientedPart {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Orientation {
     /// For each point 255 where its sign is certain, 0 where it might as well be the other: the lesser of the agreement
-    /// of its edges, those against it taken off, and of the weakest edge by which the sign came to it from the greater part.
+    /// of its edges, those against it taken off, and of the doubt in the least certain step by which its sign came from the greater part.
     pub confidence: Vec<u8>,
     /// The connected parts, by their first points.
     pub parts: Vec<OrientedPart>,
 }
 
-/// Whether two normals agree as they are, and how well, 0 to 1.
+/// Whether two normals agree as they are, how well, and how well along the surface, 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Agreement {
     same: bool,
     strength: f32,
+    along: f32,
 }
 
 #[inline]
@@ -90,16 +92,17 @@ fn agreement(p: [f32; 3], m: [f32; 3], q: [f32; 3], n: [f32; 3]) -> Agreement {
     let (me, ne) = (dot(m, e), dot(n, e));
     let mirrored = dot(m, n) - 2.0 * me * ne / square;
     let off = (me * me).max(ne * ne) / square;
-    let strength = mirrored.abs() * (1.0 - off);
     // Points in one place, or normals that are none, say nothing.
-    Agreement { same: mirrored >= 0.0, strength: if strength > 0.0 { strength.min(1.0) } else { 0.0 } }
+    let strength = if mirrored.abs() > 0.0 { mirrored.abs().min(1.0) } else { 0.0 };
+    let along = if off < 1.0 { strength * (1.0 - off) } else { 0.0 };
+    Agreement { same: mirrored >= 0.0, strength, along }
 }
 
 /// Turns `normals` so that neighbours in `graph` agree, and outwards where that can be told: by what `sides` says, where the greater part of a
 /// component follows it, else so that the component encloses a positive volume about its centre, each point standing for the
 /// square of its local sampling radius. What the signs are beforehand does not matter but where all of that says nothing.
 ///
-/// O(edges) in time and space, in part on all cores; the result does not depend on how many there are.
+/// O(e log e) in the number of edges, of which only those in doubt are sorted, in part on all cores; the result does not depend on how many there are.
 ///
 /// # Panics
 /// When there is not a position, a normal and a radius for each point, and a normal of its own if `sides` has these.
@@ -115,7 +118,7 @@ pub fn orient(
     assert_eq!(lengths, [count; 4], "one of each a point");
     let mut tree = Tree::new(count);
     let edges = strongest_first(graph, positions, normals);
-    let (smooth, rest) = edges.split_at(edges.partition_point(|edge| edge.strength() >= SMOOTH));
+    let (smooth, rest) = edges.split_at(edges.partition_point(|edge| edge.along() >= SMOOTH));
     smooth.iter().for_each(|&edge| tree.join(edge));
     tree.join_by_votes(rest);
     let roots: Vec<Signed> = (0..id(count)).map(|i| tree.root(i)).collect();
@@ -142,27 +145,30 @@ fn id(i: usize) -> u32 {
 #[derive(Debug, Clone, Copy, Default)]
 struct Edge {
     ends: [u32; 2],
-    /// [`STEPS`] − 1 − the step of agreement, and one bit for opposite normals.
+    /// The step of how well normals agree, and one bit for opposite ones.
+    strength: u16,
+    /// [`STEPS`] − 1 − the step of how well they agree along the surface.
     weakness: u16,
 }
 
 impl Edge {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to STEPS − 1")]
     fn new(ends: [u32; 2], found: Agreement) -> Self {
-        let step = STEPS - 1 - (found.strength * f32::from(STEPS - 1)) as u16;
-        Self { ends, weakness: step << 1 | u16::from(!found.same) }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to STEPS − 1")]
+        let step = |share: f32| (share * f32::from(STEPS - 1)) as u16;
+        let strength = step(found.strength) << 1 | u16::from(!found.same);
+        Self { ends, strength, weakness: STEPS - 1 - step(found.along) }
     }
 
     fn opposite(self) -> bool {
-        self.weakness & 1 != 0
+        self.strength & 1 != 0
     }
 
-    fn step(self) -> usize {
-        usize::from(self.weakness >> 1)
+    fn along(self) -> f32 {
+        f32::from(STEPS - 1 - self.weakness) / f32::from(STEPS - 1)
     }
 
     fn strength(self) -> f32 {
-        f32::from(STEPS - 1 - (self.weakness >> 1)) / f32::from(STEPS - 1)
+        f32::from(self.strength >> 1) / f32::from(STEPS - 1)
     }
 }
 
@@ -175,7 +181,7 @@ fn strongest_first(graph: &Adjacency, positions: &[[f32; 3]], normals: &[[f32; 3
             let (p, m) = (positions[i], normals[i]);
             for &j in graph.of(i).iter().filter(|&&j| i < j as usize) {
                 let edge = Edge::new([id(i), j], agreement(p, m, positions[j as usize], normals[j as usize]));
-                counts[edge.step()] += 1;
+                counts[usize::from(edge.weakness)] += 1;
                 edges.push(edge);
             }
         }
@@ -189,7 +195,7 @@ fn strongest_first(graph: &Adjacency, positions: &[[f32; 3]], normals: &[[f32; 3
     }
     let mut sorted = vec![Edge::default(); total];
     for edge in stretches.into_iter().flat_map(|(edges, _)| edges) {
-        let to = &mut next[edge.step()];
+        let to = &mut next[usize::from(edge.weakness)];
         sorted[*to] = edge;
         *to += 1;
     }
@@ -207,7 +213,7 @@ struct Signed {
 #[derive(Debug, Clone, Copy)]
 struct Votes {
     sets: [u32; 2],
-    /// Strengths of the edges between normals that agree, less those of the others.
+    /// Squares of the strengths of the edges between normals that agree, less those of the others.
     same: f64,
     all: f64,
 }
@@ -218,7 +224,7 @@ struct Tree {
     above: Vec<Signed>,
     /// Of a root the size of its set.
     size: Vec<u32>,
-    /// How a root lost its place: the root it was joined to, and how strong the edge was.
+    /// How a root lost its place: the root it was joined to, and how certain the sign was.
     joined: Vec<(u32, f32)>,
     /// Of a root: whether a ring of strong edges turns normals round.
     twisted: Vec<bool>,
@@ -256,7 +262,7 @@ impl Tree {
         if a.point == b.point {
             self.twisted[a.point as usize] |= turned;
         } else {
-            self.link(a, b, turned, edge.strength());
+            self.link(a, b, turned, edge.along());
         }
     }
 
@@ -326,7 +332,7 @@ impl Tree {
         self.twisted[root as usize] |= self.twisted[leaf as usize];
     }
 
-    /// The weakest edge by which the sign of `point` came from the greater part: the last one, as edges come weakest last.
+    /// The least certain step by which the sign of `point` came from the greater part.
     fn weakest(&self, mut point: u32) -> f32 {
         let mut weakest = 1.0_f32;
         loop {
@@ -441,8 +447,9 @@ fn confidences(graph: &Adjacency, positions: &[[f32; 3]], normals: &[[f32; 3]], 
             for &j in graph.of(i) {
                 let j = j as usize;
                 let found = agreement(positions[i], normals[i], positions[j], normals[j]);
-                votes += if found.same { found.strength } else { -found.strength };
-                all += found.strength;
+                let weight = found.strength * found.strength;
+                votes += if found.same { weight } else { -weight };
+                all += weight;
             }
             let share = if all > 0.0 { (votes / all).max(0.0) } else { 0.0 };
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255")]

@@ -16,7 +16,7 @@ fn torus_cloud() -> Cloud {
 fn check(network: Network<'_>, radii: &[f32], cells: &Cells) {
     let mut scratch = GeodesicScratch::default();
     let n = u32::try_from(network.len()).unwrap();
-    assert!(cells.centres().windows(2).all(|two| two[0] < two[1]));
+    assert!(cells.centres().windows(2).all(|two| two[0] < two[1]), "centres ascend");
     // No centre is nearer to one before it than that one asks for, and none could be added.
     let mut nearest = vec![(f32::INFINITY, u32::MAX); n as usize];
     let mut is_near = vec![false; n as usize];
@@ -48,11 +48,11 @@ fn check(network: Network<'_>, radii: &[f32], cells: &Cells) {
         touching.sort_unstable();
         touching.dedup();
         let found: Vec<(u32, f32)> = cells.network().edges(cell).collect();
-        assert_eq!(found.iter().map(|edge| edge.0).collect::<Vec<u32>>(), *touching);
+        assert_eq!(found.iter().map(|edge| edge.0).collect::<Vec<u32>>(), *touching, "about cell {cell}");
         for (other, length) in found {
             cells.expand(&[u32::try_from(cell).unwrap(), other], &mut path);
-            assert_eq!(path[0], cells.centres()[cell]);
-            assert_eq!(path[path.len() - 1], cells.centres()[other as usize]);
+            assert_eq!(path[0], cells.centres()[cell], "it begins at the centre");
+            assert_eq!(path[path.len() - 1], cells.centres()[other as usize], "and ends at the other");
             let along = along(network, &path);
             assert!((along - length).abs() <= 1e-5 * length, "{along} along a way of {length}");
             let direct = scratch.distance(network, path[0], path[path.len() - 1]).unwrap();
@@ -115,8 +115,8 @@ fn excess(form: Form, spacing: f64) -> [f64; 3] {
     for [a, b] in pairs {
         let found = levels.path(network, [a, b], &mut scratch, &mut path).unwrap();
         let shortest = exact.distance(network, a, b).unwrap();
-        assert_eq!((path[0], path[path.len() - 1]), (a, b));
-        assert!((along(network, &path) - found).abs() <= 1e-5 * found);
+        assert_eq!((path[0], path[path.len() - 1]), (a, b), "its ends");
+        assert!((along(network, &path) - found).abs() <= 1e-5 * found, "{found} is not its length");
         let over = f64::from(found) / f64::from(shortest).max(1e-9) - 1.0;
         assert!(over >= -1e-6 || a == b, "{found} below {shortest}");
         sum += over.max(0.0);
