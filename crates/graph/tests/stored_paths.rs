@@ -91,3 +91,27 @@ fn no_byte_changed_leads_out_of_the_arrays() {
     }
     assert!(refused * 4 > tried, "{refused} of {tried} refused by structure alone");
 }
+
+#[test]
+fn ways_that_go_round_are_refused() {
+    let Stored { cloud, levels, bytes, .. } = stored();
+    let cells = &levels.cells()[0];
+    // Two points of one cell, neither of them its centre, that send each other.
+    let is_centre = |i: u32| cells.centres().contains(&i);
+    let n = u32::try_from(cloud.points.len()).unwrap();
+    let owner = |i: u32| cells.owners()[i as usize];
+    let (a, b) = (0..n)
+        .flat_map(|a| (0..a).map(move |b| (a, b)))
+        .find(|&(a, b)| owner(a) == owner(b) && !is_centre(a) && !is_centre(b))
+        .unwrap();
+    let file = File::from_bytes(bytes.clone(), Check::Full).unwrap();
+    let section = file.sections().iter().find(|section| section.id.tag == *b"CWAY").unwrap();
+    let mut changed = bytes;
+    for (from, to) in [(a, b), (b, a)] {
+        let place = usize::try_from(section.offset).unwrap() + 4 * from as usize;
+        changed[place..place + 4].copy_from_slice(&to.to_le_bytes());
+    }
+    let file = File::from_bytes(changed, Check::Structure).unwrap();
+    let wrong = Levels::load(&file, cloud.points.len(), Check::Structure).unwrap_err();
+    assert!(matches!(wrong, LoadError::Flaw(Flaw::Value { what: "the cell of point", .. })), "{wrong}");
+}
