@@ -264,8 +264,10 @@ fn plates_table() -> Result<(), Failure> {
     println!("| --: | --- | --: | --: | --: | --: |");
     for order in [Order::Regular, Order::Random] {
         for gap in [1.5, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5, 4.0] {
-            let cells = two_plates(gap, order)?
-                .map(|found| format!("{:.4} | {}", found.off / count(found.found.max(1)), found.found));
+            let cells = two_plates(gap, order)?.map(|sheets| match sheets.found {
+                0 => "– | 0".into(),
+                found => format!("{:.4} | {found}", sheets.off / count(found)),
+            });
             println!("| {gap} | {order:?} | {} |", cells.join(" | "));
         }
     }
