@@ -68,8 +68,8 @@ fn rank(close: &Close) -> u64 {
 }
 
 impl ClosePairs {
-    /// The pairs of points (i, j) with a way from j to i no longer than the horizon of j, on all cores; the result does not
-    /// depend on how many there are.
+    /// The pairs of points (i, j) with a way from j to i no longer than the horizon of j, on all cores; the result does
+    /// not depend on how many there are.
     ///
     /// # Panics
     /// When there is not a horizon for each point, or there are 2³² pairs.
@@ -175,11 +175,12 @@ impl ClosePairs {
         self.view().distance(i, j)
     }
 
-    /// As [`Self::distance`]; `path` holds the points from `i` to `j` afterwards, both included, or none. Given the graph and the positions that the
-    /// map was built from, or for [`Paths::Stored`] any positions.
+    /// As [`Self::distance`]; `path` holds the points from `i` to `j` afterwards, both included, or none. Given the
+    /// graph and the positions that the map was built from; with [`Paths::Stored`] positions matter only at points of 255
+    /// neighbours or more, where a step does not fit its byte.
     ///
-    /// Klein & Zachmann 2005 (Algorithm 2) keep a queue of all neighbours that are nearer to the target. We go straight to
-    /// the one that the shortest path comes over, which the map knows.
+    /// Klein & Zachmann 2005 (Algorithm 2) keep a queue of all neighbours that are nearer to the target. We go straight
+    /// to the one that the shortest path comes over, which the map knows.
     ///
     /// # Panics
     /// When there is no point `i`.
@@ -283,7 +284,8 @@ impl<'a> Lists<'a> {
         self.of(i as usize).iter().find(|close| close.point == j).map(|close| close.distance)
     }
 
-    /// The neighbour of `at` over which the way of length `left` to `j` goes on, and how far it is from there: of several the first.
+    /// The neighbour of `at` over which the way of length `left` to `j` goes on, and how far it is from there: of
+    /// several the first.
     fn searched_step(
         &self,
         graph: &Adjacency,
@@ -299,9 +301,10 @@ impl<'a> Lists<'a> {
     }
 }
 
-/// Searches that reach the same points at the same distances as [`GeodesicScratch::within`](crate::GeodesicScratch::within), in
-/// any order. A shortest distance is the least over all ways, in whichever order they are tried; so nothing has
-/// to be kept sorted but roughly, and a point whose way is improved after it was left is left once more.
+/// Searches that reach the same points at the same distances as
+/// [`GeodesicScratch::within`](crate::GeodesicScratch::within), in any order. A shortest distance is the least over all
+/// ways, in whichever order they are tried; so nothing has to be kept sorted but roughly, and a point whose way is
+/// improved after it was left is left once more.
 struct Spread {
     /// The least distance known; infinite between searches.
     least: Vec<f32>,

@@ -67,7 +67,8 @@ impl GeodesicScratch {
         self.found(b)
     }
 
-    /// As [`Self::distance`]; `path` holds the points of a shortest path from `a` to `b` afterwards, both included, or none.
+    /// As [`Self::distance`]; `path` holds the points of a shortest path from `a` to `b` afterwards, both included, or
+    /// none.
     ///
     /// # Panics
     /// When there is no such point.

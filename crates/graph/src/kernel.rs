@@ -1,14 +1,15 @@
 //! The geodesic kernel: f with distances along the graph instead of straight ones.
 //!
-//! Klein & Zachmann 2005, eq. 5, and off the cloud as in their "Proximity graphs for defining surfaces over point clouds"
-//! (2004): x is replaced by its foot on the edge that is nearest to it, of those at its nearest point p1, and distances from the foot are
-//! interpolated between those from the two ends. So they do not jump where another point becomes the nearest, and x stays as near as
-//! the foot however high it is above the cloud; its domain ends that (`nearmiss_surface::Status`).
+//! Klein & Zachmann 2005, eq. 5, and off the cloud as in their "Proximity graphs for defining surfaces over point
+//! clouds" (2004): x is replaced by its foot on the edge that is nearest to it, of those at its nearest point p1, and
+//! distances from the foot are interpolated between those from the two ends. So they do not jump where another point
+//! becomes the nearest, and x stays as near as the foot however high it is above the cloud; its domain ends that
+//! (`nearmiss_surface::Status`).
 //!
-//! Two things we do otherwise. The ways from the foot to both ends are not added before interpolating: with them the foot half way between two points
-//! would be a whole edge from either, and from everything else by half an edge too far. And where only one of the ends is heard by a
-//! point, the other end takes its distance from there along the edge, instead of none: or points would
-//! fall silent as soon as x left p1, those too that weigh a tenth.
+//! Two things we do otherwise. The ways from the foot to both ends are not added before interpolating: with them the
+//! foot half way between two points would be a whole edge from either, and from everything else by half an edge too
+//! far. And where only one of the ends is heard by a point, the other end takes its distance from there along the edge,
+//! instead of none: or points would fall silent as soon as x left p1, those too that weigh a tenth.
 
 use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, PointBlock, SurfacePlan};
 
@@ -188,8 +189,8 @@ impl<'a> GeodesicKernel<'a> {
         Moments::measured(*level, self.plan, x, &*blocks).evaluate(self.plan, x)
     }
 
-    /// The local sampling radius that the graph alone suggests at `foot`: the longest edges at its ends, interpolated. It stands for
-    /// r in [`SurfacePlan::bandwidth`], the bandwidth of Klein & Zachmann 2004.
+    /// The local sampling radius that the graph alone suggests at `foot`: the longest edges at its ends, interpolated.
+    /// It stands for r in [`SurfacePlan::bandwidth`], the bandwidth of Klein & Zachmann 2004.
     ///
     /// # Panics
     /// When its ends are no points.

@@ -47,8 +47,8 @@ impl<'a> Network<'a> {
     }
 }
 
-/// The Euclidean length of every edge, for [`Network::new`]: of differences in single precision the root of the sum of squares,
-/// each step rounded, within 2e-7 of the true one.
+/// The Euclidean length of every edge, for [`Network::new`]: of differences in single precision the root of the sum of
+/// squares, each step rounded, within 2e-7 of the true one.
 ///
 /// # Panics
 /// When the graph has a point that has no position.

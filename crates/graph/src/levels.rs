@@ -1,10 +1,11 @@
 //! Coarser graphs over nested subsets of the points, for distances and paths of any length.
 //!
-//! A level keeps points, centres, no two of which are nearer than a distance along the graph that doubles from level to level, and of which every
-//! other point is within that of one. Each point belongs to the cell of the nearest centre (a Voronoi diagram along the
-//! graph); two cells that an edge joins are joined by an edge as long as the shortest way through one such edge,
-//! which is remembered, so that a path between centres is a path of points. A shortest path is searched among the few cells of the coarsest level,
-//! then, level by level, only in the cells near the path found on the level before.
+//! A level keeps points, centres, no two of which are nearer than a distance along the graph that doubles from level to
+//! level, and of which every other point is within that of one. Each point belongs to the cell of the nearest centre (a
+//! Voronoi diagram along the graph); two cells that an edge joins are joined by an edge as long as the shortest way
+//! through one such edge, which is remembered, so that a path between centres is a path of points. A shortest path is
+//! searched among the few cells of the coarsest level, then, level by level, only in the cells near the path found on
+//! the level before.
 
 use nearmiss_store::Array;
 
@@ -207,8 +208,8 @@ impl Cells {
         &self.to_centre
     }
 
-    /// The local sampling radii of the points at the centres, doubled with each level: times the surface's horizon what a
-    /// [`ClosePairs`](crate::ClosePairs) of this level reaches.
+    /// The local sampling radii of the points at the centres, doubled with each level: times the surface's horizon what
+    /// a [`ClosePairs`](crate::ClosePairs) of this level reaches.
     #[must_use]
     pub fn radii(&self) -> &[f32] {
         &self.radii
@@ -284,7 +285,8 @@ impl Touch {
     }
 }
 
-/// All pairs of cells that an edge joins, the lesser first, ascending, each with the shortest way; of equally long ones the first.
+/// All pairs of cells that an edge joins, the lesser first, ascending, each with the shortest way; of equally long ones
+/// the first.
 fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize) -> Vec<Touch> {
     let mut starts = vec![0_u32; cells + 1];
     for cell in owner {
@@ -327,8 +329,8 @@ fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize
 }
 
 impl Levels {
-    /// The levels over a graph whose points have these local sampling radii, such as the distances of their sixth neighbours, until one has
-    /// few cells. O(n log n) time, O(n) space.
+    /// The levels over a graph whose points have these local sampling radii, such as the distances of their sixth
+    /// neighbours, until one has few cells. O(n log n) time, O(n) space.
     ///
     /// # Panics
     /// When there is not a radius for each point.
@@ -365,8 +367,9 @@ impl Levels {
         self.cells.iter().map(Cells::byte_len).sum()
     }
 
-    /// The length of a path from `a` to `b` in the graph that the levels are over, or nothing where no way leads there. No path
-    /// is shorter in the cells that were searched; how much shorter one elsewhere can be is measured (`benches`).
+    /// The length of a path from `a` to `b` in the graph that the levels are over, or nothing where no way leads there.
+    /// No path is shorter in the cells that were searched; how much shorter one elsewhere can be is measured
+    /// (`benches`).
     ///
     /// # Panics
     /// When there is no such point.
