@@ -181,7 +181,7 @@ fn absurd_numbers_do_not_panic() {
             word.copy_from_slice(&value.to_le_bytes());
         }
     };
-    let sound = scan.at(&nearmiss::Pose::IDENTITY);
+    let sound = scan.at(&Pose::IDENTITY);
     for value in [0.0, 1e20, -1.0, f32::MAX, f32::NAN, f32::INFINITY] {
         for tags in [
             &[b"DISC"][..],
@@ -201,7 +201,7 @@ fn absurd_numbers_do_not_panic() {
             let Ok(absurd) = Scan::from_bytes(absurd, Check::Structure) else { continue };
             let plan =
                 nearmiss::CollidePlan::new(&nearmiss::CollideOptions::default(), &absurd, &scan).unwrap();
-            let view = absurd.at(&nearmiss::Pose::from_translation([0.3, 0.1, 0.0]));
+            let view = absurd.at(&Pose::from_translation([0.3, 0.1, 0.0]));
             for (a, b) in [(&view, &sound), (&sound, &view), (&view, &view)] {
                 let answer = nearmiss::collide(a, b, &plan, &nearmiss::Budget::UNLIMITED);
                 assert!(answer.statistics.node_pairs < 10_000, "{tags:?} {value}: {:?}", answer.statistics);
