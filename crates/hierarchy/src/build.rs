@@ -13,13 +13,11 @@ use crate::levels::samples;
 use crate::neighbours::{NeighbourList, chunks, groups, neighbours};
 use crate::options::{BuildError, BuildOptions};
 use crate::samples::lists;
-use crate::spacing::{Spacing, fold_nodes, map, smooth, spacings};
+use crate::sampling::Sampling;
+use crate::spacing::{Spacing, map};
 use crate::split::{Item, id32, split};
 use crate::surfels::{Leaf, LeafScratch, NormalCone, PointKind, Surfel, align, box_of_discs};
 use crate::topology::Node;
-
-/// Share of the points whose local radius is at most the scan's sampling radius.
-const SAMPLING_QUANTILE: f64 = 0.9;
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
 ///
@@ -424,40 +422,6 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     })
 }
 
-/// How densely points lie, and what follows from it.
-struct Sampling {
-    spacings: Vec<Spacing>,
-    radii: Vec<f32>,
-    sampling_radius: f32,
-    plan: SurfacePlan,
-    /// The points with their horizons.
-    blocks: Vec<PointBlock>,
-}
-
-impl Sampling {
-    /// That of points under `nodes`, in whose boxes the reaches are set; `unit` of the points' are one of the caller's.
-    fn of(
-        positions: &[[f32; 3]],
-        (nodes, boxes): (&[Node], &mut [OrientedBox]),
-        options: &BuildOptions,
-        unit: f64,
-    ) -> Result<Self, BuildError> {
-        let mut blocks: Vec<PointBlock> = PointBlock::silent(positions).collect();
-        let spacings = spacings(positions, &blocks, options.radius_neighbours as usize);
-        let radii = smooth(positions, &spacings, nodes, boxes);
-        let sampling_radius = quantile(&radii);
-        let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
-        let reaches = fold_nodes(nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
-        for (bounds, reach) in boxes.iter_mut().zip(reaches) {
-            bounds.reach = reach;
-        }
-        for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
-            block.tune(&plan, radii);
-        }
-        Ok(Self { spacings, radii, sampling_radius, plan, blocks })
-    }
-}
-
 /// The discs of all points and the bounds of all leaves, in order.
 fn surfels(
     index: &Index<'_>,
@@ -485,20 +449,4 @@ fn surfels(
             .collect();
         (surfels, bounds)
     })
-}
-
-fn quantile(radii: &[f32]) -> f32 {
-    let mut sorted = radii.to_vec();
-    *sorted.select_nth_unstable_by(sampling_rank(radii.len()), f32::total_cmp).1
-}
-
-/// Which of `count` ascending radii, from 0, is the sampling radius.
-#[expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "an index below 2^32"
-)]
-pub(crate) fn sampling_rank(count: usize) -> usize {
-    ((count - 1) as f64 * SAMPLING_QUANTILE).round() as usize
 }

@@ -13,6 +13,7 @@ mod levels;
 mod neighbours;
 mod options;
 mod samples;
+mod sampling;
 mod sanity;
 mod sections;
 mod spacing;

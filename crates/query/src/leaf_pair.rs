@@ -270,7 +270,7 @@ mod tests {
             let flat = round % 3 == 0;
             let (mut a, b) =
                 (Leaf::new(rng, 1 + round % 16, flat), Leaf::new(rng, 1 + (round / 16) % 16, flat));
-            a.lanes &= !(round as u32 % 5);
+            a.lanes &= [!0, !1, !2, !3, !4][round % 5];
             let axis = unit_vector(rng);
             let angle = if flat { 1e-3 } else { 2.0 };
             let scale = [1.0, 0.5, 3.0][round % 3];

@@ -4,9 +4,10 @@ use nearmiss_geometry::{Aabb, Frame};
 use nearmiss_surface::PointBlock;
 
 use super::{FARTHEST, Flaw};
-use crate::build::{PointHierarchy, sampling_rank};
+use crate::build::PointHierarchy;
 use crate::options::RADIUS_NEIGHBOURS;
 use crate::samples::SAMPLES;
+use crate::sampling::sampling_rank;
 
 impl PointHierarchy {
     pub(super) fn check_lengths(&self) -> Result<(), Flaw> {
