@@ -4,6 +4,7 @@
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
 //! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, measured.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
+//! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
 //! * `field` — f over a slice of a noisy scan, and how often its normal changes sides.
@@ -16,6 +17,7 @@ mod checks;
 mod demo;
 mod field;
 mod fuzz;
+mod geodesic;
 mod level;
 mod repository;
 mod tables;
@@ -30,6 +32,8 @@ of the repository
   demo           prepare a real scan, sweep two copies past each other; a table and a picture
   test [CHECK…]  every check, or: tidy, format, tests, lints, docs, features, packages, determinism
   tidy, ci       the first of them; all of them
+  geodesic [SCAN] [--from POINT] [-o FILE.png]
+                 a picture of its graph, coloured by the distance from a point along it
   level [SCAN] [--depth L]… [-o FILE.png]
                  a picture of levels of its hierarchy: samples and the balls that cover their nodes
   check-proof PROOF A B [--poses F]
@@ -60,6 +64,7 @@ fn main() -> ExitCode {
         ["ci"] => checks::run(&[]),
         ["check-proof", ..] => check_proof::run(std::env::args_os().skip(1)),
         ["field", ..] => field::run(std::env::args_os().skip(1)),
+        ["geodesic", words @ ..] => geodesic::run(words),
         ["level", words @ ..] => level::run(words),
         ["fuzz", words @ ..] => fuzz::run(words),
         ["tables", words @ ..] => tables::run(words),

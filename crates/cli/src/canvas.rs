@@ -202,6 +202,35 @@ impl Canvas {
         });
     }
 
+    /// A line of a given width where nothing is in front of it by more than `lift`, a length.
+    pub(crate) fn edge(
+        &mut self,
+        camera: &Camera,
+        ends: [Vector3<f64>; 2],
+        width: f64,
+        colour: Colour,
+        lift: f64,
+    ) {
+        let [from, to] = ends.map(|end| camera.project(end));
+        let [start, end] = [[from[0], from[1]], [to[0], to[1]]];
+        let length = distance(start, end);
+        let middle = [0, 1].map(|k| 0.5 * (start[k] + end[k]));
+        let (columns, rows) = pixels_about(camera.area, middle, 0.5 * length + width);
+        for row in rows {
+            for column in columns.clone() {
+                let p = centre_of(column, row);
+                let along = (0..2).map(|k| (p[k] - start[k]) * (end[k] - start[k])).sum::<f64>();
+                let t = if length > 0.0 { (along / (length * length)).clamp(0.0, 1.0) } else { 0.0 };
+                let foot = [0, 1].map(|k| start[k] + t * (end[k] - start[k]));
+                let near = from[2] + t * (to[2] - from[2]) + lift * camera.scale;
+                let i = row * self.width + column;
+                if distance(p, foot) <= 0.5 * width && near > self.depth[i] {
+                    self.pixels[i] = colour;
+                }
+            }
+        }
+    }
+
     /// A circle of a given line width.
     pub(crate) fn ring(&mut self, area: Area, centre: [f64; 2], radius: f64, width: f64, colour: Colour) {
         self.overlay(area, centre, radius + width, colour, |p| {

@@ -23,6 +23,7 @@ mod sentence;
 
 mod canvas;
 mod font;
+mod geodesic;
 mod level;
 mod picture;
 
@@ -40,6 +41,7 @@ pub use collide::{CollideArgs, DetailName, EvidenceName};
 pub use error::CliError;
 pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
+pub use geodesic::geodesic_picture;
 pub use inspect::InspectArgs;
 pub use level::level_picture;
 pub use picture::{Picture, contact_picture};
