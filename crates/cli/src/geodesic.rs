@@ -174,8 +174,8 @@ mod tests {
 
     #[test]
     fn rings_of_many_colours_and_a_grey_part_where_no_way_leads() {
-        let plate = |z: f64| (0..900_u32).map(move |i| [f64::from(i % 30), f64::from(i / 30), z]);
-        let cloud = PointCloud::from_positions(&plate(0.0).chain(plate(12.0)).collect::<Vec<_>>()).unwrap();
+        let plate = |x: f64| (0..900_u32).map(move |i| [x + f64::from(i % 30), f64::from(i / 30), 0.0]);
+        let cloud = PointCloud::from_positions(&plate(0.0).chain(plate(42.0)).collect::<Vec<_>>()).unwrap();
         let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
         assert!(geodesic_picture(&scan, 0).is_none(), "no graph");
         let scan = scan.with_graph(&cloud, &GraphOptions::default(), None).unwrap();
@@ -187,6 +187,6 @@ mod tests {
         let ways = Ways::new(&scan, scan.graph().unwrap(), 0);
         let apart = (0..scan.len()).filter(|&i| ways.colour(i) == ELSEWHERE).count();
         assert_eq!(apart, 900, "the other plate");
-        assert!(ways.path.len() >= 29, "across the plate");
+        assert!(ways.path.len() >= 14, "across the plate");
     }
 }
