@@ -8,7 +8,7 @@
 
 use std::path::PathBuf;
 
-use nearmiss::{BuildOptions, Check, PointCloud, Scan};
+use nearmiss::{BuildOptions, Check, GraphOptions, Paths, PointCloud, Scan};
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -84,7 +84,12 @@ fn main() -> Result<(), Failure> {
         drop(scan.take());
         scan = Some(measure(&format!("prepare, {name}"), n, runs, || Ok(Scan::build(cloud, &options)?))?);
     }
-    let scan = scan.ok_or("no number of threads")?;
+    let bare = scan.ok_or("no number of threads")?;
+    let mut scan = bare.clone();
+    for (name, pairs) in [("graph, no map", None), ("graph, with the map", Some(Paths::Rebuilt))] {
+        let options = GraphOptions::default().with_close_pairs(pairs);
+        scan = measure(name, n, runs, || Ok(bare.clone().with_graph(cloud, &options, None)?))?;
+    }
     let file = Scratch(std::env::temp_dir().join(format!("nearmiss-{}.scan", std::process::id())));
     let bytes = measure("save", n, runs, || Ok(scan.save(&file.0)?))?;
     let open = |check| Ok(Scan::open(&file.0, check)?);

@@ -27,10 +27,9 @@ pub struct Samples<'a> {
     pub radii: &'a [f32],
 }
 
-impl Samples<'_> {
-    fn horizons(&self) -> Vec<f32> {
-        self.radii.iter().map(|&r| self.plan.horizon(r)).collect()
-    }
+/// How far samples of these radii are heard.
+fn horizons(plan: &SurfacePlan, radii: &[f32]) -> Vec<f32> {
+    radii.iter().map(|&r| plan.horizon(r)).collect()
 }
 
 /// Who is whose neighbour on a surface, which side of it is out, and how far it is along it.
@@ -39,7 +38,8 @@ pub struct SurfaceGraph {
     points: PointGraph,
     confidence: Array<u8>,
     parts: Array<StoredPart>,
-    close_pairs: Option<ClosePairs>,
+    /// Of the points, then of the cells of each level; none, or all.
+    close_pairs: Vec<ClosePairs>,
     levels: Levels,
     /// Made when first wanted.
     lengths: OnceLock<Vec<f32>>,
@@ -97,9 +97,14 @@ impl SurfaceGraph {
         let oriented = orient(points.edges(), samples.positions, samples.radii, sides, normals);
         let lengths = edge_lengths(points.edges(), samples.positions);
         let network = Network::new(points.edges(), &lengths);
-        let close_pairs =
-            options.close_pairs.map(|paths| ClosePairs::build(network, &samples.horizons(), paths));
         let levels = Levels::build(network, samples.radii);
+        let plan = samples.plan;
+        let close_pairs = options.close_pairs.map_or_else(Vec::new, |paths| {
+            let of_points = (network, samples.radii);
+            let of_cells = levels.cells().iter().map(|cells| (cells.network(), cells.radii()));
+            let map = |(network, radii)| ClosePairs::build(network, &horizons(plan, radii), paths);
+            std::iter::once(of_points).chain(of_cells).map(map).collect()
+        });
         let parts: Vec<StoredPart> = oriented.parts.iter().map(StoredPart::of).collect();
         Ok(Self {
             points,
@@ -131,7 +136,14 @@ impl SurfaceGraph {
     /// The map of close pairs, if it was asked for.
     #[must_use]
     pub fn close_pairs(&self) -> Option<&ClosePairs> {
-        self.close_pairs.as_ref()
+        self.close_pairs.first()
+    }
+
+    /// The map of close pairs of the cells of a level, from 0 for the finest of [`Self::levels`], whose reach grows with the cells; `None`
+    /// where there is no such level, or no map.
+    #[must_use]
+    pub fn close_cells(&self, level: usize) -> Option<&ClosePairs> {
+        self.close_pairs.get(level.checked_add(1)?)
     }
 
     /// Coarser graphs over ever fewer of the points.
@@ -154,7 +166,7 @@ impl SurfaceGraph {
     #[must_use]
     pub fn kernel<'a>(&'a self, samples: Samples<'a>) -> Option<GeodesicKernel<'a>> {
         let Samples { plan, positions, radii } = samples;
-        let pairs = self.close_pairs.as_ref()?;
+        let pairs = self.close_pairs()?;
         Some(GeodesicKernel::new(plan, positions, radii, self.points.edges(), pairs))
     }
 
@@ -164,17 +176,17 @@ impl SurfaceGraph {
         self.points.counts()
     }
 
-    /// Bytes of all its arrays: of the graph with its orientation, of the map, and of the levels.
+    /// Bytes of all its arrays: of the graph with its orientation, of the maps, and of the levels.
     #[must_use]
     pub fn byte_lens(&self) -> [usize; 3] {
         let graph = self.points.bytes() + self.confidence.len() + size_of_val::<[_]>(&self.parts);
-        [graph, self.close_pairs.as_ref().map_or(0, ClosePairs::byte_len), self.levels.byte_len()]
+        [graph, self.close_pairs.iter().map(ClosePairs::byte_len).sum(), self.levels.byte_len()]
     }
 
     /// What is stored beside the arrays.
     #[must_use]
     pub fn meta(&self) -> SurfaceGraphMeta {
-        SurfaceGraphMeta { points: self.points.meta(), has_close_pairs: self.close_pairs.is_some() }
+        SurfaceGraphMeta { points: self.points.meta(), has_close_pairs: !self.close_pairs.is_empty() }
     }
 
     /// Adds the arrays to a container.
@@ -184,8 +196,8 @@ impl SurfaceGraph {
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
         self.points.add_to(writer)?;
         writer.section(CONFIDENCE, 0, &self.confidence)?.section(PARTS, 0, &self.parts)?;
-        if let Some(pairs) = &self.close_pairs {
-            pairs.add_to(writer, 0)?;
+        for (part, pairs) in (0..).zip(&self.close_pairs) {
+            pairs.add_to(writer, part)?;
         }
         self.levels.add_to(writer)
     }
@@ -216,10 +228,11 @@ impl SurfaceGraph {
         if let Some(index) = parts.iter().position(|part| !is_sound(part)) {
             return Err(Flaw::Value { what: "the side of part", index }.into());
         }
-        let horizons = || samples.horizons();
-        let close_pairs =
-            meta.has_close_pairs.then(|| ClosePairs::load(file, 0, &horizons(), check)).transpose()?;
         let levels = Levels::load(file, count, check)?;
+        let radii = std::iter::once(samples.radii).chain(levels.cells().iter().map(|cells| cells.radii()));
+        let maps = (0..).zip(radii).filter(|_| meta.has_close_pairs);
+        let map = |(part, radii)| ClosePairs::load(file, part, &horizons(samples.plan, radii), check);
+        let close_pairs = maps.map(map).collect::<Result<_, _>>()?;
         Ok(Self { points, confidence, parts, close_pairs, levels, lengths: OnceLock::new() })
     }
 }

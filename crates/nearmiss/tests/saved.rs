@@ -1,6 +1,7 @@
 //! A saved scan is the scan, and a file of an earlier release opens or is refused by name.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
+use nearmiss::graph::ClosePairs;
 use nearmiss::store::Fault;
 use nearmiss::{BuildOptions, Check, GraphOptions, Paths, PointCloud, Pose, Scan, Status, SurfaceGraph};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
@@ -82,6 +83,12 @@ fn a_graph_is_kept_as_it_was_asked_for() {
             same(&read, &scan);
             assert_eq!(read.graph().unwrap().close_pairs().map(|map| map.paths()), pairs);
             assert_eq!(read.geodesic_kernel().is_some(), pairs.is_some());
+            let graph = read.graph().unwrap();
+            for level in 0..graph.levels().cells().len() {
+                let map = graph.close_cells(level);
+                assert_eq!(map.map(ClosePairs::len), pairs.map(|_| graph.levels().cells()[level].len()));
+            }
+            assert!(!graph.levels().cells().is_empty() && graph.close_cells(9).is_none(), "some levels");
             assert!(read.is_oriented(), "normals were turned");
         }
     }
