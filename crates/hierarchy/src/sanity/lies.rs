@@ -8,6 +8,7 @@ use crate::build::PointHierarchy;
 use crate::covering::Covering;
 use crate::options::BuildOptions;
 use crate::samples::list_number;
+use crate::surfels::tangents;
 
 fn honest() -> PointHierarchy {
     let points = arbitrary::cloud(CloudKind::Sphere, 301, 1);
@@ -98,8 +99,8 @@ fn points_that_no_build_writes() {
         deep(&format!("the box about point {i}"), |scan| scan.positions.to_mut()[i][0] += 1.0);
         deep(&named("the normal"), |scan| scan.normals.to_mut()[i] = [0.0; 3]);
         deep(&format!("the cone about the normal of point {i}"), |scan| {
-            let turned = scan.normals[i].map(|x| -x);
-            scan.normals.to_mut()[i] = turned;
+            let (tangent, _) = tangents(scan.normals[i]);
+            scan.normals.to_mut()[i] = tangent;
         });
         deep(&named("the kind"), |scan| scan.kinds.to_mut()[i] = 5);
         deep(&named("the place in the input"), |scan| scan.source.to_mut()[i] = 301);
