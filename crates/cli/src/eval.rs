@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use nearmiss::graph::{GeodesicKernel, KernelScratch};
-use nearmiss::hierarchy::GatherScratch;
+use nearmiss::query::ViewScratch;
 use nearmiss::{Evaluation, Pose, Scan, ScanView, Status};
 use serde::Serialize;
 
@@ -67,10 +66,10 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
         KernelName::Geodesic => input::open_with_graph(&args.file, console)?,
     };
     let unit = scan.sampling_radius() / 100.0;
-    let mut f = Function::new(&scan, args)?;
+    let (view, mut scratch) = (view(&scan, args)?, ViewScratch::default());
     let mut results = Results::new();
     while let Some(x) = next {
-        let at = f.at(x);
+        let at = view.evaluate_with(x, &mut scratch);
         if args.json {
             let defined = at.status == Status::Ok;
             results.json(&Report {
@@ -88,33 +87,18 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// The implicit function of a scan.
-struct Function<'a> {
-    view: ScanView<'a>,
-    scratch: GatherScratch,
-    geodesic: Option<(GeodesicKernel<'a>, KernelScratch)>,
-}
-
-impl<'a> Function<'a> {
-    fn new(scan: &'a Scan, args: &EvalArgs) -> Result<Self, CliError> {
-        let geodesic = match args.kernel {
-            KernelName::Euclidean => None,
-            KernelName::Geodesic => {
-                let missing = || {
-                    let what = "this scan was prepared without a map of close pairs, along which the geodesic \
-                                kernel measures; prepare it again without `--no-close-pairs`";
-                    CliError::Unfit { path: args.file.clone(), what: what.into() }
-                };
-                Some((scan.geodesic_kernel().ok_or_else(missing)?, KernelScratch::default()))
-            }
-        };
-        Ok(Self { view: scan.at(&Pose::IDENTITY), scratch: GatherScratch::default(), geodesic })
-    }
-
-    fn at(&mut self, x: [f64; 3]) -> Evaluation {
-        match &mut self.geodesic {
-            None => self.view.evaluate_with(x, &mut self.scratch),
-            Some((kernel, scratch)) => self.view.evaluate_by(kernel, x, scratch),
+/// The scan where it is, with f by the kernel that is asked for.
+fn view<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<ScanView<'a>, CliError> {
+    let view = ScanView::new(scan, &Pose::IDENTITY);
+    match args.kernel {
+        KernelName::Euclidean => Ok(view),
+        KernelName::Geodesic => {
+            let missing = || {
+                let what = "this scan was prepared without a map of close pairs, along which the geodesic \
+                            kernel measures; prepare it again without `--no-close-pairs`";
+                CliError::Unfit { path: args.file.clone(), what: what.into() }
+            };
+            Ok(view.with_kernel(scan.geodesic_kernel().ok_or_else(missing)?))
         }
     }
 }

@@ -174,6 +174,22 @@ impl<'a> GeodesicKernel<'a> {
     pub fn evaluate(&self, x: [f64; 3], nearest: u32, scratch: &mut KernelScratch) -> Evaluation {
         let foot = self.foot(x, nearest);
         self.hear(&foot, scratch);
+        self.sum(x, scratch)
+    }
+
+    /// f at the point `i` itself, and the points that are heard there: as [`Self::evaluate`] at its position.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    pub fn evaluate_at<'s>(&self, i: u32, scratch: &'s mut KernelScratch) -> (Evaluation, &'s [Close]) {
+        // Its list is all, whatever edge it is at the end of.
+        self.hear(&Foot { ends: [i; 2], share: 0.0, length: 0.0 }, scratch);
+        let at = self.sum(self.positions[i as usize].map(f64::from), scratch);
+        (at, &scratch.heard)
+    }
+
+    /// f at `x`, at which is heard what was heard last.
+    fn sum(&self, x: [f64; 3], scratch: &mut KernelScratch) -> Evaluation {
         let KernelScratch { level, heard, blocks, .. } = scratch;
         blocks.clear();
         for some in heard.chunks(PointBlock::WIDTH) {

@@ -99,6 +99,9 @@ pub enum GraphError {
         /// How many there are.
         ends: usize,
     },
+    /// The geodesic kernel has nothing to measure by.
+    #[error("the geodesic kernel measures by a graph's map of close pairs; build the graph with that map")]
+    NoClosePairs,
 }
 
 /// Checks that differences of `positions` can be squared.

@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
 use nearmiss_store::Array;
-use nearmiss_surface::{PointBlock, SurfacePlan};
+use nearmiss_surface::{Metric, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot};
 use crate::covering::{Covering, Ground, Solid, coverings};
@@ -10,13 +10,13 @@ use crate::enclosure::{LeafBounds, growths};
 use crate::gather::Index;
 use crate::growth::Growth;
 use crate::levels::samples;
-use crate::neighbours::{NeighbourList, chunks, groups, neighbours};
+use crate::neighbours::{NeighbourList, groups, neighbours};
 use crate::options::{BuildError, BuildOptions};
 use crate::samples::lists;
 use crate::sampling::Sampling;
-use crate::spacing::{Spacing, map};
+use crate::spacing::map;
 use crate::split::{Item, id32, split};
-use crate::surfels::{Leaf, LeafScratch, NormalCone, PointKind, Surfel, align, box_of_discs};
+use crate::surfels::{NormalCone, PointKind, align, box_of_discs, surfels};
 use crate::topology::Node;
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
@@ -34,6 +34,7 @@ pub struct PointHierarchy {
     pub(crate) radius_neighbours: u32,
     pub(crate) samples_a_node: u32,
     pub(crate) is_oriented: bool,
+    pub(crate) metric: Metric,
     pub(crate) plan: SurfacePlan,
     pub(crate) positions: Array<[f32; 3]>,
     pub(crate) normals: Array<[f32; 3]>,
@@ -117,7 +118,7 @@ impl Slices<'_> {
 
 /// See [`Slices::ball`].
 #[inline]
-fn ball(kind: PointKind, radius: f32, sampling_radius: f32) -> f32 {
+pub(crate) fn ball(kind: PointKind, radius: f32, sampling_radius: f32) -> f32 {
     if kind.is_sparse() { radius.min(sampling_radius) } else { 0.0 }
 }
 
@@ -402,6 +403,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         radius_neighbours: options.radius_neighbours,
         samples_a_node: options.samples,
         is_oriented: false,
+        metric: Metric::Euclidean,
         plan,
         positions: positions.into(),
         normals: normals.into(),
@@ -419,34 +421,5 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         groups: groups.into(),
         lists: lists_of_blocks.lists.into(),
         listed: lists_of_blocks.entries.into(),
-    })
-}
-
-/// The discs of all points and the bounds of all leaves, in order.
-fn surfels(
-    index: &Index<'_>,
-    positions: &[[f32; 3]],
-    radii: &[f32],
-    (spacings, ordinary): (&[Spacing], f32),
-) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
-    let leaf = |(node, about): (&Node, &'_ OrientedBox)| (node.points(), *about);
-    let leaves: Vec<_> =
-        index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).map(leaf).collect();
-    chunks(&leaves, |leaves| {
-        let (mut scratch, mut surfels) = (LeafScratch::default(), Vec::new());
-        let bounds = leaves
-            .iter()
-            .map(|(points, about)| {
-                let leaf = Leaf {
-                    positions: &positions[points.clone()],
-                    radii: &radii[points.clone()],
-                    spacings: &spacings[points.clone()],
-                    about,
-                    ordinary,
-                };
-                leaf.surfels(index, &mut scratch, &mut surfels)
-            })
-            .collect();
-        (surfels, bounds)
     })
 }

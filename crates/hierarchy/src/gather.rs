@@ -232,6 +232,15 @@ impl PointHierarchy {
     /// The stored point that is nearest to `x`, in the stored frame; of equally near ones the first.
     #[must_use]
     pub fn nearest_point(&self, x: [f64; 3]) -> u32 {
+        self.nearest_point_near(0, x)
+    }
+
+    /// As [`Self::nearest_point`], faster where `x` is near the stored point `i`.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[must_use]
+    pub fn nearest_point_near(&self, i: usize, x: [f64; 3]) -> u32 {
         let place = Centre::new(x).rounded();
         let distance_sq = |p: [f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
         let (nodes, boxes, positions): (&[Node], &[OrientedBox], &[[f32; 3]]) =
@@ -239,9 +248,12 @@ impl PointHierarchy {
         // Boxes hold the points; how far off they are is told in single precision.
         let lost = place.iter().fold(self.bounds_radius(), |far, c| far.max(f64::from(c.abs()))) * 4e-6;
         let bound = |id: usize| (f64::from(boxes[id].distance_sq(place).sqrt()) - lost).max(0.0).powi(2);
-        let mut best = (f64::INFINITY, 0);
-        let mut stack = vec![(0.0, 0_usize)];
-        while let Some((least, id)) = stack.pop() {
+        let mut best = (distance_sq(positions[i]), i);
+        let mut stack = [(0.0, 0_usize); TREE_STACK];
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (least, id) = stack[top];
             let node = &nodes[id];
             if least > best.0 {
                 continue;
@@ -255,7 +267,8 @@ impl PointHierarchy {
             }
             let [left, right] = [id + 1, node.right as usize].map(|id| (bound(id), id));
             let (near, far) = if left.0 <= right.0 { (left, right) } else { (right, left) };
-            stack.extend([far, near]);
+            (stack[top], stack[top + 1]) = (far, near);
+            top += 2;
         }
         id32(best.1)
     }

@@ -12,6 +12,7 @@ mod growth;
 mod levels;
 mod neighbours;
 mod options;
+mod refit;
 mod samples;
 mod sampling;
 mod sanity;

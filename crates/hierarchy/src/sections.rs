@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_store::{Check, File, OpenError, WriteError, Writer};
-use nearmiss_surface::{SurfaceError, SurfaceOptions, SurfacePlan};
+use nearmiss_surface::{Metric, SurfaceError, SurfaceOptions, SurfacePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -38,6 +38,7 @@ pub struct HierarchyMeta {
     radius_neighbours: u32,
     samples: u32,
     is_oriented: bool,
+    metric: Metric,
     surface: SurfaceOptions,
 }
 
@@ -70,6 +71,7 @@ impl PointHierarchy {
             radius_neighbours: self.radius_neighbours,
             samples: self.samples_a_node,
             is_oriented: self.is_oriented,
+            metric: self.metric,
             surface: *self.plan.options(),
         }
     }
@@ -116,6 +118,7 @@ impl PointHierarchy {
             radius_neighbours: meta.radius_neighbours,
             samples_a_node: meta.samples,
             is_oriented: meta.is_oriented,
+            metric: meta.metric,
             plan: SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale)?,
             positions: file.array(POSITIONS, 0)?,
             normals: file.array(NORMALS, 0)?,

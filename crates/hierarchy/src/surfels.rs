@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::boxes::{OrientedBox, dot};
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::Index;
-use crate::neighbours::Locality;
+use crate::neighbours::{Locality, chunks};
 use crate::spacing::{Look, Spacing};
 use crate::topology::Node;
 
@@ -113,7 +113,7 @@ pub(crate) struct Surfel {
 
 /// Reused from leaf to leaf.
 #[derive(Debug)]
-pub(crate) struct LeafScratch {
+struct LeafScratch {
     level: Level,
     locality: Locality,
     surroundings: Surroundings,
@@ -136,9 +136,38 @@ impl Default for LeafScratch {
     }
 }
 
+/// The discs of all points and the bounds of all leaves, in order.
+pub(crate) fn surfels(
+    index: &Index<'_>,
+    positions: &[[f32; 3]],
+    radii: &[f32],
+    (spacings, ordinary): (&[Spacing], f32),
+) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
+    let leaf = |(node, about): (&Node, &'_ OrientedBox)| (node.points(), *about);
+    let leaves: Vec<_> =
+        index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).map(leaf).collect();
+    chunks(&leaves, |leaves| {
+        let (mut scratch, mut surfels) = (LeafScratch::default(), Vec::new());
+        let bounds = leaves
+            .iter()
+            .map(|(points, about)| {
+                let leaf = Leaf {
+                    positions: &positions[points.clone()],
+                    radii: &radii[points.clone()],
+                    spacings: &spacings[points.clone()],
+                    about,
+                    ordinary,
+                };
+                leaf.surfels(index, &mut scratch, &mut surfels)
+            })
+            .collect();
+        (surfels, bounds)
+    })
+}
+
 /// The points of a leaf, and what of them is known already.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Leaf<'a> {
+struct Leaf<'a> {
     pub(crate) positions: &'a [[f32; 3]],
     pub(crate) radii: &'a [f32],
     pub(crate) spacings: &'a [Spacing],
@@ -176,7 +205,13 @@ impl Leaf<'_> {
                     fits.push(index.moments(simd, &x, &locality.groups, near, halves));
                 }
                 Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| {
-                    surfels.push(surfel(&at, index.plan, self.radii[i], self.spacings[i], self.ordinary));
+                    surfels.push(surfel(
+                        &at,
+                        index.plan,
+                        self.radii[i],
+                        self.spacings[i].look == Look::Line,
+                        self.ordinary,
+                    ));
                 });
             },
         );
@@ -211,14 +246,28 @@ impl Leaf<'_> {
 }
 
 /// The disc of a point at which f is `at`, as if it were in the interior, without its cell.
-fn surfel(at: &Evaluation, plan: &SurfacePlan, radius: f32, spacing: Spacing, ordinary: f32) -> Surfel {
+fn surfel(at: &Evaluation, plan: &SurfacePlan, radius: f32, is_line: bool, ordinary: f32) -> Surfel {
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
     let normal = at.normal.map(|c| c as f32);
-    let kind = kind(at, spacing.look == Look::Line);
+    let kind = kind(at, is_line);
     // What is further than an ordinary horizon from all points is no surface (S0 eq. 6) but a hole, however sparse
     // the points about it; what a lone point knows of ends with its ball.
     let widest = if kind.is_sparse() { ordinary } else { plan.horizon(ordinary) };
     Surfel { normal, disc: (radius * DISC).min(widest), kind, cell: Cell::default() }
+}
+
+/// The disc of the point `p` at which f is `at`, narrowed where the sectors about it are empty of the points in `near`, those
+/// that are heard there.
+pub(crate) fn surfel_among(
+    p: [f32; 3],
+    at: &Evaluation,
+    (plan, radius, ordinary): (&SurfacePlan, f32, f32),
+    is_line: bool,
+    near: &[PointBlock],
+) -> Surfel {
+    let mut surfel = surfel(at, plan, radius, is_line, ordinary);
+    surfel.disc = surfel.disc.min(radius * disc(widest_gap(p, surfel.normal, near.iter())));
+    surfel
 }
 
 /// The radius of a disc over the local sampling radius, given how many sectors beside each other are empty.
@@ -288,8 +337,19 @@ fn kind(at: &Evaluation, is_line: bool) -> PointKind {
 
 /// The cone of a leaf's `normals`, each of which is turned to the axis' side.
 pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
+    let cone = cone(normals);
+    for n in normals {
+        if dot(*n, cone.axis) < 0.0 {
+            *n = n.map(|x| -x);
+        }
+    }
+    cone
+}
+
+/// The cone of a leaf's `normals`, of any sign.
+pub(crate) fn cone(normals: &[[f32; 3]]) -> NormalCone {
     let mut s = [0.0_f64; 6];
-    for n in &*normals {
+    for n in normals {
         let [x, y, z] = n.map(f64::from);
         for (sum, v) in s.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
             *sum += v;
@@ -299,14 +359,7 @@ pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
     let largest = main.iter().fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
     let axis: [f32; 3] = (main * largest.signum()).map(|c| c as f32).into();
-    let mut cosine = 1.0_f32;
-    for n in normals {
-        let c = dot(*n, axis);
-        if c < 0.0 {
-            *n = n.map(|x| -x);
-        }
-        cosine = cosine.min(c.abs());
-    }
+    let cosine = normals.iter().fold(1.0_f32, |least, n| least.min(dot(*n, axis).abs()));
     NormalCone { axis, cosine }
 }
 

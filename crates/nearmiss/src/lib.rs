@@ -27,5 +27,5 @@ pub use nearmiss_query::{
     collide_many_with, collide_paced, collide_poses, collide_poses_with, collide_proving, collide_with,
 };
 pub use nearmiss_store::Check;
-pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Status, SurfaceOptions};
+pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};
 pub use scan::{LoadError, SaveError, Scan};

@@ -7,11 +7,12 @@ use std::sync::Arc;
 
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_graph::{
-    GeodesicKernel, GraphError, GraphOptions, Samples, Sides, SurfaceGraph, SurfaceGraphMeta,
+    GeodesicKernel, GraphError, GraphOptions, KernelScratch, Samples, Sides, SurfaceGraph, SurfaceGraphMeta,
 };
 use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy};
 use nearmiss_query::ScanView;
 use nearmiss_store::{Bytes, Check, File, OpenError, Writer};
+use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -30,6 +31,11 @@ pub enum LoadError {
     /// Its graph does.
     #[error(transparent)]
     Graph(nearmiss_graph::LoadError),
+    /// Its discs are for the geodesic kernel, which needs a map of close pairs.
+    #[error(
+        "its bounds are for the geodesic kernel, but it has no map of close pairs; prepare the scan again"
+    )]
+    NoClosePairs,
 }
 
 impl From<nearmiss_hierarchy::LoadError> for LoadError {
@@ -106,13 +112,15 @@ impl Scan {
     /// ```
     ///
     /// # Errors
-    /// Names the option that is out of range.
+    /// Names the option that is out of range. [`GraphError::NoClosePairs`] where the scan [is for the geodesic
+    /// kernel](Self::with_geodesic_kernel), for which it is then fitted again, and the map is not wanted.
     pub fn with_graph(
         self,
         cloud: &PointCloud,
         options: &GraphOptions,
         scanner: Option<[f64; 3]>,
     ) -> Result<Self, GraphError> {
+        let metric = self.metric();
         let mut hierarchy = Arc::unwrap_or_clone(self.hierarchy);
         let own = cloud.normals().map(|normals| in_order_of(&hierarchy, cloud, normals));
         let scanner = scanner.map(|place| hierarchy.frame().to_local(place));
@@ -120,7 +128,43 @@ impl Scan {
         let sides = Sides { normals: own.as_deref(), scanner };
         let graph = SurfaceGraph::build(samples(&hierarchy), sides, &mut normals, options)?;
         hierarchy.turn_normals(&normals);
-        Ok(Self { hierarchy: Arc::new(hierarchy), graph: Some(Arc::new(graph)) })
+        let scan = Self { hierarchy: Arc::new(hierarchy), graph: Some(Arc::new(graph)) };
+        match metric {
+            Metric::Euclidean => Ok(scan),
+            Metric::Geodesic => scan.with_geodesic_kernel(),
+        }
+    }
+
+    /// The same scan for the geodesic kernel: its normals, discs and boxes are those of f with distances along its graph, which
+    /// keeps sheets apart that straight distances merge, and so are the answers of queries (Klein & Zachmann 2005, §3). Nothing
+    /// is certified of it but witnesses. What it is for is kept in the file.
+    ///
+    /// ```
+    /// # use nearmiss::{BuildOptions, GraphOptions, PointCloud, Metric, Scan};
+    /// # let points: Vec<[f64; 3]> = (0..400_u32).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
+    /// let cloud = PointCloud::from_positions(&points)?;
+    /// let scan = Scan::build(&cloud, &BuildOptions::default())?;
+    /// let scan = scan.with_graph(&cloud, &GraphOptions::default(), None)?.with_geodesic_kernel()?;
+    /// assert_eq!(scan.metric(), Metric::Geodesic);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`GraphError::NoClosePairs`] without a graph that has their map.
+    pub fn with_geodesic_kernel(self) -> Result<Self, GraphError> {
+        let Self { hierarchy, graph } = self;
+        let graph = graph.ok_or(GraphError::NoClosePairs)?;
+        let mut hierarchy = Arc::unwrap_or_clone(hierarchy);
+        let (positions, radii) = (hierarchy.positions().to_vec(), hierarchy.radii().to_vec());
+        let plan = *hierarchy.plan();
+        let samples = Samples { plan: &plan, positions: &positions, radii: &radii };
+        let kernel = graph.kernel(samples).ok_or(GraphError::NoClosePairs)?;
+        hierarchy.refit(Metric::Geodesic, |i, scratch: &mut KernelScratch, heard| {
+            let (at, near) = kernel.evaluate_at(i, scratch);
+            heard.extend(near.iter().map(|close| close.point));
+            at
+        });
+        Ok(Self { hierarchy: Arc::new(hierarchy), graph: Some(graph) })
     }
 
     /// The graph over the points, if one was built.
@@ -205,13 +249,22 @@ impl Scan {
         let hierarchy = PointHierarchy::load(file, meta.hierarchy, check)?;
         let graph =
             meta.graph.map(|meta| SurfaceGraph::load(file, meta, samples(&hierarchy), check)).transpose()?;
+        if hierarchy.metric() == Metric::Geodesic && graph.as_ref().is_none_or(|g| g.close_pairs().is_none())
+        {
+            return Err(LoadError::NoClosePairs);
+        }
         Ok(Self { hierarchy: Arc::new(hierarchy), graph: graph.map(Arc::new) })
     }
 
-    /// The scan in a pose, which leads from the frame of its input to the world.
+    /// The scan in a pose, which leads from the frame of its input to the world; f is by the kernel that the scan [is
+    /// for](PointHierarchy::metric).
     #[must_use]
     pub fn at(&self, pose: &Pose) -> ScanView<'_> {
-        ScanView::new(&self.hierarchy, pose)
+        let view = ScanView::new(&self.hierarchy, pose);
+        match self.metric() {
+            Metric::Euclidean => view,
+            Metric::Geodesic => self.geodesic_kernel().map_or(view, |kernel| view.with_kernel(kernel)),
+        }
     }
 }
 

@@ -141,7 +141,7 @@ fn grids_along_the_axes_are_enclosed_to_their_rims() {
     let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&pose));
     let meeting = [6.177_413_816_683_716, -0.653_311_282_612_506_4, 1.26e-7];
     for view in [&a, &b] {
-        let at = view.evaluate_with(meeting, &mut nearmiss::hierarchy::GatherScratch::default());
+        let at = view.evaluate_with(meeting, &mut nearmiss::query::ViewScratch::default());
         assert!(at.f.abs() < 1e-6 * at.bandwidth, "a point of either surface: {}", at.f);
     }
     let verdict = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict;

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Frontier, GatherScratch, Heap, NodePair, Relative, SLACK, Stack, Visitor, descend};
+use nearmiss_hierarchy::{Frontier, Heap, NodePair, Relative, SLACK, Stack, Visitor, descend};
 
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
@@ -20,7 +20,7 @@ use crate::posed::Posed;
 use crate::surface::{Surfaces, Workspace};
 use crate::thickened::Balls;
 use crate::verdict::{Answer, Evidence, Reason, Statistics, Verdict};
-use crate::view::ScanView;
+use crate::view::{ScanView, ViewScratch};
 
 /// Reused between queries, one a thread; never influences an answer.
 #[derive(Debug, Clone, Default)]
@@ -28,7 +28,7 @@ pub struct CollideScratch {
     stack: Stack,
     heap: Heap,
     instructions: Instructions,
-    gathers: [GatherScratch; 2],
+    gathers: [ViewScratch; 2],
     excluded: Vec<Excluded>,
     compared: Vec<NodePair>,
     members: Vec<u32>,

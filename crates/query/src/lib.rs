@@ -33,5 +33,5 @@ pub use hint::PairHint;
 pub use options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};
 pub use pacer::{Pacer, collide_paced};
 pub use verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
-pub use view::ScanView;
+pub use view::{ScanView, ViewScratch};
 pub use world::{Bodies, BodyId, World};

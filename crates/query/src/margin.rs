@@ -119,6 +119,9 @@ impl Surfaces<'_> {
         i: usize,
         j: usize,
     ) -> Option<Contact> {
+        if !self.verifies() {
+            return None;
+        }
         let views = self.pair.views;
         let radii = [self.pair.a.radii[i], self.pair.b.radii[j]];
         let mut evaluations = 0;

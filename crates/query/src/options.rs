@@ -1,6 +1,7 @@
 //! What is asked: options as plain numbers, and the plan that they validate to.
 
 use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -122,8 +123,10 @@ pub struct CollideOptions {
     pub margin: f64,
     /// How sure a separation of surfaces should be. Default: estimated. Certified costs half as much again, near contact
     /// two to three times as much, and says a proven distance; where the proof fails, the separation is still answered
-    /// as estimated.
+    /// as estimated. By the geodesic kernel it always is, for enclosures are proven of straight distances alone.
     pub evidence: Evidence,
+    /// By which distances surfaces are defined, for [`Semantics::Surface`]. None, the default: as both scans were prepared.
+    pub metric: Option<Metric>,
     /// How two leaves are compared, for [`Semantics::Surface`]. Default: by tangent discs.
     pub method: Method,
     /// Which pairs of nodes are looked at first, for [`Semantics::Surface`]. None, the default: what measuring found best
@@ -141,6 +144,7 @@ impl Default for CollideOptions {
             detail: Detail::default(),
             margin: 0.0,
             evidence: Evidence::Estimated,
+            metric: None,
             method: Method::default(),
             order: None,
             coverings: false,
@@ -165,6 +169,12 @@ impl CollideOptions {
     #[must_use]
     pub const fn with_evidence(self, evidence: Evidence) -> Self {
         Self { evidence, ..self }
+    }
+
+    /// The same options by this metric.
+    #[must_use]
+    pub const fn with_metric(self, metric: Metric) -> Self {
+        Self { metric: Some(metric), ..self }
     }
 
     /// Whether separations are to be proven; of points they always are.
@@ -218,6 +228,36 @@ pub enum PlanError {
         "the method `sampling` compares surfaces, without a margin; leave the margin and the thickness out"
     )]
     SamplingAlone,
+    /// The surfaces of the two scans are not defined alike.
+    #[error(
+        "one scan is prepared for the {} kernel, the other for the {} one; prepare both for the same",
+        .0[0], .0[1]
+    )]
+    Metrics([Metric; 2]),
+    /// A scan's surface is not defined as it is asked for.
+    #[error(
+        "asked by the {asked} kernel of a scan that is prepared for the {stored} one; prepare it for the {asked} kernel, or \
+         ask by the {stored} one"
+    )]
+    Metric {
+        /// By which metric it was asked.
+        asked: Metric,
+        /// For which the scan is.
+        stored: Metric,
+    },
+}
+
+/// The metric of both scans, which must be that which is asked for, if any is.
+fn common_metric(asked: Option<Metric>, a: &PointHierarchy, b: &PointHierarchy) -> Result<Metric, PlanError> {
+    let stored = [a.metric(), b.metric()];
+    match asked {
+        Some(asked) => match stored.into_iter().find(|&stored| stored != asked) {
+            Some(stored) => Err(PlanError::Metric { asked, stored }),
+            None => Ok(asked),
+        },
+        None if stored[0] != stored[1] => Err(PlanError::Metrics(stored)),
+        None => Ok(stored[0]),
+    }
 }
 
 /// A validated question about two scans.
@@ -230,12 +270,9 @@ impl CollidePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// Names the option that is out of range.
-    pub fn new(
-        options: &CollideOptions,
-        _a: &PointHierarchy,
-        _b: &PointHierarchy,
-    ) -> Result<Self, PlanError> {
+    /// Names the option that is out of range, or the [metric](PointHierarchy::metric) that does not fit. Balls about points, which
+    /// know no kernel, fit any.
+    pub fn new(options: &CollideOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         let is_length = |l: f64| l >= 0.0 && l.is_finite();
         match options.semantics {
             Semantics::Thickened(r) if !is_length(r) => return Err(PlanError::Radius(r)),
@@ -253,7 +290,15 @@ impl CollidePlan {
                 return Err(PlanError::Tolerance(tolerance));
             }
         }
-        Ok(Self { options: *options })
+        let mut options = *options;
+        if options.semantics == Semantics::Surface {
+            let metric = common_metric(options.metric, a, b)?;
+            options.metric = Some(metric);
+            if metric == Metric::Geodesic {
+                options.evidence = Evidence::Estimated;
+            }
+        }
+        Ok(Self { options })
     }
 
     /// How near points or surfaces must come to meet, in the world.
@@ -269,7 +314,7 @@ impl CollidePlan {
         Self { options: self.options.with_method(Method::Sampling(sampling)) }
     }
 
-    /// The options that were validated.
+    /// The options that were validated, with the metric of the scans.
     #[must_use]
     pub fn options(&self) -> &CollideOptions {
         &self.options

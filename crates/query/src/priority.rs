@@ -50,7 +50,7 @@ impl Surfaces<'_> {
             }
             let x = vb.placed().apply_inverse(va.point(i));
             self.pair.meter.spent.evaluations += 1;
-            let at = vb.scan().evaluate_node_with(pair.b.index(), x, &mut self.gathers[1]);
+            let at = vb.scan().evaluate_node_with(pair.b.index(), x, &mut self.gathers[1].gather);
             if at.status == Status::Outside || at.f.abs() <= near {
                 continue;
             }

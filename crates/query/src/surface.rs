@@ -10,7 +10,7 @@ use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{GatherScratch, Node, NodePair, PointKind, Slices, Split, Visitor};
+use nearmiss_hierarchy::{Node, NodePair, PointKind, Slices, Split, Visitor};
 use nearmiss_surface::{PointBlock, meet};
 
 use crate::budget::Budget;
@@ -20,6 +20,7 @@ use crate::leaf_pair::{Discs, Instructions, LeafPair, Near, padded};
 use crate::options::{CollideOptions, Detail, Method, Order};
 use crate::posed::Posed;
 use crate::verdict::{Contact, Evidence, Reason};
+use crate::view::{ScanView, ViewScratch};
 
 /// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
 const TRIES: u32 = 4;
@@ -61,7 +62,7 @@ pub(crate) struct Surfaces<'a> {
     /// The pairs whose points were compared, without a hit.
     pub(crate) compared: &'a mut Vec<NodePair>,
     instructions: Instructions,
-    pub(crate) gathers: &'a mut [GatherScratch; 2],
+    pub(crate) gathers: &'a mut [ViewScratch; 2],
     /// The points of a that lie in the box of b.
     pub(crate) members: &'a mut Vec<u32>,
     tries: u32,
@@ -79,7 +80,7 @@ pub(crate) struct Surfaces<'a> {
 #[derive(Debug)]
 pub(crate) struct Workspace<'a> {
     pub(crate) instructions: Instructions,
-    pub(crate) gathers: &'a mut [GatherScratch; 2],
+    pub(crate) gathers: &'a mut [ViewScratch; 2],
     pub(crate) excluded: &'a mut Vec<Excluded>,
     pub(crate) compared: &'a mut Vec<NodePair>,
     pub(crate) members: &'a mut Vec<u32>,
@@ -233,9 +234,17 @@ impl<'a> Surfaces<'a> {
         }
     }
 
+    /// Whether a place where both functions vanish would verify a crossing of discs.
+    pub(crate) fn verifies(&self) -> bool {
+        self.pair.views.into_iter().all(ScanView::verifies)
+    }
+
     /// A verified point on both surfaces near `contact`.
     fn refine(&mut self, contact: &Contact, i: usize, j: usize) -> Option<Contact> {
         let [va, vb] = self.pair.views;
+        if !self.verifies() {
+            return None;
+        }
         let [scratch_a, scratch_b] = &mut *self.gathers;
         let scale = vb.placed().scale() / va.placed().scale();
         let radius = f64::from(self.pair.a.radii[i]).max(f64::from(self.pair.b.radii[j]) * scale);

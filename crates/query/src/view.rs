@@ -3,13 +3,21 @@
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{GeodesicKernel, KernelScratch};
 use nearmiss_hierarchy::{GatherScratch, PointHierarchy, Slices};
-use nearmiss_surface::Evaluation;
+use nearmiss_surface::{Evaluation, Metric};
+
+/// Memory for evaluations of f, used again by the next; never influences a result.
+#[derive(Debug, Clone, Default)]
+pub struct ViewScratch {
+    pub(crate) gather: GatherScratch,
+    kernel: KernelScratch,
+}
 
 /// A scan in a pose: what queries look at. Cheap to make, cheap to copy.
 #[derive(Debug, Clone, Copy)]
 pub struct ScanView<'a> {
     scan: &'a PointHierarchy,
     slices: Slices<'a>,
+    kernel: Option<GeodesicKernel<'a>>,
     /// Stored frame → world.
     placed: Pose,
 }
@@ -21,7 +29,14 @@ impl<'a> ScanView<'a> {
     pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
         let frame = scan.frame();
         let stored = Pose::IDENTITY.with_scale(frame.scale).with_translation(frame.origin);
-        Self { slices: scan.slices(), scan, placed: pose.after(&stored) }
+        Self { slices: scan.slices(), scan, kernel: None, placed: pose.after(&stored) }
+    }
+
+    /// The same view with f by distances along the graph of this scan. Those of scans for the [geodesic
+    /// metric](PointHierarchy::metric) should have it: without, no contact of theirs is verified.
+    #[must_use]
+    pub fn with_kernel(self, kernel: GeodesicKernel<'a>) -> Self {
+        Self { kernel: Some(kernel), ..self }
     }
 
     /// The scan.
@@ -51,10 +66,20 @@ impl<'a> ScanView<'a> {
         self.placed.apply(self.slices.positions[i].map(f64::from))
     }
 
-    /// The implicit function at `x`, all in the world; the sign of f and of the normal as in the stored frame, from oriented normals if
-    /// the scan has them.
-    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        self.in_world(self.scan.evaluate_oriented_with(self.placed.apply_inverse(x), scratch))
+    /// Whether f is by the metric that the scan's discs are for: only then its zeros verify what these say.
+    pub(crate) fn verifies(&self) -> bool {
+        self.kernel.is_some() == (self.scan.metric() == Metric::Geodesic)
+    }
+
+    /// The implicit function at `x`, all in the world, by the [kernel](Self::with_kernel) of the view; the sign of f and of the normal as
+    /// in the stored frame, from oriented normals if the scan has them.
+    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
+        match &self.kernel {
+            None => self.in_world(
+                self.scan.evaluate_oriented_with(self.placed.apply_inverse(x), &mut scratch.gather),
+            ),
+            Some(kernel) => self.evaluate_by(kernel, x, &mut scratch.kernel),
+        }
     }
 
     /// The same with distances along the graph of this scan, that of `kernel`; outside further than the greatest horizon from all points.
@@ -65,8 +90,18 @@ impl<'a> ScanView<'a> {
         x: [f64; 3],
         scratch: &mut KernelScratch,
     ) -> Evaluation {
+        self.evaluate_by_near(kernel, 0, x, scratch)
+    }
+
+    fn evaluate_by_near(
+        &self,
+        kernel: &GeodesicKernel<'_>,
+        i: usize,
+        x: [f64; 3],
+        scratch: &mut KernelScratch,
+    ) -> Evaluation {
         let x = self.placed.apply_inverse(x);
-        let nearest = self.scan.nearest_point(x);
+        let nearest = self.scan.nearest_point_near(i, x);
         let at = kernel.evaluate(x, nearest, scratch);
         let at = if self.scan.is_oriented() {
             at.turned_to(self.slices.normals[nearest as usize].map(f64::from), 1.0)
@@ -76,9 +111,14 @@ impl<'a> ScanView<'a> {
         self.in_world(at)
     }
 
-    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`.
-    pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        self.in_world(self.scan.evaluate_near(i, self.placed.apply_inverse(x), scratch))
+    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`; without a kernel of either sign.
+    pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
+        match &self.kernel {
+            None => {
+                self.in_world(self.scan.evaluate_near(i, self.placed.apply_inverse(x), &mut scratch.gather))
+            }
+            Some(kernel) => self.evaluate_by_near(kernel, i, x, &mut scratch.kernel),
+        }
     }
 
     /// What holds in the stored frame, in the world.

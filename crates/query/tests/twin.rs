@@ -202,7 +202,7 @@ fn a_witness_lies_on_both_surfaces() {
         if evidence == Evidence::Certified {
             certified += 1;
             for view in [&a, &b] {
-                let at = view.evaluate_with(contact.point, &mut nearmiss_hierarchy::GatherScratch::default());
+                let at = view.evaluate_with(contact.point, &mut nearmiss_query::ViewScratch::default());
                 assert!(at.f.abs() <= 1e-6 * at.bandwidth, "on the surface: {}", at.f / at.bandwidth);
             }
             assert!(answer.statistics.evaluations >= 2, "evaluations are counted");

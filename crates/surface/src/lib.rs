@@ -22,5 +22,5 @@ pub use fit::{BORDER, Evaluation, Status};
 pub use kernel::Kernel;
 pub use meet::{Meeting, meet};
 pub use neighbourhood::{Centre, HalfBlock, MeasuredBlock, Moments, Neighbourhood, PointBlock};
-pub use options::{Bandwidth, SurfaceError, SurfaceOptions, SurfacePlan};
+pub use options::{Bandwidth, Metric, SurfaceError, SurfaceOptions, SurfacePlan};
 pub use project::{Projection, project};

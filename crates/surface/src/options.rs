@@ -1,9 +1,39 @@
 //! What defines the surface: options as plain numbers, and the plan that they validate to.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::Kernel;
+
+/// How far a point is from where f is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Metric {
+    /// In a straight line: Klein & Zachmann 2004, eq. 1.
+    #[default]
+    Euclidean,
+    /// Along a proximity graph, which does not lead across to a sheet that is near: Klein & Zachmann 2005, eq. 5.
+    Geodesic,
+}
+
+impl Metric {
+    /// The word for it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Euclidean => "euclidean",
+            Self::Geodesic => "geodesic",
+        }
+    }
+}
+
+impl fmt::Display for Metric {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
 /// Whether the kernel's width follows the local spacing.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

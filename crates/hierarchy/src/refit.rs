@@ -1,0 +1,118 @@
+//! A scan's discs for another metric: what follows from f at the points is made anew.
+//!
+//! Boxes are about the new discs, and so are coverings. What was proven of the surface by straight distances is not proven again:
+//! enclosures and covering radii hold the discs, and nothing is to be certified by them.
+
+use std::ops::Range;
+
+use nearmiss_surface::{Evaluation, Metric, PointBlock};
+
+use crate::boxes::dot;
+use crate::build::{PointHierarchy, ball};
+use crate::covering::{Ground, Solid, coverings};
+use crate::levels::samples;
+use crate::neighbours::chunks;
+use crate::spacing::map;
+use crate::split::id32;
+use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, cone, surfel_among};
+
+impl PointHierarchy {
+    /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about them. Only of the
+    /// Euclidean metric enclosures and covering radii are proven to contain the surface.
+    #[must_use]
+    pub fn metric(&self) -> Metric {
+        self.metric
+    }
+
+    /// Fits the surface at every point by another `metric`: `fit` gives f at a stored point, and adds the points that are heard
+    /// there to a list that is empty. Normals stay on their sides where they [are oriented](Self::is_oriented), and what is
+    /// [sparse](PointKind::is_sparse) stays so. On all cores with the feature `rayon`; the result does not depend on them.
+    ///
+    /// # Panics
+    /// When a point is heard that is none.
+    pub fn refit<S: Default>(
+        &mut self,
+        metric: Metric,
+        fit: impl Fn(u32, &mut S, &mut Vec<u32>) -> Evaluation + Sync + Send,
+    ) {
+        let leaves: Vec<Range<usize>> =
+            self.nodes.iter().filter(|node| node.is_leaf()).map(|node| node.points()).collect();
+        let surfels = chunks(&leaves, |leaves| {
+            let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
+            let surfel = |i: usize| {
+                heard.clear();
+                let at = fit(id32(i), &mut scratch, &mut heard);
+                self.gather(&heard, &mut near);
+                self.surfel(i, &at, &near)
+            };
+            leaves.iter().cloned().flatten().map(surfel).collect::<Vec<_>>()
+        });
+        let surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
+        self.metric = metric;
+        self.replace(&surfels);
+    }
+
+    /// Some points in blocks.
+    fn gather(&self, points: &[u32], blocks: &mut Vec<PointBlock>) {
+        blocks.clear();
+        for points in points.chunks(PointBlock::WIDTH) {
+            let mut block = PointBlock::EMPTY;
+            for (lane, &i) in points.iter().enumerate() {
+                let horizon = self.plan.horizon(self.radii[i as usize]);
+                block.set(lane, self.positions[i as usize], horizon, &self.plan);
+            }
+            blocks.push(block);
+        }
+    }
+
+    /// The disc of point `i`, at which f is `at` and the points in `near` are heard.
+    fn surfel(&self, i: usize, at: &Evaluation, near: &[PointBlock]) -> Surfel {
+        let size = (&self.plan, self.radii[i], self.sampling_radius);
+        let is_line = self.kind(i) == PointKind::Line;
+        let mut surfel = surfel_among(self.positions[i], at, size, is_line, near);
+        if dot(surfel.normal, self.normals[i]) < 0.0 {
+            surfel.normal = surfel.normal.map(|c| -c);
+        }
+        surfel
+    }
+
+    /// Takes these discs for its own, and bounds them.
+    fn replace(&mut self, surfels: &[Surfel]) {
+        let leaf_size = self.leaf_size as usize;
+        let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
+        let discs: Vec<f32> = surfels.iter().map(|s| s.disc).collect();
+        let balls: Vec<f32> =
+            surfels.iter().zip(&self.radii).map(|(s, &r)| ball(s.kind, r, self.sampling_radius)).collect();
+        let cones: Vec<NormalCone> = if self.is_oriented {
+            normals.chunks(leaf_size).map(cone).collect()
+        } else {
+            normals.chunks_mut(leaf_size).map(align).collect()
+        };
+        let ids: Vec<u32> = (0..id32(self.nodes.len())).collect();
+        let (nodes, boxes, positions) = (&*self.nodes, &*self.boxes, &*self.positions);
+        let boxes = map(&ids, |&i| {
+            let (node, about) = (&nodes[i as usize], &boxes[i as usize]);
+            box_of_discs(node, about, positions, &normals, &discs, &balls)
+        });
+        let flat: Vec<Solid> =
+            discs.iter().zip(&balls).map(|(&disc, &ball)| Solid::of_disc(disc, ball)).collect();
+        let ground = Ground {
+            nodes,
+            boxes: &boxes,
+            growths: &self.growths,
+            positions,
+            normals: &normals,
+            radii: &self.radii,
+            discs: &flat,
+            cells: &flat,
+        };
+        let sizes = (self.leaf_size, self.samples_a_node);
+        let coverings = coverings(&ground, |id| samples(&self.sample_lists, (id, &nodes[id]), sizes));
+        self.kinds = surfels.iter().map(|s| s.kind.code()).collect::<Vec<_>>().into();
+        self.normals = normals.into();
+        self.discs = discs.into();
+        self.cones = cones.into();
+        self.boxes = boxes.into();
+        self.coverings = coverings.into();
+    }
+}
