@@ -1,0 +1,93 @@
+//! Discs fitted anew follow from what is told of the surface, as those of a build do.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use nearmiss_geometry::PointCloud;
+use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy, PointKind};
+use nearmiss_surface::{Evaluation, Metric, Status};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+use nearmiss_testdata::scanner::{self, Frame};
+
+fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
+    PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+fn clouds() -> Vec<Vec<[f64; 3]>> {
+    let mut clouds: Vec<Vec<[f64; 3]>> =
+        CloudKind::ALL.iter().map(|&kind| arbitrary::cloud(kind, 1500, 3)).collect();
+    clouds.push(scanner::frame(&Frame { beams: 16, steps: 300, noise: 0.005, seed: 2 }));
+    clouds
+}
+
+/// f by straight distances, and all points whose horizons reach.
+fn straight(scan: &PointHierarchy, i: u32, scratch: &mut GatherScratch, heard: &mut Vec<u32>) -> Evaluation {
+    let p = scan.positions()[i as usize];
+    for (j, (q, &radius)) in (0..).zip(scan.positions().iter().zip(scan.radii())) {
+        let d_sq: f64 = (0..3).map(|k| (f64::from(q[k]) - f64::from(p[k])).powi(2)).sum();
+        if d_sq < f64::from(scan.plan().horizon(radius)).powi(2) {
+            heard.push(j);
+        }
+    }
+    scan.evaluate_near(i as usize, p.map(f64::from), scratch)
+}
+
+/// The twin of a fit by another metric is the build, which does the same with other loops.
+#[test]
+fn a_fit_by_straight_distances_changes_nothing() {
+    for points in clouds() {
+        let scan = prepared(&points);
+        let mut again = scan.clone();
+        again.refit(Metric::Euclidean, |i, scratch, heard| straight(&scan, i, scratch, heard));
+        assert_eq!(again.sanity_check(), Ok(()), "an invariant");
+        assert_eq!(again.normals(), scan.normals(), "normals");
+        assert_eq!(again.discs(), scan.discs(), "discs");
+        assert_eq!(again.boxes(), scan.boxes(), "boxes");
+        assert_eq!(again.cones(), scan.cones(), "cones");
+        assert!((0..scan.len()).all(|i| again.kind(i) == scan.kind(i)), "kinds");
+        assert!(again.enclosures().eq(scan.enclosures()), "enclosures");
+        for id in 0..scan.nodes().len() {
+            let [new, old] = [&again, &scan].map(|scan| scan.slices().sampling_radius_of(id));
+            assert_eq!(new.to_bits(), old.to_bits(), "the sampling radius of node {id}");
+        }
+        assert_eq!(again.meta(), scan.meta(), "metadata");
+    }
+}
+
+#[test]
+fn what_a_fit_says_is_kept() {
+    let mut scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 700, 5));
+    let old = scan.clone();
+    // Oriented, though against the axes of cones.
+    let inwards: Vec<[f32; 3]> = (old.positions().iter().zip(old.normals()))
+        .map(|(p, n)| if (0..3).map(|k| p[k] * n[k]).sum::<f32>() > 0.0 { n.map(|c| -c) } else { *n })
+        .collect();
+    scan.turn_normals(&inwards);
+    let statuses = [Status::Ok, Status::Border, Status::Ambiguous, Status::Outside];
+    let [upright, tilted] = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]];
+    let oriented = scan.clone();
+    scan.refit(Metric::Geodesic, |i, _: &mut (), heard| {
+        // Heard by themselves alone, points are at a border.
+        heard.push(i);
+        Evaluation {
+            f: 0.0,
+            normal: if i % 3 == 0 { tilted } else { upright },
+            centroid: [0.0; 3],
+            support: 9,
+            bandwidth: 1.0,
+            eigenvalues: [0.0, 1.0, 1.0],
+            status: statuses[i as usize % 4],
+        }
+    });
+    assert_eq!(scan.sanity_check(), Ok(()), "boxes hold the new discs");
+    assert_eq!((old.metric(), scan.metric()), (Metric::Euclidean, Metric::Geodesic), "said");
+    let kinds = [PointKind::Surface, PointKind::Border, PointKind::Ambiguous, PointKind::Isolated];
+    for i in 0..scan.len() {
+        assert_eq!(scan.kind(i), kinds[i % 4], "point {i}");
+        let (n, was) = (scan.normals()[i], oriented.normals()[i]);
+        let up = if i % 3 == 0 { tilted } else { upright };
+        let along: f64 = (0..3).map(|k| f64::from(n[k]) * up[k]).sum();
+        assert!(along.abs() > 1.0 - 1e-6, "the normal of point {i}: {n:?}");
+        assert!((0..3).map(|k| n[k] * was[k]).sum::<f32>() >= 0.0, "point {i} has changed sides");
+        let share = scan.discs()[i] / scan.radii()[i];
+        assert!((share - 0.35).abs() < 1e-6, "the disc of point {i}, {share} radii, is none of a border");
+    }
+}
