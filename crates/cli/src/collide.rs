@@ -9,11 +9,12 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use nearmiss::{
     Answer, BatchScratch, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence,
-    Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_proving, collide_with,
+    Metric, Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_proving, collide_with,
 };
 
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
+use crate::eval::KernelName;
 use crate::posing::{self, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
@@ -40,6 +41,10 @@ pub struct CollideArgs {
     /// Stop after the first hit of --poses: the last line is the hit, if there is one, and all before it are none
     #[arg(long, requires = "poses")]
     pub first: bool,
+    /// Which distances define the surfaces, as scans are prepared for and raw inputs will be; by default as prepared, else straight
+    /// ones. By the geodesic kernel separations are estimated
+    #[arg(long, value_enum, conflicts_with = "thickened")]
+    pub kernel: Option<KernelName>,
     /// Compare balls of this radius about the points, in world units, instead of surfaces
     #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
     pub thickened: Option<f64>,
@@ -219,9 +224,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let mut poses = args.poses.as_ref().map(|path| PoseFile::open(path)).transpose()?;
 
     let threads = args.threads.unwrap_or(0);
-    let a = input::open(&args.a, threads, console)?;
-    // The same file twice is one scan.
-    let b = if args.a == args.b { a.clone() } else { input::open(&args.b, threads, console)? };
+    let [a, b] = open(args, threads, console)?;
     let semantics = args.thickened.map_or(Semantics::Surface, Semantics::Thickened);
     let detail = match args.detail {
         DetailName::Verdict => Detail::Verdict,
@@ -255,6 +258,23 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         None => answer(&mut Outputs { results: &mut results, proof: None })?,
     }
     results.flush()
+}
+
+/// The scans: balls about points know no kernel, so any do for these.
+fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2], CliError> {
+    if args.thickened.is_some() {
+        let a = input::open(&args.a, threads, console)?;
+        let b = if args.a == args.b { a.clone() } else { input::open(&args.b, threads, console)? };
+        return Ok([a, b]);
+    }
+    let kernel = args.kernel.map(KernelName::metric);
+    let scans = input::open_both(kernel, [&args.a, &args.b], threads, console)?;
+    if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
+        let what = "--prove is for the euclidean kernel: by the geodesic one no separation is proven, and what would \
+                    check witnesses does not know it";
+        return Err(CliError::Usage(what.into()));
+    }
+    Ok(scans)
 }
 
 /// The one answer to the poses of the command line.

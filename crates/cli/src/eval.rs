@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use nearmiss::query::ViewScratch;
-use nearmiss::{Evaluation, Pose, Scan, ScanView, Status};
+use nearmiss::{Evaluation, Metric, Pose, Scan, ScanView, Status};
 use serde::Serialize;
 
 use crate::console::{Console, Results};
@@ -21,9 +21,10 @@ pub struct EvalArgs {
     /// Where to evaluate: a point a line, x y z, in the frame of the scan's input
     #[arg(long, value_name = "FILE")]
     pub points: PathBuf,
-    /// How far points are from where f is asked for: straight, or along the surface by the graph
-    #[arg(long, value_enum, default_value_t = KernelName::Euclidean)]
-    pub kernel: KernelName,
+    /// How far points are from where f is asked for: straight, or along the surface by the graph; by default as the scan was
+    /// prepared
+    #[arg(long, value_enum)]
+    pub kernel: Option<KernelName>,
     /// One object of JSON a line instead of sentences
     #[arg(long)]
     pub json: bool,
@@ -36,6 +37,16 @@ pub enum KernelName {
     Euclidean,
     /// Distances along the graph (needs a scan prepared with graph and close pairs)
     Geodesic,
+}
+
+impl KernelName {
+    /// What it names.
+    pub(crate) const fn metric(self) -> Metric {
+        match self {
+            Self::Euclidean => Metric::Euclidean,
+            Self::Geodesic => Metric::Geodesic,
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -62,8 +73,8 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     }
     let console = Console::new(false);
     let scan = match args.kernel {
-        KernelName::Euclidean => input::open(&args.file, 0, console)?,
-        KernelName::Geodesic => input::open_with_graph(&args.file, console)?,
+        None | Some(KernelName::Euclidean) => input::open(&args.file, 0, console)?,
+        Some(KernelName::Geodesic) => input::open_with_graph(&args.file, console)?,
     };
     let unit = scan.sampling_radius() / 100.0;
     let (view, mut scratch) = (view(&scan, args)?, ViewScratch::default());
@@ -90,9 +101,9 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
 /// The scan where it is, with f by the kernel that is asked for.
 fn view<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<ScanView<'a>, CliError> {
     let view = ScanView::new(scan, &Pose::IDENTITY);
-    match args.kernel {
-        KernelName::Euclidean => Ok(view),
-        KernelName::Geodesic => {
+    match args.kernel.map_or(scan.metric(), KernelName::metric) {
+        Metric::Euclidean => Ok(view),
+        Metric::Geodesic => {
             let missing = || {
                 let what = "this scan was prepared without a map of close pairs, along which the geodesic \
                             kernel measures; prepare it again without `--no-close-pairs`";

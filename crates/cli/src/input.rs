@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use nearmiss::io::{Format, Model};
-use nearmiss::{BuildOptions, Check, GraphOptions, Scan};
+use nearmiss::{BuildOptions, Check, GraphOptions, Metric, Scan};
 
 use crate::console::{self, Console};
 use crate::digits::short;
@@ -42,17 +42,63 @@ pub(crate) fn check_there(path: &Path) -> Result<(), CliError> {
 
 /// Opens a prepared scan, or prepares a raw input on `threads` threads with default options.
 pub(crate) fn open(path: &Path, threads: usize, console: Console) -> Result<Scan, CliError> {
+    open_for(None, path, threads, console)
+}
+
+/// As [`open`], for this kernel if any: a raw input is prepared for it, else for the euclidean one.
+fn open_for(kernel: Option<Metric>, path: &Path, threads: usize, console: Console) -> Result<Scan, CliError> {
     check_there(path)?;
     if is_prepared(path) {
-        return Scan::open(path, Check::Full).map_err(CliError::loading(path));
+        let scan = Scan::open(path, Check::Full).map_err(CliError::loading(path))?;
+        return match kernel.filter(|kernel| *kernel != scan.metric()) {
+            Some(kernel) => {
+                let (path, stored) = (path.display(), scan.metric());
+                let what = format!(
+                    "{path}: this scan was prepared for the {stored} kernel, not the {kernel} one; prepare it again \
+                     with `--kernel {kernel}`, or the other one with `--kernel {stored}`"
+                );
+                Err(CliError::Usage(what))
+            }
+            None => Ok(scan),
+        };
     }
     let bar = console.spinner(format_args!("reading {}", path.display()));
     let model = read(path, None)?;
     drop(bar);
-    let bar = console.spinner(format_args!("preparing {}", path.display()));
+    let _bar = console.spinner(format_args!("preparing {}", path.display()));
     let scan = build(path, &model, &BuildOptions::default().with_threads(threads))?;
-    drop(bar);
-    Ok(scan)
+    match kernel {
+        None | Some(Metric::Euclidean) => Ok(scan),
+        Some(Metric::Geodesic) => {
+            let scan = with_graph(path, scan, &model, &GraphOptions::default(), None)?;
+            with_geodesic_kernel(path, scan)
+        }
+    }
+}
+
+/// Opens two scans for this kernel, or for one and the same: that of the first that is prepared. The same file twice is one scan.
+pub(crate) fn open_both(
+    kernel: Option<Metric>,
+    [a, b]: [&Path; 2],
+    threads: usize,
+    console: Console,
+) -> Result<[Scan; 2], CliError> {
+    if a == b {
+        let scan = open_for(kernel, a, threads, console)?;
+        return Ok([scan.clone(), scan]);
+    }
+    let open_next = |like: &Scan, path| open_for(Some(like.metric()), path, threads, console);
+    if is_prepared(a) || !is_prepared(b) {
+        let a = open_for(kernel, a, threads, console)?;
+        return Ok([a.clone(), open_next(&a, b)?]);
+    }
+    let b = open_for(kernel, b, threads, console)?;
+    Ok([open_next(&b, a)?, b])
+}
+
+/// The scan for the geodesic kernel.
+pub(crate) fn with_geodesic_kernel(path: &Path, scan: Scan) -> Result<Scan, CliError> {
+    scan.with_geodesic_kernel().map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
 }
 
 /// As [`open`], for what cannot do without a graph.

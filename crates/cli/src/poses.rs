@@ -72,8 +72,7 @@ struct Line {
 pub(crate) fn run(args: &PosesArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.a, &args.b])?;
     let console = Console::new(args.quiet);
-    let a = input::open(&args.a, 0, console)?;
-    let b = if args.a == args.b { a.clone() } else { input::open(&args.b, 0, console)? };
+    let [a, b] = input::open_both(None, [&args.a, &args.b], 0, console)?;
     let [base_a, base_b] = [(&args.a, &a), (&args.b, &b)].map(|(path, scan)| {
         let what = || "all points lie in one place, so it cannot be scaled to a size of 2".into();
         normalised(scan).ok_or_else(|| CliError::Unfit { path: path.clone(), what: what() })

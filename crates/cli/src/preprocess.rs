@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::advice::health;
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
+use crate::eval::KernelName;
 use crate::input::{self, pieces};
 use crate::output;
 use crate::report::ScanReport;
@@ -49,6 +50,10 @@ pub struct PreprocessArgs {
     /// Whether shortest paths are stored, a byte a pair, or rebuilt when wanted
     #[arg(long, value_enum, default_value_t = PathsName::Rebuilt)]
     pub paths: PathsName,
+    /// Which distances define the surface: straight ones, or those along the graph, which keep sheets apart that are close to each
+    /// other; the latter takes some tenths longer, and nothing but witnesses is certified of it
+    #[arg(long, value_enum, default_value_t = KernelName::Euclidean)]
+    pub kernel: KernelName,
     /// Where the scanner stood, in the frame of the input: normals are turned towards it
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse_place)]
     pub scanner: Option<Place>,
@@ -146,6 +151,11 @@ struct Seconds {
 
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;
+    if args.kernel == KernelName::Geodesic && (args.no_graph || args.no_close_pairs) {
+        let what = "the geodesic kernel measures along the graph by its map of close pairs; leave --no-graph and \
+                    --no-close-pairs out";
+        return Err(CliError::Usage(what.into()));
+    }
     let console = Console::new(args.quiet);
     let name = args.input.display();
 
@@ -165,7 +175,11 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     let scan = match graph_options(args) {
         Some((options, scanner)) => {
             let _bar = console.spinner(format_args!("joining {} points", scan.len()));
-            input::with_graph(&args.input, scan, &model, &options, scanner)?
+            let scan = input::with_graph(&args.input, scan, &model, &options, scanner)?;
+            match args.kernel {
+                KernelName::Euclidean => scan,
+                KernelName::Geodesic => input::with_geodesic_kernel(&args.input, scan)?,
+            }
         }
         None => scan,
     };

@@ -1,7 +1,7 @@
 //! What scripts are told, the fields of the JSON lines, and the same in rows for people.
 
 use nearmiss::graph::ClosePairs;
-use nearmiss::{Answer, Evidence, PointKind, Reason, Scan, SurfaceGraph, Verdict};
+use nearmiss::{Answer, Evidence, Metric, PointKind, Reason, Scan, SurfaceGraph, Verdict};
 use serde::Serialize;
 
 use crate::digits::{bytes, count, percent, place, short};
@@ -12,6 +12,8 @@ pub(crate) struct ScanReport {
     points: usize,
     dropped: DroppedReport,
     bounds: [[f64; 3]; 2],
+    /// That the discs, and what is about them, are for.
+    kernel: Metric,
     sampling_radius: f64,
     /// The median, as `horizon`.
     bandwidth: f64,
@@ -92,6 +94,7 @@ impl ScanReport {
                 duplicate: scan.dropped().duplicate,
             },
             bounds: [scan.bounds().min, scan.bounds().max],
+            kernel: scan.metric(),
             sampling_radius: scan.sampling_radius(),
             bandwidth: f64::from(scan.plan().bandwidth(median)) * scale,
             horizon: f64::from(scan.plan().horizon(median)) * scale,
@@ -126,7 +129,8 @@ impl ScanReport {
             ),
             format!("bounds     {min} to {max}"),
             format!(
-                "surface    sampling radius {}, bandwidth {}, horizon {}, least support {}",
+                "surface    {} kernel, sampling radius {}, bandwidth {}, horizon {}, least support {}",
+                self.kernel,
                 short(self.sampling_radius),
                 short(self.bandwidth),
                 short(self.horizon),

@@ -5,7 +5,7 @@ use nearmiss_testdata::shapes::{bowl, sphere};
 
 use crate::running::{Place, keys, name, numbers, sorted, text};
 
-const FIELDS: &str = "points dropped bounds sampling_radius bandwidth horizon support_min nodes leaves depth_mean \
+const FIELDS: &str = "points dropped bounds kernel sampling_radius bandwidth horizon support_min nodes leaves depth_mean \
                       bytes bytes_per_node usable kinds graph";
 
 #[test]
@@ -306,4 +306,64 @@ fn far_from_the_origin_nothing_is_lost() {
     let local = [0, 1, 2].map(|k| witness[k] - offset[k]);
     let middle = (0..3).map(|k| local[k] * local[k]).sum::<f64>().sqrt();
     assert!((middle - 1.0).abs() < 0.02 && (local[0] - 0.15).abs() < 0.02, "the circle x = 0.15: {local:?}");
+}
+
+/// What a scan is for is asked for, kept, told, and held to.
+#[test]
+fn scans_are_prepared_for_a_kernel() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.1);
+    let prepare = |kernel: &str, to: &str| {
+        let words = ["preprocess", "ball.xyz", "-o", to, "--kernel", kernel, "--json"];
+        let report = place.ok(&words).json().remove(0);
+        let seen = place.ok(&["inspect", to, "--verify", "--json"]).json().remove(0);
+        assert_eq!([&report["kernel"], &seen["kernel"]], [kernel; 2]);
+        let told = place.ok(&["inspect", to]).results;
+        assert!(told.contains(&format!("surface    {kernel} kernel")), "{told}");
+    };
+    prepare("euclidean", "straight.nm");
+    prepare("geodesic", "along.nm");
+    for without in ["--no-graph", "--no-close-pairs"] {
+        let words = ["preprocess", "ball.xyz", "-o", "b.nm", "--kernel", "geodesic", without];
+        place.refused(2, &words, &["geodesic", without]);
+    }
+
+    let touching = crate::running::shift(1.2, 0.0, 0.0);
+    let ask = |a: &str, b: &str, options: &[&str]| {
+        place.ok(&[&["collide", a, b, "--pose-b", &touching, "--json"], options].concat()).json().remove(0)
+    };
+    let geodesic = ["--kernel", "geodesic"];
+    let expected = ask("along.nm", "along.nm", &geodesic);
+    assert_eq!((&expected["verdict"], &expected["evidence"]), (&"intersecting".into(), &"certified".into()));
+    // Raw inputs are prepared for the same, or for what the other is for.
+    for (a, b, options) in [
+        ("along.nm", "along.nm", &[][..]),
+        ("ball.xyz", "ball.xyz", &geodesic),
+        ("ball.xyz", "along.nm", &[]),
+        ("along.nm", "ball.xyz", &[]),
+    ] {
+        assert_eq!(ask(a, b, options)["witness"], expected["witness"], "{a} and {b}");
+    }
+    assert_ne!(ask("straight.nm", "ball.xyz", &[])["witness"], expected["witness"], "straight distances");
+    assert_eq!(ask("straight.nm", "along.nm", &["--thickened", "0.1"])["verdict"], "intersecting");
+    for (words, said) in [
+        (&["straight.nm", "along.nm"][..], "along.nm"),
+        (&["straight.nm", "straight.nm", "--kernel", "geodesic"], "straight.nm"),
+        (&["ball.xyz", "along.nm", "--kernel", "euclidean"], "along.nm"),
+    ] {
+        place.refused(2, &[&["collide"], words].concat(), &[said, "prepare it again", "--kernel"]);
+    }
+    place.refused(2, &["collide", "along.nm", "along.nm", "--prove", "p.jsonl"], &["--prove", "geodesic"]);
+    let apart = crate::running::shift(2.5, 0.0, 0.0);
+    let miss = place.ok(&["collide", "along.nm", "along.nm", "--pose-b", &apart, "--json"]).json().remove(0);
+    assert_eq!((&miss["verdict"], &miss["evidence"]), (&"separated".into(), &"estimated".into()));
+
+    // f is asked for by either, whatever the scan is for; by default by its own.
+    place.write("at.txt", "0.99 0 0");
+    let f = |file: &str, options: &[&str]| {
+        place.ok(&[&["eval", file, "--points", "at.txt", "--json"], options].concat()).json().remove(0)
+    };
+    let [straight, along] = ["euclidean", "geodesic"].map(|kernel| f("along.nm", &["--kernel", kernel]));
+    assert_ne!(straight["f"], along["f"]);
+    assert_eq!((f("straight.nm", &[]), f("along.nm", &[])), (straight, along));
 }
