@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use nearmiss::{
-    Budget, CollideOptions, Contact, Deadline, Detail, Evidence, Method, Order, PointId, Reason, Sampling,
-    Verdict,
+    Budget, CollideOptions, Contact, Deadline, Detail, Evidence, Method, Metric, Order, PointId, Reason,
+    Sampling, Verdict,
 };
 
 use crate::Failure;
@@ -55,6 +55,16 @@ pub fn order(arguments: &mut Arguments) -> Result<Option<Order>, Failure> {
     let Some(name) = arguments.value::<String>("--order")? else { return Ok(None) };
     let order = ORDERS.iter().find(|(known, _)| *known == name);
     Ok(Some(order.ok_or_else(|| format!("no order {name:?}"))?.1))
+}
+
+/// Reads `--kernel euclidean|geodesic`.
+///
+/// # Errors
+/// When there is no such kernel.
+pub fn kernel(arguments: &mut Arguments) -> Result<Metric, Failure> {
+    let Some(name) = arguments.value::<String>("--kernel")? else { return Ok(Metric::default()) };
+    let kernel = [Metric::Euclidean, Metric::Geodesic].into_iter().find(|kernel| kernel.name() == name);
+    Ok(kernel.ok_or_else(|| format!("no kernel {name:?}"))?)
 }
 
 /// What a query may cost.

@@ -4,8 +4,8 @@
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence, Pose,
-    Scan, Semantics, Verdict, collide_with,
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence,
+    GraphOptions, Pose, Scan, Semantics, Verdict, collide_with,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -69,15 +69,19 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
     let mut poses: Vec<Pose> = poses::near(&object, POSES, 1).unwrap().iter().map(|near| near.pose).collect();
     poses.extend(poses::sweep(POSES / 10, 1, 0).into_iter().flatten());
-    let questions = questions(&scan, object.r);
+    let along = scan.clone().with_graph(&object.cloud, &GraphOptions::default(), None).unwrap();
+    let along = along.with_geodesic_kernel().unwrap();
     let mut scratch = CollideScratch::default();
-    // The very same questions: buffers grow to what these need and no further.
-    let first = ask_all(&scan, &questions, &poses, &mut scratch);
-    let before = ALLOCATOR.calls();
-    let second = ask_all(&scan, &questions, &poses, &mut scratch);
-    assert_eq!(ALLOCATOR.calls() - before, 0, "queries allocated");
-    assert_eq!(first, second, "verdicts depend on the scratch");
-    assert!(first.iter().all(|&n| n > 20), "of every kind of verdict some: {first:?}");
+    for scan in [&scan, &along] {
+        let (questions, kernel) = (questions(scan, object.r), scan.metric());
+        // The very same questions: buffers grow to what these need and no further.
+        let first = ask_all(scan, &questions, &poses, &mut scratch);
+        let before = ALLOCATOR.calls();
+        let second = ask_all(scan, &questions, &poses, &mut scratch);
+        assert_eq!(ALLOCATOR.calls() - before, 0, "queries by the {kernel} kernel allocated");
+        assert_eq!(first, second, "verdicts depend on the scratch");
+        assert!(first.iter().all(|&n| n > 20), "of every kind of verdict some: {first:?}");
+    }
 
     let rng = &mut rng(5);
     let places: Vec<[f64; 3]> = (0..POSES)

@@ -1,18 +1,23 @@
 //! The sweep of measured queries, ours and rivals' in the same run, as Markdown.
 //!
 //! `sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival parry|trimesh|kiddo]… [--witness]
-//! [--certified] [--order NAME] [--seed N] [--threads N]`
+//! [--certified] [--kernel geodesic] [--order NAME] [--seed N] [--threads N]`
+//!
+//! With the geodesic kernel the same object prepared for it is asked beside.
 //!
 //! An object is a file of points, with or without a mesh, or one that `Object::read` knows by name.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
-use nearmiss::{BuildOptions, CollideOptions, Detail, Evidence, Order, Scan};
+use nearmiss::{
+    BuildOptions, CollideOptions, Detail, Evidence, GraphOptions, Metric, Order, PointKind, Scan,
+};
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::asked;
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::ours::Ours;
 use nearmiss_benches::rivals::{self, Method};
+use nearmiss_benches::sample::count;
 use nearmiss_benches::sweep::{self, Track};
 use nearmiss_benches::{Failure, machine, poses};
 
@@ -26,6 +31,7 @@ struct Options {
     witness: bool,
     certified: bool,
     order: Option<Order>,
+    kernel: Metric,
     seed: u64,
     threads: usize,
 }
@@ -41,6 +47,7 @@ impl Options {
             witness: arguments.flag("--witness"),
             certified: arguments.flag("--certified"),
             order: asked::order(&mut arguments)?,
+            kernel: asked::kernel(&mut arguments)?,
             seed: arguments.value("--seed")?.unwrap_or(1),
             threads: arguments.value("--threads")?.unwrap_or(0),
             objects: arguments.words()?,
@@ -65,6 +72,10 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     let build = BuildOptions::default().with_threads(options.threads);
     let (scan, time) = timed(|| Scan::build(&object.cloud, &build));
     let scan = scan?;
+    let along = match options.kernel {
+        Metric::Euclidean => None,
+        Metric::Geodesic => Some(for_geodesic(&object, &scan)?),
+    };
     let asked = CollideOptions::default();
     let asked = options.order.map_or(asked, |order| asked.with_order(order));
     let verdict = asked.with_detail(Detail::Verdict);
@@ -74,6 +85,12 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     }
     if options.witness {
         methods.push(Box::new(Ours::new(&scan, &asked)?));
+    }
+    if let Some(along) = &along {
+        methods.push(Box::new(Ours::new(along, &verdict)?));
+        if options.witness {
+            methods.push(Box::new(Ours::new(along, &asked)?));
+        }
     }
     let mut left_out = Vec::new();
     for name in &options.rivals {
@@ -108,6 +125,34 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     print_summary(&tracks);
     tracks.iter().for_each(print_distances);
     Ok(())
+}
+
+/// From this angle on a normal has turned, in degrees.
+const TURNED: f32 = 5.0;
+
+/// The scan for the geodesic kernel; tells what that took, and how much came of it.
+fn for_geodesic(object: &Object, scan: &Scan) -> Result<Scan, Failure> {
+    let scan = scan.clone().with_graph(&object.cloud, &GraphOptions::default(), None)?;
+    let (along, time) = timed(|| scan.clone().with_geodesic_kernel());
+    let along = along?;
+    let turned = |(p, q): &(&[f32; 3], &[f32; 3])| {
+        let cosine: f32 = (0..3).map(|k| p[k] * q[k]).sum();
+        cosine.abs() < TURNED.to_radians().cos()
+    };
+    let count_turned = scan.normals().iter().zip(along.normals()).filter(turned).count();
+    println!(
+        "for the geodesic kernel in {time:.2?}, {:.2} µs a point; {:.2} % of the normals turned by more than {TURNED}°; usable \
+         {:.2} % and {:.2} %, ambiguous {:.2} % and {:.2} %, isolated {:.2} % and {:.2} %\n",
+        1e6 * time.as_secs_f64() / count(scan.len()),
+        100.0 * count(count_turned) / count(scan.len()),
+        100.0 * scan.usable(),
+        100.0 * along.usable(),
+        100.0 * scan.share(PointKind::Ambiguous),
+        100.0 * along.share(PointKind::Ambiguous),
+        100.0 * scan.share(PointKind::Isolated),
+        100.0 * along.share(PointKind::Isolated),
+    );
+    Ok(along)
 }
 
 fn print_summary(tracks: &[Track]) {

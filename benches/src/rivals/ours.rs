@@ -1,8 +1,8 @@
 //! Ours, as a user would call it.
 
 use nearmiss::{
-    Answer, CollideOptions, CollidePlan, CollideScratch, Evidence, Method as Search, Pose, Scan, Verdict,
-    collide_with,
+    Answer, CollideOptions, CollidePlan, CollideScratch, Evidence, Method as Search, Metric, Pose, Scan,
+    Verdict, collide_with,
 };
 
 use crate::Failure;
@@ -53,8 +53,9 @@ impl Method for Ours<'_> {
             Search::Sampling(sampling) => format!(", sampling {}", sampling.test_points),
             _ => String::new(),
         };
+        let kernel = if options.metric == Some(Metric::Geodesic) { ", geodesic" } else { "" };
         let coverings = if options.coverings { ", coverings" } else { "" };
-        format!("nearmiss ({:?}{certified}{method}{order}{coverings})", options.detail).to_lowercase()
+        format!("nearmiss ({:?}{certified}{kernel}{method}{order}{coverings})", options.detail).to_lowercase()
     }
 
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply {
