@@ -129,7 +129,9 @@ impl<'a> GeodesicKernel<'a> {
         let KernelScratch { place, both, heard, .. } = scratch;
         both.clear();
         heard.clear();
-        let horizon = |point: u32| self.radii.get(point as usize).map_or(0.0, |&r| self.plan.horizon(r));
+        // No distance, not even one that a file makes up, is less than that of a point that is not there.
+        let horizon =
+            |point: u32| self.radii.get(point as usize).map_or(f32::NEG_INFINITY, |&r| self.plan.horizon(r));
         let first = self.lists.of(foot.ends[0] as usize);
         if foot.share <= 0.0 {
             heard.extend(first.iter().filter(|close| close.distance < horizon(close.point)));

@@ -5,6 +5,8 @@ use nearmiss::{
     Scan, Semantics, Verdict, collide_with,
 };
 
+use crate::graph::{GraphAnswers, exercise_graph};
+
 /// What a scan answered.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Answers {
@@ -12,6 +14,8 @@ pub(crate) struct Answers {
     pub(crate) collide: Vec<Answer>,
     /// At places near some of its points.
     pub(crate) at: Vec<Evaluation>,
+    /// To questions about its graph.
+    pub(crate) graph: Option<GraphAnswers>,
 }
 
 /// Poses of the other scan: on the first, a little off, across its rim, far away.
@@ -67,5 +71,5 @@ pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let _sound_or_not = scan.sanity_check();
     let mut sink = std::io::sink();
     assert!(scan.write_to(&mut sink).is_ok(), "what was loaded can be saved");
-    Answers { collide, at }
+    Answers { collide, at, graph: exercise_graph(scan) }
 }

@@ -6,5 +6,6 @@ mod cost;
 mod damage;
 mod exercise;
 mod faults;
+mod graph;
 mod mutations;
 mod repair;

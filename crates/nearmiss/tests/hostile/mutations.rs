@@ -3,7 +3,9 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use nearmiss::{Bandwidth, BuildOptions, Check, PointCloud, Scan, SurfaceOptions, Verdict};
+use nearmiss::{
+    Bandwidth, BuildOptions, Check, GraphOptions, Paths, PointCloud, Scan, SurfaceOptions, Verdict,
+};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 use crate::damage::{Random, damage, restate_length};
@@ -24,6 +26,15 @@ struct Sample {
     answers: Answers,
 }
 
+impl Sample {
+    fn of(scan: Scan) -> Self {
+        let mut bytes = Vec::new();
+        scan.write_to(&mut bytes).unwrap();
+        let answers = exercise(&scan, &scan);
+        Self { scan, bytes, answers }
+    }
+}
+
 fn samples() -> Vec<Sample> {
     let global = SurfaceOptions::default().with_bandwidth(Bandwidth::Global);
     let kinds = [
@@ -36,13 +47,20 @@ fn samples() -> Vec<Sample> {
     ];
     let sample = |(kind, n, options)| {
         let cloud = PointCloud::cleaned(&arbitrary::cloud(kind, n, 7)).unwrap();
-        let scan = Scan::build(&cloud, &options).unwrap();
-        let mut bytes = Vec::new();
-        scan.write_to(&mut bytes).unwrap();
-        let answers = exercise(&scan, &scan);
-        Sample { scan, bytes, answers }
+        Sample::of(Scan::build(&cloud, &options).unwrap())
     };
-    kinds.into_iter().map(sample).collect()
+    let bare = kinds.into_iter().map(sample);
+    let graphs = [
+        (CloudKind::Sphere, 400, GraphOptions::default()),
+        (CloudKind::Clustered, 300, GraphOptions::default().with_close_pairs(Some(Paths::Stored))),
+        (CloudKind::FarClusters, 330, GraphOptions::default().with_close_pairs(None)),
+    ];
+    let joined = |(kind, n, options): (CloudKind, u32, GraphOptions)| {
+        let cloud = PointCloud::cleaned(&arbitrary::cloud(kind, n, 7)).unwrap();
+        let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
+        Sample::of(scan.with_graph(&cloud, &options, None).unwrap())
+    };
+    bare.chain(graphs.into_iter().map(joined)).collect()
 }
 
 fn setting(name: &str, default: u64) -> u64 {
