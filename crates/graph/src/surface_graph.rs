@@ -228,6 +228,9 @@ impl SurfaceGraph {
         if let Some(index) = parts.iter().position(|part| !is_sound(part)) {
             return Err(Flaw::Value { what: "the side of part", index }.into());
         }
+        if check == Check::Full {
+            check_parts(&parts, points.components())?;
+        }
         let levels = Levels::load(file, count, check)?;
         let radii = std::iter::once(samples.radii).chain(levels.cells().iter().map(|cells| cells.radii()));
         let maps = (0..).zip(radii).filter(|_| meta.has_close_pairs);
@@ -235,4 +238,20 @@ impl SurfaceGraph {
         let close_pairs = maps.map(map).collect::<Result<_, _>>()?;
         Ok(Self { points, confidence, parts, close_pairs, levels, lengths: OnceLock::new() })
     }
+}
+
+/// Checks that there is a part for each component, in order, with as many points.
+fn check_parts(parts: &[StoredPart], components: &[u32]) -> Result<(), Flaw> {
+    let mut sizes = vec![0_u32; components.len()];
+    for &first in components {
+        sizes[first as usize] += 1;
+    }
+    let expected = (0_u32..).zip(&sizes).filter(|(_, size)| **size > 0);
+    let differs =
+        |(part, (first, &points)): (&StoredPart, (u32, &u32))| [part.first, part.points] != [first, points];
+    if let Some(index) = parts.iter().zip(expected.clone()).position(differs) {
+        return Err(Flaw::Value { what: "part", index });
+    }
+    let (found, expected) = (parts.len(), expected.count());
+    if found == expected { Ok(()) } else { Err(Flaw::Length { array: "the list of parts", found, expected }) }
 }

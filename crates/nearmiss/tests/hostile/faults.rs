@@ -3,7 +3,7 @@
 use std::io;
 
 use nearmiss::store::{Fault, File, WriteError, WriteStep};
-use nearmiss::{BuildOptions, Check, LoadError, PointCloud, Scan};
+use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud, Scan};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 use crate::damage::restate_length;
@@ -69,6 +69,28 @@ fn a_file_of_a_machine_of_the_other_byte_order_is_named_as_such() {
             assert!(matches!(refused.fault, Fault::ByteOrder), "{swapped:?}: {refused}");
             assert!(refused.to_string().contains("big-endian machine; prepare it again"), "{refused}");
         }
+    }
+}
+
+#[test]
+fn parts_that_are_not_the_components_are_refused() {
+    let points = arbitrary::cloud(CloudKind::FarClusters, 120, 1);
+    let cloud = PointCloud::from_positions(&points).unwrap();
+    let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
+    let scan = scan.with_graph(&cloud, &GraphOptions::default(), None).unwrap();
+    assert!(scan.graph().unwrap().parts().len() > 1, "several parts");
+    let whole = bytes_of(&scan);
+    let file = File::from_bytes(whole.clone(), Check::Full).unwrap();
+    let parts = file.sections().iter().find(|section| section.id.tag == *b"PART").unwrap();
+    let first = usize::try_from(parts.offset).unwrap();
+    // The number of points of the first part; the first part in place of the second.
+    for (from, to) in [(first..first + 4, first + 4), (first..first + 12, first + 12)] {
+        let mut lying = whole.clone();
+        lying.copy_within(from, to);
+        repair(&mut lying);
+        let refused = Scan::from_bytes(lying, Check::Full).unwrap_err();
+        assert!(matches!(refused, LoadError::Graph(_)), "{refused}");
+        assert!(refused.to_string().contains("part"), "{refused}");
     }
 }
 
