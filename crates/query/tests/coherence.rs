@@ -377,3 +377,32 @@ fn small_steps_count_after_a_leap() {
     }
     assert!(hits > 100, "{hits}");
 }
+
+#[test]
+fn far_from_the_origin_a_hint_proves_no_greater_distance() {
+    let scan = prepared(&plate(20));
+    let base = CollideOptions::default();
+    let both_kinds =
+        [base.with_semantics(Semantics::Thickened(0.0)), base.with_evidence(Evidence::Certified)];
+    let mut without_search = 0;
+    for options in both_kinds {
+        for away in [0.0, 2.0_f64.powi(36), 2.0_f64.powi(40), 2.0_f64.powi(43)] {
+            for step in 0..50 {
+                let lift = [0.0, 0.0, 6.0 + 0.125 * f64::from(step)];
+                let near = [[0.0; 3], lift].map(Pose::from_translation);
+                let mut hint = PairHint::default();
+                both([&scan; 2], near, &options, &Budget::UNLIMITED, &mut hint);
+                // The same motion, exactly; but poses so far out may have been rounded.
+                let far = [[away, 0.0, 0.0], [away, 0.0, lift[2]]].map(Pose::from_translation);
+                let [cold, warm] = both([&scan; 2], far, &options, &Budget::UNLIMITED, &mut hint);
+                let gap = |answer: &Answer| match answer.verdict {
+                    Verdict::Separated { gap, evidence: Evidence::Certified } => gap,
+                    _ => panic!("{options:?}, {away} away: {answer:?}"),
+                };
+                assert!(gap(&warm) <= gap(&cold), "{options:?}, {away} away: {warm:?} {cold:?}");
+                without_search += u32::from(warm.statistics.node_pairs == 0);
+            }
+        }
+    }
+    assert!(without_search > 300, "{without_search} answers came without any search");
+}
