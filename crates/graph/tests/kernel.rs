@@ -133,6 +133,8 @@ fn distances_from_the_foot_are_those_of_its_ends_and_go_over_smoothly() {
         let id = u32::try_from(i).unwrap();
         let foot = kernel.foot(ring.cloud.points[i].map(f64::from), id);
         assert_eq!((foot.ends[0], foot.share), (id, 0.0));
+        let at = kernel.evaluate(ring.cloud.points[i].map(f64::from), id, &mut scratch);
+        assert_eq!(kernel.evaluate_at(id, &mut scratch).0, at, "at point {i}");
         // At a point: its list, but for what is just at its horizon.
         let heard = kernel.hear(&foot, &mut scratch).to_vec();
         let strict = ring

@@ -3,11 +3,12 @@
 
 use nearmiss::graph::SurfaceGraphMeta;
 use nearmiss::hierarchy::HierarchyMeta;
+use nearmiss::query::ViewScratch;
 use nearmiss::store::Writer;
 use nearmiss::{
     Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, GraphError,
-    GraphOptions, LoadError, Metric, PlanError, PointCloud, PointKind, Pose, Scan, Semantics, Verdict,
-    collide_with,
+    GraphOptions, LoadError, Metric, PlanError, PointCloud, PointKind, Pose, Scan, ScanView, Semantics,
+    Verdict, collide_with,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
@@ -201,6 +202,37 @@ fn the_metric_is_kept_and_a_plan_holds_to_it() {
             Verdict::Separated { evidence: found, .. } => assert_eq!(found, evidence),
             other => panic!("{other:?}"),
         }
+    }
+}
+
+/// Views that were made without the kernel see the same discs, and verify nothing.
+#[test]
+fn a_witness_is_verified_by_the_scans_own_kernel_alone() {
+    let [straight, geodesic] = both(&arbitrary::cloud(CloudKind::Sphere, 600, 3));
+    let pose = Pose::from_translation([1.1, 0.2, 0.0]);
+    let asked = |a: &ScanView<'_>, b: &ScanView<'_>| {
+        let plan = CollidePlan::new(&CollideOptions::default(), a.scan(), b.scan()).unwrap();
+        match collide_with(a, b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict {
+            Verdict::Intersecting { contact, evidence } => (contact, evidence),
+            other => panic!("{other:?}"),
+        }
+    };
+    let along = |pose: &Pose| ScanView::new(&straight, pose).with_kernel(straight.geodesic_kernel().unwrap());
+    let bare = |pose: &Pose| ScanView::new(&geodesic, pose);
+    let (contact, evidence) = asked(&geodesic.at(&Pose::IDENTITY), &geodesic.at(&pose));
+    assert_eq!(evidence, Evidence::Certified);
+    for pose in [Pose::IDENTITY, pose] {
+        let at = geodesic.at(&pose).evaluate_with(contact.point, &mut ViewScratch::default());
+        assert!(at.f.abs() <= 1e-6 * at.bandwidth, "the witness is {} off by the geodesic kernel", at.f);
+        let at = bare(&pose).evaluate_with(contact.point, &mut ViewScratch::default());
+        assert!(at.f.abs() > 1e-6 * at.bandwidth, "and on the surface of straight distances");
+    }
+    for (a, b) in [
+        (bare(&Pose::IDENTITY), bare(&pose)),
+        (geodesic.at(&Pose::IDENTITY), bare(&pose)),
+        (along(&Pose::IDENTITY), along(&pose)),
+    ] {
+        assert_eq!(asked(&a, &b).1, Evidence::Estimated);
     }
 }
 
