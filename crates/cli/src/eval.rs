@@ -125,7 +125,7 @@ fn sentence(at: &Evaluation, unit: f64) -> String {
                 place(at.centroid, unit)
             )
         }
-        Status::Outside => format!("outside: {support} points reach here, too few"),
+        Status::Outside => format!("outside: {support} points reach here, too few or from too far away"),
         Status::Border => format!("border: off the surface, or beyond its border; support {support}"),
         _ => format!("ambiguous: the points here do not look like one sheet; support {support}"),
     }

@@ -4,11 +4,11 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::Scan;
 use nearmiss::geometry::Frame;
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::graph::{ClosePairs, PointGraph};
 use nearmiss::io::{Column, PlyPoints, WriteError};
+use nearmiss::{Scan, SurfaceGraph};
 
 use crate::console::Console;
 use crate::error::CliError;
@@ -61,15 +61,17 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     } else {
         input::open(&args.file, 0, console)?
     };
+    let pairs = scan.graph().and_then(SurfaceGraph::close_pairs);
+    // Before anything is written.
+    if args.close_pairs.is_some() && pairs.is_none() {
+        let what = "this scan was prepared without a map of close pairs; prepare it again without \
+                    `--no-close-pairs`";
+        return Err(CliError::Unfit { path: args.file.clone(), what: what.into() });
+    }
     if let (Some(path), Some(graph)) = (&args.edges, scan.graph()) {
         output::replace_plain(path, |out| edges(&scan, graph.points(), out))?;
     }
-    if let (Some(path), Some(graph)) = (&args.close_pairs, scan.graph()) {
-        let Some(pairs) = graph.close_pairs() else {
-            let what = "this scan was prepared without a map of close pairs; prepare it again without \
-                        `--no-close-pairs`";
-            return Err(CliError::Unfit { path: args.file.clone(), what: what.into() });
-        };
+    if let (Some(path), Some(pairs)) = (&args.close_pairs, pairs) {
         output::replace_plain(path, |out| close_pairs(&scan, pairs, out))?;
     }
     if let Some(path) = &args.points {

@@ -175,11 +175,15 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     let scan = match graph_options(args) {
         Some((options, scanner)) => {
             let _bar = console.spinner(format_args!("joining {} points", scan.len()));
-            let scan = input::with_graph(&args.input, scan, &model, &options, scanner)?;
-            match args.kernel {
-                KernelName::Euclidean => scan,
-                KernelName::Geodesic => input::with_geodesic_kernel(&args.input, scan)?,
-            }
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
+            let pool = pool.or(Err(CliError::Threads(args.threads)))?;
+            pool.install(|| {
+                let scan = input::with_graph(&args.input, scan, &model, &options, scanner)?;
+                match args.kernel {
+                    KernelName::Euclidean => Ok(scan),
+                    KernelName::Geodesic => input::with_geodesic_kernel(&args.input, scan),
+                }
+            })?
         }
         None => scan,
     };

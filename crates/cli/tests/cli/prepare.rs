@@ -72,6 +72,7 @@ fn a_graph_is_left_out_where_nobody_wants_it() {
     place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--no-close-pairs"]);
     for asked in [
         &["export", "ball.nm", "--close-pairs", "c.csv"][..],
+        &["export", "ball.nm", "--edges", "e.csv", "--close-pairs", "c.csv"],
         &["eval", "ball.nm", "--points", "ball.xyz", "--kernel", "geodesic"],
     ] {
         place.refused(1, asked, &["ball.nm", "--no-close-pairs"]);
