@@ -21,6 +21,9 @@ pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
 /// some seven; where the scan is sparse beside dense, or a bandwidth large, lists would be of everything.
 pub(crate) const MOST_LISTED: usize = 64;
 
+/// Steps towards the least ball about a block (Bădoiu & Clarkson 2003).
+const CENTRING: u8 = 12;
+
 /// What rounding may cost a comparison of distances, relatively.
 pub(crate) const GROWN: f32 = 1.0 + 1e-5;
 
@@ -31,12 +34,25 @@ pub(crate) fn groups(blocks: &[PointBlock]) -> Vec<PointBlock> {
         let points = || (0..PointBlock::WIDTH).filter(|&i| horizon[i] > 0.0).map(|i| [x[i], y[i], z[i]]);
         let (sum, count) =
             points().fold(([0.0; 3], 0.0), |(s, n), p| ([s[0] + p[0], s[1] + p[1], s[2] + p[2]], n + 1.0));
-        let centre = sum.map(|c: f32| c / count);
-        let heard = |p: [f32; 3], horizon: &f32| {
+        let heard = |centre: [f32; 3], (p, horizon): ([f32; 3], &f32)| {
             let d = sub(p, centre);
             dot(d, d).sqrt() + horizon
         };
-        let radius = points().zip(horizon).map(|(p, h)| heard(p, h)).fold(0.0, f32::max);
+        // From the mean ever less far towards whoever is heard furthest: the least ball of balls.
+        let mut centre = sum.map(|c: f32| c / count);
+        let mut best = (centre, f32::INFINITY);
+        for step in 2..2 + CENTRING {
+            let furthest = points().zip(horizon).map(|ball| (heard(centre, ball), ball.0));
+            let (radius, p) = furthest.fold((0.0, centre), |a, b| if b.0 > a.0 { b } else { a });
+            if radius < best.1 {
+                best = (centre, radius);
+            }
+            let share = 1.0 / f32::from(step);
+            for k in 0..3 {
+                centre[k] += share * (p[k] - centre[k]);
+            }
+        }
+        let (centre, radius) = best;
         let far = centre.iter().fold(radius, |far, c| far.max(c.abs()));
         (centre, radius * GROWN + ROUNDING * far)
     };
