@@ -93,6 +93,9 @@ pub enum GraphError {
         /// Index of the first such point.
         index: usize,
     },
+    /// The place of the scanner is none.
+    #[error("the scanner at {0:?}; its coordinates must be finite")]
+    Scanner([f64; 3]),
     /// More points, or ends of edges, than 32 bits count.
     #[error("{ends} ends of edges; at most 4294967295 can be stored; choose fewer neighbours")]
     TooLarge {

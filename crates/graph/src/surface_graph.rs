@@ -202,8 +202,9 @@ impl SurfaceGraph {
         self.levels.add_to(writer)
     }
 
-    /// The graph of `samples` in `file`, its arrays in place. With either `check` no use of it fails; with
-    /// [`Check::Full`] every number is one that a build writes.
+    /// The graph of `samples` in `file`, its arrays in place. With either `check` no use of it fails. With [`Check::Full`]
+    /// arrays also agree with each other, lists are in order and lengths are lengths; whether a distance is the shortest there is, or a
+    /// confidence deserved, only a build could tell.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

@@ -121,6 +121,9 @@ impl Scan {
         scanner: Option<[f64; 3]>,
     ) -> Result<Self, GraphError> {
         let metric = self.metric();
+        if let Some(place) = scanner.filter(|place| place.iter().any(|c| !c.is_finite())) {
+            return Err(GraphError::Scanner(place));
+        }
         let mut hierarchy = Arc::unwrap_or_clone(self.hierarchy);
         let own = cloud.normals().map(|normals| in_order_of(&hierarchy, cloud, normals));
         let scanner = scanner.map(|place| hierarchy.frame().to_local(place));

@@ -111,6 +111,9 @@ fn normals_are_turned_outwards_to_the_scanner_or_as_given() {
     let closed = scan(&ball, None);
     assert_eq!(outwards(&closed), closed.len(), "out of the ball");
     assert_eq!(outwards(&scan(&ball, Some([0.0; 3]))), 0, "to the scanner within");
+    let bare = Scan::build(&ball, &BuildOptions::default()).unwrap();
+    let refused = bare.with_graph(&ball, &GraphOptions::default(), Some([0.0, f64::NAN, 1.0])).unwrap_err();
+    assert!(refused.to_string().contains("scanner") && refused.to_string().contains("NaN"), "{refused}");
     #[expect(clippy::cast_possible_truncation, reason = "normals are single precision")]
     let inwards: Vec<[f32; 3]> = (0..ball.len()).map(|i| ball.point(i).map(|c| -c as f32)).collect();
     let given = ball.clone().with_normals(&inwards).unwrap();
