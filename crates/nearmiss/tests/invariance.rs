@@ -3,8 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Evidence, PointCloud, Pose, Reason,
-    Scan, Semantics, Verdict, collide_with,
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Evidence, GraphOptions, PointCloud,
+    Pose, Reason, Scan, Semantics, Verdict, collide_with,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -213,4 +213,42 @@ fn a_finer_mesh_answers_as_the_coarser_did() {
         apart += u32::from(gap > 0.0);
     }
     assert!(hits > 50 && apart > 100, "{hits} hits, {apart} apart");
+}
+
+/// A graph turns normals, and no verdict looks at their signs: the same bits but for the sides of a contact's normals.
+#[test]
+fn a_graph_changes_no_verdict() {
+    let mut rng = arbitrary::rng(12);
+    let mut hits = 0;
+    for (n, cloud) in [CloudKind::Sphere, CloudKind::Clustered, CloudKind::Coplanar, CloudKind::Rings]
+        .into_iter()
+        .enumerate()
+    {
+        let cloud = PointCloud::from_positions(&arbitrary::cloud(cloud, 900, n as u64)).unwrap();
+        let bare = Scan::build(&cloud, &BuildOptions::default()).unwrap();
+        let joined = bare.clone().with_graph(&cloud, &GraphOptions::default(), None).unwrap();
+        let size = bare.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        for options in [
+            CollideOptions::default(),
+            CollideOptions::default().with_evidence(Evidence::Certified).with_margin(0.01 * size),
+        ] {
+            for _ in 0..150 {
+                let pose =
+                    arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 2.2 * size));
+                let [one, other] =
+                    [&bare, &joined].map(|scan| ask(scan, scan, [Pose::IDENTITY, pose], options));
+                match (one, other) {
+                    (
+                        Verdict::Intersecting { contact: p, evidence: e },
+                        Verdict::Intersecting { contact: q, evidence: f },
+                    ) => {
+                        assert_eq!((p.point, p.residual, p.sources, e), (q.point, q.residual, q.sources, f));
+                        hits += 1;
+                    }
+                    _ => assert_eq!(one, other, "{options:?}"),
+                }
+            }
+        }
+    }
+    assert!((200..1000).contains(&hits), "{hits} of 1200 meet");
 }
