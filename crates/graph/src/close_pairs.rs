@@ -36,7 +36,7 @@ const ELSEWHERE: u8 = u8::MAX;
 pub struct Close {
     /// Its index.
     pub point: u32,
-    /// Sum of the lengths of the edges of a shortest path, as [`GeodesicScratch::within`] adds them from there.
+    /// Sum of the lengths of the edges of a shortest path, as [`GeodesicScratch::within`](crate::GeodesicScratch::within) adds them from there.
     pub distance: f32,
 }
 
@@ -302,7 +302,7 @@ impl<'a> Lists<'a> {
 }
 
 /// Searches that reach the same points at the same distances as
-/// [`GeodesicScratch::within`](crate::GeodesicScratch::within), in any order. A shortest distance is the least over all
+/// [`GeodesicScratch::within`](crate::GeodesicScratch::within)(crate::GeodesicScratch::within), in any order. A shortest distance is the least over all
 /// ways, in whichever order they are tried; so nothing has to be kept sorted but roughly, and a point whose way is
 /// improved after it was left is left once more.
 struct Spread {
