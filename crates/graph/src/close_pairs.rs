@@ -302,7 +302,7 @@ impl<'a> Lists<'a> {
 }
 
 /// Searches that reach the same points at the same distances as
-/// [`GeodesicScratch::within`](crate::GeodesicScratch::within)(crate::GeodesicScratch::within), in any order. A shortest distance is the least over all
+/// [`GeodesicScratch::within`](crate::GeodesicScratch::within), in any order. A shortest distance is the least over all
 /// ways, in whichever order they are tried; so nothing has to be kept sorted but roughly, and a point whose way is
 /// improved after it was left is left once more.
 struct Spread {
