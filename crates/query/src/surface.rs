@@ -259,19 +259,9 @@ impl<'a> Surfaces<'a> {
         })?;
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
         let nearby = NEARBY * radius * va.placed().scale();
-        // On the side of the stored normals, which a graph may have oriented.
-        let stored = [
-            va.placed().rotate(self.pair.a.normals[i].map(f64::from)),
-            vb.placed().rotate(self.pair.b.normals[j].map(f64::from)),
-        ];
-        let turned = [0, 1].map(|k: usize| {
-            let normal = Vector3::from(meeting.at[k].normal);
-            let sign = 1.0_f64.copysign(normal.dot(&Vector3::from(stored[k])));
-            (normal * sign).into()
-        });
         (meeting.verified && moved <= nearby).then(|| Contact {
             point: meeting.point,
-            normals: Some(turned),
+            normals: Some(meeting.at.map(|e| e.normal)),
             residual: meeting.residual(),
             ..*contact
         })

@@ -111,11 +111,12 @@ impl<'a> ScanView<'a> {
         self.in_world(at)
     }
 
-    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`; without a kernel of either sign.
+    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`, on the side of whose normal n is.
     pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
         match &self.kernel {
             None => {
-                self.in_world(self.scan.evaluate_near(i, self.placed.apply_inverse(x), &mut scratch.gather))
+                let at = self.scan.evaluate_near(i, self.placed.apply_inverse(x), &mut scratch.gather);
+                self.in_world(at.turned_to(self.slices.normals[i].map(f64::from), 0.0))
             }
             Some(kernel) => self.evaluate_by_near(kernel, i, x, &mut scratch.kernel),
         }
