@@ -7,11 +7,18 @@ use nearmiss_store::{Array, Check, File, WriteError, Writer};
 use nearmiss_surface::SurfacePlan;
 use serde::{Deserialize, Serialize};
 
+use crate::length::distance;
 use crate::orient::{Decision, OrientedPart, Sides, orient};
 use crate::{
-    ClosePairs, Flaw, GeodesicKernel, GraphCounts, GraphError, GraphMeta, GraphOptions, Levels, LoadError,
-    Network, PointGraph, edge_lengths,
+    Adjacency, ClosePairs, Flaw, GeodesicKernel, GraphCounts, GraphError, GraphMeta, GraphOptions, LazyPath,
+    Levels, LoadError, Network, PointGraph, edge_lengths,
 };
+
+/// A way so many times as long as its ends are apart leads round something.
+const DETOUR: f32 = 4.0;
+
+/// Ways over virtual edges stay where the sum of the distances from both ends is at most so many times their distance.
+const NARROW: f32 = 1.5;
 
 const CONFIDENCE: [u8; 4] = *b"CNFD";
 const PARTS: [u8; 4] = *b"PART";
@@ -43,6 +50,8 @@ pub struct SurfaceGraph {
     levels: Levels,
     /// Made when first wanted.
     lengths: OnceLock<Vec<f32>>,
+    areas: OnceLock<Vec<f64>>,
+    bridged: OnceLock<(Adjacency, Vec<f32>)>,
 }
 
 /// What is stored of a graph beside arrays.
@@ -113,6 +122,8 @@ impl SurfaceGraph {
             close_pairs,
             levels,
             lengths: lengths.into(),
+            areas: OnceLock::new(),
+            bridged: OnceLock::new(),
         })
     }
 
@@ -157,6 +168,55 @@ impl SurfaceGraph {
     pub fn network(&self, positions: &[[f32; 3]]) -> Network<'_> {
         let lengths = self.lengths.get_or_init(|| edge_lengths(self.points.edges(), positions));
         Network::new(self.points.edges(), lengths)
+    }
+
+    /// The edges with the virtual ones, which bridge small holes (S1 §4.5), and their lengths; made when first wanted.
+    #[must_use]
+    pub fn bridged_network(&self, positions: &[[f32; 3]]) -> Network<'_> {
+        let (graph, lengths) = self.bridged.get_or_init(|| {
+            let edges: Vec<[u32; 2]> =
+                self.points.edges().edges().chain(self.points.virtual_edges().edges()).collect();
+            let graph = Adjacency::from_edges(self.points.len(), &edges);
+            let lengths = edge_lengths(&graph, positions);
+            (graph, lengths)
+        });
+        Network::new(graph, lengths)
+    }
+
+    /// For each point the areas of all before it, in units of π, and last that of all, for drawing points by area: one
+    /// stands for the square of its local sampling radius. Made when first wanted, eight bytes a point.
+    #[must_use]
+    pub fn areas(&self, radii: &[f32]) -> &[f64] {
+        self.areas.get_or_init(|| {
+            let mut sum = 0.0;
+            let areas = radii.iter().map(|&r| {
+                let before = sum;
+                sum += f64::from(r) * f64::from(r);
+                before
+            });
+            let mut areas: Vec<f64> = areas.collect();
+            areas.push(sum);
+            areas
+        })
+    }
+
+    /// Makes `path` one from `a` to `b`: of the surface, as [`LazyPath::lead`] does, or over virtual edges where that is more
+    /// than four times as long as they are apart, or no way leads there. These are looked for among points not much further
+    /// from both than they are from each other. False, with no path, where there is none.
+    ///
+    /// # Panics
+    /// When there is no such point, or not a position for each.
+    pub fn lead(&self, positions: &[[f32; 3]], [a, b]: [u32; 2], path: &mut LazyPath) -> bool {
+        let led = path.lead(&self.levels, self.network(positions), [a, b]);
+        let place = |i: u32| positions[i as usize];
+        let apart = distance(place(a), place(b));
+        let is_direct = led && path.length() <= f64::from(DETOUR * apart);
+        if is_direct || self.points.virtual_edges().edge_count() == 0 {
+            return led;
+        }
+        let near = |i: u32| distance(place(i), place(a)) + distance(place(i), place(b)) <= NARROW * apart;
+        let bridged = path.lead_through(self.bridged_network(positions), [a, b], near);
+        bridged || path.lead(&self.levels, self.network(positions), [a, b])
     }
 
     /// The geodesic kernel over these samples, if there is a map of close pairs.
@@ -237,7 +297,16 @@ impl SurfaceGraph {
         let maps = (0..).zip(radii).filter(|_| meta.has_close_pairs);
         let map = |(part, radii)| ClosePairs::load(file, part, &horizons(samples.plan, radii), check);
         let close_pairs = maps.map(map).collect::<Result<_, _>>()?;
-        Ok(Self { points, confidence, parts, close_pairs, levels, lengths: OnceLock::new() })
+        Ok(Self {
+            points,
+            confidence,
+            parts,
+            close_pairs,
+            levels,
+            lengths: OnceLock::new(),
+            areas: OnceLock::new(),
+            bridged: OnceLock::new(),
+        })
     }
 }
 
