@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use nearmiss::{
-    Budget, CollideOptions, Contact, Deadline, Detail, Evidence, Method, Metric, Order, PointId, Reason,
-    Sampling, Verdict,
+    Budget, CollideOptions, Contact, Deadline, Detail, Evidence, Interpolation, Method, Metric, Order,
+    PointId, Reason, Sampling, Surfels, Verdict,
 };
 
 use crate::Failure;
@@ -18,8 +18,8 @@ pub const ORDERS: [(&str, Order); 4] = [
     ("sides-by-gap", Order::SidesByGap),
 ];
 
-/// Reads `--witness`, `--certified`, `--method traversal|sampling`, `--test-points N`, `--tolerance R`, `--flat`,
-/// `--order NAME` and `--coverings`.
+/// Reads `--witness`, `--certified`, `--method traversal|sampling|interpolation`, `--test-points N`, `--tolerance R`,
+/// `--surfels A`, `--surfel-radius R`, `--flat`, `--order NAME` and `--coverings`.
 ///
 /// # Errors
 /// When a value cannot be read, or names nothing.
@@ -33,9 +33,17 @@ pub fn options(arguments: &mut Arguments) -> Result<CollideOptions, Failure> {
     if let Some(tolerance) = arguments.value("--tolerance")? {
         sampling = sampling.with_tolerance(tolerance);
     }
+    let mut interpolation = Interpolation::default().with_flat(sampling.flat);
+    if let Some(surfels) = arguments.value("--surfels")? {
+        interpolation = interpolation.with_surfels(Surfels::Count(surfels));
+    }
+    if let Some(radii) = arguments.value("--surfel-radius")? {
+        interpolation = interpolation.with_surfels(Surfels::Radius(radii));
+    }
     let method = match arguments.value::<String>("--method")?.as_deref() {
         None | Some("traversal") => Method::Traversal,
         Some("sampling") => Method::Sampling(sampling),
+        Some("interpolation") => Method::Interpolation(interpolation),
         Some(other) => return Err(format!("no method {other:?}").into()),
     };
     let order = order(arguments)?;

@@ -11,7 +11,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use nearmiss::{BuildOptions, Evidence, Scan};
+use nearmiss::{BuildOptions, Evidence, GraphOptions, Scan};
 use nearmiss_benches::Failure;
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::asked::{self, Limits, best_effort};
@@ -40,7 +40,10 @@ fn main() -> Result<ExitCode, Failure> {
 
     let options = BuildOptions::default().with_threads(threads);
     let (scan, time) = timed(|| Scan::build(&object.cloud, &options));
-    let scan = scan?;
+    let mut scan = scan?;
+    if matches!(asked.method, nearmiss::Method::Interpolation(_)) {
+        scan = scan.with_graph(&object.cloud, &GraphOptions::default(), None)?;
+    }
     println!("prepared in {time:.2?}, {:.2} % of the points usable", 100.0 * scan.usable());
     let score = score(&mut Ours::new(&scan, &asked)?.with_limits(limits), &questions, object.r);
     let mut clean = score.is_clean() && (!certified || score.is_certified_enough());

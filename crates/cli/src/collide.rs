@@ -239,6 +239,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         .with_detail(detail)
         .with_margin(args.margin)
         .with_evidence(evidence);
+    args.search.check(&a, &b)?;
     let options = args.search.apply(options)?;
     let plan = CollidePlan::new(&options, &a, &b)?;
     let prove = args.prove.is_some();
@@ -268,7 +269,11 @@ fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2
         return Ok([a, b]);
     }
     let kernel = args.kernel.map(KernelName::metric);
-    let scans = input::open_both(kernel, [&args.a, &args.b], threads, console)?;
+    let scans = if args.search.wants_graphs() && kernel.is_none() {
+        input::open_both_with_graphs([&args.a, &args.b], threads, console)?
+    } else {
+        input::open_both(kernel, [&args.a, &args.b], threads, console)?
+    };
     if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
         let what = "--prove is for the euclidean kernel: by the geodesic one no separation is proven, and what would \
                     check witnesses does not know it";

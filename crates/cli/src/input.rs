@@ -101,6 +101,25 @@ pub(crate) fn with_geodesic_kernel(path: &Path, scan: Scan) -> Result<Scan, CliE
     scan.with_geodesic_kernel().map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
 }
 
+/// As [`open_both`] as prepared, with graphs for raw inputs.
+pub(crate) fn open_both_with_graphs(
+    [a, b]: [&Path; 2],
+    threads: usize,
+    console: Console,
+) -> Result<[Scan; 2], CliError> {
+    let open = |path: &Path| {
+        if is_prepared(path) {
+            return open(path, threads, console);
+        }
+        let model = read(path, None)?;
+        let scan = build(path, &model, &BuildOptions::default().with_threads(threads))?;
+        with_graph(path, scan, &model, &GraphOptions::default(), None)
+    };
+    let first = open(a)?;
+    let second = if a == b { first.clone() } else { open(b)? };
+    Ok([first, second])
+}
+
 /// As [`open`], for what cannot do without a graph.
 pub(crate) fn open_with_graph(path: &Path, console: Console) -> Result<Scan, CliError> {
     if is_prepared(path) {

@@ -48,7 +48,7 @@ pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
 pub use posing::PoseRefused;
 pub use preprocess::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
-pub use search::{MethodName, OrderName, SearchArgs};
+pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
 
 /// Whether, where and how near scanned things meet, straight from their points.
 ///

@@ -215,6 +215,7 @@ pub(crate) struct AnswerReport {
     evaluations: u64,
     node_pairs: u64,
     leaf_pairs: u64,
+    neighbour_steps: u64,
     micros: f64,
 }
 
@@ -236,6 +237,7 @@ impl AnswerReport {
             evaluations: answer.statistics.evaluations,
             node_pairs: answer.statistics.node_pairs,
             leaf_pairs: answer.statistics.leaf_pairs,
+            neighbour_steps: answer.statistics.neighbour_steps,
             micros,
         };
         match answer.verdict {
@@ -263,6 +265,7 @@ impl AnswerReport {
                     Reason::Undersampled => Some("undersampled"),
                     Reason::Ambiguous => Some("ambiguous"),
                     Reason::Pose => Some("pose"),
+                    Reason::NoGraph => Some("no-graph"),
                     _ => None,
                 };
             }
@@ -276,8 +279,12 @@ impl AnswerReport {
             (Some(a), Some(b)) => format!("between point {a} of a and point {b} of b, counted from 0; "),
             _ => String::new(),
         };
+        let steps = match self.neighbour_steps {
+            0 => String::new(),
+            steps => format!("{} to nearest points, ", count(steps, "step")),
+        };
         format!(
-            "{between}{}, {}, {}, {:.1} µs",
+            "{between}{}, {}, {}, {steps}{:.1} µs",
             count(self.node_pairs, "node pair"),
             count(self.leaf_pairs, "leaf pair"),
             count(self.evaluations, "evaluation"),

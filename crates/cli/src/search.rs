@@ -1,7 +1,7 @@
 //! How `collide` searches: methods, orders, resolution.
 
 use clap::{Args, ValueEnum};
-use nearmiss::{CollideOptions, Method, Order, Sampling};
+use nearmiss::{Brackets, CollideOptions, Interpolation, Method, Order, Refinement, Sampling, Scan, Surfels};
 
 use crate::collide::parse_radius;
 use crate::error::CliError;
@@ -12,7 +12,7 @@ pub struct SearchArgs {
     /// How leaves are compared
     #[arg(long, value_enum, default_value_t = MethodName::Traversal)]
     pub method: MethodName,
-    /// Leave the hierarchy out: test points about all points of a in the box of b
+    /// Leave the hierarchy out, with `--method sampling` or `interpolation`: points about, or of, all of a in the box of b
     #[arg(long)]
     pub flat: bool,
     /// Test points for each pair of leaves, with `--method sampling`
@@ -21,7 +21,20 @@ pub struct SearchArgs {
     /// What |f_A| + |f_B| of a test point must be less than, in sampling radii, with `--method sampling`
     #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance)]
     pub tolerance: f64,
-    /// What random test points come from
+    /// Into how many surfels the surface of a is thought to be cut where b may be, with `--method interpolation --flat`: a number, or
+    /// `adapted` to the sampling density, 8 sampling radii wide
+    #[arg(long, value_name = "A", value_parser = parse_surfels, default_value = "30")]
+    pub surfels: Surfels,
+    /// The probability that each surfel gets a point, with `--method interpolation --flat`
+    #[arg(long, value_name = "P", default_value_t = Interpolation::default().probability)]
+    pub probability: f64,
+    /// Where the other ends of brackets come from, with `--method interpolation --flat`
+    #[arg(long, value_enum, default_value_t = BracketsName::Drawn)]
+    pub brackets: BracketsName,
+    /// How a place on both surfaces is found, with `--method interpolation`
+    #[arg(long, value_enum, default_value_t = RefinementName::Newton)]
+    pub refinement: RefinementName,
+    /// What random points come from
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Which pairs of nodes are looked at first; by default depth first, or by overlap under a budget
@@ -42,6 +55,42 @@ pub enum MethodName {
     Traversal,
     /// By random test points (Klein & Zachmann 2004, section 5.3): slower, and not exhaustive
     Sampling,
+    /// By searches along paths of the proximity graph of a (Klein & Zachmann 2005): without hierarchy not exhaustive
+    Interpolation,
+}
+
+/// Where the other ends of brackets come from, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BracketsName {
+    /// The nearest of the drawn points
+    Drawn,
+    /// The map of close pairs, as far as it reaches (Klein & Zachmann 2005, section 4.3)
+    Annulus,
+}
+
+/// How a place on both surfaces is found, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RefinementName {
+    /// By Newton's method on both
+    Newton,
+    /// By random points in a sphere (section 4.6), to 0.1 sampling radii
+    Sphere,
+    /// By a regular grid in a sphere, to 0.1 sampling radii
+    Grid,
+}
+
+/// How near both surfaces, in sampling radii, a point in a sphere is to come.
+const IN_A_SPHERE: f64 = 0.1;
+
+/// Surfels adapted to the sampling density are so many sampling radii wide.
+const ADAPTED: f64 = 8.0;
+
+fn parse_surfels(text: &str) -> Result<Surfels, String> {
+    if text == "adapted" {
+        return Ok(Surfels::Radius(ADAPTED));
+    }
+    let count = text.parse().ok().filter(|count| (1..=65_536).contains(count)).map(Surfels::Count);
+    count.ok_or_else(|| "expected a number from 1 to 65536, or `adapted`".into())
 }
 
 /// Orders, by name.
@@ -58,10 +107,28 @@ pub enum OrderName {
 }
 
 impl SearchArgs {
+    /// Whether searches go along the scans' graphs.
+    pub(crate) fn wants_graphs(&self) -> bool {
+        self.method == MethodName::Interpolation
+    }
+
+    /// Whether the scans have what the method needs.
+    pub(crate) fn check(&self, a: &Scan, b: &Scan) -> Result<(), CliError> {
+        let lacks = |scan: &Scan| scan.graph().is_none();
+        if self.wants_graphs() && (lacks(a) || lacks(b)) {
+            let which = if lacks(a) { "the first" } else { "the second" };
+            return Err(CliError::Usage(format!(
+                "--method interpolation searches along the proximity graph, which {which} scan has not: prepare it without \
+                 --no-graph, or use --method traversal"
+            )));
+        }
+        Ok(())
+    }
+
     /// `options` with these.
     pub(crate) fn apply(&self, options: CollideOptions) -> Result<CollideOptions, CliError> {
-        if self.flat && self.method != MethodName::Sampling {
-            let what = "--flat leaves the hierarchy out of --method sampling; say that, or leave --flat out";
+        if self.flat && self.method == MethodName::Traversal {
+            let what = "--flat leaves the hierarchy out of --method sampling or interpolation; say one, or leave --flat out";
             return Err(CliError::Usage(what.into()));
         }
         let sampling = Sampling::default()
@@ -69,9 +136,24 @@ impl SearchArgs {
             .with_tolerance(self.tolerance)
             .with_seed(self.seed)
             .with_flat(self.flat);
+        let interpolation = Interpolation::default()
+            .with_surfels(self.surfels)
+            .with_probability(self.probability)
+            .with_brackets(match self.brackets {
+                BracketsName::Drawn => Brackets::Drawn,
+                BracketsName::Annulus => Brackets::Annulus,
+            })
+            .with_refinement(match self.refinement {
+                RefinementName::Newton => Refinement::Newton,
+                RefinementName::Sphere => Refinement::Sphere(IN_A_SPHERE),
+                RefinementName::Grid => Refinement::Grid(IN_A_SPHERE),
+            })
+            .with_seed(self.seed)
+            .with_flat(self.flat);
         let method = match self.method {
             MethodName::Traversal => Method::Traversal,
             MethodName::Sampling => Method::Sampling(sampling),
+            MethodName::Interpolation => Method::Interpolation(interpolation),
         };
         let order = self.order.map(|order| match order {
             OrderName::Depth => Order::DepthFirst,

@@ -241,6 +241,15 @@ impl PointHierarchy {
     /// When there is no such point.
     #[must_use]
     pub fn nearest_point_near(&self, i: usize, x: [f64; 3]) -> u32 {
+        self.nearest_point_counted(i, x).0
+    }
+
+    /// As [`Self::nearest_point_near`], and how many nodes were looked at.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[must_use]
+    pub fn nearest_point_counted(&self, i: usize, x: [f64; 3]) -> (u32, u32) {
         let place = Centre::new(x).rounded();
         let distance_sq = |p: [f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
         let (nodes, boxes, positions): (&[Node], &[OrientedBox], &[[f32; 3]]) =
@@ -250,9 +259,10 @@ impl PointHierarchy {
         let bound = |id: usize| (f64::from(boxes[id].distance_sq(place).sqrt()) - lost).max(0.0).powi(2);
         let mut best = (distance_sq(positions[i]), i);
         let mut stack = [(0.0, 0_usize); TREE_STACK];
-        let mut top = 1;
+        let (mut top, mut looked_at) = (1, 0);
         while top > 0 {
             top -= 1;
+            looked_at += 1;
             let (least, id) = stack[top];
             let node = &nodes[id];
             if least > best.0 {
@@ -270,7 +280,7 @@ impl PointHierarchy {
             (stack[top], stack[top + 1]) = (far, near);
             top += 2;
         }
-        id32(best.1)
+        (id32(best.1), looked_at)
     }
 
     /// f at `x`, in the stored frame; allocates a scratch of its own.

@@ -21,10 +21,11 @@ pub use nearmiss_geometry::{Aabb, CloudError, PointCloud, PointId, Pose, PoseErr
 pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
 pub use nearmiss_query::{
-    Answer, BatchScratch, Bodies, BodyId, Budget, CollideOptions, CollidePlan, CollideScratch, Contact,
-    Deadline, Detail, Evidence, Method, Order, Pacer, PairHint, PlanError, Proof, Reason, Sampling, ScanView,
-    Semantics, Statistics, Until, Verdict, World, answer_each, collide, collide_hinted, collide_many,
-    collide_many_with, collide_paced, collide_poses, collide_poses_with, collide_proving, collide_with,
+    Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, CollideOptions, CollidePlan, CollideScratch,
+    Contact, Deadline, Detail, Evidence, Interpolation, Method, Order, Pacer, PairHint, PlanError, Proof,
+    Reason, Refinement, Sampling, ScanView, Semantics, Statistics, Surfels, Until, Verdict, World,
+    answer_each, collide, collide_hinted, collide_many, collide_many_with, collide_paced, collide_poses,
+    collide_poses_with, collide_proving, collide_with,
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -264,6 +264,7 @@ impl Scan {
     #[must_use]
     pub fn at(&self, pose: &Pose) -> ScanView<'_> {
         let view = ScanView::new(&self.hierarchy, pose);
+        let view = self.graph.as_deref().map_or(view, |graph| view.with_graph(graph));
         match self.metric() {
             Metric::Euclidean => view,
             Metric::Geodesic => self.geodesic_kernel().map_or(view, |kernel| view.with_kernel(kernel)),

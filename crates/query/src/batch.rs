@@ -46,7 +46,7 @@ pub struct BatchScratch {
 const UNASKED: Answer = Answer {
     verdict: Verdict::Undecided(Reason::Budget { likelihood: 0.5 }),
     distance_estimate: None,
-    statistics: Statistics { evaluations: 0, node_pairs: 0, leaf_pairs: 0 },
+    statistics: Statistics { evaluations: 0, node_pairs: 0, leaf_pairs: 0, neighbour_steps: 0 },
 };
 
 /// Whether the two scans of each question meet. Allocates a scratch of its own; see [`collide_many_with`].

@@ -13,6 +13,7 @@ use nearmiss_hierarchy::{Frontier, Heap, NodePair, Relative, SLACK, Stack, Visit
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
 use crate::hint::{Known, PairHint};
+use crate::interpolation::InterpolationScratch;
 use crate::leaf_pair::Instructions;
 use crate::likelihood::likelihood;
 use crate::options::{CollideOptions, CollidePlan, Method, Order, Semantics};
@@ -32,6 +33,7 @@ pub struct CollideScratch {
     excluded: Vec<Excluded>,
     compared: Vec<NodePair>,
     members: Vec<u32>,
+    interpolation: InterpolationScratch,
     proven: Vec<Bound>,
     longest_stretch: Duration,
 }
@@ -124,6 +126,7 @@ fn search(
     let test_points = match options.method {
         Method::Traversal => 0,
         Method::Sampling(sampling) => u64::from(sampling.test_points),
+        Method::Interpolation(_) => u64::from(a.scan().leaf_size()),
     };
     let looked_at = match options.order {
         Some(Order::Sides | Order::SidesByGap) => a.slices().samples(0).len() as u64,
@@ -178,6 +181,7 @@ fn surfaces(
         excluded,
         compared,
         members,
+        interpolation,
         proven,
         longest_stretch,
     } = scratch;
@@ -192,7 +196,8 @@ fn surfaces(
         return Answer { verdict, distance_estimate: None, statistics };
     }
     let Certifier { pair, proven, .. } = certifier;
-    let workspace = Workspace { instructions: *instructions, gathers, excluded, compared, members };
+    let workspace =
+        Workspace { instructions: *instructions, gathers, excluded, compared, members, interpolation };
     let mut search = Surfaces::new(pair, options, budget, known.is_some(), workspace);
     let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
     let parted = !ended && search.found.is_none();
@@ -255,6 +260,16 @@ fn look(
         && sampling.flat
     {
         return search.test_all(&sampling);
+    }
+    if let Method::Interpolation(interpolation) = options.method {
+        search.interpolation.sides.clear();
+        if interpolation.flat {
+            return search.interpolate_all(&interpolation);
+        }
+        if search.pair.views[0].graph().is_none() {
+            search.doubt = Some(Reason::NoGraph);
+            return ControlFlow::Continue(());
+        }
     }
     if let Some(known) = known {
         if let Some(pair) = known.met(&search.pair) {

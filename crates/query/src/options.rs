@@ -5,6 +5,7 @@ use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::interpolation::{Interpolation, Refinement, Surfels};
 use crate::verdict::Evidence;
 
 /// What it means that two scans meet.
@@ -39,6 +40,9 @@ pub enum Method {
     /// How near both surfaces come to random test points: S0 §5.3, for comparison. Slower, and misses what lies
     /// between the test points.
     Sampling(Sampling),
+    /// By searches along the graph of a: S1 §4. Slower than [`Self::Traversal`]; without hierarchy it does without volumes, and may
+    /// miss small contacts.
+    Interpolation(Interpolation),
 }
 
 /// The random test of two leaves (S0 §5.3, eq. 8): test points in the sphere covering of a's leaf, in which an
@@ -223,9 +227,18 @@ pub enum PlanError {
     /// A tolerance that is none.
     #[error("a tolerance of {0} sampling radii; it must be more than 0 and at most 4")]
     Tolerance(f64),
+    /// Too few or too many surfels.
+    #[error("{0} surfels; 1 to 65536 are possible, or 1 to 1024 sampling radii for each")]
+    Surfels(f64),
+    /// A probability that none can have.
+    #[error("a probability of {0} that each surfel has a point; it must be more than 0 and less than 1")]
+    Probability(f64),
+    /// A tolerance in a sphere that is none.
+    #[error("a tolerance of {0} sampling radii in a sphere; it must be more than 0.01 and at most 1")]
+    Refinement(f64),
     /// Test points say whether surfaces cross, not how far apart they are.
     #[error(
-        "the method `sampling` compares surfaces, without a margin; leave the margin and the thickness out"
+        "the methods `sampling` and `interpolation` compare surfaces, without a margin; leave the margin and the thickness out"
     )]
     SamplingAlone,
     /// The surfaces of the two scans are not defined alike.
@@ -260,6 +273,45 @@ fn common_metric(asked: Option<Metric>, a: &PointHierarchy, b: &PointHierarchy) 
     }
 }
 
+/// Whether the numbers of the method are in range, and it answers such questions.
+fn check_method(options: &CollideOptions) -> Result<(), PlanError> {
+    match options.method {
+        Method::Traversal => return Ok(()),
+        Method::Sampling(Sampling { test_points, tolerance, .. }) => {
+            if !(1..=MOST_TEST_POINTS).contains(&test_points) {
+                return Err(PlanError::TestPoints(test_points));
+            }
+            if !(tolerance > 0.0 && tolerance <= 4.0) {
+                return Err(PlanError::Tolerance(tolerance));
+            }
+        }
+        Method::Interpolation(Interpolation { surfels, probability, refinement, .. }) => {
+            match surfels {
+                Surfels::Count(count) if !(1..=MOST_TEST_POINTS).contains(&count) => {
+                    return Err(PlanError::Surfels(f64::from(count)));
+                }
+                Surfels::Radius(radii) if !(1.0..=1024.0).contains(&radii) => {
+                    return Err(PlanError::Surfels(radii));
+                }
+                _ => {}
+            }
+            if !(probability > 0.0 && probability < 1.0) {
+                return Err(PlanError::Probability(probability));
+            }
+            match refinement {
+                Refinement::Sphere(tolerance) | Refinement::Grid(tolerance)
+                    if !(tolerance > 0.01 && tolerance <= 1.0) =>
+                {
+                    return Err(PlanError::Refinement(tolerance));
+                }
+                _ => {}
+            }
+        }
+    }
+    let alone = options.semantics != Semantics::Surface || options.margin > 0.0;
+    if alone { Err(PlanError::SamplingAlone) } else { Ok(()) }
+}
+
 /// A validated question about two scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CollidePlan {
@@ -279,17 +331,7 @@ impl CollidePlan {
             _ if !is_length(options.margin) => return Err(PlanError::Margin(options.margin)),
             _ => {}
         }
-        if let Method::Sampling(Sampling { test_points, tolerance, .. }) = options.method {
-            if options.semantics != Semantics::Surface || options.margin > 0.0 {
-                return Err(PlanError::SamplingAlone);
-            }
-            if !(1..=MOST_TEST_POINTS).contains(&test_points) {
-                return Err(PlanError::TestPoints(test_points));
-            }
-            if !(tolerance > 0.0 && tolerance <= 4.0) {
-                return Err(PlanError::Tolerance(tolerance));
-            }
-        }
+        check_method(options)?;
         let mut options = *options;
         if options.semantics == Semantics::Surface {
             let metric = common_metric(options.metric, a, b)?;

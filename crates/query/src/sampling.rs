@@ -29,10 +29,10 @@ const PAIRS_A_DRAW: u64 = 2;
 const A_STRETCH: u32 = 256;
 
 /// What a stream of random numbers is for, when it is for no pair of leaves.
-const FLAT: NodePair = NodePair { a: NodeId(u32::MAX), b: NodeId(u32::MAX) };
+pub(crate) const FLAT: NodePair = NodePair { a: NodeId(u32::MAX), b: NodeId(u32::MAX) };
 
 /// Random numbers for a pair of leaves, whatever was asked before.
-fn stream(seed: u64, pair: NodePair) -> Xoshiro256PlusPlus {
+pub(crate) fn stream(seed: u64, pair: NodePair) -> Xoshiro256PlusPlus {
     let pair = u64::from(pair.a.0) << 32 | u64::from(pair.b.0);
     Xoshiro256PlusPlus::seed_from_u64(seed ^ pair.wrapping_mul(0x9E37_79B9_7F4A_7C15))
 }
@@ -43,8 +43,14 @@ fn uniform(rng: &mut impl Rng) -> f32 {
     (rng.next_u64() >> 40) as f32 / (1_u64 << 24) as f32
 }
 
+/// The same, in double precision.
+#[expect(clippy::cast_precision_loss, reason = "53 bits are exact")]
+pub(crate) fn uniform_f64(rng: &mut impl Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 /// A place uniform in the ball of `radius` about `centre`.
-fn place_in(rng: &mut impl Rng, centre: [f32; 3], radius: f32) -> [f32; 3] {
+pub(crate) fn place_in(rng: &mut impl Rng, centre: [f32; 3], radius: f32) -> [f32; 3] {
     let mut offset = [0.0_f32; 3];
     // Half of a cube is in its ball; a generator that never hits it is none.
     for _ in 0..64 {
@@ -57,7 +63,7 @@ fn place_in(rng: &mut impl Rng, centre: [f32; 3], radius: f32) -> [f32; 3] {
 }
 
 /// Uniform below `count`, which is more than zero.
-fn below(rng: &mut impl Rng, count: usize) -> usize {
+pub(crate) fn below(rng: &mut impl Rng, count: usize) -> usize {
     // The bias, 2⁻³² of it, is none.
     let share = ((rng.next_u64() >> 32) * count as u64) >> 32;
     usize::try_from(share).unwrap_or(0)

@@ -16,6 +16,7 @@ use nearmiss_surface::{PointBlock, meet};
 use crate::budget::Budget;
 use crate::certify::{Excluded, distinct};
 use crate::crossing::Disc;
+use crate::interpolation::InterpolationScratch;
 use crate::leaf_pair::{Discs, Instructions, LeafPair, Near, padded};
 use crate::options::{CollideOptions, Detail, Method, Order};
 use crate::posed::Posed;
@@ -65,7 +66,8 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) gathers: &'a mut [ViewScratch; 2],
     /// The points of a that lie in the box of b.
     pub(crate) members: &'a mut Vec<u32>,
-    tries: u32,
+    pub(crate) interpolation: &'a mut InterpolationScratch,
+    pub(crate) tries: u32,
     /// The best contact so far.
     pub(crate) found: Option<(Contact, Evidence)>,
     /// The leaves of the first.
@@ -84,6 +86,7 @@ pub(crate) struct Workspace<'a> {
     pub(crate) excluded: &'a mut Vec<Excluded>,
     pub(crate) compared: &'a mut Vec<NodePair>,
     pub(crate) members: &'a mut Vec<u32>,
+    pub(crate) interpolation: &'a mut InterpolationScratch,
 }
 
 impl<'a> Surfaces<'a> {
@@ -95,7 +98,7 @@ impl<'a> Surfaces<'a> {
         notes: bool,
         workspace: Workspace<'a>,
     ) -> Self {
-        let Workspace { instructions, gathers, excluded, compared, members } = workspace;
+        let Workspace { instructions, gathers, excluded, compared, members, interpolation } = workspace;
         excluded.clear();
         compared.clear();
         let may_end = budget.work.is_some() || budget.deadline.is_some();
@@ -117,6 +120,7 @@ impl<'a> Surfaces<'a> {
             instructions,
             gathers,
             members,
+            interpolation,
             tries: 0,
             found: None,
             met: None,
@@ -157,7 +161,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Discs of two leaves cross, those of points `i` and `j` first.
-    fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
+    pub(crate) fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
         let contact = self.shared_chord(i, j);
         self.hit(contact, i, j)
     }
@@ -190,7 +194,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// The distance of two points, and their local radii, in a's stored frame.
-    fn points(&self, i: usize, j: usize) -> (f32, [f32; 2]) {
+    pub(crate) fn points(&self, i: usize, j: usize) -> (f32, [f32; 2]) {
         let q = self.pair.relative.point(self.pair.b.positions[j]);
         let distance = (Vector3::from(self.pair.a.positions[i]) - Vector3::from(q)).norm();
         (distance, [self.pair.a.radii[i], self.pair.b.radii[j] * self.pair.relative.scale()])
@@ -343,7 +347,12 @@ impl Surfaces<'_> {
             return self.samples_meet(pair);
         }
         self.pair.meter.leaf_pair(node_a.count as usize, node_b.count as usize);
-        let by_discs = matches!(self.method, Method::Traversal);
+        // Where there are no sides to tell, the test without signs.
+        let by_discs = match self.method {
+            Method::Traversal => true,
+            Method::Sampling(_) => false,
+            Method::Interpolation(_) => !self.tells_sides(pair),
+        };
         for of_a in blocks(&node_a) {
             for of_b in blocks(&node_b) {
                 let tries = self.tries;
@@ -357,6 +366,8 @@ impl Surfaces<'_> {
         match self.method {
             Method::Traversal => ControlFlow::Continue(()),
             Method::Sampling(sampling) => self.test_leaves(pair, &sampling),
+            Method::Interpolation(_) if by_discs => ControlFlow::Continue(()),
+            Method::Interpolation(interpolation) => self.test_edges(pair, &interpolation),
         }
     }
 

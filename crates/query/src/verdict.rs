@@ -62,6 +62,9 @@ pub enum Reason {
     Undersampled,
     /// They come near each other only where a scan's points do not look like one sheet.
     Ambiguous,
+    /// [`Method::Interpolation`](crate::Method) searches along the graph of the one scan, which has none, or was given
+    /// [without](crate::ScanView::with_graph).
+    NoGraph,
     /// A pose is not finite, no rotation, has no positive scale, leads further than squares of double precision reach,
     /// or makes one scan's frame more than 2⁶⁰ times as large as the other's.
     Pose,
@@ -91,6 +94,8 @@ pub struct Statistics {
     pub node_pairs: u64,
     /// Pairs of leaves whose points were compared.
     pub leaf_pairs: u64,
+    /// Nodes looked at to find nearest points, by [`Method::Interpolation`](crate::Method).
+    pub neighbour_steps: u64,
 }
 
 /// A verdict and what it cost.

@@ -1,7 +1,7 @@
 //! A prepared scan somewhere in the world.
 
 use nearmiss_geometry::Pose;
-use nearmiss_graph::{GeodesicKernel, KernelScratch};
+use nearmiss_graph::{GeodesicKernel, KernelScratch, SurfaceGraph};
 use nearmiss_hierarchy::{GatherScratch, PointHierarchy, Slices};
 use nearmiss_surface::{Evaluation, Metric};
 
@@ -18,6 +18,7 @@ pub struct ScanView<'a> {
     scan: &'a PointHierarchy,
     slices: Slices<'a>,
     kernel: Option<GeodesicKernel<'a>>,
+    graph: Option<&'a SurfaceGraph>,
     /// Stored frame → world.
     placed: Pose,
 }
@@ -29,7 +30,7 @@ impl<'a> ScanView<'a> {
     pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
         let frame = scan.frame();
         let stored = Pose::IDENTITY.with_scale(frame.scale).with_translation(frame.origin);
-        Self { slices: scan.slices(), scan, kernel: None, placed: pose.after(&stored) }
+        Self { slices: scan.slices(), scan, kernel: None, graph: None, placed: pose.after(&stored) }
     }
 
     /// The same view with f by distances along the graph of this scan. Those of scans for the [geodesic
@@ -37,6 +38,18 @@ impl<'a> ScanView<'a> {
     #[must_use]
     pub fn with_kernel(self, kernel: GeodesicKernel<'a>) -> Self {
         Self { kernel: Some(kernel), ..self }
+    }
+
+    /// The same view with the graph of this scan, for searches along it.
+    #[must_use]
+    pub fn with_graph(self, graph: &'a SurfaceGraph) -> Self {
+        Self { graph: Some(graph), ..self }
+    }
+
+    /// The graph, if it was given.
+    #[must_use]
+    pub fn graph(&self) -> Option<&'a SurfaceGraph> {
+        self.graph
     }
 
     /// The scan.

@@ -1,0 +1,325 @@
+//! Without hierarchy: brackets among drawn points of a, and a search along the path of each.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::NodeId;
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_graph::{LazyPath, SurfaceGraph};
+use nearmiss_hierarchy::NodePair;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::root::{GraphPath, Root, find_root};
+use super::volume::{Bounds, Volume};
+use super::{Brackets, Interpolation, Side, Surfels};
+use crate::crossing::crossing;
+use crate::sampling::{FLAT, below, stream};
+use crate::surface::{FAR, Surfaces};
+use crate::verdict::{Contact, Reason};
+
+/// So many points are drawn for one that lies in the box of b, before that is given up.
+const DRAWS: u32 = 8;
+
+/// So many steps at most, from nearest point to nearest point.
+const STEPS: u32 = 32;
+
+/// So many looks at most along an edge.
+const LOOKS: u32 = 8;
+
+/// Drawn points and partners in a list of the close-pairs map: some 30 points are within the kernel's reach.
+const OF_THE_ANNULUS: u32 = 4;
+
+/// As near b, in its local sampling radii, a path has arrived.
+const ARRIVED: f64 = 0.02;
+
+/// What a search goes by.
+struct Ways<'a> {
+    search: &'a Interpolation,
+    graph: &'a SurfaceGraph,
+    path: LazyPath,
+    rng: Xoshiro256PlusPlus,
+}
+
+/// Two points of a, and on which sides they are.
+#[derive(Debug, Clone, Copy)]
+struct Bracket {
+    points: [u32; 2],
+    sides: [Side; 2],
+}
+
+impl Surfaces<'_> {
+    /// Draws points of a that lie in the box of b, and looks for intersections between those on either side of b.
+    pub(crate) fn interpolate_all(&mut self, search: &Interpolation) -> ControlFlow<()> {
+        // No volumes part anything here: nothing is proven.
+        self.compared.push(NodePair { a: NodeId::ROOT, b: NodeId::ROOT });
+        let [va, _] = self.pair.views;
+        let Some(graph) = va.graph() else {
+            self.doubt = Some(Reason::NoGraph);
+            return ControlFlow::Continue(());
+        };
+        let mut volume = std::mem::take(&mut self.interpolation.volume);
+        let path = std::mem::take(&mut self.interpolation.path);
+        let mut ways = Ways { search, graph, path, rng: stream(search.seed, FLAT) };
+        let flow = self.draw_and_search(&mut volume, &mut ways);
+        (self.interpolation.volume, self.interpolation.path) = (volume, ways.path);
+        flow
+    }
+
+    fn draw_and_search(&mut self, volume: &mut Volume, ways: &mut Ways<'_>) -> ControlFlow<()> {
+        let search = ways.search;
+        let bounds = self.bounds_of_b();
+        let areas = ways.graph.areas(self.pair.a.radii);
+        self.survey(areas, volume)?;
+        if volume.count == 0 {
+            return ControlFlow::Continue(());
+        }
+        let surfels = match search.surfels {
+            Surfels::Count(count) => f64::from(count),
+            Surfels::Radius(radii) => {
+                let radius = radii * f64::from(self.pair.a.sampling_radius);
+                (volume.area / (radius * radius)).max(1.0)
+            }
+        };
+        let wanted = search.draws(surfels);
+        #[expect(clippy::cast_possible_truncation, reason = "a length in single precision")]
+        let reach = 2.0 * (volume.area / surfels).sqrt() as f32;
+        self.interpolation.drawn.begin(wanted.min(volume.count), reach);
+        self.pair.meter.spent.leaf_pairs += 1;
+        if volume.count <= wanted {
+            for i in volume.points() {
+                self.try_drawn(i, &bounds, ways)?;
+            }
+        } else {
+            let (mut left, mut draws) = (wanted, DRAWS.saturating_mul(wanted));
+            while left > 0 && draws > 0 {
+                draws -= 1;
+                let Some(i) = volume.draw(areas, &mut ways.rng) else { break };
+                left -= u32::from(self.try_drawn(i, &bounds, ways)?);
+            }
+        }
+        if self.found.is_none() {
+            self.draw_all_near(search.approaches as usize, reach, ways.graph)
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+
+    /// One drawn point, which may be outside of the box of b; whether it was in there.
+    fn try_drawn(&mut self, i: u32, bounds: &Bounds, ways: &mut Ways<'_>) -> ControlFlow<(), bool> {
+        self.pair.meter.leaf_work(1);
+        self.pair.meter.go_on()?;
+        let place = self.pair.a.positions[i as usize];
+        if !bounds.holds(place) {
+            return ControlFlow::Continue(false);
+        }
+        let hint = self.interpolation.drawn.points().last().map_or(0, |last| last.side.near);
+        let side = self.side(i, hint);
+        self.estimate = self.estimate.min(side.distance.abs());
+        let partner = match ways.search.brackets {
+            Brackets::Drawn => None,
+            Brackets::Annulus => self.partner_around(i, &side, ways)?,
+        };
+        let drawn = &mut self.interpolation.drawn;
+        let partner = partner.or_else(|| drawn.partner(place, &side).map(|other| (other.point, other.side)));
+        drawn.add(i, place, side);
+        if let Some((other, other_side)) = partner {
+            let bracket = Bracket { points: [i, other], sides: [side, other_side] };
+            self.search_between(&bracket, ways)?;
+        }
+        ControlFlow::Continue(true)
+    }
+
+    /// One of some points about two surfel radii from `i` along the surface that is on the other side, if the map of
+    /// close pairs reaches there: the annulus of S1 §4.3, at most.
+    fn partner_around(
+        &mut self,
+        i: u32,
+        side: &Side,
+        ways: &mut Ways<'_>,
+    ) -> ControlFlow<(), Option<(u32, Side)>> {
+        let Some(pairs) = ways.graph.close_pairs() else { return ControlFlow::Continue(None) };
+        let reach = self.interpolation.drawn.reach();
+        let list = pairs.of(i as usize);
+        // Sorted by distance; the outer half of it has most of the points.
+        let outer = &list[list.partition_point(|close| close.distance < 0.5 * reach)..];
+        let outer = &outer[..outer.partition_point(|close| close.distance <= reach)];
+        if outer.is_empty() {
+            return ControlFlow::Continue(None);
+        }
+        for _ in 0..OF_THE_ANNULUS {
+            self.pair.meter.go_on()?;
+            let other = outer[below(&mut ways.rng, outer.len())].point;
+            let found = self.side(other, side.near);
+            if side.is_opposite(&found) {
+                return ControlFlow::Continue(Some((other, found)));
+            }
+        }
+        ControlFlow::Continue(None)
+    }
+
+    /// Looks for an intersection on the path between two points on either side.
+    fn search_between(&mut self, bracket: &Bracket, ways: &mut Ways<'_>) -> ControlFlow<()> {
+        let Ways { search, graph, path, .. } = ways;
+        if !graph.lead(self.pair.a.positions, bracket.points, path) {
+            return ControlFlow::Continue(());
+        }
+        let [first, last] = bracket.sides;
+        let mut hint = if first.away < last.away { first.near } else { last.near };
+        let arrived = ARRIVED * f64::from(self.pair.b.radii[hint as usize]) * self.scale_of_b();
+        let mut along = GraphPath { path, levels: graph.levels() };
+        let root = find_root(&mut along, [first.distance, last.distance], arrived, |along, k| {
+            if self.pair.meter.go_on().is_break() {
+                return None;
+            }
+            let side = self.side(along.path.point(k).point, hint);
+            hint = side.near;
+            Some(side.known())
+        });
+        let point = |k: usize| path.point(k).point;
+        match root {
+            None => ControlFlow::Break(()),
+            Some(Root::Point(k) | Root::Undefined(k)) => {
+                let (i, x) = (point(k), self.pair.views[0].point(point(k) as usize));
+                let side = self.side_at(x, hint);
+                self.meets_at(i, x, &side, search)
+            }
+            Some(Root::Edge { first, values }) => {
+                self.search_edge([point(first), point(first + 1)], values, hint, search)
+            }
+        }
+    }
+
+    /// The scale from b's stored frame to the world.
+    pub(crate) fn scale_of_b(&self) -> f64 {
+        self.pair.views[1].placed().scale()
+    }
+
+    /// Looks for an intersection between two points of a at these signed distances of b, which an edge joins.
+    pub(super) fn search_edge(
+        &mut self,
+        ends: [u32; 2],
+        values: [f64; 2],
+        hint: u32,
+        search: &Interpolation,
+    ) -> ControlFlow<()> {
+        let [va, _] = self.pair.views;
+        let [p, q] = ends.map(|i| Vector3::from(va.point(i as usize)));
+        let ([mut from, mut to], [mut at_from, mut at_to]) = ([0.0, 1.0], values);
+        let mut looks = 0;
+        // S1 §4.6 has signed distances here, of which the sum of a good bracket is none.
+        let (share, x, side) = loop {
+            self.pair.meter.go_on()?;
+            let share = if looks % 3 == 2 { 0.5 } else { at_from.abs() / (at_from.abs() + at_to.abs()) };
+            let share = from + (to - from) * if share.is_finite() { share } else { 0.5 };
+            let x = p + share * (q - p);
+            let side = self.side_at(x.into(), hint);
+            looks += 1;
+            let arrived = ARRIVED * f64::from(self.pair.b.radii[side.near as usize]) * self.scale_of_b();
+            if side.distance.abs() <= arrived || looks == LOOKS || !side.is_known {
+                break (share, x, side);
+            }
+            if (side.distance < 0.0) == (values[0] < 0.0) {
+                (from, at_from) = (share, side.distance);
+            } else {
+                (to, at_to) = (share, side.distance);
+            }
+        };
+        let i = if share <= 0.5 { ends[0] } else { ends[1] };
+        self.meets_at(i, x.into(), &side, search)
+    }
+
+    /// A place on the surface of a near its point `i` that should be on that of b too: a hit, if it is.
+    fn meets_at(&mut self, i: u32, x: [f64; 3], side: &Side, search: &Interpolation) -> ControlFlow<()> {
+        let [va, vb] = self.pair.views;
+        let (i, j) = (i as usize, side.near as usize);
+        let radius_a = f64::from(self.pair.a.radii[i]) * va.placed().scale();
+        let radius_b = f64::from(self.pair.b.radii[j]) * self.scale_of_b();
+        // Where b ends, its side changes too, but there are no samples.
+        let far = f64::from(FAR) * radius_a.max(radius_b);
+        if side.away > far || side.distance.abs() > 0.25 * radius_b {
+            return ControlFlow::Continue(());
+        }
+        if let Some(reason) = self.doubt_about(i, j) {
+            self.doubt.get_or_insert(reason);
+            return ControlFlow::Continue(());
+        }
+        let na = Vector3::from(va.placed().rotate(self.pair.a.normals[i].map(f64::from)));
+        let nb = vb.placed().rotate(self.pair.b.normals[j].map(f64::from));
+        let off = na.dot(&(Vector3::from(x) - Vector3::from(va.point(i))));
+        let contact = Contact {
+            point: x,
+            normals: Some([na.into(), nb]),
+            residual: off.abs().max(side.distance.abs()),
+            sources: [va.scan().id(i), vb.scan().id(j)],
+        };
+        self.hit_by(search.refinement, contact, i, j)
+    }
+
+    /// Draws the drawn points that are near b towards it: from nearest point to nearest point, until the discs there cross, or
+    /// it goes no nearer.
+    fn draw_all_near(&mut self, most: usize, reach: f32, graph: &SurfaceGraph) -> ControlFlow<()> {
+        let reach = f64::from(reach) * self.pair.views[0].placed().scale();
+        let mut near = std::mem::take(&mut self.interpolation.near);
+        near.clear();
+        let drawn = self.interpolation.drawn.points().iter();
+        near.extend(
+            drawn
+                .filter(|drawn| drawn.side.away <= reach)
+                .map(|drawn| (drawn.side.away, drawn.point, drawn.side.near)),
+        );
+        near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        near.truncate(most);
+        self.interpolation.seen.clear();
+        let mut flow = ControlFlow::Continue(());
+        for &(_, i, j) in &near {
+            flow = self.draw_near(i, j, graph);
+            if flow.is_break() || self.found.is_some() {
+                break;
+            }
+        }
+        self.interpolation.near = near;
+        flow
+    }
+
+    fn draw_near(&mut self, mut i: u32, mut j: u32, graph: &SurfaceGraph) -> ControlFlow<()> {
+        let [va, vb] = self.pair.views;
+        for _ in 0..STEPS {
+            self.pair.meter.go_on()?;
+            let towards = |view: &crate::view::ScanView<'_>, own: u32, x: [f64; 3]| {
+                view.scan().nearest_point_counted(own as usize, view.placed().apply_inverse(x))
+            };
+            let (next, steps_a) = towards(va, i, vb.point(j as usize));
+            let (other, steps_b) = towards(vb, j, va.point(next as usize));
+            let steps = u64::from(steps_a) + u64::from(steps_b);
+            self.pair.meter.spent.neighbour_steps += steps;
+            self.pair.meter.leaf_work(steps);
+            let is_there = (next, other) == (i, j);
+            (i, j) = (next, other);
+            if self.interpolation.seen.contains(&[i, j]) {
+                return ControlFlow::Continue(());
+            }
+            if is_there {
+                break;
+            }
+        }
+        self.interpolation.seen.push([i, j]);
+        let away = (Vector3::from(va.point(i as usize)) - Vector3::from(vb.point(j as usize))).norm();
+        self.estimate = self.estimate.min(away);
+        // The discs of these points, and of those about them.
+        let about_a = std::iter::once(i).chain(graph.points().edges().of(i as usize).iter().copied());
+        for i in about_a {
+            let disc = self.disc_a(i as usize);
+            let of_b = vb.graph().map_or(&[][..], |graph| graph.points().edges().of(j as usize));
+            for j in std::iter::once(j).chain(of_b.iter().copied()) {
+                let (distance, [ra, rb]) = self.points(i as usize, j as usize);
+                if distance > FAR * ra.max(rb) || !crossing(&disc, &self.disc_b(j as usize)) {
+                    continue;
+                }
+                match self.doubt_about(i as usize, j as usize) {
+                    Some(reason) => _ = self.doubt.get_or_insert(reason),
+                    None => return self.crossed(i as usize, j as usize),
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

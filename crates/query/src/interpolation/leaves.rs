@@ -1,0 +1,65 @@
+//! As leaf test of the hierarchical search: edges of a's graph whose ends are on different sides of b.
+
+use std::ops::ControlFlow;
+
+use nearmiss_hierarchy::NodePair;
+
+use super::Interpolation;
+use crate::surface::Surfaces;
+
+/// Distances from b at the ends of an edge that crosses it add up to no more than its length; noise and curvature add to them.
+const CROSSES: f64 = 1.5;
+
+impl Surfaces<'_> {
+    /// Whether the leaf of b says which side of it a place is on: its normals are oriented, and sure of it.
+    pub(crate) fn tells_sides(&self, pair: NodePair) -> bool {
+        let [_, vb] = self.pair.views;
+        let points = self.pair.b.nodes[pair.b.index()].points();
+        vb.scan().is_oriented()
+            && vb.graph().is_some_and(|graph| {
+                graph.confidence()[points].iter().all(|&sure| sure >= super::side::CERTAIN)
+            })
+    }
+
+    /// Each edge of a's graph from a point of its leaf near the leaf of b: whether it crosses b.
+    pub(crate) fn test_edges(&mut self, pair: NodePair, search: &Interpolation) -> ControlFlow<()> {
+        let [va, _] = self.pair.views;
+        let Some(graph) = va.graph() else { return ControlFlow::Continue(()) };
+        let (edges, longest) = (graph.points().edges(), graph.points().reaches());
+        let scale = va.placed().scale();
+        let leaf = self.pair.a.nodes[pair.a.index()].points();
+        let other = &self.pair.b.boxes[pair.b.index()];
+        let volume = self.pair.relative.moved(other);
+        let hint = self.pair.b.nodes[pair.b.index()].first;
+        let own = self.pair.a.boxes[pair.a.index()].reach;
+        for i in leaf.clone() {
+            let reach = volume.reach + own.max(longest[i]) + self.reach;
+            if volume.distance_sq(self.pair.a.positions[i]) > reach * reach {
+                continue;
+            }
+            self.pair.meter.go_on()?;
+            let from = u32::try_from(i).unwrap_or(u32::MAX);
+            let side = self.side_again(from, hint);
+            if !side.is_known || side.distance.abs() > CROSSES * f64::from(longest[i]) * scale {
+                continue;
+            }
+            for &to in edges.of(i) {
+                // Edges within the leaf are looked at once.
+                if leaf.contains(&(to as usize)) && to < from {
+                    continue;
+                }
+                self.pair.meter.go_on()?;
+                let there = self.side_again(to, side.near);
+                if !side.is_opposite(&there) {
+                    continue;
+                }
+                let tries = self.tries;
+                self.search_edge([from, to], [side.distance, there.distance], side.near, search)?;
+                if self.tries > tries {
+                    return ControlFlow::Continue(());
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,231 @@
+//! A zero of a function along a path, by an interpolation search that ends.
+//!
+//! S1's Algorithm 1 goes where a straight line between the two values at the ends of the bracket is zero. As printed it
+//! need not end, and where the function bends it may come nearer by a point at a time (docs/theory). Ours looks strictly
+//! between the ends, halves the value at an end that stays (the Illinois rule), and bisects where three looks have not halved the
+//! stretch: at most three times as many looks as a bisection by length, and a few in all where the function
+//! is nearly linear.
+
+use nearmiss_graph::{LazyPath, Levels};
+
+/// Points in a row, of which some are known.
+pub(crate) trait Path {
+    /// Number of points that are known.
+    fn len(&self) -> usize;
+    /// How far the `k`-th of them is from the beginning.
+    fn along(&self, k: usize) -> f64;
+    /// See [`LazyPath::look`].
+    fn look(&mut self, left: usize, right: usize, along: f64) -> Option<usize>;
+}
+
+/// A path of a graph that has levels.
+pub(crate) struct GraphPath<'a> {
+    pub(crate) path: &'a mut LazyPath,
+    pub(crate) levels: &'a Levels,
+}
+
+impl Path for GraphPath<'_> {
+    fn len(&self) -> usize {
+        self.path.len()
+    }
+
+    fn along(&self, k: usize) -> f64 {
+        self.path.point(k).along
+    }
+
+    fn look(&mut self, left: usize, right: usize, along: f64) -> Option<usize> {
+        self.path.look(self.levels, left, right, along)
+    }
+}
+
+/// Where a search ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Root {
+    /// At a known point where the function is as small as was wanted.
+    Point(usize),
+    /// Between a known point and the next, which an edge joins and the function has different signs at.
+    Edge {
+        /// The number of the first.
+        first: usize,
+        /// Its values at both.
+        values: [f64; 2],
+    },
+    /// At a known point where the function is not defined.
+    Undefined(usize),
+}
+
+/// So many looks in a row may leave more than half of the stretch.
+const PATIENCE: u32 = 3;
+
+/// Looks for a zero between the ends of `path`, which has two at least, where the function has the `values`, of
+/// different signs; `value` is asked for it at known points by number. None as soon as that gives up.
+pub(crate) fn find_root<P: Path>(
+    path: &mut P,
+    values: [f64; 2],
+    tolerance: f64,
+    mut value: impl FnMut(&P, usize) -> Option<Option<f64>>,
+) -> Option<Root> {
+    let (mut left, mut right) = (0, path.len() - 1);
+    let (mut at_left, mut at_right) = (values[0], values[1]);
+    if at_left.abs() <= tolerance {
+        return Some(Root::Point(left));
+    }
+    if at_right.abs() <= tolerance {
+        return Some(Root::Point(right));
+    }
+    // Of the values at either end, what interpolation believes: half for an end that stayed twice.
+    let (mut weight_left, mut weight_right) = (1.0, 1.0);
+    let mut left_moved = None;
+    let (mut goal, mut idle) = (0.5 * (path.along(right) - path.along(left)), 0);
+    loop {
+        let [from, to] = [path.along(left), path.along(right)];
+        let share = if idle < PATIENCE {
+            let [l, r] = [(weight_left * at_left).abs(), (weight_right * at_right).abs()];
+            l / (l + r)
+        } else {
+            0.5
+        };
+        let before = path.len();
+        // Values may be so great that their sum is none.
+        let share = if share.is_finite() { share } else { 0.5 };
+        let found = path.look(left, right, from + share * (to - from));
+        right += path.len() - before;
+        let Some(k) = found else {
+            return Some(Root::Edge { first: left, values: [at_left, at_right] });
+        };
+        let Some(here) = value(path, k)?.filter(|value| !value.is_nan()) else {
+            return Some(Root::Undefined(k));
+        };
+        if here.abs() <= tolerance {
+            return Some(Root::Point(k));
+        }
+        if (here < 0.0) == (at_left < 0.0) {
+            weight_right *= if left_moved == Some(true) { 0.5 } else { 1.0 };
+            (left, at_left, weight_left, left_moved) = (k, here, 1.0, Some(true));
+        } else {
+            weight_left *= if left_moved == Some(false) { 0.5 } else { 1.0 };
+            (right, at_right, weight_right, left_moved) = (k, here, 1.0, Some(false));
+        }
+        let span = path.along(right) - path.along(left);
+        if span <= goal || idle == PATIENCE {
+            (goal, idle) = (0.5 * span, 0);
+        } else {
+            idle += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Path, Root, find_root};
+
+    /// Points at these places, all known.
+    struct Places(Vec<f64>);
+
+    impl Path for Places {
+        fn len(&self) -> usize {
+            self.0.len()
+        }
+
+        fn along(&self, k: usize) -> f64 {
+            self.0[k]
+        }
+
+        fn look(&mut self, left: usize, right: usize, along: f64) -> Option<usize> {
+            let nearer = |a: &usize, b: &usize| {
+                let to = |k: usize| (self.0[k] - along).abs();
+                to(*a).total_cmp(&to(*b))
+            };
+            (left + 1..right).min_by(nearer)
+        }
+    }
+
+    /// Where it ended, and after how many looks.
+    fn search(places: Vec<f64>, f: impl Fn(usize, f64) -> f64) -> (Root, usize) {
+        let last = places.len() - 1;
+        let values = [f(0, places[0]), f(last, places[last])];
+        let mut looks = 0;
+        let found = find_root(&mut Places(places), values, 0.0, |path, k| {
+            looks += 1;
+            Some(Some(f(k, path.along(k))))
+        });
+        (found.unwrap_or(Root::Undefined(usize::MAX)), looks)
+    }
+
+    fn even(m: usize) -> Vec<f64> {
+        (0..m).map(|k| f64::from(u32::try_from(k).unwrap_or(0))).collect()
+    }
+
+    /// Looks for every place of the root in a path of `m` points: most, and in the mean.
+    fn looks(m: usize, f: impl Fn(f64, f64) -> f64) -> (usize, f64) {
+        let (mut most, mut all, mut count) = (0, 0, 0.0);
+        for k in (0..m - 1).step_by((m / 256).max(1)) {
+            let root = f64::from(u32::try_from(k).unwrap_or(0)) + 0.37;
+            let (found, looks) = search(even(m), |_, x| f(x, root));
+            assert!(matches!(found, Root::Edge { first, .. } if first == k), "{found:?} for {root}");
+            (most, all, count) = (most.max(looks), all + looks, count + 1.0);
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a few thousand")]
+        let mean = all as f64 / count;
+        (most, mean)
+    }
+
+    /// S1, Algorithm 1, never ends on a line of 50 points; ours takes two looks, whatever the length.
+    #[test]
+    fn a_line_takes_two_looks() {
+        for m in [2, 3, 50, 4000, 100_000] {
+            let (most, mean) = looks(m, |x, root| x - root);
+            assert!(most <= 2 && mean <= 2.0, "{most}, {mean} looks for {m} points");
+        }
+    }
+
+    /// Functions on which pure interpolation goes point by point.
+    #[test]
+    fn bent_functions_take_logarithmically_many_looks() {
+        type Function = fn(f64, f64) -> f64;
+        let functions: [(&str, Function); 5] = [
+            ("exponential", |x, root| ((x - root) * 0.05).exp() - 1.0),
+            ("a step", |x, root| if x < root { -1e-9 } else { 1.0 }),
+            ("a power", |x, root| (x - root).powi(9)),
+            ("a root", |x, root| (x - root).cbrt()),
+            ("an odd one", |x, root| if x < root { (x - root) * 1e12 } else { x - root }),
+        ];
+        for (name, f) in functions {
+            for (m, log) in [(64, 6), (4096, 12), (65_536, 16)] {
+                let (most, mean) = looks(m, f);
+                assert!(most <= 3 * log + 3, "{name}: {most} looks for {m} points");
+                assert!(mean <= 2.5 * f64::from(u8::try_from(log).unwrap_or(0)), "{name}: {mean} for {m}");
+            }
+        }
+    }
+
+    /// Some change of signs is found however many there are, also where points are unevenly spaced; NaN ends the search.
+    #[test]
+    fn searches_end_on_any_path() {
+        let (found, looks) = search(even(4096), |k, _| if k == 0 || k % 2 == 0 { -1.0 } else { 1.0 });
+        assert!(matches!(found, Root::Edge { values, .. } if values[0] * values[1] < 0.0), "{found:?}");
+        assert!(looks <= 40, "{looks} looks where signs alternate");
+        let spaced: Vec<f64> = (0..400).map(|k| 2.0_f64.powi(k - 500)).collect();
+        let (found, looks) = search(spaced, |k, _| if k < 123 { -1.0 } else { 1.0 });
+        assert!(matches!(found, Root::Edge { first: 122, .. }), "{found:?}");
+        assert!(looks <= 400, "{looks} looks");
+        let (found, _) = search(vec![0.0; 100], |k, _| if k < 70 { -1.0 } else { 1.0 });
+        assert!(matches!(found, Root::Edge { first: 69, .. }), "{found:?} where all are in one place");
+        let (found, _) = search(even(100), |k, _| {
+            if k == 0 {
+                -1.0
+            } else if k < 99 {
+                f64::NAN
+            } else {
+                1.0
+            }
+        });
+        assert!(matches!(found, Root::Undefined(_)), "{found:?}");
+        let (found, _) = search(even(100), |_, _| 0.0);
+        assert_eq!(found, Root::Point(0), "constant");
+        let (found, _) = search(even(64), |k, _| if k == 0 { f64::NEG_INFINITY } else { f64::MAX });
+        assert!(matches!(found, Root::Edge { first: 0, .. }), "{found:?}");
+        let mut path = Places(even(10));
+        assert_eq!(find_root(&mut path, [-1.0, 1.0], 0.0, |_, _| None), None, "time is up");
+    }
+}

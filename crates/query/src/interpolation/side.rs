@@ -1,0 +1,102 @@
+//! On which side of b a place is, and how far from it.
+//!
+//! S1 lets f_B say that everywhere, its sign turned to the normal of the nearest point. Ours ends at the horizon; beyond,
+//! the nearest point says both, as in Hoppe et al. 1992.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_surface::Status;
+
+use crate::surface::Surfaces;
+
+/// Orientation less certain than this, of 255, says nothing about sides.
+pub(super) const CERTAIN: u8 = 64;
+
+/// On which side of b a place is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Side {
+    /// How far from the surface, in the world: positive outside, negative inside.
+    pub(crate) distance: f64,
+    /// The nearest point of b.
+    pub(crate) near: u32,
+    /// How far away that is.
+    pub(crate) away: f64,
+    /// Whether the sign means something: normals are oriented there, and sure of it.
+    pub(crate) is_known: bool,
+}
+
+impl Side {
+    /// The signed distance, if the sign means something.
+    pub(crate) fn known(&self) -> Option<f64> {
+        self.is_known.then_some(self.distance)
+    }
+
+    pub(crate) fn is_opposite(&self, other: &Self) -> bool {
+        self.is_known && other.is_known && (self.distance < 0.0) != (other.distance < 0.0)
+    }
+}
+
+/// So many sides of points are remembered.
+const REMEMBERED: usize = 256;
+
+/// Sides of points of a that were looked up last.
+#[derive(Debug, Clone)]
+pub(crate) struct Cache(Vec<Option<(u32, Side)>>);
+
+impl Default for Cache {
+    fn default() -> Self {
+        Self(vec![None; REMEMBERED])
+    }
+}
+
+impl Cache {
+    pub(crate) fn clear(&mut self) {
+        self.0.fill(None);
+    }
+}
+
+impl Surfaces<'_> {
+    /// The side of a place in the world; fast if b has the point `hint` near there.
+    pub(crate) fn side_at(&mut self, x: [f64; 3], hint: u32) -> Side {
+        let [_, vb] = self.pair.views;
+        let (near, steps) = vb.scan().nearest_point_counted(hint as usize, vb.placed().apply_inverse(x));
+        let meter = &mut self.pair.meter;
+        meter.spent.neighbour_steps += u64::from(steps);
+        meter.spent.evaluations += 1;
+        let j = near as usize;
+        let towards = Vector3::from(vb.point(j)) - Vector3::from(x);
+        let away = towards.norm();
+        let radius = self.pair.b.radii[j];
+        let horizon = f64::from(vb.scan().plan().horizon(radius)) * vb.placed().scale();
+        let sure = vb.graph().is_some_and(|graph| graph.confidence()[j] >= CERTAIN);
+        let is_known = sure && vb.scan().is_oriented();
+        if away < horizon {
+            let at = vb.evaluate_near(j, x, &mut self.gathers[1]);
+            if at.status == Status::Ok {
+                return Side { distance: -at.f, near, away, is_known };
+            }
+        }
+        let normal = Vector3::from(self.pair.b.normals[j].map(f64::from));
+        let normal = Vector3::from(vb.placed().rotate(normal.into()));
+        let distance = if normal.dot(&towards) > 0.0 { -away } else { away };
+        Side { distance, near, away, is_known }
+    }
+
+    /// The side of a point of a.
+    pub(crate) fn side(&mut self, i: u32, hint: u32) -> Side {
+        let [va, _] = self.pair.views;
+        self.side_at(va.point(i as usize), hint)
+    }
+
+    /// The same, remembered for a while.
+    pub(crate) fn side_again(&mut self, i: u32, hint: u32) -> Side {
+        let slot = i as usize % REMEMBERED;
+        match self.interpolation.sides.0[slot] {
+            Some((point, side)) if point == i => side,
+            _ => {
+                let side = self.side(i, hint);
+                self.interpolation.sides.0[slot] = Some((i, side));
+                side
+            }
+        }
+    }
+}
