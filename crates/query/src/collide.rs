@@ -20,7 +20,7 @@ use crate::options::{CollideOptions, CollidePlan, Method, Order, Semantics};
 use crate::posed::Posed;
 use crate::surface::{Surfaces, Workspace};
 use crate::thickened::Balls;
-use crate::verdict::{Answer, Evidence, Reason, Statistics, Verdict};
+use crate::verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
 
 /// Reused between queries, one a thread; never influences an answer.
@@ -78,7 +78,7 @@ pub fn collide_proving(
     proof: &mut Proof,
 ) -> Answer {
     proof.pairs.clear();
-    let answer = search(a, b, plan, budget, scratch, Extras { hint: None, proof: Some(proof) });
+    let answer = search(a, b, plan, budget, scratch, Extras { proof: Some(proof), ..Extras::default() });
     if !matches!(answer.verdict, Verdict::Separated { evidence: Evidence::Certified, .. }) {
         proof.pairs.clear();
     }
@@ -100,7 +100,39 @@ pub fn collide_hinted(
     hint: &mut PairHint,
     scratch: &mut CollideScratch,
 ) -> Answer {
-    search(a, b, plan, budget, scratch, Extras { hint: Some(hint), proof: None })
+    search(a, b, plan, budget, scratch, Extras { hint: Some(hint), ..Extras::default() })
+}
+
+/// The places where two scans meet, beside the [`Answer`].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Contacts {
+    /// One of every pair of leaves that meets, unrefined, in the order of the search.
+    pub contacts: Vec<Contact>,
+    /// Whether these are all: the budget lasted.
+    pub complete: bool,
+}
+
+impl Contacts {
+    fn parts(&mut self) -> (&mut Vec<Contact>, &mut bool) {
+        (&mut self.contacts, &mut self.complete)
+    }
+}
+
+/// As [`collide_with`], but looks on after the first contact and leaves all of them in `contacts`: one for each pair of leaves of which
+/// two discs cross (two points are near enough, a test point saw the crossing, as `plan` means it), to first order. The
+/// answer's is the first that is certified, of the first few, or else the first.
+///
+/// Costs a descent to all leaves that meet; does not allocate once `scratch` and `contacts` are warm.
+pub fn collide_all(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+    budget: &Budget,
+    contacts: &mut Contacts,
+    scratch: &mut CollideScratch,
+) -> Answer {
+    contacts.contacts.clear();
+    search(a, b, plan, budget, scratch, Extras { all: Some(contacts), ..Extras::default() })
 }
 
 /// What is written besides an answer.
@@ -108,6 +140,7 @@ pub fn collide_hinted(
 struct Extras<'a> {
     hint: Option<&'a mut PairHint>,
     proof: Option<&'a mut Proof>,
+    all: Option<&'a mut Contacts>,
 }
 
 fn search(
@@ -137,6 +170,9 @@ fn search(
     let (pose, relative) = match relative(a, b, plan) {
         Ok(motion) => motion,
         Err(early) => {
+            if let Some(all) = extras.all {
+                all.complete = early.is_some();
+            }
             let verdict = early.map_or(Verdict::Undecided(Reason::Pose), |distance| {
                 if let Some(proof) = extras.proof {
                     let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
@@ -159,8 +195,8 @@ fn search(
         return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
     }
     match options.semantics {
-        Semantics::Surface => surfaces(pair, options, budget, scratch, known, extras.proof),
-        Semantics::Thickened(_) => balls(pair, plan, scratch, known),
+        Semantics::Surface => surfaces(pair, options, budget, scratch, (known, extras.proof, extras.all)),
+        Semantics::Thickened(_) => balls(pair, plan, scratch, known, extras.all),
     }
 }
 
@@ -170,8 +206,7 @@ fn surfaces(
     options: &CollideOptions,
     budget: &Budget,
     scratch: &mut CollideScratch,
-    mut known: Option<&mut Known>,
-    proof: Option<&mut Proof>,
+    (mut known, proof, all): (Option<&mut Known>, Option<&mut Proof>, Option<&mut Contacts>),
 ) -> Answer {
     let CollideScratch {
         stack,
@@ -196,10 +231,21 @@ fn surfaces(
         return Answer { verdict, distance_estimate: None, statistics };
     }
     let Certifier { pair, proven, .. } = certifier;
-    let workspace =
-        Workspace { instructions: *instructions, gathers, excluded, compared, members, interpolation };
+    let (contacts, complete) = all.map(Contacts::parts).unzip();
+    let workspace = Workspace {
+        instructions: *instructions,
+        gathers,
+        excluded,
+        compared,
+        members,
+        interpolation,
+        all: contacts,
+    };
     let mut search = Surfaces::new(pair, options, budget, known.is_some(), workspace);
     let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
+    if let Some(complete) = complete {
+        *complete = !ended;
+    }
     let parted = !ended && search.found.is_none();
     let Surfaces { pair, found, doubt, estimate, excluded, compared, met, .. } = search;
     let slack = pair.relative.slack();
@@ -294,14 +340,19 @@ fn balls(
     plan: &CollidePlan,
     scratch: &mut CollideScratch,
     mut known: Option<&mut Known>,
+    all: Option<&mut Contacts>,
 ) -> Answer {
     let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
-    let mut search = Balls::new(pair, plan.reach());
+    let (contacts, complete) = all.map(Contacts::parts).unzip();
+    let mut search = Balls::new(pair, plan.reach(), contacts);
     let again = known.as_ref().and_then(|known| known.met(&search.pair));
     let mut ended = again.is_some_and(|leaves| search.leaves(leaves).is_break());
     if !ended {
         search.apart = f64::INFINITY;
         ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.stack).is_break();
+    }
+    if let Some(complete) = complete {
+        *complete = !ended;
     }
     let verdict = match search.found {
         Some(contact) => Verdict::Intersecting { contact, evidence: Evidence::Certified },

@@ -28,7 +28,9 @@ pub use batch::{
 };
 pub use budget::{Budget, Deadline};
 pub use certify::Proof;
-pub use collide::{CollideScratch, collide, collide_hinted, collide_proving, collide_with};
+pub use collide::{
+    CollideScratch, Contacts, collide, collide_all, collide_hinted, collide_proving, collide_with,
+};
 pub use crossing::{Disc, crossing};
 pub use hint::PairHint;
 pub use interpolation::{Brackets, Interpolation, Refinement, Surfels, occupancy, points_for};

@@ -10,9 +10,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Projection, project};
 
 use crate::crossing::Disc;
-use crate::options::Detail;
 use crate::surface::Surfaces;
-use crate::verdict::{Contact, Evidence};
+use crate::verdict::Contact;
 
 /// Projections from one disc to the other and back: the distance falls at least as fast as the square of the
 /// cosine between the planes, and what remains after so many is a fraction of the least margin of use.
@@ -87,14 +86,9 @@ impl Surfaces<'_> {
     /// Two places, of the discs or points `i` and `j`, are nearer than the margin.
     fn met(&mut self, places: [Vector3<f64>; 2], i: usize, j: usize) -> ControlFlow<()> {
         let contact = self.between(places, i, j);
-        if self.detail == Detail::Witness
-            && let Some(contact) = self.approach(places, &contact, i, j)
-        {
-            self.found = Some((contact, Evidence::Certified));
-        } else {
-            self.found = Some((contact, Evidence::Estimated));
-        }
-        ControlFlow::Break(())
+        self.tries += 1;
+        let certified = if self.is_settled() { None } else { self.approach(places, &contact, i, j) };
+        self.record(contact, certified)
     }
 
     /// The contact between a place of either scan.

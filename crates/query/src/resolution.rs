@@ -9,7 +9,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::NodePair;
 
 use crate::surface::Surfaces;
-use crate::verdict::{Contact, Evidence};
+use crate::verdict::Contact;
 
 impl Surfaces<'_> {
     /// Which nodes of a pair are not to be looked at more finely.
@@ -48,8 +48,7 @@ impl Surfaces<'_> {
                     residual: f64::from(radius_a.max(radius_b)) * scale,
                     sources: [va.scan().id(i), vb.scan().id(j)],
                 };
-                self.found = Some((contact, Evidence::Estimated));
-                return ControlFlow::Break(());
+                return self.record(contact, None);
             }
         }
         ControlFlow::Continue(())

@@ -96,7 +96,11 @@ impl Surfaces<'_> {
             }
             accepted += 1;
             let points = [node.points(), self.pair.b.nodes[b].points()];
+            let contacts = self.all.as_ref().map(|all| all.len());
             self.test(x, [i, points[1].start], points, sampling)?;
+            if self.all.as_ref().map(|all| all.len()) > contacts {
+                break;
+            }
         }
         ControlFlow::Continue(())
     }
@@ -166,7 +170,9 @@ impl Surfaces<'_> {
             return ControlFlow::Continue(());
         }
         let distance = at_a.f.abs() + at_b.f.abs();
-        if distance >= self.estimate.min(self.tolerance(sampling)) {
+        // Where all contacts are wanted, a further one is as good.
+        let nearest = if self.all.is_some() { f64::INFINITY } else { self.estimate };
+        if distance >= nearest.min(self.tolerance(sampling)) {
             self.estimate = self.estimate.min(distance);
             return ControlFlow::Continue(());
         }
@@ -175,7 +181,7 @@ impl Surfaces<'_> {
         let (Some(i), Some(j)) = (near(va, x, of_a, meter), near(vb, x, of_b, meter)) else {
             return ControlFlow::Continue(());
         };
-        self.estimate = distance;
+        self.estimate = self.estimate.min(distance);
         let contact = Contact {
             point: x,
             normals: Some([at_a.normal, at_b.normal]),

@@ -72,6 +72,8 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) found: Option<(Contact, Evidence)>,
     /// The leaves of the first.
     pub(crate) met: Option<NodePair>,
+    /// Every contact, one of each pair of leaves that meets, if all are wanted.
+    pub(crate) all: Option<&'a mut Vec<Contact>>,
     /// A crossing of discs that are not to be trusted, and why.
     pub(crate) doubt: Option<Reason>,
     /// The least |f_A| + |f_B| of any test point, in the world.
@@ -87,6 +89,8 @@ pub(crate) struct Workspace<'a> {
     pub(crate) compared: &'a mut Vec<NodePair>,
     pub(crate) members: &'a mut Vec<u32>,
     pub(crate) interpolation: &'a mut InterpolationScratch,
+    /// Contacts, if all are wanted.
+    pub(crate) all: Option<&'a mut Vec<Contact>>,
 }
 
 impl<'a> Surfaces<'a> {
@@ -98,7 +102,7 @@ impl<'a> Surfaces<'a> {
         notes: bool,
         workspace: Workspace<'a>,
     ) -> Self {
-        let Workspace { instructions, gathers, excluded, compared, members, interpolation } = workspace;
+        let Workspace { instructions, gathers, excluded, compared, members, interpolation, all } = workspace;
         excluded.clear();
         compared.clear();
         let may_end = budget.work.is_some() || budget.deadline.is_some();
@@ -124,6 +128,7 @@ impl<'a> Surfaces<'a> {
             tries: 0,
             found: None,
             met: None,
+            all,
             doubt: None,
             estimate: f64::INFINITY,
         }
@@ -168,17 +173,33 @@ impl<'a> Surfaces<'a> {
 
     /// The surfaces meet at `contact`, to first order, near points `i` and `j`.
     pub(crate) fn hit(&mut self, contact: Contact, i: usize, j: usize) -> ControlFlow<()> {
-        if self.detail == Detail::Verdict {
-            self.found = Some((contact, Evidence::Estimated));
-            return ControlFlow::Break(());
-        }
         self.tries += 1;
-        if let Some(contact) = self.refine(&contact, i, j) {
+        let certified = if self.is_settled() { None } else { self.refine(&contact, i, j) };
+        let enough = self.detail == Detail::Verdict || certified.is_some() || self.tries >= TRIES;
+        let flow = self.record(contact, certified);
+        if enough { flow } else { ControlFlow::Continue(()) }
+    }
+
+    /// Takes `contact` down, and what `certified` makes of it. Goes on where all are wanted.
+    pub(crate) fn record(&mut self, contact: Contact, certified: Option<Contact>) -> ControlFlow<()> {
+        if let Some(contact) = certified {
             self.found = Some((contact, Evidence::Certified));
-            return ControlFlow::Break(());
         }
         self.found.get_or_insert((contact, Evidence::Estimated));
-        if self.tries >= TRIES { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        match &mut self.all {
+            Some(all) => {
+                all.push(contact);
+                ControlFlow::Continue(())
+            }
+            None => ControlFlow::Break(()),
+        }
+    }
+
+    /// Whether no witness is looked for, or no more.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.detail == Detail::Verdict
+            || self.tries > TRIES
+            || self.found.is_some_and(|(_, evidence)| evidence == Evidence::Certified)
     }
 
     /// Why a crossing of the discs of points `i` and `j` says little, if it does.
@@ -426,6 +447,9 @@ impl Surfaces<'_> {
                 }
                 if self.margin > 0.0 {
                     self.near_discs(i, of_b.clone())?;
+                    if self.tries > tries {
+                        return ControlFlow::Continue(());
+                    }
                 }
             }
         }

@@ -16,6 +16,8 @@ pub(crate) struct Balls<'a> {
     /// 2R + margin in the world, and a little more in a's stored frame.
     reach: f64,
     pub(crate) reach_stored: f32,
+    /// One such pair of every pair of leaves, if all are wanted.
+    all: Option<&'a mut Vec<Contact>>,
     /// The first such pair.
     pub(crate) found: Option<Contact>,
     /// The leaves of that pair.
@@ -25,9 +27,9 @@ pub(crate) struct Balls<'a> {
 }
 
 impl<'a> Balls<'a> {
-    pub(crate) fn new(pair: Posed<'a>, reach: f64) -> Self {
+    pub(crate) fn new(pair: Posed<'a>, reach: f64, all: Option<&'a mut Vec<Contact>>) -> Self {
         let reach_stored = pair.stored(reach);
-        Self { pair, reach, reach_stored, found: None, met: None, apart: f64::INFINITY }
+        Self { pair, reach, reach_stored, all, found: None, met: None, apart: f64::INFINITY }
     }
 }
 
@@ -69,14 +71,17 @@ impl Visitor for Balls<'_> {
                 let distance = (p - q).norm();
                 self.apart = self.apart.min(distance);
                 if distance <= self.reach {
-                    self.found = Some(Contact {
+                    let contact = Contact {
                         point: (0.5 * (p + q)).into(),
                         normals: None,
                         residual: 0.5 * distance,
                         sources: [va.scan().id(i), vb.scan().id(j)],
-                    });
-                    self.met = Some(pair);
-                    return ControlFlow::Break(());
+                    };
+                    self.found.get_or_insert(contact);
+                    self.met.get_or_insert(pair);
+                    let Some(all) = &mut self.all else { return ControlFlow::Break(()) };
+                    all.push(contact);
+                    return ControlFlow::Continue(());
                 }
             }
         }

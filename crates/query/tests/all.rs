@@ -1,0 +1,187 @@
+//! All contacts against brute force: of every pair of leaves, every pair of discs or points.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::collections::BTreeSet;
+
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
+use nearmiss_query::{
+    Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Detail, Method, Sampling, ScanView,
+    Semantics, Verdict, collide, collide_all,
+};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+use nearmiss_testdata::oracle;
+
+fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
+    let leaf = BuildOptions::default().with_leaf_size(8);
+    PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &leaf).unwrap()
+}
+
+/// The leaf of every stored point.
+fn leaves(scan: &PointHierarchy) -> Vec<usize> {
+    let mut of = vec![0; scan.len()];
+    for (id, node) in scan.nodes().iter().enumerate().filter(|(_, node)| node.is_leaf()) {
+        of[node.points()].fill(id);
+    }
+    of
+}
+
+/// The pairs of leaves that contacts are of.
+fn found(contacts: &Contacts, scans: [&PointHierarchy; 2]) -> Vec<[usize; 2]> {
+    let [leaves_a, leaves_b] = scans.map(leaves);
+    let stored = |side: usize, contact: &nearmiss_query::Contact| {
+        scans[side].source().iter().position(|&s| s == contact.sources[side].0).unwrap()
+    };
+    contacts.contacts.iter().map(|c| [leaves_a[stored(0, c)], leaves_b[stored(1, c)]]).collect()
+}
+
+/// The pairs of leaves of which trusted discs surely cross, and those of which some may.
+fn crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> [BTreeSet<[usize; 2]>; 2] {
+    let disc = |view: &ScanView<'_>, i: usize| oracle::Disc {
+        centre: view.point(i),
+        normal: view.placed().rotate(view.scan().normals()[i].map(f64::from)),
+        radius: f64::from(view.scan().discs()[i]) * view.placed().scale(),
+    };
+    let trusted =
+        |view: &ScanView<'_>, i: usize| matches!(view.scan().kind(i), PointKind::Surface | PointKind::Border);
+    let radius = |view: &ScanView<'_>, i: usize| f64::from(view.scan().radii()[i]) * view.placed().scale();
+    let (leaves_a, leaves_b) = (leaves(a.scan()), leaves(b.scan()));
+    let [mut surely, mut maybe] = [BTreeSet::new(), BTreeSet::new()];
+    for i in 0..a.scan().len() {
+        for j in 0..b.scan().len() {
+            let (p, q) = (disc(a, i), disc(b, j));
+            let apart = (0..3).map(|k| (p.centre[k] - q.centre[k]).powi(2)).sum::<f64>().sqrt();
+            let far = 0.9 * radius(a, i).max(radius(b, j));
+            let slack = oracle::crossing(&p, &q).slack / p.radius.min(q.radius);
+            let pair = [leaves_a[i], leaves_b[j]];
+            if slack > 1e-3 && apart < far * (1.0 - 1e-5) && trusted(a, i) && trusted(b, j) {
+                surely.insert(pair);
+            }
+            // Nearly parallel discs have some thickness.
+            if slack > -0.2 && apart < far * (1.0 + 1e-5) {
+                maybe.insert(pair);
+            }
+        }
+    }
+    [surely, maybe]
+}
+
+#[test]
+fn one_contact_of_every_pair_of_leaves_whose_discs_cross() {
+    let mut rng = arbitrary::rng(31);
+    let mut scratch = CollideScratch::default();
+    let (mut contacts, mut pairs, mut several) = (Contacts::default(), 0, 0);
+    let kinds =
+        [CloudKind::Sphere, CloudKind::Random, CloudKind::Lattice, CloudKind::Coplanar, CloudKind::Outlier];
+    for (n, kind) in (0_u64..).zip(kinds.iter().cycle().take(25)) {
+        let a = prepared(&arbitrary::cloud(*kind, 250, n));
+        let b = prepared(&arbitrary::cloud(*kind, 200, n + 100));
+        let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        for _ in 0..4 {
+            let spread = arbitrary::point_in(&mut rng, 1.5 * size);
+            let pose = arbitrary::rotation(&mut rng).with_translation(spread);
+            let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
+            let [surely, maybe] = crossing(&va, &vb);
+            for detail in [Detail::Verdict, Detail::Witness] {
+                let options = CollideOptions::default().with_detail(detail);
+                let plan = CollidePlan::new(&options, &a, &b).unwrap();
+                let answer = collide_all(&va, &vb, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+                assert!(contacts.complete, "without a budget");
+                let first = collide(&va, &vb, &plan, &Budget::UNLIMITED).verdict;
+                if detail == Detail::Verdict {
+                    assert_eq!(answer.verdict, first, "{kind:?} {n}: the first contact");
+                }
+                assert_eq!(answer.verdict.is_intersecting(), first.is_intersecting());
+                assert_eq!(answer.verdict.is_intersecting(), !contacts.contacts.is_empty());
+                let list = found(&contacts, [&a, &b]);
+                let set: BTreeSet<_> = list.iter().copied().collect();
+                assert_eq!(set.len(), list.len(), "{kind:?} {n}: one of each pair");
+                assert!(set.is_superset(&surely), "{kind:?} {n}: missed {:?}", surely.difference(&set));
+                assert!(set.is_subset(&maybe), "{kind:?} {n}: made up {:?}", set.difference(&maybe));
+                pairs += set.len();
+                several += usize::from(set.len() > 20);
+            }
+        }
+    }
+    assert!(pairs > 2000 && several > 20, "{pairs} pairs, {several} questions with many");
+}
+
+#[test]
+fn one_contact_of_every_pair_of_leaves_with_near_points() {
+    let (a, b) = (
+        prepared(&arbitrary::cloud(CloudKind::Sphere, 250, 1)),
+        prepared(&arbitrary::cloud(CloudKind::Random, 200, 2)),
+    );
+    let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &Pose::IDENTITY));
+    let (leaves_a, leaves_b) = (leaves(&a), leaves(&b));
+    let (mut contacts, mut scratch) = (Contacts::default(), CollideScratch::default());
+    for share in [0.01, 0.1, 0.3] {
+        let radius = share * a.bounds().half_extents()[0];
+        let mut expected = BTreeSet::new();
+        for i in 0..a.len() {
+            for j in 0..b.len() {
+                let (p, q) = (va.point(i), vb.point(j));
+                if (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt() <= 2.0 * radius {
+                    expected.insert([leaves_a[i], leaves_b[j]]);
+                }
+            }
+        }
+        let options = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
+        let plan = CollidePlan::new(&options, &a, &b).unwrap();
+        collide_all(&va, &vb, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+        let list = found(&contacts, [&a, &b]);
+        assert_eq!(list.len(), expected.len(), "one of each pair");
+        assert_eq!(list.into_iter().collect::<BTreeSet<_>>(), expected, "within {radius}");
+    }
+}
+
+#[test]
+fn a_budget_leaves_the_first_contacts() {
+    let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
+    let size = sphere.bounds().half_extents()[0];
+    let pose = Pose::from_translation([size, 0.1 * size, 0.0]);
+    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+    let plan = CollidePlan::new(
+        &CollideOptions::default().with_order(nearmiss_query::Order::DepthFirst),
+        &sphere,
+        &sphere,
+    )
+    .unwrap();
+    let mut scratch = CollideScratch::default();
+    let mut all = Contacts::default();
+    let answer = collide_all(&a, &b, &plan, &Budget::UNLIMITED, &mut all, &mut scratch);
+    let whole = answer.statistics.evaluations + answer.statistics.node_pairs;
+    assert!(all.complete && all.contacts.len() > 50, "{}", all.contacts.len());
+    let mut some = Contacts::default();
+    let mut counts = BTreeSet::new();
+    for share in [0, 1, 2, 3, 5, 8, 10] {
+        let budget = Budget::default().with_work(whole * share / 10 + 1);
+        let answer = collide_all(&a, &b, &plan, &budget, &mut some, &mut scratch);
+        assert_eq!(some.complete, share == 10, "{share} tenths of the work");
+        assert_eq!(some.contacts, all.contacts[..some.contacts.len()], "{share} tenths: the first of all");
+        assert_eq!(answer.verdict.is_intersecting(), !some.contacts.is_empty());
+        counts.insert(some.contacts.len());
+    }
+    assert!(counts.len() > 4, "{counts:?}");
+}
+
+#[test]
+fn test_points_and_margins_find_all_along_a_circle() {
+    let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
+    let size = sphere.bounds().half_extents()[0];
+    let pose = Pose::from_translation([size, 0.0, 0.0]);
+    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+    let (mut contacts, mut scratch) = (Contacts::default(), CollideScratch::default());
+    let sampling = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
+    for options in [sampling, CollideOptions::default().with_margin(0.05 * size)] {
+        let plan = CollidePlan::new(&options, &sphere, &sphere).unwrap();
+        let answer = collide_all(&a, &b, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+        assert!(matches!(answer.verdict, Verdict::Intersecting { .. }), "{answer:?}");
+        let set: BTreeSet<_> = found(&contacts, [&sphere; 2]).into_iter().collect();
+        assert_eq!(set.len(), contacts.contacts.len(), "one of each pair");
+        // All twelve hours of the circle.
+        let hour = |c: &nearmiss_query::Contact| (c.point[1].atan2(c.point[2]) * 6.0 / 3.1416).floor();
+        let hours: BTreeSet<i64> = contacts.contacts.iter().map(|c| hour(c) as i64).collect();
+        assert_eq!(hours.len(), 12, "{hours:?}");
+    }
+}
