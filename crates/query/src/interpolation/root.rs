@@ -2,7 +2,7 @@
 //!
 //! S1's Algorithm 1 goes where a straight line between the two values at the ends of the bracket is zero. As printed it
 //! need not end, and where the function bends it may come nearer by a point at a time (docs/theory). Ours looks strictly
-//! between the ends, halves the value at an end that stays (the Illinois rule), and bisects where three looks have not halved the
+//! between the ends, halves the value at an end that stays (the Illinois rule), and bisects where two looks have not halved the
 //! stretch: at most three times as many looks as a bisection by length, and a few in all where the function
 //! is nearly linear.
 
@@ -55,7 +55,7 @@ pub(crate) enum Root {
 }
 
 /// So many looks in a row may leave more than half of the stretch.
-const PATIENCE: u32 = 3;
+const PATIENCE: u32 = 2;
 
 /// Looks for a zero between the ends of `path`, which has two at least, where the function has the `values`, of
 /// different signs; `value` is asked for it at known points by number. None as soon as that gives up.
