@@ -8,8 +8,9 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence,
-    Metric, Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_proving, collide_with,
+    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Deadline, Detail,
+    Evidence, Metric, Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_all, collide_proving,
+    collide_with,
 };
 
 use crate::console::{Console, Results, now};
@@ -67,6 +68,9 @@ pub struct CollideArgs {
     /// How much to find out about a contact
     #[arg(long, value_enum, default_value_t = DetailName::Witness)]
     pub detail: DetailName,
+    /// All contacts, one for each pair of leaves that meets or, without hierarchy, each bracket: to first order, beside the answer
+    #[arg(long, conflicts_with = "prove")]
+    pub all: bool,
     /// How to search
     #[command(flatten)]
     pub search: SearchArgs,
@@ -131,6 +135,7 @@ struct Question {
     work: Option<u64>,
     resolution: Option<f64>,
     prove: bool,
+    all: bool,
 }
 
 impl Question {
@@ -149,13 +154,15 @@ impl Question {
             budget = budget.with_deadline(Deadline::at(end));
         }
         let mut proof = self.prove.then(Proof::default);
-        let answer = match &mut proof {
-            Some(proof) => collide_proving(&a, &b, &self.plan, &budget, scratch, proof),
-            None => collide_with(&a, &b, &self.plan, &budget, scratch),
+        let mut contacts = self.all.then(Contacts::default);
+        let answer = match (&mut proof, &mut contacts) {
+            (_, Some(contacts)) => collide_all(&a, &b, &self.plan, &budget, contacts, scratch),
+            (Some(proof), None) => collide_proving(&a, &b, &self.plan, &budget, scratch, proof),
+            (None, None) => collide_with(&a, &b, &self.plan, &budget, scratch),
         };
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
-        Asked { line, poses, answer, proof, micros }
+        Asked { line, poses, answer, proof, contacts, micros }
     }
 
     fn views(&self, poses: &[Pose; 2]) -> [ScanView<'_>; 2] {
@@ -170,7 +177,7 @@ impl Question {
                 .map_err(CliError::writing(path))?;
         }
         let results = &mut *out.results;
-        let report = AnswerReport::new(&asked.answer, asked.micros);
+        let report = AnswerReport::new(&asked.answer, asked.contacts.as_ref(), asked.micros);
         if args.json {
             return results.json(&report);
         }
@@ -182,7 +189,8 @@ impl Question {
         if let Some(hint) = hint(&asked.answer, [&a, &b]) {
             results.line(hint)?;
         }
-        results.line(report.details())
+        results.line(report.details())?;
+        report.contacts().try_for_each(|contact| results.line(contact))
     }
 }
 
@@ -194,6 +202,8 @@ struct Asked {
     answer: Answer,
     /// What it rests on, if that is to be written.
     proof: Option<Proof>,
+    /// All contacts, if they are wanted.
+    contacts: Option<Contacts>,
     micros: f64,
 }
 
@@ -244,7 +254,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let plan = CollidePlan::new(&options, &a, &b)?;
     let prove = args.prove.is_some();
     let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);
-    let question = Question { a, b, plan, budget, work, resolution, prove };
+    let question = Question { a, b, plan, budget, work, resolution, prove, all: args.all };
 
     let mut results = Results::new();
     let mut answer = |out: &mut Outputs<'_, '_>| match &mut poses {

@@ -1,7 +1,7 @@
 //! What scripts are told, the fields of the JSON lines, and the same in rows for people.
 
 use nearmiss::graph::ClosePairs;
-use nearmiss::{Answer, Evidence, Metric, PointKind, Reason, Scan, SurfaceGraph, Verdict};
+use nearmiss::{Answer, Contact, Contacts, Evidence, Metric, PointKind, Reason, Scan, SurfaceGraph, Verdict};
 use serde::Serialize;
 
 use crate::digits::{bytes, count, percent, place, short};
@@ -217,10 +217,39 @@ pub(crate) struct AnswerReport {
     leaf_pairs: u64,
     neighbour_steps: u64,
     micros: f64,
+    /// Whether the contacts are all there are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    complete: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    contacts: Option<Vec<ContactReport>>,
+}
+
+/// One of all contacts.
+#[derive(Debug, Serialize)]
+struct ContactReport {
+    point: [f64; 3],
+    normal_a: Option<[f64; 3]>,
+    normal_b: Option<[f64; 3]>,
+    residual: f64,
+    source_a: u32,
+    source_b: u32,
+}
+
+impl ContactReport {
+    fn new(contact: &Contact) -> Self {
+        Self {
+            point: contact.point,
+            normal_a: contact.normals.map(|n| n[0]),
+            normal_b: contact.normals.map(|n| n[1]),
+            residual: contact.residual,
+            source_a: contact.sources[0].0,
+            source_b: contact.sources[1].0,
+        }
+    }
 }
 
 impl AnswerReport {
-    pub(crate) fn new(answer: &Answer, micros: f64) -> Self {
+    pub(crate) fn new(answer: &Answer, all: Option<&Contacts>, micros: f64) -> Self {
         let mut report = Self {
             verdict: "undecided",
             evidence: None,
@@ -239,6 +268,8 @@ impl AnswerReport {
             leaf_pairs: answer.statistics.leaf_pairs,
             neighbour_steps: answer.statistics.neighbour_steps,
             micros,
+            complete: all.map(|all| all.complete),
+            contacts: all.map(|all| all.contacts.iter().map(ContactReport::new).collect()),
         };
         match answer.verdict {
             Verdict::Intersecting { contact, evidence } => {
@@ -271,6 +302,18 @@ impl AnswerReport {
             }
         }
         report
+    }
+
+    /// All contacts, if they were asked for, for people.
+    pub(crate) fn contacts(&self) -> impl Iterator<Item = String> {
+        self.contacts.iter().flatten().map(|contact| {
+            let [x, y, z] = contact.point;
+            let (a, b) = (contact.source_a, contact.source_b);
+            format!(
+                "  ({x}, {y}, {z}), between point {a} of a and point {b} of b, to {:.2e}",
+                contact.residual
+            )
+        })
     }
 
     /// What it cost, and between which points, for people.

@@ -66,6 +66,26 @@ impl Adjacency {
         Ok(Self { starts: starts.into(), neighbours: neighbours.into() })
     }
 
+    /// The edges of both graphs, which have the same points and no edge in common.
+    ///
+    /// # Panics
+    /// When there are not as many points in either.
+    #[must_use]
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        assert_eq!(self.len(), other.len(), "both over the same points");
+        let mut starts = Vec::with_capacity(self.starts.len());
+        let mut neighbours = Vec::with_capacity(self.neighbours.len() + other.neighbours.len());
+        starts.push(0);
+        for i in 0..self.len() {
+            let first = neighbours.len();
+            neighbours.extend_from_slice(self.of(i));
+            neighbours.extend_from_slice(other.of(i));
+            neighbours[first..].sort_unstable();
+            starts.push(self.starts[i + 1] + other.starts[i + 1]);
+        }
+        Self { starts: starts.into(), neighbours: neighbours.into() }
+    }
+
     /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {

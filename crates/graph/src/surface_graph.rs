@@ -14,9 +14,6 @@ use crate::{
     Levels, LoadError, Network, PointGraph, edge_lengths,
 };
 
-/// A way so many times as long as its ends are apart leads round something.
-const DETOUR: f32 = 4.0;
-
 /// Ways over virtual edges stay where the sum of the distances from both ends is at most so many times their distance.
 const NARROW: f32 = 1.5;
 
@@ -174,9 +171,7 @@ impl SurfaceGraph {
     #[must_use]
     pub fn bridged_network(&self, positions: &[[f32; 3]]) -> Network<'_> {
         let (graph, lengths) = self.bridged.get_or_init(|| {
-            let edges: Vec<[u32; 2]> =
-                self.points.edges().edges().chain(self.points.virtual_edges().edges()).collect();
-            let graph = Adjacency::from_edges(self.points.len(), &edges);
+            let graph = self.points.edges().union(self.points.virtual_edges());
             let lengths = edge_lengths(&graph, positions);
             (graph, lengths)
         });
@@ -200,23 +195,25 @@ impl SurfaceGraph {
         })
     }
 
-    /// Makes `path` one from `a` to `b`: of the surface, as [`LazyPath::lead`] does, or over virtual edges where that is more
-    /// than four times as long as they are apart, or no way leads there. These are looked for among points not much further
-    /// from both than they are from each other. False, with no path, where there is none.
+    /// Makes `path` one from `a` to `b` along the surface, as [`LazyPath::lead`] does. False, with no path, where none leads there.
     ///
     /// # Panics
     /// When there is no such point, or not a position for each.
-    pub fn lead(&self, positions: &[[f32; 3]], [a, b]: [u32; 2], path: &mut LazyPath) -> bool {
-        let led = path.lead(&self.levels, self.network(positions), [a, b]);
+    pub fn lead(&self, positions: &[[f32; 3]], ends: [u32; 2], path: &mut LazyPath) -> bool {
+        path.lead(&self.levels, self.network(positions), ends)
+    }
+
+    /// Makes `path` a shortest one from `a` to `b` over virtual edges too, as far as it stays near both: the sum of the distances
+    /// from them no more than half as much again as their own. For points that are near each other, with a hole between
+    /// (S1 §4.5). Takes time by the number of points there.
+    ///
+    /// # Panics
+    /// When there is no such point, or not a position for each.
+    pub fn lead_across(&self, positions: &[[f32; 3]], [a, b]: [u32; 2], path: &mut LazyPath) -> bool {
         let place = |i: u32| positions[i as usize];
         let apart = distance(place(a), place(b));
-        let is_direct = led && path.length() <= f64::from(DETOUR * apart);
-        if is_direct || self.points.virtual_edges().edge_count() == 0 {
-            return led;
-        }
         let near = |i: u32| distance(place(i), place(a)) + distance(place(i), place(b)) <= NARROW * apart;
-        let bridged = path.lead_through(self.bridged_network(positions), [a, b], near);
-        bridged || path.lead(&self.levels, self.network(positions), [a, b])
+        path.lead_through(self.bridged_network(positions), [a, b], near)
     }
 
     /// The geodesic kernel over these samples, if there is a map of close pairs.

@@ -60,6 +60,8 @@ pub struct Sampling {
     pub seed: u64,
     /// Without hierarchy: test points about those points of a that lie in the box of b.
     pub flat: bool,
+    /// Without hierarchy: no more test points than this in all, as S1 §5.2 has them. Default: 2³² − 1.
+    pub most: u32,
 }
 
 /// Greatest number of test points.
@@ -67,7 +69,7 @@ pub(crate) const MOST_TEST_POINTS: u32 = 65_536;
 
 impl Default for Sampling {
     fn default() -> Self {
-        Self { test_points: 128, tolerance: 0.4, seed: 0, flat: false }
+        Self { test_points: 128, tolerance: 0.4, seed: 0, flat: false, most: u32::MAX }
     }
 }
 
@@ -88,6 +90,12 @@ impl Sampling {
     #[must_use]
     pub const fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
+    }
+
+    /// The same test with no more test points than this in all.
+    #[must_use]
+    pub const fn with_most(self, most: u32) -> Self {
+        Self { most, ..self }
     }
 
     /// The same test with or without hierarchy.

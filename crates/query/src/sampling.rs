@@ -126,7 +126,9 @@ impl Surfaces<'_> {
             return ControlFlow::Continue(());
         }
         let leaf = u64::from(self.pair.views[0].scan().leaf_size());
-        let wanted = (self.members.len() as u64 * u64::from(sampling.test_points)).div_ceil(leaf);
+        let wanted = (self.members.len() as u64 * u64::from(sampling.test_points))
+            .div_ceil(leaf)
+            .min(u64::from(sampling.most));
         let mut rng = stream(sampling.seed, FLAT);
         self.pair.meter.spent.leaf_pairs += 1;
         for _ in 0..wanted {

@@ -28,6 +28,9 @@ const LOOKS: u32 = 8;
 /// Drawn points and partners in a list of the close-pairs map: some 30 points are within the kernel's reach.
 const OF_THE_ANNULUS: u32 = 4;
 
+/// A way so many times as long as its ends are apart leads round something.
+const DETOUR: f64 = 4.0;
+
 /// As near b, in its local sampling radii, a path has arrived.
 const ARRIVED: f64 = 0.02;
 
@@ -82,6 +85,7 @@ impl Surfaces<'_> {
         let wanted = search.draws(surfels);
         #[expect(clippy::cast_possible_truncation, reason = "a length in single precision")]
         let reach = 2.0 * (volume.area / surfels).sqrt() as f32;
+        self.interpolation.crossed.clear();
         self.interpolation.drawn.begin(wanted.min(volume.count), reach);
         self.pair.meter.spent.leaf_pairs += 1;
         if volume.count <= wanted {
@@ -158,10 +162,33 @@ impl Surfaces<'_> {
 
     /// Looks for an intersection on the path between two points on either side.
     fn search_between(&mut self, bracket: &Bracket, ways: &mut Ways<'_>) -> ControlFlow<()> {
+        let positions = self.pair.a.positions;
         let Ways { search, graph, path, .. } = ways;
-        if !graph.lead(self.pair.a.positions, bracket.points, path) {
-            return ControlFlow::Continue(());
+        let tries = self.tries;
+        let mut length = f64::INFINITY;
+        if graph.lead(positions, bracket.points, path) {
+            length = path.length();
+            self.search_along(path, bracket, graph, search)?;
         }
+        let [p, q] = bracket.points.map(|i| Vector3::from(positions[i as usize]));
+        let is_round_about = length > DETOUR * f64::from((p - q).norm());
+        if self.tries == tries
+            && is_round_about
+            && graph.points().virtual_edges().edge_count() > 0
+            && graph.lead_across(positions, bracket.points, path)
+        {
+            return self.search_along(path, bracket, graph, search);
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn search_along(
+        &mut self,
+        path: &mut LazyPath,
+        bracket: &Bracket,
+        graph: &SurfaceGraph,
+        search: &Interpolation,
+    ) -> ControlFlow<()> {
         let [first, last] = bracket.sides;
         let mut hint = if first.away < last.away { first.near } else { last.near };
         let arrived = ARRIVED * f64::from(self.pair.b.radii[hint as usize]) * self.scale_of_b();
@@ -183,6 +210,13 @@ impl Surfaces<'_> {
                 self.meets_at(i, x, &side, search)
             }
             Some(Root::Edge { first, values }) => {
+                let ends = [point(first).min(point(first + 1)), point(first).max(point(first + 1))];
+                let Err(place) = self.interpolation.crossed.binary_search(&ends) else {
+                    // Another bracket led here.
+                    self.tries += 1;
+                    return ControlFlow::Continue(());
+                };
+                self.interpolation.crossed.insert(place, ends);
                 self.search_edge([point(first), point(first + 1)], values, hint, search)
             }
         }
