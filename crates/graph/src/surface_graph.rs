@@ -200,7 +200,7 @@ impl SurfaceGraph {
     /// # Panics
     /// When there is no such point, or not a position for each.
     pub fn lead(&self, positions: &[[f32; 3]], ends: [u32; 2], path: &mut LazyPath) -> bool {
-        path.lead(&self.levels, self.network(positions), ends)
+        path.lead(&self.levels, self.network(positions), positions, ends)
     }
 
     /// Makes `path` a shortest one from `a` to `b` over virtual edges too, as far as it stays near both: the sum of the distances

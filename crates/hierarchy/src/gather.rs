@@ -241,15 +241,19 @@ impl PointHierarchy {
     /// When there is no such point.
     #[must_use]
     pub fn nearest_point_near(&self, i: usize, x: [f64; 3]) -> u32 {
-        self.nearest_point_counted(i, x).0
+        self.nearest_point_within(i, x, f64::INFINITY).0
     }
 
-    /// As [`Self::nearest_point_near`], and how many nodes were looked at.
+    /// As [`Self::nearest_point_near`] if that is within `reach`; else a point that is at most a quarter further away, which
+    /// takes far fewer looks. With the number of nodes that were looked at.
     ///
     /// # Panics
     /// When there is no such point.
     #[must_use]
-    pub fn nearest_point_counted(&self, i: usize, x: [f64; 3]) -> (u32, u32) {
+    pub fn nearest_point_within(&self, i: usize, x: [f64; 3], reach: f64) -> (u32, u32) {
+        /// The square of how many times as far a point may be beyond reach.
+        const ROUGHLY: f64 = 1.25 * 1.25;
+        let reach_sq = reach * reach;
         let place = Centre::new(x).rounded();
         let distance_sq = |p: [f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
         let (nodes, boxes, positions): (&[Node], &[OrientedBox], &[[f32; 3]]) =
@@ -265,7 +269,8 @@ impl PointHierarchy {
             looked_at += 1;
             let (least, id) = stack[top];
             let node = &nodes[id];
-            if least > best.0 {
+            // A point within reach is never passed over: one that is further away lets all nodes be looked at that come so near.
+            if least > best.0 || (least > reach_sq && ROUGHLY * least > best.0) {
                 continue;
             }
             if node.is_leaf() {

@@ -31,8 +31,12 @@ const OF_THE_ANNULUS: u32 = 4;
 /// A way so many times as long as its ends are apart leads round something.
 const DETOUR: f64 = 4.0;
 
+/// Over virtual edges only points are joined that are no more than so many sampling radii apart: holes that these bridge are
+/// small.
+const NARROW: f32 = 32.0;
+
 /// As near b, in its local sampling radii, a path has arrived.
-const ARRIVED: f64 = 0.02;
+const ARRIVED: f64 = 0.1;
 
 /// What a search goes by.
 struct Ways<'a> {
@@ -115,8 +119,8 @@ impl Surfaces<'_> {
         if !bounds.holds(place) {
             return ControlFlow::Continue(false);
         }
-        let hint = self.interpolation.drawn.points().last().map_or(0, |last| last.side.near);
-        let side = self.side(i, hint);
+        // Drawn points are anywhere: none tells where to look for the next.
+        let side = self.side_again(i, 0);
         self.estimate = self.estimate.min(side.distance.abs());
         let partner = match ways.search.brackets {
             Brackets::Drawn => None,
@@ -125,7 +129,7 @@ impl Surfaces<'_> {
         let drawn = &mut self.interpolation.drawn;
         let partner = partner.or_else(|| drawn.partner(place, &side).map(|other| (other.point, other.side)));
         drawn.add(i, place, side);
-        if let Some((other, other_side)) = partner {
+        if let Some((other, other_side)) = partner.filter(|(other, _)| *other != i) {
             let bracket = Bracket { points: [i, other], sides: [side, other_side] };
             self.search_between(&bracket, ways)?;
         }
@@ -171,9 +175,11 @@ impl Surfaces<'_> {
             self.search_along(path, bracket, graph, search)?;
         }
         let [p, q] = bracket.points.map(|i| Vector3::from(positions[i as usize]));
-        let is_round_about = length > DETOUR * f64::from((p - q).norm());
+        let apart = (p - q).norm();
+        let is_near = apart <= NARROW * self.pair.a.sampling_radius;
         if self.tries == tries
-            && is_round_about
+            && is_near
+            && length > DETOUR * f64::from(apart)
             && graph.points().virtual_edges().edge_count() > 0
             && graph.lead_across(positions, bracket.points, path)
         {
@@ -197,7 +203,7 @@ impl Surfaces<'_> {
             if self.pair.meter.go_on().is_break() {
                 return None;
             }
-            let side = self.side(along.path.point(k).point, hint);
+            let side = self.side_again(along.path.point(k).point, hint);
             hint = side.near;
             Some(side.known())
         });
@@ -319,7 +325,7 @@ impl Surfaces<'_> {
         for _ in 0..STEPS {
             self.pair.meter.go_on()?;
             let towards = |view: &crate::view::ScanView<'_>, own: u32, x: [f64; 3]| {
-                view.scan().nearest_point_counted(own as usize, view.placed().apply_inverse(x))
+                view.scan().nearest_point_within(own as usize, view.placed().apply_inverse(x), f64::INFINITY)
             };
             let (next, steps_a) = towards(va, i, vb.point(j as usize));
             let (other, steps_b) = towards(vb, j, va.point(next as usize));

@@ -21,6 +21,8 @@ pub(crate) struct Drawn {
     heads: Vec<u32>,
     per_cell: f32,
     reach_sq: f32,
+    /// How many are outside, and how many inside.
+    sides: [u32; 2],
 }
 
 impl Drawn {
@@ -31,6 +33,7 @@ impl Drawn {
         self.heads.resize((2 * count as usize).next_power_of_two(), NONE);
         self.per_cell = 1.0 / reach;
         self.reach_sq = reach * reach;
+        self.sides = [0; 2];
     }
 
     /// How far partners may be from each other.
@@ -59,6 +62,9 @@ impl Drawn {
 
     /// The nearest drawn point on the other side within reach; of equally near ones the first.
     pub(crate) fn partner(&self, place: [f32; 3], side: &Side) -> Option<&DrawnPoint> {
+        if !side.is_known || self.sides[usize::from(side.distance >= 0.0)] == 0 {
+            return None;
+        }
         let middle = self.cell(place);
         let mut nearest: Option<(f32, u32)> = None;
         for offset in 0..27 {
@@ -80,6 +86,7 @@ impl Drawn {
     }
 
     pub(crate) fn add(&mut self, point: u32, place: [f32; 3], side: Side) {
+        self.sides[usize::from(side.distance < 0.0)] += u32::from(side.is_known);
         let list = self.list(self.cell(place));
         let number = u32::try_from(self.points.len()).unwrap_or(NONE);
         let next = std::mem::replace(&mut self.heads[list], number);

@@ -36,7 +36,7 @@ impl Side {
 }
 
 /// So many sides of points are remembered.
-const REMEMBERED: usize = 256;
+const REMEMBERED: usize = 1024;
 
 /// Sides of points of a that were looked up last.
 #[derive(Debug, Clone)]
@@ -58,7 +58,10 @@ impl Surfaces<'_> {
     /// The side of a place in the world; fast if b has the point `hint` near there.
     pub(crate) fn side_at(&mut self, x: [f64; 3], hint: u32) -> Side {
         let [_, vb] = self.pair.views;
-        let (near, steps) = vb.scan().nearest_point_counted(hint as usize, vb.placed().apply_inverse(x));
+        let local = vb.placed().apply_inverse(x);
+        // Beyond all horizons the side is all that counts.
+        let reach = f64::from(vb.scan().plan().horizon(self.pair.b.sampling_radius));
+        let (near, steps) = vb.scan().nearest_point_within(hint as usize, local, reach);
         let meter = &mut self.pair.meter;
         meter.spent.neighbour_steps += u64::from(steps);
         meter.spent.evaluations += 1;
