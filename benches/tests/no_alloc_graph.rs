@@ -34,7 +34,7 @@ fn warm_searches_and_evaluations_allocate_nothing() {
             search.path(network, i, other, &mut path);
             levels.path(network, [i, other], &mut coarse, &mut path);
             let close = pairs.of(i as usize).last().map_or(i, |close| close.point);
-            pairs.path(graph.edges(), scan.positions(), i, close, &mut path);
+            pairs.path(network, [i, close], &mut search, &mut path);
             let x = scan.positions()[i as usize]
                 .map(|c| f64::from(c) + 0.1 * f64::from(scan.radii()[i as usize]));
             assert!(kernel.evaluate(x, i, &mut heard).f.is_finite(), "f at {x:?}");

@@ -92,6 +92,8 @@ fn orientation(object: &Object, scan: &Scan, graph: &PointGraph, runs: usize) {
 fn close_pairs(scan: &Scan, graph: &PointGraph, runs: usize) {
     let n = count(scan.len());
     let horizons = horizons(scan);
+    let lengths = edge_lengths(graph.edges(), scan.positions());
+    let network = Network::new(graph.edges(), &lengths);
     for paths in [Paths::Rebuilt, Paths::Stored] {
         let spent = processor_time();
         let (pairs, time) = least(runs, || {
@@ -106,7 +108,33 @@ fn close_pairs(scan: &Scan, graph: &PointGraph, runs: usize) {
             count(pairs.pair_count()) / n,
             count(pairs.byte_len()) / n
         );
+        paths_of(&pairs, network, runs);
     }
+}
+
+/// Paths to the furthest that are heard, and how far the stored distances are from theirs.
+fn paths_of(pairs: &ClosePairs, network: Network<'_>, runs: usize) {
+    let ends: Vec<([u32; 2], f32)> = (0..pairs.len())
+        .step_by(pairs.len() / 4096 + 1)
+        .filter_map(|i| Some((u32::try_from(i).ok()?, pairs.of(i).last()?)))
+        .map(|(i, close)| ([i, close.point], close.distance))
+        .collect();
+    let (mut scratch, mut path) = (GeodesicScratch::default(), Vec::new());
+    let ((points, off), time) = least(runs, || {
+        let (mut points, mut off) = (0, 0.0_f32);
+        for &(ends, distance) in &ends {
+            let length = pairs.path(network, ends, &mut scratch, &mut path).unwrap_or(f32::INFINITY);
+            points += path.len();
+            off = off.max((distance - length).abs() / length.max(f32::MIN_POSITIVE));
+        }
+        (points, off)
+    });
+    let each = count(ends.len());
+    println!(
+        "* paths to the furthest: {:.1} points, {:.0} ns; distances off by {off:.1e} at most",
+        count(points) / each,
+        time * 1e9 / each
+    );
 }
 
 /// Builds the levels, and compares distances with those that a search of the whole finds.

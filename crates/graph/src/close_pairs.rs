@@ -5,17 +5,16 @@
 //! is differs from point to point here, so a search goes out from the one that is heard, to its own horizon, and what it
 //! finds is entered with those that hear it. O(N) in time and space where each point hears a bounded number.
 //!
-//! Paths need not be stored: the search that found i from j came over a neighbour of i that it had reached before,
-//! which therefore hears j too, and whose distance plus the edge is that of i, to the last bit.
+//! Paths need not be stored: every point on the way from i to j hears j too, and says how far it still is. So a search
+//! from i looks only at neighbours over which the way is no longer than it should be.
 
-use bytemuck::{Pod, Zeroable};
 use nearmiss_store::Array;
 use serde::{Deserialize, Serialize};
 
-use crate::Adjacency;
-use crate::geodesic::Reached;
-use crate::length::{Network, distance, step};
-use crate::parallel::{for_each, ranges_with};
+use crate::close_list::{BESIDE, Beside, Close, CloseList, Lists, floor, pack};
+use crate::geodesic::{GeodesicScratch, Reached};
+use crate::length::{Network, step};
+use crate::parallel::{for_each, ranges, ranges_with};
 
 /// No more stretches than this are searched from: memory is made for each.
 const STRETCHES: usize = 64;
@@ -30,15 +29,9 @@ const SHELLS_F32: f32 = 32.0;
 /// Where the way goes on is not stored: it stands among too many neighbours.
 const ELSEWHERE: u8 = u8::MAX;
 
-/// A point that is heard, and how far it is along the graph.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Close {
-    /// Its index.
-    pub point: u32,
-    /// Sum of the lengths of the edges of a shortest path, as [`GeodesicScratch::within`](crate::GeodesicScratch::within) adds them from there.
-    pub distance: f32,
-}
+/// So much longer than said, as a share, is a way that may be the shortest: three times what distances are rounded by,
+/// once for the whole, once for what is left, once for sums.
+const DOUBT: f32 = 3.0 / 16384.0;
 
 /// What is kept of paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -55,8 +48,14 @@ pub enum Paths {
 pub struct ClosePairs {
     /// Where the list of each point begins, and where the last one ends.
     pub(crate) starts: Array<u32>,
-    /// All lists, each by distance, then index.
-    pub(crate) pairs: Array<Close>,
+    /// The exponent of the least distance that fits the list of each point.
+    pub(crate) floors: Array<u8>,
+    /// All lists, each by exact distance, then index: by how much the index is more than that of the list's point.
+    pub(crate) offsets: Array<i16>,
+    /// Beside each offset the distance.
+    pub(crate) codes: Array<u16>,
+    /// The pairs that do not fit, in order.
+    pub(crate) beside: Array<Beside>,
     /// Beside each pair the rank of where the path goes on; or none at all.
     pub(crate) onward: Array<u8>,
 }
@@ -105,7 +104,7 @@ impl ClosePairs {
             starts[i + 1] += starts[i];
         }
         let mut next = starts.clone();
-        let mut pairs = vec![Close::zeroed(); total];
+        let mut pairs = vec![Close { point: 0, distance: 0.0 }; total];
         let mut source = 0;
         for (ends, reached) in stretches {
             let mut first = 0;
@@ -120,10 +119,12 @@ impl ClosePairs {
             }
         }
         sort_lists(&starts, &mut pairs);
-        let mut built = Self { starts: starts.into(), pairs: pairs.into(), onward: Array::default() };
-        if paths == Paths::Stored {
-            built.onward = built.all_onward(network).into();
-        }
+        let onward = match paths {
+            Paths::Rebuilt => Vec::new(),
+            Paths::Stored => ranks_onward(network, &starts, &pairs),
+        };
+        let mut built = pack_lists(&starts, &pairs);
+        (built.starts, built.onward) = (starts.into(), onward.into());
         built
     }
 
@@ -142,7 +143,7 @@ impl ClosePairs {
     /// Number of pairs.
     #[must_use]
     pub fn pair_count(&self) -> usize {
-        self.pairs.len()
+        self.offsets.len()
     }
 
     /// Whether paths are stored.
@@ -154,150 +155,169 @@ impl ClosePairs {
     /// What all of it takes, in bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
-        size_of_val(&*self.starts) + size_of_val(&*self.pairs) + self.onward.len()
+        let lists = size_of_val(&*self.starts) + self.floors.len();
+        lists + 4 * self.pair_count() + size_of_val(&*self.beside) + self.onward.len()
     }
 
-    /// The points heard at `i`, itself first, by distance, then index.
+    /// The points heard at `i`, itself first, by distance; of equal ones those that were nearer before rounding, then
+    /// those of lesser index first.
     ///
     /// # Panics
     /// When there is no such point.
     #[must_use]
-    pub fn of(&self, i: usize) -> &[Close] {
+    pub fn of(&self, i: usize) -> CloseList<'_> {
         self.view().of(i)
     }
 
-    /// How far `j` is from `i`, if it is heard there. A pass over the list of `i`.
+    /// How far `j` is from `i`, within 2⁻¹⁴ of it, if it is heard there. A pass over the list of `i`.
     ///
     /// # Panics
     /// When there is no point `i`.
     #[must_use]
     pub fn distance(&self, i: u32, j: u32) -> Option<f32> {
-        self.view().distance(i, j)
+        Some(self.view().find(i, j)?.1)
     }
 
-    /// As [`Self::distance`]; `path` holds the points from `i` to `j` afterwards, both included, or none. Given the
-    /// graph and the positions that the map was built from; with [`Paths::Stored`] positions matter only at points of 255
-    /// neighbours or more, where a step does not fit its byte.
+    /// The length of a shortest path from `i` to `j`, if `j` is heard at `i`; `path` holds its points afterwards, both
+    /// included, or none. Given the graph with the lengths that the map was built from. No allocation once warm.
     ///
-    /// Klein & Zachmann 2005 (Algorithm 2) keep a queue of all neighbours that are nearer to the target. We go straight
-    /// to the one that the shortest path comes over, which the map knows.
+    /// Klein & Zachmann 2005 (Algorithm 2) go to the neighbour nearest to the target, keeping a queue of all that are nearer
+    /// than those they leave; what they find need not be shortest. We keep those over which the whole way is as long as it
+    /// should be, and take of these the nearest to where we began.
     ///
     /// # Panics
     /// When there is no point `i`.
     pub fn path(
         &self,
-        graph: &Adjacency,
-        positions: &[[f32; 3]],
-        i: u32,
-        j: u32,
+        network: Network<'_>,
+        [i, j]: [u32; 2],
+        scratch: &mut GeodesicScratch,
         path: &mut Vec<u32>,
     ) -> Option<f32> {
         path.clear();
         let view = self.view();
-        let whole = view.distance(i, j)?;
-        let (mut at, mut left) = (i, whole);
-        path.push(at);
+        let whole = self.distance(i, j).filter(|_| (j as usize) < self.len())?;
+        if !self.onward.is_empty()
+            && let Some(length) = self.stored_path(network, [i, j], path)
+        {
+            return Some(length);
+        }
+        path.clear();
+        // Sums of a thousand edges that vanish in them may err by more.
+        let length = [(1.0 + DOUBT) * whole, f32::INFINITY].into_iter().find_map(|most| {
+            let is_on_the_way = |k, along| view.find(k, j).is_some_and(|(_, left)| along + left <= most);
+            scratch.search(network, [(i, 0.0)], f32::MAX, is_on_the_way, |k| k == j);
+            scratch.found(j)
+        })?;
+        scratch.trace(j, path);
+        path.reverse();
+        Some(length)
+    }
+
+    /// Follows the ranks that are stored, if all are.
+    fn stored_path(&self, network: Network<'_>, [i, j]: [u32; 2], path: &mut Vec<u32>) -> Option<f32> {
+        let (view, mut length) = (self.view(), 0.0);
+        path.push(i);
+        let mut at = i;
         while at != j {
-            let next = self.stored_step(graph, at, j).or_else(|| {
-                let edge = |k: u32| distance(positions[at as usize], positions[k as usize]);
-                view.searched_step(graph, at, j, left, edge)
-            });
-            // Only a file that lies has no next step, or one that is no nearer.
-            let Some((next, nearer)) = next.filter(|&(_, d)| d < left) else {
-                path.clear();
-                return None;
-            };
-            (at, left) = (next, nearer);
+            let rank = *self.onward.get(view.find(at, j)?.0).filter(|&&rank| rank != ELSEWHERE)?;
+            let (next, edge) = network.edges(at as usize).nth(rank.into())?;
+            (at, length) = (next, step(length, edge));
             path.push(at);
+            // Only in a file that lies it goes round.
+            if path.len() > self.len() {
+                return None;
+            }
         }
-        Some(whole)
-    }
-
-    /// Where the path from `at` to `j` goes on, and how far it is from there, if that is stored.
-    fn stored_step(&self, graph: &Adjacency, at: u32, j: u32) -> Option<(u32, f32)> {
-        let first = self.starts[at as usize] as usize;
-        let place = self.of(at as usize).iter().position(|close| close.point == j)?;
-        let rank = *self.onward.get(first + place)?;
-        if rank == ELSEWHERE {
-            return None;
-        }
-        let next = *graph.of(at as usize).get(usize::from(rank))?;
-        Some((next, self.distance(next, j)?))
-    }
-
-    /// Where paths go on, beside each pair.
-    fn all_onward(&self, network: Network<'_>) -> Vec<u8> {
-        let view = self.view();
-        let length = self.len().div_ceil(STRETCHES).max(1);
-        let stretches = ranges_with(
-            self.len(),
-            length,
-            || vec![0_u32; self.len()],
-            |place, points| {
-                let mut ranks = Vec::new();
-                for i in points {
-                    let (list, first) = (view.of(i), ranks.len());
-                    ranks.resize(first + list.len(), ELSEWHERE);
-                    for (k, close) in (1..).zip(list) {
-                        place[close.point as usize] = k;
-                    }
-                    for (rank, (k, edge)) in (0..ELSEWHERE).zip(network.edges(i)) {
-                        for close in view.of(k as usize) {
-                            let here = place[close.point as usize] as usize;
-                            if here > 0 && step(close.distance, edge) == list[here - 1].distance {
-                                let to = &mut ranks[first + here - 1];
-                                *to = rank.min(*to);
-                            }
-                        }
-                    }
-                    for close in list {
-                        place[close.point as usize] = 0;
-                    }
-                }
-                ranks
-            },
-        );
-        stretches.concat()
+        Some(length)
     }
 
     /// The arrays, taken once.
     pub(crate) fn view(&self) -> Lists<'_> {
-        Lists { starts: &self.starts, pairs: &self.pairs }
+        Lists {
+            starts: &self.starts,
+            floors: &self.floors,
+            offsets: &self.offsets,
+            codes: &self.codes,
+            beside: &self.beside,
+        }
     }
 }
 
-/// The lists of a map, borrowed.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Lists<'a> {
-    starts: &'a [u32],
-    pairs: &'a [Close],
+/// Where paths go on, beside each pair of lists of exact distances: there is a neighbour that the search reached before,
+/// whose distance plus the edge is that of the pair, to the last bit; of several the first.
+fn ranks_onward(network: Network<'_>, starts: &[u32], pairs: &[Close]) -> Vec<u8> {
+    let count = network.len();
+    let list_of = |i: usize| &pairs[starts[i] as usize..starts[i + 1] as usize];
+    let length = count.div_ceil(STRETCHES).max(1);
+    let stretches = ranges_with(
+        count,
+        length,
+        || vec![0_u32; count],
+        |place, points| {
+            let mut ranks = Vec::new();
+            for i in points {
+                let (list, first) = (list_of(i), ranks.len());
+                ranks.resize(first + list.len(), ELSEWHERE);
+                for (k, close) in (1..).zip(list) {
+                    place[close.point as usize] = k;
+                }
+                for (rank, (k, edge)) in (0..ELSEWHERE).zip(network.edges(i)) {
+                    for close in list_of(k as usize) {
+                        let here = place[close.point as usize] as usize;
+                        if here > 0 && step(close.distance, edge) == list[here - 1].distance {
+                            let to = &mut ranks[first + here - 1];
+                            *to = rank.min(*to);
+                        }
+                    }
+                }
+                for close in list {
+                    place[close.point as usize] = 0;
+                }
+            }
+            ranks
+        },
+    );
+    stretches.concat()
 }
 
-impl<'a> Lists<'a> {
-    #[inline]
-    pub(crate) fn of(&self, i: usize) -> &'a [Close] {
-        &self.pairs[self.starts[i] as usize..self.starts[i + 1] as usize]
+/// Lists of exact distances as they are stored, without starts and steps of paths.
+fn pack_lists(starts: &[u32], pairs: &[Close]) -> ClosePairs {
+    let stretches = ranges(starts.len() - 1, |points| {
+        let count = (starts[points.end] - starts[points.start]) as usize;
+        let (mut offsets, mut codes) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let (mut floors, mut beside) = (Vec::with_capacity(points.len()), Vec::new());
+        for i in points {
+            let list = starts[i]..starts[i + 1];
+            let closes = &pairs[list.start as usize..list.end as usize];
+            let floor = floor(closes);
+            floors.push(floor);
+            for (pair, &close) in list.zip(closes) {
+                let (offset, code) = pack(id32(i), floor, close).unwrap_or_else(|| {
+                    beside.push(Beside { pair, point: close.point, distance: close.distance });
+                    (BESIDE, 0)
+                });
+                offsets.push(offset);
+                codes.push(code);
+            }
+        }
+        (floors, offsets, codes, beside)
+    });
+    let (mut floors, mut beside) = (Vec::with_capacity(starts.len()), Vec::new());
+    let (mut offsets, mut codes) = (Vec::with_capacity(pairs.len()), Vec::with_capacity(pairs.len()));
+    for mut stretch in stretches {
+        floors.append(&mut stretch.0);
+        offsets.append(&mut stretch.1);
+        codes.append(&mut stretch.2);
+        beside.append(&mut stretch.3);
     }
-
-    #[inline]
-    pub(crate) fn distance(&self, i: u32, j: u32) -> Option<f32> {
-        self.of(i as usize).iter().find(|close| close.point == j).map(|close| close.distance)
-    }
-
-    /// The neighbour of `at` over which the way of length `left` to `j` goes on, and how far it is from there: of
-    /// several the first.
-    fn searched_step(
-        &self,
-        graph: &Adjacency,
-        at: u32,
-        j: u32,
-        left: f32,
-        edge: impl Fn(u32) -> f32,
-    ) -> Option<(u32, f32)> {
-        graph.of(at as usize).iter().find_map(|&k| {
-            let nearer = self.distance(k, j)?;
-            (step(nearer, edge(k)) == left).then_some((k, nearer))
-        })
+    ClosePairs {
+        starts: Array::default(),
+        floors: floors.into(),
+        offsets: offsets.into(),
+        codes: codes.into(),
+        beside: beside.into(),
+        onward: Array::default(),
     }
 }
 

@@ -54,7 +54,7 @@ impl GeodesicScratch {
     /// # Panics
     /// When there is no such point.
     pub fn within(&mut self, network: Network<'_>, source: u32, reach: f32) -> &[Reached] {
-        self.search(network, [(source, 0.0)], reach, |_| true, |_| false);
+        self.search(network, [(source, 0.0)], reach, |_, _| true, |_| false);
         &self.reached
     }
 
@@ -63,7 +63,7 @@ impl GeodesicScratch {
     /// # Panics
     /// When there is no such point.
     pub fn distance(&mut self, network: Network<'_>, a: u32, b: u32) -> Option<f32> {
-        self.search(network, [(a, 0.0)], f32::MAX, |_| true, |i| i == b);
+        self.search(network, [(a, 0.0)], f32::MAX, |_, _| true, |i| i == b);
         self.found(b)
     }
 
@@ -86,14 +86,14 @@ impl GeodesicScratch {
         self.reached.len()
     }
 
-    /// Goes out from `sources`, which begin at the distances beside them, through points that are `open`, as far as
-    /// `reach` or until a point is reached that is the `goal`.
+    /// Goes out from `sources`, which begin at the distances beside them, through points that are `open` to a way of
+    /// some length there, as far as `reach` or until a point is reached that is the `goal`.
     pub(crate) fn search(
         &mut self,
         network: Network<'_>,
         sources: impl IntoIterator<Item = (u32, f32)>,
         reach: f32,
-        open: impl Fn(u32) -> bool,
+        open: impl Fn(u32, f32) -> bool,
         goal: impl Fn(u32) -> bool,
     ) {
         self.forget();
@@ -115,7 +115,7 @@ impl GeodesicScratch {
             }
             for (to, length) in network.edges(point as usize) {
                 let distance = step(distance, length);
-                if distance <= reach && distance < self.known[to as usize].distance && open(to) {
+                if distance <= reach && distance < self.known[to as usize].distance && open(to, distance) {
                     self.offer(to, Known { distance, before: point });
                 }
             }

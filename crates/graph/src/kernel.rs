@@ -14,7 +14,8 @@
 use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, PointBlock, SurfacePlan};
 
 use crate::Adjacency;
-use crate::close_pairs::{Close, ClosePairs, Lists};
+use crate::close_list::{Close, Lists};
+use crate::close_pairs::ClosePairs;
 use crate::length::distance;
 
 /// The place on an edge of the graph that stands for x.
@@ -134,12 +135,13 @@ impl<'a> GeodesicKernel<'a> {
             |point: u32| self.radii.get(point as usize).map_or(f32::NEG_INFINITY, |&r| self.plan.horizon(r));
         let first = self.lists.of(foot.ends[0] as usize);
         if foot.share <= 0.0 {
-            heard.extend(first.iter().filter(|close| close.distance < horizon(close.point)));
+            heard.extend(first.filter(|close| close.distance < horizon(close.point)));
             return heard;
         }
         if place.len() < self.positions.len() {
             place.resize(self.positions.len(), 0);
         }
+        let of_first = first.len();
         for (place_of, close) in (1..).zip(first) {
             both.push(Both { point: close.point, distances: [close.distance, f32::INFINITY] });
             if let Some(to) = place.get_mut(close.point as usize) {
@@ -152,8 +154,8 @@ impl<'a> GeodesicKernel<'a> {
                 _ => both.push(Both { point: close.point, distances: [f32::INFINITY, close.distance] }),
             }
         }
-        for close in first {
-            if let Some(to) = place.get_mut(close.point as usize) {
+        for one in &both[..of_first] {
+            if let Some(to) = place.get_mut(one.point as usize) {
                 *to = 0;
             }
         }

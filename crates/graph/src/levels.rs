@@ -121,13 +121,13 @@ impl LevelScratch {
         is_open: impl Fn(&[u32], u32) -> bool,
     ) -> Option<f32> {
         let open = &self.open[..];
-        self.search.search(network, [(a, 0.0)], f32::MAX, |i| is_open(open, i), |_| false);
+        self.search.search(network, [(a, 0.0)], f32::MAX, |i, _| is_open(open, i), |_| false);
         let shortest = self.search.found(b)?;
         let most = (1.0 + detour) * shortest;
         self.reached += self.search.reached();
         self.far.clear();
         self.far.extend(self.search.all_reached());
-        self.search.search(network, [(b, 0.0)], most, |i| is_open(open, i), |_| false);
+        self.search.search(network, [(b, 0.0)], most, |i, _| is_open(open, i), |_| false);
         self.reached += self.search.reached();
         self.opened.clear();
         let ways =
@@ -141,7 +141,7 @@ impl Cells {
     /// The next level over a graph whose points have these local sampling radii. O(n log n), on one core.
     fn over(network: Network<'_>, radii: &[f32], scratch: &mut GeodesicScratch) -> Self {
         let centres = centres(network, radii, scratch);
-        scratch.search(network, centres.iter().map(|&c| (c, 0.0)), f32::MAX, |_| true, |_| false);
+        scratch.search(network, centres.iter().map(|&c| (c, 0.0)), f32::MAX, |_, _| true, |_| false);
         let count = network.len();
         let (mut owner, mut to_centre, mut inwards) = (vec![0; count], vec![0.0; count], vec![0; count]);
         for (cell, &centre) in centres.iter().enumerate() {
@@ -397,11 +397,11 @@ impl Levels {
             detour *= SURER;
         }
         match self.cells.first() {
-            None => scratch.search.search(network, [(a, 0.0)], f32::MAX, |_| true, |i| i == b),
+            None => scratch.search.search(network, [(a, 0.0)], f32::MAX, |_, _| true, |i| i == b),
             Some(cells) => {
                 scratch.open_about(&cells.graph);
                 let (owner, open, number): (&[u32], _, _) = (&cells.owner, &scratch.open, scratch.number);
-                let is_open = |i: u32| open[owner[i as usize] as usize] == number;
+                let is_open = |i: u32, _: f32| open[owner[i as usize] as usize] == number;
                 scratch.search.search(network, [(a, 0.0)], f32::MAX, is_open, |i| i == b);
             }
         }

@@ -3,6 +3,7 @@
 
 mod adjacency;
 mod border;
+mod close_list;
 mod close_pairs;
 mod components;
 mod dynamic;
@@ -23,7 +24,8 @@ mod sections;
 mod surface_graph;
 
 pub use adjacency::Adjacency;
-pub use close_pairs::{Close, ClosePairs, Paths};
+pub use close_list::{Close, CloseList};
+pub use close_pairs::{ClosePairs, Paths};
 pub use dynamic::{DynamicGraph, Touched};
 pub use geodesic::{GeodesicScratch, Reached};
 pub use graph::{GraphCounts, PointGraph};

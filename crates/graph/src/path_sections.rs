@@ -3,13 +3,17 @@
 use bytemuck::Pod;
 use nearmiss_store::{Array, Check, File, OpenError, WriteError, Writer};
 
-use crate::close_pairs::{Close, ClosePairs};
+use crate::close_list::{BESIDE, is_floor, pack, rounded};
+use crate::close_pairs::ClosePairs;
 use crate::levels::{Cells, Levels};
 use crate::{Adjacency, Flaw, LoadError};
 
 /// Part 0 is of the points, part k of the cells of level k.
 const LIST_STARTS: [u8; 4] = *b"CPST";
-const PAIRS: [u8; 4] = *b"CPSP";
+const FLOORS: [u8; 4] = *b"CPFL";
+const OFFSETS: [u8; 4] = *b"CPOF";
+const CODES: [u8; 4] = *b"CPDI";
+const BESIDES: [u8; 4] = *b"CPBS";
 const ONWARD: [u8; 4] = *b"CPON";
 /// Part k is what makes level k from the one before.
 const OWNERS: [u8; 4] = *b"CELL";
@@ -40,7 +44,12 @@ impl ClosePairs {
     /// # Errors
     /// When the container has sections of these names already.
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>, part: u32) -> Result<(), WriteError> {
-        writer.section(LIST_STARTS, part, &self.starts)?.section(PAIRS, part, &self.pairs)?;
+        writer
+            .section(LIST_STARTS, part, &self.starts)?
+            .section(FLOORS, part, &self.floors)?
+            .section(OFFSETS, part, &self.offsets)?
+            .section(CODES, part, &self.codes)?
+            .section(BESIDES, part, &self.beside)?;
         if !self.onward.is_empty() {
             writer.section(ONWARD, part, &self.onward)?;
         }
@@ -49,13 +58,21 @@ impl ClosePairs {
 
     /// The map in `file` of points with these horizons, its arrays in place. With either `check` every list is there,
     /// so that no use of it fails. With [`Check::Full`] each is also one that a build writes: of points that are there,
-    /// by distance, then index, itself first, and none further than it is heard.
+    /// by distance, itself first, and none further than it is heard; and what stands beside has its place, and would fit none
+    /// in the list.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
     pub fn load(file: &File, part: u32, horizons: &[f32], check: Check) -> Result<Self, LoadError> {
         let onward = if file.has(ONWARD, part) { file.array(ONWARD, part)? } else { Array::default() };
-        let map = Self { starts: file.array(LIST_STARTS, part)?, pairs: file.array(PAIRS, part)?, onward };
+        let map = Self {
+            starts: file.array(LIST_STARTS, part)?,
+            floors: file.array(FLOORS, part)?,
+            offsets: file.array(OFFSETS, part)?,
+            codes: file.array(CODES, part)?,
+            beside: file.array(BESIDES, part)?,
+            onward,
+        };
         map.check_structure(horizons.len())?;
         if check == Check::Full {
             map.check_contents(horizons)?;
@@ -65,28 +82,40 @@ impl ClosePairs {
 
     fn check_structure(&self, points: usize) -> Result<(), Flaw> {
         length(LISTS, self.starts.len(), points + 1)?;
-        length(LISTS, self.pairs.len(), self.starts[points] as usize)?;
+        length(LISTS, self.pair_count(), self.starts[points] as usize)?;
+        length("distances of close pairs", self.codes.len(), self.pair_count())?;
         if !self.onward.is_empty() {
-            length("steps of paths", self.onward.len(), self.pairs.len())?;
+            length("steps of paths", self.onward.len(), self.pair_count())?;
         }
+        // No code leads to what is no distance then.
+        length("floors of close pairs", self.floors.len(), points)?;
+        first_wrong(LISTS, self.floors.iter().position(|&floor| !is_floor(floor)))?;
         let starts: &[u32] = &self.starts;
         let descends = starts.windows(2).position(|two| two[0] > two[1]);
         first_wrong(LISTS, descends.or((starts[0] != 0).then_some(0)))
     }
 
     fn check_contents(&self, horizons: &[f32]) -> Result<(), Flaw> {
-        let view = self.view();
-        let is_sound = |i: usize| {
-            let list = view.of(i);
-            let first = list.first().is_some_and(|c| c.point as usize == i && c.distance.to_bits() == 0);
-            let is_heard = |c: &Close| {
-                let horizon = horizons.get(c.point as usize);
-                horizon.is_some_and(|&h| c.distance <= h) || c.point as usize == i
-            };
-            let rank = |c: &Close| (c.distance.to_bits(), c.point);
-            first && list.iter().all(is_heard) && list.windows(2).all(|two| rank(&two[0]) < rank(&two[1]))
-        };
-        first_wrong(LISTS, (0..self.len()).position(|i| !is_sound(i)))
+        let (view, floors): (_, &[u8]) = (self.view(), &self.floors);
+        let mut beside = self.beside.iter();
+        for (i, own) in (0..self.len()).zip(0..) {
+            let (pairs, mut before) = (self.starts[i]..self.starts[i + 1], 0.0);
+            let mut is_sound = pairs.len() > 0;
+            for (pair, close) in pairs.clone().zip(view.of(i)) {
+                if self.offsets[pair as usize] == BESIDE {
+                    let fits = pack(own, floors[i], close).is_some();
+                    is_sound &= beside.next().is_some_and(|b| b.pair == pair) && !fits;
+                }
+                let horizon = horizons.get(close.point as usize);
+                let is_heard = horizon.is_some_and(|&h| close.distance <= rounded(h));
+                let is_own = close.point == own && close.distance.to_bits() == 0;
+                let is_first = pair == pairs.start;
+                is_sound &= (is_heard || is_own) && is_own == is_first && before <= close.distance;
+                before = close.distance;
+            }
+            first_wrong(LISTS, (!is_sound).then_some(i))?;
+        }
+        length("close pairs that stand beside", self.beside.len(), self.beside.len() - beside.len())
     }
 }
 

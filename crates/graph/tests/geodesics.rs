@@ -105,22 +105,38 @@ fn paths_are_as_long_as_said_and_go_along_edges() {
     assert_eq!(scratch.distance(network, 2, 3), Some(1.0));
 }
 
+/// No path of more than some hundred edges is in a map; these have thousands.
 #[test]
 fn edges_that_vanish_beside_what_they_add_to_still_make_a_path() {
     // A long way, then points a billionth apart.
-    let mut points = vec![[0.0, 0.0, 0.0], [1e3, 0.0, 0.0]];
-    points.extend((1..40_u8).map(|i| [1e3, f32::from(i) * 1e-9, 0.0]));
-    let edges: Vec<[u32; 2]> = (0..40).map(|i| [i, i + 1]).chain((2..40).map(|i| [i - 1, i + 1])).collect();
-    let graph = Adjacency::from_edges(points.len(), &edges);
-    let lengths = edge_lengths(&graph, &points);
-    let network = Network::new(&graph, &lengths);
-    for paths in [Paths::Rebuilt, Paths::Stored] {
-        let pairs = ClosePairs::build(network, &vec![2e3; points.len()], paths);
+    for n in [40_u16, 4000] {
+        let mut points = vec![[0.0, 0.0, 0.0], [1e3, 0.0, 0.0]];
+        points.extend((1..n).map(|i| [1e3, f32::from(i) * 1e-9, 0.0]));
+        let n = u32::from(n);
+        let edges: Vec<[u32; 2]> = (0..n).map(|i| [i, i + 1]).collect();
+        let graph = Adjacency::from_edges(points.len(), &edges);
+        let lengths = edge_lengths(&graph, &points);
+        let network = Network::new(&graph, &lengths);
+        let mut horizons = vec![0.0; points.len()];
+        (horizons[0], horizons[n as usize]) = (2e3, 2e3);
         let mut path = Vec::new();
-        let distance = pairs.path(&graph, &points, 40, 0, &mut path).unwrap();
-        assert!((distance - 1e3).abs() < 0.01, "{distance}");
-        assert_eq!((path[0], path[path.len() - 1]), (40, 0));
+        for paths in [Paths::Rebuilt, Paths::Stored] {
+            let pairs = ClosePairs::build(network, &horizons, paths);
+            for ends in [[n, 0], [0, n]] {
+                let length = pairs.path(network, ends, &mut GeodesicScratch::default(), &mut path).unwrap();
+                assert!((length - 1e3).abs() < 0.5, "{length}");
+                assert_eq!([path[0], path[path.len() - 1]], ends);
+                assert_eq!(path.len(), points.len());
+            }
+        }
     }
+}
+
+/// What distances are rounded by, and a little for sums.
+const ROUNDED: f64 = 6.2e-5;
+
+fn is_near(distance: f32, exact: f64, share: f64) -> bool {
+    (f64::from(distance) - exact).abs() <= share * exact
 }
 
 #[test]
@@ -140,37 +156,102 @@ fn the_map_holds_every_pair_that_is_heard_and_no_other() {
             }
             for (i, list) in naive.iter_mut().enumerate() {
                 list.sort_unstable();
-                let found: Vec<(u32, u32)> =
-                    pairs.of(i).iter().map(|close| (close.distance.to_bits(), close.point)).collect();
-                assert_eq!(found, *list, "heard at {i} with {reach}");
+                let found = pairs.of(i);
+                assert_eq!(found.len(), list.len(), "heard at {i} with {reach}");
+                assert!(found.clone().is_sorted_by(|a, b| a.distance <= b.distance), "at {i}");
+                for (close, &(bits, point)) in found.zip(&*list) {
+                    let exact = f32::from_bits(bits);
+                    assert_eq!(close.point, point, "heard at {i} with {reach}");
+                    assert!(is_near(close.distance, exact.into(), ROUNDED), "{close:?} for {exact}");
+                    let id = u32::try_from(i).unwrap();
+                    assert_eq!(pairs.distance(id, point), Some(close.distance));
+                }
+                let deaf = (0..).find(|&j| list.iter().all(|&(_, point)| point != j)).unwrap();
+                assert_eq!(pairs.distance(u32::try_from(i).unwrap(), deaf), None);
             }
         }
     }
 }
 
+/// Points along a line, in an order that keeps no two neighbours together, with gaps of all sizes.
 #[test]
-fn stored_and_rebuilt_paths_are_the_same_and_shortest() {
+fn what_four_bytes_do_not_hold_is_as_right() {
+    const COUNT: u32 = 70_001;
+    let name = |k: u32| u64::from(k) * 35_017 % u64::from(COUNT);
+    let gap = |k: u32| 10_f64.powi(i32::try_from(k % 7).unwrap() - 6);
+    let ends = (0..COUNT).scan(0.0, |end, k| Some(std::mem::replace(end, *end + gap(k))));
+    let along: Vec<f64> = ends.collect();
+    let id = |k: u32| u32::try_from(name(k)).unwrap();
+    let edges: Vec<[u32; 2]> = (1..COUNT).map(|k| [id(k - 1), id(k)]).collect();
+    let graph = Adjacency::from_edges(COUNT as usize, &edges);
+    // Lengths from the gaps, as positions would swallow them.
+    let mut place = vec![0; COUNT as usize];
+    for k in 0..COUNT {
+        place[id(k) as usize] = k;
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "lengths are single precision")]
+    let lengths: Vec<f32> = (0..COUNT as usize)
+        .flat_map(|i| graph.of(i).iter().map(move |&j| [i, j as usize]))
+        .map(|[i, j]| gap(place[i].min(place[j])) as f32)
+        .collect();
+    let network = Network::new(&graph, &lengths);
+    let horizons = vec![1.5; COUNT as usize];
+    let pairs = ClosePairs::build(network, &horizons, Paths::Rebuilt);
+    let stored = ClosePairs::build(network, &horizons, Paths::Stored);
+    assert!(pairs.byte_len() > 9 * pairs.pair_count(), "half of them stand beside");
+    let (mut scratch, mut path) = (GeodesicScratch::default(), Vec::new());
+    let mut counted = 0;
+    for k in 0..COUNT {
+        let i = id(k);
+        let list = pairs.of(i as usize);
+        counted += list.len();
+        for (rank, close) in list.enumerate() {
+            let exact = (along[k as usize] - along[place[close.point as usize] as usize]).abs();
+            assert!(is_near(close.distance, exact, ROUNDED + 1e-5), "{close:?} for {exact}");
+            if k % 97 == 0 {
+                assert_eq!(pairs.distance(i, close.point), Some(close.distance));
+                for map in [&pairs, &stored] {
+                    let length = map.path(network, [i, close.point], &mut scratch, &mut path).unwrap();
+                    assert!(is_near(length, exact, 1e-5), "{length} for {exact}");
+                    assert_eq!(path.len(), 1 + place[close.point as usize].abs_diff(k) as usize, "{rank}");
+                }
+            }
+        }
+    }
+    assert_eq!(counted, pairs.pair_count());
+}
+
+#[test]
+fn stored_and_rebuilt_paths_are_shortest() {
     let shapes = [Cloud::of_form(torus(1.0, 0.4), 0.1, 0.2, 3), Cloud::of_form(torus(1.0, 0.4), 0.1, 0.0, 0)];
     for cloud in small_clouds().into_iter().chain(shapes) {
         let network = Network::new(&cloud.graph, &cloud.lengths);
         let horizons: Vec<f32> = cloud.radii.iter().map(|r| 3.0 * r).collect();
         let rebuilt = ClosePairs::build(network, &horizons, Paths::Rebuilt);
         let stored = ClosePairs::build(network, &horizons, Paths::Stored);
-        assert_eq!(stored.paths(), Paths::Stored);
-        let (mut a, mut b) = (Vec::new(), Vec::new());
+        assert_eq!([rebuilt.paths(), stored.paths()], [Paths::Rebuilt, Paths::Stored]);
+        let (mut scratch, mut search, mut path) =
+            (GeodesicScratch::default(), GeodesicScratch::default(), Vec::new());
         for i in (0..cloud.points.len()).step_by(3) {
             let id = u32::try_from(i).unwrap();
+            let mut shortest = vec![f32::INFINITY; cloud.points.len()];
+            for found in search.within(network, id, f32::MAX) {
+                shortest[found.point as usize] = found.distance;
+            }
             for close in rebuilt.of(i) {
-                let d = rebuilt.path(&cloud.graph, &cloud.points, id, close.point, &mut a).unwrap();
-                assert_eq!(stored.path(&cloud.graph, &[], id, close.point, &mut b), Some(d));
-                assert_eq!(a, b);
-                assert_eq!((a[0], a[a.len() - 1]), (id, close.point));
-                let long = a.windows(2).map(|two| {
-                    clouds::distance(&cloud.points[two[0] as usize], &cloud.points[two[1] as usize])
-                });
-                let long: f64 = long.sum();
-                assert!((long - f64::from(d)).abs() <= 1e-5 * long, "{long} along a path of {d}");
-                assert_eq!(rebuilt.distance(id, close.point), Some(close.distance));
+                let exact = f64::from(shortest[close.point as usize]);
+                assert!(is_near(close.distance, exact, ROUNDED), "{close:?} for {exact}");
+                for map in [&rebuilt, &stored] {
+                    let length = map.path(network, [id, close.point], &mut scratch, &mut path).unwrap();
+                    assert_eq!([path[0], path[path.len() - 1]], [id, close.point]);
+                    let edges = path.windows(2).map(|two| {
+                        assert!(cloud.graph.of(two[0] as usize).contains(&two[1]), "{two:?} is no edge");
+                        clouds::distance(&cloud.points[two[0] as usize], &cloud.points[two[1] as usize])
+                    });
+                    let along: f64 = edges.sum();
+                    assert!(is_near(length, along, 1e-5), "{along} along a path of {length}");
+                    assert!(is_near(length, exact, 1e-5), "{length} where {exact} is shortest");
+                }
             }
         }
     }

@@ -5,7 +5,8 @@ mod clouds;
 
 use clouds::Cloud;
 use nearmiss_graph::{
-    ClosePairs, Flaw, GeodesicKernel, KernelScratch, LevelScratch, Levels, LoadError, Network, Paths,
+    ClosePairs, Flaw, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels, LoadError,
+    Network, Paths,
 };
 use nearmiss_store::{Check, File, Writer};
 use nearmiss_surface::{SurfaceOptions, SurfacePlan};
@@ -55,6 +56,7 @@ fn no_byte_changed_leads_out_of_the_arrays() {
     let plan = SurfacePlan::new(&SurfaceOptions::default(), 1.0, 1.0).unwrap();
     let n = u32::try_from(cloud.points.len()).unwrap();
     let (mut scratch, mut search, mut path) = (KernelScratch::default(), LevelScratch::default(), Vec::new());
+    let mut geodesic = GeodesicScratch::default();
     let (mut refused, mut tried) = (0, 0);
     let file = File::from_bytes(bytes.clone(), Check::Full).unwrap();
     for section in file.sections() {
@@ -74,7 +76,8 @@ fn no_byte_changed_leads_out_of_the_arrays() {
                     for i in (0..n).step_by(5) {
                         let x = cloud.points[i as usize].map(|c| f64::from(c) + 0.01);
                         assert!(kernel.evaluate(x, i, &mut scratch).f.is_finite(), "byte {place}");
-                        lying.path(&cloud.graph, &cloud.points, i, (i + 1) % n, &mut path);
+                        assert_eq!(lying.of(i as usize).count(), lying.of(i as usize).len(), "byte {place}");
+                        lying.path(network, [i, (i + 1) % n], &mut geodesic, &mut path);
                     }
                 }
                 Err(_) => refused += 1,

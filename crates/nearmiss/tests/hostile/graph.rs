@@ -42,8 +42,8 @@ pub(crate) fn exercise_graph(scan: &Scan) -> Option<GraphAnswers> {
         keep(graph.levels().path(network, [i, j], &mut far, &mut path), &path);
         answers.counts.push(search.within(network, i, scan.radii()[i as usize]).len());
         let Some(pairs) = graph.close_pairs() else { continue };
-        for close in pairs.of(i as usize).iter().take(20) {
-            let length = pairs.path(points.edges(), positions, i, close.point, &mut path);
+        for close in pairs.of(i as usize).take(20) {
+            let length = pairs.path(network, [i, close.point], &mut search, &mut path);
             assert_eq!(length.is_some(), !path.is_empty(), "a length has a path");
             answers.lengths.push(length.map(f32::to_bits));
             answers.paths.push(path.clone());

@@ -1,0 +1,258 @@
+//! Lists of close pairs as they are stored: four bytes a pair.
+//!
+//! Points stand in the order of the hierarchy's leaves, so most that are heard at a point have indices near its own: two
+//! bytes hold the difference. Two more hold the distance, rounded to 14 bits (13 of them stored) of which eight binades
+//! from one that the list chooses can be told: a relative error of 2⁻¹⁴ = 6.1e-5 at most. The few pairs that do not
+//! fit stand whole beside.
+
+use std::ops::Range;
+use std::slice::Iter;
+
+use bytemuck::{Pod, Zeroable};
+
+/// A point that is heard, and how far it is along the graph.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Close {
+    /// Its index.
+    pub point: u32,
+    /// The length of a shortest path from there, within 2⁻¹⁴ of it.
+    pub distance: f32,
+}
+
+/// A pair that does not fit four bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Beside {
+    /// Where among all pairs it belongs.
+    pub(crate) pair: u32,
+    pub(crate) point: u32,
+    pub(crate) distance: f32,
+}
+
+/// The offset of a pair that stands beside.
+pub(crate) const BESIDE: i16 = i16::MIN;
+
+/// Bits of a single-precision number that are not kept.
+const DROPPED: u32 = 10;
+/// What of its mantissa is.
+const KEPT: u32 = f32::MANTISSA_DIGITS - 1 - DROPPED;
+/// Binades that a code tells apart.
+const BINADES: u32 = 1 << (16 - KEPT);
+/// The lowest of them is no lower, so that all numbers are normal, and no higher, so that all are finite.
+const FLOORS: std::ops::RangeInclusive<u32> = 1..=255 - BINADES;
+
+/// The leading bits of a distance, rounded to nearest: exponent and mantissa.
+#[inline]
+fn leading(distance: f32) -> u32 {
+    let bits = distance.to_bits();
+    (bits >> DROPPED) + (bits >> (DROPPED - 1) & 1)
+}
+
+/// The greatest that a distance of at most `most` is after packing.
+pub(crate) fn rounded(most: f32) -> f32 {
+    most.max(f32::from_bits(leading(most) << DROPPED))
+}
+
+pub(crate) fn is_floor(floor: u8) -> bool {
+    FLOORS.contains(&u32::from(floor))
+}
+
+/// The floor from which most of these, by distance, fit; of several the highest.
+pub(crate) fn floor(list: &[Close]) -> u8 {
+    let exponent = |close: &Close| leading(close.distance) >> KEPT;
+    let (mut first, mut best) = (0, (0, *FLOORS.start()));
+    for (k, close) in list.iter().enumerate() {
+        let floor = (exponent(close) + 1).saturating_sub(BINADES).clamp(*FLOORS.start(), *FLOORS.end());
+        while exponent(&list[first]) < floor && first < k {
+            first += 1;
+        }
+        best = best.max((k - first, floor));
+    }
+    u8::try_from(best.1).unwrap_or(u8::MAX)
+}
+
+/// What is stored of `close` in the list of point `own`, if it fits: the difference of indices and the code of the distance.
+#[inline]
+pub(crate) fn pack(own: u32, floor: u8, close: Close) -> Option<(i16, u16)> {
+    let offset = i16::try_from(i64::from(close.point) - i64::from(own)).ok().filter(|&o| o != BESIDE)?;
+    if close.distance == 0.0 {
+        return Some((offset, 0));
+    }
+    let code = leading(close.distance).checked_sub(u32::from(floor) << KEPT)?;
+    Some((offset, u16::try_from(code).ok().filter(|&code| code > 0)?))
+}
+
+#[inline]
+fn unpack(floor: u8, code: u16) -> f32 {
+    let bits = ((u32::from(floor) << KEPT) + u32::from(code)) << DROPPED;
+    if code == 0 { 0.0 } else { f32::from_bits(bits) }
+}
+
+/// All lists, borrowed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lists<'a> {
+    pub(crate) starts: &'a [u32],
+    pub(crate) floors: &'a [u8],
+    pub(crate) offsets: &'a [i16],
+    pub(crate) codes: &'a [u16],
+    pub(crate) beside: &'a [Beside],
+}
+
+impl<'a> Lists<'a> {
+    fn range(&self, i: usize) -> Range<usize> {
+        self.starts[i] as usize..self.starts[i + 1] as usize
+    }
+
+    #[inline]
+    pub(crate) fn of(&self, i: usize) -> CloseList<'a> {
+        let range = self.range(i);
+        CloseList {
+            #[expect(clippy::cast_possible_truncation, reason = "points are numbered by 32 bits")]
+            own: i as u32,
+            floor: self.floors[i],
+            end: self.starts[i + 1],
+            offsets: self.offsets[range.clone()].iter(),
+            codes: self.codes[range].iter(),
+            beside: self.beside,
+        }
+    }
+
+    /// Where among all pairs that of `i` with `j` stands, and how far they are from each other. Two passes over the
+    /// offsets of the list, many at a time.
+    pub(crate) fn find(&self, i: u32, j: u32) -> Option<(usize, f32)> {
+        let range = self.range(i as usize);
+        let offsets = &self.offsets[range.clone()];
+        let offset = i16::try_from(i64::from(j) - i64::from(i)).ok().filter(|&o| o != BESIDE);
+        if let Some(offset) = offset.filter(|o| offsets.contains(o)) {
+            let pair = range.start + offsets.iter().position(|&o| o == offset)?;
+            return Some((pair, unpack(self.floors[i as usize], self.codes[pair])));
+        }
+        if !offsets.contains(&BESIDE) {
+            return None;
+        }
+        let first = self.beside.partition_point(|b| (b.pair as usize) < range.start);
+        let of_list = self.beside[first..].iter().take_while(|b| (b.pair as usize) < range.end);
+        let found = of_list.copied().find(|b| b.point == j)?;
+        Some((found.pair as usize, found.distance))
+    }
+}
+
+/// The points heard at one, nearest first.
+#[derive(Debug, Clone)]
+pub struct CloseList<'a> {
+    own: u32,
+    floor: u8,
+    /// Where among all pairs the list ends.
+    end: u32,
+    offsets: Iter<'a, i16>,
+    codes: Iter<'a, u16>,
+    /// All pairs that stand beside; of the list's own what is left, once one was met.
+    beside: &'a [Beside],
+}
+
+impl CloseList<'_> {
+    /// The pair that stands beside before the `left` last ones of the list.
+    #[cold]
+    fn unfit(&mut self, left: usize) -> Close {
+        let pair = (self.end as usize).wrapping_sub(left + 1);
+        let is_before = |beside: &Beside| (beside.pair as usize) < pair;
+        // The next one, but for the first.
+        if self.beside.first().is_some_and(is_before) {
+            self.beside = &self.beside[self.beside.partition_point(is_before)..];
+        }
+        match self.beside.split_first() {
+            Some((&Beside { pair: found, point, distance }, rest)) if found as usize == pair => {
+                self.beside = rest;
+                Close { point, distance }
+            }
+            // Only in a file that lies: no point is there, or anywhere.
+            _ => Close { point: u32::MAX, distance: f32::INFINITY },
+        }
+    }
+}
+
+impl Iterator for CloseList<'_> {
+    type Item = Close;
+
+    #[inline]
+    fn next(&mut self) -> Option<Close> {
+        let (&offset, &code) = (self.offsets.next()?, self.codes.next()?);
+        if offset == BESIDE {
+            return Some(self.unfit(self.offsets.len()));
+        }
+        let point = self.own.wrapping_add_signed(offset.into());
+        Some(Close { point, distance: unpack(self.floor, code) })
+    }
+
+    #[inline]
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        self.offsets.size_hint()
+    }
+}
+
+impl ExactSizeIterator for CloseList<'_> {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(point: u32, distance: f32) -> Close {
+        Close { point, distance }
+    }
+
+    #[test]
+    fn what_fits_is_rounded_by_a_sixteen_thousandth_at_most() {
+        for start in [1e-37_f32, 1e-9, 0.3, 1.0, 77.7, 1e30] {
+            let floor = floor(&[close(0, 0.0), close(1, 200.0 * start)]);
+            let (mut before, mut distance) = (0.0, start * 2.0);
+            while distance < 200.0 * start {
+                let (offset, code) = pack(7, floor, close(3, distance)).unwrap();
+                let back = unpack(floor, code);
+                assert_eq!(offset, -4);
+                assert!((back - distance).abs() <= 6.104e-5 * distance, "{distance} comes back as {back}");
+                assert!(back >= before, "order is kept: {before}, {back}");
+                assert_eq!(pack(7, floor, close(3, back)), Some((offset, code)), "twice is once");
+                (before, distance) = (back, distance * 1.000_03);
+            }
+        }
+        assert_eq!(pack(7, 100, close(7, 0.0)), Some((0, 0)));
+        assert_eq!(unpack(100, 0).to_bits(), 0);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_known() {
+        let far = |point: u32| pack(40_000, 127, close(point, 1.5)).is_none();
+        assert!([40_000 + 32_767, 40_000 - 32_767].into_iter().all(|p| !far(p)), "as far as two bytes reach");
+        assert!([40_000 + 32_768, 40_000 - 32_768, 0, u32::MAX].into_iter().all(far), "further");
+        let lost = |floor: u8, distance: f32| pack(0, floor, close(1, distance)).is_none();
+        // From 1 to below 256, but for what is rounded to either.
+        assert!(!lost(127, 1.000_2) && lost(127, 1.000_01) && lost(127, 0.5));
+        assert!(!lost(127, 255.98) && lost(127, 255.999) && lost(127, 256.0));
+        assert!(lost(1, 1e-45) && lost(247, f32::MAX) && !lost(247, 3.4e38));
+        assert!(lost(247, f32::NAN) && lost(1, -1.0) && lost(1, -f32::NAN), "no distance at all");
+    }
+
+    #[test]
+    fn every_code_of_a_floor_is_a_finite_distance_of_its_own() {
+        for floor in [1, 2, 127, 247] {
+            assert!(is_floor(floor));
+            let distances: Vec<f32> = (0..=u16::MAX).map(|code| unpack(floor, code)).collect();
+            assert!(distances.is_sorted_by(|a, b| a < b), "floor {floor}");
+            assert!(distances[1] >= f32::MIN_POSITIVE && distances[65535].is_finite(), "floor {floor}");
+        }
+        assert!(!is_floor(0) && !is_floor(248) && !is_floor(255));
+    }
+
+    #[test]
+    fn the_floor_is_where_most_fit() {
+        let of = |distances: &[f32]| floor(&distances.iter().map(|&d| close(0, d)).collect::<Vec<_>>());
+        assert_eq!(of(&[0.0]), 1);
+        // 1 has exponent 127.
+        assert_eq!(of(&[0.0, 0.5, 1.0]), 120);
+        assert_eq!(of(&[0.0, 0.01, 0.02, 0.9, 0.95, 1.0]), 120, "all fit");
+        assert_eq!(of(&[0.0, 1e-3, 1.1e-3, 1.2e-3, 1.0]), 110, "one that is far stands beside");
+        assert_eq!(of(&[0.0, 1e-6, 1.0, 1.1, 1.2]), 120, "one that is near stands beside");
+        assert_eq!(of(&[0.0, 1e-45, 1e-44]), 1);
+        assert_eq!(of(&[0.0, f32::MAX]), 247);
+    }
+}
