@@ -57,35 +57,56 @@ pub(crate) fn is_floor(floor: u8) -> bool {
     FLOORS.contains(&u32::from(floor))
 }
 
-/// The floor from which most of these, by distance, fit; of several the highest.
+/// The floor from which most of these, by distance and the first at none, fit; of several the highest.
 pub(crate) fn floor(list: &[Close]) -> u8 {
     let exponent = |close: &Close| leading(close.distance) >> KEPT;
-    let (mut first, mut best) = (0, (0, *FLOORS.start()));
-    for (k, close) in list.iter().enumerate() {
-        let floor = (exponent(close) + 1).saturating_sub(BINADES).clamp(*FLOORS.start(), *FLOORS.end());
-        while exponent(&list[first]) < floor && first < k {
-            first += 1;
+    let below = |top: u32| (top + 1).saturating_sub(BINADES).clamp(*FLOORS.start(), *FLOORS.end());
+    let highest = below(list.last().map_or(0, exponent));
+    let (mut first, mut best) = (0, (0, highest));
+    // All fit almost always.
+    if list.get(1).is_some_and(|nearest| exponent(nearest) < highest) {
+        for (k, close) in list.iter().enumerate() {
+            let floor = below(exponent(close));
+            while exponent(&list[first]) < floor && first < k {
+                first += 1;
+            }
+            best = best.max((k - first, floor));
         }
-        best = best.max((k - first, floor));
     }
     u8::try_from(best.1).unwrap_or(u8::MAX)
 }
 
-/// What is stored of `close` in the list of point `own`, if it fits: the difference of indices and the code of the distance.
+/// What is stored of `close` in the list of point `own`: the difference of indices and the code of the distance; where these
+/// do not fit, that it stands beside.
 #[inline]
-pub(crate) fn pack(own: u32, floor: u8, close: Close) -> Option<(i16, u16)> {
-    let offset = i16::try_from(i64::from(close.point) - i64::from(own)).ok().filter(|&o| o != BESIDE)?;
-    if close.distance == 0.0 {
-        return Some((offset, 0));
-    }
-    let code = leading(close.distance).checked_sub(u32::from(floor) << KEPT)?;
-    Some((offset, u16::try_from(code).ok().filter(|&code| code > 0)?))
+pub(crate) fn pack(own: u32, floor: u8, close: Close) -> (i16, u16) {
+    // Modulo 2³², as they are added again.
+    let difference = close.point.wrapping_sub(own).cast_signed();
+    let code = leading(close.distance).wrapping_sub(u32::from(floor) << KEPT);
+    #[expect(clippy::cast_possible_truncation, reason = "whether they fit is seen below")]
+    let (offset, low) = (difference as i16, code as u16);
+    let near = (i32::from(offset) == difference) & (offset != BESIDE);
+    let coded = (u32::from(low) == code) & (low != 0);
+    let at_none = close.distance == 0.0;
+    let fits = near & (coded | at_none);
+    (if fits { offset } else { BESIDE }, if fits & !at_none { low } else { 0 })
 }
 
 #[inline]
 fn unpack(floor: u8, code: u16) -> f32 {
     let bits = ((u32::from(floor) << KEPT) + u32::from(code)) << DROPPED;
-    if code == 0 { 0.0 } else { f32::from_bits(bits) }
+    f32::from_bits(if code == 0 { 0 } else { bits })
+}
+
+/// Where `wanted` stands first, many compared at a time.
+fn position(offsets: &[i16], wanted: i16) -> Option<usize> {
+    let (chunks, rest) = offsets.as_chunks::<16>();
+    let is_in = |chunk: &[i16; 16]| chunk.iter().fold(false, |found, &offset| found | (offset == wanted));
+    let (before, some) = match chunks.iter().position(is_in) {
+        Some(k) => (16 * k, &chunks[k][..]),
+        None => (16 * chunks.len(), rest),
+    };
+    Some(before + some.iter().position(|&offset| offset == wanted)?)
 }
 
 /// All lists, borrowed.
@@ -117,19 +138,31 @@ impl<'a> Lists<'a> {
         }
     }
 
-    /// Where among all pairs that of `i` with `j` stands, and how far they are from each other. Two passes over the
-    /// offsets of the list, many at a time.
+    /// Fills `closes` with the list of `i`: as [`Self::of`], many at a time.
+    pub(crate) fn read(&self, i: usize, closes: &mut Vec<Close>) {
+        closes.clear();
+        let list = self.of(i);
+        let (own, floor, offsets) = (list.own, list.floor, list.offsets.as_slice());
+        closes.extend(offsets.iter().zip(list.codes.as_slice()).map(|(&offset, &code)| Close {
+            point: own.wrapping_add_signed(offset.into()),
+            distance: unpack(floor, code),
+        }));
+        if position(offsets, BESIDE).is_some() {
+            closes.clear();
+            closes.extend(list);
+        }
+    }
+
+    /// Where among all pairs that of `i` with `j` stands, and how far they are from each other.
     pub(crate) fn find(&self, i: u32, j: u32) -> Option<(usize, f32)> {
         let range = self.range(i as usize);
         let offsets = &self.offsets[range.clone()];
-        let offset = i16::try_from(i64::from(j) - i64::from(i)).ok().filter(|&o| o != BESIDE);
-        if let Some(offset) = offset.filter(|o| offsets.contains(o)) {
-            let pair = range.start + offsets.iter().position(|&o| o == offset)?;
+        let offset = i16::try_from(j.wrapping_sub(i).cast_signed()).ok().filter(|&offset| offset != BESIDE);
+        if let Some(place) = offset.and_then(|offset| position(offsets, offset)) {
+            let pair = range.start + place;
             return Some((pair, unpack(self.floors[i as usize], self.codes[pair])));
         }
-        if !offsets.contains(&BESIDE) {
-            return None;
-        }
+        position(offsets, BESIDE)?;
         let first = self.beside.partition_point(|b| (b.pair as usize) < range.start);
         let of_list = self.beside[first..].iter().take_while(|b| (b.pair as usize) < range.end);
         let found = of_list.copied().find(|b| b.point == j)?;
@@ -206,30 +239,40 @@ mod tests {
             let floor = floor(&[close(0, 0.0), close(1, 200.0 * start)]);
             let (mut before, mut distance) = (0.0, start * 2.0);
             while distance < 200.0 * start {
-                let (offset, code) = pack(7, floor, close(3, distance)).unwrap();
+                let (offset, code) = pack(7, floor, close(3, distance));
                 let back = unpack(floor, code);
                 assert_eq!(offset, -4);
                 assert!((back - distance).abs() <= 6.104e-5 * distance, "{distance} comes back as {back}");
                 assert!(back >= before, "order is kept: {before}, {back}");
-                assert_eq!(pack(7, floor, close(3, back)), Some((offset, code)), "twice is once");
+                assert_eq!(pack(7, floor, close(3, back)), (offset, code), "twice is once");
                 (before, distance) = (back, distance * 1.000_03);
             }
         }
-        assert_eq!(pack(7, 100, close(7, 0.0)), Some((0, 0)));
+        assert_eq!(pack(7, 100, close(7, 0.0)), (0, 0));
         assert_eq!(unpack(100, 0).to_bits(), 0);
     }
 
     #[test]
     fn what_does_not_fit_is_known() {
-        let far = |point: u32| pack(40_000, 127, close(point, 1.5)).is_none();
+        let far = |point: u32| pack(40_000, 127, close(point, 1.5)) == (BESIDE, 0);
         assert!([40_000 + 32_767, 40_000 - 32_767].into_iter().all(|p| !far(p)), "as far as two bytes reach");
         assert!([40_000 + 32_768, 40_000 - 32_768, 0, u32::MAX].into_iter().all(far), "further");
-        let lost = |floor: u8, distance: f32| pack(0, floor, close(1, distance)).is_none();
+        let lost = |floor: u8, distance: f32| pack(0, floor, close(1, distance)) == (BESIDE, 0);
         // From 1 to below 256, but for what is rounded to either.
         assert!(!lost(127, 1.000_2) && lost(127, 1.000_01) && lost(127, 0.5));
         assert!(!lost(127, 255.98) && lost(127, 255.999) && lost(127, 256.0));
         assert!(lost(1, 1e-45) && lost(247, f32::MAX) && !lost(247, 3.4e38));
         assert!(lost(247, f32::NAN) && lost(1, -1.0) && lost(1, -f32::NAN), "no distance at all");
+    }
+
+    #[test]
+    fn the_first_of_several_is_found() {
+        for count in [0, 1, 15, 16, 17, 40, 64] {
+            let offsets: Vec<i16> = (0..count).map(|k| k / 2).collect();
+            for wanted in -1..=count {
+                assert_eq!(position(&offsets, wanted), offsets.iter().position(|&o| o == wanted), "{wanted}");
+            }
+        }
     }
 
     #[test]

@@ -56,6 +56,8 @@ pub struct KernelScratch {
     /// One more than where a point stands among `both`, 0 for none.
     place: Vec<u32>,
     both: Vec<Both>,
+    /// What is heard at the ends of an edge.
+    ends: [Vec<Close>; 2],
     heard: Vec<Close>,
     blocks: Vec<MeasuredBlock>,
 }
@@ -70,7 +72,8 @@ impl KernelScratch {
     /// For evaluations by the instructions of `level`, which change no bit.
     #[must_use]
     pub fn at(level: Level) -> Self {
-        Self { level, place: Vec::new(), both: Vec::new(), heard: Vec::new(), blocks: Vec::new() }
+        let (place, both, ends) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
+        Self { level, place, both, ends, heard: Vec::new(), blocks: Vec::new() }
     }
 }
 
@@ -127,35 +130,35 @@ impl<'a> GeodesicKernel<'a> {
     /// # Panics
     /// When its ends are no points.
     pub fn hear<'s>(&self, foot: &Foot, scratch: &'s mut KernelScratch) -> &'s [Close] {
-        let KernelScratch { place, both, heard, .. } = scratch;
+        let KernelScratch { place, both, ends: [first, second], heard, .. } = scratch;
         both.clear();
         heard.clear();
         // No distance, not even one that a file makes up, is less than that of a point that is not there.
         let horizon =
             |point: u32| self.radii.get(point as usize).map_or(f32::NEG_INFINITY, |&r| self.plan.horizon(r));
-        let first = self.lists.of(foot.ends[0] as usize);
+        self.lists.read(foot.ends[0] as usize, first);
         if foot.share <= 0.0 {
-            heard.extend(first.filter(|close| close.distance < horizon(close.point)));
+            heard.extend(first.iter().filter(|close| close.distance < horizon(close.point)));
             return heard;
         }
         if place.len() < self.positions.len() {
             place.resize(self.positions.len(), 0);
         }
-        let of_first = first.len();
-        for (place_of, close) in (1..).zip(first) {
+        for (place_of, close) in (1..).zip(&*first) {
             both.push(Both { point: close.point, distances: [close.distance, f32::INFINITY] });
             if let Some(to) = place.get_mut(close.point as usize) {
                 *to = place_of;
             }
         }
-        for close in self.lists.of(foot.ends[1] as usize) {
+        self.lists.read(foot.ends[1] as usize, second);
+        for close in second {
             match place.get(close.point as usize) {
                 Some(&known) if known > 0 => both[known as usize - 1].distances[1] = close.distance,
                 _ => both.push(Both { point: close.point, distances: [f32::INFINITY, close.distance] }),
             }
         }
-        for one in &both[..of_first] {
-            if let Some(to) = place.get_mut(one.point as usize) {
+        for close in first {
+            if let Some(to) = place.get_mut(close.point as usize) {
                 *to = 0;
             }
         }

@@ -103,7 +103,7 @@ impl ClosePairs {
             let mut is_sound = pairs.len() > 0;
             for (pair, close) in pairs.clone().zip(view.of(i)) {
                 if self.offsets[pair as usize] == BESIDE {
-                    let fits = pack(own, floors[i], close).is_some();
+                    let fits = pack(own, floors[i], close).0 != BESIDE;
                     is_sound &= beside.next().is_some_and(|b| b.pair == pair) && !fits;
                 }
                 let horizon = horizons.get(close.point as usize);
