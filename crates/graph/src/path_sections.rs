@@ -100,7 +100,7 @@ impl ClosePairs {
         let mut beside = self.beside.iter();
         for (i, own) in (0..self.len()).zip(0..) {
             let (pairs, mut before) = (self.starts[i]..self.starts[i + 1], 0.0);
-            let mut is_sound = pairs.len() > 0;
+            let mut is_sound = !pairs.is_empty();
             for (pair, close) in pairs.clone().zip(view.of(i)) {
                 if self.offsets[pair as usize] == BESIDE {
                     let fits = pack(own, floors[i], close).0 != BESIDE;

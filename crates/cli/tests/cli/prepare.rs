@@ -356,8 +356,18 @@ fn scans_are_prepared_for_a_kernel() {
     }
     place.refused(2, &["collide", "along.nm", "along.nm", "--prove", "p.jsonl"], &["--prove", "geodesic"]);
     let apart = crate::running::shift(2.5, 0.0, 0.0);
-    let miss = place.ok(&["collide", "along.nm", "along.nm", "--pose-b", &apart, "--json"]).json().remove(0);
-    assert_eq!((&miss["verdict"], &miss["evidence"]), (&"separated".into(), &"estimated".into()));
+    for (file, options, warned) in [
+        ("along.nm", &[][..], false),
+        ("along.nm", &["--evidence", "estimated"], false),
+        ("along.nm", &["--evidence", "certified"], true),
+        ("straight.nm", &["--evidence", "certified"], false),
+    ] {
+        let done = place.ok(&[&["collide", file, file, "--pose-b", &apart, "--json"], options].concat());
+        let evidence = if file == "along.nm" { "estimated" } else { "certified" };
+        let miss = done.json().remove(0);
+        assert_eq!((&miss["verdict"], &miss["evidence"]), (&"separated".into(), &evidence.into()));
+        assert_eq!(done.errors.contains("no separation is proven"), warned, "{options:?}: {}", done.errors);
+    }
 
     // f is asked for by either, whatever the scan is for; by default by its own.
     place.write("at.txt", "0.99 0 0");
