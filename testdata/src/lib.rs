@@ -7,6 +7,8 @@ pub mod shapes;
 
 pub mod pairs;
 
+pub mod cuts;
+
 pub mod arbitrary;
 pub mod dragon;
 pub mod matrices;

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use crate::verdict::Statistics;
+use crate::view::ScanView;
 
 /// Between two looks at the clock, which cost some 22 ns each, lies work of about this many node pairs, which cost
 /// about 15 ns each.
@@ -127,6 +128,19 @@ impl Meter {
             longest_stretch: Duration::ZERO,
             spent: Statistics::default(),
         }
+    }
+
+    /// One that goes on after `spent`, with evaluations along curves in steps of so many sampling radii.
+    pub(crate) fn resumed(budget: &Budget, views: [&ScanView<'_>; 2], step: f64, spent: Statistics) -> Self {
+        /// The curve in a pair of leaves may be so many sampling radii long.
+        const LENGTH: f64 = 16.0;
+        /// Evaluations a step.
+        const EVALUATIONS: f64 = 8.0;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 2¹⁶")]
+        let evaluations = (EVALUATIONS * LENGTH / step).clamp(1.0, 65536.0) as u64;
+        let leaves = views.map(|view| view.slices().nodes.len().div_ceil(2) as u64);
+        let points = views.map(|view| u64::from(view.scan().leaf_size()));
+        Self { spent, ..Self::new(budget, leaves, points, evaluations) }
     }
 
     /// Counts two leaves of so many points each.

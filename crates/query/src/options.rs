@@ -244,6 +244,9 @@ pub enum PlanError {
     /// A tolerance in a sphere that is none.
     #[error("a tolerance of {0} sampling radii in a sphere; it must be more than 0.01 and at most 1")]
     Refinement(f64),
+    /// A spacing or tolerance of curves that is no length.
+    #[error("a spacing or tolerance of {0}; it must be finite and more than 0")]
+    CurveLength(f64),
     /// Test points say whether surfaces cross, not how far apart they are.
     #[error(
         "the methods `sampling` and `interpolation` compare surfaces, without a margin; leave the margin and the thickness out"

@@ -135,6 +135,25 @@ impl<'a> ScanView<'a> {
         }
     }
 
+    /// f at `x` but for its sign, as [`Self::evaluate_with`]; faster where the last place that was asked about with this scratch is near. `nearest`
+    /// is the point nearest to that, or any, and then that nearest to `x` if the kernel needs it.
+    pub(crate) fn evaluate_onward(
+        &self,
+        x: [f64; 3],
+        nearest: &mut usize,
+        scratch: &mut ViewScratch,
+    ) -> Evaluation {
+        let x = self.placed.apply_inverse(x);
+        self.in_world(match &self.kernel {
+            None => self.scan.evaluate_with(x, &mut scratch.gather),
+            Some(kernel) => {
+                let found = self.scan.nearest_point_near(*nearest, x);
+                *nearest = found as usize;
+                kernel.evaluate(x, found, &mut scratch.kernel)
+            }
+        })
+    }
+
     /// What holds in the stored frame, in the world.
     pub(crate) fn in_world(&self, at: Evaluation) -> Evaluation {
         let scale = self.placed.scale();

@@ -180,8 +180,11 @@ fn test_points_and_margins_find_all_along_a_circle() {
         let set: BTreeSet<_> = found(&contacts, [&sphere; 2]).into_iter().collect();
         assert_eq!(set.len(), contacts.contacts.len(), "one of each pair");
         // All twelve hours of the circle.
-        let hour = |c: &nearmiss_query::Contact| (c.point[1].atan2(c.point[2]) * 6.0 / 3.1416).floor();
-        let hours: BTreeSet<i64> = contacts.contacts.iter().map(|c| hour(c) as i64).collect();
+        let hour = |c: &nearmiss_query::Contact| {
+            let angle = c.point[1].atan2(c.point[2]).rem_euclid(std::f64::consts::TAU);
+            (0..12).rfind(|&hour| f64::from(hour) * std::f64::consts::TAU / 12.0 <= angle)
+        };
+        let hours: BTreeSet<Option<i32>> = contacts.contacts.iter().map(hour).collect();
         assert_eq!(hours.len(), 12, "{hours:?}");
     }
 }

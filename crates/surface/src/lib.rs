@@ -20,7 +20,7 @@ pub use eigen_cholesky::{LeastEigen, cubic_cholesky_eigen};
 pub use fearless_simd::Level;
 pub use fit::{BORDER, Evaluation, Status};
 pub use kernel::Kernel;
-pub use meet::{Meeting, meet};
+pub use meet::{Meeting, meet, step_onto_both};
 pub use neighbourhood::{Centre, HalfBlock, MeasuredBlock, Moments, Neighbourhood, PointBlock};
 pub use options::{Bandwidth, Metric, SurfaceError, SurfaceOptions, SurfacePlan};
 pub use project::{Projection, project};

@@ -58,19 +58,25 @@ pub fn meet(
             let verified = on && at.iter().all(|e| e.status == Status::Ok);
             return Some(Meeting { point, at, rounds, verified });
         }
-        point = (Vector3::from(point) + step(&at)).into();
+        point = (Vector3::from(point) + step_onto_both(&at, PARALLEL)).into();
         at = evaluate(point)?;
         rounds += 1;
     }
 }
 
-fn step(at: &[Evaluation; 2]) -> Vector3<f64> {
+/// Where the square of the sine between the normals is less, [`meet`] takes them for parallel: to within 1.8°.
+const PARALLEL: f64 = 1e-3;
+
+/// The step of [`meet`] from a place where the two functions are `at`: the least one that makes both vanish to first order, at most
+/// h/2. Where the square of the sine between the normals is less than `parallel`, halfway to either instead.
+#[must_use]
+pub fn step_onto_both(at: &[Evaluation; 2], parallel: f64) -> Vector3<f64> {
     let [a, b] = at;
     let (na, nb) = (Vector3::from(a.normal), Vector3::from(b.normal));
     let c = na.dot(&nb);
     let gram = 1.0 - c * c;
     let (fa, fb) = (newton(a), newton(b));
-    let step = if gram < 1e-3 {
+    let step = if gram < parallel {
         0.5 * (fa * na + fb * nb)
     } else {
         ((fa - c * fb) * na + (fb - c * fa) * nb) / gram

@@ -1,0 +1,241 @@
+//! All of {x | f_A(x) = f_B(x) = 0}: the curves in which two surfaces cut each other, as polylines.
+//!
+//! [`collide_all`] says where discs of either scan cross. From the first of these places that no curve has passed, Newton's
+//! method leads onto both surfaces, and from there the curve is followed both ways (`follow`): ahead along n_A × n_B, back
+//! onto both surfaces by Newton's method, in steps that get shorter where the curve turns. Crossings that it passed start
+//! no other (`trail`). Places where the surfaces cross steeply come first: where they graze, first order says little
+//! (docs/theory/curves.md).
+
+mod follow;
+mod trail;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_surface::meet;
+
+use crate::budget::{Budget, Meter};
+use crate::collide::{CollideScratch, Contacts, collide_all};
+use crate::options::{CollideOptions, CollidePlan, Detail, Order, PlanError};
+use crate::verdict::{Contact, Evidence, Statistics};
+use crate::view::{ScanView, ViewScratch};
+use follow::{Follower, LONGEST, PARALLEL, SAME_TURN};
+use trail::{Place, Trail};
+
+/// Tolerances below this share of the lesser sampling radius are not reached by single-precision sums.
+const LEAST_TOLERANCE: f64 = 1e-5;
+
+/// Crossings of discs at angles with a sine from this on start curves before all others.
+const STEEP: f64 = 0.3;
+
+/// How curves are to be drawn; lengths in the world.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
+pub struct CurveOptions {
+    /// The wanted distance of points that follow each other; they are nearer where a curve turns by more than 0.2 between
+    /// them. None: twice the lesser of the scans' sampling radii.
+    pub spacing: Option<f64>,
+    /// The greatest |f| of either surface at a point. None: a thousandth of that radius; never less than a hundredth of that.
+    pub tolerance: Option<f64>,
+}
+
+impl CurveOptions {
+    /// The same options with this spacing.
+    #[must_use]
+    pub const fn with_spacing(self, spacing: f64) -> Self {
+        Self { spacing: Some(spacing), ..self }
+    }
+
+    /// The same options with this tolerance.
+    #[must_use]
+    pub const fn with_tolerance(self, tolerance: f64) -> Self {
+        Self { tolerance: Some(tolerance), ..self }
+    }
+}
+
+/// Validated options for two scans.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurvePlan {
+    options: CurveOptions,
+    contacts: CollidePlan,
+}
+
+impl CurvePlan {
+    /// Validates `options` for two scans in any poses.
+    ///
+    /// # Errors
+    /// [`PlanError::CurveLength`] for a spacing or tolerance that is not positive; [`PlanError::Metrics`] for scans that are
+    /// prepared for different kernels.
+    pub fn new(options: &CurveOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
+        let given = [options.spacing, options.tolerance].into_iter().flatten();
+        if let Some(length) = given.into_iter().find(|&l| !(l > 0.0 && l.is_finite())) {
+            return Err(PlanError::CurveLength(length));
+        }
+        let contacts = CollideOptions::default()
+            .with_detail(Detail::Verdict)
+            .with_evidence(Evidence::Estimated)
+            .with_order(Order::DepthFirst);
+        Ok(Self { options: *options, contacts: CollidePlan::new(&contacts, a, b)? })
+    }
+
+    /// The options that were validated.
+    #[must_use]
+    pub fn options(&self) -> &CurveOptions {
+        &self.options
+    }
+}
+
+/// Why a curve ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum End {
+    /// The surface of a ends there.
+    BorderOfA,
+    /// The surface of b ends there.
+    BorderOfB,
+    /// The surfaces touch: their normals are parallel to within half a degree, or come to be so faster than the curve can be followed.
+    /// Other curves may end there too.
+    Tangent,
+    /// A surface does not look like one sheet there, or turns too sharply.
+    Lost,
+    /// The budget was spent.
+    Budget,
+}
+
+/// One of [`Curves`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Curve {
+    /// Its first point.
+    pub first: usize,
+    /// How many points it has: one alone where the surfaces touch and no curve leads away.
+    pub count: usize,
+    /// Why it ends where it begins and where it ends; none if the last point is joined to the first.
+    pub ends: Option<[End; 2]>,
+}
+
+impl Curve {
+    /// Whether it is a loop.
+    #[must_use]
+    pub const fn is_closed(&self) -> bool {
+        self.ends.is_none()
+    }
+
+    /// The pairs of points that are joined.
+    pub fn edges(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let Self { first, count, .. } = *self;
+        let joined = if self.is_closed() { count } else { count.saturating_sub(1) };
+        (0..joined).map(move |i| [first + i, first + (i + 1) % count])
+    }
+}
+
+/// The curves in which two surfaces cut each other, in the world.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Curves {
+    /// The points of all, curve after curve, each in order.
+    pub points: Vec<[f64; 3]>,
+    /// The curves, in the order in which they were found.
+    pub curves: Vec<Curve>,
+    /// The greatest |f| of either surface at any of the points.
+    pub max_residual: f64,
+    /// Whether the budget lasted, and the poses are some.
+    pub complete: bool,
+    /// What that cost.
+    pub statistics: Statistics,
+}
+
+impl Curves {
+    /// The length of all curves together.
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        let between =
+            |[i, j]: [usize; 2]| (Vector3::from(self.points[i]) - Vector3::from(self.points[j])).norm();
+        self.curves.iter().flat_map(Curve::edges).map(between).sum()
+    }
+
+    /// How many of the curves are loops.
+    #[must_use]
+    pub fn closed(&self) -> usize {
+        self.curves.iter().filter(|curve| curve.is_closed()).count()
+    }
+}
+
+/// Reused between queries, one a thread; never influences an answer.
+#[derive(Debug, Clone, Default)]
+pub struct CurveScratch {
+    collide: CollideScratch,
+    contacts: Contacts,
+    gathers: [ViewScratch; 2],
+    trail: Trail,
+}
+
+/// The curves in which the surfaces of `a` and `b` cut each other. Allocates a scratch of its own; see [`curves_with`].
+#[must_use]
+pub fn curves(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CurvePlan, budget: &Budget) -> Curves {
+    let mut found = Curves::default();
+    curves_with(a, b, plan, budget, &mut found, &mut CurveScratch::default());
+    found
+}
+
+/// Leaves in `found` the curves in which the surfaces of `a` and `b`, each by the kernel of its view, cut each other, as far as
+/// `budget` lasts.
+///
+/// Each point is within the tolerance of both zero sets, and a chord deviates from its curve by at most a fortieth of its length,
+/// which is at most the wanted spacing: 0.05 sampling radii by default. Of the true surfaces' curve it is as far as the bias of
+/// both surfaces, h²H/2 each, over the sine of their angle. No curve is missed of which a leaf of
+/// either scan saw discs cross; one that is shorter than a leaf and nearer to another than a sampling radius may be taken for that.
+/// Swapped scans give the same curves with other points on them. Scans of the geodesic metric need views with their kernel.
+///
+/// Costs, beside [`collide_all`], five to six pairs of evaluations for each sampling radius of length; does not allocate once
+/// `found` and `scratch` are warm.
+pub fn curves_with(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CurvePlan,
+    budget: &Budget,
+    found: &mut Curves,
+    scratch: &mut CurveScratch,
+) {
+    found.points.clear();
+    found.curves.clear();
+    found.max_residual = 0.0;
+    let CurveScratch { collide, contacts, gathers, trail } = scratch;
+    let answer = collide_all(a, b, &plan.contacts, budget, contacts, collide);
+    found.complete = contacts.complete;
+    found.statistics = answer.statistics;
+    let views = [a, b];
+    let radius = |view: &ScanView<'_>| f64::from(view.slices().sampling_radius) * view.placed().scale();
+    let radius = radius(a).min(radius(b));
+    let spacing = plan.options.spacing.unwrap_or(2.0 * radius);
+    let longest = spacing.min(LONGEST * radius);
+    let tolerance = plan.options.tolerance.unwrap_or(1e-3 * radius).max(LEAST_TOLERANCE * radius);
+    let Some(first) = contacts.contacts.first() else { return };
+    trail.clear(first.point.into(), longest);
+    let meter = Meter::resumed(budget, views, longest / radius, answer.statistics);
+    let mut follower = Follower { views, gathers, nearest: [0; 2], meter, longest, radius, tolerance, trail };
+    for steep in [true, false] {
+        for contact in &contacts.contacts {
+            let crossing = crossing(contact);
+            if (crossing.sine >= STEEP) != steep || follower.trail.has_passed(&crossing, 0.5 * longest) {
+                continue;
+            }
+            let Some(meeting) = meet(contact.point, |x| follower.evaluate(x)) else {
+                found.complete = false;
+                break;
+            };
+            let place = Place::new(meeting.point.into(), &meeting.at);
+            if !meeting.verified || follower.trail.has_passed(&place, SAME_TURN * longest) {
+                continue;
+            }
+            let curve = follower.trace(place, spacing, &mut found.points);
+            found.complete &= !curve.ends.is_some_and(|ends| ends.contains(&End::Budget));
+            found.curves.push(curve);
+        }
+    }
+    found.max_residual = follower.trail.places.iter().fold(0.0, |most, place| place.residual.max(most));
+    found.statistics = follower.meter.spent;
+}
+
+/// Two crossing discs as a place.
+fn crossing(contact: &Contact) -> Place {
+    let normals = contact.normals.map_or([Vector3::zeros(); 2], |normals| normals.map(Vector3::from));
+    Place::between(contact.point.into(), normals, contact.residual)
+}

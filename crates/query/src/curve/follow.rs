@@ -1,0 +1,185 @@
+//! Along a curve, step by step.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_surface::{Evaluation, Status, step_onto_both};
+
+use super::trail::{Place, Trail};
+use super::{Curve, End};
+use crate::budget::Meter;
+use crate::view::{ScanView, ViewScratch};
+
+/// The longest step in sampling radii: no further than the points about a place know of.
+pub(super) const LONGEST: f64 = 2.0;
+
+/// The shortest, in the same radii: so exactly is it known where a curve ends.
+const SHORTEST: f64 = 1.0 / 64.0;
+
+/// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a bandwidth.
+pub(super) const PARALLEL: f64 = 0.01;
+
+/// A curve that cannot be followed where the sine is below this ends because its surfaces touch.
+const GRAZING: f64 = 0.1;
+
+/// The cosine of 0.2, the most a curve turns in a step: an arc then leaves its chord by a fortieth of the chord's length.
+const TURN: f64 = 0.2;
+const TURN_COSINE: f64 = 0.980_067;
+
+/// The cosine of the most a surface turns in a step, 30°: more is another sheet.
+const TILT_COSINE: f64 = 0.866;
+
+/// Rounds of Newton's method a step; a good start needs two.
+const ROUNDS: u32 = 4;
+
+/// These may lead away from where the step aimed by this share of its length: no nearer is another sheet.
+const MOST_CORRECTION: f64 = 0.25;
+
+/// What a chord passes within this share of its length it joins: four times as far as an arc leaves it.
+pub(super) const SAME_TURN: f64 = 0.1;
+
+/// Follows curves, and leaves its trail.
+#[derive(Debug)]
+pub(super) struct Follower<'a> {
+    pub(super) views: [&'a ScanView<'a>; 2],
+    pub(super) gathers: &'a mut [ViewScratch; 2],
+    /// Points near which either function was evaluated last.
+    pub(super) nearest: [usize; 2],
+    pub(super) meter: Meter,
+    /// The longest step.
+    pub(super) longest: f64,
+    /// The lesser sampling radius.
+    pub(super) radius: f64,
+    /// The greatest |f|.
+    pub(super) tolerance: f64,
+    pub(super) trail: &'a mut Trail,
+}
+
+impl Follower<'_> {
+    /// Both functions at `x`; none once the budget is spent.
+    pub(super) fn evaluate(&mut self, x: [f64; 3]) -> Option<[Evaluation; 2]> {
+        if self.meter.go_on().is_break() {
+            return None;
+        }
+        self.meter.spent.evaluations += 2;
+        let mut side = |side: usize| {
+            self.views[side].evaluate_onward(x, &mut self.nearest[side], &mut self.gathers[side])
+        };
+        Some([side(0), side(1)])
+    }
+
+    /// The curve through `place`, whose points are added to `points`, not further than `spacing` from each other.
+    pub(super) fn trace(&mut self, place: Place, spacing: f64, points: &mut Vec<[f64; 3]>) -> Curve {
+        let start = self.trail.places.len();
+        self.trail.push(place);
+        let onward = if place.is_tangent() { Some(End::Tangent) } else { self.follow(start, 1.0) };
+        let turn = self.trail.places.len();
+        let ends = onward.map(|last| {
+            let back = match last {
+                End::Budget => None,
+                _ if place.is_tangent() => Some(End::Tangent),
+                _ => self.follow(start, -1.0),
+            };
+            [back.unwrap_or(last), last]
+        });
+        let first = points.len();
+        let (onward, back) = self.trail.places[start..].split_at(turn - start);
+        thin_out(back.iter().rev().chain(onward), spacing, points);
+        Curve { first, count: points.len() - first, ends }
+    }
+
+    /// From a place of the trail onward, or back (`way` −1), until the curve ends; none when it is there again.
+    fn follow(&mut self, start: usize, way: f64) -> Option<End> {
+        let mut here = self.trail.places[start];
+        let mut bend = Vector3::zeros();
+        let mut length = self.longest;
+        let mut grows = true;
+        loop {
+            // A step that would turn too far need not be tried.
+            let ahead = length.min(0.8 * TURN / bend.norm()).max(SHORTEST * self.longest.min(self.radius));
+            match self.advance(&here, way, bend, ahead) {
+                Ok(next) => {
+                    let chord = (next.point - here.point).norm();
+                    if let Some(passed) = self.trail.passed(&here, &next, SAME_TURN * chord) {
+                        return (passed != start).then_some(End::Lost);
+                    }
+                    let turned = (next.tangent - here.tangent) * (way / chord);
+                    bend = turned - next.tangent * next.tangent.dot(&turned);
+                    self.trail.push(next);
+                    here = next;
+                    if grows {
+                        length = self.longest.min(2.0 * length);
+                    }
+                    grows = true;
+                }
+                Err(End::Budget) => return Some(End::Budget),
+                Err(end) => {
+                    length = 0.5 * ahead;
+                    grows = false;
+                    if length < SHORTEST * self.longest.min(self.radius) {
+                        return Some(end);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The place on the curve a step of `length` ahead, or why there is none.
+    fn advance(&mut self, here: &Place, way: f64, bend: Vector3<f64>, length: f64) -> Result<Place, End> {
+        let aim = here.point + here.tangent * (way * length) + bend * (0.5 * length * length);
+        let missed = if here.sine < GRAZING { End::Tangent } else { End::Lost };
+        let mut point = aim;
+        for _ in 0..ROUNDS {
+            let at = self.evaluate(point.into()).ok_or(End::Budget)?;
+            if at.iter().all(|at| at.f.abs() <= self.tolerance)
+                || at.iter().any(|at| at.status == Status::Outside)
+            {
+                let borders = [End::BorderOfA, End::BorderOfB];
+                for (at, border) in at.iter().zip(borders) {
+                    match at.status {
+                        Status::Ok => {}
+                        Status::Border | Status::Outside => return Err(border),
+                        _ => return Err(End::Lost),
+                    }
+                }
+                let next = Place::new(point, &at).turned_like(here);
+                let tilted = |side: usize| next.normals[side].dot(&here.normals[side]) < TILT_COSINE;
+                if next.is_tangent() {
+                    return Err(End::Tangent);
+                }
+                let turned = next.tangent.dot(&here.tangent) < TURN_COSINE;
+                return if turned || tilted(0) || tilted(1) { Err(missed) } else { Ok(next) };
+            }
+            point += step_onto_both(&at, PARALLEL * PARALLEL);
+            if (point - aim).norm() > MOST_CORRECTION * length {
+                return Err(missed);
+            }
+        }
+        Err(missed)
+    }
+}
+
+/// Adds to `points` the first and the last of `places`, and of those between so many that none is further than `spacing` from the one
+/// before, nor turned by more than a step may.
+fn thin_out<'a>(places: impl Iterator<Item = &'a Place>, spacing: f64, points: &mut Vec<[f64; 3]>) {
+    let mut kept: Option<&Place> = None;
+    let mut last: Option<&Place> = None;
+    let mut since = 0.0;
+    for place in places {
+        if let (Some(kept_place), Some(last_place)) = (kept, last) {
+            let step = (place.point - last_place.point).norm();
+            let turned = place.tangent.dot(&kept_place.tangent).abs() < TURN_COSINE;
+            if since > 0.0 && (since + step > spacing || turned) {
+                points.push(last_place.point.into());
+                kept = last;
+                since = 0.0;
+            }
+            since += step;
+        } else {
+            points.push(place.point.into());
+            kept = Some(place);
+        }
+        last = Some(place);
+    }
+    if let Some(last) = last.filter(|_| since > 0.0) {
+        points.push(last.point.into());
+    }
+}

@@ -1,0 +1,170 @@
+//! The places that curves have passed, and which of them are near.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_surface::Evaluation;
+
+use super::PARALLEL;
+
+/// A place on two surfaces, or nearly so.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Place {
+    pub(super) point: Vector3<f64>,
+    pub(super) normals: [Vector3<f64>; 2],
+    /// n_A × n_B, of length one.
+    pub(super) tangent: Vector3<f64>,
+    /// The sine of the angle between the surfaces.
+    pub(super) sine: f64,
+    /// The greater |f|.
+    pub(super) residual: f64,
+}
+
+impl Place {
+    pub(super) fn new(point: Vector3<f64>, at: &[Evaluation; 2]) -> Self {
+        let residual = at[0].f.abs().max(at[1].f.abs());
+        Self::between(point, at.map(|at| Vector3::from(at.normal)), residual)
+    }
+
+    pub(super) fn between(point: Vector3<f64>, normals: [Vector3<f64>; 2], residual: f64) -> Self {
+        let across = normals[0].cross(&normals[1]);
+        let sine = across.norm();
+        let tangent = if sine > 0.0 { across / sine } else { across };
+        Self { point, normals, tangent, sine, residual }
+    }
+
+    /// The same with normals on the sides of those at `other`: n and −n are the same to a surface.
+    pub(super) fn turned_like(self, other: &Self) -> Self {
+        let signs = [0, 1].map(|side| 1.0_f64.copysign(self.normals[side].dot(&other.normals[side])));
+        let normals = [0, 1].map(|side| self.normals[side] * signs[side]);
+        Self { normals, tangent: self.tangent * (signs[0] * signs[1]), ..self }
+    }
+
+    /// Whether there is no direction to follow.
+    pub(super) fn is_tangent(&self) -> bool {
+        self.sine < PARALLEL
+    }
+
+    /// Whether surfaces that pass here as they do at `other` are likely the same sheets, cut the same way.
+    fn agrees(&self, other: &Self) -> bool {
+        /// The cosine of 45°.
+        const HALFWAY: f64 = 0.7;
+        let turned = self.turned_like(other);
+        let same = |side: usize| turned.normals[side].dot(&other.normals[side]) > HALFWAY;
+        turned.tangent.dot(&other.tangent) > HALFWAY && same(0) && same(1)
+    }
+}
+
+/// Ends a list of places.
+const NONE: u32 = u32::MAX;
+
+/// Crossings at angles with a sine below this tell no direction.
+const FLAT: f64 = 0.1;
+
+/// Places in a grid of cubes, the lists of which are found by their hash.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Trail {
+    pub(super) places: Vec<Place>,
+    /// The place before it in its list.
+    next: Vec<u32>,
+    /// The last place of each list; their number is a power of two.
+    heads: Vec<u32>,
+    /// Coordinates count from here, in edges of cubes.
+    origin: Vector3<f64>,
+    /// The longest step.
+    longest: f64,
+}
+
+impl Trail {
+    /// Edges of cubes, in longest steps: what is looked for is within half an edge.
+    const EDGE: f64 = 2.5;
+
+    const FEWEST: usize = 256;
+
+    pub(super) fn clear(&mut self, origin: Vector3<f64>, longest: f64) {
+        self.places.clear();
+        self.next.clear();
+        self.heads.clear();
+        self.heads.resize(Self::FEWEST, NONE);
+        (self.origin, self.longest) = (origin, longest);
+    }
+
+    /// The cube that has `x` in its upper half, in each direction, or its neighbour's lower one.
+    fn cube(&self, x: Vector3<f64>, shift: f64) -> [i64; 3] {
+        #[expect(clippy::cast_possible_truncation, reason = "beyond all cubes is one more")]
+        let at = |c: f64| (c / (Self::EDGE * self.longest) - shift).floor() as i64;
+        let d = x - self.origin;
+        [at(d.x), at(d.y), at(d.z)]
+    }
+
+    fn list(&self, [x, y, z]: [i64; 3]) -> usize {
+        let mix = |c: i64, by: u64| c.cast_unsigned().wrapping_mul(by);
+        let hash =
+            mix(x, 0x9e37_79b9_7f4a_7c15) ^ mix(y, 0xc2b2_ae3d_27d4_eb4f) ^ mix(z, 0x1656_67b1_9e37_79f9);
+        #[expect(clippy::cast_possible_truncation, reason = "a few bits")]
+        let list = (hash >> 32) as usize & (self.heads.len() - 1);
+        list
+    }
+
+    pub(super) fn push(&mut self, place: Place) {
+        self.places.push(place);
+        self.next.push(NONE);
+        if self.places.len() <= self.heads.len() {
+            self.link(self.places.len() - 1);
+            return;
+        }
+        let lists = 2 * self.heads.len();
+        self.heads.clear();
+        self.heads.resize(lists, NONE);
+        for i in 0..self.places.len() {
+            self.link(i);
+        }
+    }
+
+    fn link(&mut self, i: usize) {
+        let list = self.list(self.cube(self.places[i].point, 0.0));
+        self.next[i] = self.heads[list];
+        self.heads[list] = u32::try_from(i).unwrap_or(NONE);
+    }
+
+    /// The places within half an edge of `x`, and others.
+    fn near(&self, x: Vector3<f64>) -> impl Iterator<Item = usize> {
+        let [x, y, z] = self.cube(x, 0.5);
+        (0..8).flat_map(move |corner| {
+            let cube = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];
+            let existing = |i: u32| Some(i as usize).filter(|_| i != NONE);
+            let first = existing(self.heads[self.list(cube)]);
+            std::iter::successors(first, move |&i| existing(self.next[i]))
+        })
+    }
+
+    /// Whether a curve has passed `place` within `aside`, or at a place where it tells no direction, within the longest step.
+    pub(super) fn has_passed(&self, place: &Place, aside: f64) -> bool {
+        self.near(place.point).any(|i| {
+            let other = &self.places[i];
+            let offset = place.point - other.point;
+            let along = offset.dot(&other.tangent);
+            if other.is_tangent() || place.sine < FLAT {
+                return offset.norm() <= self.longest;
+            }
+            let off = (offset - other.tangent * along).norm();
+            along.abs() <= self.longest && off <= aside && place.agrees(other)
+        })
+    }
+
+    /// The nearest place that the chord from `here` to `next` passes within `aside`, in the same direction.
+    pub(super) fn passed(&self, here: &Place, next: &Place, aside: f64) -> Option<usize> {
+        let chord = next.point - here.point;
+        let length = chord.norm();
+        let direction = chord / length;
+        let mut nearest = (length, None);
+        for i in self.near(here.point) {
+            let offset = self.places[i].point - here.point;
+            let along = offset.dot(&direction);
+            // Whoever stands here was not passed.
+            let ahead = along > 1e-3 * length && along <= nearest.0;
+            if ahead && (offset - direction * along).norm() <= aside && self.places[i].agrees(here) {
+                nearest = (along, Some(i));
+            }
+        }
+        nearest.1
+    }
+}

@@ -1,0 +1,287 @@
+//! Pairs of forms that cut each other in curves known exactly.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use nalgebra::Vector3;
+use nearmiss_geometry::Pose;
+
+use crate::oracle::count;
+use crate::shapes::{Form, Primitive, bowl, patch, sphere, torus};
+
+/// Points of a true curve.
+const POINTS: usize = 3000;
+
+/// Two forms of one part each, b in the pose in which it cuts a.
+#[derive(Debug, Clone)]
+pub struct Cut {
+    /// What cuts what.
+    pub name: &'static str,
+    /// The one form.
+    pub a: Form,
+    /// The other.
+    pub b: Form,
+    /// Frame of b → frame of a.
+    pub pose_b: Pose,
+    /// Where they cut each other, in a's frame.
+    pub curves: Vec<TrueCurve>,
+}
+
+/// A curve, by many of its points.
+#[derive(Debug, Clone)]
+pub struct TrueCurve {
+    /// Whether the last point is joined to the first.
+    pub closed: bool,
+    /// Points in order.
+    pub points: Vec<[f64; 3]>,
+}
+
+impl Cut {
+    /// How far, times h², the curve of two surfaces goes aside at its point `x` when each of them goes h²H/2 to the hollow side of its
+    /// mean curvature H: the least d with n_A·d and n_B·d equal to these is no longer than their sum over the sine of the angle.
+    #[must_use]
+    pub fn aside(&self, x: [f64; 3]) -> f64 {
+        let (na, ha) = bent(&self.a.parts[0], x);
+        let (nb, hb) = bent(&self.b.parts[0], self.pose_b.apply_inverse(x));
+        let nb = Vector3::from(self.pose_b.rotate(nb.into()));
+        0.5 * (ha.abs() + hb.abs()) / na.cross(&nb).norm()
+    }
+}
+
+/// Normal and mean curvature of a sphere, bowl, torus or rectangle at its point `x`.
+fn bent(part: &Primitive, x: [f64; 3]) -> (Vector3<f64>, f64) {
+    let p = Vector3::from(x);
+    match *part {
+        Primitive::Sphere { centre, radius } => ((p - Vector3::from(centre)) / radius, 1.0 / radius),
+        Primitive::Bowl { radius } => (p / radius, 1.0 / radius),
+        Primitive::Torus { major, minor } => {
+            let from_axis = p.x.hypot(p.y);
+            let outwards = Vector3::new(p.x, p.y, 0.0) / from_axis;
+            let n = (outwards * (from_axis - major) + Vector3::z() * p.z) / minor;
+            (n, 0.5 * (1.0 / minor + (from_axis - major) / (minor * from_axis)))
+        }
+        Primitive::Rectangle { u, v, .. } => (Vector3::from(u).cross(&Vector3::from(v)).normalize(), 0.0),
+        Primitive::Capsule { .. } => (Vector3::zeros(), f64::INFINITY),
+    }
+}
+
+/// A loop through `point` of shares of a turn.
+fn closed(point: impl Fn(f64) -> [f64; 3]) -> TrueCurve {
+    let points = (0..POINTS).map(|i| point(TAU * count(i) / count(POINTS))).collect();
+    TrueCurve { closed: true, points }
+}
+
+/// A curve through `point` of shares from 0 to 1.
+fn open(point: impl Fn(f64) -> [f64; 3]) -> TrueCurve {
+    let points = (0..=POINTS).map(|i| point(count(i) / count(POINTS))).collect();
+    TrueCurve { closed: false, points }
+}
+
+/// Turns the plane z = 0 into the plane y = `offset`.
+fn upright(offset: f64) -> Pose {
+    Pose::from_axis_angle([1.0, 0.0, 0.0], FRAC_PI_2).with_translation([0.0, offset, 0.0])
+}
+
+/// All cuts without a place where the surfaces touch, and few where they graze.
+#[must_use]
+pub fn clean() -> Vec<Cut> {
+    vec![
+        spheres(1.0, 0.8, 1.1),
+        sphere_and_plane(1.0, 0.3),
+        torus_and_level(1.0, 0.6, 0.2),
+        torus_and_upright(1.0, 0.6, 0.0),
+        torus_and_upright(1.0, 0.5, 0.3),
+        torus_and_upright(1.0, 0.5, 0.8),
+        coaxial_tori(),
+        bowl_and_plane(1.0, 0.4),
+        sphere_and_strip(1.0, 0.5),
+    ]
+}
+
+/// Spheres about the origin and (`d`, 0, 0): a circle.
+#[must_use]
+pub fn spheres(radius_a: f64, radius_b: f64, d: f64) -> Cut {
+    let x = 0.5 * (d * d + radius_a * radius_a - radius_b * radius_b) / d;
+    let rho = (radius_a * radius_a - x * x).sqrt();
+    Cut {
+        name: "two spheres",
+        a: sphere(radius_a),
+        b: sphere(radius_b),
+        pose_b: Pose::from_translation([d, 0.0, 0.0]),
+        curves: vec![closed(|t| [x, rho * t.cos(), rho * t.sin()])],
+    }
+}
+
+/// A sphere and the plane z = `z`: a circle.
+#[must_use]
+pub fn sphere_and_plane(radius: f64, z: f64) -> Cut {
+    let rho = (radius * radius - z * z).sqrt();
+    Cut {
+        name: "a sphere and a plane",
+        a: sphere(radius),
+        b: patch(2.4 * radius, 2.4 * radius),
+        pose_b: Pose::from_translation([0.0, 0.0, z]),
+        curves: vec![closed(|t| [rho * t.cos(), rho * t.sin(), z])],
+    }
+}
+
+/// A torus and the plane z = `z` across its axis: two circles.
+#[must_use]
+pub fn torus_and_level(major: f64, minor: f64, z: f64) -> Cut {
+    let off = (minor * minor - z * z).sqrt();
+    let side = 2.4 * (major + minor);
+    Cut {
+        name: "a torus and a plane across its axis",
+        a: torus(major, minor),
+        b: patch(side, side),
+        pose_b: Pose::from_translation([0.0, 0.0, z]),
+        curves: [major - off, major + off].map(|rho| closed(|t| [rho * t.cos(), rho * t.sin(), z])).into(),
+    }
+}
+
+/// A torus and the plane y = `y` along its axis, a section of Perseus: two loops, a figure of eight for `y` = `major` − `minor`, or one
+/// loop.
+#[must_use]
+pub fn torus_and_upright(major: f64, minor: f64, y: f64) -> Cut {
+    let side = 2.4 * (major + minor);
+    let at = |tube: f64, sign: f64| {
+        let rho = major + minor * tube.cos();
+        [sign * (rho * rho - y * y).max(0.0).sqrt(), y, minor * tube.sin()]
+    };
+    let curves = if y <= major - minor {
+        [1.0, -1.0].map(|sign| closed(|t| at(t, sign))).into()
+    } else {
+        // To where the plane just meets the tube and back on the other side.
+        let widest = ((y - major) / minor).acos();
+        vec![closed(|t| {
+            // Evenly spread where the curve crosses x = 0.
+            let (s, c) = t.sin_cos();
+            at(widest * s, c.signum())
+        })]
+    };
+    Cut {
+        name: "a torus and a plane along its axis",
+        a: torus(major, minor),
+        b: patch(side, side),
+        pose_b: upright(y),
+        curves,
+    }
+}
+
+/// Two tori about one axis: two circles.
+#[must_use]
+pub fn coaxial_tori() -> Cut {
+    let [(major_a, minor), (major_b, z)]: [(f64, f64); 2] = [(1.0, 0.5), (1.2, 0.4)];
+    // In the plane through the axis two circles, of equal radii.
+    let between = Vector3::new(0.5 * (major_a + major_b), 0.0, 0.5 * z);
+    let apart = Vector3::new(major_b - major_a, 0.0, z);
+    let along = Vector3::new(-apart.z, 0.0, apart.x) / apart.norm();
+    let half = (minor * minor - 0.25 * apart.norm_squared()).sqrt();
+    let circle = |sign: f64| {
+        let p = between + along * (sign * half);
+        closed(|t| [p.x * t.cos(), p.x * t.sin(), p.z])
+    };
+    Cut {
+        name: "two tori about one axis",
+        a: torus(major_a, minor),
+        b: torus(major_b, minor),
+        pose_b: Pose::from_translation([0.0, 0.0, z]),
+        curves: vec![circle(1.0), circle(-1.0)],
+    }
+}
+
+/// An open half sphere and the plane y = `y`: half a circle, which ends at the rim twice.
+#[must_use]
+pub fn bowl_and_plane(radius: f64, y: f64) -> Cut {
+    let rho = (radius * radius - y * y).sqrt();
+    Cut {
+        name: "an open half sphere and a plane",
+        a: bowl(radius),
+        b: patch(2.4 * radius, 2.4 * radius),
+        pose_b: upright(y),
+        curves: vec![open(|share| {
+            let (s, c) = (0.5 * TAU * share).sin_cos();
+            [rho * c, y, -rho * s]
+        })],
+    }
+}
+
+/// A sphere and a strip of the plane z = 0, |y| ≤ `half`: two arcs, which end at the strip's borders.
+#[must_use]
+pub fn sphere_and_strip(radius: f64, half: f64) -> Cut {
+    let widest = (half / radius).asin();
+    let arc = |sign: f64| {
+        open(|share| {
+            let (s, c) = (widest * (2.0 * share - 1.0)).sin_cos();
+            [sign * radius * c, radius * s, 0.0]
+        })
+    };
+    Cut {
+        name: "a sphere and a strip",
+        a: sphere(radius),
+        b: patch(2.4 * radius, 2.0 * half),
+        pose_b: Pose::IDENTITY,
+        curves: vec![arc(1.0), arc(-1.0)],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn true_curves_lie_on_both_forms_and_bend_as_they_do() {
+        let mut cuts = clean();
+        cuts.push(torus_and_upright(1.0, 0.5, 0.5));
+        for cut in cuts {
+            for curve in &cut.curves {
+                for &x in &curve.points {
+                    let off = cut.a.distance(x).max(cut.b.distance(cut.pose_b.apply_inverse(x)));
+                    assert!(off < 1e-7, "{}: {x:?} is {off} off", cut.name);
+                }
+                let step = |i: usize| {
+                    let next = curve.points[(i + 1) % curve.points.len()];
+                    (Vector3::from(curve.points[i]) - Vector3::from(next)).norm()
+                };
+                let steps = curve.points.len() - usize::from(!curve.closed);
+                let longest = (0..steps).map(step).fold(0.0, f64::max);
+                assert!(longest < 0.01, "{}: a step of {longest}", cut.name);
+            }
+        }
+    }
+
+    #[test]
+    fn curvature_is_what_a_larger_form_gains_in_area() {
+        // H is half the divergence of the normals of parallel surfaces.
+        for part in [torus(1.0, 0.5), sphere(0.7), patch(1.0, 1.0)].map(|form| form.parts[0]) {
+            let x = match part {
+                Primitive::Torus { .. } => [0.9, 0.9, 0.45],
+                Primitive::Sphere { .. } => [0.3, 0.4, 0.4],
+                _ => [0.1, 0.2, 0.0],
+            };
+            let e = 1e-5;
+            let on = |k: usize, sign: f64| {
+                let mut y = x;
+                y[k] += sign * e;
+                y
+            };
+            // Of the distance function: the trace of its second derivatives.
+            let d = |y: [f64; 3]| {
+                let [px, py, pz] = y;
+                match part {
+                    Primitive::Torus { major, minor } => (px.hypot(py) - major).hypot(pz) - minor,
+                    Primitive::Sphere { radius, .. } => px.hypot(py).hypot(pz) - radius,
+                    _ => pz,
+                }
+            };
+            let trace: f64 = (0..3).map(|k| (d(on(k, 1.0)) + d(on(k, -1.0)) - 2.0 * d(x)) / (e * e)).sum();
+            // The surface parallel to the form through x has the same normals; its own radius is larger by d(x).
+            let parallel = match part {
+                Primitive::Torus { major, minor } => Primitive::Torus { major, minor: minor + d(x) },
+                Primitive::Sphere { centre, radius } => Primitive::Sphere { centre, radius: radius + d(x) },
+                other => other,
+            };
+            let (_, h) = bent(&parallel, x);
+            assert!((0.5 * trace - h).abs() < 1e-4, "{part:?}: {} for {h}", 0.5 * trace);
+        }
+    }
+}
