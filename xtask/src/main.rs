@@ -45,7 +45,7 @@ of the repository
   fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
-  preprocess, inspect, eval, collide, poses, export";
+  preprocess, inspect, eval, collide, curve, poses, export";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

@@ -112,7 +112,7 @@ pub(crate) fn parse_radius(text: &str) -> Result<f64, String> {
     radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
 }
 
-fn parse_duration(text: &str) -> Result<Duration, String> {
+pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let unit =
         text.trim_start_matches(|c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | 'e' | 'E' | '-'));
     let number = text.strip_suffix(unit).unwrap_or_default();
@@ -321,7 +321,7 @@ fn answer_one(
 }
 
 /// What a legend calls the scans.
-fn names(paths: [&Path; 2]) -> [String; 2] {
+pub(crate) fn names(paths: [&Path; 2]) -> [String; 2] {
     let mut letters = ["A", "B"].into_iter();
     paths.map(|path| {
         let letter = letters.next().unwrap_or_default();

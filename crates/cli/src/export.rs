@@ -89,7 +89,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-fn refused(path: &Path, error: WriteError) -> CliError {
+pub(crate) fn refused(path: &Path, error: WriteError) -> CliError {
     match error {
         WriteError::Io { cause } => CliError::writing(path)(cause),
         error => CliError::Unfit { path: path.into(), what: error.to_string() },

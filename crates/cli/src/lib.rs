@@ -3,6 +3,7 @@
 
 mod collide;
 mod console;
+mod curve;
 mod error;
 mod eval;
 mod export;
@@ -22,6 +23,7 @@ mod search;
 mod sentence;
 
 mod canvas;
+mod curve_picture;
 mod font;
 mod geodesic;
 mod level;
@@ -38,6 +40,8 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
 pub use collide::{CollideArgs, DetailName, EvidenceName};
+pub use curve::CurveArgs;
+pub use curve_picture::curve_picture;
 pub use error::CliError;
 pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
@@ -95,6 +99,9 @@ pub enum Command {
     /// Whether, where and how near two scans meet
     #[command(after_long_help = COLLIDE_EXAMPLES)]
     Collide(CollideArgs),
+    /// All curves in which two scans cut each other
+    #[command(after_long_help = "Example:\n  nearmiss curve a.nm b.nm --image curves.png -o curves.ply")]
+    Curve(CurveArgs),
     /// Make poses to ask `collide` about: a sweep, or poses about first contact
     #[command(after_long_help = POSES_EXAMPLES)]
     Poses(PosesArgs),
@@ -114,6 +121,7 @@ impl Command {
             Self::Inspect(args) => inspect::run(args),
             Self::Eval(args) => eval::run(args),
             Self::Collide(args) => collide::run(args),
+            Self::Curve(args) => curve::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),
         };

@@ -31,7 +31,7 @@ const CLOSE: f64 = 12.0;
 const CUT: f64 = 0.045;
 
 /// In the whole view no disc is larger than this, in fine pixels: far returns of a LiDAR would hide the rest.
-const LARGEST: f64 = 14.0;
+pub(crate) const LARGEST: f64 = 14.0;
 
 /// Points that are looked at to choose a view.
 const SAMPLE: usize = 20_000;
@@ -113,7 +113,9 @@ pub(crate) fn paint(views: [&ScanView<'_>; 2], answer: &Answer, style: &Style) -
     let width = if contact.is_some() { PANEL } else { 2 * PANEL + GAP };
     let area = Area { left: GAP, top: GAP, width, height: PANEL };
     canvas.fill(area, PANEL_GROUND);
-    let whole = whole_camera(views, contact.as_ref(), area);
+    let whole = whole_camera(views, area, |points, toward| {
+        4.0 * contact.as_ref().map_or(0.0, |close| hidden(close, points, *toward))
+    });
     for (view, colour) in views.into_iter().zip([OF_A, OF_B]) {
         for i in 0..view.scan().len() {
             let splat = splat(view, i);
@@ -258,15 +260,18 @@ fn sample(views: [&ScanView<'_>; 2]) -> Vec<Vector3<f64>> {
     views.into_iter().flat_map(points).collect()
 }
 
-/// A view of everything: the contact unhidden if there is one, else the scans beside each other; the longest
-/// extent lies across.
-fn whole_camera(views: [&ScanView<'_>; 2], close: Option<&Close>, area: Area) -> Camera {
+/// A view of everything: what matters unhidden, as `hides` says of points and a direction towards the viewer, else the scans beside
+/// each other; the longest extent lies across.
+pub(crate) fn whole_camera(
+    views: [&ScanView<'_>; 2],
+    area: Area,
+    hides: impl Fn(&[Vector3<f64>], &Vector3<f64>) -> f64,
+) -> Camera {
     let points = sample(views);
     let (long, apart) = extent(&points, views);
     let cost = |toward: &Vector3<f64>| {
-        let hidden = close.map_or(0.0, |c| hidden(c, &points, *toward));
         let below = (-toward.dot(&Vector3::new(0.0, 0.7, 0.7))).max(0.0);
-        4.0 * hidden + toward.dot(&apart).abs() + 0.5 * toward.dot(&long).abs() + below
+        hides(&points, toward) + toward.dot(&apart).abs() + 0.5 * toward.dot(&long).abs() + below
     };
     let toward = directions().min_by(|p, q| cost(p).total_cmp(&cost(q))).unwrap_or_else(Vector3::z);
     let right = long - toward * toward.dot(&long);
@@ -291,7 +296,7 @@ fn whole_camera(views: [&ScanView<'_>; 2], close: Option<&Close>, area: Area) ->
 
 /// A view of one scan.
 pub(crate) fn scan_camera(view: &ScanView<'_>, area: Area) -> Camera {
-    whole_camera([view, view], None, area)
+    whole_camera([view, view], area, |_, _| 0.0)
 }
 
 /// The direction of greatest extent, and the unit direction from one scan's middle to the other's, or zero.
@@ -406,7 +411,7 @@ pub(crate) fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
 }
 
 /// Longer names are cut short.
-const LONGEST_NAME: usize = 32;
+pub(crate) const LONGEST_NAME: usize = 32;
 
 fn legend(canvas: &mut Canvas, answer: &Answer, names: &[String; 2]) {
     let top = PANEL + 2 * GAP + 8 * FINE;

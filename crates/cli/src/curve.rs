@@ -1,0 +1,229 @@
+//! `curve`: all curves in which two scans cut each other.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use nearmiss::io::{Column, PlyPoints};
+use nearmiss::{
+    Budget, Curve, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, End, ScanView, curves_with,
+};
+use serde::Serialize;
+
+use crate::collide::{names, parse_duration};
+use crate::console::{Console, Results, now};
+use crate::curve_picture;
+use crate::digits::{count, rough, short};
+use crate::error::CliError;
+use crate::eval::KernelName;
+use crate::export::refused;
+use crate::preprocess::parse_threads;
+use crate::{input, output, picture, posing};
+
+/// Options of `curve`.
+#[derive(Debug, Clone, Args)]
+pub struct CurveArgs {
+    /// The one scan: prepared, or a raw input, prepared on the fly
+    pub a: PathBuf,
+    /// The other scan
+    pub b: PathBuf,
+    /// Pose of a, object to world: 16 numbers, row-major, in one argument, or a file that holds them
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose_a: Option<String>,
+    /// Pose of b
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose_b: Option<String>,
+    /// Which distances define the surfaces; by default as prepared, else straight ones
+    #[arg(long, value_enum)]
+    pub kernel: Option<KernelName>,
+    /// Wanted distance of points along a curve, in world units; nearer where it turns. By default twice the lesser sampling
+    /// radius
+    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
+    pub spacing: Option<f64>,
+    /// How far points may be off either surface, in world units. By default a thousandth of that radius
+    #[arg(long, value_name = "E", allow_hyphen_values = true, value_parser = parse_length)]
+    pub tolerance: Option<f64>,
+    /// Time for the curves: a number with ns, us, ms or s. What was found by then is written
+    #[arg(long, value_name = "5ms", allow_hyphen_values = true, value_parser = parse_duration)]
+    pub budget: Option<Duration>,
+    /// Work units, evaluations of f and node pairs; reproducible, unlike time
+    #[arg(long, value_name = "N")]
+    pub work: Option<u64>,
+    /// Threads to prepare raw inputs, 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    pub threads: Option<usize>,
+    /// Where to write the curves, as PLY: points, each with the number of its curve, and the edges that join them
+    #[arg(short, long, value_name = "OUT.ply")]
+    pub output: PathBuf,
+    /// Picture, as PNG, of both scans and their curves
+    #[arg(long, value_name = "OUT.png")]
+    pub image: Option<PathBuf>,
+    /// One object of JSON instead of a sentence
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+fn parse_length(text: &str) -> Result<f64, String> {
+    let length = text.parse().ok().filter(|l: &f64| *l > 0.0 && l.is_finite());
+    length.ok_or_else(|| "expected a length, more than zero, in world units".into())
+}
+
+/// What `curve` finds.
+#[derive(Debug, Serialize)]
+struct CurveReport {
+    points: usize,
+    curves: usize,
+    closed: usize,
+    length: f64,
+    max_residual: f64,
+    complete: bool,
+    evaluations: u64,
+    micros: f64,
+}
+
+pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
+    let console = Console::new(args.quiet);
+    let inputs: [&Path; 2] = [&args.a, &args.b];
+    output::check_apart(&args.output, &inputs)?;
+    if let Some(path) = &args.image {
+        output::check_apart(path, &inputs)?;
+        picture::check_name(path)?;
+        if *path == args.output {
+            return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
+        }
+    }
+    let given = [("--pose-a", &args.pose_a), ("--pose-b", &args.pose_b)];
+    let [matrix_a, matrix_b] = given.map(|(name, given)| posing::from_option(name, given.as_deref()));
+    let matrices = [matrix_a?, matrix_b?];
+    let kernel = args.kernel.map(KernelName::metric);
+    let [a, b] = input::open_both(kernel, inputs, args.threads.unwrap_or(0), console)?;
+    let placed = |name: &str, matrix, scan| {
+        posing::of_scan(matrix, scan).map_err(|refused| CliError::Pose { place: name.into(), refused })
+    };
+    let [a, b] = [a.at(&placed("--pose-a", &matrices[0], &a)?), b.at(&placed("--pose-b", &matrices[1], &b)?)];
+
+    let mut options = CurveOptions::default();
+    (options.spacing, options.tolerance) = (args.spacing, args.tolerance);
+    let plan = CurvePlan::new(&options, a.scan(), b.scan())?;
+    let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
+    let start = now();
+    let mut budget = Budget::UNLIMITED;
+    (budget.work, budget.deadline) =
+        (args.work, args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
+    curves_with(&a, &b, &plan, &budget, &mut found, &mut scratch);
+    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+
+    write(&args.output, &found)?;
+    if let Some(path) = &args.image {
+        let bar = console.spinner(format_args!("painting {}", path.display()));
+        curve_picture::paint([&a, &b], &found, &names(inputs)).save(path)?;
+        drop(bar);
+    }
+    tell(&found, [&a, &b], micros, args.json)
+}
+
+/// The points in the world, each with the number of its curve, and the edges.
+fn write(path: &Path, found: &Curves) -> Result<(), CliError> {
+    let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
+    let all = || (0..).zip(&found.curves);
+    let curve: Vec<u32> = all().flat_map(|(i, curve)| std::iter::repeat_n(i, curve.count)).collect();
+    let edges: Vec<[u32; 2]> =
+        found.curves.iter().flat_map(Curve::edges).map(|edge| edge.map(number)).collect();
+    output::replace(path, |out| {
+        let columns = [Column::Uint("curve", &curve)];
+        let ply = PlyPoints::double(&found.points).with_columns(&columns).with_edges(&edges);
+        ply.write(out).map_err(|error| refused(path, error))
+    })
+}
+
+fn tell(found: &Curves, views: [&ScanView<'_>; 2], micros: f64, json: bool) -> Result<(), CliError> {
+    let mut results = Results::new();
+    let report = CurveReport {
+        points: found.points.len(),
+        curves: found.curves.len(),
+        closed: found.closed(),
+        length: found.length(),
+        max_residual: found.max_residual,
+        complete: found.complete,
+        evaluations: found.statistics.evaluations,
+        micros,
+    };
+    if json {
+        results.json(&report)?;
+        return results.flush();
+    }
+    results.line(sentence(found))?;
+    if !found.complete {
+        results.line(unfinished(views))?;
+    }
+    results.line(format_args!(
+        "{}, {}, {}, {:.1} µs",
+        count(report.points as u64, "point"),
+        count(found.statistics.node_pairs, "node pair"),
+        count(report.evaluations, "evaluation"),
+        micros
+    ))?;
+    results.flush()
+}
+
+/// The curves, for people.
+fn sentence(found: &Curves) -> String {
+    let touching = found.curves.iter().filter(|curve| curve.count == 1).count();
+    let closed = found.closed();
+    let open = found.curves.len() - touching - closed;
+    let mut parts = Vec::new();
+    if closed > 0 {
+        parts.push(count(closed as u64, "closed curve"));
+    }
+    if open > 0 {
+        parts.push(count(open as u64, "open curve"));
+    }
+    let mut text = match (parts.is_empty(), touching) {
+        (true, 0) => return "They do not cut each other.".to_owned(),
+        (true, _) => format!("They touch in {}", count(touching as u64, "point")),
+        (false, 0) => format!("They cut each other in {}", parts.join(" and ")),
+        (false, _) => {
+            format!(
+                "They cut each other in {} and touch in {}",
+                parts.join(" and "),
+                count(touching as u64, "point")
+            )
+        }
+    };
+    if open + closed > 0 {
+        text += &format!(", {} long together", short(found.length()));
+    }
+    text += &format!(", within {} of both.", rough(found.max_residual));
+    let ends = |wanted: End| {
+        let ends = found.curves.iter().filter(|curve| curve.count > 1).filter_map(|curve| curve.ends);
+        ends.flatten().filter(|&end| end == wanted).count()
+    };
+    let said: Vec<String> = [
+        (End::BorderOfA, "at the border of a"),
+        (End::BorderOfB, "at the border of b"),
+        (End::Tangent, "where they touch"),
+        (End::Lost, "where points do not look like one sheet"),
+        (End::Budget, "where the budget ran out"),
+    ]
+    .into_iter()
+    .filter_map(|(end, place)| Some(ends(end)).filter(|&n| n > 0).map(|n| format!("{n} {place}")))
+    .collect();
+    if !said.is_empty() {
+        text += &format!(" Ends: {}.", said.join(", "));
+    }
+    text
+}
+
+/// Why curves may be missing.
+fn unfinished(views: [&ScanView<'_>; 2]) -> &'static str {
+    let is_finite = |view: &&ScanView<'_>| view.placed().to_row_major().iter().all(|c| c.is_finite());
+    if views.iter().all(is_finite) {
+        "The budget ran out first; curves may be missing. Try a greater --budget or --work."
+    } else {
+        "A pose is not finite."
+    }
+}
