@@ -4,8 +4,9 @@
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Deadline, Detail, Evidence,
-    GraphOptions, Pose, Scan, Semantics, Verdict, collide_with,
+    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions, CurvePlan,
+    CurveScratch, Curves, Deadline, Detail, Evidence, GraphOptions, Pose, Scan, Semantics, Verdict,
+    collide_all, collide_with, curves_with,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -82,6 +83,27 @@ fn warm_queries_and_evaluations_allocate_nothing() {
         assert_eq!(first, second, "verdicts depend on the scratch");
         assert!(first.iter().all(|&n| n > 20), "of every kind of verdict some: {first:?}");
     }
+
+    let plan = CurvePlan::new(&CurveOptions::default(), &scan, &scan).unwrap();
+    let options = CollideOptions::default();
+    let everything = CollidePlan::new(&options, &scan, &scan).unwrap();
+    let (mut found, mut of_curves, mut contacts) =
+        (Curves::default(), CurveScratch::default(), Contacts::default());
+    let mut draw_all = || {
+        let mut points = 0;
+        for pose in &poses {
+            let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
+            curves_with(&a, &b, &plan, &Budget::UNLIMITED, &mut found, &mut of_curves);
+            collide_all(&a, &b, &everything, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+            points += found.points.len();
+        }
+        points
+    };
+    let first = draw_all();
+    let before = ALLOCATOR.calls();
+    assert_eq!(draw_all(), first, "curves depend on the scratch");
+    assert_eq!(ALLOCATOR.calls() - before, 0, "curves allocated");
+    assert!(first > 1000, "{first} points of curves");
 
     let rng = &mut rng(5);
     let places: Vec<[f64; 3]> = (0..POSES)

@@ -47,6 +47,19 @@ impl Cut {
     }
 }
 
+impl Cut {
+    /// The greatest mean curvature of either surface along the curves.
+    #[must_use]
+    pub fn curvature(&self) -> f64 {
+        let bends = |&x: &[f64; 3]| {
+            let (_, a) = bent(&self.a.parts[0], x);
+            let (_, b) = bent(&self.b.parts[0], self.pose_b.apply_inverse(x));
+            a.abs().max(b.abs())
+        };
+        self.curves.iter().flat_map(|curve| curve.points.iter().map(bends)).fold(0.0, f64::max)
+    }
+}
+
 /// Normal and mean curvature of a sphere, bowl, torus or rectangle at its point `x`.
 fn bent(part: &Primitive, x: [f64; 3]) -> (Vector3<f64>, f64) {
     let p = Vector3::from(x);

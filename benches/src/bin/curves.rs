@@ -11,7 +11,6 @@ use nearmiss::{
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
-use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
 
 /// Spacings, in lesser sampling radii.
@@ -59,11 +58,6 @@ fn main() -> Result<(), Failure> {
             let time = least(passes, || {
                 curves_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut found, &mut scratch);
             });
-            if std::env::var_os("CURVES_DEBUG").is_some() {
-                for c in &found.curves {
-                    println!("{:?} {:?}", c, found.points[c.first]);
-                }
-            }
             println!(
                 "| {name_a}, {name_b} | {r:.5} | {spacing} | {} | {} | {} | {} | {:.1} | {:.1e} | {} | {:.3} | {:.3} |",
                 contacts.contacts.len(),
@@ -77,7 +71,6 @@ fn main() -> Result<(), Failure> {
                 time,
             );
         }
-        let _ = count(0);
     }
     Ok(())
 }

@@ -79,7 +79,9 @@ struct CurveReport {
     closed: usize,
     length: f64,
     max_residual: f64,
-    complete: bool,
+    /// False where the budget ended the search, else not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    complete: Option<bool>,
     evaluations: u64,
     micros: f64,
 }
@@ -148,7 +150,7 @@ fn tell(found: &Curves, views: [&ScanView<'_>; 2], micros: f64, json: bool) -> R
         closed: found.closed(),
         length: found.length(),
         max_residual: found.max_residual,
-        complete: found.complete,
+        complete: (!found.complete).then_some(false),
         evaluations: found.statistics.evaluations,
         micros,
     };

@@ -44,7 +44,7 @@ pub(crate) fn paint(views: [&ScanView<'_>; 2], found: &Curves, names: &[String; 
     let radius = |view: &ScanView<'_>| f64::from(view.slices().sampling_radius) * view.placed().scale();
     let radii = views.map(radius);
     let seen = Visibility::new(found, radii[0].max(radii[1]));
-    let camera = whole_camera(views, area, |points, toward| 4.0 * seen.hidden(points, toward));
+    let camera = whole_camera(views, area, |points, toward| 8.0 * seen.hidden(points, toward));
     for (view, colour) in views.into_iter().zip(SOFT) {
         for i in 0..view.scan().len() {
             let disc = splat(view, i);
@@ -64,7 +64,7 @@ fn draw(canvas: &mut Canvas, camera: &Camera, found: &Curves, lift: f64) {
     let edges = || found.curves.iter().flat_map(Curve::edges).map(|edge| edge.map(place));
     for edge in edges() {
         let ends = edge.map(|p| camera.project(p)).map(|[x, y, _]| [x, y]);
-        canvas.line(camera.area, ends, 2.0, BEHIND);
+        canvas.line(camera.area, ends, 3.0, BEHIND);
     }
     for (width, colour) in [(10.0, GROUND), (6.0, CURVE)] {
         for edge in edges() {

@@ -31,8 +31,8 @@ const STEEP: f64 = 0.3;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct CurveOptions {
-    /// The wanted distance of points that follow each other; they are nearer where a curve turns by more than 0.2 between
-    /// them. None: twice the lesser of the scans' sampling radii.
+    /// The wanted distance of points that follow each other; they are nearer where a chord would
+    /// leave its curve by more than a fortieth of that, or of two sampling radii. None: twice the lesser of the scans' sampling radii.
     pub spacing: Option<f64>,
     /// The greatest |f| of either surface at a point. None: a thousandth of that radius; never less than a hundredth of that.
     pub tolerance: Option<f64>,
@@ -178,13 +178,13 @@ pub fn curves(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CurvePlan, budget: &Bud
 /// Leaves in `found` the curves in which the surfaces of `a` and `b`, each by the kernel of its view, cut each other, as far as
 /// `budget` lasts.
 ///
-/// Each point is within the tolerance of both zero sets, and a chord deviates from its curve by at most a fortieth of its length,
-/// which is at most the wanted spacing: 0.05 sampling radii by default. Of the true surfaces' curve it is as far as the bias of
+/// At each point both |f| are within the tolerance, and a chord deviates from its curve by at most a fortieth of the wanted spacing, or
+/// of two sampling radii if that is less: 0.05 radii by default. Of the true surfaces' curve it is as far as the bias of
 /// both surfaces, h²H/2 each, over the sine of their angle. No curve is missed of which a leaf of
 /// either scan saw discs cross; one that is shorter than a leaf and nearer to another than a sampling radius may be taken for that.
 /// Swapped scans give the same curves with other points on them. Scans of the geodesic metric need views with their kernel.
 ///
-/// Costs, beside [`collide_all`], five to six pairs of evaluations for each sampling radius of length; does not allocate once
+/// Costs, beside [`collide_all`], four pairs of evaluations for each sampling radius of length; does not allocate once
 /// `found` and `scratch` are warm.
 pub fn curves_with(
     a: &ScanView<'_>,

@@ -274,7 +274,7 @@ fn wrong_usage_ends_with_status_2() {
     place.refused(2, &["poses", "ball.nm", "ball.nm", "-o", "p.jsonl"], &["--sweep"]);
     let none = ["poses", "ball.nm", "ball.nm", "--near", "--per-distance", "0", "-o", "p.jsonl"];
     place.refused(2, &none, &["--per-distance"]);
-    for command in ["preprocess", "inspect", "eval", "collide", "poses", "export"] {
+    for command in ["preprocess", "inspect", "eval", "collide", "curve", "poses", "export"] {
         let help = place.ok(&["help", command]).results;
         assert!(help.contains("Example") && help.contains(&format!("nearmiss {command} ")), "{help}");
     }

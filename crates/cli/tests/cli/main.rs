@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod collide;
+mod curves;
 mod faults;
 mod looking_inside;
 mod making_poses;

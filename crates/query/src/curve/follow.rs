@@ -17,12 +17,18 @@ const SHORTEST: f64 = 1.0 / 64.0;
 /// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a bandwidth.
 pub(super) const PARALLEL: f64 = 0.01;
 
+/// Corrections may make a step a little longer than it aimed for.
+const STRIDE: f64 = 0.98;
+
 /// A curve that cannot be followed where the sine is below this ends because its surfaces touch.
 const GRAZING: f64 = 0.1;
 
-/// The cosine of 0.2, the most a curve turns in a step: an arc then leaves its chord by a fortieth of the chord's length.
+/// The most a curve turns in the longest step; in a shorter one by as much more. An arc leaves its chord by an eighth of the turn
+/// times its length, so by a fortieth of the longest step.
 const TURN: f64 = 0.2;
-const TURN_COSINE: f64 = 0.980_067;
+
+/// No step turns further: 34°.
+const MOST_TURN: f64 = 0.6;
 
 /// The cosine of the most a surface turns in a step, 30°: more is another sheet.
 const TILT_COSINE: f64 = 0.866;
@@ -32,6 +38,9 @@ const ROUNDS: u32 = 4;
 
 /// These may lead away from where the step aimed by this share of its length: no nearer is another sheet.
 const MOST_CORRECTION: f64 = 0.25;
+
+/// However short the step, so much in sampling radii: f is no smoother than that where points come into its horizon.
+const LEAST_CORRECTION: f64 = 1.0 / 32.0;
 
 /// What a chord passes within this share of its length it joins: four times as far as an arc leaves it.
 pub(super) const SAME_TURN: f64 = 0.1;
@@ -51,6 +60,13 @@ pub(super) struct Follower<'a> {
     /// The greatest |f|.
     pub(super) tolerance: f64,
     pub(super) trail: &'a mut Trail,
+}
+
+impl Place {
+    /// Why a curve cannot be followed from here, although both surfaces go on.
+    fn lost(&self) -> End {
+        if self.sine < GRAZING { End::Tangent } else { End::Lost }
+    }
 }
 
 impl Follower<'_> {
@@ -82,7 +98,7 @@ impl Follower<'_> {
         });
         let first = points.len();
         let (onward, back) = self.trail.places[start..].split_at(turn - start);
-        thin_out(back.iter().rev().chain(onward), spacing, points);
+        thin_out(back.iter().rev().chain(onward), [spacing, self.longest], points);
         Curve { first, count: points.len() - first, ends }
     }
 
@@ -90,23 +106,25 @@ impl Follower<'_> {
     fn follow(&mut self, start: usize, way: f64) -> Option<End> {
         let mut here = self.trail.places[start];
         let mut bend = Vector3::zeros();
-        let mut length = self.longest;
+        let mut length = STRIDE * self.longest;
         let mut grows = true;
         loop {
             // A step that would turn too far need not be tried.
-            let ahead = length.min(0.8 * TURN / bend.norm()).max(SHORTEST * self.longest.min(self.radius));
+            let bent: f64 = bend.norm();
+            let straight = (0.8 * TURN * self.longest / bent).sqrt().min(0.8 * MOST_TURN / bent);
+            let ahead = length.min(straight).max(SHORTEST * self.longest.min(self.radius));
             match self.advance(&here, way, bend, ahead) {
                 Ok(next) => {
                     let chord = (next.point - here.point).norm();
                     if let Some(passed) = self.trail.passed(&here, &next, SAME_TURN * chord) {
-                        return (passed != start).then_some(End::Lost);
+                        return (passed != start).then(|| here.lost());
                     }
                     let turned = (next.tangent - here.tangent) * (way / chord);
                     bend = turned - next.tangent * next.tangent.dot(&turned);
                     self.trail.push(next);
                     here = next;
                     if grows {
-                        length = self.longest.min(2.0 * length);
+                        length = (STRIDE * self.longest).min(2.0 * length);
                     }
                     grows = true;
                 }
@@ -124,8 +142,9 @@ impl Follower<'_> {
 
     /// The place on the curve a step of `length` ahead, or why there is none.
     fn advance(&mut self, here: &Place, way: f64, bend: Vector3<f64>, length: f64) -> Result<Place, End> {
-        let aim = here.point + here.tangent * (way * length) + bend * (0.5 * length * length);
-        let missed = if here.sine < GRAZING { End::Tangent } else { End::Lost };
+        let arc = here.tangent * way + bend * (0.5 * length);
+        let aim = here.point + arc * (length / arc.norm());
+        let missed = here.lost();
         let mut point = aim;
         for _ in 0..ROUNDS {
             let at = self.evaluate(point.into()).ok_or(End::Budget)?;
@@ -145,11 +164,13 @@ impl Follower<'_> {
                 if next.is_tangent() {
                     return Err(End::Tangent);
                 }
-                let turned = next.tangent.dot(&here.tangent) < TURN_COSINE;
-                return if turned || tilted(0) || tilted(1) { Err(missed) } else { Ok(next) };
+                let chord = (point - here.point).norm();
+                let turned = turns(here, &next, chord, self.longest);
+                let too_far = chord > self.longest;
+                return if turned || tilted(0) || tilted(1) || too_far { Err(missed) } else { Ok(next) };
             }
             point += step_onto_both(&at, PARALLEL * PARALLEL);
-            if (point - aim).norm() > MOST_CORRECTION * length {
+            if (point - aim).norm() > (MOST_CORRECTION * length).max(LEAST_CORRECTION * self.radius) {
                 return Err(missed);
             }
         }
@@ -157,16 +178,26 @@ impl Follower<'_> {
     }
 }
 
+/// Whether the curve turns too far between two places for a chord of that length, where `longest` is the longest.
+fn turns(here: &Place, next: &Place, chord: f64, longest: f64) -> bool {
+    let turn = (next.tangent - here.tangent).norm();
+    turn > MOST_TURN || turn * chord > TURN * longest
+}
+
 /// Adds to `points` the first and the last of `places`, and of those between so many that none is further than `spacing` from the one
 /// before, nor turned by more than a step may.
-fn thin_out<'a>(places: impl Iterator<Item = &'a Place>, spacing: f64, points: &mut Vec<[f64; 3]>) {
+fn thin_out<'a>(
+    places: impl Iterator<Item = &'a Place>,
+    [spacing, longest]: [f64; 2],
+    points: &mut Vec<[f64; 3]>,
+) {
     let mut kept: Option<&Place> = None;
     let mut last: Option<&Place> = None;
     let mut since = 0.0;
     for place in places {
         if let (Some(kept_place), Some(last_place)) = (kept, last) {
             let step = (place.point - last_place.point).norm();
-            let turned = place.tangent.dot(&kept_place.tangent).abs() < TURN_COSINE;
+            let turned = turns(kept_place, place, since + step, longest);
             if since > 0.0 && (since + step > spacing || turned) {
                 points.push(last_place.point.into());
                 kept = last;

@@ -168,3 +168,77 @@ impl Trail {
         nearest.1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+    use rand::RngExt;
+
+    use super::*;
+
+    /// Without a grid.
+    fn linear(trail: &Trail, place: &Place, aside: f64) -> bool {
+        trail.places.iter().any(|other| {
+            let offset = place.point - other.point;
+            let along = offset.dot(&other.tangent);
+            let off = (offset.norm_squared() - along * along).max(0.0).sqrt();
+            let agree = (0..2).all(|k| place.normals[k].dot(&other.normals[k]).abs() > 0.7);
+            let sign = (0..2).map(|k| place.normals[k].dot(&other.normals[k]).signum()).product::<f64>();
+            let same_way = sign * place.tangent.dot(&other.tangent) > 0.7;
+            if other.sine < 0.01 || place.sine < 0.1 {
+                offset.norm() <= trail.longest
+            } else {
+                agree && same_way && along.abs() <= trail.longest && off <= aside
+            }
+        })
+    }
+
+    #[test]
+    fn the_grid_finds_what_looking_at_all_places_finds() {
+        let rng = &mut rng(6);
+        let mut trail = Trail::default();
+        let mut seen = [0, 0];
+        for (round, origin) in [0.0, 1e6, -3e9].into_iter().enumerate() {
+            let longest = [0.05, 0.2, 1.0][round];
+            trail.clear(Vector3::repeat(origin), longest);
+            for i in 0..3000 {
+                let mut normals = [unit_vector(rng), unit_vector(rng)].map(Vector3::from);
+                if i % 3 == 0 {
+                    normals = [Vector3::x(), Vector3::y()];
+                } else if i % 7 == 0 {
+                    normals[1] = normals[0];
+                }
+                let point = Vector3::repeat(origin) + Vector3::from(point_in(rng, 1.5));
+                let place = Place::between(point, normals, 0.0);
+                let aside = rng.random_range(0.1..0.5) * longest;
+                let expected = linear(&trail, &place, aside);
+                assert_eq!(trail.has_passed(&place, aside), expected, "{i} of round {round}: {place:?}");
+                seen[usize::from(expected)] += 1;
+                trail.push(place);
+            }
+        }
+        assert!(seen.iter().all(|&n| n > 500), "both answers: {seen:?}");
+    }
+
+    #[test]
+    fn a_chord_passes_what_lies_ahead_of_it_and_runs_its_way() {
+        let place = |x: f64, y: f64, way: f64| {
+            Place::between(Vector3::new(x, y, 0.0), [Vector3::y(), Vector3::z() * way], 0.0)
+        };
+        let mut trail = Trail::default();
+        trail.clear(Vector3::zeros(), 1.0);
+        let [here, next] = [place(0.0, 0.0, 1.0), place(1.0, 0.0, 1.0)];
+        for (x, y) in [(0.0, 0.0), (-0.5, 0.0), (1.2, 0.0), (0.5, 0.2)] {
+            trail.push(place(x, y, 1.0));
+            assert_eq!(trail.passed(&here, &next, 0.1), None, "({x}, {y})");
+        }
+        trail.push(place(0.9, 0.05, 1.0));
+        assert_eq!(trail.passed(&here, &next, 0.1), Some(4));
+        // Unoriented normals say nothing of a way.
+        trail.push(place(0.7, -0.05, -1.0));
+        assert_eq!(trail.passed(&here, &next, 0.1), Some(5), "the nearest");
+        let across = Place::between(Vector3::new(0.4, 0.0, 0.0), [Vector3::x(), Vector3::z()], 0.0);
+        trail.push(across);
+        assert_eq!(trail.passed(&here, &next, 0.1), Some(5), "another curve");
+    }
+}
