@@ -8,6 +8,7 @@ mod disc;
 mod eigen;
 mod proximity;
 mod radii;
+mod side;
 mod surface;
 mod thickened;
 
@@ -21,5 +22,6 @@ pub use radii::{
     GREATEST_RANK, LINE_RATIO, RANK, SLOPE, Spacing, looks_like_a_line, quantile, radii, smoothed, spacing,
     spacings,
 };
+pub use side::{Signs, falls, winding};
 pub use surface::{BORDER, Bandwidth, Evaluation, GAP, Kernel, Parameters, Status, SurfaceTwin, THIN};
 pub use thickened::{Nearest, least_distance, nearest, touches};

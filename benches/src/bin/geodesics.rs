@@ -19,6 +19,7 @@ use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, arguments::Arguments, machine};
 use nearmiss_testdata::arbitrary::{point_in, rng};
+use nearmiss_testdata::oracle::{Signs, falls, winding};
 use nearmiss_testdata::shapes::{Order, Sampling, plates};
 
 /// The least time of `runs` of `work`, in seconds, and what it returned last.
@@ -55,7 +56,7 @@ fn vertex_normals(mesh: &TriangleMesh) -> Vec<[f64; 3]> {
     normals
 }
 
-/// Orients the normals, and compares them with those of the mesh where there is one.
+/// Orients the normals, and compares them with the mesh where there is one.
 fn orientation(object: &Object, scan: &Scan, graph: &PointGraph, runs: usize) {
     let ((normals, found), time) = least(runs, || {
         let mut normals = scan.normals().to_vec();
@@ -72,20 +73,44 @@ fn orientation(object: &Object, scan: &Scan, graph: &PointGraph, runs: usize) {
         100.0 * count(doubtful) / count(scan.len()),
         largest.map(|part| part.decision),
     );
-    let Some(mesh) = &object.mesh else { return };
-    let expected = vertex_normals(mesh);
-    let (mut wrong, mut sure, mut judged) = (0, 0, 0);
+    if let Some(mesh) = &object.mesh {
+        against(mesh, scan, &normals, &found.confidence);
+    }
+}
+
+/// Counts normals that point into the mesh, and those that lean to the other side than its faces about the vertex do in sum.
+fn against(mesh: &TriangleMesh, scan: &Scan, normals: &[[f32; 3]], confidence: &[u8]) {
+    let mut at_vertices = vec![[0.0; 3]; mesh.vertices().len()];
+    for (normal, &source) in normals.iter().zip(scan.source()) {
+        at_vertices[source as usize] = normal.map(f64::from);
+    }
+    let falls = falls(mesh, &at_vertices);
+    let signs = Signs::of(&falls);
+    let (mut folded, mut sure) = (0, 0);
     for (i, &source) in scan.source().iter().enumerate() {
-        let Some(&expected) = expected.get(source as usize).filter(|n| dot(**n, **n) > 0.0) else { continue };
-        judged += 1;
-        if dot(normals[i].map(f64::from), expected) <= 0.0 {
-            wrong += 1;
-            sure += usize::from(found.confidence[i] >= 128);
+        if Signs::is_wrong(falls[source as usize]) {
+            let (p, n) = (mesh.vertices()[source as usize], normals[i].map(f64::from));
+            let r = f64::from(scan.radii()[i]) / scan.frame().scale;
+            let at = |side: f64| winding(mesh, [0, 1, 2].map(|k| p[k] + side * r * n[k]));
+            folded += usize::from(!Signs::is_wrong(at(-1.0) - at(1.0)));
+            sure += usize::from(confidence[i] >= 128);
         }
     }
     println!(
-        "* against the mesh: {wrong} of {judged} wrong, {:.3} % right; {sure} of the wrong ones not doubtful",
-        100.0 - 100.0 * count(wrong) / count(judged)
+        "* against the mesh: {} of {} wrong, {:.3} % right; {sure} of the wrong ones not doubtful, {folded} where the mesh comes \
+         back within a sampling radius",
+        signs.wrong,
+        signs.judged,
+        100.0 * signs.right(),
+    );
+    let expected = vertex_normals(mesh);
+    let sums =
+        expected.iter().zip(&at_vertices).filter(|(sum, n)| dot(**sum, **sum) > 0.0 && dot(**n, **n) > 0.0);
+    let by_sums: Vec<usize> = sums.map(|(sum, n)| usize::from(dot(*sum, *n) <= 0.0)).collect();
+    println!(
+        "* against sums of the normals of its faces: {} of {} wrong",
+        by_sums.iter().sum::<usize>(),
+        by_sums.len()
     );
 }
 
