@@ -49,9 +49,9 @@ fn network<'a>(levels: &'a Levels, points: Network<'a>, level: usize) -> Network
     level.checked_sub(1).map_or(points, |coarser| levels.cells()[coarser].network())
 }
 
-/// The point at the centre of the centre … of a cell of a level; itself on level 0.
+/// The point at the centre of a cell of a level; itself on level 0.
 fn point_of(levels: &Levels, level: usize, id: u32) -> u32 {
-    levels.cells()[..level].iter().rev().fold(id, |id, cells| cells.centres[id as usize])
+    level.checked_sub(1).map_or(id, |coarser| levels.cells()[coarser].points[id as usize])
 }
 
 /// Of an edge that a file lies about nothing is known.
@@ -61,7 +61,7 @@ fn sound(length: f32) -> f64 {
 
 /// The length of an edge, if there is one.
 fn edge(network: Network<'_>, [u, v]: [u32; 2]) -> Option<f64> {
-    network.edges(u as usize).find(|(to, _)| *to == v).map(|(_, length)| sound(length))
+    network.length(u as usize, v).map(sound)
 }
 
 impl LazyPath {
@@ -69,7 +69,7 @@ impl LazyPath {
     /// more than some of the points between. False, with no path, where no way leads from one to the other.
     ///
     /// From either end it leads inwards, from cell to coarser cell, and straight on where the cells are a few times smaller than the
-    /// ends are apart, or where those of both touch. O(log n) but where the coarsest level has to be searched; no allocation once warm.
+    /// ends are apart. O(log n) but where the coarsest level has to be searched; no allocation once warm.
     ///
     /// # Panics
     /// When there is no such point, or not a position for each.
@@ -89,10 +89,6 @@ impl LazyPath {
         loop {
             let here = network(levels, points, level);
             if at[0] == at[1] {
-                break;
-            }
-            if let Some(length) = edge(here, at) {
-                self.step(levels, level, at, &mut along, length);
                 break;
             }
             let Some(cells) = levels.cells().get(level) else {
@@ -193,7 +189,7 @@ impl LazyPath {
         open: impl Fn(u32) -> bool,
     ) -> bool {
         self.stops.clear();
-        self.search.search(network, [(a, 0.0)], f32::MAX, open, |i| i == b);
+        self.search.search(network, [(a, 0.0)], f32::MAX, |i, _| open(i), |i| i == b);
         if self.search.found(b).is_none() {
             return false;
         }

@@ -36,6 +36,18 @@ impl<'a> Network<'a> {
         self.len() == 0
     }
 
+    /// How long the edge between two points is, if there is one. O(log d) for d neighbours.
+    ///
+    /// # Panics
+    /// When there is no point `i`.
+    #[inline]
+    #[must_use]
+    pub fn length(&self, i: usize, j: u32) -> Option<f32> {
+        let range = self.starts[i] as usize..self.starts[i + 1] as usize;
+        let place = self.neighbours[range.clone()].binary_search(&j).ok()?;
+        self.lengths.get(range.start + place).copied()
+    }
+
     /// The neighbours of point `i`, ascending, and how far they are.
     ///
     /// # Panics

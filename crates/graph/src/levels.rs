@@ -48,6 +48,8 @@ pub struct Cells {
     pub(crate) centres: Array<u32>,
     /// Which cells touch.
     pub(crate) graph: Adjacency,
+    /// And which point of the graph that all levels are over; not stored.
+    pub(crate) points: Vec<u32>,
     /// How far their centres are from each other.
     pub(crate) lengths: Array<f32>,
     /// The edge of the finer level on the way: the end in the cell itself, then that in the other.
@@ -165,11 +167,18 @@ impl Cells {
             to_centre: to_centre.into(),
             inwards: inwards.into(),
             centres: centres.into(),
+            points: Vec::new(),
             graph,
             lengths: ends.iter().map(|touch| touch.length).collect::<Vec<f32>>().into(),
             crossings: ends.iter().map(|touch| touch.crossing).collect::<Vec<[u32; 2]>>().into(),
             radii: radii.into(),
         }
+    }
+
+    /// Which points the centres are, by those of the finer level.
+    pub(crate) fn find_points(&mut self, finer: Option<&Self>) {
+        let point = |&id: &u32| finer.map_or(id, |finer| finer.points[id as usize]);
+        self.points = self.centres.iter().map(point).collect();
     }
 
     /// The graph of the cells with the distances of their centres.
@@ -345,11 +354,12 @@ impl Levels {
             if finer.len() <= FEW {
                 break;
             }
-            let next = Cells::over(finer, radii, &mut scratch);
+            let mut next = Cells::over(finer, radii, &mut scratch);
             #[expect(clippy::cast_precision_loss, reason = "a share")]
             if next.len() as f64 > MOST_KEPT * finer.len() as f64 {
                 break;
             }
+            next.find_points(cells.last());
             cells.push(next);
         }
         Self { cells }

@@ -158,7 +158,7 @@ impl Levels {
         let mut cells: Vec<Cells> = Vec::new();
         let mut finer = points;
         for part in (1..).take_while(|&part| file.has(OWNERS, part)) {
-            let next = load_cells(file, part)?;
+            let mut next = load_cells(file, part)?;
             next.check_structure(finer)?;
             if check == Check::Full {
                 next.check_contents()?;
@@ -168,6 +168,7 @@ impl Levels {
                 return Err(Flaw::Metadata { what: "the number of cells" }.into());
             }
             finer = next.len();
+            next.find_points(cells.last());
             cells.push(next);
         }
         Ok(Self { cells })
@@ -180,6 +181,7 @@ fn load_cells(file: &File, part: u32) -> Result<Cells, OpenError> {
         to_centre: file.array(TO_CENTRE, part)?,
         inwards: file.array(INWARDS, part)?,
         centres: file.array(CENTRES, part)?,
+        points: Vec::new(),
         graph: Adjacency { starts: file.array(STARTS, part)?, neighbours: file.array(NEIGHBOURS, part)? },
         lengths: file.array(LENGTHS, part)?,
         crossings: file.array(CROSSINGS, part)?,

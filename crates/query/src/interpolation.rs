@@ -210,6 +210,8 @@ pub(crate) struct InterpolationScratch {
     /// Points whose neighbourhood in b is near, nearest first, and where those ended that were drawn there.
     near: Vec<(f64, u32, u32)>,
     seen: Vec<[u32; 2]>,
+    /// Points about two surfel radii away from one.
+    annulus: Vec<u32>,
     /// Edges on which searches ended, in order.
     crossed: Vec<[u32; 2]>,
 }

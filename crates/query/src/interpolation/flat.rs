@@ -53,6 +53,10 @@ struct Bracket {
     sides: [Side; 2],
 }
 
+fn id(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
 impl Surfaces<'_> {
     /// Draws points of a that lie in the box of b, and looks for intersections between those on either side of b.
     pub(crate) fn interpolate_all(&mut self, search: &Interpolation) -> ControlFlow<()> {
@@ -146,16 +150,16 @@ impl Surfaces<'_> {
     ) -> ControlFlow<(), Option<(u32, Side)>> {
         let Some(pairs) = ways.graph.close_pairs() else { return ControlFlow::Continue(None) };
         let reach = self.interpolation.drawn.reach();
-        let list = pairs.of(i as usize);
-        // Sorted by distance; the outer half of it has most of the points.
-        let outer = &list[list.partition_point(|close| close.distance < 0.5 * reach)..];
-        let outer = &outer[..outer.partition_point(|close| close.distance <= reach)];
-        if outer.is_empty() {
-            return ControlFlow::Continue(None);
-        }
-        for _ in 0..OF_THE_ANNULUS {
+        // Sorted by distance; the outer half has most of the points.
+        let list = pairs.of(i as usize).take_while(|close| close.distance <= reach);
+        let outer = list.filter(|close| close.distance >= 0.5 * reach).map(|close| close.point);
+        let annulus = &mut self.interpolation.annulus;
+        annulus.clear();
+        annulus.extend(outer);
+        let count = annulus.len();
+        for _ in 0..OF_THE_ANNULUS.min(id(count)) {
             self.pair.meter.go_on()?;
-            let other = outer[below(&mut ways.rng, outer.len())].point;
+            let other = self.interpolation.annulus[below(&mut ways.rng, count)];
             let found = self.side(other, side.near);
             if side.is_opposite(&found) {
                 return ControlFlow::Continue(Some((other, found)));
