@@ -251,7 +251,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         .with_margin(args.margin)
         .with_evidence(evidence);
     args.search.check(&a, &b)?;
-    let options = args.search.apply(options)?;
+    let options = args.search.apply(options, &a)?;
     let plan = CollidePlan::new(&options, &a, &b)?;
     let prove = args.prove.is_some();
     let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);

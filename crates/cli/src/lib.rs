@@ -4,6 +4,7 @@
 mod collide;
 mod console;
 mod curve;
+mod density;
 mod error;
 mod eval;
 mod export;
@@ -42,6 +43,7 @@ pub use clap;
 pub use collide::{CollideArgs, DetailName, EvidenceName};
 pub use curve::CurveArgs;
 pub use curve_picture::curve_picture;
+pub use density::DensityArgs;
 pub use error::CliError;
 pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
@@ -102,6 +104,9 @@ pub enum Command {
     /// All curves in which two scans cut each other
     #[command(after_long_help = "Example:\n  nearmiss curve a.nm b.nm --image curves.png -o curves.ply")]
     Curve(CurveArgs),
+    /// How many points to draw for an error rate, with `collide --method interpolation --flat`: measured, and derived
+    #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
+    Density(DensityArgs),
     /// Make poses to ask `collide` about: a sweep, or poses about first contact
     #[command(after_long_help = POSES_EXAMPLES)]
     Poses(PosesArgs),
@@ -122,6 +127,7 @@ impl Command {
             Self::Eval(args) => eval::run(args),
             Self::Collide(args) => collide::run(args),
             Self::Curve(args) => curve::run(args),
+            Self::Density(args) => density::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),
         };

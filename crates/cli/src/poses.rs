@@ -84,18 +84,11 @@ pub(crate) fn run(args: &PosesArgs) -> Result<(), CliError> {
     } else {
         let count = u64::from(DISTANCES) * u64::from(args.per_distance);
         let bar = console.steps("making poses", count);
-        let per_distance = u64::from(args.per_distance);
-        let lines = (0..count).map(|i| {
+        let poses = (0..).zip(sweep(args.per_distance, args.seed, &bases[1]));
+        let lines = poses.map(|(i, pose)| {
             bar.advance(1);
-            #[expect(clippy::cast_precision_loss, reason = "0 to 12")]
-            let d = (i / per_distance) as f64 * STEP;
-            let (turn, direction) = placement(&mut rng(args.seed, i));
-            Line {
-                a: bases[0].to_row_major(),
-                b: at(&turn, direction, d, &bases[1]).to_row_major(),
-                d,
-                offset: None,
-            }
+            let d = distance(i, args.per_distance);
+            Line { a: bases[0].to_row_major(), b: pose.to_row_major(), d, offset: None }
         });
         write(args, lines)
     }
@@ -110,8 +103,22 @@ fn write(args: &PosesArgs, mut lines: impl Iterator<Item = Line>) -> Result<(), 
     })
 }
 
+/// Poses of a second copy, scaled like the first by `base`: so many at each distance of the sweep.
+pub(crate) fn sweep(per_distance: u32, seed: u64, base: &Pose) -> impl Iterator<Item = Pose> {
+    (0..u64::from(DISTANCES) * u64::from(per_distance)).map(move |i| {
+        let (turn, direction) = placement(&mut rng(seed, i));
+        at(&turn, direction, distance(i, per_distance), base)
+    })
+}
+
+/// The distance of the `i`-th pose of a sweep.
+#[expect(clippy::cast_precision_loss, reason = "0 to 12")]
+fn distance(i: u64, per_distance: u32) -> f64 {
+    (i / u64::from(per_distance)) as f64 * STEP
+}
+
 /// Scale and shift that make the longest side of the bounds 2, and centre them; none for bounds without extent.
-fn normalised(scan: &Scan) -> Option<Pose> {
+pub(crate) fn normalised(scan: &Scan) -> Option<Pose> {
     let bounds = scan.bounds();
     let scale = 1.0 / bounds.half_extents().into_iter().fold(0.0, f64::max);
     let centre = bounds.centre();

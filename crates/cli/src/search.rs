@@ -22,9 +22,9 @@ pub struct SearchArgs {
     #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance)]
     pub tolerance: f64,
     /// Into how many surfels the surface of a is thought to be cut where b may be, with `--method interpolation --flat`: a number, or
-    /// `adapted` to the sampling density, 8 sampling radii wide
-    #[arg(long, value_name = "A", value_parser = parse_surfels, default_value = "30")]
-    pub surfels: Surfels,
+    /// `adapted` to the sampling density, 8 sampling radii wide; by default what `density` stored with a, or 30
+    #[arg(long, value_name = "A", value_parser = parse_surfels)]
+    pub surfels: Option<Surfels>,
     /// The probability that each surfel gets a point, with `--method interpolation --flat`
     #[arg(long, value_name = "P", default_value_t = Interpolation::default().probability)]
     pub probability: f64,
@@ -126,7 +126,7 @@ impl SearchArgs {
     }
 
     /// `options` with these.
-    pub(crate) fn apply(&self, options: CollideOptions) -> Result<CollideOptions, CliError> {
+    pub(crate) fn apply(&self, options: CollideOptions, a: &Scan) -> Result<CollideOptions, CliError> {
         if self.flat && self.method == MethodName::Traversal {
             let what = "--flat leaves the hierarchy out of --method sampling or interpolation; say one, or leave --flat out";
             return Err(CliError::Usage(what.into()));
@@ -136,8 +136,9 @@ impl SearchArgs {
             .with_tolerance(self.tolerance)
             .with_seed(self.seed)
             .with_flat(self.flat);
+        let stored = a.density().map(|density| Surfels::Count(density.surfels.clamp(1, 65_536)));
         let interpolation = Interpolation::default()
-            .with_surfels(self.surfels)
+            .with_surfels(self.surfels.or(stored).unwrap_or(Interpolation::default().surfels))
             .with_probability(self.probability)
             .with_brackets(match self.brackets {
                 BracketsName::Drawn => Brackets::Drawn,

@@ -30,4 +30,4 @@ pub use nearmiss_query::{
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};
-pub use scan::{LoadError, SaveError, Scan};
+pub use scan::{Density, LoadError, SaveError, Scan};

@@ -67,6 +67,16 @@ const VERSION: u32 = 5;
 struct ScanMeta {
     hierarchy: HierarchyMeta,
     graph: Option<SurfaceGraphMeta>,
+    density: Option<Density>,
+}
+
+/// How densely to draw points of a scan for [`Interpolation`](crate::Interpolation) without hierarchy.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Density {
+    /// Into how many surfels its surface is thought to be cut.
+    pub surfels: u32,
+    /// The share of wrong verdicts that was measured with as many.
+    pub error: f64,
 }
 
 /// A scan prepared for queries. A clone costs a reference count; it may be shared between threads.
@@ -76,6 +86,7 @@ struct ScanMeta {
 pub struct Scan {
     hierarchy: Arc<PointHierarchy>,
     graph: Option<Arc<SurfaceGraph>>,
+    density: Option<Density>,
 }
 
 impl Deref for Scan {
@@ -92,7 +103,7 @@ impl Scan {
     /// # Errors
     /// Names the option that is out of range.
     pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
-        Ok(Self { hierarchy: Arc::new(PointHierarchy::build(cloud, options)?), graph: None })
+        Ok(Self { hierarchy: Arc::new(PointHierarchy::build(cloud, options)?), graph: None, density: None })
     }
 
     /// The same scan, which is of `cloud`, with a graph over its points, by which normals are turned to one side: that of the
@@ -131,7 +142,7 @@ impl Scan {
         let sides = Sides { normals: own.as_deref(), scanner };
         let graph = SurfaceGraph::build(samples(&hierarchy), sides, &mut normals, options)?;
         hierarchy.turn_normals(&normals);
-        let scan = Self { hierarchy: Arc::new(hierarchy), graph: Some(Arc::new(graph)) };
+        let scan = Self { hierarchy: Arc::new(hierarchy), graph: Some(Arc::new(graph)), density: None };
         match metric {
             Metric::Euclidean => Ok(scan),
             Metric::Geodesic => scan.with_geodesic_kernel(),
@@ -155,7 +166,7 @@ impl Scan {
     /// # Errors
     /// [`GraphError::NoClosePairs`] without a graph that has their map.
     pub fn with_geodesic_kernel(self) -> Result<Self, GraphError> {
-        let Self { hierarchy, graph } = self;
+        let Self { hierarchy, graph, density } = self;
         let graph = graph.ok_or(GraphError::NoClosePairs)?;
         let mut hierarchy = Arc::unwrap_or_clone(hierarchy);
         let (positions, radii) = (hierarchy.positions().to_vec(), hierarchy.radii().to_vec());
@@ -167,7 +178,7 @@ impl Scan {
             heard.extend(near.iter().map(|close| close.point));
             at
         });
-        Ok(Self { hierarchy: Arc::new(hierarchy), graph: Some(graph) })
+        Ok(Self { hierarchy: Arc::new(hierarchy), graph: Some(graph), density })
     }
 
     /// The graph over the points, if one was built.
@@ -192,6 +203,18 @@ impl Scan {
         self.writer(&meta)?.save(path)
     }
 
+    /// The same scan with a density for searches that draw its points.
+    #[must_use]
+    pub fn with_density(self, density: Density) -> Self {
+        Self { density: Some(density), ..self }
+    }
+
+    /// That density, if one was measured.
+    #[must_use]
+    pub fn density(&self) -> Option<Density> {
+        self.density
+    }
+
     /// Writes what [`Scan::save`] would; returns its length in bytes.
     ///
     /// # Errors
@@ -202,7 +225,11 @@ impl Scan {
     }
 
     fn meta(&self) -> ScanMeta {
-        ScanMeta { hierarchy: self.hierarchy.meta(), graph: self.graph.as_ref().map(|graph| graph.meta()) }
+        ScanMeta {
+            hierarchy: self.hierarchy.meta(),
+            graph: self.graph.as_ref().map(|graph| graph.meta()),
+            density: self.density,
+        }
     }
 
     fn writer(&self, meta: &ScanMeta) -> Result<Writer<'_>, SaveError> {
@@ -256,7 +283,7 @@ impl Scan {
         {
             return Err(LoadError::NoClosePairs);
         }
-        Ok(Self { hierarchy: Arc::new(hierarchy), graph: graph.map(Arc::new) })
+        Ok(Self { hierarchy: Arc::new(hierarchy), graph: graph.map(Arc::new), density: meta.density })
     }
 
     /// The scan in a pose, which leads from the frame of its input to the world; f is by the kernel that the scan [is
