@@ -258,3 +258,36 @@ fn stored_and_rebuilt_paths_are_shortest() {
         }
     }
 }
+
+/// Layers of points, each joined to all of the next by edges that differ by less than distances are rounded by.
+#[test]
+fn paths_are_short_where_rounding_hides_which_way_is() {
+    const WIDTH: u32 = 6;
+    const LAYERS: u32 = 14;
+    let count = WIDTH * LAYERS;
+    let next = |i: u32| (i / WIDTH + 1) * WIDTH..((i / WIDTH + 2) * WIDTH).min(count);
+    let edges: Vec<[u32; 2]> = (0..count).flat_map(|i| next(i).map(move |j| [i, j])).collect();
+    let graph = Adjacency::from_edges(count as usize, &edges);
+    let mut longer = 0;
+    for seed in 0..8 {
+        let length = |i: u32, j: u32| {
+            let mixed = (i.min(j) * 1009 + i.max(j) * 131 + seed * 7).wrapping_mul(2_654_435_761) >> 8;
+            #[expect(clippy::cast_precision_loss, reason = "24 bits")]
+            let unit = mixed as f32 / 16_777_216.0;
+            1.0 + 6e-4 * unit
+        };
+        let lengths: Vec<f32> =
+            (0..count).flat_map(|i| graph.of(i as usize).iter().map(move |&j| length(i, j))).collect();
+        let network = Network::new(&graph, &lengths);
+        let pairs = ClosePairs::build(network, &vec![100.0; count as usize], Paths::Rebuilt);
+        let (mut scratch, mut path) = (GeodesicScratch::default(), Vec::new());
+        for [i, j] in (0..count).flat_map(|i| (0..count).map(move |j| [i, j])) {
+            let exact = scratch.distance(network, i, j).unwrap();
+            let found = pairs.path(network, [i, j], &mut scratch, &mut path).unwrap();
+            assert!(found >= exact * (1.0 - 2e-6), "{found} below {exact}");
+            assert!(found <= exact * (1.0 + 1.02e-4), "{found} where {exact} is shortest");
+            longer += u32::from(found > exact * (1.0 + 2e-6));
+        }
+    }
+    assert!(longer > 0, "some are not shortest");
+}
