@@ -48,9 +48,14 @@ fn leading(distance: f32) -> u32 {
     (bits >> DROPPED) + (bits >> (DROPPED - 1) & 1)
 }
 
+/// A distance as it is after packing. Those that stand beside are rounded too, so that all stay in order.
+pub(crate) fn kept(distance: f32) -> f32 {
+    f32::from_bits(leading(distance) << DROPPED)
+}
+
 /// The greatest that a distance of at most `most` is after packing.
 pub(crate) fn rounded(most: f32) -> f32 {
-    most.max(f32::from_bits(leading(most) << DROPPED))
+    most.max(kept(most))
 }
 
 pub(crate) fn is_floor(floor: u8) -> bool {

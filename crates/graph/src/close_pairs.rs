@@ -12,7 +12,7 @@
 use nearmiss_store::Array;
 use serde::{Deserialize, Serialize};
 
-use crate::close_list::{BESIDE, Beside, Close, CloseList, Lists, floor, pack};
+use crate::close_list::{BESIDE, Beside, Close, CloseList, Lists, floor, kept, pack};
 use crate::geodesic::{GeodesicScratch, Reached};
 use crate::length::{Network, step};
 use crate::parallel::{for_each, ranges, ranges_with};
@@ -333,7 +333,7 @@ fn pack_lists(starts: &[u32], pairs: &[Close]) -> ClosePairs {
             offsets.extend(closes.iter().map(|&close| pack(own, floor, close).0));
             codes.extend(closes.iter().map(|&close| pack(own, floor, close).1));
             for (pair, (_, close)) in list.zip(offsets[first..].iter().zip(closes)).filter(is_beside) {
-                beside.push(Beside { pair, point: close.point, distance: close.distance });
+                beside.push(Beside { pair, point: close.point, distance: kept(close.distance) });
             }
         }
         (floors, offsets, codes, beside)

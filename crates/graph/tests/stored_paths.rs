@@ -5,8 +5,8 @@ mod clouds;
 
 use clouds::Cloud;
 use nearmiss_graph::{
-    ClosePairs, Flaw, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels, LoadError,
-    Network, Paths,
+    Adjacency, ClosePairs, Flaw, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels,
+    LoadError, Network, Paths,
 };
 use nearmiss_store::{Check, File, Writer};
 use nearmiss_surface::{SurfaceOptions, SurfacePlan};
@@ -47,6 +47,33 @@ fn what_is_stored_comes_back() {
     let wrong = Levels::load(&file, cloud.points.len() + 1, Check::Structure).unwrap_err();
     assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { .. })), "{wrong}");
     assert!(matches!(ClosePairs::load(&file, 1, &horizons, Check::Structure), Err(LoadError::Open(_))));
+}
+
+/// Points on a line, half of which come much later: on either side of the seam pairs of almost the same distances stand in the
+/// list and beside it.
+#[test]
+fn lists_of_near_and_far_points_stay_in_order() {
+    const COUNT: usize = 70_000;
+    let id = |k: u32| if k < 300 { k } else { 65_000 + k };
+    let edges: Vec<[u32; 2]> = (0..600).map(|k| [id(k), id(k + 1)]).collect();
+    let graph = Adjacency::from_edges(COUNT, &edges);
+    let length = |i: u32, j: u32| 0.1 + 1e-6 * f32::from(u16::try_from(i % 61 + j % 61).unwrap());
+    let lengths: Vec<f32> = (0..COUNT)
+        .flat_map(|i| graph.of(i).iter().map(move |&j| length(u32::try_from(i).unwrap(), j)))
+        .collect();
+    let network = Network::new(&graph, &lengths);
+    let horizons = vec![3.0; COUNT];
+    let pairs = ClosePairs::build(network, &horizons, Paths::Rebuilt);
+    for i in [id(299), id(300)] {
+        let list: Vec<f32> = pairs.of(i as usize).map(|close| close.distance).collect();
+        assert!(list.len() > 50 && list.windows(2).all(|two| two[0] <= two[1]), "{list:?}");
+    }
+    let mut writer = Writer::new(*b"TEST", 1);
+    pairs.add_to(&mut writer, 0).unwrap();
+    let mut bytes = Vec::new();
+    writer.write_to(&mut bytes).unwrap();
+    let file = File::from_bytes(bytes, Check::Full).unwrap();
+    assert_eq!(ClosePairs::load(&file, 0, &horizons, Check::Full).unwrap(), pairs);
 }
 
 #[test]
