@@ -37,7 +37,7 @@ pub struct TrueCurve {
 
 impl Cut {
     /// How far, times h², the curve of two surfaces goes aside at its point `x` when each of them goes h²H/2 to the hollow side of its
-    /// mean curvature H: the least d with n_A·d and n_B·d equal to these is no longer than their sum over the sine of the angle.
+    /// mean curvature H: the least d whose shares along the two normals are these is no longer than their sum over the sine of the angle.
     #[must_use]
     pub fn aside(&self, x: [f64; 3]) -> f64 {
         let (na, ha) = bent(&self.a.parts[0], x);

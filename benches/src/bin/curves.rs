@@ -1,15 +1,18 @@
-//! What the curves of pairs of objects cost: all of them, at the default spacing and at others.
+//! What the curves of pairs of objects cost, by spacing; beside it, finding the contacts that they start from, and the rival that follows
+//! no curve: Newton's method from every contact, which gives points in no order.
 //!
 //! `curves OBJECT OBJECT … [--shift X] [--passes N]`: pairs of objects, each scaled to a longest side of 2, the second of a pair
-//! shifted along x by X of that, turned a little.
+//! turned a little and shifted by X along x.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
+use nearmiss::query::ViewScratch;
+use nearmiss::surface::meet;
 use nearmiss::{
     Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions, CurvePlan,
-    CurveScratch, Curves, Detail, Evidence, Order, Pose, Scan, collide_all, curves_with,
+    CurveScratch, Curves, Detail, Evidence, Order, Pose, Scan, ScanView, collide_all, curves_with,
 };
 use nearmiss_benches::arguments::Arguments;
-use nearmiss_benches::clock::{nanoseconds, timed};
+use nearmiss_benches::clock::{nanoseconds, processor_time, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::{Failure, machine};
 
@@ -19,17 +22,19 @@ const SPACINGS: [f64; 4] = [8.0, 2.0, 1.0, 0.25];
 fn main() -> Result<(), Failure> {
     let mut arguments = Arguments::of_process();
     let shift: f64 = arguments.value("--shift")?.unwrap_or(0.25);
-    let passes: u32 = arguments.value("--passes")?.unwrap_or(20);
+    let passes: u32 = arguments.value("--passes")?.unwrap_or(50);
     let objects = arguments.words()?;
     if objects.is_empty() || objects.len() % 2 == 1 {
         return Err("usage: curves OBJECT OBJECT … [--shift X] [--passes N]".into());
     }
     println!("{}", machine::description());
-    println!("b turned by 0.7 about (1, 2, 3) and shifted by {shift} along x; least of {passes} passes\n");
     println!(
-        "| a, b | r | spacing, r | hits | curves | closed | points | length, r | max residual, r | evaluations | contacts, ms | \
-         all, ms |\n| --- |{}",
-        " --: |".repeat(11)
+        "b turned by 0.7 about (1, 2, 3), shifted by {shift}; ms: least of {passes} passes, and processor time a pass\n"
+    );
+    println!(
+        "| a, b | what | curves | closed | points | length, r | max residual, r | evaluations | least ms | processor ms |\n\
+         | --- | --- |{}",
+        " --: |".repeat(8)
     );
     let scans = objects
         .iter()
@@ -41,41 +46,60 @@ fn main() -> Result<(), Failure> {
     let pose = Pose::from_axis_angle([1.0, 2.0, 3.0], 0.7).with_translation([shift, 0.0, 0.0]);
     for pair in scans.chunks_exact(2) {
         let [(name_a, a), (name_b, b)] = pair else { continue };
-        let r = a.sampling_radius().min(b.sampling_radius());
-        let views = [a.at(&Pose::IDENTITY), b.at(&pose)];
-        let options = CollideOptions::default()
-            .with_detail(Detail::Verdict)
-            .with_evidence(Evidence::Estimated)
-            .with_order(Order::DepthFirst);
-        let plan = CollidePlan::new(&options, a, b)?;
-        let (mut contacts, mut scratch) = (Contacts::default(), CollideScratch::default());
-        let contact_time = least(passes, || {
-            collide_all(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
-        });
-        for spacing in SPACINGS {
-            let plan = CurvePlan::new(&CurveOptions::default().with_spacing(spacing * r), a, b)?;
-            let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
-            let time = least(passes, || {
-                curves_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut found, &mut scratch);
-            });
-            println!(
-                "| {name_a}, {name_b} | {r:.5} | {spacing} | {} | {} | {} | {} | {:.1} | {:.1e} | {} | {:.3} | {:.3} |",
-                contacts.contacts.len(),
-                found.curves.len(),
-                found.closed(),
-                found.points.len(),
-                found.length() / r,
-                found.max_residual / r,
-                found.statistics.evaluations,
-                contact_time,
-                time,
-            );
-        }
+        measure(&format!("{name_a}, {name_b}"), &[a.at(&Pose::IDENTITY), b.at(&pose)], passes)?;
     }
     Ok(())
 }
 
-/// The least time of some passes, in milliseconds.
-fn least(passes: u32, mut work: impl FnMut()) -> f64 {
-    (0..passes).map(|_| nanoseconds(timed(&mut work).1) / 1e6).fold(f64::INFINITY, f64::min)
+fn measure(pair: &str, [a, b]: &[ScanView<'_>; 2], passes: u32) -> Result<(), Failure> {
+    let radius = |view: &ScanView<'_>| f64::from(view.slices().sampling_radius) * view.placed().scale();
+    let r = radius(a).min(radius(b));
+    let options = CollideOptions::default()
+        .with_detail(Detail::Verdict)
+        .with_evidence(Evidence::Estimated)
+        .with_order(Order::DepthFirst);
+    let plan = CollidePlan::new(&options, a.scan(), b.scan())?;
+    let (mut contacts, mut scratch) = (Contacts::default(), CollideScratch::default());
+    let times = time(passes, || {
+        collide_all(a, b, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+    });
+    println!("| {pair} | contacts | | | {} | | | | {times} |", contacts.contacts.len());
+
+    let [mut of_a, mut of_b] = [ViewScratch::default(), ViewScratch::default()];
+    let (mut evaluations, mut verified) = (0, 0);
+    let times = time(passes, || {
+        (evaluations, verified) = (0, 0);
+        for contact in &contacts.contacts {
+            let meeting = meet(contact.point, |x| {
+                evaluations += 2;
+                Some([a.evaluate_with(x, &mut of_a), b.evaluate_with(x, &mut of_b)])
+            });
+            verified += usize::from(meeting.is_some_and(|meeting| meeting.verified));
+        }
+    });
+    println!("| {pair} | Newton from each | | | {verified} | | | {evaluations} | {times} |");
+
+    for spacing in SPACINGS {
+        let plan = CurvePlan::new(&CurveOptions::default().with_spacing(spacing * r), a.scan(), b.scan())?;
+        let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
+        let times = time(passes, || curves_with(a, b, &plan, &Budget::UNLIMITED, &mut found, &mut scratch));
+        println!(
+            "| {pair} | contacts and curves, {spacing} r | {} | {} | {} | {:.1} | {:.1e} | {} | {times} |",
+            found.curves.len(),
+            found.closed(),
+            found.points.len(),
+            found.length() / r,
+            found.max_residual / r,
+            found.statistics.evaluations,
+        );
+    }
+    Ok(())
+}
+
+/// The least time of some passes, and the processor time of one, in milliseconds.
+fn time(passes: u32, mut work: impl FnMut()) -> String {
+    let start = processor_time();
+    let least = (0..passes).map(|_| nanoseconds(timed(&mut work).1) / 1e6).fold(f64::INFINITY, f64::min);
+    let spent = nanoseconds(processor_time().saturating_sub(start)) / 1e6 / f64::from(passes);
+    format!("{least:.2} | {spent:.2}")
 }

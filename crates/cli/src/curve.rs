@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use nearmiss::io::{Column, PlyPoints};
 use nearmiss::{
-    Budget, Curve, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, End, ScanView, curves_with,
+    Budget, Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, ScanView, curves_with,
 };
 use serde::Serialize;
 
@@ -200,16 +200,16 @@ fn sentence(found: &Curves) -> String {
         text += &format!(", {} long together", short(found.length()));
     }
     text += &format!(", within {} of both.", rough(found.max_residual));
-    let ends = |wanted: End| {
+    let ends = |wanted: CurveEnd| {
         let ends = found.curves.iter().filter(|curve| curve.count > 1).filter_map(|curve| curve.ends);
         ends.flatten().filter(|&end| end == wanted).count()
     };
     let said: Vec<String> = [
-        (End::BorderOfA, "at the border of a"),
-        (End::BorderOfB, "at the border of b"),
-        (End::Tangent, "where they touch"),
-        (End::Lost, "where points do not look like one sheet"),
-        (End::Budget, "where the budget ran out"),
+        (CurveEnd::BorderOfA, "at the border of a"),
+        (CurveEnd::BorderOfB, "at the border of b"),
+        (CurveEnd::Tangent, "where they touch"),
+        (CurveEnd::Lost, "where points do not look like one sheet"),
+        (CurveEnd::Budget, "where the budget ran out"),
     ]
     .into_iter()
     .filter_map(|(end, place)| Some(ends(end)).filter(|&n| n > 0).map(|n| format!("{n} {place}")))

@@ -132,12 +132,11 @@ impl Meter {
 
     /// One that goes on after `spent`, with evaluations along curves in steps of so many sampling radii.
     pub(crate) fn resumed(budget: &Budget, views: [&ScanView<'_>; 2], step: f64, spent: Statistics) -> Self {
-        /// The curve in a pair of leaves may be so many sampling radii long.
-        const LENGTH: f64 = 16.0;
-        /// Evaluations a step.
-        const EVALUATIONS: f64 = 8.0;
+        /// For each of the pairs of leaves that sound scans may have at most, of which few are on a curve: a tenth of what it
+        /// takes to follow one through.
+        const EVALUATIONS: f64 = 10.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 2¹⁶")]
-        let evaluations = (EVALUATIONS * LENGTH / step).clamp(1.0, 65536.0) as u64;
+        let evaluations = (EVALUATIONS / step).clamp(1.0, 65536.0) as u64;
         let leaves = views.map(|view| view.slices().nodes.len().div_ceil(2) as u64);
         let points = views.map(|view| u64::from(view.scan().leaf_size()));
         Self { spent, ..Self::new(budget, leaves, points, evaluations) }

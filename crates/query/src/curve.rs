@@ -1,7 +1,7 @@
-//! All of {x | f_A(x) = f_B(x) = 0}: the curves in which two surfaces cut each other, as polylines.
+//! All of `{x | f_A(x) = f_B(x) = 0}`: the curves in which two surfaces cut each other, as polylines.
 //!
 //! [`collide_all`] says where discs of either scan cross. From the first of these places that no curve has passed, Newton's
-//! method leads onto both surfaces, and from there the curve is followed both ways (`follow`): ahead along n_A × n_B, back
+//! method leads onto both surfaces, and from there the curve is followed both ways (`follow`): ahead along `n_A × n_B`, back
 //! onto both surfaces by Newton's method, in steps that get shorter where the curve turns. Crossings that it passed start
 //! no other (`trail`). Places where the surfaces cross steeply come first: where they graze, first order says little
 //! (docs/theory/curves.md).
@@ -87,7 +87,7 @@ impl CurvePlan {
 /// Why a curve ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum End {
+pub enum CurveEnd {
     /// The surface of a ends there.
     BorderOfA,
     /// The surface of b ends there.
@@ -109,7 +109,7 @@ pub struct Curve {
     /// How many points it has: one alone where the surfaces touch and no curve leads away.
     pub count: usize,
     /// Why it ends where it begins and where it ends; none if the last point is joined to the first.
-    pub ends: Option<[End; 2]>,
+    pub ends: Option<[CurveEnd; 2]>,
 }
 
 impl Curve {
@@ -226,7 +226,7 @@ pub fn curves_with(
                 continue;
             }
             let curve = follower.trace(place, spacing, &mut found.points);
-            found.complete &= !curve.ends.is_some_and(|ends| ends.contains(&End::Budget));
+            found.complete &= !curve.ends.is_some_and(|ends| ends.contains(&CurveEnd::Budget));
             found.curves.push(curve);
         }
     }

@@ -33,7 +33,7 @@ pub use collide::{
     CollideScratch, Contacts, collide, collide_all, collide_hinted, collide_proving, collide_with,
 };
 pub use crossing::{Disc, crossing};
-pub use curve::{Curve, CurveOptions, CurvePlan, CurveScratch, Curves, End, curves, curves_with};
+pub use curve::{Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, curves, curves_with};
 pub use hint::PairHint;
 pub use interpolation::{Brackets, Interpolation, Refinement, Surfels, occupancy, points_for};
 pub use options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};

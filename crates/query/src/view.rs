@@ -145,7 +145,7 @@ impl<'a> ScanView<'a> {
     ) -> Evaluation {
         let x = self.placed.apply_inverse(x);
         self.in_world(match &self.kernel {
-            None => self.scan.evaluate_with(x, &mut scratch.gather),
+            None => self.scan.evaluate_onward(x, &mut scratch.gather),
             Some(kernel) => {
                 let found = self.scan.nearest_point_near(*nearest, x);
                 *nearest = found as usize;

@@ -5,8 +5,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions, CurvePlan, CurveScratch,
-    Curves, End, PlanError, ScanView, ViewScratch, collide_all, curves, curves_with,
+    Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveEnd, CurveOptions, CurvePlan,
+    CurveScratch, Curves, PlanError, ScanView, ViewScratch, collide_all, curves, curves_with,
 };
 use nearmiss_surface::meet;
 use nearmiss_testdata::arbitrary;
@@ -119,9 +119,9 @@ fn clean_cuts_are_found_whole() {
             let r = radii[0].min(radii[1]);
             assert!(cut.curvature() * radii[0].max(radii[1]) < 0.021, "{}: H r is small", cut.name);
             let border = if cut.name.contains("bowl") || cut.name.contains("half sphere") {
-                Some(End::BorderOfA)
+                Some(CurveEnd::BorderOfA)
             } else {
-                cut.name.contains("strip").then_some(End::BorderOfB)
+                cut.name.contains("strip").then_some(CurveEnd::BorderOfB)
             };
             let allowed = if border.is_some() { AT_BORDERS } else { 0.05 };
             assert_whole(&found, &cut, &Pose::IDENTITY, radii, allowed);
@@ -238,7 +238,7 @@ fn a_figure_of_eight_is_followed_to_where_it_crosses_itself() {
         }
         for curve in &found.curves {
             for end in curve.ends.into_iter().flatten() {
-                assert_eq!(end, End::Tangent, "sampling {seed}: {:?}", found.curves);
+                assert_eq!(end, CurveEnd::Tangent, "sampling {seed}: {:?}", found.curves);
             }
         }
         let longest =
@@ -256,7 +256,7 @@ fn surfaces_that_coincide_touch_in_points() {
     let found = draw(&view, &view, CurveOptions::default());
     assert!(found.curves.len() > 50, "{}", found.curves.len());
     for curve in &found.curves {
-        assert_eq!((curve.count, curve.ends), (1, Some([End::Tangent; 2])));
+        assert_eq!((curve.count, curve.ends), (1, Some([CurveEnd::Tangent; 2])));
     }
     let r = scan.sampling_radius();
     for (i, &p) in found.points.iter().enumerate() {
@@ -300,7 +300,8 @@ fn a_budget_leaves_what_was_found() {
         assert_eq!(found.complete, share == 20, "{share} twentieths of the work");
         assert!(units(&found) <= work + 4, "{} of {work} units", units(&found));
         assert_eq!(found, curves(&views[0], &views[1], &plan, &budget), "the same twice");
-        let cut_short = |c: &nearmiss_query::Curve| c.ends.is_some_and(|ends| ends.contains(&End::Budget));
+        let cut_short =
+            |c: &nearmiss_query::Curve| c.ends.is_some_and(|ends| ends.contains(&CurveEnd::Budget));
         assert!(found.curves.iter().all(|c| c.is_closed() || cut_short(c)), "{:?}", found.curves);
         for &p in &found.points {
             assert!(to_found(p, &whole) < 0.1 * a.sampling_radius(), "on the whole curve");

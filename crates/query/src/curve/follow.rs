@@ -4,7 +4,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Evaluation, Status, step_onto_both};
 
 use super::trail::{Place, Trail};
-use super::{Curve, End};
+use super::{Curve, CurveEnd};
 use crate::budget::Meter;
 use crate::view::{ScanView, ViewScratch};
 
@@ -64,8 +64,18 @@ pub(super) struct Follower<'a> {
 
 impl Place {
     /// Why a curve cannot be followed from here, although both surfaces go on.
-    fn lost(&self) -> End {
-        if self.sine < GRAZING { End::Tangent } else { End::Lost }
+    fn lost(&self) -> CurveEnd {
+        if self.sine < GRAZING { CurveEnd::Tangent } else { CurveEnd::Lost }
+    }
+
+    /// Why it cannot be followed to a place where both functions are `at`.
+    fn obstacle(&self, at: &[Evaluation; 2]) -> CurveEnd {
+        match at.map(|at| at.status) {
+            [Status::Border | Status::Outside, _] => CurveEnd::BorderOfA,
+            [_, Status::Border | Status::Outside] => CurveEnd::BorderOfB,
+            [Status::Ok, Status::Ok] => self.lost(),
+            _ => CurveEnd::Lost,
+        }
     }
 }
 
@@ -86,12 +96,12 @@ impl Follower<'_> {
     pub(super) fn trace(&mut self, place: Place, spacing: f64, points: &mut Vec<[f64; 3]>) -> Curve {
         let start = self.trail.places.len();
         self.trail.push(place);
-        let onward = if place.is_tangent() { Some(End::Tangent) } else { self.follow(start, 1.0) };
+        let onward = if place.is_tangent() { Some(CurveEnd::Tangent) } else { self.follow(start, 1.0) };
         let turn = self.trail.places.len();
         let ends = onward.map(|last| {
             let back = match last {
-                End::Budget => None,
-                _ if place.is_tangent() => Some(End::Tangent),
+                CurveEnd::Budget => None,
+                _ if place.is_tangent() => Some(CurveEnd::Tangent),
                 _ => self.follow(start, -1.0),
             };
             [back.unwrap_or(last), last]
@@ -103,7 +113,7 @@ impl Follower<'_> {
     }
 
     /// From a place of the trail onward, or back (`way` −1), until the curve ends; none when it is there again.
-    fn follow(&mut self, start: usize, way: f64) -> Option<End> {
+    fn follow(&mut self, start: usize, way: f64) -> Option<CurveEnd> {
         let mut here = self.trail.places[start];
         let mut bend = Vector3::zeros();
         let mut length = STRIDE * self.longest;
@@ -128,7 +138,7 @@ impl Follower<'_> {
                     }
                     grows = true;
                 }
-                Err(End::Budget) => return Some(End::Budget),
+                Err(CurveEnd::Budget) => return Some(CurveEnd::Budget),
                 Err(end) => {
                     length = 0.5 * ahead;
                     grows = false;
@@ -141,40 +151,41 @@ impl Follower<'_> {
     }
 
     /// The place on the curve a step of `length` ahead, or why there is none.
-    fn advance(&mut self, here: &Place, way: f64, bend: Vector3<f64>, length: f64) -> Result<Place, End> {
+    fn advance(
+        &mut self,
+        here: &Place,
+        way: f64,
+        bend: Vector3<f64>,
+        length: f64,
+    ) -> Result<Place, CurveEnd> {
         let arc = here.tangent * way + bend * (0.5 * length);
         let aim = here.point + arc * (length / arc.norm());
-        let missed = here.lost();
         let mut point = aim;
+        let mut obstacle = here.lost();
         for _ in 0..ROUNDS {
-            let at = self.evaluate(point.into()).ok_or(End::Budget)?;
-            if at.iter().all(|at| at.f.abs() <= self.tolerance)
-                || at.iter().any(|at| at.status == Status::Outside)
-            {
-                let borders = [End::BorderOfA, End::BorderOfB];
-                for (at, border) in at.iter().zip(borders) {
-                    match at.status {
-                        Status::Ok => {}
-                        Status::Border | Status::Outside => return Err(border),
-                        _ => return Err(End::Lost),
-                    }
-                }
+            let at = self.evaluate(point.into()).ok_or(CurveEnd::Budget)?;
+            let is_on = at.iter().all(|at| at.f.abs() <= self.tolerance);
+            obstacle = here.obstacle(&at);
+            if is_on && at.iter().all(|at| at.status == Status::Ok) {
                 let next = Place::new(point, &at).turned_like(here);
-                let tilted = |side: usize| next.normals[side].dot(&here.normals[side]) < TILT_COSINE;
                 if next.is_tangent() {
-                    return Err(End::Tangent);
+                    return Err(CurveEnd::Tangent);
                 }
                 let chord = (point - here.point).norm();
-                let turned = turns(here, &next, chord, self.longest);
-                let too_far = chord > self.longest;
-                return if turned || tilted(0) || tilted(1) || too_far { Err(missed) } else { Ok(next) };
+                let tilted = |side: usize| next.normals[side].dot(&here.normals[side]) < TILT_COSINE;
+                let strays = tilted(0) || tilted(1) || turns(here, &next, chord, self.longest);
+                return if strays || chord > self.longest { Err(obstacle) } else { Ok(next) };
+            }
+            if is_on || at.iter().any(|at| at.status == Status::Outside) {
+                break;
             }
             point += step_onto_both(&at, PARALLEL * PARALLEL);
-            if (point - aim).norm() > (MOST_CORRECTION * length).max(LEAST_CORRECTION * self.radius) {
-                return Err(missed);
+            let most = (MOST_CORRECTION * length).max(LEAST_CORRECTION * self.radius);
+            if (point - aim).norm() > most {
+                break;
             }
         }
-        Err(missed)
+        Err(obstacle)
     }
 }
 

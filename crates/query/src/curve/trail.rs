@@ -10,7 +10,7 @@ use super::PARALLEL;
 pub(super) struct Place {
     pub(super) point: Vector3<f64>,
     pub(super) normals: [Vector3<f64>; 2],
-    /// n_A × n_B, of length one.
+    /// `n_A × n_B`, of length one.
     pub(super) tangent: Vector3<f64>,
     /// The sine of the angle between the surfaces.
     pub(super) sine: f64,
@@ -99,9 +99,7 @@ impl Trail {
         let mix = |c: i64, by: u64| c.cast_unsigned().wrapping_mul(by);
         let hash =
             mix(x, 0x9e37_79b9_7f4a_7c15) ^ mix(y, 0xc2b2_ae3d_27d4_eb4f) ^ mix(z, 0x1656_67b1_9e37_79f9);
-        #[expect(clippy::cast_possible_truncation, reason = "a few bits")]
-        let list = (hash >> 32) as usize & (self.heads.len() - 1);
-        list
+        (hash >> 32) as usize & (self.heads.len() - 1)
     }
 
     pub(super) fn push(&mut self, place: Place) {

@@ -1,0 +1,65 @@
+//! Curves by the kernel of the view, and of scans that were saved.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss::{
+    Budget, BuildOptions, Check, CurveOptions, CurvePlan, Curves, GraphOptions, PlanError, PointCloud, Pose,
+    Scan, curves,
+};
+use nearmiss_testdata::shapes::{Sampling, plates, sphere};
+
+fn draw(a: &Scan, b: &Scan, pose: &Pose) -> Curves {
+    let plan = CurvePlan::new(&CurveOptions::default(), a, b).unwrap();
+    curves(&a.at(&Pose::IDENTITY), &b.at(pose), &plan, &Budget::UNLIMITED)
+}
+
+/// By straight distances and by those along the graph.
+fn both(points: &[[f64; 3]]) -> [Scan; 2] {
+    let cloud = PointCloud::from_positions(points).unwrap();
+    let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
+    let along = scan.clone().with_graph(&cloud, &GraphOptions::default(), None).unwrap();
+    [scan, along.with_geodesic_kernel().unwrap()]
+}
+
+#[test]
+fn either_kernel_follows_the_same_circle() {
+    let scans = both(&sphere(1.0).sample(Sampling::clean(0.04)).points);
+    let pose = Pose::from_translation([1.0, 0.0, 0.0]);
+    for scan in &scans {
+        let found = draw(scan, scan, &pose);
+        assert_eq!((found.curves.len(), found.closed(), found.complete), (1, 1, true), "{:?}", scan.metric());
+        for p in &found.points {
+            let off = (p[0] - 0.5).hypot(p[1].hypot(p[2]) - 0.75_f64.sqrt());
+            assert!(off < 0.05 * scan.sampling_radius(), "{:?}: {off}", scan.metric());
+        }
+        let mut bytes = Vec::new();
+        scan.write_to(&mut bytes).unwrap();
+        let again = Scan::from_bytes(bytes, Check::Full).unwrap();
+        assert_eq!(draw(&again, &again, &pose), found, "a saved scan has the same curves");
+    }
+    let refused = CurvePlan::new(&CurveOptions::default(), &scans[0], &scans[1]);
+    assert!(matches!(refused, Err(PlanError::Metrics(_))));
+}
+
+#[test]
+fn along_the_graph_near_plates_are_cut_one_by_one() {
+    // Nearer each other than straight distances can tell.
+    let spacing = 0.05;
+    let plates = both(&plates(2.0, 2.0, 1.5 * spacing).sample(Sampling::clean(spacing)).points);
+    let walls = both(&nearmiss_testdata::shapes::patch(2.6, 2.6).sample(Sampling::clean(spacing)).points);
+    let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
+    let found = draw(&plates[1], &walls[1], &upright);
+    assert_eq!(found.curves.len(), 2, "{:?}", found.curves);
+    for curve in &found.curves {
+        let points = &found.points[curve.first..curve.first + curve.count];
+        let side = points[0][2].signum();
+        for p in points {
+            assert!(
+                (p[2] - side * 0.75 * spacing).abs() < 1e-3 * spacing && p[1].abs() < 1e-3 * spacing,
+                "{p:?}"
+            );
+        }
+        let ends = [points[0], points[points.len() - 1]].map(Vector3::from);
+        assert!((ends[0] - ends[1]).norm() > 1.9, "from border to border");
+    }
+}
