@@ -33,6 +33,9 @@ const MOST_TURN: f64 = 0.6;
 /// The cosine of the most a surface turns in a step, 30°: more is another sheet.
 const TILT_COSINE: f64 = 0.866;
 
+/// Where the mean of the points is this many bandwidths aside, the surface ends near: at a border it is 0.56, elsewhere seldom 0.2.
+const BESIDE: f64 = 0.4;
+
 /// Rounds of Newton's method a step; a good start needs two.
 const ROUNDS: u32 = 4;
 
@@ -68,12 +71,16 @@ impl Place {
         if self.sine < GRAZING { CurveEnd::Tangent } else { CurveEnd::Lost }
     }
 
-    /// Why it cannot be followed to a place where both functions are `at`.
-    fn obstacle(&self, at: &[Evaluation; 2]) -> CurveEnd {
-        match at.map(|at| at.status) {
-            [Status::Border | Status::Outside, _] => CurveEnd::BorderOfA,
-            [_, Status::Border | Status::Outside] => CurveEnd::BorderOfB,
-            [Status::Ok, Status::Ok] => self.lost(),
+    /// Why it cannot be followed to `x`, where both functions are `at`.
+    fn obstacle(&self, x: Vector3<f64>, at: &[Evaluation; 2]) -> CurveEnd {
+        let ends = at.each_ref().map(|at| {
+            let aside = (Vector3::from(at.centroid) - x).norm() / at.bandwidth;
+            at.status == Status::Outside || aside > BESIDE
+        });
+        match ends {
+            [true, _] => CurveEnd::BorderOfA,
+            [_, true] => CurveEnd::BorderOfB,
+            _ if at.iter().all(|at| at.status == Status::Ok) => self.lost(),
             _ => CurveEnd::Lost,
         }
     }
@@ -165,7 +172,7 @@ impl Follower<'_> {
         for _ in 0..ROUNDS {
             let at = self.evaluate(point.into()).ok_or(CurveEnd::Budget)?;
             let is_on = at.iter().all(|at| at.f.abs() <= self.tolerance);
-            obstacle = here.obstacle(&at);
+            obstacle = here.obstacle(point, &at);
             if is_on && at.iter().all(|at| at.status == Status::Ok) {
                 let next = Place::new(point, &at).turned_like(here);
                 if next.is_tangent() {
