@@ -22,7 +22,7 @@ pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
 pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, CollideOptions, CollidePlan, CollideScratch,
-    Contact, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, Detail, End,
+    Contact, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, Detail,
     Evidence, Interpolation, Method, Order, Pacer, PairHint, PlanError, Proof, Reason, Refinement, Sampling,
     ScanView, Semantics, Statistics, Surfels, Until, Verdict, World, answer_each, collide, collide_all,
     collide_hinted, collide_many, collide_many_with, collide_paced, collide_poses, collide_poses_with,
