@@ -2,7 +2,7 @@
 //!
 //! * `demo` — the main job on a real scan, with a table and a picture.
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
-//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, measured.
+//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, and those of their paper of 2005, measured.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
 //! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
@@ -40,7 +40,7 @@ of the repository
                  whether what `collide A B --prove PROOF` wrote holds, by means of its own
   field SCAN [--noise 0.1] -o OUT.png
                  a picture of f over a slice of a noisy scan; --table counts where its normal flips
-  tables -o FOLDER [--data FOLDER] [--only NUMBER] [--quick]
+  tables -o FOLDER [--data FOLDER] [--2005] [--only NUMBER] [--quick]
                  Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, measured
   fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
 

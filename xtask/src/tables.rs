@@ -1,4 +1,4 @@
-//! `cargo xtask tables`: the table and plots of Klein & Zachmann 2004, measured.
+//! `cargo xtask tables`: the table and plots of Klein & Zachmann 2004 and 2005, measured.
 
 use crate::repository::{Outcome, root, run_cargo};
 
@@ -21,7 +21,19 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
             absolute.push(here.join(path).to_string_lossy().into_owned());
         }
     }
-    let program = ["run", "--release", "--quiet", "-p", "nearmiss-benches", "--bin", "klein2004", "--"];
+    let only_2005 = absolute.iter().position(|word| word == "--2005");
+    let papers: &[&str] = if only_2005.is_some() { &["klein2005"] } else { &["klein2004", "klein2005"] };
+    if let Some(place) = only_2005 {
+        absolute.remove(place);
+    }
     let words: Vec<&str> = absolute.iter().map(String::as_str).collect();
-    run_cargo(&[&program, words.as_slice(), data].concat())
+    for &paper in papers {
+        // Numbers of figures are those of one paper.
+        if paper == "klein2005" && only_2005.is_none() && words.contains(&"--only") {
+            continue;
+        }
+        let program = ["run", "--release", "--quiet", "-p", "nearmiss-benches", "--bin", paper, "--"];
+        run_cargo(&[&program, words.as_slice(), data].concat())?;
+    }
+    Ok(())
 }
