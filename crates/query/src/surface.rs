@@ -368,12 +368,14 @@ impl Surfaces<'_> {
             return self.samples_meet(pair);
         }
         self.pair.meter.leaf_pair(node_a.count as usize, node_b.count as usize);
-        // Where there are no sides to tell, the test without signs.
-        let by_discs = match self.method {
-            Method::Traversal => true,
-            Method::Sampling(_) => false,
-            Method::Interpolation(_) => !self.tells_sides(pair),
-        };
+        let by_discs = !matches!(self.method, Method::Sampling(_));
+        if let Method::Interpolation(interpolation) = self.method {
+            let tries = self.tries;
+            self.test_edges(pair, &interpolation)?;
+            if self.tries > tries {
+                return ControlFlow::Continue(());
+            }
+        }
         for of_a in blocks(&node_a) {
             for of_b in blocks(&node_b) {
                 let tries = self.tries;
@@ -385,10 +387,8 @@ impl Surfaces<'_> {
             }
         }
         match self.method {
-            Method::Traversal => ControlFlow::Continue(()),
             Method::Sampling(sampling) => self.test_leaves(pair, &sampling),
-            Method::Interpolation(_) if by_discs => ControlFlow::Continue(()),
-            Method::Interpolation(interpolation) => self.test_edges(pair, &interpolation),
+            _ => ControlFlow::Continue(()),
         }
     }
 

@@ -38,6 +38,13 @@ const NARROW: f32 = 32.0;
 /// As near b, in its local sampling radii, a path has arrived.
 const ARRIVED: f64 = 0.1;
 
+/// A place is on b if |f| is at most so many of its local sampling radii there,
+const ZERO: f64 = 0.25;
+
+/// and no further from the tangent planes of the nearest points of both than so many of theirs: edges cut bends short, and
+/// points are noisy.
+const OFF: f64 = 0.5;
+
 /// What a search goes by.
 struct Ways<'a> {
     search: &'a Interpolation,
@@ -274,25 +281,34 @@ impl Surfaces<'_> {
     /// A place on the surface of a near its point `i` that should be on that of b too: a hit, if it is.
     fn meets_at(&mut self, i: u32, x: [f64; 3], side: &Side, search: &Interpolation) -> ControlFlow<()> {
         let [va, vb] = self.pair.views;
-        let (i, j) = (i as usize, side.near as usize);
-        let radius_a = f64::from(self.pair.a.radii[i]) * va.placed().scale();
-        let radius_b = f64::from(self.pair.b.radii[j]) * self.scale_of_b();
-        // Where b ends, its side changes too, but there are no samples.
-        let far = f64::from(FAR) * radius_a.max(radius_b);
-        if side.away > far || side.distance.abs() > 0.25 * radius_b {
+        let nearest = va.scan().nearest_point_within(i as usize, va.placed().apply_inverse(x), f64::INFINITY);
+        self.pair.meter.spent.neighbour_steps += u64::from(nearest.1);
+        let (i, j) = (nearest.0 as usize, side.near as usize);
+        let radii = [
+            f64::from(self.pair.a.radii[i]) * va.placed().scale(),
+            f64::from(self.pair.b.radii[j]) * self.scale_of_b(),
+        ];
+        let normals = [
+            va.placed().rotate(self.pair.a.normals[i].map(f64::from)),
+            vb.placed().rotate(self.pair.b.normals[j].map(f64::from)),
+        ];
+        let from = [va.point(i), vb.point(j)].map(|p| Vector3::from(x) - Vector3::from(p));
+        // Edges lead over gaps of a, and from sheet to sheet; where b ends, its side changes too, but there are no samples, and
+        // between two sheets of it f vanishes.
+        let far = f64::from(FAR) * radii[0].max(radii[1]);
+        let off = [0, 1].map(|k: usize| Vector3::from(normals[k]).dot(&from[k]).abs());
+        let is_off = [0, 1].into_iter().any(|k: usize| from[k].norm() > far || off[k] > OFF * radii[k]);
+        if is_off || side.distance.abs() > ZERO * radii[1] {
             return ControlFlow::Continue(());
         }
         if let Some(reason) = self.doubt_about(i, j) {
             self.doubt.get_or_insert(reason);
             return ControlFlow::Continue(());
         }
-        let na = Vector3::from(va.placed().rotate(self.pair.a.normals[i].map(f64::from)));
-        let nb = vb.placed().rotate(self.pair.b.normals[j].map(f64::from));
-        let off = na.dot(&(Vector3::from(x) - Vector3::from(va.point(i))));
         let contact = Contact {
             point: x,
-            normals: Some([na.into(), nb]),
-            residual: off.abs().max(side.distance.abs()),
+            normals: Some(normals),
+            residual: off[0].max(side.distance.abs()),
             sources: [va.scan().id(i), vb.scan().id(j)],
         };
         self.hit_by(search.refinement, contact, i, j)

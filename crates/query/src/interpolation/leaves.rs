@@ -12,7 +12,7 @@ const CROSSES: f64 = 1.5;
 
 impl Surfaces<'_> {
     /// Whether the leaf of b says which side of it a place is on: its normals are oriented, and sure of it.
-    pub(crate) fn tells_sides(&self, pair: NodePair) -> bool {
+    fn tells_sides(&self, pair: NodePair) -> bool {
         let [_, vb] = self.pair.views;
         let points = self.pair.b.nodes[pair.b.index()].points();
         vb.scan().is_oriented()
@@ -21,10 +21,13 @@ impl Surfaces<'_> {
             })
     }
 
-    /// Each edge of a's graph from a point of its leaf near the leaf of b: whether it crosses b.
+    /// Each edge of a's graph from a point of its leaf near the leaf of b: whether it crosses b. No edge does where sides
+    /// are not known, nor need one where b is thinner than edges are long: there the discs tell.
     pub(crate) fn test_edges(&mut self, pair: NodePair, search: &Interpolation) -> ControlFlow<()> {
         let [va, _] = self.pair.views;
-        let Some(graph) = va.graph() else { return ControlFlow::Continue(()) };
+        let Some(graph) = va.graph().filter(|_| self.tells_sides(pair)) else {
+            return ControlFlow::Continue(());
+        };
         let (edges, longest) = (graph.points().edges(), graph.points().reaches());
         let scale = va.placed().scale();
         let leaf = self.pair.a.nodes[pair.a.index()].points();
