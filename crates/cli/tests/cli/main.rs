@@ -5,6 +5,7 @@ mod bad_input;
 mod collide;
 mod curves;
 mod faults;
+mod interpolating;
 mod looking_inside;
 mod making_poses;
 mod prepare;

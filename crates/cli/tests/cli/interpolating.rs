@@ -1,0 +1,121 @@
+//! `collide --method interpolation`.
+
+use nearmiss_testdata::shapes::sphere;
+use serde_json::Value;
+
+use crate::running::{Place, numbers, shift};
+
+const METHOD: [&str; 2] = ["--method", "interpolation"];
+
+fn ask(place: &Place, scans: [&str; 2], options: &[&str]) -> Value {
+    let asked = [&["collide", scans[0], scans[1], "--json"], &METHOD[..], options].concat();
+    let done = place.ok(&asked);
+    assert_eq!(done.results.lines().count(), 1, "{}", done.results);
+    done.json().remove(0)
+}
+
+/// Two unit spheres whose centres are 1.2 apart meet in a circle of radius 0.8.
+fn is_on_the_circle(place: &Value, off: f64) -> bool {
+    let p = numbers(place);
+    (p[0] - 0.6).abs() < off && (p[1].hypot(p[2]) - 0.8).abs() < off
+}
+
+#[test]
+fn scans_without_a_graph_are_refused_and_raw_ones_get_one() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.08);
+    place.ok(&["preprocess", "ball.xyz", "-o", "bare.nm", "--no-graph", "--quiet"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    for (scans, which) in
+        [(["bare.nm", "ball.nm"], "the first scan"), (["ball.nm", "bare.nm"], "the second scan")]
+    {
+        for flat in [&[][..], &["--flat"]] {
+            let asked = [&["collide", scans[0], scans[1]], &METHOD[..], flat].concat();
+            place.refused(2, &asked, &[which, "--no-graph", "--method traversal"]);
+        }
+    }
+    let touching = shift(1.2, 0.0, 0.0);
+    for scans in [["ball.xyz", "ball.xyz"], ["ball.nm", "ball.xyz"], ["ball.xyz", "ball.nm"]] {
+        for flat in [&[][..], &["--flat"]] {
+            let hit = ask(&place, scans, &[&["--pose-b", &touching], flat].concat());
+            assert_eq!((&hit["verdict"], &hit["evidence"]), (&"intersecting".into(), &"certified".into()));
+            assert!(is_on_the_circle(&hit["witness"], 0.02), "{hit}");
+            assert!(hit["evaluations"].as_u64().unwrap() > 0, "{hit}");
+        }
+    }
+    let stored = ask(&place, ["ball.nm", "ball.nm"], &["--flat", "--pose-b", &touching]);
+    let raw = ask(&place, ["ball.xyz", "ball.xyz"], &["--flat", "--pose-b", &touching]);
+    assert_eq!(
+        (&stored["witness"], &stored["evaluations"]),
+        (&raw["witness"], &raw["evaluations"]),
+        "a file changes nothing"
+    );
+}
+
+#[test]
+fn all_contacts_are_listed() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.08);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    let touching = shift(1.2, 0.0, 0.0);
+    for (flat, least) in [(&[][..], 20), (&["--flat"], 8), (&["--flat", "--brackets", "annulus"], 8)] {
+        let options = [&["--all", "--pose-b", &touching], flat].concat();
+        let told = ask(&place, ["ball.nm", "ball.nm"], &options);
+        assert_eq!((&told["verdict"], &told["complete"]), (&"intersecting".into(), &true.into()), "{told}");
+        let contacts = told["contacts"].as_array().unwrap();
+        assert!(contacts.len() >= least, "{} contacts, {flat:?}", contacts.len());
+        for contact in contacts {
+            assert!(is_on_the_circle(&contact["point"], 0.05), "{contact}");
+        }
+        let missed = ask(
+            &place,
+            ["ball.nm", "ball.nm"],
+            &[&["--all", "--pose-b", &shift(2.3, 0.0, 0.0)], flat].concat(),
+        );
+        assert_eq!((&missed["verdict"], &missed["contacts"]), (&"separated".into(), &Value::Array(vec![])));
+    }
+}
+
+#[test]
+fn numbers_of_the_search_count_or_are_refused() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.04);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    // Nothing is found: all that is drawn is evaluated.
+    let apart = shift(1.7, 1.2, 0.0);
+    let evaluations = |options: &[&str]| {
+        let options = [&["--flat", "--pose-b", &apart], options].concat();
+        ask(&place, ["ball.nm", "ball.nm"], &options)["evaluations"].as_u64().unwrap()
+    };
+    let few = evaluations(&["--surfels", "5"]);
+    let many = evaluations(&["--surfels", "30"]);
+    let sure = evaluations(&["--surfels", "30", "--probability", "0.999999"]);
+    assert!(0 < few && few < many && many < sure, "{few}, {many}, {sure}");
+    assert!(evaluations(&["--surfels", "adapted"]) > 0);
+    assert_ne!(evaluations(&["--surfels", "adapted"]), many);
+    let touching = shift(1.2, 0.0, 0.0);
+    for refinement in ["newton", "sphere", "grid"] {
+        let told = ask(
+            &place,
+            ["ball.nm", "ball.nm"],
+            &["--flat", "--refinement", refinement, "--pose-b", &touching],
+        );
+        assert!(is_on_the_circle(&told["witness"], 0.02), "{refinement}: {told}");
+        assert!(told["residual"].as_f64().unwrap() <= 0.1 * 0.08, "{refinement}: {told}");
+    }
+
+    let refused = |options: &[&str], words: &[&str]| {
+        place.refused(2, &[&["collide", "ball.nm", "ball.nm"], options].concat(), words);
+    };
+    refused(&["--flat"], &["--flat", "--method"]);
+    refused(&["--method", "traversal", "--flat"], &["--flat", "interpolation"]);
+    for surfels in ["0", "65537", "some", "-3"] {
+        let surfels = format!("--surfels={surfels}");
+        refused(&[METHOD[0], METHOD[1], "--flat", &surfels], &["surfels", "adapted"]);
+    }
+    for probability in ["0", "1", "-0.1", "NaN"] {
+        let probability = format!("--probability={probability}");
+        refused(&[METHOD[0], METHOD[1], "--flat", &probability], &["probability"]);
+    }
+    refused(&[METHOD[0], METHOD[1], "--margin", "0.1"], &["margin"]);
+}
