@@ -37,7 +37,7 @@ pub struct Interpolation {
     /// What the random numbers come from.
     pub seed: u64,
     /// Without hierarchy: points drawn from all of a that lie in the box of b. With it, pairs of leaves are compared: each
-    /// edge of a's graph there, whether its ends are on different sides of b.
+    /// edge of a's graph there, whether its ends are on different sides of b, and where none crosses, all discs.
     pub flat: bool,
 }
 

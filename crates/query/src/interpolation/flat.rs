@@ -97,6 +97,8 @@ impl Surfaces<'_> {
                 (volume.area / (radius * radius)).max(1.0)
             }
         };
+        // None has less than a point: nothing is nearer to each other than these.
+        let surfels = surfels.min(f64::from(volume.count));
         let wanted = search.draws(surfels);
         #[expect(clippy::cast_possible_truncation, reason = "a length in single precision")]
         let reach = 2.0 * (volume.area / surfels).sqrt() as f32;
@@ -327,6 +329,8 @@ impl Surfaces<'_> {
                 .map(|drawn| (drawn.side.away, drawn.point, drawn.side.near)),
         );
         near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        // Points may have been drawn twice.
+        near.dedup_by_key(|near| near.1);
         near.truncate(most);
         self.interpolation.seen.clear();
         let mut flow = ControlFlow::Continue(());

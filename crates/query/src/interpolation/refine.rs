@@ -15,6 +15,9 @@ use crate::verdict::Contact;
 /// No sphere is looked through with more places than this.
 const MOST_PLACES: u32 = 65_536;
 
+/// Its cube root.
+const MOST_ACROSS: f64 = 40.0;
+
 /// The probability that each small sphere that makes up the large one gets a point (S1, Lemma 1).
 const PROBABILITY: f64 = 0.97;
 
@@ -57,6 +60,8 @@ impl Surfaces<'_> {
         let [va, vb] = self.pair.views;
         // Spheres of this diameter, as many as cover the large one (Rogers 1963), get a point each.
         let across = (3.0_f64.sqrt() * 2.0 * radius / wanted).ceil();
+        // A finer grid would end before it is through the sphere.
+        let across = if by_grid { across.min(MOST_ACROSS) } else { across };
         let places =
             if by_grid { across.powi(3) } else { f64::from(points_to_draw(across.powi(3), PROBABILITY)) };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
