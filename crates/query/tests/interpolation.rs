@@ -5,6 +5,7 @@ mod graphed;
 
 use graphed::Scan;
 use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::BuildOptions;
 use nearmiss_query::{
     Answer, Brackets, Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Detail, Evidence,
     Interpolation, Method, PlanError, Reason, Refinement, ScanView, Semantics, Surfels, Verdict, collide,
@@ -12,7 +13,20 @@ use nearmiss_query::{
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
-use nearmiss_testdata::shapes::{Order, Sampling, avatar, cuboid, patch, sphere, torus};
+use nearmiss_testdata::shapes::{Form, Order, Sampling, avatar, cuboid, patch, sphere, torus};
+
+fn scan(points: &[[f64; 3]]) -> Scan {
+    Scan::build(points, None, &BuildOptions::default())
+}
+
+fn with_normals(points: &[[f64; 3]], own: &[[f32; 3]]) -> Scan {
+    Scan::build(points, Some(own), &BuildOptions::default())
+}
+
+/// Random samples of a form with noise of this share of their spacing.
+fn scan_of(form: Form, spacing: f64, noise: f64) -> Scan {
+    scan(&form.sample(Sampling { spacing, noise, order: Order::Random, seed: 3 }).points)
+}
 
 fn options(search: Interpolation) -> CollideOptions {
     CollideOptions::default().with_method(Method::Interpolation(search))
@@ -33,7 +47,7 @@ fn no_verdict_is_wrong_outside_the_band() {
     let (mut judged, mut meeting, mut missed) = (0, 0, [0; 2]);
     for seed in [1, 2] {
         let set = analytic_set(seed, &SetOptions { repeats: 1, ..SetOptions::default() });
-        let scans: Vec<Scan> = set.shapes.iter().map(|shape| Scan::new(&shape.points)).collect();
+        let scans: Vec<Scan> = set.shapes.iter().map(|shape| scan(&shape.points)).collect();
         for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
             let views = [scans[pair.a].at(&pair.pose_a), scans[pair.b].at(&pair.pose_b)];
             for [a, b] in [views, [views[1], views[0]]] {
@@ -68,12 +82,12 @@ fn no_verdict_is_wrong_outside_the_band() {
 /// No edge of a has ends on different sides of what passes between its points.
 #[test]
 fn parts_thinner_than_the_edges_of_a_are_found() {
-    let coarse = Scan::of(patch(4.0, 4.0), 0.2, 0.0);
+    let coarse = scan_of(patch(4.0, 4.0), 0.2, 0.0);
     let mut scratch = CollideScratch::default();
     let mut rng = arbitrary::rng(5);
     for form in [cuboid([0.06, 0.06, 3.0]), cuboid([0.06, 1.0, 1.0]), avatar(2.0, 0.05)] {
         let name = form.name;
-        let fine = Scan::of(form, 0.012, 0.0);
+        let fine = scan_of(form, 0.012, 0.0);
         for _ in 0..30 {
             let [x, y, _] = arbitrary::point_in(&mut rng, 1.0);
             let pose =
@@ -90,7 +104,7 @@ fn parts_thinner_than_the_edges_of_a_are_found() {
 
 #[test]
 fn all_contacts_lie_on_both_spheres_however_they_are_refined() {
-    let ball = Scan::of(sphere(1.0), 0.05, 0.0);
+    let ball = scan_of(sphere(1.0), 0.05, 0.0);
     let r = ball.tree.sampling_radius();
     let pose = Pose::from_axis_angle([0.3, 1.0, 0.2], 0.8).with_translation([1.2, 0.0, 0.0]);
     let (a, b) = (ball.at(&Pose::IDENTITY), ball.at(&pose));
@@ -145,7 +159,7 @@ fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
     let sampling = Sampling { spacing: 1.0, noise: 0.1, order: Order::Random, seed: 5 };
     let mut points = patch(60.0, 60.0).sample(sampling).points;
     points.retain(|p| p[0].abs() > 1.5);
-    let slit = Scan::new(&points);
+    let slit = scan(&points);
     assert_eq!(slit.graph.counts().components, 2, "no edge leads across");
     // Where a point stands out, a blade upright along the slit cuts it off: no other of this half is beyond, and it is seldom drawn.
     // Roofs above and below, which meet nothing, have the other half searched too.
@@ -159,7 +173,7 @@ fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
     let both: Vec<[f64; 3]> = upright.chain(roof).collect();
     let normals: Vec<[f32; 3]> =
         both.iter().map(|p| if p[2].abs() > 4.0 { [0.0, 0.0, -1.0] } else { [1.0, 0.0, 0.0] }).collect();
-    let blade = Scan::with_normals(&both, Some(&normals));
+    let blade = with_normals(&both, &normals);
     let (mut found, mut asked) = (0, 0);
     for tip in points.iter().filter(outermost) {
         let pose = Pose::from_translation([tip[0] - 0.3, tip[1], 0.0]);
@@ -187,8 +201,8 @@ fn where_sides_are_unknown_discs_tell() {
     let random: Vec<[f32; 3]> =
         points.iter().map(|_| arbitrary::unit_vector(&mut rng).map(|x| x as f32)).collect();
     let inwards: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| -x as f32)).collect();
-    let plain = Scan::new(&points);
-    let scans = [Scan::with_normals(&points, Some(&random)), Scan::with_normals(&points, Some(&inwards))];
+    let plain = scan(&points);
+    let scans = [with_normals(&points, &random), with_normals(&points, &inwards)];
     let mut scratch = CollideScratch::default();
     for (away, meets) in [(1.2, true), (1.9, true), (2.2, false), (0.3, true)] {
         let pose = Pose::from_axis_angle([1.0, 0.4, 0.0], 0.5).with_translation([0.0, away, 0.0]);
@@ -209,7 +223,7 @@ fn where_sides_are_unknown_discs_tell() {
 
 #[test]
 fn what_cannot_be_searched_is_refused() {
-    let scan = Scan::of(sphere(1.0), 0.3, 0.0);
+    let scan = scan_of(sphere(1.0), 0.3, 0.0);
     let refused = |search, margin| {
         let options = options(search).with_margin(margin);
         CollidePlan::new(&options, &scan.tree, &scan.tree).unwrap_err()
@@ -254,8 +268,8 @@ fn what_cannot_be_searched_is_refused() {
 
 #[test]
 fn seeds_decide_and_scratch_does_not() {
-    let ball = Scan::of(sphere(1.0), 0.04, 0.05);
-    let torus = Scan::of(torus(1.0, 0.3), 0.06, 0.1);
+    let ball = scan_of(sphere(1.0), 0.04, 0.05);
+    let torus = scan_of(torus(1.0, 0.3), 0.06, 0.1);
     let mut rng = arbitrary::rng(11);
     let mut scratch = CollideScratch::default();
     let (mut differ, mut asked) = (0, 0);
@@ -302,7 +316,7 @@ fn seeds_decide_and_scratch_does_not() {
 
 #[test]
 fn budgets_end_searches() {
-    let ball = Scan::of(sphere(1.0), 0.04, 0.0);
+    let ball = scan_of(sphere(1.0), 0.04, 0.0);
     let mut scratch = CollideScratch::default();
     let mut all = Contacts::default();
     let (mut ended, mut found) = (0, 0);
@@ -339,7 +353,7 @@ fn budgets_end_searches() {
 /// Nothing is proven without volumes, and with them as much as ever.
 #[test]
 fn certificates_are_those_of_volumes() {
-    let ball = Scan::of(sphere(1.0), 0.05, 0.0);
+    let ball = scan_of(sphere(1.0), 0.05, 0.0);
     for (away, proven) in [(3.0, true), (2.02, false)] {
         let pose = Pose::from_translation([away, 0.0, 0.0]);
         let (a, b) = (ball.at(&Pose::IDENTITY), ball.at(&pose));

@@ -8,13 +8,20 @@ use std::collections::BTreeSet;
 use graphed::Scan;
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::BuildOptions;
 use nearmiss_query::{
     Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Detail, Interpolation, Method, ScanView,
     collide_all,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::oracle::{self, SurfaceTwin};
-use nearmiss_testdata::shapes::{Form, cuboid, sphere, torus};
+use nearmiss_testdata::shapes::{Form, Order, Sampling, cuboid, sphere, torus};
+
+/// Random samples in small leaves, of which few edges cross.
+fn scan(form: Form, spacing: f64, noise: f64) -> Scan {
+    let sampling = Sampling { spacing, noise, order: Order::Random, seed: 3 };
+    Scan::build(&form.sample(sampling).points, None, &BuildOptions::default().with_leaf_size(4))
+}
 
 /// The surface of a scan by sums over all its points, in the world.
 struct Twin<'a> {
@@ -121,8 +128,8 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
 #[test]
 fn edges_that_cross_are_those_of_brute_force() {
     let forms: [fn() -> Form; 3] = [|| sphere(1.0), || torus(1.0, 0.35), || cuboid([1.5, 1.0, 1.2])];
-    let scans: Vec<Scan> = forms.iter().map(|form| Scan::of(form(), 0.12, 0.05)).collect();
-    let finer: Vec<Scan> = forms.iter().map(|form| Scan::of(form(), 0.08, 0.1)).collect();
+    let scans: Vec<Scan> = forms.iter().map(|form| scan(form(), 0.12, 0.05)).collect();
+    let finer: Vec<Scan> = forms.iter().map(|form| scan(form(), 0.08, 0.1)).collect();
     let mut rng = arbitrary::rng(4);
     let [mut crossing, mut on_edges] = [0; 2];
     for a in &scans {
@@ -137,6 +144,14 @@ fn edges_that_cross_are_those_of_brute_force() {
                 }
             }
         }
+    }
+    // Where they graze each other, single edges cross.
+    for round in 0..60 {
+        let away = 1.8 + 0.003 * f64::from(round);
+        let axis = arbitrary::unit_vector(&mut rng).map(|x| away * x);
+        let pose = arbitrary::rotation(&mut rng).with_translation(axis);
+        let [crosses, on] = check([&scans[0], &finer[0]], &pose);
+        (crossing, on_edges) = (crossing + crosses, on_edges + on);
     }
     assert!(crossing > 2000 && on_edges > 400, "{crossing} edges cross, {on_edges} contacts are on edges");
 }
