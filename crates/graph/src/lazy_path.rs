@@ -267,6 +267,40 @@ impl LazyPath {
         }
     }
 
+    /// As [`Self::look`], about the first place where `guess`, a function of points, changes its sign between those two; nothing
+    /// where it has the same sign at both.
+    ///
+    /// # Panics
+    /// When there are not so many points.
+    pub fn look_where(
+        &mut self,
+        levels: &Levels,
+        left: usize,
+        right: usize,
+        guess: impl Fn(u32) -> f64,
+    ) -> Option<usize> {
+        let end = self.stops.len() - right;
+        let value = |stop: &Stop| guess(stop.point);
+        let (mut first, mut here) = (left, value(&self.stops[left]));
+        if (here < 0.0) == (value(&self.stops[right]) < 0.0) {
+            return None;
+        }
+        // It changes further on, until it has changed.
+        while first + end < self.stops.len() {
+            let next = value(&self.stops[first + 1]);
+            if (here < 0.0) == (next < 0.0) {
+                (first, here) = (first + 1, next);
+            } else if self.stops[first].level > 0 {
+                self.take_apart(levels, first);
+            } else {
+                let right = self.stops.len() - end;
+                let nearer = if here.abs() <= next.abs() { [first, first + 1] } else { [first + 1, first] };
+                return nearer.into_iter().find(|&k| left < k && k < right);
+            }
+        }
+        None
+    }
+
     /// Replaces an edge between cells by the edges between their points that it stands for.
     fn take_apart(&mut self, levels: &Levels, k: usize) {
         let Stop { along, level, ends, .. } = self.stops[k];

@@ -121,7 +121,11 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
             );
         }
     }
-    assert!(crossing == 0 || answer.verdict.is_intersecting());
+    assert!(
+        crossing == 0 || answer.verdict.is_intersecting(),
+        "{crossing} edges cross, {:?}",
+        answer.verdict
+    );
     [crossing, on_edges]
 }
 

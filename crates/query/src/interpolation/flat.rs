@@ -8,7 +8,7 @@ use nearmiss_graph::{LazyPath, SurfaceGraph};
 use nearmiss_hierarchy::NodePair;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::root::{GraphPath, Root, find_root};
+use super::root::{GraphPath, Root, Slope, find_root};
 use super::volume::{Bounds, Volume};
 use super::{Brackets, Interpolation, Side, Surfels};
 use crate::crossing::crossing;
@@ -211,13 +211,18 @@ impl Surfaces<'_> {
         let [first, last] = bracket.sides;
         let mut hint = if first.away < last.away { first.near } else { last.near };
         let arrived = ARRIVED * f64::from(self.pair.b.radii[hint as usize]) * self.scale_of_b();
-        let mut along = GraphPath { path, levels: graph.levels() };
+        let nearer = usize::from(last.distance.abs() < first.distance.abs());
+        let slope = self.slope(bracket.points[nearer], &bracket.sides[nearer]);
+        let positions = self.pair.a.positions;
+        let mut along = GraphPath { path, levels: graph.levels(), positions, slope };
         let root = find_root(&mut along, [first.distance, last.distance], arrived, |along, k| {
             if self.pair.meter.go_on().is_break() {
                 return None;
             }
-            let side = self.side_again(along.path.point(k).point, hint);
+            let point = along.path.point(k).point;
+            let side = self.side_again(point, hint);
             hint = side.near;
+            along.slope = self.slope(point, &side);
             Some(side.known())
         });
         let point = |k: usize| path.point(k).point;
@@ -239,6 +244,18 @@ impl Surfaces<'_> {
                 self.search_edge([point(first), point(first + 1)], values, hint, search)
             }
         }
+    }
+
+    /// The distance from b to first order about a point of a, in a's stored frame.
+    fn slope(&self, i: u32, side: &Side) -> Slope {
+        let (place, j) = (self.pair.a.positions[i as usize], side.near as usize);
+        let normal = self.pair.relative.direction(self.pair.b.normals[j]);
+        // Far from b its nearest point is the centre of all that is as far away.
+        let is_far = side.distance.abs() >= side.away && side.away > 0.0;
+        let from = Vector3::from(place) - Vector3::from(self.pair.relative.point(self.pair.b.positions[j]));
+        let outwards = if side.distance < 0.0 { -from } else { from };
+        let gradient = outwards.try_normalize(0.0).filter(|_| is_far).map_or(normal, Into::into);
+        Slope { place, value: side.distance / self.pair.views[0].placed().scale(), gradient }
     }
 
     /// The scale from b's stored frame to the world.

@@ -14,14 +14,32 @@ pub(crate) trait Path {
     fn len(&self) -> usize;
     /// How far the `k`-th of them is from the beginning.
     fn along(&self, k: usize) -> f64;
-    /// See [`LazyPath::look`].
-    fn look(&mut self, left: usize, right: usize, along: f64) -> Option<usize>;
+    /// See [`LazyPath::look`]. The path may know of a better place than that, unless it must be there.
+    fn look(&mut self, left: usize, right: usize, along: f64, exactly: bool) -> Option<usize>;
 }
 
-/// A path of a graph that has levels.
+/// A path of a graph that has levels, over points in space.
 pub(crate) struct GraphPath<'a> {
     pub(crate) path: &'a mut LazyPath,
     pub(crate) levels: &'a Levels,
+    pub(crate) positions: &'a [[f32; 3]],
+    /// What the function is about the last point that was looked at.
+    pub(crate) slope: Slope,
+}
+
+/// A function to first order: its value at a place, and how fast it grows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slope {
+    pub(crate) place: [f32; 3],
+    pub(crate) value: f64,
+    pub(crate) gradient: [f32; 3],
+}
+
+impl Slope {
+    fn at(&self, x: [f32; 3]) -> f64 {
+        (0..3).map(|k| f64::from(self.gradient[k]) * f64::from(x[k] - self.place[k])).sum::<f64>()
+            + self.value
+    }
 }
 
 impl Path for GraphPath<'_> {
@@ -33,8 +51,12 @@ impl Path for GraphPath<'_> {
         self.path.point(k).along
     }
 
-    fn look(&mut self, left: usize, right: usize, along: f64) -> Option<usize> {
-        self.path.look(self.levels, left, right, along)
+    fn look(&mut self, left: usize, right: usize, along: f64, exactly: bool) -> Option<usize> {
+        let (slope, positions) = (self.slope, self.positions);
+        let guess = |point: u32| slope.at(positions[point as usize]);
+        let guessed = if exactly { None } else { self.path.look_where(self.levels, left, right, guess) };
+        // What is taken apart stays so.
+        guessed.or_else(|| self.path.look(self.levels, left, right, along))
     }
 }
 
@@ -63,7 +85,7 @@ pub(crate) fn find_root<P: Path>(
     path: &mut P,
     values: [f64; 2],
     tolerance: f64,
-    mut value: impl FnMut(&P, usize) -> Option<Option<f64>>,
+    mut value: impl FnMut(&mut P, usize) -> Option<Option<f64>>,
 ) -> Option<Root> {
     let (mut left, mut right) = (0, path.len() - 1);
     let (mut at_left, mut at_right) = (values[0], values[1]);
@@ -88,7 +110,7 @@ pub(crate) fn find_root<P: Path>(
         let before = path.len();
         // Values may be so great that their sum is none.
         let share = if share.is_finite() { share } else { 0.5 };
-        let found = path.look(left, right, from + share * (to - from));
+        let found = path.look(left, right, from + share * (to - from), idle == PATIENCE);
         right += path.len() - before;
         let Some(k) = found else {
             return Some(Root::Edge { first: left, values: [at_left, at_right] });
@@ -131,7 +153,7 @@ mod tests {
             self.0[k]
         }
 
-        fn look(&mut self, left: usize, right: usize, along: f64) -> Option<usize> {
+        fn look(&mut self, left: usize, right: usize, along: f64, _: bool) -> Option<usize> {
             let nearer = |a: &usize, b: &usize| {
                 let to = |k: usize| (self.0[k] - along).abs();
                 to(*a).total_cmp(&to(*b))
