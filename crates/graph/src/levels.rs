@@ -239,17 +239,29 @@ impl Cells {
         path.clear();
         path.extend(cells.first().map(|&cell| self.centres[cell as usize]));
         for two in cells.windows(2) {
-            let place = self.graph.of(two[0] as usize).iter().position(|&cell| cell == two[1]);
-            let Some(place) = place else { panic!("cells {two:?} do not touch") };
-            let (starts, _) = self.graph.slices();
-            let [near, far] = self.crossings[starts[two[0] as usize] as usize + place];
-            // From the centre out, its last point being there already.
-            let first = path.len();
-            self.walk_in(near, path);
-            path.pop();
-            path[first..].reverse();
-            self.walk_in(far, path);
+            self.cross([two[0], two[1]], path);
         }
+    }
+
+    /// Appends the points from the centre of a cell, which is there already, to that of one that touches it; tells the place of
+    /// the first point of that in `path`.
+    ///
+    /// # Panics
+    /// When the cells do not touch.
+    pub(crate) fn cross(&self, [from, to]: [u32; 2], path: &mut Vec<u32>) -> usize {
+        let (starts, neighbours) = self.graph.slices();
+        let first = starts[from as usize] as usize;
+        let others = &neighbours[first..starts[from as usize + 1] as usize];
+        let Ok(place) = others.binary_search(&to) else { panic!("cells {from} and {to} do not touch") };
+        let [near, far] = self.crossings[first + place];
+        // From the centre out, its last point being there already.
+        let first = path.len();
+        self.walk_in(near, path);
+        path.pop();
+        path[first..].reverse();
+        let crossed = path.len();
+        self.walk_in(far, path);
+        crossed
     }
 
     /// Appends the points from `point` to the centre of its cell.
