@@ -4,9 +4,9 @@
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions, CurvePlan,
-    CurveScratch, Curves, Deadline, Detail, Evidence, GraphOptions, Pose, Scan, Semantics, Verdict,
-    collide_all, collide_with, curves_with,
+    Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions,
+    CurvePlan, CurveScratch, Curves, Deadline, Detail, Evidence, GraphOptions, Interpolation, Method, Pose,
+    Scan, Semantics, Verdict, collide_all, collide_with, curves_with,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -27,7 +27,12 @@ fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
     let thick = options.with_semantics(Semantics::Thickened(0.5 * r));
     let whole = Budget::UNLIMITED;
     let hour = whole.with_deadline(Deadline::within(Duration::from_secs(3600)));
+    let along = |search| witness.with_method(Method::Interpolation(search));
+    let flat = Interpolation::default().with_flat(true);
     let asked = [
+        (along(Interpolation::default()), whole),
+        (along(flat), whole),
+        (along(flat.with_brackets(Brackets::Annulus)), whole.with_work(300)),
         (verdict, whole),
         (witness, whole),
         (thick, whole),

@@ -251,6 +251,9 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         .with_margin(args.margin)
         .with_evidence(evidence);
     args.search.check(&a, &b)?;
+    if args.search.wants_graphs() {
+        a.make_ready();
+    }
     let options = args.search.apply(options, &a)?;
     let plan = CollidePlan::new(&options, &a, &b)?;
     let prove = args.prove.is_some();

@@ -203,6 +203,14 @@ impl Scan {
         self.writer(&meta)?.save(path)
     }
 
+    /// Makes what searches along the graph make when they first want it, if there is a graph: some tenths of a second for a million
+    /// points. So the first [`Interpolation`](crate::Interpolation) takes no longer than the next, and keeps its deadline.
+    pub fn make_ready(&self) {
+        if let Some(graph) = &self.graph {
+            graph.make_ready(samples(&self.hierarchy));
+        }
+    }
+
     /// The same scan with a density for searches that draw its points.
     #[must_use]
     pub fn with_density(self, density: Density) -> Self {

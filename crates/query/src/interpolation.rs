@@ -17,6 +17,9 @@ pub(crate) use side::Side;
 /// b are joined by a path, and on it the place is looked for where the side changes. Where b's sides are not known, and
 /// where no drawn points lie on either side though some are near, points are drawn towards each other instead.
 ///
+/// What a graph makes for such searches it makes when the first wants it, whatever that's deadline, unless it was [made
+/// ready](nearmiss_graph::SurfaceGraph::make_ready).
+///
 /// Wants the graph of a, and for brackets that of b, which says which side is out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]

@@ -105,7 +105,7 @@ pub struct Answer {
     pub verdict: Verdict,
     /// By [`Method::Sampling`](crate::Method), the least |f_A| + |f_B| of all test points on which both mean something, in
     /// world units (S0 eq. 8): an estimate, from above, of the distance of the surfaces. By a flat
-    /// [`Method::Interpolation`] the least distance of any point drawn of a from b. None otherwise, and where there was no such point.
+    /// [`Method::Interpolation`](crate::Method) the least distance of any point drawn of a from b. None otherwise, and where there was no such point.
     pub distance_estimate: Option<f64>,
     /// What that cost.
     pub statistics: Statistics,

@@ -23,11 +23,6 @@ fn with_normals(points: &[[f64; 3]], own: &[[f32; 3]]) -> Scan {
     Scan::build(points, Some(own), &BuildOptions::default())
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "normals are single precision")]
-fn single(x: f64) -> f32 {
-    x as f32
-}
-
 /// Random samples of a form with noise of this share of their spacing.
 fn scan_of(form: Form, spacing: f64, noise: f64) -> Scan {
     scan(&form.sample(Sampling { spacing, noise, order: Order::Random, seed: 3 }).points)
@@ -203,8 +198,10 @@ fn where_sides_are_unknown_discs_tell() {
     let form = || sphere(1.0).sample(Sampling::clean(0.06)).points;
     let points = form();
     let mut rng = arbitrary::rng(8);
-    let random: Vec<[f32; 3]> = points.iter().map(|_| arbitrary::unit_vector(&mut rng).map(single)).collect();
-    let inwards: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| single(-x))).collect();
+    #[expect(clippy::cast_possible_truncation, reason = "normals are stored in single precision")]
+    let single = |n: [f64; 3]| n.map(|x| x as f32);
+    let random: Vec<[f32; 3]> = points.iter().map(|_| single(arbitrary::unit_vector(&mut rng))).collect();
+    let inwards: Vec<[f32; 3]> = points.iter().map(|p| single(p.map(|x| -x))).collect();
     let plain = scan(&points);
     let scans = [with_normals(&points, &random), with_normals(&points, &inwards)];
     let mut scratch = CollideScratch::default();

@@ -121,11 +121,7 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
             );
         }
     }
-    assert!(
-        crossing == 0 || answer.verdict.is_intersecting(),
-        "{crossing} edges cross, {:?}",
-        answer.verdict
-    );
+    assert!(crossing == 0 || answer.verdict.is_intersecting(), "{crossing} edges cross: {answer:?}");
     [crossing, on_edges]
 }
 

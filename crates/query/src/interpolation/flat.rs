@@ -330,7 +330,7 @@ impl Surfaces<'_> {
             residual: off[0].max(side.distance.abs()),
             sources: [va.scan().id(i), vb.scan().id(j)],
         };
-        self.hit_by(search.refinement, contact, i, j)
+        self.hit_by(search, contact, i, j)
     }
 
     /// Draws the drawn points that are near b towards it: from nearest point to nearest point, until the discs there cross, or

@@ -6,7 +6,7 @@ use nearmiss_surface::Status;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
-use super::{Refinement, points_to_draw};
+use super::{Interpolation, Refinement, points_to_draw};
 use crate::options::Detail;
 use crate::sampling::place_in;
 use crate::surface::Surfaces;
@@ -25,12 +25,13 @@ impl Surfaces<'_> {
     /// A hit near points `i` and `j`, refined as is wanted.
     pub(super) fn hit_by(
         &mut self,
-        refinement: Refinement,
+        search: &Interpolation,
         contact: Contact,
         i: usize,
         j: usize,
     ) -> ControlFlow<()> {
-        let (tolerance, by_grid) = match refinement {
+        let seed = search.seed;
+        let (tolerance, by_grid) = match search.refinement {
             _ if self.detail == Detail::Verdict => return self.hit(contact, i, j),
             Refinement::Newton => return self.hit(contact, i, j),
             Refinement::Sphere(tolerance) => (tolerance, false),
@@ -43,7 +44,7 @@ impl Surfaces<'_> {
         ];
         // The sphere about the place between two neighbouring points holds a common point, unless the surface is bent (S1 §4.6).
         let (radius, wanted) = (radii[0].max(radii[1]), tolerance * radii[0].max(radii[1]));
-        let found = self.look_through(contact, [i, j], radius, wanted, by_grid)?;
+        let found = self.look_through(contact, [i, j], (radius, wanted), (by_grid, seed))?;
         self.tries += 1;
         self.record(found.unwrap_or(contact), None)
     }
@@ -53,9 +54,8 @@ impl Surfaces<'_> {
         &mut self,
         contact: Contact,
         [i, j]: [usize; 2],
-        radius: f64,
-        wanted: f64,
-        by_grid: bool,
+        (radius, wanted): (f64, f64),
+        (by_grid, seed): (bool, u64),
     ) -> ControlFlow<(), Option<Contact>> {
         let [va, vb] = self.pair.views;
         // Spheres of this diameter, as many as cover the large one (Rogers 1963), get a point each.
@@ -66,7 +66,7 @@ impl Surfaces<'_> {
             if by_grid { across.powi(3) } else { f64::from(points_to_draw(across.powi(3), PROBABILITY)) };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
         let places = (places as u32).min(MOST_PLACES);
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(i as u64 ^ (j as u64) << 32);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed ^ i as u64 ^ (j as u64) << 32);
         let mut best: Option<Contact> = None;
         for k in 0..places {
             self.pair.meter.go_on()?;
