@@ -215,7 +215,9 @@ pub(crate) struct AnswerReport {
     evaluations: u64,
     node_pairs: u64,
     leaf_pairs: u64,
-    neighbour_steps: u64,
+    /// Of searches along graphs only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    neighbour_steps: Option<u64>,
     micros: f64,
     /// Whether the contacts are all there are.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -266,7 +268,7 @@ impl AnswerReport {
             evaluations: answer.statistics.evaluations,
             node_pairs: answer.statistics.node_pairs,
             leaf_pairs: answer.statistics.leaf_pairs,
-            neighbour_steps: answer.statistics.neighbour_steps,
+            neighbour_steps: Some(answer.statistics.neighbour_steps).filter(|&steps| steps > 0),
             micros,
             complete: all.map(|all| all.complete),
             contacts: all.map(|all| all.contacts.iter().map(ContactReport::new).collect()),
@@ -323,8 +325,8 @@ impl AnswerReport {
             _ => String::new(),
         };
         let steps = match self.neighbour_steps {
-            0 => String::new(),
-            steps => format!("{} to nearest points, ", count(steps, "step")),
+            None => String::new(),
+            Some(steps) => format!("{} to nearest points, ", count(steps, "step")),
         };
         format!(
             "{between}{}, {}, {}, {steps}{:.1} µs",

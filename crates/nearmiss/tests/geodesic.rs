@@ -241,6 +241,7 @@ fn a_witness_is_verified_by_the_scans_own_kernel_alone() {
 struct Meta {
     hierarchy: HierarchyMeta,
     graph: Option<SurfaceGraphMeta>,
+    density: Option<nearmiss::Density>,
 }
 
 #[test]
@@ -263,7 +264,8 @@ fn without_the_map_there_is_no_such_scan() {
 
     // Files that claim it.
     for scan in [&bare, &without] {
-        let meta = Meta { hierarchy: whole.meta(), graph: scan.graph().map(|graph| graph.meta()) };
+        let meta =
+            Meta { hierarchy: whole.meta(), graph: scan.graph().map(|graph| graph.meta()), density: None };
         let (mut writer, mut bytes) = (Writer::new(*b"SCAN", 5), Vec::new());
         writer.metadata(&meta).unwrap();
         (*whole).add_to(&mut writer).unwrap();
