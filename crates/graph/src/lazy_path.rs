@@ -91,17 +91,24 @@ impl LazyPath {
             if at[0] == at[1] {
                 break;
             }
-            let Some(cells) = levels.cells().get(level) else {
+            let coarser = levels.cells().get(level);
+            // Radii double from level to level.
+            let radius = match (coarser, level.checked_sub(1)) {
+                (Some(cells), _) => cells.radii[cells.owner[at[0] as usize] as usize],
+                (None, Some(own)) => 2.0 * levels.cells()[own].radii[at[0] as usize],
+                (None, None) => 0.0,
+            };
+            let is_fit = SHORT * radius >= apart;
+            if is_fit && self.walk((levels, positions), (here, level), at, &mut along) {
+                break;
+            }
+            let Some(cells) = coarser else {
                 if self.search_level(levels, (here, level), at, &mut along) {
                     break;
                 }
                 self.stops.clear();
                 return false;
             };
-            let is_fit = SHORT * cells.radii[cells.owner[at[0] as usize] as usize] >= apart;
-            if is_fit && self.walk((levels, positions), (here, level), at, &mut along) {
-                break;
-            }
             let [u, v] = at.map(|id| id as usize);
             let mut id = at[0];
             while cells.inwards[id as usize] != id {
