@@ -1,7 +1,6 @@
 //! `density`: how many points `--method interpolation --flat` has to draw for a wanted error rate.
 //!
-//! Measured as in S1 §5.1: the scan against a copy of itself over the sweep of `poses`, once for each density, by
-//! brackets alone; an error is a hit of the traversal that is not found, or the other way round. Derived from Lemma 1: that each
+//! Measured as in S1 §5.1: the scan against a copy of itself over the sweep of `poses`, once for each density; an error is a hit of the traversal that is not found, or the other way round. Derived from Lemma 1: that each
 //! surfel gets a point, by inclusion and exclusion.
 
 use std::path::PathBuf;
@@ -16,7 +15,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::console::{Bar, Console, Results};
-use crate::digits::{count, percent};
+use crate::digits::count;
 use crate::error::CliError;
 use crate::input;
 use crate::poses;
@@ -36,7 +35,10 @@ pub struct DensityArgs {
     /// Number of poses at each of the 13 distances of the sweep
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
-    /// Keep what was measured in the file: `collide --method interpolation --flat` draws as many points from it by default
+    /// Measure brackets alone, as Klein & Zachmann 2005 do: without the approaches that find what they miss
+    #[arg(long, conflicts_with = "store")]
+    pub brackets_alone: bool,
+    /// Keep what was measured in the file, if it suffices: `collide --method interpolation --flat` draws as many points from it by default
     #[arg(long)]
     pub store: bool,
     /// Seed of all that is random
@@ -102,6 +104,13 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
         hits,
     };
     if args.store {
+        if found.error > args.error {
+            let what = format!(
+                "{} of all tests are wrong however many points are drawn; nothing is stored",
+                rate(found.error)
+            );
+            return Err(CliError::Unfit { path: args.a.clone(), what });
+        }
         scan.with_density(found).save(&args.a)?;
     }
     let mut results = Results::new();
@@ -113,23 +122,26 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
         "measured   {}, of {}, for {} wrong of {}, {} of which touch",
         count(u64::from(report.samples), "point"),
         count(u64::from(surfels), "surfel"),
-        percent(report.error),
+        rate(report.error),
         count(report.tests as u64, "test"),
         report.hits
     ))?;
     if report.error > args.error {
-        results.line(format_args!(
-            "           more than {}: finer surfels are not tried",
-            percent(args.error)
-        ))?;
+        results
+            .line(format_args!("           more than {}: finer surfels are not tried", rate(args.error)))?;
     }
     results.line(format_args!(
         "derived    {} for {} of which none is empty but in {}",
         count(u64::from(report.derived), "point"),
         count(u64::from(args.surfels), "surfel"),
-        percent(args.error)
+        rate(args.error)
     ))?;
     results.flush()
+}
+
+/// A small share.
+fn rate(share: f64) -> String {
+    format!("{:.2} %", 100.0 * share)
 }
 
 /// Points that are drawn for so many surfels.
@@ -137,9 +149,8 @@ fn points(surfels: u32) -> u32 {
     search(surfels).points().unwrap_or(0)
 }
 
-/// Brackets alone: approaches would find what they miss.
 fn search(surfels: u32) -> Interpolation {
-    Interpolation::default().with_flat(true).with_surfels(Surfels::Count(surfels)).with_approaches(0)
+    Interpolation::default().with_flat(true).with_surfels(Surfels::Count(surfels))
 }
 
 /// Questions whose answers the traversal knows.
@@ -155,7 +166,9 @@ impl Tests<'_> {
     fn coarsest(&self, args: &DensityArgs) -> Result<(Density, usize), CliError> {
         let touching = self.verdicts(Method::Traversal)?;
         let error = |surfels: u32| {
-            let found = self.verdicts(Method::Interpolation(search(surfels).with_seed(args.seed)))?;
+            let search = search(surfels).with_seed(args.seed);
+            let search = if args.brackets_alone { search.with_approaches(0) } else { search };
+            let found = self.verdicts(Method::Interpolation(search))?;
             let wrong = found.iter().zip(&touching).filter(|(a, b)| a != b).count();
             #[expect(clippy::cast_precision_loss, reason = "far fewer than 2⁵²")]
             let error = wrong as f64 / touching.len().max(1) as f64;

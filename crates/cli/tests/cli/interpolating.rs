@@ -119,3 +119,18 @@ fn numbers_of_the_search_count_or_are_refused() {
     }
     refused(&[METHOD[0], METHOD[1], "--margin", "0.1"], &["margin"]);
 }
+
+#[test]
+fn a_density_is_measured_derived_and_stored() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.1);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    let options = ["density", "ball.nm", "--error", "0.02", "--per-distance", "10", "--json", "--quiet"];
+    let told = place.ok(&options).json().remove(0);
+    assert_eq!(told["derived"], 216, "30 surfels, one in fifty empty");
+    assert!(told["error"].as_f64().unwrap() <= 0.02 && told["tests"] == 130, "{told}");
+    assert!(told["samples"].as_u64().unwrap() <= 207, "{told}");
+    assert_eq!(place.ok(&[&options[..], &["--store"]].concat()).json().remove(0), told, "the same");
+    assert_eq!(place.ok(&["inspect", "ball.nm", "--verify", "--json"]).results.lines().count(), 1);
+    place.refused(2, &["density", "ball.xyz", "--store"], &["--store"]);
+}
