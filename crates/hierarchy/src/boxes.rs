@@ -6,7 +6,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16};
+use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
 
@@ -113,6 +113,20 @@ impl Relative {
         let [rx, ry, rz] = self.linear;
         let [tx, ty, tz] = self.translation;
         [dot(rx, p) + tx, dot(ry, p) + ty, dot(rz, p) + tz]
+    }
+
+    /// Four points of b's frame in a's.
+    #[inline(always)]
+    pub(crate) fn points_of_four<S: Simd>(&self, p: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+        let [x, y, z] = turned(&self.linear, p);
+        let [tx, ty, tz] = self.translation;
+        [x + tx, y + ty, z + tz]
+    }
+
+    /// Four directions of b's frame in a's.
+    #[inline(always)]
+    pub(crate) fn directions_of_four<S: Simd>(&self, v: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+        turned(&self.rotation, v)
     }
 
     /// A direction of b's frame in a's.
@@ -241,6 +255,12 @@ impl Relative {
             reach: b.reach,
         }
     }
+}
+
+#[inline(always)]
+fn turned<S: Simd>(rows: &Axes, [x, y, z]: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    let [rx, ry, rz] = rows;
+    [x * rx[0] + y * rx[1] + z * rx[2], x * ry[0] + y * ry[1] + z * ry[2], x * rz[0] + y * rz[1] + z * rz[2]]
 }
 
 /// Four lanes.

@@ -18,6 +18,7 @@ use crate::spacing::map;
 use crate::split::{Item, id32, split};
 use crate::surfels::{NormalCone, PointKind, align, box_of_discs, surfels};
 use crate::topology::Node;
+use crate::wide::WideTree;
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
 ///
@@ -44,6 +45,7 @@ pub struct PointHierarchy {
     pub(crate) source: Array<u32>,
     pub(crate) nodes: Array<Node>,
     pub(crate) boxes: Array<OrientedBox>,
+    pub(crate) wide: WideTree,
     pub(crate) growths: Array<Growth>,
     pub(crate) sample_lists: Array<u32>,
     pub(crate) coverings: Array<Covering>,
@@ -72,6 +74,8 @@ pub struct Slices<'a> {
     pub nodes: &'a [Node],
     /// A box about the discs of each node's points, and about their balls.
     pub boxes: &'a [OrientedBox],
+    /// The tree with four children a node.
+    pub wide: &'a WideTree,
     /// What the boxes must grow by to contain each node's part of the surface.
     pub growths: &'a [Growth],
     /// The points in blocks: see [`PointHierarchy::blocks`].
@@ -149,6 +153,7 @@ impl PointHierarchy {
             kinds: &self.kinds,
             nodes: &self.nodes,
             boxes: &self.boxes,
+            wide: &self.wide,
             growths: &self.growths,
             blocks: &self.blocks,
             sample_lists: &self.sample_lists,
@@ -254,6 +259,7 @@ impl PointHierarchy {
             }
         }
         self.is_oriented = true;
+        self.wide = WideTree::of(self);
     }
 
     /// Local sampling radii r_i.
@@ -393,7 +399,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     });
     drop((flat, cells));
 
-    Ok(PointHierarchy {
+    let mut hierarchy = PointHierarchy {
         frame: cloud.frame(),
         bounds: cloud.bounds(),
         dropped: cloud.dropped(),
@@ -411,6 +417,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         discs: discs.into(),
         kinds: kinds.into(),
         source: source.into(),
+        wide: WideTree::default(),
         nodes: nodes.into(),
         boxes: boxes.into(),
         growths: growths.into(),
@@ -421,5 +428,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         groups: groups.into(),
         lists: lists_of_blocks.lists.into(),
         listed: lists_of_blocks.entries.into(),
-    })
+    };
+    hierarchy.wide = WideTree::of(&hierarchy);
+    Ok(hierarchy)
 }

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use crate::build::PointHierarchy;
 use crate::sanity::Flaw;
+use crate::wide::WideTree;
 
 const POSITIONS: [u8; 4] = *b"PNTS";
 const NORMALS: [u8; 4] = *b"NRML";
@@ -108,7 +109,7 @@ impl PointHierarchy {
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
     pub fn load(file: &File, meta: HierarchyMeta, check: Check) -> Result<Self, LoadError> {
-        let hierarchy = Self {
+        let mut hierarchy = Self {
             frame: meta.frame,
             bounds: meta.bounds,
             dropped: meta.dropped,
@@ -128,6 +129,7 @@ impl PointHierarchy {
             source: file.array(SOURCE, 0)?,
             nodes: file.array(NODES, 0)?,
             boxes: file.array(BOXES, 0)?,
+            wide: WideTree::default(),
             growths: file.array(GROWTHS, 0)?,
             sample_lists: file.array(SAMPLES, 0)?,
             coverings: file.array(COVERINGS, 0)?,
@@ -138,6 +140,7 @@ impl PointHierarchy {
             listed: file.array(LISTED, 0)?,
         };
         hierarchy.check_structure()?;
+        hierarchy.wide = WideTree::of(&hierarchy);
         if check == Check::Full {
             hierarchy.check_contents()?;
         }

@@ -8,7 +8,9 @@ use std::time::Duration;
 
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Frontier, Heap, NodePair, Relative, SLACK, Stack, Visitor, descend};
+use nearmiss_hierarchy::{
+    Frontier, Heap, NodePair, Relative, SLACK, Stack, Visitor, WideStack, descend, descend_wide,
+};
 
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
@@ -26,8 +28,7 @@ use crate::view::{ScanView, ViewScratch};
 /// Reused between queries, one a thread; never influences an answer.
 #[derive(Debug, Clone, Default)]
 pub struct CollideScratch {
-    stack: Stack,
-    heap: Heap,
+    frontiers: Frontiers,
     instructions: Instructions,
     gathers: [ViewScratch; 2],
     excluded: Vec<Excluded>,
@@ -36,6 +37,31 @@ pub struct CollideScratch {
     interpolation: InterpolationScratch,
     proven: Vec<Bound>,
     longest_stretch: Duration,
+}
+
+/// The pairs of nodes still to be looked at, by how a search goes on.
+#[derive(Debug, Clone, Default)]
+struct Frontiers {
+    /// All leaves that are near.
+    wide: WideStack,
+    /// Depth first, with what is excluded noted.
+    stack: Stack,
+    /// The most urgent first.
+    heap: Heap,
+}
+
+impl Frontiers {
+    fn clear(&mut self) {
+        self.wide.clear();
+        self.stack.clear();
+        self.heap.clear();
+    }
+
+    /// What is still there. A search goes on from a front depth first, whatever its order.
+    fn open(&self, pair: &Posed<'_>) -> impl Iterator<Item = NodePair> {
+        let narrow = self.stack.open().chain(self.heap.open());
+        narrow.map(|(_, pair)| pair).chain(self.wide.open(pair.a, pair.b))
+    }
 }
 
 impl CollideScratch {
@@ -209,8 +235,7 @@ fn surfaces(
     (mut known, proof, all): (Option<&mut Known>, Option<&mut Proof>, Option<&mut Contacts>),
 ) -> Answer {
     let CollideScratch {
-        stack,
-        heap,
+        frontiers,
         instructions,
         gathers,
         excluded,
@@ -224,7 +249,7 @@ fn surfaces(
     let mut certifier = Certifier::new(pair, reach, proven);
     // Enclosures hold the boxes: what they part has no contact.
     if let Some(known) = &mut known
-        && let Some(distance) = known.prove_again(&mut certifier, stack)
+        && let Some(distance) = known.prove_again(&mut certifier, &mut frontiers.stack)
     {
         *longest_stretch = certifier.pair.meter.longest_stretch;
         let (verdict, statistics) = (apart(options, distance, true), certifier.pair.meter.spent);
@@ -242,7 +267,7 @@ fn surfaces(
         all: contacts,
     };
     let mut search = Surfaces::new(pair, options, budget, known.is_some(), workspace);
-    let ended = look(&mut search, options, known.as_deref_mut(), stack, heap).is_break();
+    let ended = look(&mut search, options, known.as_deref_mut(), frontiers).is_break();
     if let Some(complete) = complete {
         *complete = !ended;
     }
@@ -253,8 +278,7 @@ fn surfaces(
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
-            // A search goes on from a front depth first, whatever its order.
-            let likelihood = likelihood(&certifier.pair, reach, stack.open().chain(heap.open()));
+            let likelihood = likelihood(&certifier.pair, reach, frontiers.open(&certifier.pair));
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         (None, Some(reason)) => Verdict::Undecided(reason),
@@ -265,7 +289,7 @@ fn surfaces(
             apart(options, 0.0, false)
         }
         _ => {
-            let whole = certifier.prove(excluded, stack).is_continue();
+            let whole = certifier.prove(excluded, &mut frontiers.stack).is_continue();
             let distance = if whole { certifier.tighten() } else { 0.0 };
             if let Some(proof) = proof.filter(|_| whole) {
                 certifier.hand_out(proof);
@@ -297,11 +321,9 @@ fn look(
     search: &mut Surfaces<'_>,
     options: &CollideOptions,
     known: Option<&mut Known>,
-    stack: &mut Stack,
-    heap: &mut Heap,
+    frontiers: &mut Frontiers,
 ) -> ControlFlow<()> {
-    stack.clear();
-    heap.clear();
+    frontiers.clear();
     if let Method::Sampling(sampling) = options.method
         && sampling.flat
     {
@@ -323,14 +345,19 @@ fn look(
             search.compared.clear();
         }
         if known.has_front(&search.pair, search.reach, options.certifies()) {
-            return known.look_again(search, stack);
+            return known.look_again(search, &mut frontiers.stack);
         }
         known.forget(None);
     }
+    if search.is_plain() {
+        let Posed { a, b, relative, .. } = search.pair;
+        let level = search.instructions.0;
+        return descend_wide((a, b), &relative, search.reach, level, &mut frontiers.wide, search);
+    }
     let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
     match search.order {
-        Order::DepthFirst => descend(nodes_a, nodes_b, search, stack),
-        _ => descend(nodes_a, nodes_b, search, heap),
+        Order::DepthFirst => descend(nodes_a, nodes_b, search, &mut frontiers.stack),
+        _ => descend(nodes_a, nodes_b, search, &mut frontiers.heap),
     }
 }
 
@@ -345,11 +372,12 @@ fn balls(
     let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
     let (contacts, complete) = all.map(Contacts::parts).unzip();
     let mut search = Balls::new(pair, plan.reach(), contacts);
+    scratch.frontiers.clear();
     let again = known.as_ref().and_then(|known| known.met(&search.pair));
     let mut ended = again.is_some_and(|leaves| search.leaves(leaves).is_break());
     if !ended {
         search.apart = f64::INFINITY;
-        ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.stack).is_break();
+        ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.frontiers.stack).is_break();
     }
     if let Some(complete) = complete {
         *complete = !ended;
@@ -357,7 +385,8 @@ fn balls(
     let verdict = match search.found {
         Some(contact) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
         None if ended => {
-            let likelihood = likelihood(&search.pair, search.reach_stored, scratch.stack.open());
+            let likelihood =
+                likelihood(&search.pair, search.reach_stored, scratch.frontiers.open(&search.pair));
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         None => apart(plan.options(), search.apart, true),

@@ -6,14 +6,13 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_hierarchy::{OrientedBox, Relative, THICKNESS};
-use nearmiss_surface::PointBlock;
+use nearmiss_hierarchy::{LeafBlock, OrientedBox, Relative, THICKNESS};
 
-const WIDTH: usize = PointBlock::WIDTH;
+const WIDTH: usize = LeafBlock::WIDTH;
 
 /// What leaves are compared by.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Instructions(Level);
+pub(crate) struct Instructions(pub(crate) Level);
 
 impl Default for Instructions {
     fn default() -> Self {
@@ -21,15 +20,20 @@ impl Default for Instructions {
     }
 }
 
-/// Points of a block that belong to a leaf, as tangent discs.
+/// Points of a leaf as tangent discs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Discs<'a> {
-    pub(crate) points: &'a PointBlock,
-    /// Of the block's points from the first; there may be fewer than lanes.
-    pub(crate) normals: &'a [[f32; 3]],
-    pub(crate) radii: &'a [f32],
-    /// The lanes that are the leaf's, as bits.
-    pub(crate) lanes: u32,
+    pub(crate) block: &'a LeafBlock,
+    /// How many of the lanes, from the first, have a point.
+    pub(crate) count: usize,
+}
+
+impl Discs<'_> {
+    /// The lanes that have one, as bits.
+    #[inline]
+    fn lanes(&self) -> u32 {
+        (1 << self.count) - 1
+    }
 }
 
 /// Discs of a and b, and what is between them.
@@ -39,8 +43,6 @@ pub(crate) struct LeafPair<'a> {
     pub(crate) b: Discs<'a>,
     /// How far what is at the points of a reaches, in a's frame.
     pub(crate) reaches: [f32; WIDTH],
-    /// That of b's leaf, in its own frame.
-    pub(crate) bounds: &'a OrientedBox,
     pub(crate) relative: &'a Relative,
 }
 
@@ -65,41 +67,41 @@ impl LeafPair<'_> {
 
     #[inline(always)]
     fn next_by<S: Simd>(&self, simd: S, from: u32, each: bool) -> Option<Near> {
-        let centres = self.relative.points_back(simd, &self.a.points.position);
-        let mut candidates = self.near_box(simd, &centres) & self.a.lanes & u32::MAX.unbounded_shl(from);
+        let centres = self.relative.points_back(simd, &self.a.block.positions);
+        let mut candidates = self.near_box(simd, &centres) & self.a.lanes() & u32::MAX.unbounded_shl(from);
         if candidates == 0 {
             return None;
         }
         let [x, y, z] = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
         let per_scale = self.relative.scale_back();
-        let [px, py, pz] = &self.b.points.position;
+        let [px, py, pz] = &self.b.block.positions;
         let (px, py, pz) = (
             f32x16::load_array_ref(simd, px),
             f32x16::load_array_ref(simd, py),
             f32x16::load_array_ref(simd, pz),
         );
-        let radii = f32x16::load_array_ref(simd, &padded(self.b.radii));
-        let mut normals = None;
+        let radii = f32x16::load_array_ref(simd, &self.b.block.discs);
         while candidates != 0 {
             let number = candidates.trailing_zeros();
             let lane = number as usize;
             candidates &= candidates - 1;
             let d = [-(px - x[lane]), -(py - y[lane]), -(pz - z[lane])];
-            let radius = self.a.radii.get(lane).copied().unwrap_or(0.0) * per_scale;
+            let radius = self.a.block.discs[lane & (WIDTH - 1)] * per_scale;
             let d_sq = product(&d, &d);
             let reach = radii + radius;
             let near: mask32x16<S> = d_sq.simd_le(reach * reach);
-            let near_bits = bits(near) & self.b.lanes;
+            let near_bits = bits(near) & self.b.lanes();
             let mut crossings = 0;
             if near_bits != 0 {
-                // A closure given to the standard library would not be compiled for the instruction set.
-                let of_b = match normals {
-                    Some(normals) => normals,
-                    None => side_by_side(simd, self.b.normals),
-                };
-                normals = Some(of_b);
-                let normal = self.a.normals.get(lane).copied().unwrap_or_default();
-                let normal = self.relative.direction_back(normal);
+                let [x, y, z] = &self.a.block.normals;
+                let own = lane & (WIDTH - 1);
+                let normal = self.relative.direction_back([x[own], y[own], z[own]]);
+                let [x, y, z] = &self.b.block.normals;
+                let of_b = [
+                    f32x16::load_array_ref(simd, x),
+                    f32x16::load_array_ref(simd, y),
+                    f32x16::load_array_ref(simd, z),
+                ];
                 crossings = near_bits & bits(cross(simd, (&d, d_sq), (normal, radius), (&of_b, radii)));
             }
             if each || crossings != 0 {
@@ -112,7 +114,7 @@ impl LeafPair<'_> {
     /// The points of a, which are `centres` in b's frame, that reach b's box.
     #[inline(always)]
     fn near_box<S: Simd>(&self, simd: S, centres: &[f32x16<S>; 3]) -> u32 {
-        let OrientedBox { centre, half, axes, .. } = self.bounds;
+        let OrientedBox { centre, half, axes, .. } = &self.b.block.bounds;
         let d = [centres[0] - centre[0], centres[1] - centre[1], centres[2] - centre[2]];
         let mut beyond_sq = f32x16::simd_from(simd, 0.0);
         for k in 0..3 {
@@ -160,28 +162,6 @@ fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
-/// The first lanes; zero where there are none.
-#[inline(always)]
-pub(crate) fn padded(values: &[f32]) -> [f32; WIDTH] {
-    values.first_chunk().copied().unwrap_or_else(|| {
-        let mut lanes = [0.0; WIDTH];
-        lanes[..values.len()].copy_from_slice(values);
-        lanes
-    })
-}
-
-#[inline(always)]
-fn side_by_side<S: Simd>(simd: S, vectors: &[[f32; 3]]) -> [f32x16<S>; 3] {
-    let mut rows = [[0.0_f32; WIDTH]; 3];
-    for (lane, vector) in vectors.iter().take(WIDTH).enumerate() {
-        for k in 0..3 {
-            rows[k][lane] = vector[k];
-        }
-    }
-    let [x, y, z] = &rows;
-    [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
-}
-
 #[cfg(test)]
 mod tests {
     use nearmiss_geometry::Pose;
@@ -192,10 +172,8 @@ mod tests {
 
     /// Some discs about the origin, in one block.
     struct Leaf {
-        block: PointBlock,
-        normals: Vec<[f32; 3]>,
-        radii: Vec<f32>,
-        lanes: u32,
+        block: LeafBlock,
+        count: usize,
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
@@ -205,28 +183,36 @@ mod tests {
 
     impl Leaf {
         fn new(rng: &mut impl rand::Rng, count: usize, flat: bool) -> Self {
-            let positions: Vec<[f32; 3]> = (0..count)
-                .map(|_| {
-                    let [x, y, z] = single(point_in(rng, 1.0));
-                    [x, y, if flat { 0.01 * z } else { z }]
-                })
-                .collect();
-            let normal = |_| if flat { [0.0, 0.0, 1.0] } else { single(unit_vector(rng)) };
-            let normals = (0..count).map(normal).collect();
-            let radii = (0..16_u8).map(|i| 0.2 + 0.02 * f32::from(i)).take(count).collect();
-            let block = PointBlock::silent(&positions).next().unwrap();
-            Self { block, normals, radii, lanes: (1 << count) - 1 }
+            let bounds = OrientedBox {
+                centre: [0.0; 3],
+                half: [0.9, 0.8, if flat { 0.05 } else { 0.7 }],
+                axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                reach: 1.0,
+            };
+            let (positions, normals, discs) = ([[0.0; 16]; 3], [[0.0; 16]; 3], [0.0; 16]);
+            let mut block = LeafBlock { positions, normals, discs, bounds };
+            for (lane, number) in (0..16_u8).enumerate().take(count) {
+                let [x, y, z] = single(point_in(rng, 1.0));
+                let position = [x, y, if flat { 0.01 * z } else { z }];
+                let normal = if flat { [0.0, 0.0, 1.0] } else { single(unit_vector(rng)) };
+                for k in 0..3 {
+                    block.positions[k][lane] = position[k];
+                    block.normals[k][lane] = normal[k];
+                }
+                block.discs[lane] = 0.2 + 0.02 * f32::from(number);
+            }
+            Self { block, count }
         }
 
         fn discs(&self) -> Discs<'_> {
-            Discs { points: &self.block, normals: &self.normals, radii: &self.radii, lanes: self.lanes }
+            Discs { block: &self.block, count: self.count }
         }
 
         fn disc(&self, lane: usize) -> Disc {
             Disc {
-                centre: self.block.position.map(|c| c[lane]),
-                normal: self.normals[lane],
-                radius: self.radii[lane],
+                centre: self.block.positions.map(|c| c[lane]),
+                normal: self.block.normals.map(|c| c[lane]),
+                radius: self.block.discs[lane],
             }
         }
     }
@@ -234,9 +220,9 @@ mod tests {
     /// Who reaches the box and what it crosses there, one by one.
     fn one_by_one(test: &LeafPair<'_>, a: &Leaf, b: &Leaf) -> Vec<Near> {
         let back = test.relative.scale_back();
-        let lanes = |leaf: &Leaf| (0..16_u32).filter(|lane| leaf.lanes >> lane & 1 != 0).collect::<Vec<_>>();
+        let lanes = |leaf: &Leaf| (0..16_u32).take(leaf.count);
         let [tx, ty, tz] = test.relative.point([0.0; 3]);
-        let near = |&lane: &u32| {
+        let near = |lane: u32| {
             let disc = a.disc(lane as usize);
             let [x, y, z] = disc.centre;
             let moved = Disc {
@@ -246,10 +232,10 @@ mod tests {
             };
             let reach = test.reaches[lane as usize] * back;
             let crosses = |j: &u32| crossing(&moved, &b.disc(*j as usize));
-            let crossings = lanes(b).iter().filter(|j| crosses(j)).fold(0, |bits, j| bits | 1 << j);
-            (test.bounds.distance_sq(moved.centre) <= reach * reach).then_some(Near { lane, crossings })
+            let crossings = lanes(b).filter(crosses).fold(0, |bits, j| bits | 1 << j);
+            (b.block.bounds.distance_sq(moved.centre) <= reach * reach).then_some(Near { lane, crossings })
         };
-        lanes(a).iter().filter_map(near).collect()
+        lanes(a).filter_map(near).collect()
     }
 
     fn levels() -> Vec<Level> {
@@ -268,26 +254,17 @@ mod tests {
         let (mut reached, mut crossed, mut missed) = (0, 0, 0);
         for round in 0..4000_usize {
             let flat = round % 3 == 0;
-            let (mut a, b) =
-                (Leaf::new(rng, 1 + round % 16, flat), Leaf::new(rng, 1 + (round / 16) % 16, flat));
-            a.lanes &= [!0, !1, !2, !3, !4][round % 5];
+            let (a, b) = (Leaf::new(rng, 1 + round % 16, flat), Leaf::new(rng, 1 + (round / 16) % 16, flat));
             let axis = unit_vector(rng);
             let angle = if flat { 1e-3 } else { 2.0 };
             let scale = [1.0, 0.5, 3.0][round % 3];
             let shift = point_in(rng, if flat { 0.2 } else { 2.5 });
             let pose = Pose::from_axis_angle(axis, angle).with_scale(scale).with_translation(shift);
             let relative = Relative::new(&pose, 8.0);
-            let bounds = OrientedBox {
-                centre: [0.0; 3],
-                half: [0.9, 0.8, if flat { 0.05 } else { 0.7 }],
-                axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-                reach: 1.0,
-            };
             let test = LeafPair {
                 a: a.discs(),
                 b: b.discs(),
-                reaches: padded(&a.radii).map(|r| r + 0.01),
-                bounds: &bounds,
+                reaches: a.block.discs.map(|r| r + 0.01),
                 relative: &relative,
             };
             let expected = one_by_one(&test, &a, &b);
@@ -304,7 +281,7 @@ mod tests {
             }
             reached += expected.len();
             crossed += expected.iter().filter(|near| near.crossings != 0).count();
-            missed += a.lanes.count_ones() as usize - expected.len();
+            missed += a.count - expected.len();
         }
         assert!(reached > 5000 && crossed > 1000 && missed > 5000, "{reached} {crossed} {missed}");
     }

@@ -5,6 +5,7 @@ mod batch;
 mod budget;
 mod certify;
 mod collide;
+mod compare;
 mod crossing;
 mod curve;
 mod hint;

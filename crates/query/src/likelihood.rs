@@ -19,12 +19,12 @@ const SLOPE: f64 = 13.5;
 const OFFSET: f64 = 4.65;
 
 /// The chance that the pairs still open, or all if none was looked at, hide a contact or what is within `reach`.
-pub(crate) fn likelihood(pair: &Posed<'_>, reach: f32, open: impl Iterator<Item = (f32, NodePair)>) -> f64 {
+pub(crate) fn likelihood(pair: &Posed<'_>, reach: f32, open: impl Iterator<Item = NodePair>) -> f64 {
     let together = |nodes: NodePair| {
         let (a, b) = (&pair.a.boxes[nodes.a.index()], &pair.b.boxes[nodes.b.index()]);
         f64::from(pair.relative.gaps_and_overlaps([a; 2], [b; 2], reach).1[0])
     };
-    let mut open = open.map(|(_, nodes)| nodes).take(LOOKED_AT).peekable();
+    let mut open = open.take(LOOKED_AT).peekable();
     let roots = open.peek().is_none().then_some(NodePair { a: NodeId::ROOT, b: NodeId::ROOT });
     // What is no number, as of boxes that overflow, says nothing.
     let most = open.chain(roots).map(together).filter(|s| s.is_finite()).fold(0.0, f64::max);

@@ -11,13 +11,13 @@ use std::ops::{ControlFlow, Range};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Node, NodePair, PointKind, Slices, Split, Visitor};
-use nearmiss_surface::{PointBlock, meet};
+use nearmiss_surface::meet;
 
 use crate::budget::Budget;
 use crate::certify::{Excluded, distinct};
 use crate::crossing::Disc;
 use crate::interpolation::InterpolationScratch;
-use crate::leaf_pair::{Discs, Instructions, LeafPair, Near, padded};
+use crate::leaf_pair::Instructions;
 use crate::options::{CollideOptions, Detail, Method, Order};
 use crate::posed::Posed;
 use crate::verdict::{Contact, Evidence, Reason};
@@ -62,7 +62,7 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) excluded: &'a mut Vec<Excluded>,
     /// The pairs whose points were compared, without a hit.
     pub(crate) compared: &'a mut Vec<NodePair>,
-    instructions: Instructions,
+    pub(crate) instructions: Instructions,
     pub(crate) gathers: &'a mut [ViewScratch; 2],
     /// The points of a that lie in the box of b.
     pub(crate) members: &'a mut Vec<u32>,
@@ -152,7 +152,7 @@ impl<'a> Surfaces<'a> {
 
     /// Whether a disc of some points of b comes into the `ball` about the centre of `disc` of a, or that disc into
     /// one of their balls. A point with a ball has no disc here.
-    fn comes_near_sparse(&self, disc: &Disc, ball: f32, mut points: Range<usize>) -> bool {
+    pub(crate) fn comes_near_sparse(&self, disc: &Disc, ball: f32, mut points: Range<usize>) -> bool {
         let point =
             |disc: &Disc, ball: f32| Disc { radius: if ball > 0.0 { 0.0 } else { disc.radius }, ..*disc };
         // Within a margin of a ball is as good as within it.
@@ -361,6 +361,15 @@ impl Visitor for Surfaces<'_> {
 }
 
 impl Surfaces<'_> {
+    /// Whether pairs of boxes tell all that is wanted of those that are apart: they need not be looked at one by one.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.method == Method::Traversal
+            && self.order == Order::DepthFirst
+            && !self.looks_closer
+            && !self.notes
+            && self.resolution < 0.0
+    }
+
     /// Two leaves, or nodes that answer by their samples.
     fn compare(&mut self, pair: NodePair) -> ControlFlow<()> {
         let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
@@ -376,124 +385,15 @@ impl Surfaces<'_> {
                 return ControlFlow::Continue(());
             }
         }
-        for of_a in blocks(&node_a) {
-            for of_b in blocks(&node_b) {
-                let tries = self.tries;
-                self.compare_blocks(pair.b, of_a.clone(), of_b, by_discs)?;
-                if self.tries > tries {
-                    // Other crossings of the same leaves would fail likewise.
-                    return ControlFlow::Continue(());
-                }
-            }
+        let tries = self.tries;
+        let leaf = |node: &Node, scan: &Slices<'_>| (node.first / scan.leaf_size) as usize;
+        self.compare_leaves([leaf(&node_a, self.pair.a), leaf(&node_b, self.pair.b)], by_discs)?;
+        if self.tries > tries {
+            return ControlFlow::Continue(());
         }
         match self.method {
             Method::Sampling(sampling) => self.test_leaves(pair, &sampling),
             _ => ControlFlow::Continue(()),
         }
-    }
-
-    /// Points of a leaf of a that lie in one block against points of the leaf `node` of b that do.
-    fn compare_blocks(
-        &mut self,
-        node: NodeId,
-        of_a: Range<usize>,
-        of_b: Range<usize>,
-        by_discs: bool,
-    ) -> ControlFlow<()> {
-        let (a, b) = (self.pair.a, self.pair.b);
-        let (first_a, first_b) =
-            (of_a.start & !(PointBlock::WIDTH - 1), of_b.start & !(PointBlock::WIDTH - 1));
-        let is_sparse = |kinds: &[u8]| kinds.iter().any(|&code| PointKind::from_code(code).is_sparse());
-        let (sparse_a, sparse_b) = (is_sparse(&a.kinds[of_a.clone()]), is_sparse(&b.kinds[of_b.clone()]));
-        let is_looked_about = sparse_a || sparse_b;
-        if !by_discs && !is_looked_about {
-            return ControlFlow::Continue(());
-        }
-        let discs_a = discs(a, first_a, &of_a);
-        let mut reaches = padded(discs_a.radii);
-        if sparse_a {
-            for i in of_a {
-                let reach = &mut reaches[i - first_a];
-                *reach = reach.max(a.ball(i));
-            }
-        }
-        let reach = self.reach;
-        let test = LeafPair {
-            a: discs_a,
-            b: discs(b, first_b, &of_b),
-            reaches: reaches.map(|own| own + reach),
-            bounds: &b.boxes[node.index()],
-            relative: &self.pair.relative.clone(),
-        };
-        // Where nothing but crossings counts, only points with some are looked at.
-        let each = is_looked_about || self.margin > 0.0;
-        let mut from = 0;
-        while let Some(Near { lane, crossings }) = test.next(self.instructions, from, each) {
-            from = lane + 1;
-            let i = first_a + lane as usize;
-            let ball = if sparse_a { a.ball(i) } else { 0.0 };
-            let is_open = self.doubt == Some(Reason::Undersampled);
-            if (ball > 0.0 || sparse_b)
-                && !is_open
-                && self.comes_near_sparse(&self.disc_a(i), ball, of_b.clone())
-            {
-                self.doubt = Some(Reason::Undersampled);
-            }
-            if by_discs {
-                let tries = self.tries;
-                self.discs_cross(i, crossings, first_b)?;
-                if self.tries > tries {
-                    return ControlFlow::Continue(());
-                }
-                if self.margin > 0.0 {
-                    self.near_discs(i, of_b.clone())?;
-                    if self.tries > tries {
-                        return ControlFlow::Continue(());
-                    }
-                }
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// The disc of point `i` crosses those of b from point `first` on that have a bit in `crossings`.
-    #[inline]
-    fn discs_cross(&mut self, i: usize, mut crossings: u32, first: usize) -> ControlFlow<()> {
-        while crossings != 0 {
-            let j = first + crossings.trailing_zeros() as usize;
-            crossings &= crossings - 1;
-            let (distance, [ra, rb]) = self.points(i, j);
-            if distance > FAR * ra.max(rb) {
-                continue;
-            }
-            match self.doubt_about(i, j) {
-                Some(reason) => _ = self.doubt.get_or_insert(reason),
-                None => return self.crossed(i, j),
-            }
-        }
-        ControlFlow::Continue(())
-    }
-}
-
-/// The points of a leaf, those of a block at a time.
-fn blocks(leaf: &Node) -> impl Iterator<Item = Range<usize>> + use<> {
-    let Range { mut start, end } = leaf.points();
-    std::iter::from_fn(move || {
-        let first = start;
-        start = end.min((first / PointBlock::WIDTH + 1) * PointBlock::WIDTH);
-        (first < end).then_some(first..start)
-    })
-}
-
-/// Points of a leaf that lie in the block from point `first` on.
-#[inline]
-fn discs<'a>(scan: &'a Slices<'a>, first: usize, points: &Range<usize>) -> Discs<'a> {
-    let end = scan.positions.len().min(first + PointBlock::WIDTH);
-    let below = |i: usize| (1_u32 << (i - first)) - 1;
-    Discs {
-        points: &scan.blocks[first / PointBlock::WIDTH],
-        normals: &scan.normals[first..end],
-        radii: &scan.discs[first..end],
-        lanes: below(points.end) & !below(points.start),
     }
 }

@@ -1,0 +1,332 @@
+//! The tree with four children a node, whose boxes stand side by side: sixteen pairs of boxes are compared in one pass.
+//!
+//! Every other level of the binary tree is left out. What a boolean query costs is pairs of boxes, and with sixteen in the
+//! lanes of a register a pair costs a sixth of what it costs four at a time; the boxes of a level that is left out would have
+//! parted few (docs/decisions). Made from the binary tree whenever that is made or loaded, in O(nodes): nothing of it is stored.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
+
+use crate::boxes::{OrientedBox, Relative};
+use crate::build::{PointHierarchy, Slices};
+use crate::descend::NodePair;
+use crate::leaf_block::Leaves;
+use crate::split::id32;
+
+/// Children of a node.
+const WIDTH: usize = 4;
+
+type Lanes = [f32; WIDTH];
+
+/// A leaf by its number in the order of the points, or an inner node by its place in the [`WideTree`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Child(u32);
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+    const NONE: Self = Self(u32::MAX);
+
+    fn leaf(number: u32) -> Self {
+        Self(number | Self::LEAF)
+    }
+
+    #[inline]
+    const fn is_leaf(self) -> bool {
+        self.0 & Self::LEAF != 0
+    }
+
+    #[inline]
+    const fn index(self) -> usize {
+        (self.0 & !Self::LEAF) as usize
+    }
+}
+
+/// The boxes of up to four children.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+struct Siblings {
+    centre: [Lanes; 3],
+    half: [Lanes; 3],
+    axes: [[Lanes; 3]; 3],
+    children: [Child; WIDTH],
+}
+
+impl Siblings {
+    const NONE: Self = Self {
+        centre: [[0.0; WIDTH]; 3],
+        half: [[0.0; WIDTH]; 3],
+        axes: [[[0.0; WIDTH]; 3]; 3],
+        children: [Child::NONE; WIDTH],
+    };
+
+    fn set(&mut self, lane: usize, bounds: &OrientedBox, child: Child) {
+        for k in 0..3 {
+            self.centre[k][lane] = bounds.centre[k];
+            self.half[k][lane] = bounds.half[k];
+            for j in 0..3 {
+                self.axes[k][j][lane] = bounds.axes[k][j];
+            }
+        }
+        self.children[lane] = child;
+    }
+
+    /// The lanes that have a child, as bits: the first few.
+    #[inline]
+    fn lanes(&self) -> u32 {
+        let there = |lane: usize| u32::from(self.children[lane] != Child::NONE) << lane;
+        there(0) | there(1) | there(2) | there(3)
+    }
+}
+
+/// The tree with four children a node.
+#[derive(Debug, Clone, Default)]
+pub struct WideTree {
+    nodes: Vec<Siblings>,
+    /// The id of each node in the binary tree.
+    ids: Vec<u32>,
+    /// What leaves are compared by.
+    pub leaves: Leaves,
+}
+
+impl WideTree {
+    /// Every other level of the tree of these nodes, level by level: what all queries look at stands together.
+    pub(crate) fn of(scan: &PointHierarchy) -> Self {
+        let Slices { nodes, boxes, leaf_size, .. } = scan.slices();
+        let is_leaf = |id: NodeId| nodes[id.index()].is_leaf();
+        let children = |id: NodeId| nodes[id.index()].children(id);
+        let mut ids: Vec<u32> = if nodes.len() > 1 { vec![0] } else { Vec::new() };
+        let mut wide: Vec<Siblings> = Vec::with_capacity(nodes.len().div_ceil(WIDTH));
+        while let Some(&id) = ids.get(wide.len()) {
+            let mut siblings = Siblings::NONE;
+            let below = children(NodeId(id))
+                .into_iter()
+                .map(|child| if is_leaf(child) { [Some(child), None] } else { children(child).map(Some) });
+            for (lane, id) in below.flatten().flatten().enumerate() {
+                let child = if is_leaf(id) {
+                    Child::leaf(nodes[id.index()].first / leaf_size)
+                } else {
+                    ids.push(id.0);
+                    Child(id32(ids.len() - 1))
+                };
+                siblings.set(lane, &boxes[id.index()], child);
+            }
+            wide.push(siblings);
+        }
+        Self { nodes: wide, ids, leaves: Leaves::of(scan) }
+    }
+
+    fn root(&self) -> Child {
+        if self.nodes.is_empty() { Child::leaf(0) } else { Child(0) }
+    }
+
+    /// The id of a child in the binary tree.
+    #[inline]
+    fn id(&self, child: Child) -> NodeId {
+        NodeId(if child.is_leaf() { self.leaves.id(child.index()) } else { self.ids[child.index()] })
+    }
+}
+
+/// What a descent does with what it finds.
+pub trait LeafVisitor {
+    /// So many pairs of boxes were compared; may end the descent.
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()>;
+
+    /// Two leaves, by their numbers, whose boxes are not apart.
+    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()>;
+}
+
+/// The pairs that a descent has still to look at.
+#[derive(Debug, Clone, Default)]
+pub struct WideStack {
+    pairs: Vec<[Child; 2]>,
+}
+
+impl WideStack {
+    /// Forgets all pairs.
+    pub fn clear(&mut self) {
+        self.pairs.clear();
+    }
+
+    /// The pairs still there, as those of the binary trees of `a` and `b`, the next first.
+    pub fn open(&self, a: &Slices<'_>, b: &Slices<'_>) -> impl Iterator<Item = NodePair> {
+        self.pairs.iter().rev().map(|&[of_a, of_b]| NodePair { a: a.wide.id(of_a), b: b.wide.id(of_b) })
+    }
+}
+
+/// Visits the pairs of leaves of `a` and `b` whose boxes are no further apart than `reach`, in a's frame, until `visitor` ends it: depth
+/// first, of siblings the deepest overlap first. The other fifteen are not sorted, which costs what it saves.
+pub fn descend_wide(
+    (a, b): (&Slices<'_>, &Slices<'_>),
+    relative: &Relative,
+    reach: f32,
+    level: Level,
+    stack: &mut WideStack,
+    visitor: &mut impl LeafVisitor,
+) -> ControlFlow<()> {
+    stack.pairs.clear();
+    stack.pairs.push([a.wide.root(), b.wide.root()]);
+    while let Some(pair) = stack.pairs.pop() {
+        if pair[0].is_leaf() && pair[1].is_leaf() {
+            let flow = visitor.leaf_pair(pair.map(Child::index));
+            if flow.is_break() {
+                // It was not looked at to the end, so it is still open.
+                stack.pairs.push(pair);
+                return flow;
+            }
+            continue;
+        }
+        let [whole_a, whole_b] = whole([a.wide, b.wide], pair, relative.scale());
+        let (alone_a, alone_b);
+        let below_a = if whole_a {
+            alone_a = a.alone(pair[0]);
+            &alone_a
+        } else {
+            &a.wide.nodes[pair[0].index()]
+        };
+        let below_b = if whole_b {
+            alone_b = b.alone(pair[1]);
+            &alone_b
+        } else {
+            &b.wide.nodes[pair[1].index()]
+        };
+        let Near { mut lanes, deepest, compared } = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || compare(simd, relative, [below_a, below_b], reach),
+        ));
+        if lanes != 0 {
+            let child = |lane: u32| {
+                [below_a.children[lane as usize % WIDTH], below_b.children[lane as usize / WIDTH]]
+            };
+            lanes &= !(1 << deepest);
+            while lanes != 0 {
+                stack.pairs.push(child(lanes.trailing_zeros()));
+                lanes &= lanes - 1;
+            }
+            stack.pairs.push(child(deepest));
+        }
+        visitor.compared(compared)?;
+    }
+    ControlFlow::Continue(())
+}
+
+/// Which nodes of a pair that are not both leaves stay whole: leaves, and those that are less than half as long as the other.
+#[inline]
+fn whole(trees: [&WideTree; 2], pair: [Child; 2], scale: f32) -> [bool; 2] {
+    let [a, b] = pair.map(Child::is_leaf);
+    if a || b {
+        return [a, b];
+    }
+    let longest = |side: usize| {
+        let [a, b, c, d] = trees[side].nodes[pair[side].index()].half[0];
+        a.max(b).max(c.max(d))
+    };
+    let (a, b) = (longest(0), longest(1) * scale);
+    [b > 2.0 * a, a > 2.0 * b]
+}
+
+impl Slices<'_> {
+    /// A node by itself.
+    fn alone(&self, child: Child) -> Siblings {
+        let mut alone = Siblings::NONE;
+        alone.set(0, &self.boxes[self.wide.id(child).index()], child);
+        alone
+    }
+}
+
+/// What of sixteen pairs of boxes is near. Lane 4j + i is child i of a and child j of b.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Near {
+    /// Those that are not apart, as bits.
+    lanes: u32,
+    /// The one of these that overlaps most.
+    deepest: u32,
+    /// How many there are at all.
+    compared: u32,
+}
+
+/// As [`Relative::gaps`], in the same order of operations.
+#[inline(always)]
+fn compare<S: Simd>(simd: S, relative: &Relative, [a, b]: [&Siblings; 2], reach: f32) -> Near {
+    let centre_a = each(simd, &a.centre);
+    let half_a = each(simd, &a.half);
+    let axes_a = [each(simd, &a.axes[0]), each(simd, &a.axes[1]), each(simd, &a.axes[2])];
+    let centre_b = spread(relative.points_of_four(four(simd, &b.centre)));
+    let [hx, hy, hz] = four(simd, &b.half);
+    let scale = relative.scale();
+    let half_b = spread([hx * scale, hy * scale, hz * scale]);
+    let axes_b = [
+        spread(relative.directions_of_four(four(simd, &b.axes[0]))),
+        spread(relative.directions_of_four(four(simd, &b.axes[1]))),
+        spread(relative.directions_of_four(four(simd, &b.axes[2]))),
+    ];
+    let d = [centre_b[0] - centre_a[0], centre_b[1] - centre_a[1], centre_b[2] - centre_a[2]];
+    let mut gap = f32x16::splat(simd, f32::MIN);
+    let mut reach_b = half_b;
+    for i in 0..3 {
+        let mut reach_a = half_a[i];
+        for j in 0..3 {
+            let cosine = product(&axes_a[i], &axes_b[j]).abs();
+            reach_a += half_b[j] * cosine;
+            reach_b[j] += half_a[i] * cosine;
+        }
+        gap = gap.max(product(&axes_a[i], &d).abs() - reach_a);
+    }
+    for j in 0..3 {
+        gap = gap.max(product(&axes_b[j], &d).abs() - reach_b[j]);
+    }
+    let [of_a, of_b] = [a.lanes(), b.lanes()];
+    // Those of b are the first few.
+    let there = (of_a * 0x1111) & ((1 << (4 * of_b.count_ones())) - 1);
+    let near = gap.simd_le(reach) & mask32x16::from_bitmask(simd, u64::from(there));
+    let depth = near.select(gap, f32x16::splat(simd, f32::INFINITY));
+    let deepest = depth.simd_eq(depth.reduce_min());
+    Near {
+        lanes: bits(near),
+        deepest: bits(deepest).trailing_zeros(),
+        compared: of_a.count_ones() * of_b.count_ones(),
+    }
+}
+
+// A closure given to the standard library would not be compiled for the instruction set.
+
+#[inline(always)]
+fn four<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> [f32x4<S>; 3] {
+    [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
+}
+
+/// Child i in lanes i, 4 + i, 8 + i, 12 + i.
+#[inline(always)]
+fn each<S: Simd>(simd: S, rows: &[Lanes; 3]) -> [f32x16<S>; 3] {
+    let [x, y, z] = four(simd, rows);
+    [f32x16::block_splat(x), f32x16::block_splat(y), f32x16::block_splat(z)]
+}
+
+/// Child j in lanes 4j to 4j + 3.
+#[inline(always)]
+fn spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> [f32x16<S>; 3] {
+    [spread_one(x), spread_one(y), spread_one(z)]
+}
+
+#[inline(always)]
+fn spread_one<S: Simd>(row: f32x4<S>) -> f32x16<S> {
+    let row = f32x16::block_splat(row);
+    let row = row.zip_low(row);
+    row.zip_low(row)
+}
+
+#[inline(always)]
+fn product<S: Simd>(x: &[f32x16<S>; 3], y: &[f32x16<S>; 3]) -> f32x16<S> {
+    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
+    mask.to_bitmask() as u32
+}
+
+#[cfg(test)]
+mod tests;

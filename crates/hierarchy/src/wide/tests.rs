@@ -1,0 +1,204 @@
+use std::collections::BTreeSet;
+
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+
+use super::*;
+use crate::options::BuildOptions;
+
+/// A blob, a sheet or a line of so many points.
+fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) -> PointHierarchy {
+    let point = |_| {
+        let p = point_in(rng, 1.0);
+        [p[0], p[1] * flat[1], p[2] * flat[2]]
+    };
+    let points: Vec<[f64; 3]> = (0..count).map(point).collect();
+    let cloud = PointCloud::from_positions(&points).unwrap();
+    PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(leaf_size)).unwrap()
+}
+
+fn levels() -> Vec<Level> {
+    let mut levels = vec![Level::new(), Level::baseline()];
+    #[cfg(target_arch = "x86_64")]
+    {
+        levels.extend(Level::new().as_avx2().map(Level::Avx2));
+        levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
+    }
+    levels
+}
+
+/// Notes all leaves, and ends after so many.
+#[derive(Default)]
+struct All {
+    leaves: Vec<[usize; 2]>,
+    most: usize,
+    compared: u64,
+}
+
+impl LeafVisitor for All {
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.compared += u64::from(pairs);
+        ControlFlow::Continue(())
+    }
+
+    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+        if self.leaves.len() == self.most {
+            return ControlFlow::Break(());
+        }
+        self.leaves.push(leaves);
+        ControlFlow::Continue(())
+    }
+}
+
+/// The points of a leaf, in a's frame by `place`.
+fn points(scan: &PointHierarchy, leaf: usize, place: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<[f32; 3]> {
+    scan.wide.leaves.points(leaf).map(|i| place(scan.positions[i])).collect()
+}
+
+#[test]
+fn every_leaf_is_below_one_node_and_every_box_is_its_own() {
+    let rng = &mut rng(3);
+    for (count, leaf_size) in
+        [(9, 16), (16, 16), (17, 16), (33, 16), (48, 16), (700, 16), (700, 5), (900, 40)]
+    {
+        let scan = scan(rng, count, [1.0; 3], leaf_size);
+        let tree = &scan.wide;
+        let (mut seen, mut open) = (BTreeSet::new(), vec![tree.root()]);
+        while let Some(child) = open.pop() {
+            if child.is_leaf() {
+                assert!(seen.insert(child.index()), "leaf {} twice", child.index());
+                continue;
+            }
+            let siblings = &tree.nodes[child.index()];
+            for (lane, &below) in siblings.children.iter().enumerate().filter(|(_, c)| **c != Child::NONE) {
+                let bounds = &scan.boxes[tree.id(below).index()];
+                assert_eq!(siblings.centre.map(|row| row[lane]), bounds.centre);
+                assert_eq!(siblings.half.map(|row| row[lane]), bounds.half);
+                assert_eq!(siblings.axes.map(|axis| axis.map(|row| row[lane])), bounds.axes);
+                open.push(below);
+            }
+            assert!(siblings.lanes().trailing_ones() == siblings.lanes().count_ones());
+        }
+        let leaves = scan.nodes.iter().filter(|node| node.is_leaf());
+        for (number, node) in leaves.enumerate() {
+            assert!(seen.remove(&number), "leaf {number} is nowhere");
+            assert_eq!(tree.leaves.points(number), node.points());
+            assert_eq!(scan.nodes[tree.leaves.id(number) as usize], *node);
+            for (block, first, points) in tree.leaves.blocks(number) {
+                for lane in 0..points {
+                    assert_eq!(block.positions.map(|row| row[lane]), scan.positions[first + lane]);
+                    assert_eq!(block.normals.map(|row| row[lane]), scan.normals[first + lane]);
+                    assert_eq!(block.discs[lane].to_bits(), scan.discs[first + lane].to_bits());
+                }
+                assert_eq!(block.bounds, scan.boxes[tree.leaves.id(number) as usize]);
+            }
+            let counts = tree.leaves.blocks(number).map(|(.., points)| points);
+            assert_eq!(counts.sum::<usize>(), node.count as usize);
+        }
+        assert!(seen.is_empty());
+    }
+}
+
+#[test]
+fn sixteen_pairs_at_once_are_what_one_by_one_is() {
+    let rng = &mut rng(4);
+    let scans = [
+        scan(rng, 900, [1.0, 1.0, 0.0], 16),
+        scan(rng, 500, [1.0, 1.0, 1.0], 16),
+        scan(rng, 60, [1.0, 0.0, 0.0], 16),
+    ];
+    let (mut near_ones, mut others) = (0, 0);
+    for round in 0..3000 {
+        let [a, b] = [&scans[round % 3], &scans[round / 3 % 3]].map(PointHierarchy::slices);
+        let scale = [1.0, 0.3, 7.0][round % 3];
+        let turned = Pose::from_axis_angle(unit_vector(rng), 3.0);
+        let relative = Relative::new(&turned.with_scale(scale).with_translation(point_in(rng, 1.0)), 8.0);
+        let reach = [0.0, 0.1, 0.5][round % 3];
+        let pair = [&a, &b].map(|scan| &scan.wide.nodes[round * 7 % scan.wide.nodes.len()]);
+        let bounds = |scan: &Slices<'_>, child: Child| scan.boxes[scan.wide.id(child).index()];
+        let mut expected = Near { lanes: 0, deepest: 32, compared: 0 };
+        let mut least = f32::INFINITY;
+        for lane in 0..16_u32 {
+            let [of_a, of_b] = [pair[0].children[lane as usize % 4], pair[1].children[lane as usize / 4]];
+            if of_a == Child::NONE || of_b == Child::NONE {
+                continue;
+            }
+            expected.compared += 1;
+            let (box_a, box_b) = (bounds(&a, of_a), bounds(&b, of_b));
+            let gap = relative.gaps([&box_a; 2], [&box_b; 2])[0];
+            if gap <= reach {
+                expected.lanes |= 1 << lane;
+                if gap < least {
+                    (least, expected.deepest) = (gap, lane);
+                }
+            }
+        }
+        for level in levels() {
+            let found = dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || compare(simd, &relative, pair, reach),
+            ));
+            if expected.lanes == 0 {
+                assert_eq!((found.lanes, found.compared), (0, expected.compared), "{round}, {level:?}");
+            } else {
+                assert_eq!(found, expected, "round {round}, {level:?}");
+            }
+        }
+        near_ones += expected.lanes.count_ones();
+        others += expected.compared - expected.lanes.count_ones();
+    }
+    assert!(near_ones > 2000 && others > 2000, "{near_ones} {others}");
+}
+
+#[test]
+fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
+    let rng = &mut rng(5);
+    let mut found_any = 0;
+    for round in 0..60_usize {
+        let leaf_size = [16, 16, 7, 33][round % 4];
+        let a = scan(rng, [9, 40, 300, 800][round / 2 % 4], [1.0, 1.0, 0.1], leaf_size);
+        let b = scan(rng, [300, 9, 700, 47][round / 3 % 4], [1.0, 0.7, 0.7], leaf_size);
+        // Of very different sizes, and leaves at different depths.
+        let scale = [1.0, 0.05, 20.0][round % 3];
+        let pose = Pose::from_axis_angle(unit_vector(rng), 2.0).with_scale(scale);
+        let shift = point_in(rng, if round % 7 == 0 { 9.0 } else { 0.3 });
+        let relative = Relative::new(&pose.with_translation(shift), 64.0);
+        let reach = relative.slack() + [0.1, 0.3][round % 2];
+        let mut visitor = All { most: usize::MAX, ..All::default() };
+        let stack = &mut WideStack::default();
+        let pair = (&a.slices(), &b.slices());
+        let flow = descend_wide(pair, &relative, reach, Level::new(), stack, &mut visitor);
+        assert!(flow.is_continue() && stack.pairs.is_empty());
+        let found: BTreeSet<[usize; 2]> = visitor.leaves.iter().copied().collect();
+        assert_eq!(found.len(), visitor.leaves.len(), "round {round}: some leaves twice");
+        let leaves = |scan: &PointHierarchy| scan.len().div_ceil(leaf_size as usize);
+        for leaf_a in 0..leaves(&a) {
+            let of_a = points(&a, leaf_a, |p| p);
+            for leaf_b in 0..leaves(&b) {
+                let of_b = points(&b, leaf_b, |p| relative.point(p));
+                let near = |p: &[f32; 3], q: &[f32; 3]| {
+                    let d = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+                    d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= (reach - relative.slack()).powi(2)
+                };
+                if of_a.iter().any(|p| of_b.iter().any(|q| near(p, q))) {
+                    found_any += 1;
+                    assert!(found.contains(&[leaf_a, leaf_b]), "round {round}: {leaf_a}, {leaf_b}");
+                }
+            }
+        }
+        // Ended and gone on with from the open pairs, nothing is lost.
+        let mut first = All { most: found.len() / 2, ..All::default() };
+        let flow = descend_wide(pair, &relative, reach, Level::new(), stack, &mut first);
+        assert_eq!(flow.is_break(), !found.is_empty());
+        let open: Vec<NodePair> = stack.open(pair.0, pair.1).collect();
+        for &[leaf_a, leaf_b] in found.iter().filter(|leaves| !first.leaves.contains(leaves)) {
+            let holds = |scan: &PointHierarchy, id: NodeId, leaf: usize| {
+                let (points, node) = (scan.wide.leaves.points(leaf), scan.nodes[id.index()].points());
+                node.start <= points.start && points.end <= node.end
+            };
+            let is_open = open.iter().any(|pair| holds(&a, pair.a, leaf_a) && holds(&b, pair.b, leaf_b));
+            assert!(is_open, "round {round}: {leaf_a}, {leaf_b} is not open");
+        }
+    }
+    assert!(found_any > 200, "{found_any}");
+}

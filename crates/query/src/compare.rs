@@ -1,0 +1,135 @@
+//! The points of two leaves against each other: sixteen at a time, and what crosses is looked at one by one.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::NodeId;
+use nearmiss_hierarchy::{LeafBlock, LeafVisitor, NodePair};
+
+use crate::leaf_pair::{Discs, LeafPair, Near};
+use crate::surface::{FAR, Surfaces};
+use crate::verdict::Reason;
+
+impl LeafVisitor for Surfaces<'_> {
+    #[inline]
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.pair.meter.spent.node_pairs += u64::from(pairs);
+        self.pair.meter.go_on()
+    }
+
+    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+        let (a, b) = (&self.pair.a.wide.leaves, &self.pair.b.wide.leaves);
+        let [of_a, of_b] = leaves;
+        self.pair.meter.leaf_pair(a.points(of_a).len(), b.points(of_b).len());
+        let flow = self.compare_leaves(leaves, true);
+        if self.found.is_some() {
+            self.met.get_or_insert(NodePair { a: NodeId(a.id(of_a)), b: NodeId(b.id(of_b)) });
+        }
+        flow
+    }
+}
+
+impl Surfaces<'_> {
+    /// The points of two leaves, by their numbers, against each other.
+    pub(crate) fn compare_leaves(&mut self, [leaf_a, leaf_b]: [usize; 2], by_discs: bool) -> ControlFlow<()> {
+        let (a, b) = (self.pair.a, self.pair.b);
+        let (of_a, of_b) = (&a.wide.leaves, &b.wide.leaves);
+        let sparse = [of_a.is_sparse(leaf_a), of_b.is_sparse(leaf_b)];
+        if !by_discs && sparse == [false; 2] {
+            return ControlFlow::Continue(());
+        }
+        for (block_a, first_a, count_a) in of_a.blocks(leaf_a) {
+            for (block_b, first_b, count_b) in of_b.blocks(leaf_b) {
+                let test = LeafPair {
+                    a: Discs { block: block_a, count: count_a },
+                    b: Discs { block: block_b, count: count_b },
+                    reaches: self.reaches(block_a, first_a, count_a, sparse[0]),
+                    relative: &self.pair.relative.clone(),
+                };
+                let tries = self.tries;
+                self.compare_blocks(&test, [first_a, first_b], sparse, by_discs)?;
+                if self.tries > tries {
+                    // Other crossings of the same leaves would fail likewise.
+                    return ControlFlow::Continue(());
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// How far the discs of a block reach, and the balls if there are some.
+    #[inline]
+    fn reaches(
+        &self,
+        block: &LeafBlock,
+        first: usize,
+        count: usize,
+        sparse: bool,
+    ) -> [f32; LeafBlock::WIDTH] {
+        let mut reaches = block.discs;
+        if sparse {
+            for (i, reach) in (first..first + count).zip(&mut reaches) {
+                *reach = reach.max(self.pair.a.ball(i));
+            }
+        }
+        reaches.map(|own| own + self.reach)
+    }
+
+    /// The points of a block of a leaf of a against those of b.
+    #[inline]
+    fn compare_blocks(
+        &mut self,
+        test: &LeafPair<'_>,
+        [first_a, first_b]: [usize; 2],
+        [sparse_a, sparse_b]: [bool; 2],
+        by_discs: bool,
+    ) -> ControlFlow<()> {
+        let of_b = first_b..first_b + test.b.count;
+        // Where nothing but crossings counts, only points with some are looked at.
+        let each = sparse_a || sparse_b || self.margin > 0.0;
+        let mut from = 0;
+        while let Some(Near { lane, crossings }) = test.next(self.instructions, from, each) {
+            from = lane + 1;
+            let i = first_a + lane as usize;
+            let ball = if sparse_a { self.pair.a.ball(i) } else { 0.0 };
+            let is_open = self.doubt == Some(Reason::Undersampled);
+            if (ball > 0.0 || sparse_b)
+                && !is_open
+                && self.comes_near_sparse(&self.disc_a(i), ball, of_b.clone())
+            {
+                self.doubt = Some(Reason::Undersampled);
+            }
+            if by_discs {
+                let tries = self.tries;
+                self.discs_cross(i, crossings, first_b)?;
+                if self.tries > tries {
+                    return ControlFlow::Continue(());
+                }
+                if self.margin > 0.0 {
+                    self.near_discs(i, of_b.clone())?;
+                    if self.tries > tries {
+                        return ControlFlow::Continue(());
+                    }
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The disc of point `i` crosses those of b from point `first` on that have a bit in `crossings`.
+    #[inline]
+    fn discs_cross(&mut self, i: usize, mut crossings: u32, first: usize) -> ControlFlow<()> {
+        while crossings != 0 {
+            let j = first + crossings.trailing_zeros() as usize;
+            crossings &= crossings - 1;
+            let (distance, [ra, rb]) = self.points(i, j);
+            if distance > FAR * ra.max(rb) {
+                continue;
+            }
+            match self.doubt_about(i, j) {
+                Some(reason) => _ = self.doubt.get_or_insert(reason),
+                None => return self.crossed(i, j),
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
