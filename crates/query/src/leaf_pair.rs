@@ -81,28 +81,36 @@ impl LeafPair<'_> {
             f32x16::load_array_ref(simd, pz),
         );
         let radii = f32x16::load_array_ref(simd, &self.b.block.discs);
+        // Who is near anyone is seldom foreseen, so nothing branches on it until all are known.
+        let mut nears = [0_u32; WIDTH];
+        let mut left = candidates;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize & (WIDTH - 1);
+            let d = [px - x[lane], py - y[lane], pz - z[lane]];
+            let reach = radii + self.a.block.discs[lane] * per_scale;
+            let near: mask32x16<S> = product(&d, &d).simd_le(reach * reach);
+            nears[lane] = bits(near) & self.b.lanes();
+            candidates &= !(u32::from(nears[lane] == 0 && !each) << lane);
+            left &= left - 1;
+        }
         while candidates != 0 {
             let number = candidates.trailing_zeros();
-            let lane = number as usize;
+            let lane = number as usize & (WIDTH - 1);
             candidates &= candidates - 1;
-            let d = [-(px - x[lane]), -(py - y[lane]), -(pz - z[lane])];
-            let radius = self.a.block.discs[lane & (WIDTH - 1)] * per_scale;
-            let d_sq = product(&d, &d);
-            let reach = radii + radius;
-            let near: mask32x16<S> = d_sq.simd_le(reach * reach);
-            let near_bits = bits(near) & self.b.lanes();
             let mut crossings = 0;
-            if near_bits != 0 {
-                let [x, y, z] = &self.a.block.normals;
-                let own = lane & (WIDTH - 1);
-                let normal = self.relative.direction_back([x[own], y[own], z[own]]);
-                let [x, y, z] = &self.b.block.normals;
+            if nears[lane] != 0 {
+                let d = [-(px - x[lane]), -(py - y[lane]), -(pz - z[lane])];
+                let radius = self.a.block.discs[lane] * per_scale;
+                let [nx, ny, nz] = &self.a.block.normals;
+                let normal = self.relative.direction_back([nx[lane], ny[lane], nz[lane]]);
+                let [nx, ny, nz] = &self.b.block.normals;
                 let of_b = [
-                    f32x16::load_array_ref(simd, x),
-                    f32x16::load_array_ref(simd, y),
-                    f32x16::load_array_ref(simd, z),
+                    f32x16::load_array_ref(simd, nx),
+                    f32x16::load_array_ref(simd, ny),
+                    f32x16::load_array_ref(simd, nz),
                 ];
-                crossings = near_bits & bits(cross(simd, (&d, d_sq), (normal, radius), (&of_b, radii)));
+                let crossing = cross(simd, (&d, product(&d, &d)), (normal, radius), (&of_b, radii));
+                crossings = nears[lane] & bits(crossing);
             }
             if each || crossings != 0 {
                 return Some(Near { lane: number, crossings });
