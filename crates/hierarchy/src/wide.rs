@@ -157,7 +157,7 @@ impl WideStack {
 }
 
 /// Visits the pairs of leaves of `a` and `b` whose boxes are no further apart than `reach`, in a's frame, until `visitor` ends it: depth
-/// first, of siblings the deepest overlap first. The other fifteen are not sorted, which costs what it saves.
+/// first, of siblings those that overlap most first. The other fifteen are not sorted, which costs what it saves.
 pub fn descend_wide(
     (a, b): (&Slices<'_>, &Slices<'_>),
     relative: &Relative,
@@ -192,7 +192,7 @@ pub fn descend_wide(
         } else {
             &b.wide.nodes[pair[1].index()]
         };
-        let Near { mut lanes, deepest, compared } = dispatch!(level, simd => simd.vectorize(
+        let Near { mut lanes, most, compared } = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || compare(simd, relative, [below_a, below_b], reach),
         ));
@@ -200,12 +200,12 @@ pub fn descend_wide(
             let child = |lane: u32| {
                 [below_a.children[lane as usize % WIDTH], below_b.children[lane as usize / WIDTH]]
             };
-            lanes &= !(1 << deepest);
+            lanes &= !(1 << most);
             while lanes != 0 {
                 stack.pairs.push(child(lanes.trailing_zeros()));
                 lanes &= lanes - 1;
             }
-            stack.pairs.push(child(deepest));
+            stack.pairs.push(child(most));
         }
         visitor.compared(compared)?;
     }
@@ -241,13 +241,13 @@ impl Slices<'_> {
 struct Near {
     /// Those that are not apart, as bits.
     lanes: u32,
-    /// The one of these that overlaps most.
-    deepest: u32,
+    /// The one of these that overlaps most: as [`Relative::gaps_and_overlaps`] has it.
+    most: u32,
     /// How many there are at all.
     compared: u32,
 }
 
-/// As [`Relative::gaps`], in the same order of operations.
+/// As [`Relative::gaps_and_overlaps`], in the same order of operations.
 #[inline(always)]
 fn compare<S: Simd>(simd: S, relative: &Relative, [a, b]: [&Siblings; 2], reach: f32) -> Near {
     let centre_a = each(simd, &a.centre);
@@ -264,6 +264,7 @@ fn compare<S: Simd>(simd: S, relative: &Relative, [a, b]: [&Siblings; 2], reach:
     ];
     let d = [centre_b[0] - centre_a[0], centre_b[1] - centre_a[1], centre_b[2] - centre_a[2]];
     let mut gap = f32x16::splat(simd, f32::MIN);
+    let mut share = f32x16::splat(simd, 0.0);
     let mut reach_b = half_b;
     for i in 0..3 {
         let mut reach_a = half_a[i];
@@ -272,20 +273,26 @@ fn compare<S: Simd>(simd: S, relative: &Relative, [a, b]: [&Siblings; 2], reach:
             reach_a += half_b[j] * cosine;
             reach_b[j] += half_a[i] * cosine;
         }
-        gap = gap.max(product(&axes_a[i], &d).abs() - reach_a);
+        let away = product(&axes_a[i], &d).abs();
+        gap = gap.max(away - reach_a);
+        share = share.max(away / (reach_a + f32::MIN_POSITIVE));
     }
     for j in 0..3 {
-        gap = gap.max(product(&axes_b[j], &d).abs() - reach_b[j]);
+        let away = product(&axes_b[j], &d).abs();
+        gap = gap.max(away - reach_b[j]);
+        share = share.max(away / (reach_b[j] + f32::MIN_POSITIVE));
     }
     let [of_a, of_b] = [a.lanes(), b.lanes()];
     // Those of b are the first few.
     let there = (of_a * 0x1111) & ((1 << (4 * of_b.count_ones())) - 1);
     let near = gap.simd_le(reach) & mask32x16::from_bitmask(simd, u64::from(there));
-    let depth = near.select(gap, f32x16::splat(simd, f32::INFINITY));
-    let deepest = depth.simd_eq(depth.reduce_min());
+    let share = near.select(share, f32x16::splat(simd, f32::INFINITY));
+    let lanes = bits(near);
+    let most = bits(share.simd_eq(share.reduce_min())) & lanes;
     Near {
-        lanes: bits(near),
-        deepest: bits(deepest).trailing_zeros(),
+        lanes,
+        // What is no number has no least.
+        most: if most == 0 { lanes } else { most }.trailing_zeros(),
         compared: of_a.count_ones() * of_b.count_ones(),
     }
 }
