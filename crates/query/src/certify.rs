@@ -1,10 +1,11 @@
 //! Certificates of separation: what boxes of discs parted is parted again by enclosures, which provably contain
 //! the surfaces.
 //!
-//! The search notes the pairs of nodes that its tight boxes exclude; together they cover all pairs of points.
-//! A pair whose enclosures are disjoint is proven; one whose enclosures overlap is replaced by its children. The
+//! A search that looks at pairs of boxes one by one notes those that its tight boxes exclude; together they cover all pairs
+//! of points. A pair whose enclosures are disjoint is proven; one whose enclosures overlap is replaced by its children. The
 //! certificate is whole when no pair of leaves overlaps, and given up at the first that does. The nearest
-//! pairs are taken first: they are the likeliest to fail.
+//! pairs are taken first: they are the likeliest to fail. After a search that looks at sixteen pairs at a time and notes nothing the
+//! proof begins with the roots, and takes what overlaps most first, for the same reason.
 //!
 //! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with the least bound
 //! is split further, for about an eighth as long as all took before.
@@ -14,7 +15,7 @@ use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Frontier, NodePair, Split, Stack, Visitor, resume};
+use nearmiss_hierarchy::{Frontier, NodePair, Split, Stack, Visitor, descend, resume};
 
 use crate::posed::Posed;
 
@@ -94,9 +95,10 @@ impl<'a> Certifier<'a> {
         Self { pair, reach, proven, doubtful: None }
     }
 
-    /// Proves all of `excluded`, or breaks.
-    pub(crate) fn prove(&mut self, excluded: &[Excluded], stack: &mut Stack) -> ControlFlow<()> {
+    /// Proves all of `excluded`, or all there is if nothing was noted; or breaks.
+    pub(crate) fn prove(&mut self, excluded: Option<&[Excluded]>, stack: &mut Stack) -> ControlFlow<()> {
         let (a, b) = (self.pair.a.nodes, self.pair.b.nodes);
+        let Some(excluded) = excluded else { return descend(a, b, self, stack) };
         stack.clear();
         for group in excluded.iter().rev() {
             let admitted = self.overlaps(group.a, group.b, group.gaps.map(|gap| gap.is_some()));

@@ -272,7 +272,7 @@ fn surfaces(
         *complete = !ended;
     }
     let parted = !ended && search.found.is_none();
-    let Surfaces { pair, found, doubt, estimate, excluded, compared, met, .. } = search;
+    let Surfaces { pair, found, doubt, estimate, excluded, compared, met, is_plain, .. } = search;
     let slack = pair.relative.slack();
     let mut certifier = Certifier::new(pair, reach, proven);
     let verdict = match (found, doubt) {
@@ -289,7 +289,8 @@ fn surfaces(
             apart(options, 0.0, false)
         }
         _ => {
-            let whole = certifier.prove(excluded, &mut frontiers.stack).is_continue();
+            let noted = (!is_plain).then_some(&**excluded);
+            let whole = certifier.prove(noted, &mut frontiers.stack).is_continue();
             let distance = if whole { certifier.tighten() } else { 0.0 };
             if let Some(proof) = proof.filter(|_| whole) {
                 certifier.hand_out(proof);
@@ -349,7 +350,7 @@ fn look(
         }
         known.forget(None);
     }
-    if search.is_plain() {
+    if search.is_plain {
         let Posed { a, b, relative, .. } = search.pair;
         let level = search.instructions.0;
         return descend_wide((a, b), &relative, search.reach, level, &mut frontiers.wide, search);

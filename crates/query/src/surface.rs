@@ -54,6 +54,8 @@ pub(crate) struct Surfaces<'a> {
     looks_closer: bool,
     /// Nodes whose samples are no further from their surface than this, in a's stored frame, are not split.
     pub(crate) resolution: f32,
+    /// Whether pairs of boxes tell all that is wanted of those that are apart: they need not be looked at one by one.
+    pub(crate) is_plain: bool,
     /// Whether excluded and compared pairs are noted.
     notes: bool,
     /// The least gap of any pair excluded.
@@ -94,7 +96,7 @@ pub(crate) struct Workspace<'a> {
 }
 
 impl<'a> Surfaces<'a> {
-    /// `notes`: whether the pairs that were excluded or compared are wanted although no certificate is.
+    /// `notes`: whether the pairs that were excluded or compared are wanted for more than a certificate.
     pub(crate) fn new(
         pair: Posed<'a>,
         options: &CollideOptions,
@@ -107,6 +109,9 @@ impl<'a> Surfaces<'a> {
         compared.clear();
         let may_end = budget.work.is_some() || budget.deadline.is_some();
         let order = options.order.unwrap_or(if may_end { Order::Overlap } else { Order::DepthFirst });
+        let looks_closer = options.coverings || matches!(order, Order::Sides | Order::SidesByGap);
+        let is_whole = options.method == Method::Traversal && budget.resolution.is_none();
+        let is_plain = is_whole && order == Order::DepthFirst && !looks_closer && !notes;
         Self {
             detail: options.detail,
             margin: options.margin,
@@ -114,10 +119,11 @@ impl<'a> Surfaces<'a> {
             method: options.method,
             order,
             coverings: options.coverings,
-            looks_closer: options.coverings || matches!(order, Order::Sides | Order::SidesByGap),
+            looks_closer,
             resolution: budget.resolution.map_or(-1.0, |length| pair.stored(length)),
             pair,
-            notes: notes || options.certifies(),
+            is_plain,
+            notes: !is_plain && (notes || options.certifies()),
             nearest: f32::INFINITY,
             excluded,
             compared,
@@ -361,15 +367,6 @@ impl Visitor for Surfaces<'_> {
 }
 
 impl Surfaces<'_> {
-    /// Whether pairs of boxes tell all that is wanted of those that are apart: they need not be looked at one by one.
-    pub(crate) fn is_plain(&self) -> bool {
-        self.method == Method::Traversal
-            && self.order == Order::DepthFirst
-            && !self.looks_closer
-            && !self.notes
-            && self.resolution < 0.0
-    }
-
     /// Two leaves, or nodes that answer by their samples.
     fn compare(&mut self, pair: NodePair) -> ControlFlow<()> {
         let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
