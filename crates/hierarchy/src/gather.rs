@@ -103,6 +103,26 @@ impl Index<'_> {
         Some([x[lane], y[lane], z[lane]])
     }
 
+    /// Of the blocks that are heard near `block` the one with the middle nearest to `x`.
+    fn next_block(&self, block: usize, x: [f32; 3]) -> Option<usize> {
+        const LANES: usize = PointBlock::WIDTH;
+        let list = self.lists.get(block)?;
+        let first = list.first as usize;
+        // Lane by lane, as they stand side by side.
+        let (mut least, mut nearest) = ([f32::INFINITY; LANES], [0_u32; LANES]);
+        for &group in self.listed.get(first..first + list.count as usize)? {
+            let [px, py, pz] = &self.groups.get(group as usize)?.position;
+            for i in 0..LANES {
+                let d = [px[i] - x[0], py[i] - x[1], pz[i] - x[2]];
+                let far = dot(d, d);
+                nearest[i] = if far < least[i] { group } else { nearest[i] };
+                least[i] = least[i].min(far);
+            }
+        }
+        let lane = (0..LANES).min_by(|&i, &k| least[i].total_cmp(&least[k]))?;
+        Some(nearest[lane] as usize * LANES + lane)
+    }
+
     /// A block of the leaf whose box is near `x`: always into the nearer child.
     fn nearest_block(&self, x: [f32; 3]) -> usize {
         let mut id = 0;
@@ -200,12 +220,17 @@ impl PointHierarchy {
     }
 
     /// As [`Self::evaluate_with`], faster for places along the surface, each near that which was asked about last with this scratch:
-    /// where the list used there ends, that of the nearest point is taken, which holds all that is heard on the surface.
+    /// where the list used there ends, that of the nearest block it names is taken, and where that ends too, that of the nearest point,
+    /// which holds all that is heard on the surface.
     pub fn evaluate_onward(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let index = self.index();
-        if index.list(scratch.block, Centre::new(x).rounded()).is_none() {
-            let start = (scratch.block * PointBlock::WIDTH).min(self.len() - 1);
-            scratch.block = self.nearest_point_near(start, x) as usize / PointBlock::WIDTH;
+        let place = Centre::new(x).rounded();
+        if index.list(scratch.block, place).is_none() {
+            let next = index.next_block(scratch.block, place);
+            scratch.block = next.filter(|&next| index.list(next, place).is_some()).unwrap_or_else(|| {
+                let start = (scratch.block * PointBlock::WIDTH).min(self.len() - 1);
+                self.nearest_point_near(start, x) as usize / PointBlock::WIDTH
+            });
         }
         index.evaluate(x, scratch)
     }

@@ -255,6 +255,23 @@ fn a_scratch_of_another_scan_does_no_harm() {
 }
 
 #[test]
+fn where_f_was_asked_about_before_does_not_matter() {
+    let mut rng = arbitrary::rng(5);
+    for kind in CloudKind::ALL {
+        let scan = prepared(&arbitrary::cloud(kind, 3000, 4), &BuildOptions::default());
+        let mut scratch = GatherScratch::default();
+        let mut x = scan.positions()[0].map(f64::from);
+        for round in 0..1500 {
+            assert_eq!(scan.evaluate_onward(x, &mut scratch), scan.evaluate(x), "{kind:?}, at {x:?}");
+            // From point to point by short steps, and now and then a long one.
+            let next = scan.nearest_point(x) as usize + if round % 40 == 0 { 1000 } else { 1 };
+            let step = arbitrary::point_in(&mut rng, 0.5 * f64::from(scan.radii()[next % scan.len()]));
+            x = [0, 1, 2].map(|k| f64::from(scan.positions()[next % scan.len()][k]) + step[k]);
+        }
+    }
+}
+
+#[test]
 fn threads_and_order_of_work_do_not_matter() {
     let points = arbitrary::cloud(CloudKind::Clustered, 30_000, 9);
     let cloud = PointCloud::from_positions(&points).unwrap();

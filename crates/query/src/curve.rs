@@ -11,7 +11,6 @@ mod trail;
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointHierarchy;
-use nearmiss_surface::meet;
 
 use crate::budget::{Budget, Meter};
 use crate::collide::{CollideScratch, Contacts, collide_all};
@@ -184,7 +183,7 @@ pub fn curves(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CurvePlan, budget: &Bud
 /// either scan saw discs cross; one that is shorter than a leaf and nearer to another than a sampling radius may be taken for that.
 /// Swapped scans give the same curves with other points on them. Scans of the geodesic metric need views with their kernel.
 ///
-/// Costs, beside [`collide_all`], four pairs of evaluations for each sampling radius of length; does not allocate once
+/// Costs, beside [`collide_all`], three pairs of evaluations for each sampling radius of length; does not allocate once
 /// `found` and `scratch` are warm.
 pub fn curves_with(
     a: &ScanView<'_>,
@@ -217,14 +216,14 @@ pub fn curves_with(
             if (crossing.sine >= STEEP) != steep || follower.trail.has_passed(&crossing, 0.5 * longest) {
                 continue;
             }
-            let Some(meeting) = meet(contact.point, |x| follower.evaluate(x)) else {
+            let Ok(place) = follower.begin(contact.point) else {
                 found.complete = false;
                 break;
             };
-            let place = Place::new(meeting.point.into(), &meeting.at);
-            if !meeting.verified || follower.trail.has_passed(&place, SAME_TURN * longest) {
+            let Some(place) = place.filter(|place| !follower.trail.has_passed(place, SAME_TURN * longest))
+            else {
                 continue;
-            }
+            };
             let curve = follower.trace(place, spacing, &mut found.points);
             found.complete &= !curve.ends.is_some_and(|ends| ends.contains(&CurveEnd::Budget));
             found.curves.push(curve);

@@ -17,6 +17,15 @@ const SHORTEST: f64 = 1.0 / 64.0;
 /// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a bandwidth.
 pub(super) const PARALLEL: f64 = 0.01;
 
+/// So often a chord that turns too far is halved: to a quarter, which may turn sixteen times as much a length.
+const BRIDGES: u32 = 2;
+
+/// Rounds of Newton's method from a crossing of discs: most that reach the tolerance at all do so in half as many.
+const ROUNDS_TO_BEGIN: u32 = 8;
+
+/// Where the square of the sine is less, a beginning is looked for between the surfaces, as [`meet`](nearmiss_surface::meet) does.
+const FLAT: f64 = 1e-3;
+
 /// Corrections may make a step a little longer than it aimed for.
 const STRIDE: f64 = 0.98;
 
@@ -71,18 +80,23 @@ impl Place {
         if self.sine < GRAZING { CurveEnd::Tangent } else { CurveEnd::Lost }
     }
 
-    /// Why it cannot be followed to `x`, where both functions are `at`.
-    fn obstacle(&self, x: Vector3<f64>, at: &[Evaluation; 2]) -> CurveEnd {
-        let ends = at.each_ref().map(|at| {
-            let aside = (Vector3::from(at.centroid) - x).norm() / at.bandwidth;
-            at.status == Status::Outside || aside > BESIDE
-        });
-        match ends {
-            [true, _] => CurveEnd::BorderOfA,
-            [_, true] => CurveEnd::BorderOfB,
-            _ if at.iter().all(|at| at.status == Status::Ok) => self.lost(),
-            _ => CurveEnd::Lost,
-        }
+    /// No step was found to where it was looked for.
+    fn astray(&self) -> Refusal {
+        Refusal { end: self.lost(), is_wall: false }
+    }
+
+    /// How the curve turns here for each unit of length, by the chord from `before`.
+    fn bend_since(&self, before: &Self, way: f64) -> Vector3<f64> {
+        let turned = (self.tangent - before.tangent) * (way / (self.point - before.point).norm());
+        turned - self.tangent * self.tangent.dot(&turned)
+    }
+
+    /// Where the curve passes halfway to `next`: the middle of the cubic with these ends and their tangents, as long as an arc that turns so
+    /// far.
+    fn halfway(&self, next: &Self, way: f64) -> Vector3<f64> {
+        let turned = next.tangent - self.tangent;
+        let length = way * (next.point - self.point).norm() * (1.0 + turned.norm_squared() / 16.0);
+        0.5 * (self.point + next.point) - turned * (0.125 * length)
     }
 }
 
@@ -119,80 +133,138 @@ impl Follower<'_> {
         Curve { first, count: points.len() - first, ends }
     }
 
+    /// The place on both surfaces that Newton's method leads to from a crossing of discs, if it does; in `Err` that the budget is spent.
+    pub(super) fn begin(&mut self, crossing: [f64; 3]) -> Result<Option<Place>, CurveEnd> {
+        let mut point = Vector3::from(crossing);
+        for _ in 0..ROUNDS_TO_BEGIN {
+            let at = self.evaluate(point.into()).ok_or(CurveEnd::Budget)?;
+            let place = Place::new(point, &at);
+            if place.residual <= self.tolerance {
+                return Ok(Some(place).filter(|_| at.iter().all(|at| at.status == Status::Ok)));
+            }
+            if at.iter().any(|at| at.status == Status::Outside) {
+                break;
+            }
+            point += step_onto_both(&at, FLAT);
+        }
+        Ok(None)
+    }
+
     /// From a place of the trail onward, or back (`way` −1), until the curve ends; none when it is there again.
     fn follow(&mut self, start: usize, way: f64) -> Option<CurveEnd> {
+        let shortest = SHORTEST * self.longest.min(self.radius);
+        let most = STRIDE * self.longest;
         let mut here = self.trail.places[start];
         let mut bend = Vector3::zeros();
-        let mut length = STRIDE * self.longest;
+        let mut length = most;
+        // How far ahead a surface was seen not to go on.
+        let mut wall = f64::INFINITY;
         let mut grows = true;
         loop {
             // A step that would turn too far need not be tried.
             let bent: f64 = bend.norm();
             let straight = (0.8 * TURN * self.longest / bent).sqrt().min(0.8 * MOST_TURN / bent);
-            let ahead = length.min(straight).max(SHORTEST * self.longest.min(self.radius));
-            match self.advance(&here, way, bend, ahead) {
-                Ok(next) => {
-                    let chord = (next.point - here.point).norm();
-                    if let Some(passed) = self.trail.passed(&here, &next, SAME_TURN * chord) {
-                        return (passed != start).then(|| here.lost());
+            let ahead = length.min(straight).max(shortest);
+            let arc = here.tangent * way + bend * (0.5 * ahead);
+            let aim = here.point + arc * (ahead / arc.norm());
+            let known = self.trail.places.len();
+            let step = self.land(&here, aim, ahead).and_then(|next| self.join(&here, &next, way, BRIDGES));
+            if let [between @ .., last] = &self.trail.places[known..] {
+                let (last, before) = (*last, between.last().unwrap_or(&here));
+                bend = last.bend_since(before, way);
+                let left = wall - (last.point - here.point).norm();
+                wall = if left > 0.0 { left } else { f64::INFINITY };
+                here = last;
+                length = if grows { most.min(2.0 * length) } else { length }.min(0.5 * wall);
+                grows = true;
+            }
+            match step {
+                Ok(None) => {}
+                Ok(Some(passed)) => return (passed != start).then(|| here.lost()),
+                Err(refusal) => {
+                    if refusal.end == CurveEnd::Budget || ahead <= shortest {
+                        return Some(refusal.end);
                     }
-                    let turned = (next.tangent - here.tangent) * (way / chord);
-                    bend = turned - next.tangent * next.tangent.dot(&turned);
-                    self.trail.push(next);
-                    here = next;
-                    if grows {
-                        length = (STRIDE * self.longest).min(2.0 * length);
+                    if refusal.is_wall {
+                        wall = ahead;
                     }
-                    grows = true;
-                }
-                Err(CurveEnd::Budget) => return Some(CurveEnd::Budget),
-                Err(end) => {
                     length = 0.5 * ahead;
                     grows = false;
-                    if length < SHORTEST * self.longest.min(self.radius) {
-                        return Some(end);
-                    }
                 }
             }
         }
     }
 
-    /// The place on the curve a step of `length` ahead, or why there is none.
-    fn advance(
-        &mut self,
-        here: &Place,
-        way: f64,
-        bend: Vector3<f64>,
-        length: f64,
-    ) -> Result<Place, CurveEnd> {
-        let arc = here.tangent * way + bend * (0.5 * length);
-        let aim = here.point + arc * (length / arc.norm());
-        let mut point = aim;
-        let mut obstacle = here.lost();
-        for _ in 0..ROUNDS {
-            let at = self.evaluate(point.into()).ok_or(CurveEnd::Budget)?;
-            let is_on = at.iter().all(|at| at.f.abs() <= self.tolerance);
-            obstacle = here.obstacle(point, &at);
-            if is_on && at.iter().all(|at| at.status == Status::Ok) {
-                let next = Place::new(point, &at).turned_like(here);
-                if next.is_tangent() {
-                    return Err(CurveEnd::Tangent);
-                }
-                let chord = (point - here.point).norm();
-                let tilted = |side: usize| next.normals[side].dot(&here.normals[side]) < TILT_COSINE;
-                let strays = tilted(0) || tilted(1) || turns(here, &next, chord, self.longest);
-                return if strays || chord > self.longest { Err(obstacle) } else { Ok(next) };
+    /// Leaves on the trail `next`, on the same curve as `here`, and before it as many places between as it takes for no chord to turn
+    /// further than it may. Tells which place one of these chords passes, where they stop.
+    fn join(&mut self, here: &Place, next: &Place, way: f64, bridges: u32) -> Result<Option<usize>, Refusal> {
+        let chord = (next.point - here.point).norm();
+        if !turns(here, next, chord, self.longest) {
+            let passed = self.trail.passed(here, next, SAME_TURN * chord);
+            if passed.is_none() {
+                self.trail.push(*next);
             }
-            if is_on || at.iter().any(|at| at.status == Status::Outside) {
+            return Ok(passed);
+        }
+        if bridges == 0 {
+            return Err(here.astray());
+        }
+        let between = self.land(here, here.halfway(next, way), 0.5 * chord)?;
+        match self.join(here, &between, way, bridges - 1)? {
+            None => self.join(&between, next, way, bridges - 1),
+            passed => Ok(passed),
+        }
+    }
+
+    /// The place on the curve near `aim`, which is about `length` from `here`, or why there is none.
+    fn land(&mut self, here: &Place, aim: Vector3<f64>, length: f64) -> Result<Place, Refusal> {
+        let most = (MOST_CORRECTION * length).max(LEAST_CORRECTION * self.radius);
+        let mut point = aim;
+        for _ in 0..ROUNDS {
+            let at = self.evaluate(point.into()).ok_or(Refusal { end: CurveEnd::Budget, is_wall: false })?;
+            let place = Place::new(point, &at).turned_like(here);
+            if at.iter().any(|at| at.status != Status::Ok) {
+                let is_wall = place.residual <= LEAST_CORRECTION * self.radius;
+                return Err(Refusal { end: obstacle(point, &at), is_wall });
+            }
+            if (0..2).any(|side| place.normals[side].dot(&here.normals[side]) < TILT_COSINE) {
                 break;
             }
+            if place.residual <= self.tolerance {
+                if place.is_tangent() {
+                    return Err(Refusal { end: CurveEnd::Tangent, is_wall: false });
+                }
+                let is_near = (point - here.point).norm() <= self.longest;
+                return if is_near { Ok(place) } else { Err(here.astray()) };
+            }
             point += step_onto_both(&at, PARALLEL * PARALLEL);
-            let most = (MOST_CORRECTION * length).max(LEAST_CORRECTION * self.radius);
             if (point - aim).norm() > most {
                 break;
             }
         }
-        Err(obstacle)
+        Err(here.astray())
+    }
+}
+
+/// Why a step is not taken.
+#[derive(Debug, Clone, Copy)]
+struct Refusal {
+    /// Why the curve ends if it can come no nearer.
+    end: CurveEnd,
+    /// Whether a surface was seen from so near not to go on that another step that far will not be taken either.
+    is_wall: bool,
+}
+
+/// What is in the way at `x`, where one of the functions that are `at` says that its surface is not.
+fn obstacle(x: Vector3<f64>, at: &[Evaluation; 2]) -> CurveEnd {
+    let ends = at.each_ref().map(|at| {
+        let aside = (Vector3::from(at.centroid) - x).norm() / at.bandwidth;
+        at.status == Status::Outside || aside > BESIDE
+    });
+    match ends {
+        [true, _] => CurveEnd::BorderOfA,
+        [_, true] => CurveEnd::BorderOfB,
+        _ => CurveEnd::Lost,
     }
 }
 
