@@ -89,6 +89,11 @@ fn open(point: impl Fn(f64) -> [f64; 3]) -> TrueCurve {
     TrueCurve { closed: false, points }
 }
 
+/// `a` and a plane that is z = 0 in `pose`, as large as `a` or larger.
+fn with_plane(name: &'static str, a: Form, side: f64, pose: Pose, curves: Vec<TrueCurve>) -> Cut {
+    Cut { name, a, b: patch(side, side), pose_b: pose, curves }
+}
+
 /// Turns the plane z = 0 into the plane y = `offset`.
 fn upright(offset: f64) -> Pose {
     Pose::from_axis_angle([1.0, 0.0, 0.0], FRAC_PI_2).with_translation([0.0, offset, 0.0])
@@ -128,13 +133,9 @@ pub fn spheres(radius_a: f64, radius_b: f64, d: f64) -> Cut {
 #[must_use]
 pub fn sphere_and_plane(radius: f64, z: f64) -> Cut {
     let rho = (radius * radius - z * z).sqrt();
-    Cut {
-        name: "a sphere and a plane",
-        a: sphere(radius),
-        b: patch(2.4 * radius, 2.4 * radius),
-        pose_b: Pose::from_translation([0.0, 0.0, z]),
-        curves: vec![closed(|t| [rho * t.cos(), rho * t.sin(), z])],
-    }
+    let circle = closed(|t| [rho * t.cos(), rho * t.sin(), z]);
+    let pose = Pose::from_translation([0.0, 0.0, z]);
+    with_plane("a sphere and a plane", sphere(radius), 2.4 * radius, pose, vec![circle])
 }
 
 /// A torus and the plane z = `z` across its axis: two circles.
@@ -142,13 +143,9 @@ pub fn sphere_and_plane(radius: f64, z: f64) -> Cut {
 pub fn torus_and_level(major: f64, minor: f64, z: f64) -> Cut {
     let off = (minor * minor - z * z).sqrt();
     let side = 2.4 * (major + minor);
-    Cut {
-        name: "a torus and a plane across its axis",
-        a: torus(major, minor),
-        b: patch(side, side),
-        pose_b: Pose::from_translation([0.0, 0.0, z]),
-        curves: [major - off, major + off].map(|rho| closed(|t| [rho * t.cos(), rho * t.sin(), z])).into(),
-    }
+    let circles = [major - off, major + off].map(|rho| closed(|t| [rho * t.cos(), rho * t.sin(), z]));
+    let pose = Pose::from_translation([0.0, 0.0, z]);
+    with_plane("a torus and a plane across its axis", torus(major, minor), side, pose, circles.into())
 }
 
 /// A torus and the plane y = `y` along its axis, a section of Perseus: two loops, a figure of eight for `y` = `major` − `minor`, or one
@@ -171,13 +168,7 @@ pub fn torus_and_upright(major: f64, minor: f64, y: f64) -> Cut {
             at(widest * s, c.signum())
         })]
     };
-    Cut {
-        name: "a torus and a plane along its axis",
-        a: torus(major, minor),
-        b: patch(side, side),
-        pose_b: upright(y),
-        curves,
-    }
+    with_plane("a torus and a plane along its axis", torus(major, minor), side, upright(y), curves)
 }
 
 /// Two tori about one axis: two circles.
@@ -202,20 +193,75 @@ pub fn coaxial_tori() -> Cut {
     }
 }
 
+/// Two tori, the tube of b thinner than that of a: where it enters that of a and leaves it, a loop each.
+#[derive(Debug, Clone, Copy)]
+struct Crossing {
+    a: [f64; 2],
+    b: [f64; 2],
+    pose_b: Pose,
+}
+
+impl Crossing {
+    /// The loop on b where it passes the surface of a between `outside` and `inside`: angles along the tube of b, for each one about it, where
+    /// the loop goes `across` the tube; otherwise the other way round.
+    fn curve(&self, outside: f64, inside: f64, across: bool) -> TrueCurve {
+        let [major, minor] = self.b;
+        let [major_a, minor_a] = self.a;
+        closed(|t| {
+            let at = |u: f64| {
+                let [along, about] = if across { [u, t] } else { [t, u] };
+                let rho = major + minor * about.cos();
+                self.pose_b.apply([rho * along.cos(), rho * along.sin(), minor * about.sin()])
+            };
+            let height = |x: [f64; 3]| (x[0].hypot(x[1]) - major_a).hypot(x[2]) - minor_a;
+            let (mut out, mut within) = (outside, inside);
+            for _ in 0..60 {
+                let middle = 0.5 * (out + within);
+                *(if height(at(middle)) > 0.0 { &mut out } else { &mut within }) = middle;
+            }
+            at(0.5 * (out + within))
+        })
+    }
+}
+
+/// Pairs of tori whose tubes cross: upright to each other and at a slant, each through the tube of the other twice, in four loops;
+/// once, in two; and one that is a ring too narrow about the other's tube, in two.
+#[must_use]
+pub fn crossing_tori() -> Vec<Cut> {
+    let upright =
+        |centre: [f64; 3]| Pose::from_axis_angle([1.0, 0.0, 0.0], FRAC_PI_2).with_translation(centre);
+    let slanted = Pose::from_axis_angle([1.0, 0.0, 0.0], 0.9).with_translation([0.05, 0.0, 0.0]);
+    let half = 0.5 * TAU;
+    let twice = |far: f64| vec![[-far, 0.0], [far, 0.0], [half - far, half], [half + far, half]];
+    let once = vec![[half - 0.7, half], [half + 0.7, half]];
+    let cut = |name, [a, b]: [[f64; 2]; 2], pose_b: Pose, brackets: Vec<[f64; 2]>, across| {
+        let tori = Crossing { a, b, pose_b };
+        let curves = brackets.into_iter().map(|[out, within]| tori.curve(out, within, across)).collect();
+        Cut { name, a: torus(a[0], a[1]), b: torus(b[0], b[1]), pose_b, curves }
+    };
+    vec![
+        cut("two upright tori", [[1.0, 0.5], [1.0, 0.35]], upright([0.0; 3]), twice(0.9), true),
+        cut("two slanted tori", [[1.0, 0.5], [1.1, 0.3]], slanted, twice(1.4), true),
+        cut("two tori that cross once", [[1.0, 0.5], [1.5, 0.35]], upright([2.5, 0.0, 0.0]), once, true),
+        cut(
+            "a ring about a torus",
+            [[1.0, 0.5], [0.75, 0.35]],
+            upright([1.0, 0.0, 0.0]),
+            vec![[0.5 * half, half], [1.5 * half, half]],
+            false,
+        ),
+    ]
+}
+
 /// An open half sphere and the plane y = `y`: half a circle, which ends at the rim twice.
 #[must_use]
 pub fn bowl_and_plane(radius: f64, y: f64) -> Cut {
     let rho = (radius * radius - y * y).sqrt();
-    Cut {
-        name: "an open half sphere and a plane",
-        a: bowl(radius),
-        b: patch(2.4 * radius, 2.4 * radius),
-        pose_b: upright(y),
-        curves: vec![open(|share| {
-            let (s, c) = (0.5 * TAU * share).sin_cos();
-            [rho * c, y, -rho * s]
-        })],
-    }
+    let arc = open(|share| {
+        let (s, c) = (0.5 * TAU * share).sin_cos();
+        [rho * c, y, -rho * s]
+    });
+    with_plane("an open half sphere and a plane", bowl(radius), 2.4 * radius, upright(y), vec![arc])
 }
 
 /// A sphere and a strip of the plane z = 0, |y| ≤ `half`: two arcs, which end at the strip's borders.
@@ -245,6 +291,7 @@ mod tests {
     fn true_curves_lie_on_both_forms_and_bend_as_they_do() {
         let mut cuts = clean();
         cuts.push(torus_and_upright(1.0, 0.5, 0.5));
+        cuts.extend(crossing_tori());
         for cut in cuts {
             for curve in &cut.curves {
                 for &x in &curve.points {

@@ -1,0 +1,120 @@
+//! Curves of tori through each other, whole; and of surfaces that graze or nearly coincide, where what is asserted is that the search ends,
+//! makes nothing up and says where it could not go on.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+mod cut;
+
+use cut::{assert_whole, draw, fine, scans, to_segment};
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_query::{CurveEnd, CurveOptions, Curves, ScanView};
+use nearmiss_testdata::cuts;
+use nearmiss_testdata::shapes::{Form, Sampling, patch, sphere};
+
+#[test]
+fn tori_through_each_other_are_found_whole() {
+    let mut loops = Vec::new();
+    for cut in cuts::crossing_tori() {
+        let [a, b] = scans(&cut, [Sampling::clean(fine(&cut)); 2]);
+        let radii = [a.sampling_radius(), b.sampling_radius()];
+        assert!(cut.curvature() * radii[0].max(radii[1]) < 0.021, "{}: H r is small", cut.name);
+        let views = [ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &cut.pose_b)];
+        let found = draw(&views[0], &views[1], CurveOptions::default());
+        assert_whole(&found, &cut, &Pose::IDENTITY, radii, 0.05);
+        assert!(found.max_residual <= 1e-3 * radii[0].min(radii[1]), "{}: {}", cut.name, found.max_residual);
+        loops.push(found.closed());
+    }
+    assert_eq!(loops, [4, 4, 2, 2]);
+}
+
+fn prepared(form: &Form, spacing: f64, keep: impl Fn(&[f64; 3]) -> bool) -> PointHierarchy {
+    let points: Vec<_> =
+        form.clone().sample(Sampling::clean(spacing)).points.into_iter().filter(keep).collect();
+    PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
+}
+
+/// Whether every end is told to be where the surfaces touch.
+fn ends_touch(found: &Curves) -> bool {
+    found.curves.iter().all(|curve| curve.ends.is_none_or(|ends| ends == [CurveEnd::Tangent; 2]))
+}
+
+#[test]
+fn a_ball_that_grazes_leaves_a_loop_or_a_point_or_nothing() {
+    const SPACING: f64 = 0.02;
+    let ball = prepared(&sphere(1.0), SPACING, |x| x[2] > 0.7);
+    let above = prepared(&sphere(1.0), SPACING, |x| x[2] < -0.7);
+    let plane = prepared(&patch(1.4, 1.4), SPACING, |_| true);
+    let r = ball.sampling_radius();
+    // Zero sets of balls are h²H/2 within.
+    let radius = 1.0 - 0.5 * (0.99 * r).powi(2);
+    let view = ScanView::new(&ball, &Pose::IDENTITY);
+    for other in [&plane, &above] {
+        let is_plane = std::ptr::eq(other, &raw const plane);
+        // Where both surfaces meet on the axis and how far from it, one being so deep in the other.
+        let drawn = |depth: f64| {
+            let (pose, height) = if is_plane {
+                (radius - depth, radius - depth)
+            } else {
+                (2.0 * radius - depth, radius - 0.5 * depth)
+            };
+            let pose = Pose::from_translation([0.0, 0.0, pose]);
+            let found = draw(&view, &ScanView::new(other, &pose), CurveOptions::default());
+            assert!(found.max_residual <= 1e-3 * r, "{} r off", found.max_residual / r);
+            (found, [0.0, 0.0, height], (radius * radius - height * height).max(0.0).sqrt())
+        };
+        let (found, centre, rho) = drawn(0.8 * r);
+        assert_eq!((found.curves.len(), found.closed()), (1, 1), "a loop: {:?}", found.curves);
+        for &x in &found.points {
+            let off = (to_segment(x, centre, centre) - rho).abs() / r;
+            assert!(off < 0.2, "{off} r from the circle");
+        }
+        // Smaller than a step, or less than the tolerance deep: a loop or points, none far from where the surfaces touch.
+        for depth in [0.2, 0.1, 0.05, 0.02, 0.01, 2e-3, 0.0, -2e-3] {
+            let (found, centre, rho) = drawn(depth * r);
+            assert!(ends_touch(&found), "{depth} r deep: {:?}", found.curves);
+            assert!(found.curves.len() <= 3, "{depth} r deep: {:?}", found.curves);
+            for &x in &found.points {
+                let off = (to_segment(x, centre, centre) - rho).max(0.0) / r;
+                assert!(off < 1.0, "{depth} r deep: {off} r outside the circle");
+            }
+            assert!(depth > -1e-3 || found.points.len() <= 2, "{depth} r deep: {}", found.points.len());
+            assert!(found.statistics.evaluations < 2000, "{depth} r deep: {:?}", found.statistics);
+        }
+        let (none, ..) = drawn(-0.1 * r);
+        assert!(none.complete && none.curves.is_empty(), "apart: {:?}", none.curves);
+    }
+}
+
+#[test]
+fn sheets_that_are_nearly_parallel_cross_in_a_line_or_touch_in_points() {
+    const SPACING: f64 = 0.02;
+    let sheet = prepared(&patch(1.0, 1.0), SPACING, |_| true);
+    let r = sheet.sampling_radius();
+    let view = ScanView::new(&sheet, &Pose::IDENTITY);
+    let drawn = |angle: f64, height: f64| {
+        let pose = Pose::from_axis_angle([1.0, 0.0, 0.0], angle).with_translation([0.0, 0.0, height]);
+        draw(&view, &ScanView::new(&sheet, &pose), CurveOptions::default())
+    };
+    for angle in [0.3, 0.1, 0.05, 0.02] {
+        let found = drawn(angle, 0.0);
+        assert_eq!(found.curves.len(), 1, "{angle}: {:?}", found.curves);
+        let ends = found.curves[0].ends.unwrap();
+        let is_border = |end| matches!(end, CurveEnd::BorderOfA | CurveEnd::BorderOfB);
+        assert!(ends.into_iter().all(is_border), "{angle}: {ends:?}");
+        assert!((found.length() - 1.0).abs() < 1.5 * r, "{angle}: {} long", found.length());
+        let aside = found.points.iter().map(|x| x[1].abs()).fold(0.0, f64::max) / r;
+        assert!(aside < 0.15, "{angle}: {aside} r aside");
+    }
+    // At less than half a degree they touch: in points a step from each other, along the line.
+    for angle in [5e-3, 1e-3] {
+        let found = drawn(angle, 0.0);
+        assert!(!found.curves.is_empty(), "{angle}");
+        assert!(found.curves.iter().all(|curve| curve.count == 1) && ends_touch(&found), "{angle}");
+        for (i, &x) in found.points.iter().enumerate() {
+            assert!(x[1].abs() < 1e-3 * r / angle + r, "{angle}: {} r aside", x[1] / r);
+            assert!(found.points[..i].iter().all(|&y| to_segment(x, y, y) > 2.0 * r), "{angle}: apart");
+        }
+    }
+    let none = drawn(0.0, 0.1 * r);
+    assert!(none.complete && none.curves.is_empty(), "{:?}", none.curves);
+}
