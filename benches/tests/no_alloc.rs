@@ -5,8 +5,9 @@
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
     Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions,
-    CurvePlan, CurveScratch, Curves, Deadline, Detail, Evidence, GraphOptions, Interpolation, Method, Pose,
-    Scan, Semantics, Verdict, collide_all, collide_with, curves_with,
+    CurvePlan, CurveScratch, Curves, Deadline, Detail, DistanceOptions, DistancePlan, DistanceScratch,
+    Evidence, GraphOptions, Interpolation, Method, Pose, Scan, Semantics, Verdict, collide_all, collide_with,
+    curves_with, distance_with,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -109,6 +110,26 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     assert_eq!(draw_all(), first, "curves depend on the scratch");
     assert_eq!(ALLOCATOR.calls() - before, 0, "curves allocated");
     assert!(first > 1000, "{first} points of curves");
+
+    let mut of_distances = DistanceScratch::default();
+    let mut measure_all = || {
+        let mut sum = 0.0;
+        for semantics in [Semantics::Surface, Semantics::Thickened(0.5 * object.r)] {
+            let asked = DistanceOptions::default().with_semantics(semantics);
+            let plan = DistancePlan::new(&asked, &scan, &scan).unwrap();
+            for (pose, work) in poses.iter().zip([u64::MAX, 400].into_iter().cycle()) {
+                let budget = Budget::UNLIMITED.with_work(work);
+                let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
+                sum += distance_with(&a, &b, &plan, &budget, &mut of_distances).upper;
+            }
+        }
+        sum
+    };
+    let first = measure_all();
+    let before = ALLOCATOR.calls();
+    assert_eq!(measure_all().to_bits(), first.to_bits(), "distances depend on the scratch");
+    assert_eq!(ALLOCATOR.calls() - before, 0, "distances allocated");
+    assert!(first > 100.0 * object.r, "some are apart: {first}");
 
     let rng = &mut rng(5);
     let places: Vec<[f64; 3]> = (0..POSES)

@@ -29,6 +29,19 @@ impl PointScan {
         let tree = ImmutableKdTree::new_from_slice(&points).map_err(|e| format!("{e:?}"))?;
         Ok(Self { tree, points, bounds: cloud.bounds(), reach })
     }
+
+    /// The distance of the nearest points of the copy at `pose` and the resting one: the nearest
+    /// of each point.
+    #[must_use]
+    pub fn least_distance(&self, pose: &Pose) -> f32 {
+        let mut least_sq = f32::INFINITY;
+        for p in &self.points {
+            let p = single(pose.apply(p.map(f64::from)));
+            let nearest = self.tree.query(&p).nearest_one::<SquaredEuclidean<f32>>().execute();
+            least_sq = least_sq.min(nearest.distance);
+        }
+        least_sq.sqrt()
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "the tree is single precision")]

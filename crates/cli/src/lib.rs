@@ -5,6 +5,7 @@ mod collide;
 mod console;
 mod curve;
 mod density;
+mod distance;
 mod error;
 mod eval;
 mod export;
@@ -44,6 +45,7 @@ pub use collide::{CollideArgs, DetailName, EvidenceName};
 pub use curve::CurveArgs;
 pub use curve_picture::curve_picture;
 pub use density::DensityArgs;
+pub use distance::DistanceArgs;
 pub use error::CliError;
 pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
@@ -104,6 +106,11 @@ pub enum Command {
     /// All curves in which two scans cut each other
     #[command(after_long_help = "Example:\n  nearmiss curve a.nm b.nm --image curves.png -o curves.ply")]
     Curve(CurveArgs),
+    /// How far two scans are apart: a proven bound from below, and two points that show one from above
+    #[command(
+        after_long_help = "Example:\n  nearmiss distance a.nm b.nm --pose-b \"1 0 0 2  0 1 0 0  0 0 1 0  0 0 0 1\""
+    )]
+    Distance(DistanceArgs),
     /// How many points to draw for an error rate, with `collide --method interpolation --flat`: measured, and derived
     #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
     Density(DensityArgs),
@@ -128,6 +135,7 @@ impl Command {
             Self::Collide(args) => collide::run(args),
             Self::Curve(args) => curve::run(args),
             Self::Density(args) => density::run(args),
+            Self::Distance(args) => distance::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),
         };

@@ -120,6 +120,6 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], thickened: bool) -> String {
 }
 
 /// A scan's sampling radius in the world.
-fn world_radius(view: &ScanView<'_>) -> f64 {
+pub(crate) fn world_radius(view: &ScanView<'_>) -> f64 {
     view.scan().sampling_radius() * view.placed().scale() / view.scan().frame().scale
 }

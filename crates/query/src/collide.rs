@@ -423,7 +423,11 @@ const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 
 /// The motion of b's stored frame into a's, in double and in single precision. An error is the distance of balls about the two scans if that is more
 /// than any contact reaches, or `None` for poses that are none.
-fn relative(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CollidePlan) -> Result<(Pose, Relative), Option<f64>> {
+pub(crate) fn relative(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+) -> Result<(Pose, Relative), Option<f64>> {
     let ratio = b.placed().scale() / a.placed().scale();
     let finite = |m: [f64; 16]| m.iter().all(|x| x.is_finite());
     let proper = [a, b].iter().all(|view| finite(view.placed().to_row_major()) && is_rotation(view.placed()));

@@ -8,6 +8,7 @@ mod collide;
 mod compare;
 mod crossing;
 mod curve;
+mod distance;
 mod hint;
 mod interpolation;
 mod leaf_pair;
@@ -35,6 +36,7 @@ pub use collide::{
 };
 pub use crossing::{Disc, crossing};
 pub use curve::{Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, curves, curves_with};
+pub use distance::{Distance, DistanceOptions, DistancePlan, DistanceScratch, distance, distance_with};
 pub use hint::PairHint;
 pub use interpolation::{Brackets, Interpolation, Refinement, Surfels, occupancy, points_for};
 pub use options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};

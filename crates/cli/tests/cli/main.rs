@@ -4,6 +4,7 @@
 mod bad_input;
 mod collide;
 mod curves;
+mod distances;
 mod faults;
 mod interpolating;
 mod looking_inside;

@@ -1,0 +1,158 @@
+//! How far two copies of an object are apart, over the poses of the sweep: what that costs, and what it tells. Beside it the rival: the
+//! nearest point of one copy for each point of the other, by kiddo.
+//!
+//! `distances OBJECT… [--per-distance N] [--passes N] [--rival-poses N] [--from I] [--seed N] [--threads N]`
+//!
+//! Times are the least of three askings of a pose, not one after the other.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::hint::black_box;
+
+use nearmiss::{
+    Budget, BuildOptions, Distance, DistanceOptions, DistancePlan, DistanceScratch, Evidence, Pose, Scan,
+    Semantics, distance_with,
+};
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::clock::{nanoseconds, timed};
+use nearmiss_benches::object::Object;
+use nearmiss_benches::rivals::kiddo::PointScan;
+use nearmiss_benches::sample::{Sample, count};
+use nearmiss_benches::{Failure, machine, poses};
+
+/// Times a pose is asked.
+const ASKINGS: usize = 3;
+
+struct Options {
+    per_distance: usize,
+    passes: u64,
+    rival_poses: usize,
+    from: usize,
+    seed: u64,
+    threads: usize,
+}
+
+fn main() -> Result<(), Failure> {
+    let mut arguments = Arguments::of_process();
+    let options = Options {
+        per_distance: arguments.value("--per-distance")?.unwrap_or(200),
+        passes: arguments.value("--passes")?.unwrap_or(1),
+        rival_poses: arguments.value("--rival-poses")?.unwrap_or(2),
+        from: arguments.value("--from")?.unwrap_or(0),
+        seed: arguments.value("--seed")?.unwrap_or(1),
+        threads: arguments.value("--threads")?.unwrap_or(0),
+    };
+    let objects = arguments.words()?;
+    if objects.is_empty() {
+        return Err("usage: distances OBJECT… [--per-distance N] [--passes N] [--rival-poses N]".into());
+    }
+    println!("{}", machine::description());
+    objects.iter().try_for_each(|source| measure(source, &options))
+}
+
+fn measure(source: &str, options: &Options) -> Result<(), Failure> {
+    let object = Object::read(source)?.scaled()?;
+    let scan = Scan::build(&object.cloud, &BuildOptions::default().with_threads(options.threads))?;
+    println!("## {}: {} points, r {:.5}\n", object.name, object.cloud.len(), object.r);
+    for (name, semantics) in [("surfaces", Semantics::Surface), ("points", Semantics::Thickened(0.0))] {
+        let plan = DistancePlan::new(&DistanceOptions::default().with_semantics(semantics), &scan, &scan)?;
+        let mut scratch = DistanceScratch::default();
+        let ask = |pose: &Pose| {
+            let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
+            distance_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch)
+        };
+        println!("### {name}\n");
+        tell(&columns(options, options.per_distance, ask), options.from, object.r);
+    }
+    let rival = PointScan::new(&object.cloud, f64::INFINITY)?;
+    println!("### kiddo, the nearest of each point\n");
+    println!("| d | mean µs |\n| --: | --: |");
+    let mut sum = 0.0;
+    for (i, poses) in poses::sweep(options.rival_poses, options.seed, 0).iter().enumerate().skip(options.from)
+    {
+        let mut times = Sample::default();
+        for pose in poses {
+            times.push(nanoseconds(timed(|| black_box(rival.least_distance(black_box(pose)))).1));
+        }
+        sum += times.summary().mean / count(poses::DISTANCES - options.from);
+        println!("| {} | {:.1} |", poses::distance(i), times.summary().mean / 1e3);
+    }
+    println!("\nmean of all distances {:.1} µs\n", sum / 1e3);
+    Ok(())
+}
+
+/// The poses of each distance, asked in turn.
+fn columns(options: &Options, per_distance: usize, mut ask: impl FnMut(&Pose) -> Distance) -> Vec<Column> {
+    let mut columns: Vec<Column> = Vec::new();
+    columns.resize_with(poses::DISTANCES, Column::default);
+    for pass in 0..options.passes {
+        let poses = poses::sweep(per_distance, options.seed, pass);
+        for (column, poses) in columns.iter_mut().zip(&poses).skip(options.from) {
+            let mut least = vec![f64::INFINITY; poses.len()];
+            for asking in 0..ASKINGS {
+                for (pose, least) in poses.iter().zip(&mut least) {
+                    let (found, time) = timed(|| black_box(ask(black_box(pose))));
+                    *least = least.min(nanoseconds(time));
+                    if asking == 0 {
+                        column.add(&found);
+                    }
+                }
+            }
+            least.into_iter().for_each(|time| column.times.push(time));
+        }
+    }
+    columns
+}
+
+fn tell(columns: &[Column], from: usize, r: f64) {
+    println!(
+        "| d | mean µs | median | p99 | upper, r | upper − lower, r | touching | certified | node pairs | leaf pairs | evaluations |"
+    );
+    println!("|{}", " --: |".repeat(11));
+    let mut sum = 0.0;
+    for (i, column) in columns.iter().enumerate().skip(from) {
+        let all = column.times.summary();
+        sum += all.mean / count(columns.len() - from);
+        let n = count(column.times.len());
+        println!(
+            "| {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.3} | {:.3} | {:.1} | {:.1} | {:.1} |",
+            poses::distance(i),
+            all.mean / 1e3,
+            all.median / 1e3,
+            all.p99 / 1e3,
+            column.upper / n / r,
+            column.width / n / r,
+            column.touching / n,
+            column.certified / n,
+            column.node_pairs / n,
+            column.leaf_pairs / n,
+            column.evaluations / n,
+        );
+    }
+    println!("\nmean of all distances {:.2} µs\n", sum / 1e3);
+}
+
+/// Sums over the poses of a distance.
+#[derive(Default)]
+struct Column {
+    times: Sample,
+    upper: f64,
+    width: f64,
+    touching: f64,
+    certified: f64,
+    node_pairs: f64,
+    leaf_pairs: f64,
+    evaluations: f64,
+}
+
+impl Column {
+    #[expect(clippy::cast_precision_loss, reason = "means of counts")]
+    fn add(&mut self, found: &Distance) {
+        self.upper += found.upper;
+        self.width += found.upper - found.lower;
+        self.touching += f64::from(u8::from(found.upper <= 0.0));
+        self.certified += f64::from(u8::from(found.evidence == Evidence::Certified));
+        self.node_pairs += found.statistics.node_pairs as f64;
+        self.leaf_pairs += found.statistics.leaf_pairs as f64;
+        self.evaluations += found.statistics.evaluations as f64;
+    }
+}

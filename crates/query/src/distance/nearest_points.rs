@@ -1,0 +1,132 @@
+//! The two nearest points of two leaves: sixteen of b side by side, in single precision, for each of a that may be near; those that
+//! come out nearest are measured in double precision, in the world, as brute force would.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{Node, NodePair};
+use nearmiss_surface::PointBlock;
+
+use crate::posed::Posed;
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// Two points, and how far apart they are in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PointPair {
+    pub(crate) distance: f64,
+    /// Stored points of a and b.
+    pub(crate) points: [usize; 2],
+}
+
+impl PointPair {
+    pub(crate) fn new(pair: &Posed<'_>, points: [usize; 2]) -> Self {
+        let [p, q] = [0, 1].map(|k| Vector3::from(pair.views[k].point(points[k])));
+        Self { distance: (p - q).norm(), points }
+    }
+}
+
+/// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that is found.
+pub(crate) fn nearest(level: Level, pair: &Posed<'_>, leaves: NodePair, best: PointPair) -> PointPair {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || nearest_by(simd, pair, leaves, best),
+    ))
+}
+
+#[inline(always)]
+fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: PointPair) -> PointPair {
+    let (a, b) = (&pair.a.nodes[leaves.a.index()], &pair.b.nodes[leaves.b.index()]);
+    let bounds = &pair.b.boxes[leaves.b.index()];
+    let zero = f32x16::simd_from(simd, 0.0);
+    let mut reach_sq = reach_of(pair, best.distance);
+    for block_a in blocks(a) {
+        let centres = pair.relative.points_back(simd, &pair.a.blocks[block_a].position);
+        let places = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
+        // How far each is from the box of b.
+        let d = [centres[0] - bounds.centre[0], centres[1] - bounds.centre[1], centres[2] - bounds.centre[2]];
+        let mut off_sq = zero;
+        for k in 0..3 {
+            let [x, y, z] = bounds.axes[k];
+            let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(zero);
+            off_sq += beyond * beyond;
+        }
+        let mut left = lanes(a, block_a);
+        loop {
+            let near: mask32x16<S> = off_sq.simd_le(reach_sq);
+            left &= bits(near);
+            if left == 0 {
+                break;
+            }
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            for block_b in blocks(b) {
+                let [x, y, z] = &pair.b.blocks[block_b].position;
+                let d = [
+                    f32x16::load_array_ref(simd, x) - places[0][lane],
+                    f32x16::load_array_ref(simd, y) - places[1][lane],
+                    f32x16::load_array_ref(simd, z) - places[2][lane],
+                ];
+                let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let mut left_b = lanes(b, block_b);
+                loop {
+                    let near: mask32x16<S> = d_sq.simd_le(reach_sq);
+                    left_b &= bits(near);
+                    if left_b == 0 {
+                        break;
+                    }
+                    let other = least(&d_sq.to_array(), left_b);
+                    left_b &= !(1 << other);
+                    let points = [block_a * WIDTH + lane, block_b * WIDTH + other];
+                    let own = PointPair::new(pair, points);
+                    if own.distance < best.distance {
+                        best = own;
+                        reach_sq = reach_of(pair, best.distance);
+                    }
+                }
+            }
+        }
+    }
+    best
+}
+
+/// The square of how far apart, in b's stored frame, points may come out that are no further apart than `distance`.
+#[inline(always)]
+fn reach_of(pair: &Posed<'_>, distance: f64) -> f32 {
+    let stored = pair.stored(distance) + 3.0 * pair.relative.slack();
+    let reach = stored * pair.relative.scale_back() * (1.0 + 2e-6);
+    reach * reach
+}
+
+/// The lane of the least of those in `lanes`, of which there are some; the first of equals.
+#[inline(always)]
+fn least(values: &[f32; WIDTH], lanes: u32) -> usize {
+    let mut least = lanes.trailing_zeros() as usize;
+    for (lane, value) in values.iter().enumerate() {
+        if lanes >> lane & 1 != 0 && *value < values[least] {
+            least = lane;
+        }
+    }
+    least
+}
+
+/// The blocks in which a leaf's points lie.
+#[inline(always)]
+fn blocks(leaf: &Node) -> std::ops::RangeInclusive<usize> {
+    let points = leaf.points();
+    points.start / WIDTH..=(points.end - 1) / WIDTH
+}
+
+/// The lanes of a block that are the leaf's, as bits.
+#[inline(always)]
+fn lanes(leaf: &Node, block: usize) -> u32 {
+    let (points, first) = (leaf.points(), block * WIDTH);
+    let below = |i: usize| (1_u32 << i.saturating_sub(first).min(WIDTH)) - 1;
+    below(points.end) & !below(points.start)
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
+    mask.to_bitmask() as u32
+}
