@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
+use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{
     Frontier, Heap, NodePair, Relative, SLACK, Stack, Visitor, WideStack, descend, descend_wide,
@@ -429,8 +429,9 @@ pub(crate) fn relative(
     plan: &CollidePlan,
 ) -> Result<(Pose, Relative), Option<f64>> {
     let ratio = b.placed().scale() / a.placed().scale();
-    let finite = |m: [f64; 16]| m.iter().all(|x| x.is_finite());
-    let proper = [a, b].iter().all(|view| finite(view.placed().to_row_major()) && is_rotation(view.placed()));
+    // A rotation has no entry that is none.
+    let finite = |t: [f64; 3]| t.iter().all(|x| x.is_finite());
+    let proper = [a, b].iter().all(|view| finite(view.placed().translation()) && is_rotation(view.placed()));
     let positive = a.placed().scale() > 0.0 && b.placed().scale() > 0.0;
     if !(proper && positive && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
         return Err(None);
@@ -472,6 +473,14 @@ const DOUBLE_ROUNDING: f64 = 2e-15;
 /// Whether the rotation is one, to more than rounding: products of many poses may not be.
 fn is_rotation(pose: &Pose) -> bool {
     let rotation = pose.rotation();
-    let error = rotation.transpose() * rotation - Matrix3::identity();
-    error.iter().all(|x| x.abs() <= 1e-9) && rotation.determinant() > 0.0
+    let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];
+    let errors = [
+        u.norm_squared() - 1.0,
+        v.norm_squared() - 1.0,
+        w.norm_squared() - 1.0,
+        u.dot(&v),
+        v.dot(&w),
+        w.dot(&u),
+    ];
+    errors.iter().all(|x| x.abs() <= 1e-9) && u.cross(&v).dot(&w) > 0.0
 }
