@@ -62,6 +62,15 @@ impl Arguments {
             None => Ok(self.rest),
         }
     }
+
+    /// That nothing is left. Ask for options first.
+    ///
+    /// # Errors
+    /// When something is.
+    pub fn nothing_left(self) -> Result<(), Failure> {
+        let words = self.words()?;
+        if words.is_empty() { Ok(()) } else { Err(format!("what is {words:?}?").into()) }
+    }
 }
 
 #[cfg(test)]

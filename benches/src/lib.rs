@@ -4,6 +4,7 @@ pub mod arguments;
 pub mod asked;
 pub mod clock;
 pub mod counting;
+pub mod figures;
 pub mod hulls;
 pub mod klein2004;
 pub mod machine;

@@ -7,7 +7,6 @@
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 use std::fmt::Write;
-use std::path::PathBuf;
 use std::time::Duration;
 
 use nearmiss::{
@@ -15,11 +14,12 @@ use nearmiss::{
     Sampling, Scan, collide_paced, collide_with,
 };
 use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::figures::FigureOptions;
 use nearmiss_benches::klein2004::course::{Course, Questions};
 use nearmiss_benches::klein2004::hierarchy::{Makeup, build_seconds};
 use nearmiss_benches::klein2004::{artificial, objects, sizes, subset};
 use nearmiss_benches::object::{Object, bumpy_sphere};
-use nearmiss_benches::plot::{Axis, Line, Panel, figure};
+use nearmiss_benches::plot::{Axis, Line, Panel};
 use nearmiss_benches::poses::{DISTANCES, distance, sweep};
 use nearmiss_benches::rivals::Method as Rival;
 use nearmiss_benches::rivals::ours::Ours;
@@ -42,61 +42,35 @@ const SHARES: [usize; 4] = [8, 4, 2, 1];
 
 /// What was asked for.
 struct Options {
-    out: PathBuf,
-    data: Option<PathBuf>,
-    poses: usize,
-    seed: u64,
+    figures: FigureOptions,
     target: Duration,
-    /// One figure, or Table 1, of all.
-    only: Option<u32>,
-    quick: bool,
 }
 
 impl Options {
     fn read() -> Result<Self, Failure> {
         let mut arguments = Arguments::of_process();
-        let quick = arguments.flag("--quick");
-        let named: Option<PathBuf> = arguments.value("--data")?;
-        let options = Self {
-            out: arguments
-                .value("-o")?
-                .ok_or("usage: klein2004 -o FOLDER [--data FOLDER] [--poses N] [--only NUMBER]")?,
-            data: named.or_else(|| std::env::var_os("NEARMISS_DATA").map(PathBuf::from)),
-            poses: arguments.value("--poses")?.unwrap_or(if quick { 40 } else { 1000 }),
-            seed: arguments.value("--seed")?.unwrap_or(1),
-            target: Duration::from_micros(arguments.value("--target")?.unwrap_or(200)),
-            only: arguments.value("--only")?,
-            quick,
-        };
-        let words = arguments.words()?;
-        if words.is_empty() { Ok(options) } else { Err(format!("what is {words:?}?").into()) }
-    }
-
-    fn wants(&self, figure: u32) -> bool {
-        self.only.is_none_or(|only| only == figure)
+        let figures = FigureOptions::take(&mut arguments, "klein2004", [40, 1000])?;
+        let target = Duration::from_micros(arguments.value("--target")?.unwrap_or(200));
+        arguments.nothing_left()?;
+        Ok(Self { figures, target })
     }
 
     fn grid(&self) -> u32 {
-        if self.quick { GRID / 10 } else { GRID }
-    }
-
-    fn save(&self, name: &str, panels: &[Panel]) -> Result<(), Failure> {
-        Ok(std::fs::write(self.out.join(name), figure(panels)?)?)
+        if self.figures.quick { GRID / 10 } else { GRID }
     }
 }
 
 fn main() -> Result<(), Failure> {
     let options = Options::read()?;
-    std::fs::create_dir_all(&options.out)?;
-    let data = options.data.as_deref();
+    let data = options.figures.data.as_deref();
     let (all, sizes) = (objects(data)?, sizes(data)?);
     let artificial = artificial(options.grid())?;
     let mut text =
         format!("# Klein & Zachmann 2004, Table 1 and Figs 8 to 12\n\n{}\n", machine::description());
-    if options.wants(1) {
+    if options.figures.wants(&[1]) {
         table_1(&mut text, all.iter().chain(&artificial))?;
     }
-    if options.wants(8) {
+    if options.figures.wants(&[8]) {
         figure_8(&mut text, &options, all.iter().chain(&artificial))?;
     }
     let groups = [
@@ -104,15 +78,15 @@ fn main() -> Result<(), Failure> {
         (10, "sizes of one object", &sizes[..]),
         (11, "artificial models", &artificial[..]),
     ];
-    for (number, what, objects) in groups.into_iter().filter(|group| options.wants(group.0)) {
+    for (number, what, objects) in groups.into_iter().filter(|group| options.figures.wants(&[group.0])) {
         let courses = objects.iter().map(|object| measure(object, &options));
         courses_of(&mut text, &options, (number, what), &courses.collect::<Result<Vec<_>, _>>()?)?;
     }
     let last = all.iter().rfind(|object| object.mesh.is_some());
-    if let Some(object) = last.filter(|_| options.wants(12)) {
+    if let Some(object) = last.filter(|_| options.figures.wants(&[12])) {
         figure_12(&mut text, &options, object)?;
     }
-    let path = options.out.join("klein2004.md");
+    let path = options.figures.out.join("klein2004.md");
     std::fs::write(&path, text)?;
     println!("{}", path.display());
     Ok(())
@@ -156,13 +130,16 @@ fn figure_8<'a>(
         eprintln!("Fig. 8: {}", object.name);
         let mut points = Vec::new();
         for share in SHARES {
-            let cloud = subset(object, object.cloud.len() / share, options.seed)?;
+            let cloud = subset(object, object.cloud.len() / share, options.figures.seed)?;
             points.push([count(cloud.len()), 1e3 * build_seconds(&cloud)?]);
         }
         lines.push(Line { name: object.name.clone(), points, colour, dashed: false });
     }
-    let large: &[u32] =
-        if options.quick { &[10_000, 40_000] } else { &[10_000, 31_623, 100_000, 316_228, 1_000_000] };
+    let large: &[u32] = if options.figures.quick {
+        &[10_000, 40_000]
+    } else {
+        &[10_000, 31_623, 100_000, 316_228, 1_000_000]
+    };
     let mut one = Vec::new();
     for &n in large {
         eprintln!("Fig. 8: {n} points");
@@ -195,7 +172,7 @@ fn figure_8<'a>(
             lines: vec![line("bumpy sphere", one, 0, false), line("n log n", expected, 6, true)],
         },
     ];
-    options.save("figure-8.svg", &panels)
+    options.figures.save("figure-8.svg", &panels)
 }
 
 /// An object under all ways to ask.
@@ -212,7 +189,7 @@ struct Measured {
 fn measure(object: &Object, options: &Options) -> Result<Measured, Failure> {
     eprintln!("{}: {} points", object.name, object.cloud.len());
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
-    let fresh = sweep(options.poses, options.seed, 0);
+    let fresh = sweep(options.figures.poses, options.figures.seed, 0);
     let repeated = fresh.each_ref().map(|poses| poses[..poses.len().min(REPEATED)].to_vec());
     let mut mesh = object.mesh.as_ref().map(MeshTree::new);
     let questions = Questions::new(fresh, &scan, mesh.as_mut().map(|mesh| mesh as &mut dyn Rival));
@@ -316,7 +293,7 @@ fn courses_of(
             lines: pair(&Course::percents, true),
         },
     ];
-    options.save(&file, &panels)
+    options.figures.save(&file, &panels)
 }
 
 /// A column for each line, a row for each distance.
@@ -344,7 +321,7 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
     eprintln!("Fig. 12: {}", object.name);
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let mut mesh = object.mesh.as_ref().map(MeshTree::new);
-    let poses = sweep(options.poses, options.seed, 1);
+    let poses = sweep(options.figures.poses, options.figures.seed, 1);
     let questions = Questions::new(poses, &scan, mesh.as_mut().map(|mesh| mesh as &mut dyn Rival));
     let plan = CollidePlan::new(&as_in_the_paper(), &scan, &scan)?;
     let (mut pacer, mut scratch) = (Pacer::new(options.target), CollideScratch::default());
@@ -399,5 +376,5 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
             lines: lines(&Course::percents),
         },
     ];
-    options.save("figure-12.svg", &panels)
+    options.figures.save("figure-12.svg", &panels)
 }

@@ -8,7 +8,6 @@
 
 use std::fmt::Write;
 use std::hint::black_box;
-use std::path::PathBuf;
 
 use nearmiss::query::{Contacts, collide_all};
 use nearmiss::{
@@ -17,9 +16,10 @@ use nearmiss::{
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
+use nearmiss_benches::figures::FigureOptions;
 use nearmiss_benches::klein2004::objects;
 use nearmiss_benches::object::{Object, bumpy_sphere};
-use nearmiss_benches::plot::{Axis, Line, Panel, figure};
+use nearmiss_benches::plot::{Axis, Line, Panel};
 use nearmiss_benches::poses::{DISTANCES, distance, sweep};
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
@@ -38,64 +38,44 @@ const WITHIN: usize = 7;
 
 /// What was asked for.
 struct Options {
-    out: PathBuf,
-    data: Option<PathBuf>,
-    poses: usize,
-    seed: u64,
+    figures: FigureOptions,
+    /// The largest cloud of Fig. 9.
     points: u32,
-    only: Option<u32>,
 }
 
 impl Options {
     fn read() -> Result<Self, Failure> {
         let mut arguments = Arguments::of_process();
-        let quick = arguments.flag("--quick");
-        let named: Option<PathBuf> = arguments.value("--data")?;
-        let options = Self {
-            out: arguments
-                .value("-o")?
-                .ok_or("usage: klein2005 -o FOLDER [--data FOLDER] [--poses N] [--only NUMBER]")?,
-            data: named.or_else(|| std::env::var_os("NEARMISS_DATA").map(PathBuf::from)),
-            poses: arguments.value("--poses")?.unwrap_or(if quick { 10 } else { 100 }),
-            seed: arguments.value("--seed")?.unwrap_or(1),
-            points: arguments.value("--points")?.unwrap_or(if quick { 30_000 } else { 3_000_000 }),
-            only: arguments.value("--only")?,
-        };
-        let words = arguments.words()?;
-        if words.is_empty() { Ok(options) } else { Err(format!("what is {words:?}?").into()) }
-    }
-
-    fn wants(&self, figures: &[u32]) -> bool {
-        self.only.is_none_or(|only| figures.contains(&only))
-    }
-
-    fn save(&self, name: &str, panels: &[Panel]) -> Result<(), Failure> {
-        Ok(std::fs::write(self.out.join(name), figure(panels)?)?)
+        let figures = FigureOptions::take(&mut arguments, "klein2005", [10, 100])?;
+        let points = arguments.value("--points")?;
+        let points = points.unwrap_or(if figures.quick { 30_000 } else { 3_000_000 });
+        arguments.nothing_left()?;
+        Ok(Self { figures, points })
     }
 }
 
 fn main() -> Result<(), Failure> {
     let options = Options::read()?;
-    std::fs::create_dir_all(&options.out)?;
+
     let mut text = format!("# Klein & Zachmann 2005, Figs 7 and 9 to 11\n\n{}\n", machine::description());
-    if options.wants(&[7, 10, 11]) {
+    if options.figures.wants(&[7, 10, 11]) {
         let mut asked = Vec::new();
-        for object in objects(options.data.as_deref())? {
+        for object in objects(options.figures.data.as_deref())? {
             eprintln!("{}: {} points", object.name, object.cloud.len());
             let scan = prepared(&object)?;
             asked.push((object.name.clone(), scan));
         }
-        if options.wants(&[7]) {
+        if options.figures.wants(&[7]) {
             figure_7(&mut text, &options, &asked)?;
         }
-        if options.wants(&[10, 11]) {
+        if options.figures.wants(&[10, 11]) {
             figures_10_and_11(&mut text, &options, &asked)?;
         }
     }
-    if options.wants(&[9]) {
+    if options.figures.wants(&[9]) {
         figure_9(&mut text, &options)?;
     }
-    let path = options.out.join("klein2005.md");
+    let path = options.figures.out.join("klein2005.md");
     std::fs::write(&path, text)?;
     println!("{}", path.display());
     Ok(())
@@ -220,7 +200,7 @@ fn figure_7(text: &mut String, options: &Options, asked: &[(String, Scan)]) -> R
     writeln!(text, "\n|---|{}", "--:|".repeat(SURFELS.len()))?;
     let mut lines = Vec::new();
     for (colour, (name, scan)) in asked.iter().enumerate() {
-        let poses = sweep(options.poses, options.seed, 0);
+        let poses = sweep(options.figures.poses, options.figures.seed, 0);
         let truth = truths(scan, &poses)?;
         for approaches in [false, true] {
             let what = if approaches { "with approaches" } else { "brackets" };
@@ -246,7 +226,7 @@ fn figure_7(text: &mut String, options: &Options, asked: &[(String, Scan)]) -> R
         axes: [Axis::logarithmic("drawn points n"), Axis::even("% of all tests")],
         lines,
     };
-    options.save("figure-7.svg", &[panel])
+    options.figures.save("figure-7.svg", &[panel])
 }
 
 /// Times and evaluations over distance, against test points.
@@ -271,7 +251,7 @@ fn figures_10_and_11(text: &mut String, options: &Options, asked: &[(String, Sca
     text.push_str("|---|---|--:|--:|--:|--:|--:|--:|\n");
     let mut panels: [Vec<Line>; 2] = Default::default();
     for (colour, (name, scan)) in asked.iter().enumerate() {
-        let poses = sweep(options.poses, options.seed, 0);
+        let poses = sweep(options.figures.poses, options.figures.seed, 0);
         let truth = truths(scan, &poses)?;
         for (way, (what, method, part)) in ways.into_iter().enumerate() {
             eprintln!("{name}: {what}");
@@ -313,7 +293,7 @@ fn figures_10_and_11(text: &mut String, options: &Options, asked: &[(String, Sca
             lines: evaluations,
         },
     ];
-    options.save("figure-10-11.svg", &panels)
+    options.figures.save("figure-10-11.svg", &panels)
 }
 
 /// All intersections over the density of one shape.
@@ -337,7 +317,7 @@ fn figure_9(text: &mut String, options: &Options) -> Result<(), Failure> {
         let plan = CollidePlan::new(&verdict(Method::Interpolation(interpolation(29, false))), &scan, &scan)?;
         let (mut scratch, mut contacts) = (CollideScratch::default(), Contacts::default());
         let a = scan.at(&Pose::IDENTITY);
-        let poses = sweep(options.poses, options.seed, 0);
+        let poses = sweep(options.figures.poses, options.figures.seed, 0);
         let (mut tally, mut found) = (Tally::default(), 0);
         for pose in poses[..WITHIN].iter().flatten() {
             let b = scan.at(pose);
@@ -382,5 +362,5 @@ fn figure_9(text: &mut String, options: &Options) -> Result<(), Failure> {
             lines: vec![line("measured", evaluations, false)],
         },
     ];
-    options.save("figure-9.svg", &panels)
+    options.figures.save("figure-9.svg", &panels)
 }

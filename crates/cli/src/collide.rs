@@ -16,7 +16,7 @@ use nearmiss::{
 use crate::console::{self, Console, Results, now};
 use crate::error::CliError;
 use crate::eval::KernelName;
-use crate::posing::{self, PoseFile};
+use crate::posing::{self, PairArgs, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::search::SearchArgs;
@@ -26,16 +26,9 @@ use crate::{input, output, picture, proof};
 /// Options of `collide`.
 #[derive(Debug, Clone, Args)]
 pub struct CollideArgs {
-    /// The one scan: prepared, or a raw input, prepared on the fly
-    pub a: PathBuf,
-    /// The other scan
-    pub b: PathBuf,
-    /// Pose of a, object to world: 16 numbers, row-major, in one argument, or a file that holds them
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub pose_a: Option<String>,
-    /// Pose of b
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub pose_b: Option<String>,
+    /// What is asked about
+    #[command(flatten)]
+    pub pair: PairArgs,
     /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b", "image"])]
     pub poses: Option<PathBuf>,
@@ -223,15 +216,13 @@ struct Outputs<'a, 'f> {
 pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     if let Some(path) = &args.image {
-        output::check_apart(path, &[&args.a, &args.b])?;
+        output::check_apart(path, &args.pair.inputs())?;
         picture::check_name(path)?;
     }
     if let Some(path) = &args.prove {
-        output::check_apart(path, &[&args.a, &args.b])?;
+        output::check_apart(path, &args.pair.inputs())?;
     }
-    let matrices = [("--pose-a", &args.pose_a), ("--pose-b", &args.pose_b)];
-    let [pose_a, pose_b] = matrices.map(|(name, given)| posing::from_option(name, given.as_deref()));
-    let matrices = [pose_a?, pose_b?];
+    let matrices = args.pair.matrices()?;
     let mut poses = args.poses.as_ref().map(|path| PoseFile::open(path)).transpose()?;
 
     let threads = args.threads.unwrap_or(0);
@@ -278,15 +269,16 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
 /// The scans: balls about points know no kernel, so any do for these.
 fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2], CliError> {
     if args.thickened.is_some() {
-        let a = input::open(&args.a, threads, console)?;
-        let b = if args.a == args.b { a.clone() } else { input::open(&args.b, threads, console)? };
+        let [path_a, path_b] = args.pair.inputs();
+        let a = input::open(path_a, threads, console)?;
+        let b = if path_a == path_b { a.clone() } else { input::open(path_b, threads, console)? };
         return Ok([a, b]);
     }
     let kernel = args.kernel.map(KernelName::metric);
     let scans = if args.search.wants_graphs() && kernel.is_none() {
-        input::open_both_with_graphs([&args.a, &args.b], threads, console)?
+        input::open_both_with_graphs(args.pair.inputs(), threads, console)?
     } else {
-        input::open_both(kernel, [&args.a, &args.b], threads, console)?
+        input::open_both(kernel, args.pair.inputs(), threads, console)?
     };
     if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
         let what = "--prove is for the euclidean kernel: by the geodesic one no separation is proven, and what would \
@@ -307,16 +299,12 @@ fn answer_one(
     console: Console,
     out: &mut Outputs<'_, '_>,
 ) -> Result<(), CliError> {
-    let placed = |name: &str, matrix, scan| {
-        posing::of_scan(matrix, scan).map_err(|refused| CliError::Pose { place: name.into(), refused })
-    };
-    let poses =
-        [placed("--pose-a", &matrices[0], &question.a)?, placed("--pose-b", &matrices[1], &question.b)?];
+    let poses = posing::of_options(matrices, [&question.a, &question.b])?;
     let asked = question.ask(None, poses, &mut CollideScratch::default());
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let [a, b] = question.views(&asked.poses);
-        let style = picture::Style { names: names([&args.a, &args.b]), points: args.thickened.is_some() };
+        let style = picture::Style { names: names(args.pair.inputs()), points: args.thickened.is_some() };
         picture::paint([&a, &b], &asked.answer, &style).save(path)?;
         drop(bar);
     }

@@ -17,22 +17,16 @@ use crate::digits::{count, rough, short};
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::export::refused;
+use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
 use crate::{input, output, picture, posing};
 
 /// Options of `curve`.
 #[derive(Debug, Clone, Args)]
 pub struct CurveArgs {
-    /// The one scan: prepared, or a raw input, prepared on the fly
-    pub a: PathBuf,
-    /// The other scan
-    pub b: PathBuf,
-    /// Pose of a, object to world: 16 numbers, row-major, in one argument, or a file that holds them
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub pose_a: Option<String>,
-    /// Pose of b
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub pose_b: Option<String>,
+    /// What is asked about
+    #[command(flatten)]
+    pub pair: PairArgs,
     /// Which distances define the surfaces; by default as prepared, else straight ones
     #[arg(long, value_enum)]
     pub kernel: Option<KernelName>,
@@ -88,7 +82,7 @@ struct CurveReport {
 
 pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
-    let inputs: [&Path; 2] = [&args.a, &args.b];
+    let inputs = args.pair.inputs();
     output::check_apart(&args.output, &inputs)?;
     if let Some(path) = &args.image {
         output::check_apart(path, &inputs)?;
@@ -97,15 +91,11 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
             return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
         }
     }
-    let given = [("--pose-a", &args.pose_a), ("--pose-b", &args.pose_b)];
-    let [matrix_a, matrix_b] = given.map(|(name, given)| posing::from_option(name, given.as_deref()));
-    let matrices = [matrix_a?, matrix_b?];
+    let matrices = args.pair.matrices()?;
     let kernel = args.kernel.map(KernelName::metric);
     let [a, b] = input::open_both(kernel, inputs, args.threads.unwrap_or(0), console)?;
-    let placed = |name: &str, matrix, scan| {
-        posing::of_scan(matrix, scan).map_err(|refused| CliError::Pose { place: name.into(), refused })
-    };
-    let [a, b] = [a.at(&placed("--pose-a", &matrices[0], &a)?), b.at(&placed("--pose-b", &matrices[1], &b)?)];
+    let [pose_a, pose_b] = posing::of_options(&matrices, [&a, &b])?;
+    let [a, b] = [a.at(&pose_a), b.at(&pose_b)];
 
     let mut options = CurveOptions::default();
     (options.spacing, options.tolerance) = (args.spacing, args.tolerance);

@@ -54,7 +54,7 @@ pub use inspect::InspectArgs;
 pub use level::level_picture;
 pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
-pub use posing::PoseRefused;
+pub use posing::{PairArgs, PoseRefused};
 pub use preprocess::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
 pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
 

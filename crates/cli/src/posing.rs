@@ -1,14 +1,53 @@
 //! Poses from the command line and from files.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use clap::Args;
 use nearmiss::{Pose, PoseError, Scan};
 use serde::Deserialize;
 
 use crate::digits::short;
 use crate::error::CliError;
 use crate::input::{TextLines, pieces};
+
+/// Two scans, and where they are.
+#[derive(Debug, Clone, Args)]
+pub struct PairArgs {
+    /// The one scan: prepared, or a raw input, prepared on the fly
+    pub a: PathBuf,
+    /// The other scan
+    pub b: PathBuf,
+    /// Pose of a, object to world: 16 numbers, row-major, in one argument, or a file that holds them
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose_a: Option<String>,
+    /// Pose of b
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose_b: Option<String>,
+}
+
+impl PairArgs {
+    /// The files.
+    pub(crate) fn inputs(&self) -> [&Path; 2] {
+        [&self.a, &self.b]
+    }
+
+    /// The matrices of both poses.
+    pub(crate) fn matrices(&self) -> Result<[Matrix; 2], CliError> {
+        let [a, b] = [("--pose-a", &self.pose_a), ("--pose-b", &self.pose_b)]
+            .map(|(name, given)| from_option(name, given.as_deref()));
+        Ok([a?, b?])
+    }
+}
+
+/// The poses of two scans nearest to the matrices of their options.
+pub(crate) fn of_options(matrices: &[Matrix; 2], scans: [&Scan; 2]) -> Result<[Pose; 2], CliError> {
+    let placed = |name: &str, side: usize| {
+        of_scan(&matrices[side], scans[side])
+            .map_err(|refused| CliError::Pose { place: name.into(), refused })
+    };
+    Ok([placed("--pose-a", 0)?, placed("--pose-b", 1)?])
+}
 
 /// A matrix as given, row-major.
 pub(crate) type Matrix = [f64; 16];
