@@ -168,8 +168,8 @@ impl Motion {
         #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
         let mut beyond = product(&line, &between) - product(&turn, &turn) * (0.5 * self.distance) as f32;
         for k in 0..3 {
-            beyond = beyond - a.half[k] * product(&a.axes[k], &line).abs();
-            beyond = beyond - half_b[k] * product(&axes_b[k], &line).abs();
+            beyond -= a.half[k] * product(&a.axes[k], &line).abs();
+            beyond -= half_b[k] * product(&axes_b[k], &line).abs();
         }
         beyond.to_array()
     }
