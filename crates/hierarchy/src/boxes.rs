@@ -5,7 +5,6 @@
 //! (benches/record).
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
@@ -140,13 +139,9 @@ impl Relative {
     /// Points of a's frame in b's.
     #[inline(always)]
     #[must_use]
-    pub fn points_back<S: Simd>(&self, simd: S, points: &[[f32; 16]; 3]) -> [f32x16<S>; 3] {
+    pub fn points_back<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
         let [tx, ty, tz] = self.translation;
-        let (x, y, z) = (
-            f32x16::load_array_ref(simd, &points[0]) - tx,
-            f32x16::load_array_ref(simd, &points[1]) - ty,
-            f32x16::load_array_ref(simd, &points[2]) - tz,
-        );
+        let (x, y, z) = (points[0] - tx, points[1] - ty, points[2] - tz);
         let [rx, ry, rz] = self.rotation;
         let back = self.scale_back();
         [

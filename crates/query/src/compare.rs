@@ -47,7 +47,8 @@ impl Surfaces<'_> {
                 let test = LeafPair {
                     a: Discs { block: block_a, count: count_a },
                     b: Discs { block: block_b, count: count_b },
-                    reaches: self.reaches(block_a, first_a, count_a, sparse[0]),
+                    balls: sparse[0].then(|| self.balls(first_a, count_a)),
+                    reach: self.reach,
                     relative: &self.pair.relative.clone(),
                 };
                 let tries = self.tries;
@@ -61,22 +62,13 @@ impl Surfaces<'_> {
         ControlFlow::Continue(())
     }
 
-    /// How far the discs of a block reach, and the balls if there are some.
-    #[inline]
-    fn reaches(
-        &self,
-        block: &LeafBlock,
-        first: usize,
-        count: usize,
-        sparse: bool,
-    ) -> [f32; LeafBlock::WIDTH] {
-        let mut reaches = block.discs;
-        if sparse {
-            for (i, reach) in (first..first + count).zip(&mut reaches) {
-                *reach = reach.max(self.pair.a.ball(i));
-            }
+    /// The radii of the balls about some points of a.
+    fn balls(&self, first: usize, count: usize) -> [f32; LeafBlock::WIDTH] {
+        let mut balls = [0.0; LeafBlock::WIDTH];
+        for (i, ball) in (first..first + count).zip(&mut balls) {
+            *ball = self.pair.a.ball(i);
         }
-        reaches.map(|own| own + self.reach)
+        balls
     }
 
     /// The points of a block of a leaf of a against those of b.

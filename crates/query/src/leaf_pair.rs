@@ -6,7 +6,7 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_hierarchy::{LeafBlock, OrientedBox, Relative, THICKNESS};
+use nearmiss_hierarchy::{LeafBlock, Relative, THICKNESS};
 
 const WIDTH: usize = LeafBlock::WIDTH;
 
@@ -41,8 +41,10 @@ impl Discs<'_> {
 pub(crate) struct LeafPair<'a> {
     pub(crate) a: Discs<'a>,
     pub(crate) b: Discs<'a>,
-    /// How far what is at the points of a reaches, in a's frame.
-    pub(crate) reaches: [f32; WIDTH],
+    /// The radii of balls about the points of a, beside their discs.
+    pub(crate) balls: Option<[f32; WIDTH]>,
+    /// How much further what is at the points of a reaches, in a's frame.
+    pub(crate) reach: f32,
     pub(crate) relative: &'a Relative,
 }
 
@@ -67,27 +69,22 @@ impl LeafPair<'_> {
 
     #[inline(always)]
     fn next_by<S: Simd>(&self, simd: S, from: u32, each: bool) -> Option<Near> {
-        let centres = self.relative.points_back(simd, &self.a.block.positions);
+        let centres = self.relative.points_back(&self.a.block.positions(simd));
         let mut candidates = self.near_box(simd, &centres) & self.a.lanes() & u32::MAX.unbounded_shl(from);
         if candidates == 0 {
             return None;
         }
         let [x, y, z] = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
         let per_scale = self.relative.scale_back();
-        let [px, py, pz] = &self.b.block.positions;
-        let (px, py, pz) = (
-            f32x16::load_array_ref(simd, px),
-            f32x16::load_array_ref(simd, py),
-            f32x16::load_array_ref(simd, pz),
-        );
-        let radii = f32x16::load_array_ref(simd, &self.b.block.discs);
+        let [px, py, pz] = self.b.block.positions(simd);
+        let radii = self.b.block.discs(simd);
         // Who is near anyone is seldom foreseen, so nothing branches on it until all are known.
         let mut nears = [0_u32; WIDTH];
         let mut left = candidates;
         while left != 0 {
             let lane = left.trailing_zeros() as usize & (WIDTH - 1);
             let d = [px - x[lane], py - y[lane], pz - z[lane]];
-            let reach = radii + self.a.block.discs[lane] * per_scale;
+            let reach = radii + self.a.block.disc(lane) * per_scale;
             let near: mask32x16<S> = product(&d, &d).simd_le(reach * reach);
             nears[lane] = bits(near) & self.b.lanes();
             candidates &= !(u32::from(nears[lane] == 0 && !each) << lane);
@@ -100,15 +97,9 @@ impl LeafPair<'_> {
             let mut crossings = 0;
             if nears[lane] != 0 {
                 let d = [-(px - x[lane]), -(py - y[lane]), -(pz - z[lane])];
-                let radius = self.a.block.discs[lane] * per_scale;
-                let [nx, ny, nz] = &self.a.block.normals;
-                let normal = self.relative.direction_back([nx[lane], ny[lane], nz[lane]]);
-                let [nx, ny, nz] = &self.b.block.normals;
-                let of_b = [
-                    f32x16::load_array_ref(simd, nx),
-                    f32x16::load_array_ref(simd, ny),
-                    f32x16::load_array_ref(simd, nz),
-                ];
+                let radius = self.a.block.disc(lane) * per_scale;
+                let normal = self.relative.direction_back(self.a.block.normal(lane));
+                let of_b = self.b.block.normals(simd);
                 let crossing = cross(simd, (&d, product(&d, &d)), (normal, radius), (&of_b, radii));
                 crossings = nears[lane] & bits(crossing);
             }
@@ -122,7 +113,7 @@ impl LeafPair<'_> {
     /// The points of a, which are `centres` in b's frame, that reach b's box.
     #[inline(always)]
     fn near_box<S: Simd>(&self, simd: S, centres: &[f32x16<S>; 3]) -> u32 {
-        let OrientedBox { centre, half, axes, .. } = &self.b.block.bounds;
+        let LeafBlock { centre, half, axes, .. } = self.b.block;
         let d = [centres[0] - centre[0], centres[1] - centre[1], centres[2] - centre[2]];
         let mut beyond_sq = f32x16::simd_from(simd, 0.0);
         for k in 0..3 {
@@ -131,7 +122,11 @@ impl LeafPair<'_> {
             let beyond = (along - half[k]).max(0.0);
             beyond_sq += beyond * beyond;
         }
-        let reach = f32x16::load_array_ref(simd, &self.reaches) * self.relative.scale_back();
+        let mut own = self.a.block.discs(simd);
+        if let Some(balls) = &self.balls {
+            own = own.max(f32x16::load_array_ref(simd, balls));
+        }
+        let reach = (own + self.reach) * self.relative.scale_back();
         bits(beyond_sq.simd_le(reach * reach))
     }
 }
@@ -173,13 +168,16 @@ fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
 #[cfg(test)]
 mod tests {
     use nearmiss_geometry::Pose;
+    use nearmiss_hierarchy::OrientedBox;
     use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+    use rand::RngExt;
 
     use super::*;
     use crate::crossing::{Disc, crossing};
 
     /// Some discs about the origin, in one block.
     struct Leaf {
+        bounds: OrientedBox,
         block: LeafBlock,
         count: usize,
     }
@@ -197,19 +195,14 @@ mod tests {
                 axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
                 reach: 1.0,
             };
-            let (positions, normals, discs) = ([[0.0; 16]; 3], [[0.0; 16]; 3], [0.0; 16]);
-            let mut block = LeafBlock { positions, normals, discs, bounds };
+            let mut block = LeafBlock::new(&bounds);
             for (lane, number) in (0..16_u8).enumerate().take(count) {
                 let [x, y, z] = single(point_in(rng, 1.0));
                 let position = [x, y, if flat { 0.01 * z } else { z }];
                 let normal = if flat { [0.0, 0.0, 1.0] } else { single(unit_vector(rng)) };
-                for k in 0..3 {
-                    block.positions[k][lane] = position[k];
-                    block.normals[k][lane] = normal[k];
-                }
-                block.discs[lane] = 0.2 + 0.02 * f32::from(number);
+                block.set(lane, position, normal, 0.2 + 0.02 * f32::from(number));
             }
-            Self { block, count }
+            Self { bounds, block, count }
         }
 
         fn discs(&self) -> Discs<'_> {
@@ -217,11 +210,8 @@ mod tests {
         }
 
         fn disc(&self, lane: usize) -> Disc {
-            Disc {
-                centre: self.block.positions.map(|c| c[lane]),
-                normal: self.block.normals.map(|c| c[lane]),
-                radius: self.block.discs[lane],
-            }
+            let block = &self.block;
+            Disc { centre: block.position(lane), normal: block.normal(lane), radius: block.disc(lane) }
         }
     }
 
@@ -238,10 +228,11 @@ mod tests {
                 normal: test.relative.direction_back(disc.normal),
                 radius: disc.radius * back,
             };
-            let reach = test.reaches[lane as usize] * back;
+            let ball = test.balls.map_or(0.0, |balls| balls[lane as usize]);
+            let reach = (a.block.disc(lane as usize).max(ball) + test.reach) * back;
             let crosses = |j: &u32| crossing(&moved, &b.disc(*j as usize));
             let crossings = lanes(b).filter(crosses).fold(0, |bits, j| bits | 1 << j);
-            (b.block.bounds.distance_sq(moved.centre) <= reach * reach).then_some(Near { lane, crossings })
+            (b.bounds.distance_sq(moved.centre) <= reach * reach).then_some(Near { lane, crossings })
         };
         lanes(a).filter_map(near).collect()
     }
@@ -272,7 +263,8 @@ mod tests {
             let test = LeafPair {
                 a: a.discs(),
                 b: b.discs(),
-                reaches: a.block.discs.map(|r| r + 0.01),
+                balls: (round % 2 == 0).then(|| std::array::from_fn(|_| rng.random_range(0.0..0.5))),
+                reach: 0.01,
                 relative: &relative,
             };
             let expected = one_by_one(&test, &a, &b);

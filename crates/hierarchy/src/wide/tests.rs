@@ -85,12 +85,32 @@ fn every_leaf_is_below_one_node_and_every_box_is_its_own() {
             assert_eq!(tree.leaves.points(number), node.points());
             assert_eq!(scan.nodes[tree.leaves.id(number) as usize], *node);
             for (block, first, points) in tree.leaves.blocks(number) {
+                let bounds = &scan.boxes[tree.leaves.id(number) as usize];
+                assert_eq!((block.centre, block.half, block.axes), (bounds.centre, bounds.half, bounds.axes));
+                // Sixteen bits of each number, and the lanes as one by one.
+                let off = |x: [f32; 3], y: [f32; 3]| (0..3).fold(0.0_f32, |m, k| m.max((x[k] - y[k]).abs()));
+                let step = bounds.radius() / 32767.0;
                 for lane in 0..points {
-                    assert_eq!(block.positions.map(|row| row[lane]), scan.positions[first + lane]);
-                    assert_eq!(block.normals.map(|row| row[lane]), scan.normals[first + lane]);
-                    assert_eq!(block.discs[lane].to_bits(), scan.discs[first + lane].to_bits());
+                    let i = first + lane;
+                    assert!(off(block.position(lane), scan.positions[i]) <= 0.52 * step);
+                    assert!(off(block.normal(lane), scan.normals[i]) <= 0.52 / 32767.0);
+                    assert!((block.disc(lane) - scan.discs[i]).abs() <= 0.52 * step);
                 }
-                assert_eq!(block.bounds, scan.boxes[tree.leaves.id(number) as usize]);
+                for level in levels() {
+                    let (positions, normals, discs) = dispatch!(level, simd => simd.vectorize(
+                        #[inline(always)]
+                        || {
+                            let ([x, y, z], [u, v, w]) = (block.positions(simd), block.normals(simd));
+                            let rows = [x.to_array(), y.to_array(), z.to_array()];
+                            (rows, [u.to_array(), v.to_array(), w.to_array()], block.discs(simd).to_array())
+                        },
+                    ));
+                    for lane in 0..points {
+                        assert_eq!(positions.map(|row| row[lane]), block.position(lane));
+                        assert_eq!(normals.map(|row| row[lane]), block.normal(lane));
+                        assert_eq!(discs[lane].to_bits(), block.disc(lane).to_bits());
+                    }
+                }
             }
             let counts = tree.leaves.blocks(number).map(|(.., points)| points);
             assert_eq!(counts.sum::<usize>(), node.count as usize);

@@ -41,7 +41,13 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
     let zero = f32x16::simd_from(simd, 0.0);
     let mut reach_sq = reach_of(pair, best.distance);
     for block_a in blocks(a) {
-        let centres = pair.relative.points_back(simd, &pair.a.blocks[block_a].position);
+        let [x, y, z] = &pair.a.blocks[block_a].position;
+        let own = [
+            f32x16::load_array_ref(simd, x),
+            f32x16::load_array_ref(simd, y),
+            f32x16::load_array_ref(simd, z),
+        ];
+        let centres = pair.relative.points_back(&own);
         let places = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
         // How far each is from the box of b.
         let d = [centres[0] - bounds.centre[0], centres[1] - bounds.centre[1], centres[2] - bounds.centre[2]];
