@@ -4,11 +4,13 @@
 
 mod cut;
 
-use cut::{assert_whole, draw, fine, scans, to_segment};
+use cut::{assert_whole, draw, fine, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{CurveEnd, CurveOptions, Curves, ScanView};
+use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::cuts;
+use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use nearmiss_testdata::shapes::{Form, Sampling, patch, sphere};
 
 #[test]
@@ -117,4 +119,30 @@ fn sheets_that_are_nearly_parallel_cross_in_a_line_or_touch_in_points() {
     }
     let none = drawn(0.0, 0.1 * r);
     assert!(none.complete && none.curves.is_empty(), "{:?}", none.curves);
+}
+
+#[test]
+fn chords_keep_to_what_shorter_ones_show() {
+    let points = dragon_mesh(Dragon::Points5k).unwrap().vertices().to_vec();
+    let scan = PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
+        .unwrap();
+    let r = scan.sampling_radius();
+    let size = scan.bounds().half_extents().into_iter().fold(0.0, f64::max);
+    let mut rng = arbitrary::rng(7);
+    let mut off = Vec::new();
+    for _ in 0..40 {
+        let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.5 * size));
+        let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+        let found = draw(&views[0], &views[1], CurveOptions::default());
+        let fine = draw(&views[0], &views[1], CurveOptions::default().with_spacing(0.2 * r));
+        for [i, j] in found.curves.iter().flat_map(nearmiss_query::Curve::edges) {
+            let middle = [0, 1, 2].map(|k| 0.5 * (found.points[i][k] + found.points[j][k]));
+            off.push(to_found(middle, &fine) / r);
+        }
+    }
+    off.sort_by(f64::total_cmp);
+    // A fortieth of two sampling radii, and what a surface that is rougher than an arc adds.
+    let [most, nearly_all] = [off[off.len() - 1], off[off.len() * 99 / 100]];
+    assert!(off.len() > 500, "{} chords", off.len());
+    assert!(nearly_all < 0.065 && most < 0.1, "{nearly_all} r off, {most} at most");
 }
