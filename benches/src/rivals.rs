@@ -1,6 +1,7 @@
 //! What is measured beside each other: ours, and what users would pick instead, behind one trait.
 
 pub mod eigen;
+pub mod grid;
 pub mod jacobi;
 pub mod kiddo;
 pub mod ours;

@@ -9,10 +9,13 @@
 //! or edge, exceeds no distance to a point in it, and what is found depends on nothing but the points.
 
 mod heard;
+mod near;
 mod nearest;
+mod skeleton;
 
 pub use heard::Heard;
 pub use nearest::{Nearest, Neighbour};
+pub use skeleton::Skeleton;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, mask32x16};

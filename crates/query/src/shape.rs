@@ -1,0 +1,164 @@
+//! Spheres, capsules and boxes against the points of a scan.
+//!
+//! A shape touches a scan if a point of it is in the shape: what a robot of spheres asks of a depth frame. Points are held in blocks of
+//! sixteen, with bounds about blocks, about sixteen of these, and so on (`surface::BlockTree`); the blocks are those of the scan.
+
+use fearless_simd::Level;
+use nearmiss_geometry::{PointId, Pose};
+use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_surface::{BlockTree, Skeleton};
+
+use crate::view::ScanView;
+
+/// A shape in the world. Radii and half edge lengths are zero or more; nothing touches one that is less, or no number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Shape {
+    /// All within `radius` of `centre`.
+    Sphere {
+        /// The middle.
+        centre: [f64; 3],
+        /// How far it reaches.
+        radius: f64,
+    },
+    /// All within `radius` of a segment.
+    Capsule {
+        /// The ends of the segment.
+        ends: [[f64; 3]; 2],
+        /// How far it reaches from there.
+        radius: f64,
+    },
+    /// A solid box.
+    Box {
+        /// From the box about the origin, along the axes, to the world; its scale counts.
+        pose: Pose,
+        /// Half the edge lengths before that.
+        half: [f64; 3],
+    },
+}
+
+/// The point of a scan nearest to a shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestPoint {
+    /// Which point, as the caller numbered them.
+    pub source: PointId,
+    /// Where it is in the world.
+    pub point: [f64; 3],
+    /// How far from the shape, in the world; negative within a sphere or capsule, 0 within a box.
+    pub gap: f64,
+}
+
+/// The points of a scan, ready for shapes. Made once for a scan, in O(n): a millisecond for 100,000 points.
+#[derive(Debug, Clone)]
+pub struct ShapeIndex<'a> {
+    scan: &'a PointHierarchy,
+    tree: BlockTree<'a>,
+    level: Level,
+}
+
+impl<'a> ShapeIndex<'a> {
+    /// That of `scan`.
+    #[must_use]
+    pub fn new(scan: &'a PointHierarchy) -> Self {
+        let tree = BlockTree::new(scan.slices().blocks, scan.len());
+        Self { scan, tree, level: Level::new() }
+    }
+
+    /// The scan in `pose`, which leads from the frame of its input to the world.
+    #[must_use]
+    pub fn at(&self, pose: &Pose) -> PlacedIndex<'_> {
+        PlacedIndex { index: self, view: ScanView::new(self.scan, pose) }
+    }
+}
+
+/// A scan in a pose, to be asked about shapes.
+#[derive(Debug, Clone, Copy)]
+pub struct PlacedIndex<'a> {
+    index: &'a ShapeIndex<'a>,
+    view: ScanView<'a>,
+}
+
+impl PlacedIndex<'_> {
+    /// Whether a point of the scan is in `shape`, its boundary included: exactly what double precision says of each point in the stored
+    /// frame of the scan ([`Skeleton::distance_sq`]).
+    ///
+    /// Some ten registers' worth of boxes and points near the surface (benches/record); does not allocate.
+    #[inline]
+    #[must_use]
+    pub fn touches(&self, shape: &Shape) -> bool {
+        let (skeleton, radius) = self.stored(shape);
+        radius >= 0.0 && self.index.tree.any_within(self.index.level, &skeleton, radius)
+    }
+
+    /// The point nearest to `shape`, if it is no further than `reach` from it, in the world; of equally near ones the first in the order of
+    /// the scan. Exact as [`Self::touches`]. Within a sphere or capsule the nearest point is that nearest to its centre or segment.
+    #[must_use]
+    pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
+        let (skeleton, radius) = self.stored(shape);
+        let scale = self.view.placed().scale();
+        let reach = radius + reach / scale;
+        if !(radius >= 0.0 && reach >= 0.0) {
+            return None;
+        }
+        let (i, distance_sq) = self.index.tree.nearest_to(self.index.level, &skeleton, reach)?;
+        Some(NearestPoint {
+            source: self.index.scan.id(i),
+            point: self.view.point(i),
+            gap: (distance_sq.sqrt() - radius) * scale,
+        })
+    }
+
+    /// Which of many shapes [touch](Self::touches) the scan, in order, on the threads of the current rayon pool; the same on any number.
+    ///
+    /// # Panics
+    /// When there are not as many answers as shapes.
+    pub fn touch_each(&self, shapes: &[Shape], answers: &mut [bool]) {
+        /// Shapes that a thread takes at once: some 50 µs of work.
+        #[cfg(feature = "rayon")]
+        const AT_ONCE: usize = 1024;
+        assert_eq!(shapes.len(), answers.len(), "an answer a shape");
+        #[cfg(feature = "rayon")]
+        if shapes.len() > AT_ONCE {
+            use rayon::prelude::*;
+            let parts = shapes.par_chunks(AT_ONCE).zip(answers.par_chunks_mut(AT_ONCE));
+            parts.for_each(|(shapes, answers)| self.touch_in_turn(shapes, answers));
+            return;
+        }
+        self.touch_in_turn(shapes, answers);
+    }
+
+    fn touch_in_turn(&self, shapes: &[Shape], answers: &mut [bool]) {
+        for (shape, answer) in shapes.iter().zip(answers) {
+            *answer = self.touches(shape);
+        }
+    }
+
+    /// A shape in the stored frame of the scan: what it is about, and how thick; less than nothing for a box that has a negative edge.
+    #[inline]
+    fn stored(&self, shape: &Shape) -> (Skeleton, f64) {
+        let placed = self.view.placed();
+        match *shape {
+            Shape::Sphere { centre, radius } => {
+                (Skeleton::Point(placed.apply_inverse(centre)), radius / placed.scale())
+            }
+            Shape::Capsule { ends, radius } => {
+                (Skeleton::Segment(ends.map(|end| placed.apply_inverse(end))), radius / placed.scale())
+            }
+            Shape::Box { pose, half } => {
+                let per_scale = pose.scale() / placed.scale();
+                let axis = |k: usize| {
+                    let mut axis = [0.0; 3];
+                    axis[k] = 1.0;
+                    placed.rotate_inverse(pose.rotate(axis))
+                };
+                let skeleton = Skeleton::Box {
+                    centre: placed.apply_inverse(pose.translation()),
+                    half: half.map(|h| h * per_scale),
+                    axes: [axis(0), axis(1), axis(2)],
+                };
+                // Written so that what is no number touches nothing.
+                (skeleton, if half.iter().all(|&h| h >= 0.0) { 0.0 } else { -1.0 })
+            }
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! Whether points are near a shape, and which is nearest: boxes sixteen at a time down to blocks, blocks sixteen points at a time.
+//!
+//! Single precision with slack tells what is surely within, and what is surely not; what is between is measured again in double
+//! precision. So the answers are those of [`Skeleton::distance_sq`] for every point, whatever the instructions.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, mask32x16};
+
+use super::skeleton::{Block, Lanes, Place, Skeleton, Stretch, single};
+use super::{Bits, BlockTree, WIDTH, bits, id32, load};
+
+/// 2³² points fill so many levels of groups.
+const MOST_LEVELS: usize = 8;
+
+/// Room for a descent that keeps all siblings.
+const STACK: usize = MOST_LEVELS * WIDTH;
+
+/// What relative rounding may do to a squared length in single precision.
+const RELATIVE: f64 = 4e-6;
+
+impl BlockTree<'_> {
+    /// Whether a point is within `radius` of a skeleton: exactly if its [distance](Skeleton::distance_sq) is at most that in double
+    /// precision.
+    ///
+    /// A few lines of memory where nothing is near; does not allocate.
+    #[inline]
+    #[must_use]
+    pub fn any_within(&self, level: Level, skeleton: &Skeleton, radius: f64) -> bool {
+        match *skeleton {
+            Skeleton::Point(centre) => self.any(level, Place(single(centre)), skeleton, radius),
+            Skeleton::Segment(ends) => self.any(level, Stretch::new(ends), skeleton, radius),
+            Skeleton::Box { centre, half, axes } => {
+                self.any(level, Block::new(centre, half, axes), skeleton, radius)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn any(&self, level: Level, lanes: impl Lanes, skeleton: &Skeleton, radius: f64) -> bool {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.any_by(simd, lanes, skeleton, radius)
+        ))
+    }
+
+    #[inline(always)]
+    fn any_by<S: Simd>(&self, simd: S, lanes: impl Lanes, skeleton: &Skeleton, radius: f64) -> bool {
+        let slack = skeleton.slack() + RELATIVE * radius;
+        let (sure, most) = (square((radius - slack).max(0.0)), square(radius + slack));
+        let sure = if radius > slack { sure } else { -1.0 };
+        // Of each level a group, and its boxes still to be looked into.
+        let mut open = [(0_usize, 0_u64); MOST_LEVELS];
+        let top = self.levels.len();
+        let (mut level, mut id) = (top, 0);
+        loop {
+            if level > 0 {
+                level -= 1;
+                let near: mask32x16<S> = lanes.of_boxes(simd, &self.levels[level][id]).simd_le(most);
+                open[level] = (id, bits(near) & self.filled(level, id));
+            } else if self.is_within(simd, lanes, id, (sure, most), (skeleton, radius)) {
+                return true;
+            }
+            while open[level].1 == 0 {
+                level += 1;
+                if level == top {
+                    return false;
+                }
+            }
+            let (group, near) = &mut open[level];
+            id = *group * WIDTH + near.trailing_zeros() as usize;
+            *near &= *near - 1;
+        }
+    }
+
+    /// Whether a point of a block is within `radius`: surely if its squared distance is at most `sure`, surely not above `most`.
+    #[inline(always)]
+    fn is_within<S: Simd>(
+        &self,
+        simd: S,
+        lanes: impl Lanes,
+        block: usize,
+        (sure, most): (f32, f32),
+        (skeleton, radius): (&Skeleton, f64),
+    ) -> bool {
+        let distances = lanes.of_points(simd, load(simd, &self.blocks[block]));
+        let near: mask32x16<S> = distances.simd_le(most);
+        let near = bits(near) & self.present(block);
+        if near == 0 {
+            return false;
+        }
+        let surely: mask32x16<S> = distances.simd_le(sure);
+        bits(surely) & near != 0
+            || Bits(near).any(|lane| skeleton.distance_sq(self.place(block, lane)) <= radius * radius)
+    }
+
+    /// The point nearest to a skeleton and the square of its [distance](Skeleton::distance_sq) in double precision, if that is at most
+    /// `reach`; of equally near ones the first. Does not allocate.
+    #[inline]
+    #[must_use]
+    pub fn nearest_to(&self, level: Level, skeleton: &Skeleton, reach: f64) -> Option<(usize, f64)> {
+        match *skeleton {
+            Skeleton::Point(centre) => self.nearest_of(level, Place(single(centre)), skeleton, reach),
+            Skeleton::Segment(ends) => self.nearest_of(level, Stretch::new(ends), skeleton, reach),
+            Skeleton::Box { centre, half, axes } => {
+                self.nearest_of(level, Block::new(centre, half, axes), skeleton, reach)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn nearest_of(
+        &self,
+        level: Level,
+        lanes: impl Lanes,
+        skeleton: &Skeleton,
+        reach: f64,
+    ) -> Option<(usize, f64)> {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.nearest_to_by(simd, lanes, skeleton, reach)
+        ))
+    }
+
+    #[inline(always)]
+    fn nearest_to_by<S: Simd>(
+        &self,
+        simd: S,
+        lanes: impl Lanes,
+        skeleton: &Skeleton,
+        reach: f64,
+    ) -> Option<(usize, f64)> {
+        let slack = skeleton.slack();
+        let limit = |distance_sq: f64| square(distance_sq.sqrt() * (1.0 + RELATIVE) + slack);
+        let mut best = (reach * reach, usize::MAX);
+        let mut most = limit(best.0);
+        let mut stack = [(0.0_f32, 0_u32, 0_u32); STACK];
+        stack[0] = (0.0, id32(self.levels.len()), 0);
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (least, above, id) = stack[top];
+            let id = id as usize;
+            if least > most {
+                continue;
+            }
+            if above == 0 {
+                let distances = lanes.of_points(simd, load(simd, &self.blocks[id]));
+                let near: mask32x16<S> = distances.simd_le(most);
+                for lane in Bits(bits(near) & self.present(id)) {
+                    let own = (skeleton.distance_sq(self.place(id, lane)), id * WIDTH + lane);
+                    if own < best {
+                        best = own;
+                        most = limit(best.0);
+                    }
+                }
+                continue;
+            }
+            let below = above as usize - 1;
+            let distances = lanes.of_boxes(simd, &self.levels[below][id]);
+            let near: mask32x16<S> = distances.simd_le(most);
+            let distances = distances.to_array();
+            let first = top;
+            for lane in Bits(bits(near) & self.filled(below, id)) {
+                let child = id * WIDTH + lane;
+                // The nearest on top.
+                let mut place = top;
+                while place > first && stack[place - 1].0 < distances[lane] {
+                    stack[place] = stack[place - 1];
+                    place -= 1;
+                }
+                stack[place] = (distances[lane], id32(below), id32(child));
+                top += 1;
+            }
+        }
+        (best.1 < usize::MAX).then_some((best.1, best.0))
+    }
+
+    /// The lanes of a group that have boxes, as bits.
+    #[inline(always)]
+    fn filled(&self, level: usize, group: usize) -> u64 {
+        (1 << (self.nodes(level) - group * WIDTH).min(WIDTH)) - 1
+    }
+
+    /// The lanes of a block that have points, as bits.
+    #[inline(always)]
+    fn present(&self, block: usize) -> u64 {
+        (1 << self.count(block)) - 1
+    }
+
+    #[inline(always)]
+    fn place(&self, block: usize, lane: usize) -> [f64; 3] {
+        let [x, y, z] = &self.blocks[block].position;
+        [f64::from(x[lane]), f64::from(y[lane]), f64::from(z[lane])]
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
+fn square(length: f64) -> f32 {
+    (length * length) as f32
+}
