@@ -15,7 +15,10 @@ const MOST_LEVELS: usize = 8;
 /// Room for a descent that keeps all siblings.
 const STACK: usize = MOST_LEVELS * WIDTH;
 
-/// What relative rounding may do to a squared length in single precision.
+/// Squares that are less may have lost digits.
+const LEAST_SURE: f32 = 1e-30;
+
+/// What relative rounding may do to a length in single precision.
 const RELATIVE: f64 = 4e-6;
 
 impl BlockTree<'_> {
@@ -47,7 +50,8 @@ impl BlockTree<'_> {
     fn any_by<S: Simd>(&self, simd: S, lanes: impl Lanes, skeleton: &Skeleton, radius: f64) -> bool {
         let slack = skeleton.slack() + RELATIVE * radius;
         let (sure, most) = (square((radius - slack).max(0.0)), square(radius + slack));
-        let sure = if radius > slack { sure } else { -1.0 };
+        // Where squares leave the range of single precision nothing is sure.
+        let sure = if (LEAST_SURE..=f32::MAX).contains(&sure) { sure } else { -1.0 };
         // Of each level a group, and its boxes still to be looked into.
         let mut open = [(0_usize, 0_u64); MOST_LEVELS];
         let top = self.levels.len();
@@ -198,4 +202,86 @@ impl BlockTree<'_> {
 #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
 fn square(length: f64) -> f32 {
     (length * length) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, rotation, unit_vector};
+
+    use super::*;
+    use crate::PointBlock;
+
+    fn levels() -> Vec<Level> {
+        let mut levels = vec![Level::new(), Level::baseline()];
+        #[cfg(target_arch = "x86_64")]
+        {
+            levels.extend(Level::new().as_avx2().map(Level::Avx2));
+            levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
+        }
+        levels
+    }
+
+    /// The nearest point, one by one.
+    fn nearest(points: &[[f32; 3]], skeleton: &Skeleton) -> (usize, f64) {
+        let all = points.iter().map(|p| skeleton.distance_sq(p.map(f64::from))).enumerate();
+        all.min_by(|p, q| p.1.total_cmp(&q.1)).unwrap()
+    }
+
+    #[test]
+    fn every_level_tells_exactly_what_is_within() {
+        let rng = &mut arbitrary::rng(93);
+        let (mut within, mut without) = (0, 0);
+        for (n, kind) in (0_u64..).zip(CloudKind::ALL.iter().cycle().take(42)) {
+            let count = [1, 16, 17, 300, 5000][(n % 5) as usize];
+            let mut points: Vec<[f32; 3]> =
+                arbitrary::cloud(*kind, count, n).into_iter().map(single).collect();
+            // Near points are near in the order, more or less.
+            points.sort_unstable_by(|p, q| p[0].total_cmp(&q[0]));
+            let size = points.iter().flatten().fold(0.0, |far: f64, c| far.max(f64::from(c.abs())));
+            let blocks: Vec<PointBlock> = PointBlock::silent(&points).collect();
+            let tree = BlockTree::new(&blocks, points.len());
+            for round in 0..40_usize {
+                let about = points[(7919 * round) % points.len()].map(f64::from);
+                let d = point_in(rng, size * [1.5, 0.1, 1e-3, 1e-7][round % 4]);
+                let centre = [0, 1, 2].map(|k| about[k] + d[k]);
+                let along = unit_vector(rng).map(|x| 0.3 * size * x);
+                let turn = rotation(rng);
+                let axis = |k: usize| turn.rotation().column(k).into_owned().into();
+                let skeleton = match round % 3 {
+                    0 => Skeleton::Point(centre),
+                    1 => Skeleton::Segment([centre, [0, 1, 2].map(|k| centre[k] + along[k])]),
+                    _ => Skeleton::Box {
+                        centre,
+                        half: [0.05, 0.1, 0.0].map(|h| h * size),
+                        axes: [axis(0), axis(1), axis(2)],
+                    },
+                };
+                let expected = nearest(&points, &skeleton);
+                let distance = expected.1.sqrt();
+                for level in levels() {
+                    assert_eq!(
+                        tree.nearest_to(level, &skeleton, f64::INFINITY),
+                        Some(expected),
+                        "{skeleton:?}"
+                    );
+                    // Just so much, and the least that is more or less.
+                    for radius in [
+                        0.0,
+                        0.5 * distance,
+                        distance.next_down(),
+                        distance,
+                        distance.next_up(),
+                        3.0 * distance,
+                    ] {
+                        let radius = radius.max(0.0);
+                        let is_within = expected.1 <= radius * radius;
+                        let found = tree.any_within(level, &skeleton, radius);
+                        assert_eq!(found, is_within, "{kind:?} {n}, {skeleton:?}, {radius} for {distance}");
+                        if is_within { within += 1 } else { without += 1 }
+                    }
+                }
+            }
+        }
+        assert!(within > 5000 && without > 5000, "{within} within, {without} not");
+    }
 }
