@@ -62,33 +62,7 @@ fn measure(object: &Object, (number, passes, radius, seed): (usize, u32, f64, u6
     for (name, away) in
         [("in the bounding box", None), ("up to 3 r off", Some(3.0)), ("up to 10 r off", Some(10.0))]
     {
-        let rng = &mut rng(seed);
-        let bounds = object.cloud.bounds();
-        let centres: Vec<[f64; 3]> = (0..number)
-            .map(|_| match away {
-                None => [0, 1, 2].map(|k| rng.random_range(bounds.min[k]..bounds.max[k])),
-                Some(away) => {
-                    let p = object.cloud.point(rng.random_range(0..object.cloud.len()));
-                    let d = point_in(rng, away * object.r);
-                    [0, 1, 2].map(|k| p[k] + d[k])
-                }
-            })
-            .collect();
-        let spheres: Vec<Shape> = centres.iter().map(|&centre| Shape::Sphere { centre, radius }).collect();
-        let capsules: Vec<Shape> = centres
-            .iter()
-            .map(|&from| {
-                let along = unit_vector(rng).map(|x| x * 4.0 * radius);
-                Shape::Capsule { ends: [from, [0, 1, 2].map(|k| from[k] + along[k])], radius }
-            })
-            .collect();
-        let boxes: Vec<Shape> = centres
-            .iter()
-            .map(|&centre| Shape::Box {
-                pose: rotation(rng).with_translation(centre),
-                half: [2.0 * radius, radius, 0.5 * radius],
-            })
-            .collect();
+        let Drawn { centres, spheres, capsules, boxes } = draw(object, (number, radius, seed), away);
         let singles: Vec<[f32; 3]> = centres.iter().map(|&c| single(c)).collect();
         let [reach] = [single([radius; 3])[0]];
         let one_by_one = |shapes: &[Shape]| {
@@ -125,6 +99,46 @@ fn measure(object: &Object, (number, passes, radius, seed): (usize, u32, f64, u6
     }
     println!();
     Ok(())
+}
+
+/// Shapes of each kind about the same places.
+struct Drawn {
+    centres: Vec<[f64; 3]>,
+    spheres: Vec<Shape>,
+    capsules: Vec<Shape>,
+    boxes: Vec<Shape>,
+}
+
+/// At most `away` r from a point, or in the bounding box.
+fn draw(object: &Object, (number, radius, seed): (usize, f64, u64), away: Option<f64>) -> Drawn {
+    let rng = &mut rng(seed);
+    let bounds = object.cloud.bounds();
+    let centres: Vec<[f64; 3]> = (0..number)
+        .map(|_| match away {
+            None => [0, 1, 2].map(|k| rng.random_range(bounds.min[k]..bounds.max[k])),
+            Some(away) => {
+                let p = object.cloud.point(rng.random_range(0..object.cloud.len()));
+                let d = point_in(rng, away * object.r);
+                [0, 1, 2].map(|k| p[k] + d[k])
+            }
+        })
+        .collect();
+    let spheres: Vec<Shape> = centres.iter().map(|&centre| Shape::Sphere { centre, radius }).collect();
+    let capsules: Vec<Shape> = centres
+        .iter()
+        .map(|&from| {
+            let along = unit_vector(rng).map(|x| x * 4.0 * radius);
+            Shape::Capsule { ends: [from, [0, 1, 2].map(|k| from[k] + along[k])], radius }
+        })
+        .collect();
+    let boxes: Vec<Shape> = centres
+        .iter()
+        .map(|&centre| Shape::Box {
+            pose: rotation(rng).with_translation(centre),
+            half: [2.0 * radius, radius, 0.5 * radius],
+        })
+        .collect();
+    Drawn { centres, spheres, capsules, boxes }
 }
 
 /// The least time of some passes, and what the last one found.

@@ -132,8 +132,8 @@ pub fn distance(a: &ScanView<'_>, b: &ScanView<'_>, plan: &DistancePlan, budget:
 /// for scans of the geodesic metric. `upper` is the distance of two points on the surfaces, near the two nearest
 /// samples; a step further along either surface leads no nearer. Surfaces that meet, as [`collide_with`] says it, are at distance 0.
 ///
-/// A budget's resolution is not looked at. Does not allocate once `scratch` is warm. Costs a tenth of a millisecond for scans of
-/// 100,000 points that are apart (benches/record), a few microseconds for surfaces that meet; balls about the points
+/// A budget's resolution is not looked at. Does not allocate once `scratch` is warm. Costs one or two tenths of a millisecond for
+/// scans of 100,000 points that are apart (benches/record), ten microseconds for surfaces that meet; balls about the points
 /// of scans that lie in each other cost as much as all leaves that are so near.
 pub fn distance_with(
     a: &ScanView<'_>,
