@@ -280,60 +280,10 @@ impl PointHierarchy {
         self.nearest_point_within(i, x, f64::INFINITY).0
     }
 
-    /// As [`Self::nearest_point_near`] if that is within `reach`; else a point that is at most a quarter further away, which
-    /// takes far fewer looks. With the number of nodes that were looked at.
-    ///
-    /// # Panics
-    /// When there is no such point.
-    #[must_use]
-    pub fn nearest_point_within(&self, i: usize, x: [f64; 3], reach: f64) -> (u32, u32) {
-        /// The square of how many times as far a point may be beyond reach.
-        const ROUGHLY: f64 = 1.25 * 1.25;
-        let reach_sq = reach * reach;
-        let place = Centre::new(x).rounded();
-        let distance_sq = |p: [f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
-        let (nodes, boxes, positions): (&[Node], &[OrientedBox], &[[f32; 3]]) =
-            (&self.nodes, &self.boxes, &self.positions);
-        // Boxes hold the points; how far off they are is told in single precision.
-        let lost = place.iter().fold(self.bounds_radius(), |far, c| far.max(f64::from(c.abs()))) * 4e-6;
-        let bound = |id: usize| (f64::from(boxes[id].distance_sq(place).sqrt()) - lost).max(0.0).powi(2);
-        let mut best = (distance_sq(positions[i]), i);
-        let mut stack = [(0.0, 0_usize); TREE_STACK];
-        let (mut top, mut looked_at) = (1, 0);
-        while top > 0 {
-            top -= 1;
-            looked_at += 1;
-            let (least, id) = stack[top];
-            let node = &nodes[id];
-            // A point within reach is never passed over: one that is further away lets all nodes be looked at that come so near.
-            if least > best.0 || (least > reach_sq && ROUGHLY * least > best.0) {
-                continue;
-            }
-            if node.is_leaf() {
-                for i in node.points() {
-                    let own = (distance_sq(positions[i]), i);
-                    best = if own < best { own } else { best };
-                }
-                continue;
-            }
-            let [left, right] = [id + 1, node.right as usize].map(|id| (bound(id), id));
-            let (near, far) = if left.0 <= right.0 { (left, right) } else { (right, left) };
-            (stack[top], stack[top + 1]) = (far, near);
-            top += 2;
-        }
-        (id32(best.1), looked_at)
-    }
-
     /// f at `x`, in the stored frame; allocates a scratch of its own.
     #[must_use]
     pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
         self.evaluate_with(x, &mut GatherScratch::default())
-    }
-
-    /// No stored coordinate is greater.
-    fn bounds_radius(&self) -> f64 {
-        let OrientedBox { centre, .. } = self.boxes[0];
-        f64::from(self.boxes[0].radius()) + f64::from(centre.iter().fold(0.0_f32, |far, c| far.max(c.abs())))
     }
 
     pub(crate) fn index(&self) -> Index<'_> {

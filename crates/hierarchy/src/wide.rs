@@ -4,6 +4,8 @@
 //! lanes of a register a pair costs a sixth of what it costs four at a time; the boxes of a level that is left out would have
 //! parted few (docs/decisions). Made from the binary tree whenever that is made or loaded, in O(nodes): nothing of it is stored.
 
+mod nearest;
+
 use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
