@@ -6,6 +6,7 @@ use fearless_simd::{Simd, f32x16, i16x16};
 
 use crate::boxes::{OrientedBox, sub};
 use crate::build::PointHierarchy;
+use crate::spacing::map;
 use crate::surfels::PointKind;
 
 /// Lanes of a block.
@@ -59,12 +60,14 @@ impl LeafBlock {
     /// When there is no such lane.
     #[expect(clippy::cast_possible_truncation, reason = "a cast of floats keeps within the range")]
     pub fn set(&mut self, lane: usize, position: [f32; 3], normal: [f32; 3], disc: f32) {
-        let steps = |x: f32| if self.step > 0.0 { (x / self.step).round() as i16 } else { 0 };
+        let nearest = |x: f32| (x + 0.5_f32.copysign(x)) as i16;
+        let per_step = if self.step > 0.0 { 1.0 / self.step } else { 0.0 };
+        let steps = |x: f32| nearest(x * per_step);
         let offset = sub(position, self.centre).map(steps);
         self.discs[lane] = steps(disc);
         for k in 0..3 {
             self.positions[k][lane] = offset[k];
-            self.normals[k][lane] = (normal[k] * STEPS).round() as i16;
+            self.normals[k][lane] = nearest(normal[k] * STEPS);
         }
     }
 
@@ -136,28 +139,28 @@ pub struct Leaves {
 }
 
 impl Leaves {
-    /// Those of this scan. O(n).
+    /// Those of this scan. O(n), on all cores.
     pub(crate) fn of(scan: &PointHierarchy) -> Self {
         let (slices, leaf_size) = (scan.slices(), scan.leaf_size as usize);
         let blocks_a_leaf = leaf_size.div_ceil(WIDTH);
-        let mut leaves = Self { points: scan.len(), leaf_size, blocks_a_leaf, ..Self::default() };
-        let ids = (0_u32..).zip(slices.nodes).filter(|(_, node)| node.is_leaf());
-        for ((id, node), bounds) in ids.map(|(id, node)| ((id, node), slices.boxes[id as usize])) {
-            leaves.ids.push(id);
-            leaves
-                .sparse
-                .push(slices.kinds[node.points()].iter().any(|&k| PointKind::from_code(k).is_sparse()));
-            let full = leaves.blocks.len() + blocks_a_leaf;
-            for first in node.points().step_by(WIDTH) {
-                let mut block = LeafBlock::new(&bounds);
-                for (lane, i) in (first..node.points().end.min(first + WIDTH)).enumerate() {
-                    block.set(lane, slices.positions[i], slices.normals[i], slices.discs[i]);
-                }
-                leaves.blocks.push(block);
+        let numbered = (0_u32..).zip(slices.nodes).filter(|(_, node)| node.is_leaf());
+        let (ids, sparse): (Vec<u32>, Vec<bool>) = numbered
+            .map(|(id, node)| {
+                let is_sparse = |&code: &u8| PointKind::from_code(code).is_sparse();
+                (id, slices.kinds[node.points()].iter().any(is_sparse))
+            })
+            .unzip();
+        let numbers: Vec<usize> = (0..ids.len() * blocks_a_leaf).collect();
+        let blocks = map(&numbers, |&number| {
+            let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
+            let mut block = LeafBlock::new(&slices.boxes[ids[leaf] as usize]);
+            let points = slices.nodes[ids[leaf] as usize].points();
+            for (lane, i) in points.skip(part * WIDTH).take(WIDTH).enumerate() {
+                block.set(lane, slices.positions[i], slices.normals[i], slices.discs[i]);
             }
-            leaves.blocks.resize(full, LeafBlock::new(&bounds));
-        }
-        leaves
+            block
+        });
+        Self { blocks, ids, sparse, points: scan.len(), leaf_size, blocks_a_leaf }
     }
 
     /// The leaf's id in the binary tree.
