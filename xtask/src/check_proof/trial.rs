@@ -29,11 +29,11 @@ const SHIFTS: [f64; 9] = [0.0, 0.06, 0.1, 0.14, 0.15, 0.175, 0.18, 0.2, 1.0];
 static TRIAL: OnceLock<Trial> = OnceLock::new();
 
 fn trial() -> &'static Trial {
-    TRIAL.get_or_init(|| Trial::new("0"))
+    TRIAL.get_or_init(|| Trial::new("0", &SHIFTS))
 }
 
 impl Trial {
-    fn new(margin: &str) -> Self {
+    fn new(margin: &str, shifts: &[f64]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let [scan, poses, proof] =
             ["dragon.nm", "poses.jsonl", "proof.jsonl"].map(|name| folder.path().join(name));
@@ -42,7 +42,7 @@ impl Trial {
         let identity = "[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]";
         let line =
             |y: &f64| format!("{{\"a\":{identity},\"b\":[0.8,0,-0.6,0,0,1,0,{y},0.6,0,0.8,0,0,0,0,1]}}\n");
-        fs::write(&poses, SHIFTS.iter().map(line).collect::<String>()).unwrap();
+        fs::write(&poses, shifts.iter().map(line).collect::<String>()).unwrap();
         let words = |paths: &[&str], path: &PathBuf| -> Vec<OsString> {
             paths.iter().map(OsString::from).chain([path.clone().into_os_string()]).collect()
         };
@@ -172,7 +172,9 @@ fn witnesses_lie_on_both_surfaces() {
 #[test]
 fn witnesses_between_surfaces_are_within_the_margin() {
     let margin = 0.012;
-    let trial = Trial::new(&margin.to_string());
+    // Some of the places where they come so near verify that they do.
+    let shifts: Vec<f64> = (0..16_u8).map(|i| 0.142 + 0.002 * f64::from(i)).collect();
+    let trial = Trial::new(&margin.to_string(), &shifts);
     let mut between = Vec::new();
     for line in &trial.lines {
         let finding = trial.checker().check(line);
