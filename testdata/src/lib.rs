@@ -11,5 +11,6 @@ pub mod cuts;
 
 pub mod arbitrary;
 pub mod dragon;
+pub mod instructions;
 pub mod matrices;
 pub mod scanner;

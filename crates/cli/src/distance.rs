@@ -1,6 +1,6 @@
 //! `distance`: how far two scans are apart.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
@@ -16,7 +16,7 @@ use crate::digits::{count, rounded, rounded_down, short};
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::input;
-use crate::posing::{self, PoseFile};
+use crate::posing::{self, PairArgs, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::word;
 use crate::sentence::world_radius;
@@ -24,16 +24,9 @@ use crate::sentence::world_radius;
 /// Options of `distance`.
 #[derive(Debug, Clone, Args)]
 pub struct DistanceArgs {
-    /// The one scan: prepared, or a raw input, prepared on the fly
-    pub a: PathBuf,
-    /// The other scan
-    pub b: PathBuf,
-    /// Pose of a, object to world: 16 numbers, row-major, in one argument, or a file that holds them
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub pose_a: Option<String>,
-    /// Pose of b
-    #[arg(long, value_name = "M", allow_hyphen_values = true)]
-    pub pose_b: Option<String>,
+    /// What is asked about
+    #[command(flatten)]
+    pub pair: PairArgs,
     /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b"])]
     pub poses: Option<PathBuf>,
@@ -89,11 +82,9 @@ struct Question<'a> {
 
 pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
-    let given = [("--pose-a", &args.pose_a), ("--pose-b", &args.pose_b)];
-    let [matrix_a, matrix_b] = given.map(|(name, given)| posing::from_option(name, given.as_deref()));
-    let matrices = [matrix_a?, matrix_b?];
+    let matrices = args.pair.matrices()?;
     let mut poses = args.poses.as_ref().map(|path| PoseFile::open(path)).transpose()?;
-    let inputs: [&Path; 2] = [&args.a, &args.b];
+    let inputs = args.pair.inputs();
     let threads = args.threads.unwrap_or(0);
     let [a, b] = if args.thickened.is_some() {
         let a = input::open(inputs[0], threads, console)?;
@@ -118,11 +109,7 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
             }
         }
         None => {
-            let placed = |name: &str, matrix, scan| {
-                posing::of_scan(matrix, scan)
-                    .map_err(|refused| CliError::Pose { place: name.into(), refused })
-            };
-            let placed = [placed("--pose-a", &matrices[0], &a)?, placed("--pose-b", &matrices[1], &b)?];
+            let placed = posing::of_options(&matrices, question.scans)?;
             question.answer(None, &placed, &mut scratch, &mut results)?;
         }
     }

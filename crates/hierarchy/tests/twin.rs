@@ -5,6 +5,7 @@ use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy};
 use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
+use nearmiss_testdata::instructions::levels;
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 
 const KINDS: [CloudKind; 14] = [
@@ -167,18 +168,6 @@ fn near_an_interior_sheet_the_function_is_ok() {
         assert!((at.f.abs() - (0.2 * h * z).abs()).abs() < 1e-5 * h, "f is the height");
     }
     assert!(ok >= 950, "{ok} of 1000");
-}
-
-/// Every instruction set there is here.
-fn levels() -> Vec<Level> {
-    let best = Level::new();
-    let mut levels = vec![best, Level::baseline()];
-    #[cfg(target_arch = "x86_64")]
-    {
-        levels.extend(best.as_avx2().map(Level::Avx2));
-        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
-    }
-    levels
 }
 
 /// f at `x` with all points of the scan offered.

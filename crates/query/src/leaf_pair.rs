@@ -170,6 +170,7 @@ mod tests {
     use nearmiss_geometry::Pose;
     use nearmiss_hierarchy::OrientedBox;
     use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+    use nearmiss_testdata::instructions::levels;
     use rand::RngExt;
 
     use super::*;
@@ -235,16 +236,6 @@ mod tests {
             (b.bounds.distance_sq(moved.centre) <= reach * reach).then_some(Near { lane, crossings })
         };
         lanes(a).filter_map(near).collect()
-    }
-
-    fn levels() -> Vec<Level> {
-        let mut levels = vec![Level::new(), Level::baseline()];
-        #[cfg(target_arch = "x86_64")]
-        {
-            levels.extend(Level::new().as_avx2().map(Level::Avx2));
-            levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
-        }
-        levels
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Neighbours of blocks of points against all points, in the same arithmetic.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use nearmiss_surface::{BlockTree, Heard, Level, Nearest, PointBlock};
+use nearmiss_surface::{BlockTree, Heard, Nearest, PointBlock};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
+use nearmiss_testdata::instructions::levels;
 
 type Point = [f32; 3];
 
@@ -25,14 +26,6 @@ fn blocks(points: &[Point], horizon: impl Fn(usize) -> f32) -> Vec<PointBlock> {
         blocks[i / 16].horizon[i % 16] = horizon(i);
     }
     blocks
-}
-
-/// The instruction sets that can be chosen here.
-fn levels() -> Vec<Level> {
-    let mut levels = vec![Level::new(), Level::baseline()];
-    #[cfg(target_arch = "x86_64")]
-    levels.extend(Level::new().as_avx2().map(Level::Avx2));
-    levels
 }
 
 fn distance_sq(a: Point, b: Point) -> f32 {

@@ -5,6 +5,7 @@ use nearmiss_geometry::nalgebra::Matrix3;
 use nearmiss_surface::{
     Eigen3, EigenBlock, Level, MatrixBlock, cubic_cholesky_eigen, symmetric_eigen, symmetric_eigen_batch,
 };
+use nearmiss_testdata::instructions::levels;
 use nearmiss_testdata::matrices::{Family, orthogonality_error, residual};
 use nearmiss_testdata::oracle;
 use proptest::prelude::*;
@@ -64,19 +65,6 @@ fn closed_form_agrees_with_rotations() {
             }
         }
     }
-}
-
-/// Every instruction set of this machine that a batch can run with, the greatest first.
-fn levels() -> Vec<Level> {
-    #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "there are more on x86"))]
-    let mut levels = vec![Level::new()];
-    #[cfg(target_arch = "x86_64")]
-    {
-        levels.extend(Level::new().as_avx2().map(Level::Avx2));
-        levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
-        levels.extend(Level::new().as_sse2().map(Level::Sse2));
-    }
-    levels
 }
 
 fn bits(eigen: &Eigen3) -> [u64; 12] {

@@ -2,6 +2,7 @@ use std::collections::BTreeSet;
 
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
+use nearmiss_testdata::instructions::levels;
 
 use super::*;
 use crate::options::BuildOptions;
@@ -15,16 +16,6 @@ fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) 
     let points: Vec<[f64; 3]> = (0..count).map(point).collect();
     let cloud = PointCloud::from_positions(&points).unwrap();
     PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(leaf_size)).unwrap()
-}
-
-fn levels() -> Vec<Level> {
-    let mut levels = vec![Level::new(), Level::baseline()];
-    #[cfg(target_arch = "x86_64")]
-    {
-        levels.extend(Level::new().as_avx2().map(Level::Avx2));
-        levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
-    }
-    levels
 }
 
 /// Notes all leaves, and ends after so many.

@@ -243,6 +243,7 @@ fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>;
 #[cfg(test)]
 mod tests {
     use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
+    use nearmiss_testdata::instructions::levels;
     use rand::RngExt;
 
     use super::*;
@@ -270,16 +271,6 @@ mod tests {
             last = distance;
         }
         last
-    }
-
-    fn levels() -> Vec<Level> {
-        let mut levels = vec![Level::new(), Level::baseline()];
-        #[cfg(target_arch = "x86_64")]
-        {
-            levels.extend(Level::new().as_avx2().map(Level::Avx2));
-            levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
-        }
-        levels
     }
 
     /// The motion by `pose` between scans about their origins that reach as far as 4.

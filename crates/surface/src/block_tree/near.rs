@@ -207,19 +207,10 @@ fn square(length: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, rotation, unit_vector};
+    use nearmiss_testdata::instructions::levels;
 
     use super::*;
     use crate::PointBlock;
-
-    fn levels() -> Vec<Level> {
-        let mut levels = vec![Level::new(), Level::baseline()];
-        #[cfg(target_arch = "x86_64")]
-        {
-            levels.extend(Level::new().as_avx2().map(Level::Avx2));
-            levels.extend(Level::new().as_sse4_2().map(Level::Sse4_2));
-        }
-        levels
-    }
 
     /// The nearest point, one by one.
     fn nearest(points: &[[f32; 3]], skeleton: &Skeleton) -> (usize, f64) {
