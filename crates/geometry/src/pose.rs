@@ -146,60 +146,70 @@ impl Pose {
     }
 
     /// The same pose about another scale of the object.
+    #[inline]
     #[must_use]
     pub fn with_scale(self, scale: f64) -> Self {
         Self { scale, ..self }
     }
 
     /// The same pose, moved to `t`.
+    #[inline]
     #[must_use]
     pub fn with_translation(self, t: [f64; 3]) -> Self {
         Self { translation: t.into(), ..self }
     }
 
     /// The rotation.
+    #[inline]
     #[must_use]
     pub fn rotation(&self) -> &Matrix3<f64> {
         &self.rotation
     }
 
     /// Where the object's zero lies in the world.
+    #[inline]
     #[must_use]
     pub fn translation(&self) -> [f64; 3] {
         self.translation.into()
     }
 
     /// The uniform scale, positive.
+    #[inline]
     #[must_use]
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
     /// A point of the object in the world.
+    #[inline]
     #[must_use]
     pub fn apply(&self, p: [f64; 3]) -> [f64; 3] {
         (self.scale * (self.rotation * Vector3::from(p)) + self.translation).into()
     }
 
     /// A point of the world in the object.
+    #[inline]
     #[must_use]
     pub fn apply_inverse(&self, p: [f64; 3]) -> [f64; 3] {
         (self.rotation.tr_mul(&(Vector3::from(p) - self.translation)) / self.scale).into()
     }
 
     /// A direction of the object in the world, of the same length.
+    #[inline]
     #[must_use]
     pub fn rotate(&self, v: [f64; 3]) -> [f64; 3] {
         (self.rotation * Vector3::from(v)).into()
     }
 
     /// A direction of the world in the object, of the same length.
+    #[inline]
     #[must_use]
     pub fn rotate_inverse(&self, v: [f64; 3]) -> [f64; 3] {
         self.rotation.tr_mul(&Vector3::from(v)).into()
     }
 
     /// `self` after `inner`: x ↦ self(inner(x)).
+    #[inline]
     #[must_use]
     pub fn after(&self, inner: &Self) -> Self {
         Self {
@@ -210,6 +220,7 @@ impl Pose {
     }
 
     /// The pose that undoes this one.
+    #[inline]
     #[must_use]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.transpose();

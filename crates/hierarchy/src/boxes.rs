@@ -151,6 +151,14 @@ impl Relative {
         ]
     }
 
+    /// A point of a's frame in b's.
+    #[inline]
+    #[must_use]
+    pub fn point_back(&self, p: [f32; 3]) -> [f32; 3] {
+        let p = sub(p, self.translation);
+        self.direction_back(p).map(|x| x * self.scale_back)
+    }
+
     /// A direction of a's frame in b's.
     #[inline]
     #[must_use]

@@ -12,6 +12,7 @@ use crate::growth::Growth;
 use crate::levels::samples;
 use crate::neighbours::{NeighbourList, groups, neighbours};
 use crate::options::{BuildError, BuildOptions};
+use crate::outline::Outline;
 use crate::samples::lists;
 use crate::sampling::Sampling;
 use crate::spacing::map;
@@ -46,6 +47,7 @@ pub struct PointHierarchy {
     pub(crate) nodes: Array<Node>,
     pub(crate) boxes: Array<OrientedBox>,
     pub(crate) wide: WideTree,
+    pub(crate) outline: Outline,
     pub(crate) growths: Array<Growth>,
     pub(crate) sample_lists: Array<u32>,
     pub(crate) coverings: Array<Covering>,
@@ -76,6 +78,8 @@ pub struct Slices<'a> {
     pub boxes: &'a [OrientedBox],
     /// The tree with four children a node.
     pub wide: &'a WideTree,
+    /// What tells the scan from others, and where it is.
+    pub outline: &'a Outline,
     /// What the boxes must grow by to contain each node's part of the surface.
     pub growths: &'a [Growth],
     /// The points in blocks: see [`PointHierarchy::blocks`].
@@ -143,6 +147,7 @@ impl PointHierarchy {
     }
 
     /// The arrays that a query reads.
+    #[inline]
     #[must_use]
     pub fn slices(&self) -> Slices<'_> {
         Slices {
@@ -154,6 +159,7 @@ impl PointHierarchy {
             nodes: &self.nodes,
             boxes: &self.boxes,
             wide: &self.wide,
+            outline: &self.outline,
             growths: &self.growths,
             blocks: &self.blocks,
             sample_lists: &self.sample_lists,
@@ -259,7 +265,12 @@ impl PointHierarchy {
             }
         }
         self.is_oriented = true;
+    }
+
+    /// Makes anew what is not stored, after discs or boxes have changed. Signs of normals, which say nothing to leaves, do not matter.
+    pub(crate) fn derive(&mut self) {
         self.wide = WideTree::of(self);
+        self.outline = Outline::of(self);
     }
 
     /// Local sampling radii r_i.
@@ -278,6 +289,7 @@ impl PointHierarchy {
     ///
     /// # Panics
     /// When there is no such point.
+    #[inline]
     #[must_use]
     pub fn kind(&self, i: usize) -> PointKind {
         PointKind::from_code(self.kinds[i])
@@ -307,6 +319,7 @@ impl PointHierarchy {
     ///
     /// # Panics
     /// When there is no such point.
+    #[inline]
     #[must_use]
     pub fn id(&self, i: usize) -> PointId {
         PointId(self.source[i])
@@ -418,6 +431,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         kinds: kinds.into(),
         source: source.into(),
         wide: WideTree::default(),
+        outline: Outline::default(),
         nodes: nodes.into(),
         boxes: boxes.into(),
         growths: growths.into(),
@@ -429,6 +443,6 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         lists: lists_of_blocks.lists.into(),
         listed: lists_of_blocks.entries.into(),
     };
-    hierarchy.wide = WideTree::of(&hierarchy);
+    hierarchy.derive();
     Ok(hierarchy)
 }

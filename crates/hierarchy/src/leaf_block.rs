@@ -181,6 +181,27 @@ impl Leaves {
         first..self.points.min(first + self.leaf_size)
     }
 
+    /// The leaf of a point.
+    #[inline]
+    #[must_use]
+    pub fn leaf_of(&self, i: usize) -> usize {
+        i / self.leaf_size
+    }
+
+    /// The block with a point, its first point and how many it has.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn block_with(&self, i: usize) -> (&LeafBlock, usize, usize) {
+        let (leaf, within) = (i / self.leaf_size, i % self.leaf_size);
+        let part = within / WIDTH;
+        let first = i - within % WIDTH;
+        let count = (self.points(leaf).end - first).min(WIDTH);
+        (&self.blocks[leaf * self.blocks_a_leaf + part], first, count)
+    }
+
     /// Whether some of them are [sparse](PointKind::is_sparse).
     #[inline]
     #[must_use]

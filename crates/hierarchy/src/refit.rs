@@ -15,7 +15,6 @@ use crate::neighbours::chunks;
 use crate::spacing::map;
 use crate::split::id32;
 use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, cone, surfel_among};
-use crate::wide::WideTree;
 
 impl PointHierarchy {
     /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about them. Only of the
@@ -115,6 +114,6 @@ impl PointHierarchy {
         self.cones = cones.into();
         self.boxes = boxes.into();
         self.coverings = coverings.into();
-        self.wide = WideTree::of(self);
+        self.derive();
     }
 }

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::build::PointHierarchy;
+use crate::outline::Outline;
 use crate::sanity::Flaw;
 use crate::wide::WideTree;
 
@@ -130,6 +131,7 @@ impl PointHierarchy {
             nodes: file.array(NODES, 0)?,
             boxes: file.array(BOXES, 0)?,
             wide: WideTree::default(),
+            outline: Outline::default(),
             growths: file.array(GROWTHS, 0)?,
             sample_lists: file.array(SAMPLES, 0)?,
             coverings: file.array(COVERINGS, 0)?,
@@ -140,7 +142,7 @@ impl PointHierarchy {
             listed: file.array(LISTED, 0)?,
         };
         hierarchy.check_structure()?;
-        hierarchy.wide = WideTree::of(&hierarchy);
+        hierarchy.derive();
         if check == Check::Full {
             hierarchy.check_contents()?;
         }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{
-    Frontier, Heap, NodePair, Relative, SLACK, Stack, Visitor, WideStack, descend, descend_wide,
+    Ball, Frontier, Heap, NodePair, Relative, SLACK, Stack, Visitor, WideStack, descend, descend_wide,
 };
 
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
@@ -18,10 +18,10 @@ use crate::hint::{Known, PairHint};
 use crate::interpolation::InterpolationScratch;
 use crate::leaf_pair::Instructions;
 use crate::likelihood::likelihood;
-use crate::options::{CollideOptions, CollidePlan, Method, Order, Semantics};
+use crate::options::{CollideOptions, CollidePlan, Detail, Method, Order, Semantics};
 use crate::posed::Posed;
 use crate::surface::{Surfaces, Workspace};
-use crate::thickened::Balls;
+use crate::thickened::{Balls, balls_meet};
 use crate::verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
 
@@ -215,7 +215,17 @@ fn search(
     // than crossings, depends on the way to them.
     let is_exact = budget.resolution.is_none() && options.method == Method::Traversal;
     let hint = extras.hint.filter(|_| is_exact);
-    let known = hint.map(|hint| hint.recall(&pair, options, pose));
+    let mut known = hint.map(|hint| hint.recall(&pair, options));
+    if let Some(known) = &mut known {
+        if let Some(met) = known.met(&pair)
+            && let Some((contact, evidence)) = still_meet(&pair, plan, met)
+        {
+            known.still_met(pose);
+            let verdict = Verdict::Intersecting { contact, evidence };
+            return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
+        }
+        known.come_to(pose, &pair);
+    }
     if let Some(distance) = known.as_ref().and_then(|known| known.distance(&pair, plan.reach())) {
         let verdict = apart(options, distance, true);
         return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
@@ -223,6 +233,18 @@ fn search(
     match options.semantics {
         Semantics::Surface => surfaces(pair, options, budget, scratch, (known, extras.proof, extras.all)),
         Semantics::Thickened(_) => balls(pair, plan, scratch, known, extras.all),
+    }
+}
+
+/// What is seen of a contact at the points of another.
+fn still_meet(pair: &Posed<'_>, plan: &CollidePlan, [i, j]: [usize; 2]) -> Option<(Contact, Evidence)> {
+    match plan.options().semantics {
+        Semantics::Thickened(_) => {
+            balls_meet(pair, plan.reach(), [i, j]).map(|contact| (contact, Evidence::Certified))
+        }
+        // A witness takes a search of its own.
+        Semantics::Surface if plan.options().detail == Detail::Witness => None,
+        Semantics::Surface => pair.crosses([i, j]).then(|| (pair.shared_chord(i, j), Evidence::Estimated)),
     }
 }
 
@@ -266,7 +288,8 @@ fn surfaces(
         interpolation,
         all: contacts,
     };
-    let mut search = Surfaces::new(pair, options, budget, known.is_some(), workspace);
+    let is_slow = known.as_ref().is_some_and(|known| known.keeps_front(&pair));
+    let mut search = Surfaces::new(pair, options, budget, is_slow, workspace);
     let ended = look(&mut search, options, known.as_deref_mut(), frontiers).is_break();
     if let Some(complete) = complete {
         *complete = !ended;
@@ -306,7 +329,7 @@ fn surfaces(
     if let Some(known) = known
         && !matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
     {
-        if parted {
+        if parted && is_slow {
             known.parted((excluded, compared), slack, options.certifies(), certifier.doubtful);
         } else {
             known.forget(met);
@@ -341,8 +364,8 @@ fn look(
         }
     }
     if let Some(known) = known {
-        if let Some(pair) = known.met(&search.pair) {
-            search.leaves(pair)?;
+        if let Some(points) = known.met(&search.pair) {
+            search.leaves(search.pair.leaves_of(points))?;
             search.compared.clear();
         }
         if known.has_front(&search.pair, search.reach, options.certifies()) {
@@ -375,7 +398,7 @@ fn balls(
     let mut search = Balls::new(pair, plan.reach(), contacts);
     scratch.frontiers.clear();
     let again = known.as_ref().and_then(|known| known.met(&search.pair));
-    let mut ended = again.is_some_and(|leaves| search.leaves(leaves).is_break());
+    let mut ended = again.is_some_and(|points| search.leaves(search.pair.leaves_of(points)).is_break());
     if !ended {
         search.apart = f64::INFINITY;
         ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.frontiers.stack).is_break();
@@ -437,13 +460,12 @@ pub(crate) fn relative(
         return Err(None);
     }
     let [(ca, ra, own), (cb, rb, _)] = [a, b].map(|view| {
-        // The enclosure contains the box.
-        let root = match plan.options().semantics {
-            Semantics::Surface => view.slices().enclosure(0),
-            Semantics::Thickened(_) => view.slices().boxes[0],
+        let outline = view.slices().outline;
+        let Ball { centre, radius } = match plan.options().semantics {
+            Semantics::Surface => outline.surface,
+            Semantics::Thickened(_) => outline.discs,
         };
-        let centre = view.placed().apply(root.centre.map(f64::from));
-        (Vector3::from(centre), f64::from(root.radius()) * view.placed().scale(), root.centre)
+        (Vector3::from(view.placed().apply(centre)), radius * view.placed().scale(), centre)
     });
     // What double precision loses of places far from the origin of the world.
     let far = [a, b].map(|view| Vector3::from(view.placed().translation()).norm());
@@ -458,7 +480,7 @@ pub(crate) fn relative(
     }
     let pose = a.placed().inverse().after(b.placed());
     // Coordinates in a's stored frame: of its own points, and of b's.
-    let own = Vector3::from(own.map(f64::from)).norm();
+    let own = Vector3::from(own).norm();
     let extent = own + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
     let shift = Vector3::from(pose.translation()).norm();
     // The slack of the motion is a share of its reach.

@@ -5,8 +5,9 @@ use std::ops::ControlFlow;
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{LeafBlock, LeafVisitor, NodePair};
 
+use crate::disc_pair::FAR;
 use crate::leaf_pair::{Discs, LeafPair, Near};
-use crate::surface::{FAR, Surfaces};
+use crate::surface::Surfaces;
 use crate::verdict::Reason;
 
 impl LeafVisitor for Surfaces<'_> {
@@ -25,11 +26,7 @@ impl LeafVisitor for Surfaces<'_> {
             // One is enough to know that no proof would hold.
             self.compared.push(pair());
         }
-        let flow = self.compare_leaves(leaves, true);
-        if self.found.is_some() {
-            self.met.get_or_insert_with(pair);
-        }
-        flow
+        self.compare_leaves(leaves, true)
     }
 }
 
@@ -83,15 +80,15 @@ impl Surfaces<'_> {
         let of_b = first_b..first_b + test.b.count;
         // Where nothing but crossings counts, only points with some are looked at.
         let each = sparse_a || sparse_b || self.margin > 0.0;
-        let mut from = 0;
-        while let Some(Near { lane, crossings }) = test.next(self.instructions, from, each) {
-            from = lane + 1;
-            let i = first_a + lane as usize;
+        let mut lanes = u32::MAX;
+        while let Some(Near { lane, crossings }) = test.next(self.instructions, lanes, each) {
+            lanes = u32::MAX << 1 << lane;
+            let i = first_a + lane;
             let ball = if sparse_a { self.pair.a.ball(i) } else { 0.0 };
             let is_open = self.doubt == Some(Reason::Undersampled);
             if (ball > 0.0 || sparse_b)
                 && !is_open
-                && self.comes_near_sparse(&self.disc_a(i), ball, of_b.clone())
+                && self.comes_near_sparse(&self.pair.disc_a(i), ball, of_b.clone())
             {
                 self.doubt = Some(Reason::Undersampled);
             }
@@ -118,11 +115,11 @@ impl Surfaces<'_> {
         while crossings != 0 {
             let j = first + crossings.trailing_zeros() as usize;
             crossings &= crossings - 1;
-            let (distance, [ra, rb]) = self.points(i, j);
+            let (distance, [ra, rb]) = self.pair.points(i, j);
             if distance > FAR * ra.max(rb) {
                 continue;
             }
-            match self.doubt_about(i, j) {
+            match self.pair.doubt_about(i, j) {
                 Some(reason) => _ = self.doubt.get_or_insert(reason),
                 None => return self.crossed(i, j),
             }

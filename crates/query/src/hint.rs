@@ -8,8 +8,8 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{Frame, NodeId, Pose};
-use nearmiss_hierarchy::{Frontier, Node, NodePair, OrientedBox, PointHierarchy, Stack, descend, resume};
+use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_hierarchy::{Ball, Frontier, Node, NodePair, Stack, descend, resume};
 use serde::{Deserialize, Serialize};
 
 use crate::certify::{Bound, Certifier, Excluded};
@@ -22,6 +22,13 @@ const GROWN: usize = 3;
 
 /// Where more than one in so many pairs of the front has expired, a search from the roots is cheaper.
 const MOST_EXPIRED: usize = 4;
+
+/// Steps of up to so many sampling radii find enough of a front as it was: after longer ones a search from the roots, sixteen pairs
+/// at a time, is faster (benches/record).
+const SLOW: f64 = 0.2;
+
+/// The same of a front of enclosures.
+const SLOW_PROVEN: f64 = 1.0;
 
 /// A travel of more slacks than this is begun anew: gaps beside it would lose their digits.
 const LONGEST: f64 = (1_u64 << 40) as f64;
@@ -41,42 +48,10 @@ pub struct PairHint {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Question {
     options: CollideOptions,
-    scans: [Likeness; 2],
+    /// Their [identities](nearmiss_hierarchy::Outline).
+    scans: [u64; 2],
     /// Of a's stored frame in the world.
     scale: f64,
-}
-
-/// What tells scans apart: most of it moves when any point does.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-struct Likeness {
-    frame: Frame,
-    points: usize,
-    leaf_size: u32,
-    sampling_radius: f32,
-    ends: [[f32; 3]; 2],
-    /// Bits of the numbers of the root: its box, and its bandwidth, to which all local radii add.
-    root: [u32; 16],
-}
-
-impl Likeness {
-    fn of(scan: &PointHierarchy) -> Self {
-        let positions = scan.positions();
-        let at = |i: usize| positions.get(i).copied().unwrap_or_default();
-        let slices = scan.slices();
-        let OrientedBox { centre, half, axes: [u, v, w], .. } = slices.boxes[0];
-        let mut root = [slices.node_bandwidth(0).to_bits(); 16];
-        for (bits, x) in root.iter_mut().zip([centre, half, u, v, w].into_iter().flatten()) {
-            *bits = x.to_bits();
-        }
-        Self {
-            frame: *scan.frame(),
-            points: scan.len(),
-            leaf_size: scan.leaf_size(),
-            sampling_radius: slices.sampling_radius,
-            ends: [at(0), at(scan.len() - 1)],
-            root,
-        }
-    }
 }
 
 /// A pair of nodes that are no nearer each other than b has still to travel until then.
@@ -91,11 +66,13 @@ struct Standing {
 pub(crate) struct Known {
     question: Question,
     /// Of b's stored frame in a's, when last asked.
-    pose: Pose,
+    pose: Option<Pose>,
     /// How far b has come since the first question.
     travel: f64,
-    /// The leaves that met.
-    met: Option<NodePair>,
+    /// And since the last one.
+    step: f64,
+    /// The points that met.
+    met: Option<[u32; 2]>,
     /// The scans are no nearer each other than b has still to travel until then.
     clear: f64,
     /// Pairs that cover all pairs of points, if whole.
@@ -110,17 +87,36 @@ pub(crate) struct Known {
 }
 
 impl PairHint {
-    /// What is known of this question, with b now at `pose`.
-    pub(crate) fn recall(&mut self, pair: &Posed<'_>, options: &CollideOptions, pose: Pose) -> &mut Known {
+    /// What is known of this question, not yet about this pose: that is for [`Known::come_to`].
+    pub(crate) fn recall(&mut self, pair: &Posed<'_>, options: &CollideOptions) -> &mut Known {
         let question = Question {
             options: *options,
-            scans: pair.views.map(|view| Likeness::of(view.scan())),
+            scans: pair.views.map(|view| view.slices().outline.identity),
             scale: pair.views[0].placed().scale(),
         };
-        let nothing = || Known {
+        match &mut self.known {
+            Some(known) if known.question == question => {}
+            known => *known = Some(Known::nothing(question)),
+        }
+        self.known.get_or_insert_with(|| Known::nothing(question))
+    }
+}
+
+/// How far the motion from one pose to another takes any point of b at most.
+fn motion(pair: &Posed<'_>, from: &Pose, to: &Pose) -> f64 {
+    let Ball { centre, radius } = pair.b.outline.surface;
+    let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
+    let turn = (to.rotation() * to.scale() - from.rotation() * from.scale()).norm();
+    (shift + turn * radius) * (1.0 + 1e-9)
+}
+
+impl Known {
+    fn nothing(question: Question) -> Self {
+        Self {
             question,
-            pose,
+            pose: None,
             travel: 0.0,
+            step: f64::MAX,
             met: None,
             clear: f64::MIN,
             front: Vec::new(),
@@ -128,35 +124,46 @@ impl PairHint {
             is_proof: false,
             fresh: 0,
             doubtful: None,
-        };
-        let known = self.known.get_or_insert_with(nothing);
-        let motion = motion(pair, &known.pose, &pose);
-        // Rounded so that no step is lost.
-        let travel = if motion > 0.0 { (known.travel + motion).next_up() } else { known.travel };
-        if known.question == question && motion >= 0.0 && travel <= LONGEST * f64::from(pair.relative.slack())
-        {
-            known.travel = travel;
-            known.pose = pose;
-        } else {
-            // The room of the front is kept.
-            let mut front = std::mem::take(&mut known.front);
-            front.clear();
-            *known = Known { front, ..nothing() };
         }
-        known
     }
-}
 
-/// How far the motion from one pose to another takes any point of b at most.
-fn motion(pair: &Posed<'_>, from: &Pose, to: &Pose) -> f64 {
-    let root = pair.b.enclosure(0);
-    let centre = root.centre.map(f64::from);
-    let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
-    let turn = (to.rotation() * to.scale() - from.rotation() * from.scale()).norm();
-    (shift + turn * f64::from(root.radius())) * (1.0 + 1e-9)
-}
+    /// b is at `pose` now. After too long a way, or one that is no number, all but the question is forgotten.
+    pub(crate) fn come_to(&mut self, pose: Pose, pair: &Posed<'_>) {
+        self.step = self.pose.map_or(f64::MAX, |from| motion(pair, &from, &pose));
+        self.pose = Some(pose);
+        // Rounded so that no step is lost.
+        let travel = if self.step > 0.0 { (self.travel + self.step).next_up() } else { self.travel };
+        if self.step >= 0.0 && travel <= LONGEST * f64::from(pair.relative.slack()) {
+            self.travel = travel;
+        } else {
+            self.forget(None);
+            self.travel = 0.0;
+        }
+    }
 
-impl Known {
+    /// The points that met last time, if there are such: files lie.
+    pub(crate) fn met(&self, pair: &Posed<'_>) -> Option<[usize; 2]> {
+        let met = self.met?.map(|i| i as usize);
+        (met[0] < pair.a.positions.len() && met[1] < pair.b.positions.len()).then_some(met)
+    }
+
+    /// b has come to `pose`, and the same points meet there: nothing else rests on the way.
+    pub(crate) fn still_met(&mut self, pose: Pose) {
+        self.pose = Some(pose);
+    }
+
+    /// Whether a front is worth its keep: nothing met last time, and b moves slowly.
+    pub(crate) fn keeps_front(&self, pair: &Posed<'_>) -> bool {
+        self.met.is_none() && self.is_slow(pair, SLOW)
+    }
+
+    /// Whether b moves no more than so many sampling radii.
+    fn is_slow(&self, pair: &Posed<'_>, radii: f64) -> bool {
+        let scale = f64::from(pair.relative.scale());
+        let [a, b] = [pair.a, pair.b].map(|scan| f64::from(scan.sampling_radius));
+        self.step <= radii * a.min(b * scale)
+    }
+
     /// A lower bound of the distance of the scans in the world, without any search, if it is beyond `reach`.
     pub(crate) fn distance(&self, pair: &Posed<'_>, reach: f64) -> Option<f64> {
         // The pose is rounded now as it was then.
@@ -164,17 +171,15 @@ impl Known {
         (left > f64::from(pair.stored(reach))).then(|| left * pair.views[0].placed().scale() * (1.0 - 1e-9))
     }
 
-    /// The leaves that met last time, if there are such: files lie.
-    pub(crate) fn met(&self, pair: &Posed<'_>) -> Option<NodePair> {
-        self.met.filter(|&met| are_leaves(pair, met))
-    }
-
     /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail again.
     pub(crate) fn has_front(&self, pair: &Posed<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
             are_leaves(pair, leaves) && pair.gaps_of_enclosures([leaves.a; 2], [leaves.b; 2])[0] <= reach
         };
-        self.is_there(pair) && !self.is_proof && (!certifies || self.doubtful.as_ref().is_some_and(fails))
+        self.is_slow(pair, SLOW)
+            && self.is_there(pair)
+            && !self.is_proof
+            && (!certifies || self.doubtful.as_ref().is_some_and(fails))
     }
 
     /// Whether a proof is known to fail, at leaves that [`Known::has_front`] has looked at.
@@ -206,7 +211,8 @@ impl Known {
     /// Goes on from the front of a proof, if there is one: how far the scans are apart at least, if it can be made
     /// whole again.
     pub(crate) fn prove_again(&mut self, certifier: &mut Certifier<'_>, stack: &mut Stack) -> Option<f64> {
-        if !self.is_proof || !self.is_there(&certifier.pair) {
+        let pair = &certifier.pair;
+        if !self.is_proof || !self.is_slow(pair, SLOW_PROVEN) || !self.is_there(pair) {
             return None;
         }
         stack.clear();
@@ -264,8 +270,10 @@ impl Known {
         (self.travel + (f64::from(gap) - f64::from(slack))).next_down()
     }
 
-    /// The leaves of `pair` meet, or nothing is known.
-    pub(crate) fn forget(&mut self, met: Option<NodePair>) {
+    /// The points `met`, or nothing is known.
+    pub(crate) fn forget(&mut self, met: Option<[usize; 2]>) {
+        #[expect(clippy::cast_possible_truncation, reason = "points are counted in 32 bits")]
+        let met = met.map(|met| met.map(|i| i as u32));
         self.met = met;
         self.clear = f64::MIN;
         self.front.clear();

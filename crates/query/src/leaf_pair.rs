@@ -6,7 +6,9 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_hierarchy::{LeafBlock, Relative, THICKNESS};
+use nearmiss_hierarchy::{LeafBlock, Leaves, Relative, THICKNESS};
+
+use crate::crossing::{Disc, crossing};
 
 const WIDTH: usize = LeafBlock::WIDTH;
 
@@ -28,7 +30,19 @@ pub(crate) struct Discs<'a> {
     pub(crate) count: usize,
 }
 
-impl Discs<'_> {
+impl<'a> Discs<'a> {
+    /// Those of the block with point `i`, and its lane.
+    pub(crate) fn about(leaves: &'a Leaves, i: usize) -> (Self, usize) {
+        let (block, first, count) = leaves.block_with(i);
+        (Self { block, count }, i - first)
+    }
+
+    /// That in a lane.
+    pub(crate) fn disc(&self, lane: usize) -> Disc {
+        let block = self.block;
+        Disc { centre: block.position(lane), normal: block.normal(lane), radius: block.disc(lane) }
+    }
+
     /// The lanes that have one, as bits.
     #[inline]
     fn lanes(&self) -> u32 {
@@ -51,26 +65,37 @@ pub(crate) struct LeafPair<'a> {
 /// A point of a that reaches b's box, and which discs of b cross its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Near {
-    pub(crate) lane: u32,
+    pub(crate) lane: usize,
     /// Lanes of b, as bits.
     pub(crate) crossings: u32,
 }
 
 impl LeafPair<'_> {
-    /// The first from lane `from` on that crosses something, or, if `each`, that reaches the box at all; the same by any
+    /// The first of some `lanes`, as bits, that crosses something, or, if `each`, that reaches the box at all; the same by any
     /// instructions.
     #[inline]
-    pub(crate) fn next(&self, by: Instructions, from: u32, each: bool) -> Option<Near> {
+    pub(crate) fn next(&self, by: Instructions, lanes: u32, each: bool) -> Option<Near> {
         dispatch!(by.0, simd => simd.vectorize(
             #[inline(always)]
-            || self.next_by(simd, from, each),
+            || self.next_by(simd, lanes, each),
         ))
     }
 
+    /// Whether the discs in two lanes cross: the same as [`Self::next`] says of them.
+    pub(crate) fn cross_alone(&self, lane_a: usize, lane_b: usize) -> bool {
+        let disc = self.a.disc(lane_a);
+        let moved = Disc {
+            centre: self.relative.point_back(disc.centre),
+            normal: self.relative.direction_back(disc.normal),
+            radius: disc.radius * self.relative.scale_back(),
+        };
+        crossing(&moved, &self.b.disc(lane_b))
+    }
+
     #[inline(always)]
-    fn next_by<S: Simd>(&self, simd: S, from: u32, each: bool) -> Option<Near> {
+    fn next_by<S: Simd>(&self, simd: S, lanes: u32, each: bool) -> Option<Near> {
         let centres = self.relative.points_back(&self.a.block.positions(simd));
-        let mut candidates = self.near_box(simd, &centres) & self.a.lanes() & u32::MAX.unbounded_shl(from);
+        let mut candidates = self.near_box(simd, &centres) & self.a.lanes() & lanes;
         if candidates == 0 {
             return None;
         }
@@ -91,8 +116,7 @@ impl LeafPair<'_> {
             left &= left - 1;
         }
         while candidates != 0 {
-            let number = candidates.trailing_zeros();
-            let lane = number as usize & (WIDTH - 1);
+            let lane = candidates.trailing_zeros() as usize & (WIDTH - 1);
             candidates &= candidates - 1;
             let mut crossings = 0;
             if nears[lane] != 0 {
@@ -104,7 +128,7 @@ impl LeafPair<'_> {
                 crossings = nears[lane] & bits(crossing);
             }
             if each || crossings != 0 {
-                return Some(Near { lane: number, crossings });
+                return Some(Near { lane, crossings });
             }
         }
         None
@@ -174,7 +198,6 @@ mod tests {
     use rand::RngExt;
 
     use super::*;
-    use crate::crossing::{Disc, crossing};
 
     /// Some discs about the origin, in one block.
     struct Leaf {
@@ -209,29 +232,24 @@ mod tests {
         fn discs(&self) -> Discs<'_> {
             Discs { block: &self.block, count: self.count }
         }
-
-        fn disc(&self, lane: usize) -> Disc {
-            let block = &self.block;
-            Disc { centre: block.position(lane), normal: block.normal(lane), radius: block.disc(lane) }
-        }
     }
 
     /// Who reaches the box and what it crosses there, one by one.
     fn one_by_one(test: &LeafPair<'_>, a: &Leaf, b: &Leaf) -> Vec<Near> {
         let back = test.relative.scale_back();
-        let lanes = |leaf: &Leaf| (0..16_u32).take(leaf.count);
+        let lanes = |leaf: &Leaf| 0..leaf.count;
         let [tx, ty, tz] = test.relative.point([0.0; 3]);
-        let near = |lane: u32| {
-            let disc = a.disc(lane as usize);
+        let near = |lane: usize| {
+            let disc = a.discs().disc(lane);
             let [x, y, z] = disc.centre;
             let moved = Disc {
                 centre: test.relative.direction_back([x - tx, y - ty, z - tz]).map(|c| c * back),
                 normal: test.relative.direction_back(disc.normal),
                 radius: disc.radius * back,
             };
-            let ball = test.balls.map_or(0.0, |balls| balls[lane as usize]);
-            let reach = (a.block.disc(lane as usize).max(ball) + test.reach) * back;
-            let crosses = |j: &u32| crossing(&moved, &b.disc(*j as usize));
+            let ball = test.balls.map_or(0.0, |balls| balls[lane]);
+            let reach = (a.block.disc(lane).max(ball) + test.reach) * back;
+            let crosses = |&j: &usize| crossing(&moved, &b.discs().disc(j));
             let crossings = lanes(b).filter(crosses).fold(0, |bits, j| bits | 1 << j);
             (b.bounds.distance_sq(moved.centre) <= reach * reach).then_some(Near { lane, crossings })
         };
@@ -261,14 +279,18 @@ mod tests {
             let expected = one_by_one(&test, &a, &b);
             for level in levels() {
                 for each in [true, false] {
-                    let (mut found, mut from) = (Vec::new(), 0);
-                    while let Some(near) = test.next(Instructions(level), from, each) {
-                        from = near.lane + 1;
+                    let (mut found, mut lanes) = (Vec::new(), u32::MAX);
+                    while let Some(near) = test.next(Instructions(level), lanes, each) {
+                        lanes = u32::MAX << 1 << near.lane;
                         found.push(near);
                     }
                     let wanted = expected.iter().filter(|near| each || near.crossings != 0);
                     assert!(found.iter().eq(wanted), "round {round}, {level:?}: {found:?} for {expected:?}");
                 }
+            }
+            for near in &expected {
+                let alone = (0..b.count).filter(|&j| test.cross_alone(near.lane, j));
+                assert_eq!(alone.fold(0, |bits, j| bits | 1 << j), near.crossings, "round {round}, {near:?}");
             }
             reached += expected.len();
             crossed += expected.iter().filter(|near| near.crossings != 0).count();

@@ -8,6 +8,7 @@ mod collide;
 mod compare;
 mod crossing;
 mod curve;
+mod disc_pair;
 mod distance;
 mod hint;
 mod interpolation;

@@ -54,10 +54,10 @@ fn nearest(disc: &Disc, p: Vector3<f32>) -> Vector3<f32> {
 impl Surfaces<'_> {
     /// The disc of point `i` against those of some points of b that come nearer than the margin.
     pub(crate) fn near_discs(&mut self, i: usize, of_b: Range<usize>) -> ControlFlow<()> {
-        let disc = self.disc_a(i);
+        let disc = self.pair.disc_a(i);
         for j in of_b {
             self.pair.meter.go_on()?;
-            let other = self.disc_b(j);
+            let other = self.pair.disc_b(j);
             let distance = (Vector3::from(disc.centre) - Vector3::from(other.centre)).norm();
             if distance > self.reach + disc.radius + other.radius {
                 continue;
@@ -70,7 +70,7 @@ impl Surfaces<'_> {
             }
             self.pair.meter.leaf_work(PAIRS_A_DISTANCE);
             if let Some([x, y]) = near(&disc, &other, self.reach) {
-                match self.doubt_about(i, j) {
+                match self.pair.doubt_about(i, j) {
                     Some(reason) => _ = self.doubt.get_or_insert(reason),
                     None => {
                         let placed = self.pair.views[0].placed();
@@ -87,6 +87,7 @@ impl Surfaces<'_> {
     fn met(&mut self, places: [Vector3<f64>; 2], i: usize, j: usize) -> ControlFlow<()> {
         let contact = self.between(places, i, j);
         self.tries += 1;
+        self.met.get_or_insert([i, j]);
         let certified = if self.is_settled() { None } else { self.approach(places, &contact, i, j) };
         self.record(contact, certified)
     }

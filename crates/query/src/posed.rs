@@ -22,6 +22,12 @@ impl<'a> Posed<'a> {
         Self { views, a, b, relative, meter }
     }
 
+    /// The leaves with a point of either scan.
+    pub(crate) fn leaves_of(&self, [i, j]: [usize; 2]) -> NodePair {
+        let (a, b) = (&self.a.wide.leaves, &self.b.wide.leaves);
+        NodePair { a: NodeId(a.id(a.leaf_of(i))), b: NodeId(b.id(b.leaf_of(j))) }
+    }
+
     /// A length of the world in a's stored frame, and a little more: what rounding may take from a gap there.
     pub(crate) fn stored(&self, length: f64) -> f32 {
         #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]

@@ -14,8 +14,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 use crate::budget::{Meter, POINTS_A_PAIR};
+use crate::disc_pair::FAR;
 use crate::options::Sampling;
-use crate::surface::{FAR, Surfaces};
+use crate::surface::Surfaces;
 use crate::verdict::Contact;
 use crate::view::ScanView;
 

@@ -10,7 +10,7 @@ use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Node, NodePair, PointKind, Slices, Split, Visitor};
+use nearmiss_hierarchy::{Node, NodePair, Slices, Split, Visitor};
 use nearmiss_surface::meet;
 
 use crate::budget::Budget;
@@ -28,15 +28,6 @@ const TRIES: u32 = 4;
 
 /// A verified point further than this from the crossing, in the greater of the two local radii, is some other place.
 const NEARBY: f64 = 4.0;
-
-/// As near each other as discs are wide, in the lesser local radius, points say enough by themselves, however their
-/// discs lie.
-const NEAR: f32 = 0.65;
-
-/// Where surfaces cross, samples of either are within some 0.6 local radii of the place, and nearer than this to each
-/// other, in the greater radius. Discs reach up to 1.3; those that stand upright, as noise on thin plates makes them,
-/// would bridge a gap of that width.
-pub(crate) const FAR: f32 = 0.9;
 
 /// The search for a crossing.
 #[derive(Debug)]
@@ -72,8 +63,8 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) tries: u32,
     /// The best contact so far.
     pub(crate) found: Option<(Contact, Evidence)>,
-    /// The leaves of the first.
-    pub(crate) met: Option<NodePair>,
+    /// The points of the first.
+    pub(crate) met: Option<[usize; 2]>,
     /// Every contact, one of each pair of leaves that meets, if all are wanted.
     pub(crate) all: Option<&'a mut Vec<Contact>>,
     /// A crossing of discs that are not to be trusted, and why.
@@ -140,22 +131,6 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    pub(crate) fn disc_a(&self, i: usize) -> Disc {
-        Disc {
-            centre: self.pair.a.positions[i],
-            normal: self.pair.a.normals[i],
-            radius: self.pair.a.discs[i],
-        }
-    }
-
-    pub(crate) fn disc_b(&self, j: usize) -> Disc {
-        Disc {
-            centre: self.pair.relative.point(self.pair.b.positions[j]),
-            normal: self.pair.relative.direction(self.pair.b.normals[j]),
-            radius: self.pair.b.discs[j] * self.pair.relative.scale(),
-        }
-    }
-
     /// Whether a disc of some points of b comes into the `ball` about the centre of `disc` of a, or that disc into
     /// one of their balls. A point with a ball has no disc here.
     pub(crate) fn comes_near_sparse(&self, disc: &Disc, ball: f32, mut points: Range<usize>) -> bool {
@@ -164,7 +139,7 @@ impl<'a> Surfaces<'a> {
         // Within a margin of a ball is as good as within it.
         let reach = |ball: f32| if ball > 0.0 { ball + self.reach } else { 0.0 };
         points.any(|j| {
-            let other = self.disc_b(j);
+            let other = self.pair.disc_b(j);
             let ball_b = self.pair.b.ball(j) * self.pair.relative.scale();
             comes_within(reach(ball), disc.centre, &point(&other, ball_b))
                 || comes_within(reach(ball_b), other.centre, &point(disc, ball))
@@ -173,13 +148,14 @@ impl<'a> Surfaces<'a> {
 
     /// Discs of two leaves cross, those of points `i` and `j` first.
     pub(crate) fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
-        let contact = self.shared_chord(i, j);
+        let contact = self.pair.shared_chord(i, j);
         self.hit(contact, i, j)
     }
 
     /// The surfaces meet at `contact`, to first order, near points `i` and `j`.
     pub(crate) fn hit(&mut self, contact: Contact, i: usize, j: usize) -> ControlFlow<()> {
         self.tries += 1;
+        self.met.get_or_insert([i, j]);
         let certified = if self.is_settled() { None } else { self.refine(&contact, i, j) };
         let enough = self.detail == Detail::Verdict || certified.is_some() || self.tries >= TRIES;
         let flow = self.record(contact, certified);
@@ -206,63 +182,6 @@ impl<'a> Surfaces<'a> {
         self.detail == Detail::Verdict
             || self.tries > TRIES
             || self.found.is_some_and(|(_, evidence)| evidence == Evidence::Certified)
-    }
-
-    /// Why a crossing of the discs of points `i` and `j` says little, if it does.
-    pub(crate) fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
-        match self.pair.views[0].scan().kind(i).max(self.pair.views[1].scan().kind(j)) {
-            PointKind::Surface | PointKind::Border => None,
-            PointKind::Line | PointKind::Isolated => Some(Reason::Undersampled),
-            _ => {
-                let (distance, [ra, rb]) = self.points(i, j);
-                (distance > NEAR * ra.min(rb)).then_some(Reason::Ambiguous)
-            }
-        }
-    }
-
-    /// The distance of two points, and their local radii, in a's stored frame.
-    pub(crate) fn points(&self, i: usize, j: usize) -> (f32, [f32; 2]) {
-        let q = self.pair.relative.point(self.pair.b.positions[j]);
-        let distance = (Vector3::from(self.pair.a.positions[i]) - Vector3::from(q)).norm();
-        (distance, [self.pair.a.radii[i], self.pair.b.radii[j] * self.pair.relative.scale()])
-    }
-
-    /// The middle of what the chords of two crossing discs share, in the world.
-    fn shared_chord(&self, i: usize, j: usize) -> Contact {
-        let [va, vb] = self.pair.views;
-        let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
-        let na = Vector3::from(va.placed().rotate(self.pair.a.normals[i].map(f64::from)));
-        let nb = Vector3::from(vb.placed().rotate(self.pair.b.normals[j].map(f64::from)));
-        let middle = 0.5 * (pa + pb);
-        let (fa, fb) = (na.dot(&(pa - middle)), nb.dot(&(pb - middle)));
-        let c = na.dot(&nb);
-        let gram = 1.0 - c * c;
-        let step = if gram < 1e-3 {
-            0.5 * (fa * na + fb * nb)
-        } else {
-            ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
-        };
-        let radii = [
-            f64::from(self.pair.a.discs[i]) * va.placed().scale(),
-            f64::from(self.pair.b.discs[j]) * vb.placed().scale(),
-        ];
-        let place = middle + step;
-        // Along the common line each chord is an interval; for parallel planes the place is as good as any.
-        let along = na.cross(&nb).try_normalize(0.03).map_or_else(Vector3::zeros, |line| {
-            let chord = |p: Vector3<f64>, radius: f64| {
-                let t = line.dot(&(p - place));
-                let half = (radius * radius - (p - place - t * line).norm_squared()).max(0.0).sqrt();
-                (t - half, t + half)
-            };
-            let ((a0, a1), (b0, b1)) = (chord(pa, radii[0]), chord(pb, radii[1]));
-            line * (0.5 * (a0.max(b0) + a1.min(b1)))
-        });
-        Contact {
-            point: (place + along).into(),
-            normals: Some([na.into(), nb.into()]),
-            residual: nb.dot(&(pa - pb)).abs().max(na.dot(&(pa - pb)).abs()),
-            sources: [va.scan().id(i), vb.scan().id(j)],
-        }
     }
 
     /// Whether a place where both functions vanish would verify a crossing of discs.
@@ -358,11 +277,7 @@ impl Visitor for Surfaces<'_> {
         if self.notes {
             self.compared.push(pair);
         }
-        let flow = self.compare(pair);
-        if self.found.is_some() {
-            self.met.get_or_insert(pair);
-        }
-        flow
+        self.compare(pair)
     }
 }
 

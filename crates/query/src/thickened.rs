@@ -20,8 +20,8 @@ pub(crate) struct Balls<'a> {
     all: Option<&'a mut Vec<Contact>>,
     /// The first such pair.
     pub(crate) found: Option<Contact>,
-    /// The leaves of that pair.
-    pub(crate) met: Option<NodePair>,
+    /// Their numbers.
+    pub(crate) met: Option<[usize; 2]>,
     /// A lower bound of the distance of all points looked at or excluded, in the world.
     pub(crate) apart: f64,
 }
@@ -71,14 +71,9 @@ impl Visitor for Balls<'_> {
                 let distance = (p - q).norm();
                 self.apart = self.apart.min(distance);
                 if distance <= self.reach {
-                    let contact = Contact {
-                        point: (0.5 * (p + q)).into(),
-                        normals: None,
-                        residual: 0.5 * distance,
-                        sources: [va.scan().id(i), vb.scan().id(j)],
-                    };
+                    let contact = contact(&self.pair, [p, q], [i, j]);
                     self.found.get_or_insert(contact);
-                    self.met.get_or_insert(pair);
+                    self.met.get_or_insert([i, j]);
                     let Some(all) = &mut self.all else { return ControlFlow::Break(()) };
                     all.push(contact);
                     return ControlFlow::Continue(());
@@ -87,4 +82,20 @@ impl Visitor for Balls<'_> {
         }
         ControlFlow::Continue(())
     }
+}
+
+/// Between two points.
+fn contact(pair: &Posed<'_>, [p, q]: [Vector3<f64>; 2], [i, j]: [usize; 2]) -> Contact {
+    Contact {
+        point: (0.5 * (p + q)).into(),
+        normals: None,
+        residual: 0.5 * (p - q).norm(),
+        sources: [pair.views[0].scan().id(i), pair.views[1].scan().id(j)],
+    }
+}
+
+/// Where two points are, if they are within `reach` of each other in the world.
+pub(crate) fn balls_meet(pair: &Posed<'_>, reach: f64, [i, j]: [usize; 2]) -> Option<Contact> {
+    let [p, q] = [pair.views[0].point(i), pair.views[1].point(j)].map(Vector3::from);
+    ((p - q).norm() <= reach).then(|| contact(pair, [p, q], [i, j]))
 }

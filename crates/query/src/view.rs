@@ -26,6 +26,7 @@ pub struct ScanView<'a> {
 impl<'a> ScanView<'a> {
     /// `scan` in `pose`, which leads from the frame of its input to the world. Lengths of the scan, its radii
     /// and bandwidths among them, scale with the pose.
+    #[inline]
     #[must_use]
     pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
         let frame = scan.frame();

@@ -268,6 +268,7 @@ fn test_points_see_the_same_with_a_hint() {
 fn a_hint_that_names_what_is_not_there_is_none() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 1000, 3));
     let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let mut fronts = 0;
     for (away, semantics) in [
         (1.0, Semantics::Surface),
         (2.03, Semantics::Surface),
@@ -277,15 +278,19 @@ fn a_hint_that_names_what_is_not_there_is_none() {
         let options = options.with_semantics(semantics);
         let poses = [Pose::IDENTITY, Pose::from_translation([away, 0.1, 0.0])];
         let mut hint = PairHint::default();
-        both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+        // At rest, the second answer leaves a front.
+        for _ in 0..2 {
+            both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
+        }
         let written = serde_json::to_value(&hint).unwrap();
         for id in [0_u32, 5, 99_999, u32::MAX] {
             let mut damaged = written.clone();
             damaged["clear"] = (-1e30).into();
             damaged["fresh"] = u64::MAX.into();
             if !damaged["met"].is_null() {
-                damaged["met"]["a"] = id.into();
+                damaged["met"][0] = id.into();
             }
+            fronts += damaged["front"].as_array().unwrap().len();
             for standing in damaged["front"].as_array_mut().unwrap() {
                 standing["pair"]["b"] = id.into();
                 standing["until"] = (-1e30).into();
@@ -298,6 +303,7 @@ fn a_hint_that_names_what_is_not_there_is_none() {
             }
         }
     }
+    assert!(fronts > 20, "{fronts} pairs");
 }
 
 #[test]

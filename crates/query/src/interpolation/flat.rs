@@ -12,8 +12,9 @@ use super::root::{GraphPath, Root, Slope, find_root};
 use super::volume::{Bounds, Volume};
 use super::{Brackets, Interpolation, Side, Surfels};
 use crate::crossing::crossing;
+use crate::disc_pair::FAR;
 use crate::sampling::{FLAT, below, stream};
-use crate::surface::{FAR, Surfaces};
+use crate::surface::Surfaces;
 use crate::verdict::{Contact, Reason};
 
 /// So many points are drawn for one that lies in the box of b, before that is given up.
@@ -320,7 +321,7 @@ impl Surfaces<'_> {
         if is_off || side.distance.abs() > ZERO * radii[1] {
             return ControlFlow::Continue(());
         }
-        if let Some(reason) = self.doubt_about(i, j) {
+        if let Some(reason) = self.pair.doubt_about(i, j) {
             self.doubt.get_or_insert(reason);
             return ControlFlow::Continue(());
         }
@@ -388,14 +389,14 @@ impl Surfaces<'_> {
         // The discs of these points, and of those about them.
         let about_a = std::iter::once(i).chain(graph.points().edges().of(i as usize).iter().copied());
         for i in about_a {
-            let disc = self.disc_a(i as usize);
+            let disc = self.pair.disc_a(i as usize);
             let of_b = vb.graph().map_or(&[][..], |graph| graph.points().edges().of(j as usize));
             for j in std::iter::once(j).chain(of_b.iter().copied()) {
-                let (distance, [ra, rb]) = self.points(i as usize, j as usize);
-                if distance > FAR * ra.max(rb) || !crossing(&disc, &self.disc_b(j as usize)) {
+                let (distance, [ra, rb]) = self.pair.points(i as usize, j as usize);
+                if distance > FAR * ra.max(rb) || !crossing(&disc, &self.pair.disc_b(j as usize)) {
                     continue;
                 }
-                match self.doubt_about(i as usize, j as usize) {
+                match self.pair.doubt_about(i as usize, j as usize) {
                     Some(reason) => _ = self.doubt.get_or_insert(reason),
                     None => return self.crossed(i as usize, j as usize),
                 }
