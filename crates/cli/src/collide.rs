@@ -9,8 +9,8 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use nearmiss::{
     Answer, BatchScratch, Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Deadline, Detail,
-    Evidence, Metric, Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_all, collide_proving,
-    collide_with,
+    Evidence, ManifoldPoint, Metric, Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_all,
+    collide_proving, collide_with,
 };
 
 use crate::console::{self, Console, Results, now};
@@ -89,6 +89,8 @@ pub enum DetailName {
     Verdict,
     /// A point on both surfaces, verified where that can be had
     Witness,
+    /// A contact, and several places of it, well spread, each with the way out and the gap along it, for a solver
+    Manifold,
 }
 
 /// How sure a separation should be, by name.
@@ -156,7 +158,9 @@ impl Question {
         };
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
-        Asked { line, poses, answer, proof, contacts, micros }
+        let wants_manifold = self.plan.options().detail == Detail::Manifold;
+        let manifold = wants_manifold.then(|| scratch.manifold().to_vec());
+        Asked { line, poses, answer, proof, contacts, manifold, micros }
     }
 
     fn views(&self, poses: &[Pose; 2]) -> [ScanView<'_>; 2] {
@@ -172,6 +176,7 @@ impl Question {
         }
         let results = &mut *out.results;
         let report = AnswerReport::new(&asked.answer, asked.contacts.as_ref(), asked.micros);
+        let report = report.with_manifold(asked.manifold.as_deref());
         if args.json {
             return results.json(&report);
         }
@@ -184,7 +189,7 @@ impl Question {
             results.line(hint)?;
         }
         results.line(report.details())?;
-        report.contacts().try_for_each(|contact| results.line(contact))
+        report.contacts().chain(report.manifold()).try_for_each(|contact| results.line(contact))
     }
 }
 
@@ -198,6 +203,8 @@ struct Asked {
     proof: Option<Proof>,
     /// All contacts, if they are wanted.
     contacts: Option<Contacts>,
+    /// The manifold, if it is wanted.
+    manifold: Option<Vec<ManifoldPoint>>,
     micros: f64,
 }
 
@@ -231,6 +238,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let detail = match args.detail {
         DetailName::Verdict => Detail::Verdict,
         DetailName::Witness => Detail::Witness,
+        DetailName::Manifold => Detail::Manifold,
     };
     let evidence = match args.evidence {
         None | Some(EvidenceName::Certified) => Evidence::Certified,

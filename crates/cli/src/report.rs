@@ -1,7 +1,10 @@
 //! What scripts are told, the fields of the JSON lines, and the same in rows for people.
 
 use nearmiss::graph::ClosePairs;
-use nearmiss::{Answer, Contact, Contacts, Evidence, Metric, PointKind, Reason, Scan, SurfaceGraph, Verdict};
+use nearmiss::{
+    Answer, Contact, Contacts, Evidence, ManifoldPoint, Metric, PointKind, Reason, Scan, SurfaceGraph,
+    Verdict,
+};
 use serde::Serialize;
 
 use crate::digits::{bytes, count, percent, place, short};
@@ -224,6 +227,26 @@ pub(crate) struct AnswerReport {
     complete: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     contacts: Option<Vec<ContactReport>>,
+    /// The deepest place first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    manifold: Option<Vec<PlaceReport>>,
+}
+
+/// One place of a manifold.
+#[derive(Debug, Serialize)]
+struct PlaceReport {
+    point: [f64; 3],
+    normal: [f64; 3],
+    gap: f64,
+    source_a: u32,
+    source_b: u32,
+}
+
+impl PlaceReport {
+    fn new(place: &ManifoldPoint) -> Self {
+        let ManifoldPoint { point, normal, gap, sources: [a, b] } = *place;
+        Self { point, normal, gap, source_a: a.0, source_b: b.0 }
+    }
 }
 
 /// One of all contacts.
@@ -272,6 +295,7 @@ impl AnswerReport {
             micros,
             complete: all.map(|all| all.complete),
             contacts: all.map(|all| all.contacts.iter().map(ContactReport::new).collect()),
+            manifold: None,
         };
         match answer.verdict {
             Verdict::Intersecting { contact, evidence } => {
@@ -304,6 +328,24 @@ impl AnswerReport {
             }
         }
         report
+    }
+
+    /// The same with a manifold.
+    pub(crate) fn with_manifold(self, places: Option<&[ManifoldPoint]>) -> Self {
+        let manifold = places.map(|places| places.iter().map(PlaceReport::new).collect());
+        Self { manifold, ..self }
+    }
+
+    /// The places of a manifold, if it was asked for, for people.
+    pub(crate) fn manifold(&self) -> impl Iterator<Item = String> {
+        self.manifold.iter().flatten().map(|place| {
+            let ([x, y, z], [u, v, w]) = (place.point, place.normal);
+            let depth = if place.gap < 0.0 { "deep" } else { "apart" };
+            format!(
+                "  ({x}, {y}, {z}), {:.4e} {depth}, a gets out by ({u:.4}, {v:.4}, {w:.4})",
+                place.gap.abs()
+            )
+        })
     }
 
     /// All contacts, if they were asked for, for people.

@@ -6,11 +6,8 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{
-    Ball, Frontier, Heap, NodePair, Relative, SLACK, Stack, Visitor, WideStack, descend, descend_wide,
-};
+use nearmiss_hierarchy::{Frontier, Heap, NodePair, Stack, Visitor, WideStack, descend, descend_wide};
 
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
 use crate::certify::{Bound, Certifier, Excluded, Proof};
@@ -18,8 +15,9 @@ use crate::hint::{Known, PairHint};
 use crate::interpolation::InterpolationScratch;
 use crate::leaf_pair::Instructions;
 use crate::likelihood::likelihood;
+use crate::manifold::{self, ManifoldPoint, ManifoldScratch};
 use crate::options::{CollideOptions, CollidePlan, Detail, Method, Order, Semantics};
-use crate::posed::Posed;
+use crate::posed::{Posed, relative};
 use crate::surface::{Surfaces, Workspace};
 use crate::thickened::{Balls, balls_meet};
 use crate::verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
@@ -37,6 +35,7 @@ pub struct CollideScratch {
     interpolation: InterpolationScratch,
     proven: Vec<Bound>,
     longest_stretch: Duration,
+    manifold: ManifoldScratch,
 }
 
 /// The pairs of nodes still to be looked at, by how a search goes on.
@@ -70,6 +69,13 @@ impl CollideScratch {
     #[must_use]
     pub fn longest_stretch(&self) -> Duration {
         self.longest_stretch
+    }
+
+    /// Where the scans of the last query with [`Detail::Manifold`] meet: the deepest place first, then ever again the one furthest from
+    /// those before it, up to eight. Empty after any other answer than that they meet.
+    #[must_use]
+    pub fn manifold(&self) -> &[ManifoldPoint] {
+        &self.manifold.points
     }
 }
 
@@ -177,22 +183,9 @@ fn search(
     scratch: &mut CollideScratch,
     extras: Extras<'_>,
 ) -> Answer {
-    let [leaves, points] = [
-        [a, b].map(|view| view.slices().nodes.len().div_ceil(2) as u64),
-        [a, b].map(|view| u64::from(view.scan().leaf_size())),
-    ];
+    scratch.manifold.points.clear();
     let options = plan.options();
-    let test_points = match options.method {
-        Method::Traversal => 0,
-        Method::Sampling(sampling) => u64::from(sampling.test_points),
-        Method::Interpolation(_) => u64::from(a.scan().leaf_size()),
-    };
-    let looked_at = match options.order {
-        Some(Order::Sides | Order::SidesByGap) => a.slices().samples(0).len() as u64,
-        _ => 0,
-    };
-    let evaluations = 2 * test_points + NODE_PAIRS_A_LEAF_PAIR * looked_at;
-    let meter = Meter::new(budget, leaves, points, evaluations);
+    let meter = meter([a, b], options, budget);
     let (pose, relative) = match relative(a, b, plan) {
         Ok(motion) => motion,
         Err(early) => {
@@ -210,24 +203,61 @@ fn search(
             return Answer { verdict, distance_estimate: None, statistics };
         }
     };
-    let pair = Posed::new([a, b], relative, meter);
+    let answer = decide(Posed::new([a, b], relative, meter), pose, (plan, budget), scratch, extras);
+    match answer.verdict {
+        Verdict::Intersecting { contact, .. } if options.detail == Detail::Manifold => {
+            let mut spent = self::meter([a, b], options, budget);
+            spent.spent = answer.statistics;
+            let mut pair = Posed::new([a, b], relative, spent);
+            manifold::gather(&mut pair, options, &contact, scratch.instructions.0, &mut scratch.manifold);
+            Answer { statistics: pair.meter.spent, ..answer }
+        }
+        _ => answer,
+    }
+}
+
+/// What a query may spend.
+fn meter(views: [&ScanView<'_>; 2], options: &CollideOptions, budget: &Budget) -> Meter {
+    let leaves = views.map(|view| view.slices().nodes.len().div_ceil(2) as u64);
+    let points = views.map(|view| u64::from(view.scan().leaf_size()));
+    let test_points = match options.method {
+        Method::Traversal => 0,
+        Method::Sampling(sampling) => u64::from(sampling.test_points),
+        Method::Interpolation(_) => points[0],
+    };
+    let looked_at = match options.order {
+        Some(Order::Sides | Order::SidesByGap) => views[0].slices().samples(0).len() as u64,
+        _ => 0,
+    };
+    let evaluations = 2 * test_points + NODE_PAIRS_A_LEAF_PAIR * looked_at;
+    Meter::new(budget, leaves, points, evaluations)
+}
+
+/// What is known from before, and then what there is to see.
+fn decide(
+    pair: Posed<'_>,
+    pose: Pose,
+    (plan, budget): (&CollidePlan, &Budget),
+    scratch: &mut CollideScratch,
+    extras: Extras<'_>,
+) -> Answer {
+    let options = plan.options();
     // What was seen at some resolution says nothing of the rest, and which leaves are tested by points, which see more
     // than crossings, depends on the way to them.
     let is_exact = budget.resolution.is_none() && options.method == Method::Traversal;
     let hint = extras.hint.filter(|_| is_exact);
     let mut known = hint.map(|hint| hint.recall(&pair, options));
-    if let Some(known) = &mut known {
+    let early = known.as_mut().and_then(|known| {
         if let Some(met) = known.met(&pair)
             && let Some((contact, evidence)) = still_meet(&pair, plan, met)
         {
             known.still_met(pose);
-            let verdict = Verdict::Intersecting { contact, evidence };
-            return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
+            return Some(Verdict::Intersecting { contact, evidence });
         }
         known.come_to(pose, &pair);
-    }
-    if let Some(distance) = known.as_ref().and_then(|known| known.distance(&pair, plan.reach())) {
-        let verdict = apart(options, distance, true);
+        Some(apart(options, known.distance(&pair, plan.reach())?, true))
+    });
+    if let Some(verdict) = early {
         return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
     }
     match options.semantics {
@@ -266,6 +296,7 @@ fn surfaces(
         interpolation,
         proven,
         longest_stretch,
+        ..
     } = scratch;
     let reach = pair.stored(options.margin);
     let mut certifier = Certifier::new(pair, reach, proven);
@@ -273,22 +304,15 @@ fn surfaces(
     if let Some(known) = &mut known
         && let Some(distance) = known.prove_again(&mut certifier, &mut frontiers.stack)
     {
-        *longest_stretch = certifier.pair.meter.longest_stretch;
         let (verdict, statistics) = (apart(options, distance, true), certifier.pair.meter.spent);
+        *longest_stretch = certifier.pair.meter.longest_stretch;
         return Answer { verdict, distance_estimate: None, statistics };
     }
     let Certifier { pair, proven, .. } = certifier;
-    let (contacts, complete) = all.map(Contacts::parts).unzip();
-    let workspace = Workspace {
-        instructions: *instructions,
-        gathers,
-        excluded,
-        compared,
-        members,
-        interpolation,
-        all: contacts,
-    };
     let is_slow = known.as_ref().is_some_and(|known| known.keeps_front(&pair));
+    let (all, complete) = all.map(Contacts::parts).unzip();
+    let instructions = *instructions;
+    let workspace = Workspace { instructions, gathers, excluded, compared, members, interpolation, all };
     let mut search = Surfaces::new(pair, options, budget, is_slow, workspace);
     let ended = look(&mut search, options, known.as_deref_mut(), frontiers).is_break();
     if let Some(complete) = complete {
@@ -296,7 +320,6 @@ fn surfaces(
     }
     let parted = !ended && search.found.is_none();
     let Surfaces { pair, found, doubt, estimate, excluded, compared, met, is_plain, .. } = search;
-    let slack = pair.relative.slack();
     let mut certifier = Certifier::new(pair, reach, proven);
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
@@ -330,6 +353,7 @@ fn surfaces(
         && !matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
     {
         if parted && is_slow {
+            let slack = certifier.pair.relative.slack();
             known.parted((excluded, compared), slack, options.certifies(), certifier.doubtful);
         } else {
             known.forget(met);
@@ -436,73 +460,4 @@ fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
         }
         Semantics::Surface => Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
     }
-}
-
-/// From so many radii on the distance of balls is a good bound, and single precision less and less use.
-const FAR_APART: f64 = 100.0;
-
-/// Scans whose stored frames differ in scale by more than this are not compared in single precision.
-const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
-
-/// The motion of b's stored frame into a's, in double and in single precision. An error is the distance of balls about the two scans if that is more
-/// than any contact reaches, or `None` for poses that are none.
-pub(crate) fn relative(
-    a: &ScanView<'_>,
-    b: &ScanView<'_>,
-    plan: &CollidePlan,
-) -> Result<(Pose, Relative), Option<f64>> {
-    let ratio = b.placed().scale() / a.placed().scale();
-    // A rotation has no entry that is none.
-    let finite = |t: [f64; 3]| t.iter().all(|x| x.is_finite());
-    let proper = [a, b].iter().all(|view| finite(view.placed().translation()) && is_rotation(view.placed()));
-    let positive = a.placed().scale() > 0.0 && b.placed().scale() > 0.0;
-    if !(proper && positive && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
-        return Err(None);
-    }
-    let [(ca, ra, own), (cb, rb, _)] = [a, b].map(|view| {
-        let outline = view.slices().outline;
-        let Ball { centre, radius } = match plan.options().semantics {
-            Semantics::Surface => outline.surface,
-            Semantics::Thickened(_) => outline.discs,
-        };
-        (Vector3::from(view.placed().apply(centre)), radius * view.placed().scale(), centre)
-    });
-    // What double precision loses of places far from the origin of the world.
-    let far = [a, b].map(|view| Vector3::from(view.placed().translation()).norm());
-    let lost = DOUBLE_ROUNDING * (far[0] + far[1] + ca.norm() + cb.norm());
-    let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6) - lost;
-    if gap.is_nan() || gap == f64::INFINITY {
-        return Err(None);
-    }
-    // A certificate has more to say, unless they are so far apart that balls say nearly all.
-    if gap > plan.reach() && (!plan.options().certifies() || gap > FAR_APART * (ra + rb)) {
-        return Err(Some(gap));
-    }
-    let pose = a.placed().inverse().after(b.placed());
-    // Coordinates in a's stored frame: of its own points, and of b's.
-    let own = Vector3::from(own).norm();
-    let extent = own + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
-    let shift = Vector3::from(pose.translation()).norm();
-    // The slack of the motion is a share of its reach.
-    let lost = lost / a.placed().scale() / f64::from(SLACK);
-    let relative = Relative::new(&pose, extent + shift + lost);
-    Ok((pose, relative))
-}
-
-/// Of 2⁻⁵³ each: some ten roundings where poses are composed and applied.
-const DOUBLE_ROUNDING: f64 = 2e-15;
-
-/// Whether the rotation is one, to more than rounding: products of many poses may not be.
-fn is_rotation(pose: &Pose) -> bool {
-    let rotation = pose.rotation();
-    let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];
-    let errors = [
-        u.norm_squared() - 1.0,
-        v.norm_squared() - 1.0,
-        w.norm_squared() - 1.0,
-        u.dot(&v),
-        v.dot(&w),
-        w.dot(&u),
-    ];
-    errors.iter().all(|x| x.abs() <= 1e-9) && u.cross(&v).dot(&w) > 0.0
 }

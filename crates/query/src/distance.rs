@@ -19,9 +19,9 @@ use nearmiss_hierarchy::PointHierarchy;
 use nearmiss_surface::Metric;
 
 use crate::budget::{Budget, Meter};
-use crate::collide::{CollideScratch, collide_with, relative};
+use crate::collide::{CollideScratch, collide_with};
 use crate::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
-use crate::posed::Posed;
+use crate::posed::{Posed, relative};
 use crate::verdict::{Evidence, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
 use approach::{Approach, Feet};

@@ -14,6 +14,7 @@ mod hint;
 mod interpolation;
 mod leaf_pair;
 mod likelihood;
+mod manifold;
 mod margin;
 mod options;
 mod pacer;
@@ -41,6 +42,7 @@ pub use curve::{Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, 
 pub use distance::{Distance, DistanceOptions, DistancePlan, DistanceScratch, distance, distance_with};
 pub use hint::PairHint;
 pub use interpolation::{Brackets, Interpolation, Refinement, Surfels, occupancy, points_for};
+pub use manifold::ManifoldPoint;
 pub use options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};
 pub use pacer::{Pacer, collide_paced};
 pub use shape::{NearestPoint, PlacedIndex, Shape, ShapeIndex};

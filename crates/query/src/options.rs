@@ -28,6 +28,9 @@ pub enum Detail {
     /// A point on both surfaces, verified where that can be had.
     #[default]
     Witness,
+    /// As [`Self::Verdict`], and several well-spread places with the way out, for a solver
+    /// ([`CollideScratch::manifold`](crate::CollideScratch::manifold)).
+    Manifold,
 }
 
 /// How two leaves are compared.

@@ -1,9 +1,11 @@
 //! Two scans in relative motion, and what every search through them does with a pair of nodes.
 
-use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{NodePair, Relative, Slices, Split};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_hierarchy::{Ball, NodePair, Relative, SLACK, Slices, Split};
 
 use crate::budget::Meter;
+use crate::options::{CollidePlan, Semantics};
 use crate::view::ScanView;
 
 /// Two views, their arrays, the motion between them, and what the search has cost.
@@ -81,3 +83,55 @@ impl<'a> Posed<'a> {
         }
     }
 }
+
+/// From so many radii on the distance of balls is a good bound, and single precision less and less use.
+const FAR_APART: f64 = 100.0;
+
+/// Scans whose stored frames differ in scale by more than this are not compared in single precision.
+const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
+
+/// The motion of b's stored frame into a's, in double and in single precision. An error is the distance of balls about the two scans if that is more
+/// than any contact reaches, or `None` for poses that are none.
+pub(crate) fn relative(
+    a: &ScanView<'_>,
+    b: &ScanView<'_>,
+    plan: &CollidePlan,
+) -> Result<(Pose, Relative), Option<f64>> {
+    let ratio = b.placed().scale() / a.placed().scale();
+    if !(a.is_proper() && b.is_proper() && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
+        return Err(None);
+    }
+    let ball = |view: &ScanView<'_>| {
+        let outline = view.slices().outline;
+        let Ball { centre, radius } = match plan.options().semantics {
+            Semantics::Surface => outline.surface,
+            Semantics::Thickened(_) => outline.discs,
+        };
+        (Vector3::from(view.placed().apply(centre)), radius * view.placed().scale(), Vector3::from(centre))
+    };
+    let ((ca, ra, own), (cb, rb, _)) = (ball(a), ball(b));
+    // No less than the length, and sooner had.
+    let size = |v: Vector3<f64>| v.x.abs() + v.y.abs() + v.z.abs();
+    let far = |view: &ScanView<'_>| size(view.placed().translation().into());
+    // What double precision loses of places far from the origin of the world.
+    let lost = DOUBLE_ROUNDING * (far(a) + far(b) + size(ca) + size(cb));
+    let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6) - lost;
+    if gap.is_nan() || gap == f64::INFINITY {
+        return Err(None);
+    }
+    // A certificate has more to say, unless they are so far apart that balls say nearly all.
+    if gap > plan.reach() && (!plan.options().certifies() || gap > FAR_APART * (ra + rb)) {
+        return Err(Some(gap));
+    }
+    let pose = a.placed().inverse().after(b.placed());
+    // Coordinates in a's stored frame: of its own points, and of b's.
+    let extent = size(own) + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
+    let shift = size(pose.translation().into());
+    // The slack of the motion is a share of its reach.
+    let lost = lost / a.placed().scale() / f64::from(SLACK);
+    let relative = Relative::new(&pose, extent + shift + lost);
+    Ok((pose, relative))
+}
+
+/// Of 2⁻⁵³ each: some ten roundings where poses are composed and applied.
+const DOUBLE_ROUNDING: f64 = 2e-15;

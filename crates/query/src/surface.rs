@@ -157,7 +157,7 @@ impl<'a> Surfaces<'a> {
         self.tries += 1;
         self.met.get_or_insert([i, j]);
         let certified = if self.is_settled() { None } else { self.refine(&contact, i, j) };
-        let enough = self.detail == Detail::Verdict || certified.is_some() || self.tries >= TRIES;
+        let enough = self.detail != Detail::Witness || certified.is_some() || self.tries >= TRIES;
         let flow = self.record(contact, certified);
         if enough { flow } else { ControlFlow::Continue(()) }
     }
@@ -179,7 +179,7 @@ impl<'a> Surfaces<'a> {
 
     /// Whether no witness is looked for, or no more.
     pub(crate) fn is_settled(&self) -> bool {
-        self.detail == Detail::Verdict
+        self.detail != Detail::Witness
             || self.tries > TRIES
             || self.found.is_some_and(|(_, evidence)| evidence == Evidence::Certified)
     }

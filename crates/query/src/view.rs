@@ -21,6 +21,7 @@ pub struct ScanView<'a> {
     graph: Option<&'a SurfaceGraph>,
     /// Stored frame → world.
     placed: Pose,
+    is_proper: bool,
 }
 
 impl<'a> ScanView<'a> {
@@ -31,7 +32,8 @@ impl<'a> ScanView<'a> {
     pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
         let frame = scan.frame();
         let stored = Pose::IDENTITY.with_scale(frame.scale).with_translation(frame.origin);
-        Self { slices: scan.slices(), scan, kernel: None, graph: None, placed: pose.after(&stored) }
+        let placed = pose.after(&stored);
+        Self { slices: scan.slices(), scan, kernel: None, graph: None, placed, is_proper: is_proper(&placed) }
     }
 
     /// The same view with f by distances along the graph of this scan. Those of scans for the [geodesic
@@ -69,6 +71,11 @@ impl<'a> ScanView<'a> {
     #[must_use]
     pub fn placed(&self) -> &Pose {
         &self.placed
+    }
+
+    /// Whether its pose is one.
+    pub(crate) fn is_proper(&self) -> bool {
+        self.is_proper
     }
 
     /// The `i`-th stored point in the world.
@@ -168,3 +175,24 @@ impl<'a> ScanView<'a> {
         }
     }
 }
+
+/// Whether a pose is one: products of many may lead nowhere, or turn by what is no rotation to more than rounding.
+fn is_proper(pose: &Pose) -> bool {
+    let rotation = pose.rotation();
+    let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];
+    let off = [
+        u.norm_squared() - 1.0,
+        v.norm_squared() - 1.0,
+        w.norm_squared() - 1.0,
+        u.dot(&v),
+        v.dot(&w),
+        w.dot(&u),
+    ];
+    // Nothing branches on one of them; a sum with what is no number is none.
+    let off: f64 = off.iter().map(|x| x.abs()).sum();
+    let far: f64 = pose.translation().iter().map(|x| x.abs()).sum();
+    off <= MOST_OFF && u.cross(&v).dot(&w) > 0.0 && far < f64::INFINITY && pose.scale() > 0.0
+}
+
+/// A rotation is one to so much, in the sum of what six products of its columns are off.
+const MOST_OFF: f64 = 6e-9;

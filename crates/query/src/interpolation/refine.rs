@@ -32,7 +32,7 @@ impl Surfaces<'_> {
     ) -> ControlFlow<()> {
         let seed = search.seed;
         let (tolerance, by_grid) = match search.refinement {
-            _ if self.detail == Detail::Verdict => return self.hit(contact, i, j),
+            _ if self.detail != Detail::Witness => return self.hit(contact, i, j),
             Refinement::Newton => return self.hit(contact, i, j),
             Refinement::Sphere(tolerance) => (tolerance, false),
             Refinement::Grid(tolerance) => (tolerance, true),
