@@ -133,6 +133,14 @@ impl WideTree {
 
 /// What a descent does with what it finds.
 pub trait LeafVisitor {
+    /// Whether it is told how far apart is what is.
+    const NOTES_GAPS: bool = false;
+
+    /// Of the pairs of boxes that were compared last those that are apart are no less so than this.
+    fn apart(&mut self, least: f32) {
+        let _ = least;
+    }
+
     /// So many pairs of boxes were compared; may end the descent.
     fn compared(&mut self, pairs: u32) -> ControlFlow<()>;
 
@@ -160,13 +168,13 @@ impl WideStack {
 
 /// Visits the pairs of leaves of `a` and `b` whose boxes are no further apart than `reach`, in a's frame, until `visitor` ends it: depth
 /// first, of siblings those that overlap most first. The other fifteen are not sorted, which costs what it saves.
-pub fn descend_wide(
+pub fn descend_wide<V: LeafVisitor>(
     (a, b): (&Slices<'_>, &Slices<'_>),
     relative: &Relative,
     reach: f32,
     level: Level,
     stack: &mut WideStack,
-    visitor: &mut impl LeafVisitor,
+    visitor: &mut V,
 ) -> ControlFlow<()> {
     stack.pairs.clear();
     stack.pairs.push([a.wide.root(), b.wide.root()]);
@@ -194,10 +202,13 @@ pub fn descend_wide(
         } else {
             &b.wide.nodes[pair[1].index()]
         };
-        let Near { mut lanes, most, compared } = dispatch!(level, simd => simd.vectorize(
+        let Near { mut lanes, most, compared, apart } = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || compare(simd, relative, [below_a, below_b], reach),
+            || compare(simd, relative, [below_a, below_b], (reach, V::NOTES_GAPS)),
         ));
+        if V::NOTES_GAPS {
+            visitor.apart(apart);
+        }
         if lanes != 0 {
             let child = |lane: u32| {
                 [below_a.children[lane as usize % WIDTH], below_b.children[lane as usize / WIDTH]]
@@ -239,7 +250,7 @@ impl Slices<'_> {
 }
 
 /// What of sixteen pairs of boxes is near. Lane 4j + i is child i of a and child j of b.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Near {
     /// Those that are not apart, as bits.
     lanes: u32,
@@ -247,11 +258,18 @@ struct Near {
     most: u32,
     /// How many there are at all.
     compared: u32,
+    /// How far those that are apart are at least, if that is wanted.
+    apart: f32,
 }
 
 /// As [`Relative::gaps_and_overlaps`], in the same order of operations.
 #[inline(always)]
-fn compare<S: Simd>(simd: S, relative: &Relative, [a, b]: [&Siblings; 2], reach: f32) -> Near {
+fn compare<S: Simd>(
+    simd: S,
+    relative: &Relative,
+    [a, b]: [&Siblings; 2],
+    (reach, notes_gaps): (f32, bool),
+) -> Near {
     let centre_a = each(simd, &a.centre);
     let half_a = each(simd, &a.half);
     let axes_a = [each(simd, &a.axes[0]), each(simd, &a.axes[1]), each(simd, &a.axes[2])];
@@ -287,7 +305,13 @@ fn compare<S: Simd>(simd: S, relative: &Relative, [a, b]: [&Siblings; 2], reach:
     let [of_a, of_b] = [a.lanes(), b.lanes()];
     // Those of b are the first few.
     let there = (of_a * 0x1111) & ((1 << (4 * of_b.count_ones())) - 1);
-    let near = gap.simd_le(reach) & mask32x16::from_bitmask(simd, u64::from(there));
+    let there = mask32x16::from_bitmask(simd, u64::from(there));
+    let near = gap.simd_le(reach) & there;
+    let apart = if notes_gaps {
+        (there & !near).select(gap, f32x16::splat(simd, f32::INFINITY)).reduce_min()
+    } else {
+        f32::INFINITY
+    };
     let share = near.select(share, f32x16::splat(simd, f32::INFINITY));
     let lanes = bits(near);
     let most = bits(share.simd_eq(share.reduce_min())) & lanes;
@@ -296,6 +320,7 @@ fn compare<S: Simd>(simd: S, relative: &Relative, [a, b]: [&Siblings; 2], reach:
         // What is no number has no least.
         most: if most == 0 { lanes } else { most }.trailing_zeros(),
         compared: of_a.count_ones() * of_b.count_ones(),
+        apart,
     }
 }
 

@@ -17,7 +17,7 @@ use std::ops::ControlFlow;
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{Frontier, NodePair, Split, Stack, Visitor, descend, resume};
 
-use crate::posed::Posed;
+use crate::posed::{Posed, balls_apart};
 
 /// Pairs of either of `a` with either of `b`, some of which were excluded.
 #[derive(Debug, Clone, Copy)]
@@ -137,7 +137,17 @@ impl<'a> Certifier<'a> {
         }
         let least = heap.peek().map_or(f64::INFINITY, |least| self.in_world(least.gap));
         *self.proven = heap.into_vec();
-        least
+        // Along the axes of boxes little is seen of a distance between them.
+        let balls = balls_apart(self.pair.views) / self.pair.views[0].placed().scale();
+        #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
+        let gap = (balls * (1.0 - 1e-6)) as f32;
+        if self.in_world(gap) <= least {
+            return least;
+        }
+        let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
+        self.proven.clear();
+        self.proven.push(Bound { gap, pair: roots, shown_by: roots });
+        self.in_world(gap)
     }
 
     /// What was proven, in the world.

@@ -417,21 +417,23 @@ fn balls(
     mut known: Option<&mut Known>,
     all: Option<&mut Contacts>,
 ) -> Answer {
-    let (nodes_a, nodes_b) = (pair.a.nodes, pair.b.nodes);
     let (contacts, complete) = all.map(Contacts::parts).unzip();
-    let mut search = Balls::new(pair, plan.reach(), contacts);
+    let mut search = Balls::new(pair, plan.reach(), scratch.instructions, contacts);
     scratch.frontiers.clear();
     let again = known.as_ref().and_then(|known| known.met(&search.pair));
-    let mut ended = again.is_some_and(|points| search.leaves(search.pair.leaves_of(points)).is_break());
+    let mut ended = again.is_some_and(|points| search.compare(search.pair.leaves_of(points)).is_break());
     if !ended {
         search.apart = f64::INFINITY;
-        ended = descend(nodes_a, nodes_b, &mut search, &mut scratch.frontiers.stack).is_break();
+        let Posed { a, b, relative, .. } = search.pair;
+        let reach = search.reach_stored;
+        let (level, stack) = (scratch.instructions.0, &mut scratch.frontiers.wide);
+        ended = descend_wide((a, b), &relative, reach, level, stack, &mut search).is_break();
     }
     if let Some(complete) = complete {
         *complete = !ended;
     }
     let verdict = match search.found {
-        Some(contact) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
+        Some((contact, _)) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
         None if ended => {
             let likelihood =
                 likelihood(&search.pair, search.reach_stored, scratch.frontiers.open(&search.pair));
@@ -440,7 +442,7 @@ fn balls(
         None => apart(plan.options(), search.apart, true),
     };
     if let Some(known) = &mut known {
-        known.forget(search.met);
+        known.forget(search.found.map(|(_, points)| points));
         if verdict.is_separated() {
             known.clear_to(search.apart, &search.pair);
         }

@@ -26,7 +26,7 @@ use crate::verdict::{Evidence, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
 use approach::{Approach, Feet};
 use bounds::Motion;
-use nearest_points::{PointPair, nearest};
+pub(crate) use nearest_points::{PointPair, nearest};
 use search::{Open, Search, Volumes};
 
 /// What is asked. Plain values; [`DistancePlan::new`] validates them.

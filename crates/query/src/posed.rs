@@ -101,21 +101,12 @@ pub(crate) fn relative(
     if !(a.is_proper() && b.is_proper() && (1.0 / GREATEST_RATIO..=GREATEST_RATIO).contains(&ratio)) {
         return Err(None);
     }
-    let ball = |view: &ScanView<'_>| {
-        let outline = view.slices().outline;
-        let Ball { centre, radius } = match plan.options().semantics {
-            Semantics::Surface => outline.surface,
-            Semantics::Thickened(_) => outline.discs,
-        };
-        (Vector3::from(view.placed().apply(centre)), radius * view.placed().scale(), Vector3::from(centre))
+    let about = |view: &ScanView<'_>| match plan.options().semantics {
+        Semantics::Surface => view.slices().outline.surface,
+        Semantics::Thickened(_) => view.slices().outline.discs,
     };
-    let ((ca, ra, own), (cb, rb, _)) = (ball(a), ball(b));
-    // No less than the length, and sooner had.
-    let size = |v: Vector3<f64>| v.x.abs() + v.y.abs() + v.z.abs();
-    let far = |view: &ScanView<'_>| size(view.placed().translation().into());
-    // What double precision loses of places far from the origin of the world.
-    let lost = DOUBLE_ROUNDING * (far(a) + far(b) + size(ca) + size(cb));
-    let gap = (ca - cb).norm() * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6) - lost;
+    let own = about(a);
+    let Balls { distance, radii: [ra, rb], gap, lost } = Balls::of([a, b], [own, about(b)]);
     if gap.is_nan() || gap == f64::INFINITY {
         return Err(None);
     }
@@ -125,12 +116,48 @@ pub(crate) fn relative(
     }
     let pose = a.placed().inverse().after(b.placed());
     // Coordinates in a's stored frame: of its own points, and of b's.
-    let extent = size(own) + ((ca - cb).norm() + ra + 2.0 * rb) / a.placed().scale();
+    let extent = size(own.centre.into()) + (distance + ra + 2.0 * rb) / a.placed().scale();
     let shift = size(pose.translation().into());
     // The slack of the motion is a share of its reach.
     let lost = lost / a.placed().scale() / f64::from(SLACK);
     let relative = Relative::new(&pose, extent + shift + lost);
     Ok((pose, relative))
+}
+
+/// No less than the length, and sooner had.
+fn size(v: Vector3<f64>) -> f64 {
+    v.x.abs() + v.y.abs() + v.z.abs()
+}
+
+/// Balls about two scans in the world.
+struct Balls {
+    /// Of their middles.
+    distance: f64,
+    radii: [f64; 2],
+    /// A lower bound of what is between them.
+    gap: f64,
+    /// What double precision loses of places far from the origin of the world.
+    lost: f64,
+}
+
+impl Balls {
+    /// `stored` in the frames of the scans.
+    fn of([a, b]: [&ScanView<'_>; 2], stored: [Ball; 2]) -> Self {
+        let placed = |view: &ScanView<'_>, ball: &Ball| {
+            (Vector3::from(view.placed().apply(ball.centre)), ball.radius * view.placed().scale())
+        };
+        let ((ca, ra), (cb, rb)) = (placed(a, &stored[0]), placed(b, &stored[1]));
+        let far = |view: &ScanView<'_>| size(view.placed().translation().into());
+        let lost = DOUBLE_ROUNDING * (far(a) + far(b) + size(ca) + size(cb));
+        let distance = (ca - cb).norm();
+        let gap = distance * (1.0 - 1e-6) - (ra + rb) * (1.0 + 1e-6) - lost;
+        Self { distance, radii: [ra, rb], gap, lost }
+    }
+}
+
+/// A lower bound of the distance of two surfaces in the world: that of balls about them, which is less than 0 where these overlap.
+pub(crate) fn balls_apart([a, b]: [&ScanView<'_>; 2]) -> f64 {
+    Balls::of([a, b], [a.slices().outline.surface, b.slices().outline.surface]).gap
 }
 
 /// Of 2⁻⁵³ each: some ten roundings where poses are composed and applied.

@@ -137,19 +137,23 @@ fn sixteen_pairs_at_once_are_what_one_by_one_is() {
                 (gaps[0], overlaps[0])
             })
         };
+        let mut apart = f32::INFINITY;
         for (lane, (gap, overlap)) in (0..16).filter_map(|lane| Some((lane, overlap(lane)?))) {
             compared += 1;
             if gap <= reach {
                 near |= 1 << lane;
                 most = most.max(overlap);
+            } else {
+                apart = apart.min(gap);
             }
         }
         for level in levels() {
             let found = dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || compare(simd, &relative, pair, reach),
+                || compare(simd, &relative, pair, (reach, true)),
             ));
             assert_eq!((found.lanes, found.compared), (near, compared), "round {round}, {level:?}");
+            assert_eq!(found.apart.to_bits(), apart.to_bits(), "round {round}, {level:?}");
             if near != 0 {
                 assert_eq!(overlap(found.most).map(|(_, overlap)| overlap), Some(most), "{round}, {level:?}");
             }
