@@ -30,6 +30,9 @@ pub trait Method {
     /// What to call it in a table.
     fn name(&self) -> String;
 
+    /// Done before each question, and not timed.
+    fn prepare(&mut self) {}
+
     /// Whether the copies at `a` and `b` meet. Poses are rigid; all work that depends on them is done here.
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply;
 }

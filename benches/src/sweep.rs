@@ -34,6 +34,7 @@ impl Column {
     /// Asks all `poses` once.
     pub fn ask<'a>(&mut self, method: &mut dyn Method, poses: impl IntoIterator<Item = &'a Pose>) {
         for pose in poses {
+            method.prepare();
             let (reply, time) = timed(|| black_box(method.ask(&Pose::IDENTITY, black_box(pose))));
             self.times.push(nanoseconds(time));
             self.hits += usize::from(reply.hit);

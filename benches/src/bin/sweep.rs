@@ -1,8 +1,9 @@
 //! The sweep of measured queries, ours and rivals' in the same run, as Markdown.
 //!
 //! `sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival parry|trimesh|kiddo]… [--witness]
-//! [--certified] [--kernel geodesic] [--order NAME] [--seed N] [--threads N]`
+//! [--certified] [--levels] [--evicted] [--kernel geodesic] [--order NAME] [--seed N] [--threads N]`
 //!
+//! `--levels` asks by each instruction set there is, `--evicted` with nothing left in the caches.
 //! With the geodesic kernel the same object prepared for it is asked beside.
 //!
 //! An object is a file of points, with or without a mesh, or one that `Object::read` knows by name.
@@ -20,6 +21,7 @@ use nearmiss_benches::rivals::{self, Method};
 use nearmiss_benches::sample::count;
 use nearmiss_benches::sweep::{self, Track};
 use nearmiss_benches::{Failure, machine, poses};
+use nearmiss_testdata::instructions::levels;
 
 /// What was asked for.
 struct Options {
@@ -30,6 +32,8 @@ struct Options {
     rivals: Vec<String>,
     witness: bool,
     certified: bool,
+    levels: bool,
+    evicted: bool,
     order: Option<Order>,
     kernel: Metric,
     seed: u64,
@@ -46,6 +50,8 @@ impl Options {
             rivals: arguments.values("--rival")?,
             witness: arguments.flag("--witness"),
             certified: arguments.flag("--certified"),
+            levels: arguments.flag("--levels"),
+            evicted: arguments.flag("--evicted"),
             order: asked::order(&mut arguments)?,
             kernel: asked::kernel(&mut arguments)?,
             seed: arguments.value("--seed")?.unwrap_or(1),
@@ -85,6 +91,14 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     }
     if options.witness {
         methods.push(Box::new(Ours::new(&scan, &asked)?));
+    }
+    if options.levels {
+        for level in levels() {
+            methods.push(Box::new(Ours::new(&scan, &verdict)?.by_level(level)));
+        }
+    }
+    if options.evicted {
+        methods.push(Box::new(Ours::new(&scan, &verdict)?.evicted()));
     }
     if let Some(along) = &along {
         methods.push(Box::new(Ours::new(along, &verdict)?));

@@ -1,5 +1,8 @@
 //! Ours, as a user would call it.
 
+use std::hint::black_box;
+
+use fearless_simd::Level;
 use nearmiss::{
     Answer, CollideOptions, CollidePlan, CollideScratch, Evidence, Method as Search, Metric, Pose, Scan,
     Verdict, collide_with,
@@ -16,7 +19,13 @@ pub struct Ours<'a> {
     plan: CollidePlan,
     limits: Limits,
     scratch: CollideScratch,
+    level: Option<Level>,
+    /// What is read before each question, so that nothing of the scan is left in any cache.
+    evicting: Vec<u64>,
 }
+
+/// Words to read before a question: 96 MiB, more than any last level cache leaves to one core.
+const EVICTING: usize = 12 << 20;
 
 impl<'a> Ours<'a> {
     /// Asks with these `options`, without a limit.
@@ -25,13 +34,26 @@ impl<'a> Ours<'a> {
     /// When there is no plan for that.
     pub fn new(scan: &'a Scan, options: &CollideOptions) -> Result<Self, Failure> {
         let plan = CollidePlan::new(options, scan, scan)?;
-        Ok(Self { scan, plan, limits: Limits::default(), scratch: CollideScratch::default() })
+        let scratch = CollideScratch::default();
+        Ok(Self { scan, plan, limits: Limits::default(), scratch, level: None, evicting: Vec::new() })
     }
 
     /// The same, each question within `limits`; hits are then best efforts.
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
+    }
+
+    /// The same by this instruction set.
+    #[must_use]
+    pub fn by_level(self, level: Level) -> Self {
+        Self { scratch: CollideScratch::by_level(level), level: Some(level), ..self }
+    }
+
+    /// The same with nothing in the caches when asked.
+    #[must_use]
+    pub fn evicted(self) -> Self {
+        Self { evicting: (0..EVICTING as u64).collect(), ..self }
     }
 
     /// The whole answer.
@@ -42,6 +64,10 @@ impl<'a> Ours<'a> {
 }
 
 impl Method for Ours<'_> {
+    fn prepare(&mut self) {
+        black_box(self.evicting.iter().fold(0, |sum, word| sum ^ word));
+    }
+
     fn name(&self) -> String {
         let options = self.plan.options();
         let certified = if options.evidence == Evidence::Certified { ", certified" } else { "" };
@@ -55,7 +81,11 @@ impl Method for Ours<'_> {
         };
         let kernel = if options.metric == Some(Metric::Geodesic) { ", geodesic" } else { "" };
         let coverings = if options.coverings { ", coverings" } else { "" };
-        format!("nearmiss ({:?}{certified}{kernel}{method}{order}{coverings})", options.detail).to_lowercase()
+        let level = self.level.map_or(String::new(), |level| format!(", {}", level_name(level)));
+        let evicted = if self.evicting.is_empty() { "" } else { ", caches evicted" };
+        let detail = options.detail;
+        format!("nearmiss ({detail:?}{certified}{kernel}{method}{order}{coverings}{level}{evicted})")
+            .to_lowercase()
     }
 
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply {
@@ -63,4 +93,10 @@ impl Method for Ours<'_> {
         let hit = matches!(best_effort(verdict), Verdict::Intersecting { .. });
         Reply { hit, evaluations: statistics.evaluations, node_pairs: statistics.node_pairs }
     }
+}
+
+/// What an instruction set is called.
+fn level_name(level: Level) -> String {
+    let name = format!("{level:?}");
+    name.split('(').next().unwrap_or_default().to_owned()
 }

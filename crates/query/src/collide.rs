@@ -6,6 +6,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use fearless_simd::Level;
 use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{Frontier, Heap, NodePair, Stack, Visitor, WideStack, descend, descend_wide};
 
@@ -64,6 +65,12 @@ impl Frontiers {
 }
 
 impl CollideScratch {
+    /// For code in lanes by this level instead of the best there is, to compare: answers are the same by any.
+    #[must_use]
+    pub fn by_level(level: Level) -> Self {
+        Self { instructions: Instructions(level), ..Self::default() }
+    }
+
     /// The longest time that the last query with a deadline did not look at the clock; zero without a deadline. What a
     /// query may be late by, beside what the machine takes away.
     #[must_use]
