@@ -9,6 +9,7 @@ use nearmiss_query::{
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle;
+use rand::RngExt;
 
 fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     let leaf = BuildOptions::default().with_leaf_size(8);
@@ -328,4 +329,53 @@ fn balls_that_surely_meet_are_likely_to() {
         let Verdict::Undecided(Reason::Budget { likelihood }) = verdict else { panic!("{verdict:?}") };
         assert!(likelihood > 0.5, "{likelihood} after {work} units");
     }
+}
+
+#[test]
+fn signs_of_normals_change_no_answer() {
+    let mut rng = arbitrary::rng(8);
+    let (mut hits, mut apart) = (0, 0);
+    for (n, kind) in (0_u64..).zip(SHAPES.iter().cycle().take(16)) {
+        let points = arbitrary::cloud(*kind, 600, n);
+        let plain = prepared(&points);
+        // Some of all to either side, as where nothing tells inside from outside.
+        let mut turned = prepared(&points);
+        let either: Vec<[f32; 3]> = turned
+            .normals()
+            .iter()
+            .map(|normal| if rng.random_bool(0.5) { *normal } else { normal.map(|x| -x) })
+            .collect();
+        turned.turn_normals(&either);
+        let size = plain.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        let options = CollideOptions::default();
+        for options in [
+            options,
+            options.with_detail(Detail::Verdict),
+            options.with_evidence(Evidence::Certified),
+            options.with_margin(plain.sampling_radius()),
+        ] {
+            for _ in 0..40 {
+                let poses = [arbitrary::pose(&mut rng, size), arbitrary::pose(&mut rng, size)];
+                let [one, other] = [&plain, &turned].map(|scan| {
+                    let views = [ScanView::new(scan, &poses[0]), ScanView::new(scan, &poses[1])];
+                    ask(&views[0], &views[1], options, &Budget::UNLIMITED)
+                });
+                assert_eq!(one.statistics, other.statistics, "{kind:?}");
+                match (one.verdict, other.verdict) {
+                    (
+                        Verdict::Intersecting { contact: p, evidence: e },
+                        Verdict::Intersecting { contact: q, evidence: f },
+                    ) => {
+                        assert_eq!((p.sources, e), (q.sources, f), "{kind:?}");
+                        hits += 1;
+                    }
+                    (p, q) => {
+                        assert_eq!(p, q, "{kind:?}");
+                        apart += 1;
+                    }
+                }
+            }
+        }
+    }
+    assert!(hits > 300 && apart > 300, "{hits} {apart}");
 }
