@@ -23,7 +23,7 @@ pub enum Extent {
 ///
 /// As in the paper, balls that are further than that from the volume of the other node are dropped first: its box for
 /// discs, its [enclosure](Slices::enclosure) for the surface. Rounding is included: what is excluded has nothing within
-/// `reach` of each other. Compares each ball of one that is left with eight of the other at a time; does not
+/// `reach` of each other. Compares each ball of one that is left with sixteen of the other at a time; does not
 /// allocate.
 ///
 /// # Panics

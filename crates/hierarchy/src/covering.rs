@@ -7,6 +7,7 @@
 //! that most of what is under a node is never looked at: a box about it is inside.
 
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::boxes::{OrientedBox, dot};
 use crate::enclosure::Cell;
@@ -44,7 +45,7 @@ const CANCELLED: f32 = 1.0 + 2e-6;
 const LOST: f32 = 1e-20;
 
 /// Samples that are worked on together.
-pub(crate) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 16;
 
 /// Places side by side; where there are fewer than lanes, places infinitely far away.
 #[derive(Debug, Clone, Copy)]
@@ -84,19 +85,22 @@ impl Centres {
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = [f32; 3]> {
-        (0..self.len).map(|i| {
-            let [x, y, z] = &self.blocks[i / WIDTH];
-            [x[i % WIDTH], y[i % WIDTH], z[i % WIDTH]]
-        })
+        (0..self.len).map(|i| self.get(i))
     }
 
-    #[inline]
+    #[inline(always)]
+    fn get(&self, i: usize) -> [f32; 3] {
+        let [x, y, z] = &self.blocks[i / WIDTH];
+        [x[i % WIDTH], y[i % WIDTH], z[i % WIDTH]]
+    }
+
+    #[inline(always)]
     fn blocks(&self) -> &[[[f32; WIDTH]; 3]] {
         &self.blocks[..self.len.div_ceil(WIDTH)]
     }
 
     /// The squared distance of the nearest; infinite if there is none.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn nearest_sq(&self, p: [f32; 3]) -> f32 {
         let mut least = [f32::INFINITY; WIDTH];
         for [x, y, z] in self.blocks() {
@@ -110,7 +114,7 @@ impl Centres {
     }
 
     /// The square of the least radius at which one ball alone contains the box; infinite if anything is no number.
-    #[inline]
+    #[inline(always)]
     fn far_sq(&self, bounds: &OrientedBox) -> f32 {
         let OrientedBox { centre: c, half, axes, .. } = bounds;
         let mut least = [f32::INFINITY; WIDTH];
@@ -130,11 +134,12 @@ impl Centres {
     }
 
     /// For each solid the square of the least radius at which one ball alone contains it.
-    #[inline]
+    #[inline(always)]
     fn each_far_sq(&self, solids: &Solids) -> [f32; WIDTH] {
         let Solids { middle: [px, py, pz], normal: [nx, ny, nz], across, height } = solids;
         let mut least = [f32::INFINITY; WIDTH];
-        for [x, y, z] in self.iter() {
+        for centre in 0..self.len {
+            let [x, y, z] = self.get(centre);
             for i in 0..WIDTH {
                 let d = [x - px[i], y - py[i], z - pz[i]];
                 let up = dot(d, [nx[i], ny[i], nz[i]]);
@@ -149,14 +154,27 @@ impl Centres {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn fold_min(lanes: &[f32; WIDTH]) -> f32 {
-    let less = |a: f32, b: f32| if a < b { a } else { b };
-    let mut four = [0.0; WIDTH / 2];
-    for i in 0..WIDTH / 2 {
-        four[i] = less(lanes[i], lanes[i + WIDTH / 2]);
+    let mut least = *lanes;
+    let mut width = WIDTH / 2;
+    while width > 0 {
+        for i in 0..width {
+            least[i] = if least[i] < least[i + width] { least[i] } else { least[i + width] };
+        }
+        width /= 2;
     }
-    less(less(four[0], four[2]), less(four[1], four[3]))
+    least[0]
+}
+
+/// As by [`f32::max`], which makes nothing of what is no number.
+#[inline(always)]
+fn fold_max(lanes: &[f32; WIDTH]) -> f32 {
+    let mut greatest = 0.0_f32;
+    for &x in lanes {
+        greatest = greatest.max(x);
+    }
+    greatest
 }
 
 /// A flat cylinder about a point and its normal.
@@ -216,31 +234,41 @@ pub(crate) fn coverings<'a>(
         |a: f64, b| a + b,
     );
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
+    let level = Level::new();
     map(&ids, |&id| {
         let node = id as usize;
         let centres = Centres::of(samples(node), positions);
-        let radius = ground.covering_radius(node, &centres);
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
         let spacing = (squares[node] / f64::from(nodes[node].count)).sqrt() as f32;
-        Covering { radius, sampling: ground.sampling_radius(node, &centres).min(radius), spacing }
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let radius = ground.covering_radius(node, &centres);
+                Covering { radius, sampling: ground.sampling_radius(node, &centres).min(radius), spacing }
+            },
+        ))
     })
 }
 
+// Inlined into a caller that has it compiled for an instruction set.
 impl Ground<'_> {
     /// A radius at which balls about `centres` contain the surface whose nearest points are under `node`, and their discs
     /// and balls.
+    #[inline(always)]
     fn covering_radius(&self, node: usize, centres: &Centres) -> f32 {
         let about = |id: usize| self.growths[id].of(&self.boxes[id]);
         self.greatest(node, centres, about, self.cells)
     }
 
     /// A radius at which each disc and ball of a point under `node` lies in one of the balls about `centres`.
+    #[inline(always)]
     fn sampling_radius(&self, node: usize, centres: &Centres) -> f32 {
         self.greatest(node, centres, |id| self.boxes[id], self.discs)
     }
 
     /// The least radius at which under `node` each box `about` a node, or else each of the `solids` of points, lies in one of the
     /// balls about `centres`. Of two children the further comes first, so that little is left to look at.
+    #[inline(always)]
     fn greatest(
         &self,
         node: usize,
@@ -262,15 +290,17 @@ impl Ground<'_> {
             let at = &self.nodes[id as usize];
             if at.is_leaf() {
                 let points = at.points();
-                let mut inside_sq = 0.0_f32;
-                for start in points.clone().step_by(WIDTH) {
+                let (mut inside_sq, mut start) = (0.0_f32, points.start);
+                while start < points.end {
                     let far_sq = centres.each_far_sq(&self.side_by_side(solids, start, points.end));
-                    inside_sq = far_sq.iter().fold(inside_sq, |m, &d_sq| m.max(d_sq));
+                    inside_sq = inside_sq.max(fold_max(&far_sq));
+                    start += WIDTH;
                 }
                 radius_sq = radius_sq.max(inside_sq.min(far));
                 continue;
             }
-            let [left, right] = [id + 1, at.right].map(|child| (child, far_sq(child as usize)));
+            let left = (id + 1, far_sq(id as usize + 1));
+            let right = (at.right, far_sq(at.right as usize));
             let (near, far) = if left.1 > right.1 { (right, left) } else { (left, right) };
             stack[top] = near;
             stack[top + 1] = far;
@@ -280,7 +310,7 @@ impl Ground<'_> {
     }
 
     /// The solids from that of point `start` on; if there are too few, the last again.
-    #[inline]
+    #[inline(always)]
     fn side_by_side(&self, of: &[Solid], start: usize, end: usize) -> Solids {
         let none = [0.0; WIDTH];
         let mut solids = Solids { middle: [none; 3], normal: [none; 3], across: none, height: none };

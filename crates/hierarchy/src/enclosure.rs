@@ -15,11 +15,14 @@
 //! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull
 //! of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_surface::{BORDER, PointBlock};
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::gather::Index;
 use crate::growth::Growth;
+use crate::lanes::{along, greatest, least, load, product, seen_from};
 use crate::neighbours::Locality;
 use crate::spacing::map;
 use crate::split::id32;
@@ -38,6 +41,17 @@ const RAYS: [[f32; SECTORS]; 2] = {
         [1.0, A, B, C, 0.0, -C, -B, -A, -1.0, -A, -B, -C, 0.0, C, B, A],
         [0.0, C, B, A, 1.0, A, B, C, 0.0, -C, -B, -A, -1.0, -A, -B, -C],
     ]
+};
+
+/// At the place of each ray the next.
+const NEXT_RAYS: [[f32; SECTORS]; 2] = {
+    let mut next = RAYS;
+    let mut k = 0;
+    while k < SECTORS {
+        (next[0][k], next[1][k]) = (RAYS[0][(k + 1) % SECTORS], RAYS[1][(k + 1) % SECTORS]);
+        k += 1;
+    }
+    next
 };
 
 /// Neighbours further than this many local radii bound a cell only beside holes; what is missed there makes it
@@ -83,8 +97,9 @@ impl Surroundings {
 
     /// Where the surface points nearest to the point `p` can be, whose neighbours are in the blocks `near`.
     #[inline(always)]
-    pub(crate) fn cell<'a>(
+    pub(crate) fn cell<'a, S: Simd>(
         &self,
+        simd: S,
         p: [f32; 3],
         normal: [f32; 3],
         radius: f32,
@@ -92,37 +107,37 @@ impl Surroundings {
     ) -> Cell {
         let (u, v) = tangents(normal);
         let reach = self.reach;
-        let (low, high) = self.heights(sub(p, self.origin), normal, reach);
+        let (low, high) = self.heights(simd, sub(p, self.origin), normal, reach);
         let mut cell = Cell { across: reach, low: low.max(-reach), high: high.min(reach) };
-        cell.across = across(p, [u, v, normal], &cell, NEIGHBOURS * radius, near).min(reach);
+        let frame = [u, v, normal];
+        cell.across = across(simd, p, frame, &cell, NEIGHBOURS * radius, near).min(reach);
         cell
     }
 
     /// Fact 1 along the normal of `p`: the least and greatest height of a surface point within `reach` of it.
     #[inline(always)]
-    fn heights(&self, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
-        let (mut low, mut high, mut most) = ([0.0_f32; WIDTH], [0.0_f32; WIDTH], [0.0_f32; WIDTH]);
-        for PointBlock { position: [x, y, z], horizon, .. } in &self.blocks {
-            for i in 0..WIDTH {
-                let d = [x[i] - p[0], y[i] - p[1], z[i] - p[2]];
-                let within = horizon[i] + reach;
-                let reaches = dot(d, d) < within * within;
-                let height = if reaches { dot(d, normal) } else { 0.0 };
-                let heard = if reaches { horizon[i] } else { 0.0 };
-                low[i] = if height < low[i] { height } else { low[i] };
-                high[i] = if height > high[i] { height } else { high[i] };
-                most[i] = if heard > most[i] { heard } else { most[i] };
-            }
+    fn heights<S: Simd>(&self, simd: S, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut low, mut high, mut most) = (zero, zero, zero);
+        for block in &self.blocks {
+            let d = seen_from(simd, block, p);
+            let horizon = f32x16::load_array_ref(simd, &block.horizon);
+            let within = horizon + reach;
+            let reaches: mask32x16<S> = product(d, d).simd_lt(within * within);
+            let height = simd.select_f32x16(reaches, along(d, normal), zero);
+            let heard = simd.select_f32x16(reaches, horizon, zero);
+            (low, high, most) = (height.min(low), height.max(high), heard.max(most));
         }
-        let margin = self.border * most.into_iter().fold(0.0, f32::max);
-        (low.into_iter().fold(0.0, f32::min) - margin, high.into_iter().fold(0.0, f32::max) + margin)
+        let margin = self.border * greatest(most, 0.0);
+        (least(low, 0.0) - margin, greatest(high, 0.0) + margin)
     }
 }
 
 /// Fact 3: how far from its axis a surface point in the cell of `p` can be. Of the points in the blocks `near`
 /// those `within` some distance of it are looked at; the last axis is the normal.
 #[inline(always)]
-fn across<'a>(
+fn across<'a, S: Simd>(
+    simd: S,
     p: [f32; 3],
     axes: [[f32; 3]; 3],
     cell: &Cell,
@@ -130,28 +145,29 @@ fn across<'a>(
     near: impl Iterator<Item = &'a PointBlock>,
 ) -> f32 {
     // Per sector the greatest reciprocal of a bound.
-    let mut closed = [0.0_f32; SECTORS];
-    for PointBlock { position: [x, y, z], .. } in near {
-        let mut d = [[0.0_f32; WIDTH]; 3];
-        let mut bits = 0;
-        for i in 0..WIDTH {
-            (d[0][i], d[1][i], d[2][i]) = (x[i] - p[0], y[i] - p[1], z[i] - p[2]);
-            let d_sq = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
-            bits |= u32::from(d_sq > 0.0 && d_sq <= within * within) << i;
+    let mut closed = f32x16::splat(simd, 0.0);
+    for block in near {
+        let d = seen_from(simd, block, p);
+        let d_sq = product(d, d);
+        let counts: mask32x16<S> = d_sq.simd_gt(0.0) & d_sq.simd_le(within * within);
+        let mut bits = counts.to_bitmask();
+        if bits == 0 {
+            continue;
         }
+        let [x, y, z] = [d[0].to_array(), d[1].to_array(), d[2].to_array()];
         while bits != 0 {
             let i = bits.trailing_zeros() as usize % WIDTH;
             bits &= bits - 1;
-            close(&mut closed, axes, cell, [d[0][i], d[1][i], d[2][i]]);
+            close(simd, &mut closed, axes, cell, [x[i], y[i], z[i]]);
         }
     }
-    let least = closed.into_iter().fold(f32::INFINITY, f32::min);
+    let least = least(closed, f32::INFINITY);
     if least > 0.0 { GROWN / least } else { f32::INFINITY }
 }
 
 /// Bounds the sectors by the neighbour `q` of the middle of a cell.
 #[inline(always)]
-fn close(closed: &mut [f32; SECTORS], axes: [[f32; 3]; 3], cell: &Cell, q: [f32; 3]) {
+fn close<S: Simd>(simd: S, closed: &mut f32x16<S>, axes: [[f32; 3]; 3], cell: &Cell, q: [f32; 3]) {
     // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, and any height z.
     let height = dot(q, axes[2]);
     let c = 0.5 * dot(q, q) + (-cell.low * height).max(-cell.high * height).max(0.0);
@@ -159,18 +175,16 @@ fn close(closed: &mut [f32; SECTORS], axes: [[f32; 3]; 3], cell: &Cell, q: [f32;
         return;
     }
     let (x, y) = (dot(q, axes[0]) / c, dot(q, axes[1]) / c);
-    let mut side = [0.0_f32; SECTORS];
-    for k in 0..SECTORS {
-        side[k] = x * RAYS[0][k] + y * RAYS[1][k];
-    }
+    let along = |[rays_x, rays_y]: &[[f32; SECTORS]; 2]| {
+        f32x16::load_array_ref(simd, rays_x) * x + f32x16::load_array_ref(simd, rays_y) * y
+    };
     // What holds at both rays of a sector holds between them.
-    let mut next = [side[0]; SECTORS];
-    next[..SECTORS - 1].copy_from_slice(&side[1..]);
-    for k in 0..SECTORS {
-        let least = if side[k] < next[k] { side[k] } else { next[k] };
-        // What is no number, or a zero of either sign, leaves a sector open.
-        closed[k] = if least > closed[k] { least } else { closed[k] };
-    }
+    let (side, next) = (along(&RAYS), along(&NEXT_RAYS));
+    let is_less: mask32x16<S> = side.simd_lt(next);
+    let least = simd.select_f32x16(is_less, side, next);
+    // What is no number, or a zero of either sign, leaves a sector open.
+    let is_more: mask32x16<S> = least.simd_gt(*closed);
+    *closed = simd.select_f32x16(is_more, least, *closed);
 }
 
 /// Where the surface points nearest to a point can be: a cylinder about its normal.
@@ -202,29 +216,45 @@ pub(crate) struct LeafBounds {
 impl LeafBounds {
     /// Facts 1 and 2 for a leaf with these points and box.
     #[inline(always)]
-    pub(crate) fn new(points: &[[f32; 3]], about: &OrientedBox, surroundings: &Surroundings) -> Self {
+    pub(crate) fn new<S: Simd>(
+        simd: S,
+        points: &[[f32; 3]],
+        about: &OrientedBox,
+        surroundings: &Surroundings,
+    ) -> Self {
         let (axes, origin, reach) = (about.axes, points[0], surroundings.reach);
-        let mut own = [[0.0_f32; 3]; 2];
+        let (mut own_low, mut own_high) = ([0.0_f32; 3], [0.0_f32; 3]);
         for p in points {
-            include(&mut own, axes.map(|axis| dot(axis, sub(*p, origin))));
-        }
-        let mut hull = own;
-        let mut greatest = 0.0_f32;
-        for PointBlock { position: [x, y, z], horizon, .. } in &surroundings.blocks {
-            for i in 0..WIDTH {
-                let at = axes.map(|axis| dot(axis, [x[i], y[i], z[i]]));
-                let far = (0..3).map(|k| (own[0][k] - at[k]).max(at[k] - own[1][k]).max(0.0));
-                let within = horizon[i] + reach;
-                if far.map(|d| d * d).sum::<f32>() < within * within {
-                    include(&mut hull, at);
-                    greatest = greatest.max(horizon[i]);
-                }
+            for k in 0..3 {
+                let c = dot(axes[k], sub(*p, origin));
+                (own_low[k], own_high[k]) = (own_low[k].min(c), own_high[k].max(c));
             }
         }
-        let margin = surroundings.border * greatest;
-        let low = [0, 1, 2].map(|k| (hull[0][k] - margin).max(own[0][k] - reach));
-        let high = [0, 1, 2].map(|k| (hull[1][k] + margin).min(own[1][k] + reach));
-        Self { axes, origin, low, high }
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut low, mut high, mut most) = ([zero; 3], [zero; 3], zero);
+        for block in &surroundings.blocks {
+            let d = load(simd, block);
+            let (mut at, mut far) = ([zero; 3], [zero; 3]);
+            for k in 0..3 {
+                at[k] = along(d, axes[k]);
+                far[k] = (-(at[k] - own_low[k])).max(at[k] - own_high[k]).max(zero);
+            }
+            let horizon = f32x16::load_array_ref(simd, &block.horizon);
+            let within = horizon + reach;
+            let is_near: mask32x16<S> = product(far, far).simd_lt(within * within);
+            for k in 0..3 {
+                low[k] = simd.select_f32x16(is_near, at[k].min(low[k]), low[k]);
+                high[k] = simd.select_f32x16(is_near, at[k].max(high[k]), high[k]);
+            }
+            most = simd.select_f32x16(is_near, horizon.max(most), most);
+        }
+        let margin = surroundings.border * greatest(most, 0.0);
+        let mut bounds = Self { axes, origin, low: own_low, high: own_high };
+        for k in 0..3 {
+            bounds.low[k] = (least(low[k], own_low[k]) - margin).max(own_low[k] - reach);
+            bounds.high[k] = (greatest(high[k], own_high[k]) + margin).min(own_high[k] + reach);
+        }
+        bounds
     }
 
     /// Begins to bound the leaf by its points' cells.
@@ -278,13 +308,6 @@ impl Cells {
             }
         }
         leaf
-    }
-}
-
-fn include(bounds: &mut [[f32; 3]; 2], x: [f32; 3]) {
-    for k in 0..3 {
-        bounds[0][k] = bounds[0][k].min(x[k]);
-        bounds[1][k] = bounds[1][k].max(x[k]);
     }
 }
 

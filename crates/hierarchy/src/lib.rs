@@ -9,6 +9,7 @@ mod descend;
 mod enclosure;
 mod gather;
 mod growth;
+mod lanes;
 mod leaf_block;
 mod levels;
 mod neighbours;

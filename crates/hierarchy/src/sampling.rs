@@ -1,6 +1,6 @@
 //! How densely points lie: local radii, the sampling radius, and the points with their horizons.
 
-use nearmiss_surface::{PointBlock, SurfacePlan};
+use nearmiss_surface::{BlockTree, PointBlock, SurfacePlan};
 
 use crate::boxes::OrientedBox;
 use crate::options::{BuildError, BuildOptions};
@@ -29,8 +29,9 @@ impl Sampling {
         unit: f64,
     ) -> Result<Self, BuildError> {
         let mut blocks: Vec<PointBlock> = PointBlock::silent(positions).collect();
-        let spacings = spacings(positions, &blocks, options.radius_neighbours as usize);
-        let radii = smooth(positions, &spacings, nodes, boxes);
+        let tree = BlockTree::new(&blocks, positions.len());
+        let spacings = spacings(positions, &tree, options.radius_neighbours as usize);
+        let radii = smooth(&tree, &spacings);
         let sampling_radius = quantile(&radii);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
         let reaches = fold_nodes(nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);

@@ -10,10 +10,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use fearless_simd::Level;
 use nearmiss_surface::{BlockTree, Nearest, PointBlock, symmetric_eigen};
 
-use crate::boxes::{OrientedBox, dot, sub};
-use crate::gather::TREE_STACK;
 use crate::neighbours::chunks;
-use crate::split::id32;
 use crate::topology::Node;
 
 /// How many neighbours are looked at where the first look like a line; doubled while they all do.
@@ -51,14 +48,13 @@ pub(crate) enum Look {
     Bend,
 }
 
-/// The spacing of every one of the distinct `points`, which stand in `blocks` too.
-pub(crate) fn spacings(points: &[[f32; 3]], blocks: &[PointBlock], neighbours: usize) -> Vec<Spacing> {
-    let tree = BlockTree::new(blocks, points.len());
-    let numbers: Vec<usize> = (0..blocks.len()).collect();
+/// The spacing of every one of the distinct `points`, those of the `tree`.
+pub(crate) fn spacings(points: &[[f32; 3]], tree: &BlockTree<'_>, neighbours: usize) -> Vec<Spacing> {
+    let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
     let mut spacings = Vec::with_capacity(points.len());
     spacings.extend(
         chunks(&numbers, |blocks| {
-            let (mut search, mut spacings) = (Search::new(&tree, points), Vec::new());
+            let (mut search, mut spacings) = (Search::new(tree, points), Vec::new());
             for &block in blocks {
                 search.start(block);
                 let first = block * PointBlock::WIDTH;
@@ -82,7 +78,7 @@ pub(crate) fn spacings(points: &[[f32; 3]], blocks: &[PointBlock], neighbours: u
     let votes: Vec<AtomicU32> = spacings.iter().map(|_| 0.into()).collect();
     // A sum does not depend on its order.
     chunks(&numbers, |blocks| {
-        let mut search = Search::new(&tree, points);
+        let mut search = Search::new(tree, points);
         for &block in blocks {
             search.start(block);
             let first = block * PointBlock::WIDTH;
@@ -246,48 +242,31 @@ impl Sums {
     }
 }
 
-/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines and bends, by branch and bound on the tree.
-pub(crate) fn smooth(
-    points: &[[f32; 3]],
-    spacings: &[Spacing],
-    nodes: &[Node],
-    boxes: &[OrientedBox],
-) -> Vec<f32> {
+/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines and bends.
+pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
     // How near points are along a line says nothing of the surface about it.
-    let radii = map(spacings, |s| match s.look {
+    let tips = map(spacings, |s| match s.look {
         Look::Area | Look::Ring => s.radius,
         Look::Line | Look::Bend => f32::INFINITY,
     });
-    let least =
-        fold_nodes(nodes, |range| radii[range].iter().copied().fold(f32::INFINITY, f32::min), f32::min);
-    let ids: Vec<u32> = (0..id32(points.len())).collect();
-    map(&ids, |&i| {
-        let p = points[i as usize];
-        let own = spacings[i as usize];
-        let mut best = if own.look == Look::Bend { f32::MAX } else { own.radius };
-        let mut stack = [0_u32; TREE_STACK];
-        let mut top = 1;
-        while top > 0 {
-            top -= 1;
-            let id = stack[top] as usize;
-            let margin = best - least[id];
-            if margin <= 0.0 || GROWTH * GROWTH * boxes[id].distance_sq(p) >= margin * margin {
-                continue;
+    let (cones, level) = (tree.cones(&tips, GROWTH), Level::new());
+    let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
+    let smoothed = chunks(&numbers, |blocks| {
+        let mut radii = Vec::with_capacity(blocks.len() * PointBlock::WIDTH);
+        for &block in blocks {
+            let first = block * PointBlock::WIDTH;
+            let own = &spacings[first..(first + PointBlock::WIDTH).min(spacings.len())];
+            let mut heights = [0.0; PointBlock::WIDTH];
+            for (height, own) in heights.iter_mut().zip(own) {
+                *height = if own.look == Look::Bend { f32::MAX } else { own.radius };
             }
-            let node = nodes[id];
-            if node.is_leaf() {
-                for j in node.points() {
-                    let d = sub(points[j], p);
-                    best = best.min(radii[j] + GROWTH * dot(d, d).sqrt());
-                }
-            } else {
-                stack[top] = node.right;
-                stack[top + 1] = id32(id) + 1;
-                top += 2;
-            }
+            let lowest = cones.below(level, block, &heights);
+            let radius = |(own, lowest): (&Spacing, f32)| if lowest < f32::MAX { lowest } else { own.radius };
+            radii.extend(own.iter().zip(lowest).map(radius));
         }
-        if best < f32::MAX { best } else { own.radius }
-    })
+        radii
+    });
+    smoothed.concat()
 }
 
 /// A value for each node from its points, leaves first: `leaf` of a leaf's range, `join` of two children's.

@@ -6,7 +6,8 @@
 //! sampling radius apart must not meet.
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{
     Centre, Evaluation, HalfBlock, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen,
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::boxes::{OrientedBox, dot};
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::Index;
+use crate::lanes::{along, product, seen_from};
 use crate::neighbours::{Locality, chunks};
 use crate::spacing::{Look, Spacing};
 use crate::topology::Node;
@@ -231,12 +233,13 @@ impl Leaf<'_> {
             || {
                 let LeafScratch { locality, surroundings, near, .. } = scratch;
                 surroundings.fill(index, self.positions[0], locality);
-                let mut cells = LeafBounds::new(self.positions, self.about, surroundings).cells();
+                let mut cells = LeafBounds::new(simd, self.positions, self.about, surroundings).cells();
                 for ((p, radius), surfel) in self.positions.iter().zip(self.radii).zip(surfels) {
                     let near = index.heard(simd, &locality.groups, *p, 0.0, near);
                     let blocks = || near.iter().map(|&block| &index.blocks[block as usize]);
-                    surfel.disc = surfel.disc.min(radius * disc(widest_gap(*p, surfel.normal, blocks())));
-                    surfel.cell = surroundings.cell(*p, surfel.normal, *radius, blocks());
+                    let gap = widest_gap(simd, *p, surfel.normal, blocks());
+                    surfel.disc = surfel.disc.min(radius * disc(gap));
+                    surfel.cell = surroundings.cell(simd, *p, surfel.normal, *radius, blocks());
                     cells.include(*p, surfel.normal, &surfel.cell);
                 }
                 cells.close()
@@ -266,7 +269,11 @@ pub(crate) fn surfel_among(
     near: &[PointBlock],
 ) -> Surfel {
     let mut surfel = surfel(at, plan, radius, is_line, ordinary);
-    surfel.disc = surfel.disc.min(radius * disc(widest_gap(p, surfel.normal, near.iter())));
+    let gap = dispatch!(Level::new(), simd => simd.vectorize(
+        #[inline(always)]
+        || widest_gap(simd, p, surfel.normal, near.iter()),
+    ));
+    surfel.disc = surfel.disc.min(radius * disc(gap));
     surfel
 }
 
@@ -278,32 +285,31 @@ fn disc(gap: u32) -> f32 {
     DISC - (DISC - DISC_AT_BORDER) * border
 }
 
-/// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at `p`.
+/// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at `p`; such points are
+/// in the blocks `near`.
 #[inline(always)]
-fn widest_gap<'a>(p: [f32; 3], normal: [f32; 3], blocks: impl Iterator<Item = &'a PointBlock>) -> u32 {
+fn widest_gap<'a, S: Simd>(
+    simd: S,
+    p: [f32; 3],
+    normal: [f32; 3],
+    near: impl Iterator<Item = &'a PointBlock>,
+) -> u32 {
     let (u, v) = tangents(normal);
-    let mut taken = [0_u32; PointBlock::WIDTH];
-    for PointBlock { position: [px, py, pz], horizon, .. } in blocks {
-        for i in 0..PointBlock::WIDTH {
-            let d = [px[i] - p[0], py[i] - p[1], pz[i] - p[2]];
-            let (x, y) = (dot(d, u), dot(d, v));
-            let length = x.abs() + y.abs();
-            // The angle of the diamond |x| + |y| = 1, 0 to 4: a quarter turn each 1, without trigonometry.
-            let share = x / length;
-            let quarter = if y >= 0.0 { 1.0 - share } else { 3.0 + share };
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                clippy::cast_precision_loss,
-                reason = "0 to 24"
-            )]
-            let sector = (quarter * (SECTORS as f32 / 4.0)) as u32;
-            let sector = if sector < SECTORS { sector } else { 0 };
-            let counts = (dot(d, d) < horizon[i] * horizon[i]) & (length > 0.0);
-            taken[i] |= if counts { 1 << sector } else { 0 };
-        }
+    let mut taken = i32x16::splat(simd, 0);
+    for block in near {
+        let d = seen_from(simd, block, p);
+        let (x, y) = (along(d, u), along(d, v));
+        let length = x.abs() + y.abs();
+        // The angle of the diamond |x| + |y| = 1, 0 to 4: a quarter turn each 1, without trigonometry.
+        let share = x / length;
+        let quarter = simd.select_f32x16(y.simd_ge(0.0), -(share - 1.0), share + 3.0);
+        let turn = quarter * (SECTORS as f32 / 4.0);
+        let sector = simd.select_f32x16(turn.simd_lt(SECTORS as f32), turn, f32x16::splat(simd, 0.0));
+        let horizon = f32x16::load_array_ref(simd, &block.horizon);
+        let counts: mask32x16<S> = product(d, d).simd_lt(horizon * horizon) & length.simd_gt(0.0);
+        taken |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
     }
-    let taken = u64::from(taken.into_iter().fold(0, |all, bits| all | bits));
+    let taken = taken.to_array().into_iter().fold(0, |all, bits| all | u64::from(bits.cast_unsigned()));
     // Twice round, so that a run across the start counts whole.
     let round = taken | taken << SECTORS;
     // Runs of k are left where k − 1 more follow.
@@ -313,6 +319,16 @@ fn widest_gap<'a>(p: [f32; 3], normal: [f32; 3], blocks: impl Iterator<Item = &'
         widest += 1;
     }
     widest.min(SECTORS)
+}
+
+/// The bit of each number from 0 to 30, rounded down: two to its power, made as a floating-point number.
+#[inline(always)]
+fn bit<S: Simd>(number: f32x16<S>) -> i32x16<S> {
+    const ONE: i32 = 127;
+    const DIGITS: u32 = 23;
+    let exponent = i32x16::truncate_from(number) + ONE;
+    let power: f32x16<S> = (exponent << DIGITS).bitcast();
+    i32x16::truncate_from(power)
 }
 
 /// Two unit vectors that complete `normal` to a right-handed frame (Duff et al., "Building an orthonormal

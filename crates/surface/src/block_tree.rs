@@ -8,11 +8,13 @@
 //! underflow included. Rounding keeps order, so the distance of a box, computed alike from its nearest corner, face
 //! or edge, exceeds no distance to a point in it, and what is found depends on nothing but the points.
 
+mod cones;
 mod heard;
 mod near;
 mod nearest;
 mod skeleton;
 
+pub use cones::Cones;
 pub use heard::Heard;
 pub use nearest::{Nearest, Neighbour};
 pub use skeleton::Skeleton;
@@ -23,6 +25,9 @@ use fearless_simd::{Simd, f32x16, mask32x16};
 use crate::PointBlock;
 
 const WIDTH: usize = PointBlock::WIDTH;
+
+/// 2³² points fill so many levels of groups.
+const MOST_LEVELS: usize = 8;
 
 /// Boxes side by side, with the greatest horizon in each.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -125,3 +125,43 @@ fn what_is_heard_is_what_a_look_at_all_points_hears() {
     compare_heard(&points, |i| if i % 97 == 0 { 3.0 } else { 0.01 }, "a few that are heard everywhere");
     compare_heard(&points, |_| 0.0, "nobody");
 }
+
+fn compare_cones(points: &[Point], tips: &[f32], own: &[f32], slope: f32, what: &str) {
+    let blocks = blocks(points, |_| 0.0);
+    let tree = BlockTree::new(&blocks, points.len());
+    let cones = tree.cones(tips, slope);
+    for level in levels() {
+        for (block, own) in own.chunks(16).enumerate() {
+            let mut heights = [7.0; 16];
+            heights[..own.len()].copy_from_slice(own);
+            let below = cones.below(level, block, &heights);
+            for (lane, (&own, &found)) in own.iter().zip(&below).enumerate() {
+                let p = points[block * 16 + lane];
+                let cone = |(q, tip): (&Point, &f32)| distance_sq(p, *q).sqrt() * slope + tip;
+                let all = points.iter().zip(tips).map(cone).fold(own, f32::min);
+                assert_eq!(found.to_bits(), all.to_bits(), "{what}: {found} for {all}, {own}");
+            }
+            assert!(below[own.len()..].iter().all(|&height| height == 7.0), "{what}: lanes without a point");
+        }
+    }
+}
+
+#[test]
+fn cones_are_those_of_all_points() {
+    for kind in CloudKind::ALL {
+        for (n, scale) in [(1, 1.0), (17, 1e12), (700, 1.0), (700, 1e-9)] {
+            let points = points(kind, n, 9, scale);
+            let radius = |i: usize| naive_nearest(&points, i, 6).last().map_or(1e-18, |n| n.0.sqrt());
+            let radii: Vec<f32> = (0..points.len()).map(radius).collect();
+            for slope in [0.0, 0.3, 4.0] {
+                compare_cones(&points, &radii, &radii, slope, &format!("{kind:?}, {n}, slope {slope}"));
+            }
+            // Some tell nothing, some know nothing, one is far below all others.
+            let tips = |i: usize| [f32::INFINITY, radii[i], 1e-3 * radii[i]][i % 7 % 3];
+            let tips: Vec<f32> = (0..points.len()).map(tips).collect();
+            let own = |i: usize| if i % 5 == 0 { f32::MAX } else { radii[i] };
+            let own: Vec<f32> = (0..points.len()).map(own).collect();
+            compare_cones(&points, &tips, &own, 0.3, &format!("{kind:?}, {n}, uneven"));
+        }
+    }
+}

@@ -7,10 +7,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, mask32x16};
 
 use super::skeleton::{Block, Lanes, Place, Skeleton, Stretch, single};
-use super::{Bits, BlockTree, WIDTH, bits, id32, load};
-
-/// 2³² points fill so many levels of groups.
-const MOST_LEVELS: usize = 8;
+use super::{Bits, BlockTree, MOST_LEVELS, WIDTH, bits, id32, load};
 
 /// Room for a descent that keeps all siblings.
 const STACK: usize = MOST_LEVELS * WIDTH;
