@@ -7,6 +7,7 @@ use nearmiss_surface::{Metric, PointBlock, SurfacePlan};
 use crate::boxes::{OrientedBox, dot};
 use crate::covering::{Covering, Ground, Solid, coverings};
 use crate::enclosure::{LeafBounds, growths};
+use crate::extents::{Discs, boxes_of_discs};
 use crate::gather::Index;
 use crate::growth::Growth;
 use crate::levels::samples;
@@ -15,9 +16,8 @@ use crate::options::{BuildError, BuildOptions};
 use crate::outline::Outline;
 use crate::samples::lists;
 use crate::sampling::Sampling;
-use crate::spacing::map;
-use crate::split::{Item, id32, split};
-use crate::surfels::{NormalCone, PointKind, align, box_of_discs, surfels};
+use crate::split::{Item, split};
+use crate::surfels::{NormalCone, PointKind, align, surfels};
 use crate::topology::Node;
 use crate::wide::WideTree;
 
@@ -380,20 +380,24 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let lists_of_blocks = neighbours(&index, &positions, &radii);
     let parts = surfels(&index, &positions, &radii, (&spacings, sampling_radius));
     drop(spacings);
-    let all = || parts.iter().flat_map(|(surfels, _)| surfels);
-    let mut normals: Vec<[f32; 3]> = all().map(|s| s.normal).collect();
-    let discs: Vec<f32> = all().map(|s| s.disc).collect();
-    let kinds: Vec<u8> = all().map(|s| s.kind.code()).collect();
-    let balls: Vec<f32> = all().zip(&radii).map(|(s, &r)| ball(s.kind, r, sampling_radius)).collect();
-    let flat: Vec<Solid> =
-        discs.iter().zip(&balls).map(|(&disc, &ball)| Solid::of_disc(disc, ball)).collect();
-    let cells: Vec<Solid> = all().zip(&flat).map(|(s, &disc)| Solid::of_cell(&s.cell, disc)).collect();
+    let count = positions.len();
+    let (mut normals, mut discs) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let (mut kinds, mut balls) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    let (mut flat, mut cells) = (Vec::with_capacity(count), Vec::with_capacity(count));
+    for (s, &radius) in parts.iter().flat_map(|(surfels, _)| surfels).zip(&radii) {
+        let ball = ball(s.kind, radius, sampling_radius);
+        let solid = Solid::of_disc(s.disc, ball);
+        normals.push(s.normal);
+        discs.push(s.disc);
+        kinds.push(s.kind.code());
+        balls.push(ball);
+        flat.push(solid);
+        cells.push(Solid::of_cell(&s.cell, solid));
+    }
     let leaves: Vec<LeafBounds> = parts.into_iter().flat_map(|(_, leaves)| leaves).collect();
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
-    let ids: Vec<u32> = (0..id32(nodes.len())).collect();
-    boxes = map(&ids, |&i| {
-        box_of_discs(&nodes[i as usize], &boxes[i as usize], &positions, &normals, &discs, &balls)
-    });
+    let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
+    boxes = boxes_of_discs(&nodes, &boxes, &of_points);
     drop(balls);
     let growths = growths(&nodes, &boxes, &leaves);
     let sample_lists = lists(&positions, &nodes, (options.leaf_size, options.samples));

@@ -15,14 +15,16 @@
 //! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull
 //! of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_surface::{BORDER, PointBlock};
 
 use crate::boxes::{OrientedBox, dot, sub};
 use crate::gather::Index;
 use crate::growth::Growth;
-use crate::lanes::{along, greatest, least, load, product, seen_from};
+use crate::lanes::{along, greatest, lanes_of, least, load, product, seen_from};
 use crate::neighbours::Locality;
 use crate::spacing::map;
 use crate::split::id32;
@@ -150,41 +152,35 @@ fn across<'a, S: Simd>(
         let d = seen_from(simd, block, p);
         let d_sq = product(d, d);
         let counts: mask32x16<S> = d_sq.simd_gt(0.0) & d_sq.simd_le(within * within);
-        let mut bits = counts.to_bitmask();
-        if bits == 0 {
+        if !counts.any_true() {
             continue;
         }
-        let [x, y, z] = [d[0].to_array(), d[1].to_array(), d[2].to_array()];
+        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal of a neighbour q, and any height z.
+        let height = along(d, axes[2]);
+        let bound = d_sq * 0.5 + (-(height * cell.low)).max(-(height * cell.high)).max(0.0);
+        let (x, y) = ((along(d, axes[0]) / bound).to_array(), (along(d, axes[1]) / bound).to_array());
+        let counts: mask32x16<S> = counts & bound.simd_ge(f32::MIN_POSITIVE);
+        let mut bits = counts.to_bitmask();
         while bits != 0 {
             let i = bits.trailing_zeros() as usize % WIDTH;
             bits &= bits - 1;
-            close(simd, &mut closed, axes, cell, [x[i], y[i], z[i]]);
+            // What holds at both rays of a sector holds between them.
+            let (side, next) = (rays(simd, &RAYS, x[i], y[i]), rays(simd, &NEXT_RAYS, x[i], y[i]));
+            let is_less: mask32x16<S> = side.simd_lt(next);
+            let least = simd.select_f32x16(is_less, side, next);
+            // What is no number, or a zero of either sign, leaves a sector open.
+            let is_more: mask32x16<S> = least.simd_gt(closed);
+            closed = simd.select_f32x16(is_more, least, closed);
         }
     }
     let least = least(closed, f32::INFINITY);
     if least > 0.0 { GROWN / least } else { f32::INFINITY }
 }
 
-/// Bounds the sectors by the neighbour `q` of the middle of a cell.
+/// How far a vector goes along each of some rays.
 #[inline(always)]
-fn close<S: Simd>(simd: S, closed: &mut f32x16<S>, axes: [[f32; 3]; 3], cell: &Cell, q: [f32; 3]) {
-    // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, and any height z.
-    let height = dot(q, axes[2]);
-    let c = 0.5 * dot(q, q) + (-cell.low * height).max(-cell.high * height).max(0.0);
-    if c < f32::MIN_POSITIVE {
-        return;
-    }
-    let (x, y) = (dot(q, axes[0]) / c, dot(q, axes[1]) / c);
-    let along = |[rays_x, rays_y]: &[[f32; SECTORS]; 2]| {
-        f32x16::load_array_ref(simd, rays_x) * x + f32x16::load_array_ref(simd, rays_y) * y
-    };
-    // What holds at both rays of a sector holds between them.
-    let (side, next) = (along(&RAYS), along(&NEXT_RAYS));
-    let is_less: mask32x16<S> = side.simd_lt(next);
-    let least = simd.select_f32x16(is_less, side, next);
-    // What is no number, or a zero of either sign, leaves a sector open.
-    let is_more: mask32x16<S> = least.simd_gt(*closed);
-    *closed = simd.select_f32x16(is_more, least, *closed);
+fn rays<S: Simd>(simd: S, rays: &[[f32; SECTORS]; 2], x: f32, y: f32) -> f32x16<S> {
+    f32x16::load_array_ref(simd, &rays[0]) * x + f32x16::load_array_ref(simd, &rays[1]) * y
 }
 
 /// Where the surface points nearest to a point can be: a cylinder about its normal.
@@ -233,7 +229,7 @@ impl LeafBounds {
         let zero = f32x16::splat(simd, 0.0);
         let (mut low, mut high, mut most) = ([zero; 3], [zero; 3], zero);
         for block in &surroundings.blocks {
-            let d = load(simd, block);
+            let d = load(simd, &block.position);
             let (mut at, mut far) = ([zero; 3], [zero; 3]);
             for k in 0..3 {
                 at[k] = along(d, axes[k]);
@@ -322,7 +318,9 @@ pub(crate) fn growths(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBound
             (growth, growth.of(bounds))
         })
         .collect();
+    let blocks: Vec<BoxBlock> = of_leaves.chunks(WIDTH).map(BoxBlock::of).collect();
     let leaf_size = nodes.iter().find(|node| node.is_leaf()).map_or(1, |leaf| leaf.count as usize);
+    let level = Level::new();
     map(&ids, |&id| {
         let (node, bounds) = (&nodes[id as usize], &boxes[id as usize]);
         let range =
@@ -330,14 +328,68 @@ pub(crate) fn growths(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBound
         if node.is_leaf() {
             return of_leaves[range.start].0;
         }
-        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        for (_, leaf) in &of_leaves[range] {
-            let other = leaf.along(&bounds.axes);
-            for k in 0..3 {
-                low[k] = low[k].min(other[k][0]);
-                high[k] = high[k].max(other[k][1]);
-            }
-        }
+        let [low, high] = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || extents(simd, &blocks, &range, &bounds.axes),
+        ));
         Growth::new(bounds, low, high)
     })
+}
+
+/// Boxes side by side.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct BoxBlock {
+    centre: [[f32; WIDTH]; 3],
+    half: [[f32; WIDTH]; 3],
+    axes: [[[f32; WIDTH]; 3]; 3],
+}
+
+impl BoxBlock {
+    fn of(boxes: &[(Growth, OrientedBox)]) -> Self {
+        let zero = [[0.0; WIDTH]; 3];
+        let mut block = Self { centre: zero, half: zero, axes: [zero; 3] };
+        for (lane, (_, bounds)) in boxes.iter().enumerate() {
+            for k in 0..3 {
+                block.centre[k][lane] = bounds.centre[k];
+                block.half[k][lane] = bounds.half[k];
+                for j in 0..3 {
+                    block.axes[k][j][lane] = bounds.axes[k][j];
+                }
+            }
+        }
+        block
+    }
+}
+
+/// How far these of the boxes reach along some axes, either way: what is [`OrientedBox::along`] of one.
+#[inline(always)]
+fn extents<S: Simd>(
+    simd: S,
+    blocks: &[BoxBlock],
+    range: &Range<usize>,
+    axes: &[[f32; 3]; 3],
+) -> [[f32; 3]; 2] {
+    let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
+    let (mut low, mut high) = ([most; 3], [none; 3]);
+    for number in range.start / WIDTH..range.end.div_ceil(WIDTH) {
+        let block = &blocks[number];
+        let inside = mask32x16::from_bitmask(simd, lanes_of(number, range));
+        for k in 0..3 {
+            let middle = along(load(simd, &block.centre), axes[k]);
+            let mut spread = f32x16::splat(simd, 0.0);
+            for j in 0..3 {
+                let cosine = along(load(simd, &block.axes[j]), axes[k]).abs();
+                spread += f32x16::load_array_ref(simd, &block.half[j]) * cosine;
+            }
+            low[k] = low[k].min(simd.select_f32x16(inside, middle - spread, most));
+            high[k] = high[k].max(simd.select_f32x16(inside, middle + spread, none));
+        }
+    }
+    let mut bounds = [[0.0; 3]; 2];
+    for k in 0..3 {
+        bounds[0][k] = least(low[k], f32::INFINITY);
+        bounds[1][k] = greatest(high[k], f32::NEG_INFINITY);
+    }
+    bounds
 }

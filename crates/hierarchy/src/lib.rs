@@ -7,6 +7,7 @@ mod build;
 mod covering;
 mod descend;
 mod enclosure;
+mod extents;
 mod gather;
 mod growth;
 mod lanes;

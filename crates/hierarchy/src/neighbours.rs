@@ -7,12 +7,14 @@
 //! point is the block's (`docs/theory/certificates.md`, fact 2).
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_surface::PointBlock;
 
 use crate::boxes::{ROUNDING, dot, sub};
 use crate::build::PointHierarchy;
 use crate::gather::Index;
+use crate::lanes::{greatest, product, seen_from};
 
 /// Points of a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
@@ -29,45 +31,56 @@ pub(crate) const GROWN: f32 = 1.0 + 1e-5;
 
 /// For every group of blocks the balls outside of which no point of a block is heard, given the blocks.
 pub(crate) fn groups(blocks: &[PointBlock]) -> Vec<PointBlock> {
-    let ball = |block: &PointBlock| {
-        let PointBlock { position: [x, y, z], horizon, .. } = block;
-        let points = || (0..PointBlock::WIDTH).filter(|&i| horizon[i] > 0.0).map(|i| [x[i], y[i], z[i]]);
-        let (sum, count) =
-            points().fold(([0.0; 3], 0.0), |(s, n), p| ([s[0] + p[0], s[1] + p[1], s[2] + p[2]], n + 1.0));
-        let heard = |centre: [f32; 3], (p, horizon): ([f32; 3], &f32)| {
-            let d = sub(p, centre);
-            dot(d, d).sqrt() + horizon
-        };
-        // From the mean ever less far towards whoever is heard furthest: the least ball of balls.
-        let mut centre = sum.map(|c: f32| c / count);
-        let mut best = (centre, f32::INFINITY);
-        for step in 2..2 + CENTRING {
-            let furthest = points().zip(horizon).map(|ball| (heard(centre, ball), ball.0));
-            let (radius, p) = furthest.fold((0.0, centre), |a, b| if b.0 > a.0 { b } else { a });
-            if radius < best.1 {
-                best = (centre, radius);
-            }
-            let share = 1.0 / f32::from(step);
-            for k in 0..3 {
-                centre[k] += share * (p[k] - centre[k]);
-            }
-        }
-        let (centre, radius) = best;
-        let far = centre.iter().fold(radius, |far, c| far.max(c.abs()));
-        (centre, radius * GROWN + ROUNDING * far)
-    };
-    let group = |blocks: &[PointBlock]| {
+    let level = Level::new();
+    chunks(blocks, |blocks| {
         let mut group = PointBlock::EMPTY;
         for (lane, block) in blocks.iter().enumerate() {
-            let (centre, radius) = ball(block);
+            let (centre, radius) = dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || ball(simd, block),
+            ));
             for k in 0..3 {
                 group.position[k][lane] = centre[k];
             }
             group.horizon[lane] = radius;
         }
         group
-    };
-    blocks.chunks(PointBlock::WIDTH).map(group).collect()
+    })
+}
+
+/// A ball outside of which no point of a block is heard.
+#[inline(always)]
+fn ball<S: Simd>(simd: S, block: &PointBlock) -> ([f32; 3], f32) {
+    let PointBlock { position: [x, y, z], horizon, .. } = block;
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    for i in 0..PointBlock::WIDTH {
+        if horizon[i] > 0.0 {
+            (sum, count) = ([sum[0] + x[i], sum[1] + y[i], sum[2] + z[i]], count + 1.0);
+        }
+    }
+    let mut centre = [sum[0] / count, sum[1] / count, sum[2] / count];
+    // From the mean ever less far towards whoever is heard furthest: the least ball of balls.
+    let horizons = f32x16::load_array_ref(simd, horizon);
+    let is_there: mask32x16<S> = horizons.simd_gt(0.0);
+    let mut best = (centre, f32::INFINITY);
+    for step in 2..2 + CENTRING {
+        let d = seen_from(simd, block, centre);
+        let heard = product(d, d).sqrt() + horizons;
+        let heard = simd.select_f32x16(is_there, heard, f32x16::splat(simd, 0.0));
+        let radius = greatest(heard, 0.0);
+        if radius < best.1 {
+            best = (centre, radius);
+        }
+        let furthest: mask32x16<S> = heard.simd_eq(radius);
+        let i = furthest.to_bitmask().trailing_zeros() as usize % PointBlock::WIDTH;
+        let share = 1.0 / f32::from(step);
+        for (c, p) in centre.iter_mut().zip([x[i], y[i], z[i]]) {
+            *c += share * (p - *c);
+        }
+    }
+    let (centre, radius) = best;
+    let far = centre.iter().fold(radius, |far, c| far.max(c.abs()));
+    (centre, radius * GROWN + ROUNDING * far)
 }
 
 /// Which entries of the array of all lists are a block's, and where they are complete.
@@ -195,8 +208,8 @@ pub(crate) fn neighbours(index: &Index<'_>, positions: &[[f32; 3]], radii: &[f32
     all
 }
 
-/// Items that a thread works on at once: enough to hide the hand-over.
-const ITEMS_A_TASK: usize = 16;
+/// Items that a thread works on at once: enough to hide the hand-over, and a group of blocks.
+const ITEMS_A_TASK: usize = PointBlock::WIDTH;
 
 /// `f` of some items at a time, in order, on all cores where there are several.
 pub(crate) fn chunks<T: Sync, R: Send>(items: &[T], f: impl Fn(&[T]) -> R + Sync + Send) -> Vec<R> {

@@ -10,11 +10,11 @@ use nearmiss_surface::{Evaluation, Metric, PointBlock};
 use crate::boxes::dot;
 use crate::build::{PointHierarchy, ball};
 use crate::covering::{Ground, Solid, coverings};
+use crate::extents::{Discs, boxes_of_discs};
 use crate::levels::samples;
 use crate::neighbours::chunks;
-use crate::spacing::map;
 use crate::split::id32;
-use crate::surfels::{NormalCone, PointKind, Surfel, align, box_of_discs, cone, surfel_among};
+use crate::surfels::{NormalCone, PointKind, Surfel, align, cone, surfel_among};
 
 impl PointHierarchy {
     /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about them. Only of the
@@ -88,12 +88,9 @@ impl PointHierarchy {
         } else {
             normals.chunks_mut(leaf_size).map(align).collect()
         };
-        let ids: Vec<u32> = (0..id32(self.nodes.len())).collect();
-        let (nodes, boxes, positions) = (&*self.nodes, &*self.boxes, &*self.positions);
-        let boxes = map(&ids, |&i| {
-            let (node, about) = (&nodes[i as usize], &boxes[i as usize]);
-            box_of_discs(node, about, positions, &normals, &discs, &balls)
-        });
+        let (nodes, positions) = (&*self.nodes, &*self.positions);
+        let of_points = Discs { positions, normals: &normals, discs: &discs, balls: &balls };
+        let boxes = boxes_of_discs(nodes, &self.boxes, &of_points);
         let flat: Vec<Solid> =
             discs.iter().zip(&balls).map(|(&disc, &ball)| Solid::of_disc(disc, ball)).collect();
         let ground = Ground {

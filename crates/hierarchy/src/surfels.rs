@@ -382,29 +382,3 @@ pub(crate) fn cone(normals: &[[f32; 3]]) -> NormalCone {
 pub(crate) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
-
-/// The least box along the axes of `about` that contains the discs of the node's points with their thickness, and
-/// their `balls`.
-pub(crate) fn box_of_discs(
-    node: &Node,
-    about: &OrientedBox,
-    positions: &[[f32; 3]],
-    normals: &[[f32; 3]],
-    discs: &[f32],
-    balls: &[f32],
-) -> OrientedBox {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for i in node.points() {
-        for k in 0..3 {
-            let axis = about.axes[k];
-            let c = dot(axis, positions[i]);
-            // ‖n × axis‖, without the cancellation of √(1 − (n·axis)²).
-            let [x, y, z] = cross(axis, normals[i]);
-            let spread = (discs[i] * ((x * x + y * y + z * z).sqrt() + THICKNESS)).max(balls[i]);
-            low[k] = low[k].min(c - spread);
-            high[k] = high[k].max(c + spread);
-        }
-    }
-    OrientedBox::spanned(about.axes, low, high, about.reach)
-}
