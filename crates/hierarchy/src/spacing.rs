@@ -7,11 +7,13 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_surface::{BlockTree, Nearest, PointBlock, symmetric_eigen};
 
 use crate::neighbours::chunks;
 use crate::topology::Node;
+
+const WIDTH: usize = PointBlock::WIDTH;
 
 /// How many neighbours are looked at where the first look like a line; doubled while they all do.
 const LINE_NEIGHBOURS: usize = 32;
@@ -57,9 +59,16 @@ pub(crate) fn spacings(points: &[[f32; 3]], tree: &BlockTree<'_>, neighbours: us
             let (mut search, mut spacings) = (Search::new(tree, points), Vec::new());
             for &block in blocks {
                 search.start(block);
-                let first = block * PointBlock::WIDTH;
-                let points = first..(first + PointBlock::WIDTH).min(points.len());
-                spacings.extend(points.map(|i| search.spacing(i, neighbours)));
+                let plain = search.plain(neighbours);
+                let first = block * WIDTH;
+                let points = first..(first + WIDTH).min(points.len());
+                spacings.extend(points.map(|i| {
+                    if plain >> (i % WIDTH) & 1 == 1 {
+                        search.area(i, neighbours)
+                    } else {
+                        search.spacing(i, neighbours)
+                    }
+                }));
             }
             spacings
         })
@@ -69,7 +78,7 @@ pub(crate) fn spacings(points: &[[f32; 3]], tree: &BlockTree<'_>, neighbours: us
 
     let numbers: Vec<usize> = numbers
         .into_iter()
-        .zip(spacings.chunks(PointBlock::WIDTH))
+        .zip(spacings.chunks(WIDTH))
         .filter_map(|(block, spacings)| spacings.iter().any(|s| s.look != Look::Area).then_some(block))
         .collect();
     if numbers.is_empty() {
@@ -81,8 +90,8 @@ pub(crate) fn spacings(points: &[[f32; 3]], tree: &BlockTree<'_>, neighbours: us
         let mut search = Search::new(tree, points);
         for &block in blocks {
             search.start(block);
-            let first = block * PointBlock::WIDTH;
-            let points = first..(first + PointBlock::WIDTH).min(points.len());
+            let first = block * WIDTH;
+            let points = first..(first + WIDTH).min(points.len());
             for i in points.filter(|&i| spacings[i].look != Look::Area) {
                 search.look(i, neighbours);
                 for &(_, j) in &search.near {
@@ -123,6 +132,68 @@ impl<'a> Search<'a> {
         (self.block, self.count) = (block, 0);
     }
 
+    /// The points of the block that surely see an area, as bits: those of which [`Self::spacing`] says so at once. All are looked at
+    /// together.
+    fn plain(&mut self, neighbours: usize) -> u64 {
+        self.tree.nearest(self.level, self.block, neighbours, &mut self.found);
+        self.count = neighbours;
+        dispatch!(self.level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.surely_areas(neighbours)
+        ))
+    }
+
+    #[inline(always)]
+    fn surely_areas(&self, neighbours: usize) -> u64 {
+        let own = &self.tree.blocks()[self.block].position;
+        let mut sums = [[0.0_f64; WIDTH]; 9];
+        let mut plain = u64::MAX;
+        for rank in 0..neighbours {
+            let mut d = [[0.0_f64; WIDTH]; 3];
+            for lane in 0..WIDTH {
+                match self.found.ranked(lane, rank) {
+                    Some(near) => {
+                        let p = self.points[near.id as usize];
+                        for k in 0..3 {
+                            d[k][lane] = f64::from(p[k] - own[k][lane]);
+                        }
+                    }
+                    None => plain &= !(1 << lane),
+                }
+            }
+            let [x, y, z] = &d;
+            for i in 0..WIDTH {
+                let (x, y, z) = (x[i], y[i], z[i]);
+                let products = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+                for k in 0..9 {
+                    sums[k][i] += products[k];
+                }
+            }
+        }
+        for lane in 0..WIDTH {
+            let mut of = [0.0; 9];
+            for k in 0..9 {
+                of[k] = sums[k][lane];
+            }
+            let is_line = Sums { count: neighbours + 1, of }.is_surely_line();
+            plain &= !(u64::from(is_line != Some(false)) << lane);
+        }
+        plain
+    }
+
+    /// The spacing of point `i` of the block, which sees an area.
+    fn area(&self, i: usize, neighbours: usize) -> Spacing {
+        let last = self.found.ranked(i % WIDTH, neighbours - 1);
+        let radius = last.map_or(0.0, |last| length(&self.exact(i, last.id as usize)));
+        Spacing { radius, look: Look::Area }
+    }
+
+    /// The squared distance of point `j` from point `i` in double precision, and its index.
+    fn exact(&self, i: usize, j: usize) -> (f64, usize) {
+        let d = [0, 1, 2].map(|k| f64::from(self.points[j][k]) - f64::from(self.points[i][k]));
+        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
+    }
+
     /// Makes `near` hold point `i` of the block and the nearest `count` others. Those of the whole block are found at
     /// once.
     fn look(&mut self, i: usize, count: usize) {
@@ -130,15 +201,11 @@ impl<'a> Search<'a> {
             self.tree.nearest(self.level, self.block, count, &mut self.found);
             self.count = count;
         }
-        let points = self.points;
-        let exact = |j: usize| {
-            let d = [0, 1, 2].map(|k| f64::from(points[j][k]) - f64::from(points[i][k]));
-            (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
-        };
-        let found = self.found.of(i % PointBlock::WIDTH).take(count).map(|n| exact(n.id as usize));
-        self.near.clear();
-        self.near.push((0.0, i));
-        self.near.extend(found);
+        let mut near = std::mem::take(&mut self.near);
+        near.clear();
+        near.push((0.0, i));
+        near.extend(self.found.of(i % WIDTH).take(count).map(|n| self.exact(i, n.id as usize)));
+        self.near = near;
     }
 
     /// The spacing of point `i` of the block: as many neighbours are looked at as are needed.
@@ -205,6 +272,7 @@ impl Sums {
     }
 
     /// The covariance about their mean as xx xy xz yy yz zz.
+    #[inline(always)]
     fn covariance(&self) -> [f64; 6] {
         #[expect(clippy::cast_precision_loss, reason = "at most 257")]
         let n = self.count as f64;
@@ -225,20 +293,24 @@ impl Sums {
 
     /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
     fn is_line(&self) -> bool {
+        self.is_surely_line().unwrap_or_else(|| {
+            let [_, l2, l3] = symmetric_eigen(self.covariance()).values;
+            l2 < LINE * l3
+        })
+    }
+
+    /// The same where it is decided without a solve, as most neighbourhoods are.
+    #[inline(always)]
+    fn is_surely_line(&self) -> Option<bool> {
         let c = self.covariance();
         // The sum of the principal minors is λ1λ2 + λ3(λ1 + λ2). For a line it is less than
-        // (0.05² + 2·0.05) λ3², for anything else at least 0.05/1.05² of the trace's square: most
-        // neighbourhoods are decided without a solve.
+        // (0.05² + 2·0.05) λ3², for anything else at least 0.05/1.05² of the trace's square.
         let minors = c[0] * c[3] - c[1] * c[1] + c[0] * c[5] - c[2] * c[2] + c[3] * c[5] - c[4] * c[4];
         let trace_sq = (c[0] + c[3] + c[5]).powi(2);
         if minors > (LINE * LINE + 2.0 * LINE) * trace_sq * (1.0 + 1e-9) {
-            return false;
+            return Some(false);
         }
-        if minors < LINE / (1.0 + LINE).powi(2) * trace_sq * (1.0 - 1e-9) {
-            return true;
-        }
-        let [_, l2, l3] = symmetric_eigen(c).values;
-        l2 < LINE * l3
+        (minors < LINE / (1.0 + LINE).powi(2) * trace_sq * (1.0 - 1e-9)).then_some(true)
     }
 }
 
@@ -252,11 +324,11 @@ pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
     let (cones, level) = (tree.cones(&tips, GROWTH), Level::new());
     let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
     let smoothed = chunks(&numbers, |blocks| {
-        let mut radii = Vec::with_capacity(blocks.len() * PointBlock::WIDTH);
+        let mut radii = Vec::with_capacity(blocks.len() * WIDTH);
         for &block in blocks {
-            let first = block * PointBlock::WIDTH;
-            let own = &spacings[first..(first + PointBlock::WIDTH).min(spacings.len())];
-            let mut heights = [0.0; PointBlock::WIDTH];
+            let first = block * WIDTH;
+            let own = &spacings[first..(first + WIDTH).min(spacings.len())];
+            let mut heights = [0.0; WIDTH];
             for (height, own) in heights.iter_mut().zip(own) {
                 *height = if own.look == Look::Bend { f32::MAX } else { own.radius };
             }

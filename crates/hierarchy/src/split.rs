@@ -5,13 +5,18 @@
 //! children have the least summed volume of boxes along the same axes. A patch of surface is flat, so every
 //! extent is taken larger by the mean spacing of the points; otherwise all volumes would vanish alike.
 
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, f64x2, f64x4};
 use nearmiss_surface::symmetric_eigen;
 
 use crate::boxes::{OrientedBox, dot, to_axes};
+use crate::lanes::{along, greatest, least};
 use crate::topology::{Node, left_count, node_count};
 
 /// A point on its way to its place.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Item {
     pub(crate) position: [f32; 3],
     /// Index in the cloud.
@@ -51,8 +56,9 @@ impl Place<'_> {
     fn split(self, leaf_size: usize) {
         let Place { items, nodes, boxes, first, id } = self;
         let count = items.len();
-        let axes = principal_axes(items);
-        let (low, high) = extents(items, &axes);
+        let level = Level::new();
+        let axes = principal_axes(level, items);
+        let (low, high) = extents(level, items, &axes);
         boxes[0] = OrientedBox::spanned(axes, low, high, 0.0);
         if count <= leaf_size {
             items.sort_unstable_by_key(|item| item.index);
@@ -60,7 +66,7 @@ impl Place<'_> {
             return;
         }
         let left = left_count(count, leaf_size);
-        let axis = best_axis(items, &boxes[0], left);
+        let axis = best_axis(level, items, &boxes[0], left);
         partition(items, axis, left);
         let left_nodes = node_count(left, leaf_size);
         nodes[0] = Node { first: id32(first), count: id32(count), right: id32(id + 1 + left_nodes) };
@@ -91,20 +97,38 @@ pub(crate) fn id32(i: usize) -> u32 {
     i as u32
 }
 
-/// Principal axes of the points, the longest spread first.
-fn principal_axes(items: &[Item]) -> [[f32; 3]; 3] {
-    /// Lanes of the sums; a fixed order, whatever the machine.
-    const LANES: usize = 4;
-    let origin = items[0].position;
-    let mut sums = [[0.0_f64; LANES]; 9];
-    for chunk in items.chunks(LANES) {
-        for (lane, item) in chunk.iter().enumerate() {
-            let [x, y, z] = [0, 1, 2].map(|k| f64::from(item.position[k] - origin[k]));
-            for (sum, v) in sums.iter_mut().zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]) {
-                sum[lane] += v;
-            }
-        }
+/// Sums of coordinates and their products are taken in so many lanes: a fixed order, whatever the machine.
+const LANES: usize = 4;
+
+/// Items that are looked at together, for the lanes of the widest registers.
+const WIDTH: usize = 16;
+
+/// Up to sixteen items; the first of all where there are fewer.
+#[inline(always)]
+fn sixteen(items: &[Item], start: usize) -> [Item; WIDTH] {
+    let mut some = [items[0]; WIDTH];
+    let rest = &items[start..];
+    match rest.first_chunk() {
+        Some(full) => some = *full,
+        None => some[..rest.len()].copy_from_slice(rest),
     }
+    some
+}
+
+/// The coordinates of four of them.
+#[inline(always)]
+fn coordinates<S: Simd>(simd: S, items: &[Item; WIDTH], four: usize) -> [f32x4<S>; 3] {
+    let floats: &[f32] = bytemuck::cast_slice(&items[four * LANES..][..LANES]);
+    let [x, y, z, _] = f32x4::load_four_interleaved(simd, floats);
+    [x, y, z]
+}
+
+/// Principal axes of the points, the longest spread first.
+fn principal_axes(level: Level, items: &[Item]) -> [[f32; 3]; 3] {
+    let sums = dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || sums(simd, items),
+    ));
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     let n = items.len() as f64;
     let [x, y, z, xx, xy, xz, yy, yz, zz] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
@@ -114,18 +138,67 @@ fn principal_axes(items: &[Item]) -> [[f32; 3]; 3] {
     to_axes([long, middle, short.map(|c| -c)])
 }
 
-/// Least and greatest coordinate of the points along each axis.
-fn extents(items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
-    let mut low = [f32::INFINITY; 3];
-    let mut high = [f32::NEG_INFINITY; 3];
-    for item in items {
-        for k in 0..3 {
-            let c = dot(axes[k], item.position);
-            low[k] = low[k].min(c);
-            high[k] = high[k].max(c);
+/// The sums of x y z xx xy xz yy yz zz of the points relative to the first, in lanes.
+#[inline(always)]
+fn sums<S: Simd>(simd: S, items: &[Item]) -> [[f64; LANES]; 9] {
+    let origin = items[0].position;
+    let mut sums = [f64x4::splat(simd, 0.0); 9];
+    let mut start = 0;
+    while start < items.len() {
+        let some = sixteen(items, start);
+        for four in 0..WIDTH / LANES {
+            let [x, y, z] = coordinates(simd, &some, four);
+            let double = |(low, high): (f64x2<S>, f64x2<S>)| low.combine(high);
+            let x = double(simd.widen_f32x4(x - origin[0]));
+            let y = double(simd.widen_f32x4(y - origin[1]));
+            let z = double(simd.widen_f32x4(z - origin[2]));
+            let products = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+            for k in 0..9 {
+                sums[k] += products[k];
+            }
         }
+        start += WIDTH;
     }
-    (low, high)
+    let mut lanes = [[0.0; LANES]; 9];
+    for k in 0..9 {
+        lanes[k] = sums[k].to_array();
+    }
+    lanes
+}
+
+/// Least and greatest coordinate of the points along each axis.
+fn extents(level: Level, items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || extents_by(simd, items, axes),
+    ))
+}
+
+#[inline(always)]
+fn extents_by<S: Simd>(simd: S, items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
+    let mut low = [f32x16::splat(simd, f32::INFINITY); 3];
+    let mut high = [f32x16::splat(simd, f32::NEG_INFINITY); 3];
+    let mut start = 0;
+    while start < items.len() {
+        let some = sixteen(items, start);
+        let (a, b) = (coordinates(simd, &some, 0), coordinates(simd, &some, 1));
+        let (c, d) = (coordinates(simd, &some, 2), coordinates(simd, &some, 3));
+        let mut all = [low[0]; 3];
+        for k in 0..3 {
+            all[k] = a[k].combine(b[k]).combine(c[k].combine(d[k]));
+        }
+        for k in 0..3 {
+            let at = along(all, axes[k]);
+            (low[k], high[k]) = (at.min(low[k]), at.max(high[k]));
+        }
+        start += WIDTH;
+    }
+    let (mut least_of, mut greatest_of) = ([0.0; 3], [0.0; 3]);
+    for k in 0..3 {
+        least_of[k] = least(low[k], f32::INFINITY);
+        greatest_of[k] = greatest(high[k], f32::NEG_INFINITY);
+    }
+    (least_of, greatest_of)
 }
 
 /// Moves the `left` points least along `axis` to the front; equal ones by their index.
@@ -135,7 +208,7 @@ fn partition(items: &mut [Item], axis: [f32; 3], left: usize) {
 }
 
 /// The principal axis whose median split leaves the least volume, judged on an even subset.
-fn best_axis(items: &[Item], bounds: &OrientedBox, left: usize) -> [f32; 3] {
+fn best_axis(level: Level, items: &[Item], bounds: &OrientedBox, left: usize) -> [f32; 3] {
     let axes = &bounds.axes;
     let worth = |k: usize| bounds.half[k] >= WORTH_A_TRY * bounds.half[0];
     if !worth(1) && !worth(2) {
@@ -152,7 +225,7 @@ fn best_axis(items: &[Item], bounds: &OrientedBox, left: usize) -> [f32; 3] {
         [l, r]
             .into_iter()
             .map(|half| {
-                let (low, high) = extents(half, axes);
+                let (low, high) = extents(level, half, axes);
                 (0..3).map(|j| high[j] - low[j] + spacing).product::<f32>()
             })
             .sum::<f32>()
