@@ -62,6 +62,14 @@ impl Growth {
         grown
     }
 
+    /// Against the first axis and the second, against the third and along the first, along the second and the third: of each pair
+    /// the first in the lower half.
+    #[inline]
+    pub(crate) fn pairs(&self) -> [u32; 3] {
+        let ([a, b, c], [d, e, f]) = (self.low, self.high);
+        [[a, b], [c, d], [e, f]].map(|[first, second]| u32::from(second) << 16 | u32::from(first))
+    }
+
     /// Whether all lengths are lengths, if boundless ones.
     pub(crate) fn is_sound(&self) -> bool {
         self.low.iter().chain(&self.high).all(|&half| half <= BOUNDLESS)

@@ -1,16 +1,14 @@
 //! How far two scans are apart.
 //!
-//! Two searches by branch and bound over the same trees, the nearest pair of nodes first: one through the boxes about the points, for
-//! the two nearest points; one through the enclosures, which provably contain the surfaces, for a bound from below. Each is worth
-//! what it found whenever a budget ends it, so they take turns. From the nearest points on, points of the surfaces themselves approach
-//! each other.
+//! Branch and bound over both trees, the nearest pair of nodes first: by the boxes about the points for the two nearest points, by the
+//! enclosures, which provably contain the surfaces, for a bound from below. It is worth what it found whenever a budget ends it. From
+//! the nearest points on, points of the surfaces themselves approach each other.
 
 mod approach;
 mod bounds;
 mod nearest_points;
 mod search;
 
-use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use fearless_simd::Level;
@@ -27,7 +25,7 @@ use crate::view::{ScanView, ViewScratch};
 use approach::{Approach, Feet};
 use bounds::Motion;
 pub(crate) use nearest_points::{PointPair, nearest};
-use search::{Open, Search, Volumes};
+use search::{Frontier, Search};
 
 /// What is asked. Plain values; [`DistancePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -112,8 +110,7 @@ pub struct Distance {
 /// Reused between queries, one a thread; never influences an answer.
 #[derive(Debug, Clone, Default)]
 pub struct DistanceScratch {
-    boxes: BinaryHeap<Open>,
-    enclosures: BinaryHeap<Open>,
+    open: Frontier,
     gathers: [ViewScratch; 2],
     collide: CollideScratch,
 }
@@ -180,18 +177,22 @@ struct Apart<'a> {
 impl Apart<'_> {
     /// Balls of this radius about the points.
     fn balls(mut self, radius: f64, scratch: &mut DistanceScratch) -> Distance {
-        let mut boxes = self.through(Volumes::Boxes, &mut scratch.boxes);
-        boxes.least = self.motion.bound_of(self.best.distance);
+        let mut search = Search::new(&mut scratch.open, false, &self.motion);
+        search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         let beyond = |distance: f64| (distance - 2.0 * radius).max(0.0);
         let mut flow = ControlFlow::Continue(());
-        while flow.is_continue() && !boxes.is_over() && beyond(self.best.distance) > 0.0 {
+        while flow.is_continue() && !search.is_over() && beyond(self.best.distance) > 0.0 {
             flow = self.pair.meter.go_on();
             if flow.is_continue() {
-                self.look_for_points(&mut boxes);
+                self.step(&mut search);
             }
         }
         let nearest = self.best.distance;
-        let lower = if flow.is_continue() { nearest } else { self.motion.proven(boxes.lower()).min(nearest) };
+        let lower = if flow.is_continue() {
+            nearest
+        } else {
+            self.motion.proven(search.lower(&self.motion)).min(nearest)
+        };
         Distance {
             lower: beyond(lower),
             upper: beyond(nearest),
@@ -202,47 +203,32 @@ impl Apart<'_> {
     }
 
     fn surfaces(mut self, scratch: &mut DistanceScratch) -> Distance {
-        let DistanceScratch { boxes, enclosures, gathers, collide } = scratch;
-        let mut boxes = self.through(Volumes::Boxes, boxes);
-        let mut enclosures = self.through(Volumes::Enclosures, enclosures);
-        boxes.least = self.motion.bound_of(self.best.distance);
-        if self.plan.options.metric == Some(Metric::Geodesic) {
-            // By this metric enclosures prove nothing.
-            enclosures.least = 0.0;
-        }
-        let (mut for_boxes, mut for_enclosures) = (0, 0);
+        let DistanceScratch { open, gathers, collide } = scratch;
+        // By the geodesic metric enclosures prove nothing.
+        let is_bounded = self.plan.options.metric != Some(Metric::Geodesic);
+        let mut search = Search::new(open, is_bounded, &self.motion);
+        search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         // Whether they touch costs a hundredth of the rest. A budget is spent on bounds first.
         let mut is_asked = self.budget.work.is_none() && self.budget.deadline.is_none();
         if is_asked && let Some(touching) = self.touch(collide) {
             return touching;
         }
         let flow = loop {
-            if !is_asked && enclosures.is_over() {
+            if !is_asked && (!is_bounded || self.motion.proven(search.upper(&self.motion)) <= 0.0) {
                 is_asked = true;
-                if self.motion.proven(enclosures.least) <= 0.0
-                    && let Some(touching) = self.touch(collide)
-                {
+                if let Some(touching) = self.touch(collide) {
                     return touching;
                 }
             }
-            if boxes.is_over() && enclosures.is_over() {
+            if search.is_over() {
                 break ControlFlow::Continue(());
             }
             if self.pair.meter.go_on().is_break() {
                 break ControlFlow::Break(());
             }
-            let before = self.pair.meter.spent.node_pairs;
-            if !enclosures.is_over() && (boxes.is_over() || for_enclosures <= for_boxes) {
-                if let Some((bound, _)) = enclosures.step(&mut self.pair, &self.motion) {
-                    enclosures.least = enclosures.least.min(bound);
-                }
-                for_enclosures += self.pair.meter.spent.node_pairs - before;
-            } else {
-                self.look_for_points(&mut boxes);
-                for_boxes += self.pair.meter.spent.node_pairs - before;
-            }
+            self.step(&mut search);
         };
-        let lower = self.motion.proven(enclosures.lower());
+        let lower = if is_bounded { self.motion.proven(search.lower(&self.motion)) } else { 0.0 };
         let feet = if flow.is_continue() { self.approach(gathers) } else { None };
         let found = Distance { lower, complete: flow.is_continue(), ..self.samples() };
         let found = feet.map_or(found, |feet| Distance {
@@ -254,17 +240,13 @@ impl Apart<'_> {
         Distance { lower: found.lower.min(found.upper), ..found }
     }
 
-    fn through<'s>(&self, volumes: Volumes, open: &'s mut BinaryHeap<Open>) -> Search<'s> {
-        Search::new(volumes, open, &self.pair, &self.motion)
-    }
-
-    /// A step of the search for the nearest points.
-    fn look_for_points(&mut self, boxes: &mut Search<'_>) {
-        if let Some((_, leaves)) = boxes.step(&mut self.pair, &self.motion) {
+    /// A step of a search, and a look at the points of the leaves it leads to.
+    fn step(&mut self, search: &mut Search<'_>) {
+        if let Some(leaves) = search.step(&mut self.pair, &self.motion) {
             let (a, b) = (&self.pair.a.nodes[leaves.a.index()], &self.pair.b.nodes[leaves.b.index()]);
             self.pair.meter.leaf_pair(a.count as usize, b.count as usize);
             self.best = nearest(self.motion.level(), &self.pair, leaves, self.best);
-            boxes.least = self.motion.bound_of(self.best.distance);
+            search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         }
     }
 

@@ -1,4 +1,5 @@
-//! The least distance over all pairs of leaves, by branch and bound, nearest pair of nodes first.
+//! The nearest pairs of leaves, by branch and bound, nearest pair of nodes first: for the nearest points by boxes, for a bound from below by
+//! enclosures, both in one descent.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -6,21 +7,41 @@ use std::collections::BinaryHeap;
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{Node, NodePair, Split};
 
-use crate::distance::bounds::{FAN, Motion};
+use crate::distance::bounds::{FAN, Gaps, Limits, Motion};
 use crate::posed::Posed;
 
-/// A pair of nodes still to be looked at, and how near what is in them may be, in a's stored frame. Ordered so that the nearest is
-/// greatest, and of equally near ones the first.
+/// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in them is at least.
+/// Ordered so that the nearest is greatest, of equally near ones that of the nearest boxes, then the first.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Open {
-    bound: f64,
+    enclosures: f32,
+    boxes: f32,
     pair: NodePair,
+}
+
+impl Open {
+    #[inline]
+    fn key(&self) -> u64 {
+        u64::from(ascending(self.enclosures)) << 32 | u64::from(ascending(self.boxes))
+    }
+
+    #[inline]
+    fn ids(&self) -> u64 {
+        u64::from(self.pair.a.0) << 32 | u64::from(self.pair.b.0)
+    }
+}
+
+/// Bits that are in the order of the numbers.
+#[inline]
+fn ascending(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
 }
 
 impl Ord for Open {
     #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
-        other.key().cmp(&self.key())
+        other.key().cmp(&self.key()).then_with(|| other.ids().cmp(&self.ids()))
     }
 }
 
@@ -33,19 +54,11 @@ impl PartialOrd for Open {
 
 impl PartialEq for Open {
     fn eq(&self, other: &Self) -> bool {
-        self.key() == other.key()
+        self.cmp(other) == Ordering::Equal
     }
 }
 
 impl Eq for Open {}
-
-impl Open {
-    /// Bounds are not negative, so their bits are in their order.
-    #[inline]
-    fn key(&self) -> u128 {
-        u128::from(self.bound.to_bits()) << 64 | u128::from(self.pair.a.0) << 32 | u128::from(self.pair.b.0)
-    }
-}
 
 /// The lanes of so many nodes of a, less one, with so many of b, less one.
 const LANES: [[u32; FAN]; FAN] = {
@@ -63,64 +76,95 @@ const LANES: [[u32; FAN]; FAN] = {
     lanes
 };
 
-/// What stands for a node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Volumes {
-    /// The box about its points.
-    Boxes,
-    /// The box about its part of the surface.
-    Enclosures,
+/// So many steps split the nearest pair of all, which a heap finds. Then limits are near what they will be, and what was put off last
+/// comes next: some pairs more, but a heap takes longer than to look at those.
+const NEAREST_FIRST: u32 = 128;
+
+/// The pairs of nodes still to be looked at. Reused.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Frontier {
+    heap: BinaryHeap<Open>,
+    /// Before any in the heap.
+    stack: Vec<Open>,
 }
 
-/// A search through pairs of nodes. What is not open any more is at least `least` apart, or was looked at.
+/// A search through pairs of nodes.
 #[derive(Debug)]
 pub(crate) struct Search<'s> {
-    volumes: Volumes,
-    open: &'s mut BinaryHeap<Open>,
-    /// Nothing further apart than this, in a's stored frame, is looked at.
-    pub(crate) least: f64,
-    /// To be looked at next although it is not the nearest.
-    front: Option<Open>,
-    steps: u64,
+    open: &'s mut Frontier,
+    /// Whether enclosures are asked about too.
+    of_surfaces: bool,
+    /// Nothing that is so much further away than the centres of the scans is looked at for the nearest points.
+    points: f32,
+    /// Nor for the bound from below: some pair of leaves whose enclosures are so near was looked at.
+    surfaces: f32,
+    /// So many pairs were split.
+    steps: u32,
 }
 
 impl<'s> Search<'s> {
-    /// From the pair of the roots on.
-    pub(crate) fn new(
-        volumes: Volumes,
-        open: &'s mut BinaryHeap<Open>,
-        pair: &Posed<'_>,
-        motion: &Motion,
-    ) -> Self {
-        open.clear();
-        let mut search = Self { volumes, open, least: f64::INFINITY, front: None, steps: 0 };
-        let roots = [NodeId::ROOT; FAN];
-        let bound = search.bounds(pair, motion, roots, roots)[0];
-        search.front = Some(Open { bound, pair: NodePair { a: NodeId::ROOT, b: NodeId::ROOT } });
-        search
+    /// From the pair of the roots on; for the nearest points alone, or for the nearest enclosures of leaves as well.
+    pub(crate) fn new(open: &'s mut Frontier, of_surfaces: bool, motion: &Motion) -> Self {
+        open.heap.clear();
+        open.stack.clear();
+        let pair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
+        open.stack.push(Open { enclosures: motion.least(), boxes: motion.least(), pair });
+        let surfaces = if of_surfaces { f32::INFINITY } else { f32::NEG_INFINITY };
+        Self { open, of_surfaces, points: f32::INFINITY, surfaces, steps: 0 }
     }
 
-    /// How near, in a's stored frame, what is open or at `least` may be.
-    pub(crate) fn lower(&self) -> f64 {
-        let of_front = self.front.map_or(f64::INFINITY, |o| o.bound);
-        self.open.peek().map_or(self.least, |nearest| nearest.bound.min(self.least)).min(of_front)
+    /// Points further apart than this `bound` are not looked for any more.
+    pub(crate) fn found_points(&mut self, bound: f64, motion: &Motion) {
+        self.points = motion.beyond(bound);
     }
 
-    /// Whether nothing nearer than `least` is left.
-    pub(crate) fn is_over(&self) -> bool {
-        self.front.is_none() && self.open.peek().is_none_or(|nearest| nearest.bound >= self.least)
+    /// How near, in a's stored frame, surfaces are at least, or points where these alone are looked for. O(open pairs).
+    pub(crate) fn lower(&self, motion: &Motion) -> f64 {
+        let known = if self.of_surfaces { self.surfaces } else { self.points };
+        let open = self.open.heap.iter().chain(&self.open.stack);
+        motion.bound(open.fold(known, |least, open| least.min(open.enclosures)))
     }
 
-    /// Splits the nearest pair of nodes; if it is one of leaves takes it off, with its bound. None of either when the search is over.
-    pub(crate) fn step(&mut self, pair: &mut Posed<'_>, motion: &Motion) -> Option<(f64, NodePair)> {
-        self.steps += 1;
-        let dives = self.front.is_some() || self.steps.is_power_of_two();
-        let nearest =
-            self.front.take().or_else(|| self.open.pop()).filter(|nearest| nearest.bound < self.least)?;
-        let nodes = nearest.pair;
+    /// What [`Self::lower`] will not exceed.
+    pub(crate) fn upper(&self, motion: &Motion) -> f64 {
+        motion.bound(self.surfaces)
+    }
+
+    /// Whether nothing is left to look at.
+    pub(crate) fn is_over(&mut self) -> bool {
+        let Frontier { heap, stack } = &mut *self.open;
+        let (points, surfaces) = (self.points, self.surfaces);
+        let wanted = |open: &Open| open.boxes < points || open.enclosures < surfaces;
+        while stack.last().is_some_and(|open| !wanted(open)) {
+            stack.pop();
+        }
+        if !stack.is_empty() {
+            return false;
+        }
+        if self.steps >= NEAREST_FIRST {
+            // A heap's array has its nearest first, more or less.
+            stack.extend(heap.drain().filter(wanted));
+            stack.reverse();
+        }
+        while heap.peek().is_some_and(|open| !wanted(open)) {
+            heap.pop();
+        }
+        stack.is_empty() && heap.is_empty()
+    }
+
+    /// Splits the next pair of nodes; a pair of leaves whose points may be nearer than those found so far is taken off. None when the
+    /// search [is over](Self::is_over), too.
+    pub(crate) fn step(&mut self, pair: &mut Posed<'_>, motion: &Motion) -> Option<NodePair> {
+        self.steps = self.steps.saturating_add(1);
+        let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
+        let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
+        let nodes = next.pair;
         let (a, b) = (&pair.a.nodes[nodes.a.index()], &pair.b.nodes[nodes.b.index()]);
         let split = match (a.is_leaf(), b.is_leaf()) {
-            (true, true) => return Some((nearest.bound, nodes)),
+            (true, true) => {
+                self.surfaces = self.surfaces.min(next.enclosures);
+                return (next.boxes < self.points).then_some(nodes);
+            }
             (true, false) => Split::Second,
             (false, true) => Split::First,
             (false, false) => pair.split(nodes),
@@ -129,53 +173,37 @@ impl<'s> Search<'s> {
             if split == Split::Second { ([nodes.a; FAN], 1) } else { below(pair.a.nodes, nodes.a) };
         let (b, count_b) =
             if split == Split::First { ([nodes.b; FAN], 1) } else { below(pair.b.nodes, nodes.b) };
-        let bounds = self.bounds(pair, motion, a, b);
+        let limits = Limits { boxes: self.points, enclosures: self.surfaces };
+        let Gaps { boxes, enclosures, near } = motion.gaps([pair.a, pair.b], a, b, limits);
+        let enclosures = if self.of_surfaces { enclosures } else { boxes };
         pair.meter.spent.node_pairs += (count_a * count_b) as u64;
-        let mut near = 0_u32;
-        for (lane, bound) in bounds.iter().enumerate() {
-            near |= u32::from(*bound < self.least) << lane;
-        }
-        near &= LANES[count_a - 1][count_b - 1];
+        let mut near = near & LANES[count_a - 1][count_b - 1];
+        let mut nearest: Option<Open> = None;
         while near != 0 {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
             // What is in its parents is no nearer than they are.
-            let bound = bounds[lane].max(nearest.bound);
-            let own = Open { bound, pair: NodePair { a: a[lane / FAN], b: b[lane % FAN] } };
+            let own = Open {
+                enclosures: enclosures[lane].max(next.enclosures),
+                boxes: boxes[lane].max(next.boxes),
+                pair: NodePair { a: a[lane / FAN], b: b[lane % FAN] },
+            };
             if !dives {
-                self.open.push(own);
-            } else if let Some(front) = self.front.take() {
-                self.open.push(front.min(own));
-                self.front = Some(front.max(own));
+                self.put_off(own);
+            } else if let Some(known) = nearest {
+                self.put_off(known.min(own));
+                nearest = Some(known.max(own));
             } else {
-                self.front = Some(own);
+                nearest = Some(own);
             }
         }
+        self.open.stack.extend(nearest);
         None
     }
 
-    fn bounds(
-        &self,
-        pair: &Posed<'_>,
-        motion: &Motion,
-        a: [NodeId; FAN],
-        b: [NodeId; FAN],
-    ) -> [f64; FAN * FAN] {
-        match self.volumes {
-            Volumes::Boxes => {
-                let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (a, b);
-                let (a, b) = (pair.a.boxes, pair.b.boxes);
-                motion.distances(
-                    [&a[a0.index()], &a[a1.index()], &a[a2.index()], &a[a3.index()]],
-                    [&b[b0.index()], &b[b1.index()], &b[b2.index()], &b[b3.index()]],
-                )
-            }
-            Volumes::Enclosures => {
-                let [a0, a1, a2, a3] = a.map(|id| pair.a.enclosure(id.index()));
-                let [b0, b1, b2, b3] = b.map(|id| pair.b.enclosure(id.index()));
-                motion.distances([&a0, &a1, &a2, &a3], [&b0, &b1, &b2, &b3])
-            }
-        }
+    #[inline]
+    fn put_off(&mut self, open: Open) {
+        if self.steps < NEAREST_FIRST { self.open.heap.push(open) } else { self.open.stack.push(open) }
     }
 }
 
