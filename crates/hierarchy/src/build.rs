@@ -5,8 +5,8 @@ use nearmiss_store::Array;
 use nearmiss_surface::{Metric, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot};
-use crate::covering::{Covering, Ground, Solid, coverings};
-use crate::enclosure::{LeafBounds, growths};
+use crate::covering::{Covering, Ground, coverings};
+use crate::enclosure::growths;
 use crate::extents::{Discs, boxes_of_discs};
 use crate::gather::Index;
 use crate::growth::Growth;
@@ -17,7 +17,7 @@ use crate::outline::Outline;
 use crate::samples::lists;
 use crate::sampling::Sampling;
 use crate::split::{Item, split};
-use crate::surfels::{NormalCone, PointKind, align, surfels};
+use crate::surfels::{NormalCone, PointKind, Surfels, align, surfels};
 use crate::topology::Node;
 use crate::wide::WideTree;
 
@@ -378,23 +378,9 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let groups = groups(&blocks);
     let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);
-    let parts = surfels(&index, &positions, &radii, (&spacings, sampling_radius));
+    let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves } =
+        surfels(&index, &positions, &radii, (&spacings, sampling_radius));
     drop(spacings);
-    let count = positions.len();
-    let (mut normals, mut discs) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    let (mut kinds, mut balls) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    let (mut flat, mut cells) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    for (s, &radius) in parts.iter().flat_map(|(surfels, _)| surfels).zip(&radii) {
-        let ball = ball(s.kind, radius, sampling_radius);
-        let solid = Solid::of_disc(s.disc, ball);
-        normals.push(s.normal);
-        discs.push(s.disc);
-        kinds.push(s.kind.code());
-        balls.push(ball);
-        flat.push(solid);
-        cells.push(Solid::of_cell(&s.cell, solid));
-    }
-    let leaves: Vec<LeafBounds> = parts.into_iter().flat_map(|(_, leaves)| leaves).collect();
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
     boxes = boxes_of_discs(&nodes, &boxes, &of_points);

@@ -15,6 +15,8 @@ use nearmiss_surface::{
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot};
+use crate::build::ball;
+use crate::covering::Solid;
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::Index;
 use crate::lanes::{along, product, seen_from};
@@ -113,6 +115,45 @@ pub(crate) struct Surfel {
     pub(crate) cell: Cell,
 }
 
+/// The discs of all points as arrays, and the bounds of all leaves.
+#[derive(Debug)]
+pub(crate) struct Surfels {
+    pub(crate) normals: Vec<[f32; 3]>,
+    pub(crate) discs: Vec<f32>,
+    pub(crate) kinds: Vec<u8>,
+    /// See [`Slices::ball`](crate::Slices::ball).
+    pub(crate) balls: Vec<f32>,
+    /// About the disc and the ball of each point.
+    pub(crate) flat: Vec<Solid>,
+    /// About its cell as well.
+    pub(crate) cells: Vec<Solid>,
+    pub(crate) leaves: Vec<LeafBounds>,
+}
+
+impl Surfels {
+    fn with_capacity(points: usize) -> Self {
+        Self {
+            normals: Vec::with_capacity(points),
+            discs: Vec::with_capacity(points),
+            kinds: Vec::with_capacity(points),
+            balls: Vec::with_capacity(points),
+            flat: Vec::with_capacity(points),
+            cells: Vec::with_capacity(points),
+            leaves: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, surfel: &Surfel, ball: f32) {
+        let solid = Solid::of_disc(surfel.disc, ball);
+        self.normals.push(surfel.normal);
+        self.discs.push(surfel.disc);
+        self.kinds.push(surfel.kind.code());
+        self.balls.push(ball);
+        self.flat.push(solid);
+        self.cells.push(Solid::of_cell(&surfel.cell, solid));
+    }
+}
+
 /// Reused from leaf to leaf.
 #[derive(Debug)]
 struct LeafScratch {
@@ -144,11 +185,11 @@ pub(crate) fn surfels(
     positions: &[[f32; 3]],
     radii: &[f32],
     (spacings, ordinary): (&[Spacing], f32),
-) -> Vec<(Vec<Surfel>, Vec<LeafBounds>)> {
+) -> Surfels {
     let leaf = |(node, about): (&Node, &'_ OrientedBox)| (node.points(), *about);
     let leaves: Vec<_> =
         index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).map(leaf).collect();
-    chunks(&leaves, |leaves| {
+    let parts = chunks(&leaves, |leaves| {
         let (mut scratch, mut surfels) = (LeafScratch::default(), Vec::new());
         let bounds = leaves
             .iter()
@@ -162,9 +203,18 @@ pub(crate) fn surfels(
                 };
                 leaf.surfels(index, &mut scratch, &mut surfels)
             })
-            .collect();
+            .collect::<Vec<_>>();
         (surfels, bounds)
-    })
+    });
+    let mut all = Surfels::with_capacity(positions.len());
+    let mut radii = radii.iter();
+    for (surfels, leaves) in parts {
+        for (surfel, &radius) in surfels.iter().zip(&mut radii) {
+            all.push(surfel, ball(surfel.kind, radius, ordinary));
+        }
+        all.leaves.extend(leaves);
+    }
+    all
 }
 
 /// The points of a leaf, and what of them is known already.
