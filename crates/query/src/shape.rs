@@ -1,12 +1,13 @@
 //! Spheres, capsules and boxes against the points of a scan.
 //!
 //! A shape touches a scan if a point of it is in the shape: what a robot of spheres asks of a depth frame. Points are held in blocks of
-//! sixteen, with bounds about blocks, about sixteen of these, and so on (`surface::BlockTree`); the blocks are those of the scan.
+//! sixteen, with bounds about blocks, about sixteen of these, and so on (`surface::BlockTree`); the blocks are those of the scan. A grid
+//! tells which blocks are near small spheres (`surface::Cells`).
 
 use fearless_simd::Level;
 use nearmiss_geometry::{PointId, Pose};
 use nearmiss_hierarchy::PointHierarchy;
-use nearmiss_surface::{BlockTree, Skeleton};
+use nearmiss_surface::{BlockTree, Cells, Skeleton};
 
 use crate::view::ScanView;
 
@@ -48,11 +49,12 @@ pub struct NearestPoint {
     pub gap: f64,
 }
 
-/// The points of a scan, ready for shapes. Made once for a scan, in O(n): a millisecond for 100,000 points.
+/// The points of a scan, ready for shapes. Made once for a scan, in O(n): some milliseconds and two megabytes for 100,000 points.
 #[derive(Debug, Clone)]
 pub struct ShapeIndex<'a> {
     scan: &'a PointHierarchy,
     tree: BlockTree<'a>,
+    cells: Cells,
     level: Level,
 }
 
@@ -61,7 +63,9 @@ impl<'a> ShapeIndex<'a> {
     #[must_use]
     pub fn new(scan: &'a PointHierarchy) -> Self {
         let tree = BlockTree::new(scan.slices().blocks, scan.len());
-        Self { scan, tree, level: Level::new() }
+        let level = Level::new();
+        let cells = tree.cells(level);
+        Self { scan, tree, cells, level }
     }
 
     /// The scan in `pose`, which leads from the frame of its input to the world.
@@ -82,12 +86,33 @@ impl PlacedIndex<'_> {
     /// Whether a point of the scan is in `shape`, its boundary included: exactly what double precision says of each point in the stored
     /// frame of the scan ([`Skeleton::distance_sq`]).
     ///
-    /// Some ten registers' worth of boxes and points near the surface (benches/record); does not allocate.
+    /// A small sphere looks at some five blocks of points, named by the cell of its centre; others descend through some ten registers'
+    /// worth of boxes near the surface (benches/record). Does not allocate.
     #[inline]
     #[must_use]
     pub fn touches(&self, shape: &Shape) -> bool {
         let (skeleton, radius) = self.stored(shape);
-        radius >= 0.0 && self.index.tree.any_within(self.index.level, &skeleton, radius)
+        self.holds(&skeleton, radius, self.near(&skeleton, radius))
+    }
+
+    /// The blocks that may have a point within `radius` of a skeleton, if the cells know.
+    #[inline]
+    fn near(&self, skeleton: &Skeleton, radius: f64) -> Option<&[u32]> {
+        match *skeleton {
+            Skeleton::Point(centre) => self.index.cells.near(centre, radius),
+            _ => None,
+        }
+    }
+
+    /// Whether a point, of these blocks if they are known, is within `radius` of a skeleton.
+    #[inline]
+    fn holds(&self, skeleton: &Skeleton, radius: f64, near: Option<&[u32]>) -> bool {
+        let ShapeIndex { tree, level, .. } = self.index;
+        radius >= 0.0
+            && match *skeleton {
+                Skeleton::Point(centre) => tree.any_in_ball(*level, near, centre, radius),
+                _ => tree.any_within(*level, skeleton, radius),
+            }
     }
 
     /// The point nearest to `shape`, if it is no further than `reach` from it, in the world; of equally near ones the first in the order of
@@ -128,8 +153,17 @@ impl PlacedIndex<'_> {
     }
 
     fn touch_in_turn(&self, shapes: &[Shape], answers: &mut [bool]) {
-        for (shape, answer) in shapes.iter().zip(answers) {
-            *answer = self.touches(shape);
+        /// So many are looked up before they are asked: their cells are fetched at the same time.
+        const TOGETHER: usize = 16;
+        let mut looked_up = [(Skeleton::Point([0.0; 3]), 0.0, None); TOGETHER];
+        for (shapes, answers) in shapes.chunks(TOGETHER).zip(answers.chunks_mut(TOGETHER)) {
+            for (shape, looked_up) in shapes.iter().zip(&mut looked_up) {
+                let (skeleton, radius) = self.stored(shape);
+                *looked_up = (skeleton, radius, self.near(&skeleton, radius));
+            }
+            for ((skeleton, radius, near), answer) in looked_up.iter().zip(answers) {
+                *answer = self.holds(skeleton, *radius, *near);
+            }
         }
     }
 

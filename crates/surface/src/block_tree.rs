@@ -8,12 +8,14 @@
 //! underflow included. Rounding keeps order, so the distance of a box, computed alike from its nearest corner, face
 //! or edge, exceeds no distance to a point in it, and what is found depends on nothing but the points.
 
+mod cells;
 mod cones;
 mod heard;
 mod near;
 mod nearest;
 mod skeleton;
 
+pub use cells::Cells;
 pub use cones::Cones;
 pub use heard::Heard;
 pub use nearest::{Nearest, Neighbour};

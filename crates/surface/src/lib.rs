@@ -13,7 +13,7 @@ mod neighbourhood;
 mod options;
 mod project;
 
-pub use block_tree::{BlockTree, Cones, Heard, Nearest, Neighbour, Skeleton};
+pub use block_tree::{BlockTree, Cells, Cones, Heard, Nearest, Neighbour, Skeleton};
 pub use eigen::{Eigen3, symmetric_eigen};
 pub use eigen_batch::{EigenBlock, MatrixBlock, symmetric_eigen_batch};
 pub use eigen_cholesky::{LeastEigen, cubic_cholesky_eigen};

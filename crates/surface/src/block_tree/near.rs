@@ -43,12 +43,34 @@ impl BlockTree<'_> {
         ))
     }
 
+    /// As [`Self::any_within`], for a ball about `centre`, given what [`Cells::near`] tells of it: a few blocks instead of a descent.
+    ///
+    /// # Panics
+    /// When a block is named that is none.
+    #[inline]
+    #[must_use]
+    pub fn any_in_ball(&self, level: Level, near: Option<&[u32]>, centre: [f64; 3], radius: f64) -> bool {
+        let skeleton = Skeleton::Point(centre);
+        let Some(blocks) = near else {
+            return self.any_within(level, &skeleton, radius);
+        };
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let (limits, lanes) = (limits(&skeleton, radius), Place(single(centre)));
+                for &block in blocks {
+                    if self.is_within(simd, lanes, block as usize, limits, (&skeleton, radius)) {
+                        return true;
+                    }
+                }
+                false
+            },
+        ))
+    }
+
     #[inline(always)]
     fn any_by<S: Simd>(&self, simd: S, lanes: impl Lanes, skeleton: &Skeleton, radius: f64) -> bool {
-        let slack = skeleton.slack() + RELATIVE * radius;
-        let (sure, most) = (square((radius - slack).max(0.0)), square(radius + slack));
-        // Where squares leave the range of single precision nothing is sure.
-        let sure = if (LEAST_SURE..=f32::MAX).contains(&sure) { sure } else { -1.0 };
+        let (sure, most) = limits(skeleton, radius);
         // Of each level a group, and its boxes still to be looked into.
         let mut open = [(0_usize, 0_u64); MOST_LEVELS];
         let top = self.levels.len();
@@ -195,6 +217,15 @@ impl BlockTree<'_> {
     }
 }
 
+/// The squared distances in single precision up to which places are surely within `radius`, and may be.
+#[inline(always)]
+fn limits(skeleton: &Skeleton, radius: f64) -> (f32, f32) {
+    let slack = skeleton.slack() + RELATIVE * radius;
+    let (sure, most) = (square((radius - slack).max(0.0)), square(radius + slack));
+    // Where squares leave the range of single precision nothing is sure.
+    (if (LEAST_SURE..=f32::MAX).contains(&sure) { sure } else { -1.0 }, most)
+}
+
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
 fn square(length: f64) -> f32 {
@@ -218,7 +249,7 @@ mod tests {
     #[test]
     fn every_level_tells_exactly_what_is_within() {
         let rng = &mut arbitrary::rng(93);
-        let (mut within, mut without) = (0, 0);
+        let (mut within, mut without, mut by_cells) = (0, 0, 0);
         for (n, kind) in (0_u64..).zip(CloudKind::ALL.iter().cycle().take(42)) {
             let count = [1, 16, 17, 300, 5000][(n % 5) as usize];
             let mut points: Vec<[f32; 3]> =
@@ -228,6 +259,7 @@ mod tests {
             let size = points.iter().flatten().fold(0.0, |far: f64, c| far.max(f64::from(c.abs())));
             let blocks: Vec<PointBlock> = PointBlock::silent(&points).collect();
             let tree = BlockTree::new(&blocks, points.len());
+            let cells = tree.cells(Level::new());
             for round in 0..40_usize {
                 let about = points[(7919 * round) % points.len()].map(f64::from);
                 let d = point_in(rng, size * [1.5, 0.1, 1e-3, 1e-7][round % 4]);
@@ -265,11 +297,22 @@ mod tests {
                         let is_within = expected.1 <= radius * radius;
                         let found = tree.any_within(level, &skeleton, radius);
                         assert_eq!(found, is_within, "{kind:?} {n}, {skeleton:?}, {radius} for {distance}");
-                        if is_within { within += 1 } else { without += 1 }
+                        if is_within {
+                            within += 1
+                        } else {
+                            without += 1
+                        }
+                        if let Skeleton::Point(centre) = skeleton {
+                            let near = cells.near(centre, radius);
+                            let found = tree.any_in_ball(level, near, centre, radius);
+                            assert_eq!(found, is_within, "{kind:?} {n}, {near:?}, {radius} for {distance}");
+                            by_cells += usize::from(near.is_some_and(|blocks| !blocks.is_empty()));
+                        }
                     }
                 }
             }
         }
         assert!(within > 5000 && without > 5000, "{within} within, {without} not");
+        assert!(by_cells > 2000, "{by_cells} by cells");
     }
 }
