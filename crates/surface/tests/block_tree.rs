@@ -159,7 +159,7 @@ fn cones_are_those_of_all_points() {
             // Some tell nothing, some know nothing, one is far below all others.
             let tips = |i: usize| [f32::INFINITY, radii[i], 1e-3 * radii[i]][i % 7 % 3];
             let tips: Vec<f32> = (0..points.len()).map(tips).collect();
-            let own = |i: usize| if i % 5 == 0 { f32::MAX } else { radii[i] };
+            let own = |i: usize| if i.is_multiple_of(5) { f32::MAX } else { radii[i] };
             let own: Vec<f32> = (0..points.len()).map(own).collect();
             compare_cones(&points, &tips, &own, 0.3, &format!("{kind:?}, {n}, uneven"));
         }
