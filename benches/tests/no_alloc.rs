@@ -24,7 +24,8 @@ const POSES: usize = 300;
 /// What is asked, and within what.
 fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
     let options = CollideOptions::default();
-    let [verdict, witness] = [Detail::Verdict, Detail::Witness].map(|detail| options.with_detail(detail));
+    let [verdict, witness, manifold] =
+        [Detail::Verdict, Detail::Witness, Detail::Manifold].map(|detail| options.with_detail(detail));
     let thick = options.with_semantics(Semantics::Thickened(0.5 * r));
     let whole = Budget::UNLIMITED;
     let hour = whole.with_deadline(Deadline::within(Duration::from_secs(3600)));
@@ -43,6 +44,8 @@ fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
         (witness, hour),
         (verdict.with_evidence(Evidence::Certified), whole),
         (witness.with_margin(r), whole),
+        (manifold, whole),
+        (manifold.with_semantics(Semantics::Thickened(0.5 * r)), whole),
     ];
     let plan = |options: &CollideOptions| CollidePlan::new(options, scan, scan).expect("options in range");
     asked.map(|(options, budget)| (plan(&options), budget)).to_vec()

@@ -25,6 +25,36 @@ fn ask(place: &Place, options: &[&str]) -> Value {
 }
 
 #[test]
+fn a_manifold_is_told_when_asked_for() {
+    let place = balls();
+    let asked = |x: f64| {
+        let options = ["--pose-b", &shift(x, 0.0, 0.0), "--detail", "manifold", "--json"];
+        place.ok(&[&["collide", "ball.nm", "ball.nm"], &options[..]].concat()).json().remove(0)
+    };
+    let hit = asked(1.96);
+    assert_eq!(keys(&hit), sorted(&format!("{FIELDS} manifold")));
+    let places = hit["manifold"].as_array().unwrap();
+    assert!((3..=8).contains(&places.len()), "{hit}");
+    assert!((places[0]["gap"].as_f64().unwrap() + 0.04).abs() < 0.01, "{hit}");
+    for at in places {
+        // b is to the right.
+        assert!(numbers(&at["normal"])[0] < -0.8 && (numbers(&at["point"])[0] - 0.98).abs() < 0.05, "{at}");
+        assert!(at["source_a"].is_u64() && at["source_b"].is_u64(), "{at}");
+    }
+    assert_eq!(asked(2.5)["manifold"], Value::Array(Vec::new()));
+    let told = place.ok(&[
+        "collide",
+        "ball.nm",
+        "ball.nm",
+        "--pose-b",
+        &shift(1.96, 0.0, 0.0),
+        "--detail",
+        "manifold",
+    ]);
+    assert!(told.results.lines().filter(|line| line.contains("a gets out by")).count() == places.len());
+}
+
+#[test]
 fn every_verdict_has_all_fields() {
     let place = balls();
     let touching = shift(1.2, 0.0, 0.0);
