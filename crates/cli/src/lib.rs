@@ -13,6 +13,7 @@ mod inspect;
 mod poses;
 mod preprocess;
 mod proof;
+mod touch;
 
 mod input;
 mod output;
@@ -57,6 +58,7 @@ pub use poses::PosesArgs;
 pub use posing::{PairArgs, PoseRefused};
 pub use preprocess::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
 pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
+pub use touch::TouchArgs;
 
 /// Whether, where and how near scanned things meet, straight from their points.
 ///
@@ -85,6 +87,10 @@ that box's centre, of a to the origin and of b to the distance d from there. Len
 world. offset is the shift along the line between the centres from where the two first touch: positive apart, \
 negative further in.";
 
+const TOUCH_EXAMPLE: &str = "\
+Example, with a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} a shape in robot.jsonl:
+  nearmiss touch room.nm --shapes robot.jsonl --json";
+
 /// The commands, each with its options. `xtask` flattens them into its own.
 #[derive(Debug, Clone, Subcommand)]
 #[non_exhaustive]
@@ -111,6 +117,9 @@ pub enum Command {
         after_long_help = "Example:\n  nearmiss distance a.nm b.nm --pose-b \"1 0 0 2  0 1 0 0  0 0 1 0  0 0 0 1\""
     )]
     Distance(DistanceArgs),
+    /// Which spheres, capsules and boxes touch the points of a scan, and which point is nearest
+    #[command(after_long_help = TOUCH_EXAMPLE)]
+    Touch(TouchArgs),
     /// How many points to draw for an error rate, with `collide --method interpolation --flat`: measured, and derived
     #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
     Density(DensityArgs),
@@ -136,6 +145,7 @@ impl Command {
             Self::Curve(args) => curve::run(args),
             Self::Density(args) => density::run(args),
             Self::Distance(args) => distance::run(args),
+            Self::Touch(args) => touch::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),
         };

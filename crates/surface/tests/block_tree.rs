@@ -122,7 +122,11 @@ fn what_is_heard_is_what_a_look_at_all_points_hears() {
         }
     }
     let points = points(CloudKind::Sphere, 500, 8, 1.0);
-    compare_heard(&points, |i| if i % 97 == 0 { 3.0 } else { 0.01 }, "a few that are heard everywhere");
+    compare_heard(
+        &points,
+        |i| if i.is_multiple_of(97) { 3.0 } else { 0.01 },
+        "a few that are heard everywhere",
+    );
     compare_heard(&points, |_| 0.0, "nobody");
 }
 

@@ -11,3 +11,4 @@ mod looking_inside;
 mod making_poses;
 mod prepare;
 mod running;
+mod touching;

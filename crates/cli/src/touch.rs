@@ -1,0 +1,184 @@
+//! `touch`: which of many shapes touch the points of a scan.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nearmiss::{Aabb, NearestPoint, PlacedIndex, Pose, Shape, ShapeIndex};
+use serde::{Deserialize, Serialize};
+
+use crate::console::{Console, Results, now};
+use crate::digits::{place, short};
+use crate::error::CliError;
+use crate::input::{self, TextLines};
+use crate::posing;
+use crate::preprocess::parse_threads;
+
+/// Options of `touch`.
+#[derive(Debug, Clone, Args)]
+pub struct TouchArgs {
+    /// The scan: prepared, or a raw input, prepared on the fly
+    pub scan: PathBuf,
+    /// A shape a line, in world units: {"sphere":{"centre":[x,y,z],"radius":r}}, {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}} or
+    /// {"box":{"pose":[16 numbers],"half":[x,y,z]}}; an answer a line, in order
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub shapes: PathBuf,
+    /// Pose of the scan, object to world: 16 numbers, row-major, in one argument, or a file that holds them
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub pose: Option<String>,
+    /// Threads to prepare a raw input, 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    pub threads: Option<usize>,
+    /// One object of JSON a shape instead of sentences
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What `touch` finds.
+#[derive(Debug, Serialize)]
+struct TouchReport {
+    touches: bool,
+    nearest: [f64; 3],
+    gap: f64,
+    source: u32,
+    micros: f64,
+}
+
+pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
+    let matrix = posing::from_option("--pose", args.pose.as_deref())?;
+    let mut shapes = ShapeFile::open(&args.shapes)?;
+    let scan = input::open(&args.scan, args.threads.unwrap_or(0), Console::new(args.quiet))?;
+    let pose = posing::of_scan(&matrix, &scan)
+        .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
+    let index = ShapeIndex::new(&scan);
+    let placed = index.at(&pose);
+    // Lengths that the sampling carries.
+    let r = scan.sampling_radius() * pose.scale();
+    let mut results = Results::new();
+    while let Some((line, text)) = shapes.next_line()? {
+        // What was answered before a faulty line is told before the fault.
+        let read = shapes.shape(line, &text, r);
+        let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
+        let (touches, nearest, micros) = answer(&placed, &shape);
+        let Some(nearest) = nearest else {
+            return Err(shapes
+                .lines
+                .fault_on(line, "the shape is too far away, or too large, to be measured"));
+        };
+        if args.json {
+            let NearestPoint { source, point, gap } = nearest;
+            results.json(&TouchReport { touches, nearest: point, gap, source: source.0, micros })?;
+        } else {
+            results.line(format_args!("line {line}: {}", sentence(touches, &nearest, 0.01 * r)))?;
+        }
+    }
+    results.flush()
+}
+
+fn answer(placed: &PlacedIndex<'_>, shape: &Shape) -> (bool, Option<NearestPoint>, f64) {
+    let start = now();
+    let touches = placed.touches(shape);
+    let nearest = placed.nearest(shape, f64::INFINITY);
+    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+    (touches, nearest, micros)
+}
+
+/// The answer, for people.
+fn sentence(touches: bool, nearest: &NearestPoint, unit: f64) -> String {
+    let at = format!("point {} at {}", nearest.source.0, place(nearest.point, unit));
+    if touches {
+        return format!("It touches {at}.");
+    }
+    format!("No contact; {} from {at}.", short(nearest.gap))
+}
+
+/// What the messages show.
+const SHAPE_LINE: &str = r#"a line is {"sphere":{"centre":[x,y,z],"radius":r}}, {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}} or {"box":{"pose":[16 numbers],"half":[x,y,z]}}"#;
+
+/// A line of a file of shapes: one of them. Other fields are ignored.
+#[derive(Debug, Deserialize)]
+#[serde(expecting = "an object")]
+struct ShapeLine {
+    sphere: Option<SphereLine>,
+    capsule: Option<CapsuleLine>,
+    r#box: Option<BoxLine>,
+}
+
+#[derive(Debug, Deserialize)]
+struct SphereLine {
+    centre: [f64; 3],
+    radius: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct CapsuleLine {
+    ends: [[f64; 3]; 2],
+    radius: f64,
+}
+
+#[derive(Debug, Deserialize)]
+struct BoxLine {
+    pose: [f64; 16],
+    half: [f64; 3],
+}
+
+/// A file with a shape on each line.
+struct ShapeFile {
+    lines: TextLines,
+    /// No line with a shape has been met so far.
+    is_empty: bool,
+}
+
+impl ShapeFile {
+    fn open(path: &Path) -> Result<Self, CliError> {
+        Ok(Self { lines: TextLines::open(path)?, is_empty: true })
+    }
+
+    /// The next line that is not blank, and its number, counted from 1.
+    fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
+        let line = self.lines.next_filled()?;
+        if line.is_none() && self.is_empty {
+            return Err(self.lines.unfit(format!("holds no shapes; {SHAPE_LINE}")));
+        }
+        self.is_empty = false;
+        Ok(line)
+    }
+
+    /// The shape on a line of this number and text; the pose of a box may be off a rotation by a tenth of `r`.
+    fn shape(&self, number: u64, text: &str, r: f64) -> Result<Shape, CliError> {
+        let line: ShapeLine = serde_json::from_str(text).map_err(|e| {
+            let message = e.to_string();
+            let what = message.split(" at line ").next().unwrap_or_default();
+            self.lines.fault_on(number, format!("column {}: {what}; {SHAPE_LINE}", e.column()))
+        })?;
+        let shape = match line {
+            ShapeLine { sphere: Some(SphereLine { centre, radius }), capsule: None, r#box: None } => {
+                positive("radius", radius).map(|radius| Shape::Sphere { centre, radius })
+            }
+            ShapeLine { sphere: None, capsule: Some(CapsuleLine { ends, radius }), r#box: None } => {
+                positive("radius", radius).map(|radius| Shape::Capsule { ends, radius })
+            }
+            ShapeLine { sphere: None, capsule: None, r#box: Some(BoxLine { pose, half }) } => {
+                solid(&pose, half, r)
+            }
+            _ => Err(format!("holds not one shape; {SHAPE_LINE}")),
+        };
+        shape.map_err(|what| self.lines.fault_on(number, what))
+    }
+}
+
+fn solid(pose: &[f64; 16], half: [f64; 3], r: f64) -> Result<Shape, String> {
+    let half = [positive("half", half[0])?, positive("half", half[1])?, positive("half", half[2])?];
+    let bounds = Aabb { min: half.map(|h| -h), max: half };
+    let pose = Pose::from_row_major(pose, &bounds, 0.1 * r);
+    let pose =
+        pose.map_err(|cause| format!("`pose`: {}", posing::PoseRefused { cause, is_transposed: false }))?;
+    Ok(Shape::Box { pose, half })
+}
+
+fn positive(name: &str, length: f64) -> Result<f64, String> {
+    if length >= 0.0 { Ok(length) } else { Err(format!("`{name}` is {}; give zero or more", short(length))) }
+}
