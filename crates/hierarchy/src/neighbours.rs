@@ -9,12 +9,13 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_surface::PointBlock;
+use nearmiss_surface::{PointBlock, SurfacePlan};
 
 use crate::boxes::{ROUNDING, dot, sub};
 use crate::build::PointHierarchy;
 use crate::gather::Index;
 use crate::lanes::{greatest, product, seen_from};
+use crate::spacing::map;
 
 /// Points of a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
@@ -28,6 +29,16 @@ const CENTRING: u8 = 12;
 
 /// What rounding may cost a comparison of distances, relatively.
 pub(crate) const GROWN: f32 = 1.0 + 1e-5;
+
+/// The points in blocks, with their horizons. O(n), on all cores.
+pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32]) -> Vec<PointBlock> {
+    let starts: Vec<usize> = (0..positions.len()).step_by(PointBlock::WIDTH).collect();
+    map(&starts, |&start| {
+        let points = start..(start + PointBlock::WIDTH).min(positions.len());
+        let mut block = PointBlock::all(plan, &positions[points.clone()], &radii[points]);
+        block.next().unwrap_or(PointBlock::EMPTY)
+    })
+}
 
 /// For every group of blocks the balls outside of which no point of a block is heard, given the blocks.
 pub(crate) fn groups(blocks: &[PointBlock]) -> Vec<PointBlock> {

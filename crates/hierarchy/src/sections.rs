@@ -1,12 +1,13 @@
 //! The hierarchy in a container: one section an array, the rest in the metadata.
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
-use nearmiss_store::{Check, File, OpenError, WriteError, Writer};
+use nearmiss_store::{Array, Check, File, OpenError, WriteError, Writer};
 use nearmiss_surface::{Metric, SurfaceError, SurfaceOptions, SurfacePlan};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::build::PointHierarchy;
+use crate::neighbours::blocks;
 use crate::outline::Outline;
 use crate::sanity::Flaw;
 use crate::wide::WideTree;
@@ -23,7 +24,6 @@ const GROWTHS: [u8; 4] = *b"GROW";
 const SAMPLES: [u8; 4] = *b"SMPL";
 const COVERINGS: [u8; 4] = *b"COVR";
 const CONES: [u8; 4] = *b"CONE";
-const BLOCKS: [u8; 4] = *b"BLOK";
 const GROUPS: [u8; 4] = *b"GRUP";
 const LISTS: [u8; 4] = *b"LIST";
 const LISTED: [u8; 4] = *b"NEAR";
@@ -90,7 +90,6 @@ impl PointHierarchy {
             .section(SAMPLES, 0, &self.sample_lists)?
             .section(COVERINGS, 0, &self.coverings)?
             .section(CONES, 0, &self.cones)?
-            .section(BLOCKS, 0, &self.blocks)?
             .section(GROUPS, 0, &self.groups)?
             .section(LISTS, 0, &self.lists)?
             .section(LISTED, 0, &self.listed)?
@@ -136,12 +135,14 @@ impl PointHierarchy {
             sample_lists: file.array(SAMPLES, 0)?,
             coverings: file.array(COVERINGS, 0)?,
             cones: file.array(CONES, 0)?,
-            blocks: file.array(BLOCKS, 0)?,
+            blocks: Array::default(),
             groups: file.array(GROUPS, 0)?,
             lists: file.array(LISTS, 0)?,
             listed: file.array(LISTED, 0)?,
         };
         hierarchy.check_structure()?;
+        // They say nothing that points and radii do not.
+        hierarchy.blocks = blocks(&hierarchy.plan, &hierarchy.positions, &hierarchy.radii).into();
         hierarchy.derive();
         if check == Check::Full {
             hierarchy.check_contents()?;

@@ -60,7 +60,7 @@ impl From<nearmiss_graph::LoadError> for LoadError {
 const KIND: [u8; 4] = *b"SCAN";
 
 /// Version of the layout of a scan's sections and metadata. Older versions are refused by name.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 /// What a scan's file holds beside arrays.
 #[derive(Debug, Serialize, Deserialize)]

@@ -30,7 +30,6 @@ impl PointHierarchy {
             ),
             ("coverings", self.coverings.len(), nodes),
             ("cones", self.cones.len(), leaves),
-            ("blocks", self.blocks.len(), blocks),
             ("groups", self.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
             ("lists", self.lists.len(), blocks),
         ];
