@@ -13,7 +13,7 @@ const MOST_LINES: usize = 500;
 const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 
 /// Which members of the workspace each crate may use; the table of ARCHITECTURE.md.
-const LAYERS: [(&str, &[&str]); 12] = [
+const LAYERS: [(&str, &[&str]); 14] = [
     ("nearmiss-geometry", &[]),
     ("nearmiss-store", &[]),
     ("nearmiss-io", &["nearmiss-geometry"]),
@@ -21,6 +21,8 @@ const LAYERS: [(&str, &[&str]); 12] = [
     ("nearmiss-graph", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-store"]),
     ("nearmiss-hierarchy", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-store"]),
     ("nearmiss-query", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-graph", "nearmiss-hierarchy"]),
+    ("nearmiss-mesh", &["nearmiss-geometry"]),
+    ("nearmiss-slices", &["nearmiss-geometry", "nearmiss-store", "nearmiss-mesh"]),
     (
         "nearmiss",
         &[
@@ -31,6 +33,8 @@ const LAYERS: [(&str, &[&str]); 12] = [
             "nearmiss-graph",
             "nearmiss-hierarchy",
             "nearmiss-query",
+            "nearmiss-mesh",
+            "nearmiss-slices",
         ],
     ),
     ("nearmiss-cli", &["nearmiss"]),

@@ -4,6 +4,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nearmiss::io::ReadError;
+use nearmiss::mesh::SampleError;
+use nearmiss::slices::{SliceError, StoreError};
 use nearmiss::{BuildError, GraphError, LoadError, PlanError, SaveError};
 use thiserror::Error;
 
@@ -54,6 +56,25 @@ pub enum CliError {
     /// A prepared scan could not be saved.
     #[error(transparent)]
     Save(#[from] SaveError),
+    /// A mesh could not be sampled.
+    #[error("{}: {cause}", path.display())]
+    Sample {
+        /// The mesh.
+        path: PathBuf,
+        /// Why not.
+        cause: SampleError,
+    },
+    /// No slice map can be made of these points with these options.
+    #[error("{}: {cause}", path.display())]
+    Slices {
+        /// The input.
+        path: PathBuf,
+        /// Why not.
+        cause: SliceError,
+    },
+    /// A slice map could not be saved or loaded.
+    #[error(transparent)]
+    SliceStore(#[from] StoreError),
     /// A question that cannot be asked; exit status 2.
     #[error(transparent)]
     Plan(#[from] PlanError),

@@ -14,6 +14,8 @@ mod poses;
 mod preprocess;
 mod proof;
 mod touch;
+mod sample;
+mod slices;
 
 mod input;
 mod output;
@@ -57,8 +59,13 @@ pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
 pub use posing::{PairArgs, PoseRefused};
 pub use preprocess::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
+pub use sample::SampleArgs;
 pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
 pub use touch::TouchArgs;
+pub use slices::{
+    AvatarBox, BuildArgs, FloorName, PixelArgs, QueryArgs, ResponseName, SlicesCommand, SlicesExportArgs,
+    SlicesInspectArgs, WalkArgs,
+};
 
 /// Whether, where and how near scanned things meet, straight from their points.
 ///
@@ -131,6 +138,12 @@ pub enum Command {
         after_long_help = "Example:\n  nearmiss export dragon.nm --points normals.ply --boxes level-6.obj --level 6"
     )]
     Export(ExportArgs),
+    /// Points on the surface of a mesh
+    #[command(after_long_help = "Example:\n  nearmiss sample atrium.obj -o atrium.ply --spacing 0.02")]
+    Sample(SampleArgs),
+    /// 2.5+D maps: a building as a stack of images, to walk an avatar through
+    #[command(subcommand)]
+    Slices(SlicesCommand),
 }
 
 impl Command {
@@ -148,6 +161,8 @@ impl Command {
             Self::Touch(args) => touch::run(args),
             Self::Poses(args) => poses::run(args),
             Self::Export(args) => export::run(args),
+            Self::Sample(args) => sample::run(args),
+            Self::Slices(command) => slices::run(command),
         };
         done.map_or_else(|error| console::fail(&error), |()| ExitCode::SUCCESS)
     }

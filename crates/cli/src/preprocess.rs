@@ -108,7 +108,7 @@ fn parse_place(text: &str) -> Result<Place, String> {
     }
 }
 
-fn parse_format(name: &str) -> Result<FormatChoice, String> {
+pub(crate) fn parse_format(name: &str) -> Result<FormatChoice, String> {
     if name.eq_ignore_ascii_case("auto") {
         return Ok(FormatChoice(None));
     }

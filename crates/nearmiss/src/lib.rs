@@ -13,7 +13,11 @@ pub use nearmiss_graph as graph;
 pub use nearmiss_hierarchy as hierarchy;
 #[cfg(feature = "io")]
 pub use nearmiss_io as io;
+#[cfg(feature = "mesh")]
+pub use nearmiss_mesh as mesh;
 pub use nearmiss_query as query;
+#[cfg(feature = "slices")]
+pub use nearmiss_slices as slices;
 pub use nearmiss_store as store;
 pub use nearmiss_surface as surface;
 

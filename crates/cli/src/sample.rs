@@ -1,0 +1,82 @@
+//! `sample`: points on a mesh.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nearmiss::io::PlyPoints;
+use nearmiss::mesh::{SampleOptions, Samples, sample};
+use serde::Serialize;
+
+use crate::console::{Console, Results, now};
+use crate::digits::count;
+use crate::error::CliError;
+use crate::export::refused;
+use crate::{input, output};
+
+/// Options of `sample`.
+#[derive(Debug, Clone, Args)]
+#[command(group = clap::ArgGroup::new("samples").required(true).args(["spacing", "points"]))]
+pub struct SampleArgs {
+    /// Mesh: OBJ, or PLY with faces
+    pub input: PathBuf,
+    /// Where to write the points, as PLY
+    #[arg(short, long, value_name = "CLOUD.ply")]
+    pub output: PathBuf,
+    /// No place of the surface is further than this from a point, in the units of the mesh
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub spacing: Option<f64>,
+    /// So many points, at random, everywhere as densely as the area says
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub points: Option<u32>,
+    /// What is random depends on it; with --spacing, points are moved at random instead of lying in rows
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// One object of JSON instead of a sentence
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What `sample` has done.
+#[derive(Debug, Serialize)]
+struct Report {
+    points: usize,
+    triangles: usize,
+    seconds: f64,
+}
+
+pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
+    output::check_apart(&args.output, &[&args.input])?;
+    let start = now();
+    let bar = Console::new(args.quiet).spinner(format_args!("sampling {}", args.input.display()));
+    input::check_there(&args.input)?;
+    let mesh = nearmiss::io::read_mesh(&args.input, None)?;
+    let samples = match (args.spacing, args.points) {
+        (Some(spacing), _) => Samples::Spacing(spacing),
+        (None, points) => Samples::Count(points.unwrap_or(0)),
+    };
+    let mut options = SampleOptions::new(samples);
+    options.seed = args.seed;
+    let points =
+        sample(&mesh, &options).map_err(|cause| CliError::Sample { path: args.input.clone(), cause })?;
+    output::replace(&args.output, |out| {
+        PlyPoints::double(&points).write(out).map_err(|error| refused(&args.output, error))
+    })?;
+    drop(bar);
+    let report =
+        Report { points: points.len(), triangles: mesh.triangles().len(), seconds: start.elapsed().as_secs_f64() };
+    let mut results = Results::new();
+    if args.json {
+        results.json(&report)?;
+    } else {
+        results.line(format_args!(
+            "{} on {} written to {}",
+            count(report.points as u64, "point"),
+            count(report.triangles as u64, "triangle"),
+            args.output.display()
+        ))?;
+    }
+    results.flush()
+}

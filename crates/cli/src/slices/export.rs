@@ -1,0 +1,42 @@
+//! `slices export`: the paper's images.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::open;
+use crate::console::{Console, Results};
+use crate::digits::count;
+use crate::error::CliError;
+use crate::picture::Picture;
+
+/// Options of `slices export`.
+#[derive(Debug, Clone, Args)]
+pub struct SlicesExportArgs {
+    /// Folder of the map
+    pub folder: PathBuf,
+    /// Folder for the images, `slice-0000.png` the lowest; made if it is not there
+    #[arg(short, long, value_name = "FOLDER")]
+    pub output: PathBuf,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+pub(super) fn run(args: &SlicesExportArgs) -> Result<(), CliError> {
+    let folder = open(&args.folder)?;
+    std::fs::create_dir_all(&args.output).map_err(CliError::writing(&args.output))?;
+    let slices = folder.grid().counts[2];
+    let bar = Console::new(args.quiet).steps("slices", u64::from(slices));
+    for slice in 0..slices {
+        let image = folder.load(slice)?;
+        let [width, height] = [image.width(), image.height()].map(|side| side as usize);
+        let picture = Picture { width, height, pixels: image.rgb() };
+        picture.save(&args.output.join(format!("slice-{slice:04}.png")))?;
+        bar.advance(1);
+    }
+    drop(bar);
+    let mut results = Results::new();
+    results.line(format_args!("{} written to {}", count(u64::from(slices), "image"), args.output.display()))?;
+    results.flush()
+}

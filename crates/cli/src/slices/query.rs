@@ -1,0 +1,182 @@
+//! `slices query`: boxes, or another map in some poses.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use nearmiss::slices::{Floor, ObjectError, Occupancy, SliceMap};
+use nearmiss::{Aabb, Pose};
+use serde::{Deserialize, Serialize};
+
+use super::open_all;
+use crate::console::{Results, now};
+use crate::digits::{count, short};
+use crate::error::CliError;
+use crate::input::TextLines;
+
+/// A pose may be off a rotation by so much of the object's pixels.
+const OFF: f64 = 0.1;
+
+/// Options of `slices query`.
+#[derive(Debug, Clone, Args)]
+#[command(group = clap::ArgGroup::new("what").required(true).args(["boxes", "map"]))]
+pub struct QueryArgs {
+    /// Folder of the map
+    pub folder: PathBuf,
+    /// Boxes, a line {"min":[x,y,z],"max":[x,y,z]} each
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub boxes: Option<PathBuf>,
+    /// Another map, to be held against this one in the poses of --poses
+    #[arg(long, value_name = "DIR", requires = "poses")]
+    pub map: Option<PathBuf>,
+    /// Poses about the axis that points up, a line {"a":[16 numbers],"b":[16 numbers]} each: a of this map (may be left out), b of the other
+    #[arg(long, value_name = "FILE.jsonl", requires = "map")]
+    pub poses: Option<PathBuf>,
+    /// The floor under a base: its highest pixel, or the mean of all
+    #[arg(long, value_enum, default_value_t = FloorName::Max)]
+    pub floor: FloorName,
+    /// One object of JSON a line instead of sentences
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What the floor is, by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FloorName {
+    /// The highest pixel
+    Max,
+    /// The mean of all pixels
+    Mean,
+}
+
+/// A line of a file of boxes. Other fields are ignored.
+#[derive(Debug, Deserialize)]
+struct BoxLine {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+/// A line of a file of poses. Other fields are ignored.
+#[derive(Debug, Deserialize)]
+struct PoseLine {
+    a: Option<[f64; 16]>,
+    b: [f64; 16],
+}
+
+/// An answer.
+#[derive(Debug, Serialize)]
+struct Answer {
+    #[serde(flatten)]
+    found: Occupancy,
+    micros: f64,
+}
+
+pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
+    let floor = match args.floor {
+        FloorName::Max => Floor::Max,
+        FloorName::Mean => Floor::Mean,
+    };
+    let (map, mut faults) = open_all(&args.folder)?;
+    let mut results = Results::new();
+    let mut failed = None;
+    let mut tell = |found: Result<Occupancy, ObjectError>, micros: f64| match found {
+        Ok(found) if args.json => results.json(&Answer { found, micros }),
+        Ok(found) => results.line(sentence(&found)),
+        Err(ObjectError::Unloaded(cause)) => {
+            // The others serve; this one is null, and the command fails in the end.
+            failed = Some(cause);
+            let text = format!("Cannot tell: {cause}.");
+            if args.json { results.json(&serde_json::Value::Null) } else { results.line(text) }
+        }
+        Err(other) => Err(CliError::Usage(other.to_string())),
+    };
+    if let Some(path) = &args.boxes {
+        each_line(path, BOX_LINE, |line: BoxLine| {
+            let bounds = Aabb { min: line.min, max: line.max };
+            if !(0..3).all(|k| bounds.min[k] <= bounds.max[k]) {
+                return Err("the box is empty: min is greater than max".into());
+            }
+            let start = now();
+            let found = map.query(&bounds, floor);
+            Ok(tell(found.map_err(Into::into), micros(start)))
+        })?;
+    }
+    if let (Some(other), Some(path)) = (&args.map, &args.poses) {
+        let (object, more) = open_all(other)?;
+        faults.extend(more);
+        each_line(path, POSE_LINE, |line: PoseLine| {
+            let pose = pose(&line, &map, &object)?;
+            let start = now();
+            let found = map.meets(&object, &pose, floor);
+            let took = micros(start);
+            match found {
+                Err(ObjectError::Tilted { .. }) => Err(found.map_or_else(|e| e.to_string(), |_| String::new())),
+                found => Ok(tell(found, took)),
+            }
+        })?;
+    }
+    results.flush()?;
+    match (failed, faults.pop()) {
+        (Some(_), Some(fault)) => Err(fault.into()),
+        _ => Ok(()),
+    }
+}
+
+const BOX_LINE: &str = r#"a box is {"min":[x,y,z],"max":[x,y,z]}"#;
+const POSE_LINE: &str = r#"a pose line is {"a":[16 numbers],"b":[16 numbers]}"#;
+
+/// Reads each line and answers it; what is wrong with a line is said with its number.
+fn each_line<L: for<'a> Deserialize<'a>>(
+    path: &Path,
+    form: &str,
+    mut answer: impl FnMut(L) -> Result<Result<(), CliError>, String>,
+) -> Result<(), CliError> {
+    let mut lines = TextLines::open(path)?;
+    let mut is_empty = true;
+    while let Some((_, text)) = lines.next_filled()? {
+        is_empty = false;
+        let line = serde_json::from_str(&text).map_err(|e| {
+            let message = e.to_string();
+            let what = message.split(" at line ").next().unwrap_or_default();
+            lines.fault(format!("column {}: {what}; {form}", e.column()))
+        })?;
+        answer(line).map_err(|what| lines.fault(what))??;
+    }
+    if is_empty { Err(lines.unfit(format!("holds no lines; {form}"))) } else { Ok(()) }
+}
+
+/// The object's pose in the building.
+fn pose(line: &PoseLine, map: &SliceMap, object: &SliceMap) -> Result<Pose, String> {
+    let read = |matrix: &[f64; 16], map: &SliceMap| {
+        let grid = map.grid();
+        let far = [0, 1, 2].map(|k| {
+            let size = if k == 2 { grid.slice_height } else { grid.pixel };
+            grid.origin[k] + f64::from(grid.counts[k]) * size
+        });
+        let bounds = Aabb::of([grid.origin, far].map(|corner| grid.up.from_map(corner)));
+        Pose::from_row_major(matrix, &bounds, OFF * grid.pixel).map_err(|e| e.to_string())
+    };
+    let b = read(&line.b, object)?;
+    match &line.a {
+        Some(a) => Ok(read(a, map)?.inverse().after(&b)),
+        None => Ok(b),
+    }
+}
+
+fn micros(start: std::time::Instant) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+    let nanos = start.elapsed().as_nanos() as f64;
+    nanos / 1e3
+}
+
+/// For people.
+fn sentence(found: &Occupancy) -> String {
+    let what = match (found.collides, found.obstacle) {
+        (false, _) => "Free".to_owned(),
+        (true, true) => format!("Obstacles among {}", count(found.pixels, "pixel")),
+        (true, false) => format!("No obstacle, {}", count(found.pixels, "pixel")),
+    };
+    match found.floor {
+        Some(floor) => format!("{what}; the floor below is at {}.", short(floor)),
+        None => format!("{what}; no floor below."),
+    }
+}

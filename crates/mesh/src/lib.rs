@@ -1,0 +1,9 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod lattice;
+mod sample;
+mod triangle;
+
+pub use lattice::lattice_samples;
+pub use sample::{SampleError, SampleOptions, Samples, sample};

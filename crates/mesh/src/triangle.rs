@@ -1,0 +1,96 @@
+//! A triangle with its longest side below, in rows.
+
+/// Corners, and the frame in which its longest side lies along the first axis and its tip above.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Triangle {
+    corner: [f64; 3],
+    /// Unit directions along the longest side and away from it, in the triangle's plane.
+    axes: [[f64; 3]; 2],
+    base: f64,
+    /// Of the tip.
+    foot: f64,
+    height: f64,
+}
+
+impl Triangle {
+    pub(crate) fn new(corners: [[f64; 3]; 3]) -> Self {
+        let side = |i: usize| length(between(corners[i], corners[(i + 1) % 3]));
+        let sides = [side(0), side(1), side(2)];
+        let longest = (0..3).fold(0, |best, i| if sides[i] > sides[best] { i } else { best });
+        let [a, b, tip] = [0, 1, 2].map(|k| corners[(longest + k) % 3]);
+        let base = sides[longest];
+        let along = unit(between(a, b), base);
+        let to_tip = between(a, tip);
+        let foot = dot(to_tip, along).clamp(0.0, base);
+        let away = [0, 1, 2].map(|k| to_tip[k] - foot * along[k]);
+        let height = length(away);
+        Self { corner: a, axes: [along, unit(away, height)], base, foot, height }
+    }
+
+    pub(crate) fn area(&self) -> f64 {
+        0.5 * self.base * self.height
+    }
+
+    /// The place so far along the base and so high.
+    fn at(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        [0, 1, 2].map(|k| self.corner[k] + x * self.axes[0][k] + y * self.axes[1][k])
+    }
+
+    /// The place with these shares, both from 0 to 1: evenly spread ones give evenly spread places.
+    pub(crate) fn spread(&self, [s, t]: [f64; 2]) -> [f64; 3] {
+        // The farther from the tip, the more room.
+        let from_tip = s.sqrt();
+        let y = (1.0 - from_tip) * self.height;
+        let [left, right] = self.row(y);
+        self.at([left + t * (right - left), y])
+    }
+
+    /// From where to where the triangle reaches at this height.
+    fn row(&self, y: f64) -> [f64; 2] {
+        let up = if self.height > 0.0 { y / self.height } else { 0.0 };
+        [up * self.foot, self.base + up * (self.foot - self.base)]
+    }
+
+    /// How many places [`Self::rows`] hands out, about.
+    pub(crate) fn count(&self, step: f64) -> f64 {
+        (self.base / step + 1.0) * (self.height / step + 1.0)
+    }
+
+    /// Places in rows along the base, both at most `step` apart, corners and sides included.
+    ///
+    /// No place of the triangle is further than √5/2 steps from one: below it is a row, at most a step away, that reaches at least as
+    /// far to both sides, as the angles at the longest side are no wider than right.
+    pub(crate) fn rows(&self, step: f64, mut each: impl FnMut([f64; 3])) {
+        let rows = (self.height / step).ceil();
+        for i in whole(rows) {
+            let y = if rows > 0.0 { i / rows * self.height } else { 0.0 };
+            let [left, right] = self.row(y);
+            let places = ((right - left) / step).ceil();
+            for j in whole(places) {
+                let share = if places > 0.0 { j / places } else { 0.0 };
+                each(self.at([left + share * (right - left), y]));
+            }
+        }
+    }
+}
+
+/// 0, 1, … up to and including `last`, which is whole.
+fn whole(last: f64) -> impl Iterator<Item = f64> {
+    std::iter::successors(Some(0.0), |i| Some(i + 1.0)).take_while(move |i| *i <= last)
+}
+
+pub(crate) fn between(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| b[k] - a[k])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn length(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn unit(a: [f64; 3], length: f64) -> [f64; 3] {
+    if length > 0.0 { a.map(|x| x / length) } else { [0.0; 3] }
+}

@@ -1,0 +1,161 @@
+//! From what voxels have seen to slices: which are obstacles, how high the floors are, how noisy the points.
+//!
+//! S4, Fig. 2, marks a point that lies more than ε from the one seen last, so the order of points decides, and it overwrites
+//! the height that it still has to compare with. Here a voxel is an obstacle if its highest point lies more than ε σ above its lowest,
+//! whatever the order.
+//!
+//! A surface that crosses from a slice into the next is one surface: where the gap between the highest point of a voxel and the lowest of
+//! the one above is at most ε σ, both are obstacles if together they span more than ε σ; if not, they are one floor,
+//! whose height is that of the upper one.
+
+use crate::Grid;
+use crate::build::{Cell, span};
+use crate::grid::LEVELS;
+use crate::parallel::map_each;
+use crate::slice::{Slice, words};
+
+/// Of the spans of level voxels this share is no greater than the noise: enough that few floors become obstacles, and
+/// not so much that what stands on them decides.
+const QUANTILE: f64 = 0.95;
+
+/// Fewer level voxels than this say nothing about noise.
+const LEAST: u64 = 100;
+
+/// Layers that are finished together; their cells are then let go of.
+const WAVE: usize = 16;
+
+/// The greatest number of levels that a floor may span, for ε. Rounding of a tangent must not decide, hence the small
+/// addition.
+pub(crate) fn most_levels(share: f64) -> i32 {
+    #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
+    let most = (share * f64::from(LEVELS) + 1e-6).floor().min(f64::from(2 * LEVELS)) as i32;
+    most
+}
+
+/// How far points of a level floor spread upwards in a pixel: the 0.95-quantile of the spans of voxels with surface to
+/// all four sides, opposite neighbours of which differ by at most half a pixel's side in height. The span of a voxel itself plays
+/// no part in the choice. 0 where there are too few.
+///
+/// Voxels with something right below or above are left out: they may hold half a floor.
+pub(crate) fn noise(grid: &Grid, layers: &[Vec<Cell>]) -> f64 {
+    let width = grid.counts[0] as usize;
+    #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
+    let step = (0.5 * grid.pixel / grid.slice_height * f64::from(LEVELS)) as i32;
+    let of_layer = |s: usize| {
+        let mut spans = [0_u64; LEVELS as usize];
+        let layer = &layers[s];
+        let others = [s.checked_sub(1), Some(s + 1)].map(|s| s.and_then(|s| layers.get(s)));
+        for row in 1..(grid.counts[1] as usize).saturating_sub(1) {
+            for i in row * width + 1..((row + 1) * width).saturating_sub(1) {
+                let Some([low, high]) = span(&layer[i]) else { continue };
+                let beside = [i - 1, i + 1, i - width, i + width].map(|j| span(&layer[j]));
+                let [Some(left), Some(right), Some(front), Some(back)] = beside else { continue };
+                let is_level = (left[1] - right[1]).abs() <= step && (front[1] - back[1]).abs() <= step;
+                let is_alone = others.iter().flatten().all(|other| span(&other[i]).is_none());
+                if is_level && is_alone {
+                    spans[usize::try_from(high - low).unwrap_or(0)] += 1;
+                }
+            }
+        }
+        spans
+    };
+    let mut all = [0_u64; LEVELS as usize];
+    for spans in map_each(layers.len(), of_layer) {
+        all.iter_mut().zip(spans).for_each(|(sum, n)| *sum += n);
+    }
+    let count: u64 = all.iter().sum();
+    if count < LEAST {
+        return 0.0;
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a rank")]
+    let rank = (QUANTILE * count as f64).ceil() as u64;
+    let mut below = 0;
+    let quantile = all.iter().position(|n| {
+        below += n;
+        below >= rank
+    });
+    let levels = u32::try_from(quantile.unwrap_or(0)).unwrap_or(LEVELS);
+    f64::from(levels) / f64::from(LEVELS) * grid.slice_height
+}
+
+/// The slices, lowest first; takes the cells away.
+pub(crate) fn slices(grid: &Grid, layers: &mut [Vec<Cell>], most: i32) -> Vec<Slice> {
+    let mut slices = Vec::with_capacity(layers.len());
+    while slices.len() < layers.len() {
+        let first = slices.len();
+        let wave = map_each(WAVE.min(layers.len() - first), |i| slice(grid, layers, first + i, most));
+        slices.extend(wave);
+        // The last of them is still needed by the one above.
+        layers[first.saturating_sub(1)..slices.len() - 1].fill_with(Vec::new);
+    }
+    slices
+}
+
+fn slice(grid: &Grid, layers: &[Vec<Cell>], s: usize, most: i32) -> Slice {
+    let [width, height, _] = grid.counts;
+    let columns = width as usize;
+    let mut tops = vec![0_u8; grid.area()];
+    let mut obstacle = vec![0_u64; words(width) * height as usize];
+    let above = layers.get(s + 1);
+    let below = s.checked_sub(1).map(|s| &layers[s]);
+    for row in 0..height as usize {
+        let bits = &mut obstacle[row * words(width)..];
+        for column in 0..columns {
+            let i = row * columns + column;
+            let Some(own) = span(&layers[s][i]) else { continue };
+            let up = above.and_then(|layer| span(&layer[i]));
+            let down = below.and_then(|layer| span(&layer[i]));
+            let (top, is_obstacle) = judge(own, down, up, most);
+            tops[i] = top;
+            bits[column / 64] |= u64::from(is_obstacle) << (column % 64);
+        }
+    }
+    Slice::new(width, height, tops, obstacle)
+}
+
+/// The top, plus one, of a voxel that spans these levels, and whether it is an obstacle, given what lies right below and above.
+fn judge([low, high]: [i32; 2], down: Option<[i32; 2]>, up: Option<[i32; 2]>, most: i32) -> (u8, bool) {
+    /// Levels from one slice to the next.
+    const SLICE: i32 = 255;
+    let top = u8::try_from(high + 1).unwrap_or(u8::MAX);
+    let up = up.map(|span| span.map(|level| level + SLICE)).filter(|[from, _]| from - high <= most);
+    let down = down.map(|span| span.map(|level| level - SLICE)).filter(|[_, to]| low - to <= most);
+    let spans = [Some(high - low), up.map(|[_, to]| to - low), down.map(|[from, _]| high - from)];
+    match spans.iter().flatten().any(|span| *span > most) {
+        true => (top, true),
+        // The floor goes on in the next slice.
+        false => (if up.is_some() { u8::MAX } else { top }, false),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_beyond_the_share_are_obstacles() {
+        assert_eq!(judge([10, 27], None, None, 17), (28, false));
+        assert_eq!(judge([10, 28], None, None, 17), (29, true));
+    }
+
+    #[test]
+    fn a_floor_that_straddles_two_slices_is_one() {
+        // Nine levels from 250 to 259.
+        assert_eq!(judge([250, 254], None, Some([0, 4]), 17), (255, false), "it goes on above");
+        assert_eq!(judge([0, 4], Some([250, 254]), None, 17), (5, false));
+        // Too steep together: a wall cut by the border of its slices.
+        assert_eq!(judge([240, 254], None, Some([0, 10]), 17), (255, true));
+        assert_eq!(judge([0, 10], Some([240, 254]), None, 17), (11, true));
+        // Far apart: a floor and something that hangs over it.
+        assert_eq!(judge([100, 104], None, Some([10, 12]), 17), (105, false));
+        assert_eq!(judge([10, 12], Some([100, 104]), None, 17), (13, false));
+    }
+
+    #[test]
+    fn thresholds_do_not_hang_on_the_last_bit_of_a_tangent() {
+        let share = |tan: f64| tan / 3.0;
+        assert_eq!(most_levels(share(1.0)), most_levels(share(1.0_f64.next_down())));
+        assert_eq!(most_levels(0.07), 17);
+        assert_eq!(most_levels(1e300), 510);
+    }
+}

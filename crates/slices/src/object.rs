@@ -1,0 +1,149 @@
+//! A map against a map: objects of the scene as slices of their own (S4, §5), turned about the axis that points up.
+
+use nearmiss_geometry::Pose;
+use thiserror::Error;
+
+use crate::map::{SliceMap, Unloaded};
+use crate::query::{Floor, Floors, Occupancy};
+
+/// How far the object's axis may be off the building's: rounding of a rotation given in decimals.
+const UPRIGHT: f64 = 1e-6;
+
+/// Why a map is not held against another.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ObjectError {
+    /// The pose tilts the object.
+    #[error("the pose tilts the object's axis by {degrees} degrees; turn it about the axis that points up only")]
+    Tilted {
+        /// Between the axis as posed and the building's.
+        degrees: f64,
+    },
+    /// A slice that is needed is not loaded.
+    #[error(transparent)]
+    Unloaded(#[from] Unloaded),
+}
+
+/// An object's coordinates into the building's: a turn about the axis that points up, a scale, a shift.
+struct Upright {
+    /// Cosine and sine of the turn.
+    turn: [f64; 2],
+    scale: f64,
+    shift: [f64; 3],
+}
+
+impl Upright {
+    /// The pose between the coordinates of two maps, if it tilts nothing.
+    fn new(building: &SliceMap, object: &SliceMap, pose: &Pose) -> Result<Self, ObjectError> {
+        let (of, to) = (object.grid().up, building.grid().up);
+        let turned = |v: [f64; 3]| to.to_map(pose.rotate(of.from_map(v)));
+        let up = turned([0.0, 0.0, 1.0]);
+        // Written so that what is not a number is refused.
+        if !(up[0].abs() <= UPRIGHT && up[1].abs() <= UPRIGHT && up[2] > 0.0) {
+            let degrees = up[2].clamp(-1.0, 1.0).acos().to_degrees();
+            return Err(ObjectError::Tilted { degrees });
+        }
+        let [cosine, sine, _] = turned([1.0, 0.0, 0.0]);
+        Ok(Self { turn: [cosine, sine], scale: pose.scale(), shift: to.to_map(pose.translation()) })
+    }
+
+    fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [c, s] = self.turn;
+        [self.scale * (c * x - s * y) + self.shift[0], self.scale * (s * x + c * y) + self.shift[1]]
+    }
+
+    fn height(&self, z: f64) -> f64 {
+        self.scale * z + self.shift[2]
+    }
+}
+
+impl SliceMap {
+    /// What an object's own map meets of this one, posed object → building.
+    ///
+    /// Each of the object's pixels that holds something is a box, turned with the object: as broad and deep as a pixel of it and as high
+    /// as a slice. It meets every pixel of the building that it overlaps or touches. `pixels` counts those of the object
+    /// that meet something. The floor is taken under the middles of the object's columns, below its lowest slice that holds something.
+    ///
+    /// # Errors
+    /// When the pose tilts the object, or a slice that is needed is not loaded.
+    pub fn meets(&self, object: &Self, pose: &Pose, floor: Floor) -> Result<Occupancy, ObjectError> {
+        let upright = Upright::new(self, object, pose)?;
+        let grid = object.grid();
+        let lowest = |s: &u32| Ok::<_, Unloaded>(object.slice(*s)?.counts()[0] > 0);
+        let mut base = None;
+        for s in 0..grid.counts[2] {
+            if lowest(&s)? {
+                base = Some(upright.height(grid.origin[2] + f64::from(s) * grid.slice_height));
+                break;
+            }
+        }
+        let mut found = Occupancy::default();
+        let Some(base) = base else { return Ok(found) };
+        let mut floors = Floors::default();
+        for row in 0..grid.counts[1] {
+            for column in 0..grid.counts[0] {
+                let mut is_filled = false;
+                let centre = upright.apply(grid.middle(column, row));
+                for s in 0..grid.counts[2] {
+                    if object.slice(s)?.pixel(column, row).is_some() {
+                        is_filled = true;
+                        let bottom = grid.origin[2] + f64::from(s) * grid.slice_height;
+                        let heights = [bottom, bottom + grid.slice_height].map(|z| upright.height(z));
+                        let half = 0.5 * grid.pixel * upright.scale;
+                        let met = self.turned_box(centre, half, upright.turn, heights)?;
+                        found.pixels += u64::from(met.is_some());
+                        found.obstacle |= met == Some(true);
+                    }
+                }
+                if is_filled {
+                    floors.add(self.floor_at(centre, base)?);
+                }
+            }
+        }
+        found.collides = found.pixels > 0;
+        found.floor = floors.height(floor).map(|height| self.grid().up.coordinate(height));
+        Ok(found)
+    }
+
+    fn floor_at(&self, [x, y]: [f64; 2], base: f64) -> Result<Option<f64>, Unloaded> {
+        let [column, row] = [(0, x), (1, y)].map(|(axis, x)| self.grid().range(axis, [x, x]));
+        let (Some(column), Some(row)) = (column, row) else { return Ok(None) };
+        self.floor_below([*column.start(), *row.start()], base)
+    }
+
+    /// Whether an upright box with a square base, turned, meets something, and whether that is an obstacle.
+    fn turned_box(
+        &self,
+        centre: [f64; 2],
+        half: f64,
+        [c, s]: [f64; 2],
+        [low, high]: [f64; 2],
+    ) -> Result<Option<bool>, Unloaded> {
+        let grid = self.grid();
+        let breadth = c.abs() + s.abs();
+        let reach = half * breadth;
+        let min = [centre[0] - reach, centre[1] - reach, low];
+        let max = [centre[0] + reach, centre[1] + reach, high];
+        let Some(block) = grid.block(min, max) else { return Ok(None) };
+        // Along the sides of the turned square both squares reach so far together.
+        let apart = half + 0.5 * grid.pixel * breadth;
+        let mut met = None;
+        for row in block.rows.clone() {
+            for column in block.columns.clone() {
+                let [x, y] = grid.middle(column, row);
+                let [dx, dy] = [x - centre[0], y - centre[1]];
+                if (c * dx + s * dy).abs() > apart || (c * dy - s * dx).abs() > apart {
+                    continue;
+                }
+                for slice in block.slices.clone() {
+                    match self.slice(slice)?.pixel(column, row) {
+                        Some((_, true)) => return Ok(Some(true)),
+                        Some((_, false)) => met = Some(false),
+                        None => {}
+                    }
+                }
+            }
+        }
+        Ok(met)
+    }
+}

@@ -1,0 +1,155 @@
+//! A box against the slices: does it touch anything, is that an obstacle, how high is the floor below?
+//!
+//! S4, §3.1: the pixels under the box in every slice between its bottom and its top; O(pixels · slices). Where the paper counts
+//! size/t pixels about the centre, these are all that the closed box meets.
+
+use nearmiss_geometry::Aabb;
+use serde::{Deserialize, Serialize};
+
+use crate::map::{SliceMap, Unloaded};
+use crate::parallel::fill_each;
+use crate::{Block, Grid};
+
+/// Questions that a thread takes at a time.
+const CHUNK: usize = 64;
+
+/// What the floor under a base is, where it is not level (S4, §3.1).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Floor {
+    /// The highest.
+    #[default]
+    Max,
+    /// The mean of those pixels that have one.
+    Mean,
+}
+
+/// What is in a box.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Occupancy {
+    /// Whether any pixel holds something.
+    pub collides: bool,
+    /// Whether any pixel is an obstacle.
+    pub obstacle: bool,
+    /// The floor under the base, as the caller's coordinate along the axis that points up.
+    pub floor: Option<f64>,
+    /// How many pixels hold something.
+    pub pixels: u64,
+}
+
+impl Grid {
+    /// The voxels that a closed box of the caller's coordinates meets; none if it is empty, has a bound that is not a number, or lies
+    /// outside.
+    #[must_use]
+    pub fn block_of(&self, bounds: &Aabb) -> Option<Block> {
+        let [min, max] = self.turned(bounds)?;
+        self.block(min, max)
+    }
+
+    /// The box in the map's coordinates; none if it is empty.
+    fn turned(&self, bounds: &Aabb) -> Option<[[f64; 3]; 2]> {
+        // Written so that what is not a number is empty.
+        if !(0..3).all(|k| bounds.min[k] <= bounds.max[k]) {
+            return None;
+        }
+        let Aabb { min, max } = Aabb::of([bounds.min, bounds.max].map(|corner| self.up.to_map(corner)));
+        Some([min, max])
+    }
+}
+
+impl SliceMap {
+    /// Whether a box, in the caller's coordinates, meets a pixel that holds something. An empty box meets none.
+    ///
+    /// Equal slices in a row are looked at once (S4, §5). Some hundred nanoseconds for an avatar of 15 × 15 × 15 pixels.
+    ///
+    /// # Errors
+    /// When a slice that is needed is not loaded.
+    pub fn touches(&self, bounds: &Aabb) -> Result<bool, Unloaded> {
+        let Some(block) = self.grid().block_of(bounds) else { return Ok(false) };
+        for run in self.runs(&block) {
+            let (_, slice, is_again) = run?;
+            if !is_again && slice.any(&block.columns, &block.rows) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// What is in a box of the caller's coordinates, and how high the floor is below it.
+    ///
+    /// The floor of a pixel under the base is the highest thing in its column in the slice of the base or lower, unless that is an
+    /// obstacle.
+    ///
+    /// # Errors
+    /// When a slice that is needed is not loaded; the floor may need any slice below the box.
+    pub fn query(&self, bounds: &Aabb, floor: Floor) -> Result<Occupancy, Unloaded> {
+        let mut found = Occupancy::default();
+        let Some([min, max]) = self.grid().turned(bounds) else { return Ok(found) };
+        if let Some(block) = self.grid().block(min, max) {
+            let mut counts = [0; 2];
+            for run in self.runs(&block) {
+                let (_, slice, is_again) = run?;
+                if !is_again {
+                    counts = slice.count(&block.columns, &block.rows);
+                }
+                found.pixels += counts[0];
+                found.obstacle |= counts[1] > 0;
+            }
+            found.collides = found.pixels > 0;
+        }
+        let grid = self.grid();
+        let [columns, rows] = [0, 1].map(|axis| grid.range(axis, [min[axis], max[axis]]));
+        let (Some(columns), Some(rows)) = (columns, rows) else { return Ok(found) };
+        let mut floors = Floors::default();
+        for row in rows {
+            for column in columns.clone() {
+                floors.add(self.floor_below([column, row], min[2])?);
+            }
+        }
+        found.floor = floors.height(floor).map(|height| grid.up.coordinate(height));
+        Ok(found)
+    }
+
+    /// Answers every question, on all cores with the feature `rayon`.
+    ///
+    /// # Panics
+    /// When there are not as many answers as boxes.
+    pub fn query_each(&self, boxes: &[Aabb], floor: Floor, answers: &mut [Result<Occupancy, Unloaded>]) {
+        assert_eq!(boxes.len(), answers.len(), "an answer a box");
+        fill_each(boxes, answers, CHUNK, |bounds| self.query(bounds, floor));
+    }
+
+    /// Height, in the map's coordinates, of the highest thing in a column in the slice of `base` or lower, unless it is an obstacle.
+    pub(crate) fn floor_below(&self, [column, row]: [u32; 2], base: f64) -> Result<Option<f64>, Unloaded> {
+        let slices = (self.grid().slice_at(base) + 1).clamp(0, i64::from(self.grid().counts[2]));
+        for s in (0..u32::try_from(slices).unwrap_or(0)).rev() {
+            if let Some((level, is_obstacle)) = self.slice(s)?.pixel(column, row) {
+                return Ok(if is_obstacle { None } else { Some(self.grid().height(s, level)) });
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Heights of floors, put together.
+#[derive(Debug, Default)]
+pub(crate) struct Floors {
+    sum: f64,
+    count: u32,
+    greatest: Option<f64>,
+}
+
+impl Floors {
+    pub(crate) fn add(&mut self, height: Option<f64>) {
+        let Some(height) = height else { return };
+        self.sum += height;
+        self.count += 1;
+        self.greatest = Some(self.greatest.map_or(height, |greatest| greatest.max(height)));
+    }
+
+    pub(crate) fn height(&self, floor: Floor) -> Option<f64> {
+        match floor {
+            Floor::Max => self.greatest,
+            Floor::Mean => self.greatest.map(|_| self.sum / f64::from(self.count)),
+        }
+    }
+}

@@ -1,0 +1,421 @@
+//! An avatar in a building: steps of fixed length, up and down what it can climb, and falling.
+//!
+//! S4, §3.1: pixels that hold something stop the avatar, except those it can climb; where it collides it goes back to where it
+//! was, so it always stands on a valid place; its height is that of the floor under its base. Here, what is no higher than it can
+//! climb carries it, floor or not, but climbing counts from the last floor: so a slope that is too steep is no way up, however
+//! short the steps.
+
+use std::ops::RangeInclusive;
+
+use nearmiss_geometry::Aabb;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::grid::LEVELS;
+use crate::map::{SliceMap, Unloaded};
+use crate::parallel::walk_each;
+use crate::{Grid, Response};
+
+/// Levels of a slice.
+const SLICE: i64 = LEVELS as i64;
+
+/// Avatars that a thread takes at a time.
+const CHUNK: usize = 64;
+
+/// Who walks: lengths in the caller's units. Plain numbers, checked by [`Avatar::new`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct AvatarOptions {
+    /// Of the box, along the two axes across in the caller's order. Default: 0.6 each.
+    pub base: [f64; 2],
+    /// Of the box. Default: 1.8.
+    pub height: f64,
+    /// How far it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
+    pub climb: f64,
+    /// How far it moves in a step. Default: 0.05.
+    pub step: f64,
+}
+
+impl Default for AvatarOptions {
+    fn default() -> Self {
+        Self { base: [0.6; 2], height: 1.8, climb: 0.35, step: 0.05 }
+    }
+}
+
+impl AvatarOptions {
+    /// The same avatar with a box of this base and height.
+    #[must_use]
+    pub const fn with_box(self, base: [f64; 2], height: f64) -> Self {
+        Self { base, height, ..self }
+    }
+
+    /// The same avatar that climbs so far.
+    #[must_use]
+    pub const fn with_climb(self, climb: f64) -> Self {
+        Self { climb, ..self }
+    }
+
+    /// The same avatar with steps of this length.
+    #[must_use]
+    pub const fn with_step(self, step: f64) -> Self {
+        Self { step, ..self }
+    }
+}
+
+/// Why nobody walks.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum WalkError {
+    /// A length that is none.
+    #[error("{what} of {length} is none; give a length above 0")]
+    Length {
+        /// Which.
+        what: &'static str,
+        /// As given.
+        length: f64,
+    },
+    /// An avatar that climbs over its own head.
+    #[error("an avatar {height} high cannot climb {climb}; give less than its height")]
+    Climb {
+        /// Of the avatar.
+        height: f64,
+        /// As given.
+        climb: f64,
+    },
+    /// A place that is not finite.
+    #[error("point {index} of the route has a coordinate that is not finite")]
+    NotFinite {
+        /// Which, the start being 0.
+        index: usize,
+    },
+    /// Nobody can stand there.
+    #[error("the start {place:?} is inside an obstacle or too low under a ceiling; start elsewhere, or with a smaller avatar")]
+    Blocked {
+        /// As given.
+        place: [f64; 3],
+    },
+    /// A slice that is needed is not loaded.
+    #[error(transparent)]
+    Unloaded(#[from] Unloaded),
+}
+
+/// Somebody with a size that makes sense.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Avatar {
+    options: AvatarOptions,
+}
+
+impl Avatar {
+    /// Checks the lengths.
+    ///
+    /// # Errors
+    /// Names the one that makes no sense.
+    pub fn new(options: &AvatarOptions) -> Result<Self, WalkError> {
+        let AvatarOptions { base: [width, depth], height, climb, step } = *options;
+        let all = [
+            ("an avatar's width", width),
+            ("an avatar's depth", depth),
+            ("an avatar's height", height),
+            ("a climb", climb),
+            ("a step", step),
+        ];
+        for (what, length) in all {
+            if !(length > 0.0 && length.is_finite()) {
+                return Err(WalkError::Length { what, length });
+            }
+        }
+        if climb >= height {
+            return Err(WalkError::Climb { height, climb });
+        }
+        Ok(Self { options: *options })
+    }
+
+    /// Its lengths.
+    #[must_use]
+    pub fn options(&self) -> &AvatarOptions {
+        &self.options
+    }
+
+    /// Its box, in the caller's coordinates, when its feet stand on this place.
+    #[must_use]
+    pub fn bounds(&self, grid: &Grid, feet: [f64; 3]) -> Aabb {
+        let [x, y, z] = grid.up.to_map(feet);
+        let [w, d] = grid.up.across(self.options.base).map(|side| 0.5 * side);
+        let corners = [[x - w, y - d, z], [x + w, y + d, z + self.options.height]];
+        Aabb::of(corners.map(|corner| grid.up.from_map(corner)))
+    }
+
+    /// The greatest number of slices that a step can need.
+    #[must_use]
+    pub fn slices(&self, grid: &Grid) -> u32 {
+        // Down as far as it falls, up from the greatest climb to the head, and both ends.
+        let AvatarOptions { height, climb, .. } = self.options;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+        let slices = ((height + 2.0 * climb) / grid.slice_height).ceil() as u32;
+        slices.saturating_add(1).min(grid.counts[2])
+    }
+}
+
+/// What became of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// Where the feet are, in the caller's coordinates.
+    pub position: [f64; 3],
+    /// Whether something was in the way.
+    pub blocked: bool,
+    /// Whether it fell, or is about to.
+    pub falling: bool,
+    /// The lowest and the highest slice that the avatar spans, as far as they are on the map.
+    pub slices: [u32; 2],
+}
+
+/// An avatar somewhere in a building.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Walker {
+    avatar: Avatar,
+    /// Of the feet, in the map's coordinates.
+    place: [f64; 3],
+    /// Height of the last floor under them, from which climbing counts; never above them.
+    footing: f64,
+    falling: bool,
+}
+
+/// What is at a place.
+struct Look {
+    /// Something the avatar can neither climb nor pass under.
+    blocked: bool,
+    /// Height of what would carry it.
+    support: Option<f64>,
+    /// Height of the highest floor there.
+    floor: Option<f64>,
+}
+
+impl Walker {
+    /// Puts an avatar's feet at a place of the caller's coordinates: on what is there, at most as far below or above as it climbs; else it
+    /// begins to fall.
+    ///
+    /// # Errors
+    /// When the place is not finite, or there is no room; or a slice is not loaded.
+    pub fn new(avatar: Avatar, map: &SliceMap, start: [f64; 3]) -> Result<Self, WalkError> {
+        if !start.iter().all(|x| x.is_finite()) {
+            return Err(WalkError::NotFinite { index: 0 });
+        }
+        let place = map.grid().up.to_map(start);
+        let mut walker = Self { avatar, place, footing: place[2], falling: false };
+        if walker.stand(map, [place[0], place[1]])? {
+            Ok(walker)
+        } else {
+            Err(WalkError::Blocked { place: start })
+        }
+    }
+
+    /// The slices that finding the place `start` needs, as far as they are on the map.
+    #[must_use]
+    pub fn needs_at(avatar: &Avatar, grid: &Grid, start: [f64; 3]) -> Option<RangeInclusive<u32>> {
+        let place = grid.up.to_map(start);
+        Self { avatar: *avatar, place, footing: place[2], falling: false }.needs(grid)
+    }
+
+    /// Where the feet are, in the caller's coordinates.
+    #[must_use]
+    pub fn position(&self, grid: &Grid) -> [f64; 3] {
+        grid.up.from_map(self.place)
+    }
+
+    /// Height of the feet in the map's coordinates.
+    pub(crate) fn feet(&self) -> f64 {
+        self.place[2]
+    }
+
+    /// Whether it stands on nothing.
+    #[must_use]
+    pub fn is_falling(&self) -> bool {
+        self.falling
+    }
+
+    /// Whether it is at this place, given as the two coordinates across in the caller's order.
+    #[must_use]
+    pub fn is_at(&self, grid: &Grid, target: [f64; 2]) -> bool {
+        [self.place[0], self.place[1]] == grid.up.across(target)
+    }
+
+    /// The slices that the next step needs, as far as they are on the map.
+    #[must_use]
+    pub fn needs(&self, grid: &Grid) -> Option<RangeInclusive<u32>> {
+        let AvatarOptions { height, climb, .. } = self.avatar.options;
+        grid.range(2, [self.place[2] - climb, self.footing + climb + height])
+    }
+
+    /// One step towards a place, given as the two coordinates across in the caller's order; or, while it falls, one step down.
+    ///
+    /// If something is in the way, `response` says where else it may go; if that does not serve either, it stays.
+    ///
+    /// # Errors
+    /// When a slice that is needed is not loaded; then it is where it was.
+    pub fn step(&mut self, map: &SliceMap, target: [f64; 2], response: &dyn Response) -> Result<Step, Unloaded> {
+        let mut blocked = false;
+        let is_falling = self.falling;
+        if is_falling {
+            self.fall(map)?;
+        } else {
+            let from = [self.place[0], self.place[1]];
+            let wanted = self.towards(map.grid().up.across(target));
+            if wanted != from && !self.stand(map, wanted)? {
+                blocked = true;
+                for place in response.elsewhere(from, wanted).into_iter().flatten() {
+                    if self.stand(map, place)? {
+                        break;
+                    }
+                }
+            }
+        }
+        Ok(self.told(map.grid(), blocked, is_falling || self.falling))
+    }
+
+    fn towards(&self, target: [f64; 2]) -> [f64; 2] {
+        let way = [target[0] - self.place[0], target[1] - self.place[1]];
+        let length = (way[0] * way[0] + way[1] * way[1]).sqrt();
+        let step = self.avatar.options.step;
+        // Written so that rounding never leaves a last step without length.
+        if length <= step * (1.0 + 1e-9) {
+            return target;
+        }
+        [0, 1].map(|k| self.place[k] + way[k] / length * step)
+    }
+
+    /// Goes to a place if there is room.
+    fn stand(&mut self, map: &SliceMap, place: [f64; 2]) -> Result<bool, Unloaded> {
+        let climb = self.avatar.options.climb;
+        let look = self.look(map, place, [self.place[2] - climb, self.footing + climb])?;
+        if look.blocked {
+            return Ok(false);
+        }
+        self.place = [place[0], place[1], look.support.unwrap_or(self.place[2])];
+        self.falling = look.support.is_none();
+        self.footing = look.floor.unwrap_or(self.footing).min(self.place[2]);
+        Ok(true)
+    }
+
+    /// Down as far as it climbs, or onto what is there.
+    fn fall(&mut self, map: &SliceMap) -> Result<(), Unloaded> {
+        let [x, y, z] = self.place;
+        let below = z - self.avatar.options.climb;
+        let look = self.look(map, [x, y], [below, z])?;
+        self.place[2] = look.support.unwrap_or(below);
+        self.falling = look.support.is_none();
+        self.footing = self.place[2];
+        Ok(())
+    }
+
+    /// What is at a place, where what lies between two heights would carry the avatar.
+    fn look(&self, map: &SliceMap, [x, y]: [f64; 2], reach: [f64; 2]) -> Result<Look, Unloaded> {
+        let grid = map.grid();
+        let [w, d] = grid.up.across(self.avatar.options.base).map(|side| 0.5 * side);
+        let nothing = Look { blocked: false, support: None, floor: None };
+        let ranges = (grid.range(0, [x - w, x + w]), grid.range(1, [y - d, y + d]));
+        let (Some(columns), Some(rows)) = ranges else { return Ok(nothing) };
+        let [least, most] = reach.map(|height| grid.level_at(height));
+        let last = i64::from(grid.counts[2]) - 1;
+        let mut found = nothing;
+        // From the highest that can be climbed downwards, until a floor is found.
+        let carrying = least.div_euclid(SLICE).max(0)..=most.div_euclid(SLICE).min(last);
+        for s in carrying.rev() {
+            let s = u32::try_from(s).unwrap_or(0);
+            let slice = map.slice(s)?;
+            if !slice.any(&columns, &rows) {
+                continue;
+            }
+            let [from, to] = [least + 1, most].map(|level| level - i64::from(s) * SLICE);
+            let span = Span { from: from.max(0), to: to.min(SLICE - 1) };
+            let (mut support, mut floor) = (None, None);
+            for row in rows.clone() {
+                let tops = slice.row(&columns, row);
+                let (is_over, top) = span.greatest(tops);
+                if is_over {
+                    return Ok(Look { blocked: true, ..found });
+                }
+                support = support.max(top);
+                if top > floor {
+                    if slice.any_obstacle(&columns, row) {
+                        let is_floor = |i: usize| !slice.is_obstacle(*columns.start() + to_u32(i), row);
+                        floor = floor.max(span.greatest_where(tops, is_floor));
+                    } else {
+                        floor = top;
+                    }
+                }
+            }
+            let height = |level: u8| grid.height(s, level);
+            found.support = found.support.or(support.map(height));
+            found.floor = floor.map(height);
+            if found.floor.is_some() {
+                break;
+            }
+        }
+        let head = found.support.unwrap_or(self.place[2]) + self.avatar.options.height;
+        let above = (most.div_euclid(SLICE) + 1).max(0)..=grid.slice_at(head).min(last);
+        for s in above {
+            if map.slice(u32::try_from(s).unwrap_or(0))?.any(&columns, &rows) {
+                return Ok(Look { blocked: true, ..found });
+            }
+        }
+        Ok(found)
+    }
+
+    fn told(&self, grid: &Grid, blocked: bool, falling: bool) -> Step {
+        let head = self.place[2] + self.avatar.options.height;
+        let last = i64::from(grid.counts[2]) - 1;
+        let slices = [self.place[2], head].map(|height| {
+            let slice = grid.slice_at(height).clamp(0, last);
+            u32::try_from(slice).unwrap_or(0)
+        });
+        Step { position: self.position(grid), blocked, falling, slices }
+    }
+}
+
+/// Levels of a slice that would carry the avatar.
+struct Span {
+    from: i64,
+    to: i64,
+}
+
+impl Span {
+    /// Whether any top is above, and the greatest top within, both of a row; as levels.
+    #[inline]
+    fn greatest(&self, tops: &[u8]) -> (bool, Option<u8>) {
+        let [from, to] = [self.from, self.to].map(|level| u8::try_from(level + 1).unwrap_or(0));
+        let mut greatest = 0;
+        let mut most = 0;
+        for &top in tops {
+            most = most.max(top);
+            greatest = greatest.max(if top <= to { top } else { 0 });
+        }
+        (most > to, if greatest >= from.max(1) { Some(greatest - 1) } else { None })
+    }
+
+    /// The greatest top within among some of a row.
+    fn greatest_where(&self, tops: &[u8], mut is_wanted: impl FnMut(usize) -> bool) -> Option<u8> {
+        let tops = tops.iter().enumerate().filter(|&(i, &top)| top > 0 && is_wanted(i));
+        let levels = tops.map(|(_, top)| top - 1);
+        levels.filter(|level| (self.from..=self.to).contains(&i64::from(*level))).max()
+    }
+}
+
+fn to_u32(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
+/// A step of every walker towards its own target, on all cores with the feature `rayon`; the same on any number of
+/// threads.
+///
+/// # Panics
+/// When there are not as many targets and steps as walkers.
+pub fn step_each(
+    map: &SliceMap,
+    walkers: &mut [Walker],
+    targets: &[[f64; 2]],
+    response: &dyn Response,
+    steps: &mut [Result<Step, Unloaded>],
+) {
+    assert!(walkers.len() == targets.len() && walkers.len() == steps.len(), "a target and a step a walker");
+    walk_each(walkers, targets, steps, CHUNK, |walker, target| walker.step(map, *target, response));
+}
