@@ -65,8 +65,11 @@ pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
         PlyPoints::double(&points).write(out).map_err(|error| refused(&args.output, error))
     })?;
     drop(bar);
-    let report =
-        Report { points: points.len(), triangles: mesh.triangles().len(), seconds: start.elapsed().as_secs_f64() };
+    let report = Report {
+        points: points.len(),
+        triangles: mesh.triangles().len(),
+        seconds: start.elapsed().as_secs_f64(),
+    };
     let mut results = Results::new();
     if args.json {
         results.json(&report)?;

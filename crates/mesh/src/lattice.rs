@@ -78,7 +78,12 @@ impl Piece {
 /// So every box that holds more of the surface than rounding gets a sample, and its least and greatest coordinates are those of the surface in
 /// it, to a millionth. Boxes are half open: what lies in a wall belongs to the box above. Costs some ten nanoseconds
 /// a sample, and a step a box along each axis: sides must be positive, and coordinates finite.
-pub fn lattice_samples(triangle: [[f64; 3]; 3], origin: [f64; 3], sides: [f64; 3], mut each: impl FnMut([f64; 3])) {
+pub fn lattice_samples(
+    triangle: [[f64; 3]; 3],
+    origin: [f64; 3],
+    sides: [f64; 3],
+    mut each: impl FnMut([f64; 3]),
+) {
     let mut whole = Piece::EMPTY;
     for corner in triangle {
         whole.push([0, 1, 2].map(|k| (corner[k] - origin[k]) / sides[k]));

@@ -6,8 +6,8 @@ use nearmiss_geometry::{PointCloud, TriangleMesh};
 use nearmiss_mesh::lattice_samples;
 
 use crate::error::SliceError;
-use crate::options::SlicePlan;
 use crate::map::About;
+use crate::options::SlicePlan;
 use crate::parallel::each_chunk;
 use crate::{Grid, SliceMap, finish};
 

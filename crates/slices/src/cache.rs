@@ -8,11 +8,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 
+use crate::Grid;
 use crate::map::SliceMap;
 use crate::route::Building;
 use crate::slice::Slice;
 use crate::store::{SliceFolder, StoreError};
-use crate::Grid;
 
 /// How slices are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -207,7 +207,8 @@ impl SliceCache {
             return;
         };
         // The nearest first.
-        let ahead = (1..=room).filter_map(|i| if rise > 0.0 { last.checked_add(i) } else { first.checked_sub(i) });
+        let ahead =
+            (1..=room).filter_map(|i| if rise > 0.0 { last.checked_add(i) } else { first.checked_sub(i) });
         for slice in ahead.filter(|slice| spared.contains(slice)) {
             let is_new = !self.kept.contains(&slice) && self.make_room(slices, &spared);
             if is_new && self.loader.as_ref().is_some_and(|loader| loader.ask(slice)) {

@@ -18,7 +18,9 @@ pub enum SliceError {
         up: Up,
     },
     /// All points on one upright line.
-    #[error("the points have no extent across {up}, so a number of pixels gives no size; give a pixel's side")]
+    #[error(
+        "the points have no extent across {up}, so a number of pixels gives no size; give a pixel's side"
+    )]
     NoWidth {
         /// The direction upwards.
         up: Up,

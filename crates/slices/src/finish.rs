@@ -12,7 +12,7 @@ use crate::Grid;
 use crate::build::{Cell, span};
 use crate::grid::LEVELS;
 use crate::parallel::map_each;
-use crate::slice::{Slice, words};
+use crate::slice::{Canvas, Content, Slice};
 
 /// Of the spans of level voxels this share is no greater than the noise: enough that few floors become obstacles, and
 /// not so much that what stands on them decides.
@@ -67,7 +67,12 @@ pub(crate) fn noise(grid: &Grid, layers: &[Vec<Cell>]) -> f64 {
     if count < LEAST {
         return 0.0;
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a rank")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "a rank"
+    )]
     let rank = (QUANTILE * count as f64).ceil() as u64;
     let mut below = 0;
     let quantile = all.iter().position(|n| {
@@ -94,61 +99,62 @@ pub(crate) fn slices(grid: &Grid, layers: &mut [Vec<Cell>], most: i32) -> Vec<Sl
 fn slice(grid: &Grid, layers: &[Vec<Cell>], s: usize, most: i32) -> Slice {
     let [width, height, _] = grid.counts;
     let columns = width as usize;
-    let mut tops = vec![0_u8; grid.area()];
-    let mut obstacle = vec![0_u64; words(width) * height as usize];
+    let mut canvas = Canvas::new(width, height);
     let above = layers.get(s + 1);
     let below = s.checked_sub(1).map(|s| &layers[s]);
     for row in 0..height as usize {
-        let bits = &mut obstacle[row * words(width)..];
         for column in 0..columns {
             let i = row * columns + column;
             let Some(own) = span(&layers[s][i]) else { continue };
             let up = above.and_then(|layer| span(&layer[i]));
             let down = below.and_then(|layer| span(&layer[i]));
-            let (top, is_obstacle) = judge(own, down, up, most);
-            tops[i] = top;
-            bits[column / 64] |= u64::from(is_obstacle) << (column % 64);
+            canvas.set(column, row, judge(own, down, up, most));
         }
     }
-    Slice::new(width, height, tops, obstacle)
+    canvas.finish()
 }
 
-/// The top, plus one, of a voxel that spans these levels, and whether it is an obstacle, given what lies right below and above.
-fn judge([low, high]: [i32; 2], down: Option<[i32; 2]>, up: Option<[i32; 2]>, most: i32) -> (u8, bool) {
+/// What a voxel that spans these levels holds, given what lies right below and above.
+fn judge([low, high]: [i32; 2], down: Option<[i32; 2]>, up: Option<[i32; 2]>, most: i32) -> Content {
     /// Levels from one slice to the next.
     const SLICE: i32 = 255;
-    let top = u8::try_from(high + 1).unwrap_or(u8::MAX);
+    let [top, bottom] = [high, low].map(|level| u8::try_from(level).unwrap_or(u8::MAX - 1));
     let up = up.map(|span| span.map(|level| level + SLICE)).filter(|[from, _]| from - high <= most);
     let down = down.map(|span| span.map(|level| level - SLICE)).filter(|[_, to]| low - to <= most);
     let spans = [Some(high - low), up.map(|[_, to]| to - low), down.map(|[from, _]| high - from)];
-    match spans.iter().flatten().any(|span| *span > most) {
-        true => (top, true),
-        // The floor goes on in the next slice.
-        false => (if up.is_some() { u8::MAX } else { top }, false),
-    }
+    let is_obstacle = spans.iter().flatten().any(|span| *span > most);
+    // A floor that is joined to one above goes on there.
+    let top = if up.is_some() && !is_obstacle { u8::MAX - 1 } else { top };
+    Content { top, bottom, is_obstacle }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn judged(own: [i32; 2], down: Option<[i32; 2]>, up: Option<[i32; 2]>) -> (u8, bool) {
+        let content = judge(own, down, up, 17);
+        assert_eq!(i32::from(content.bottom), own[0], "the bottom is its own");
+        (content.top, content.is_obstacle)
+    }
+
     #[test]
     fn spans_beyond_the_share_are_obstacles() {
-        assert_eq!(judge([10, 27], None, None, 17), (28, false));
-        assert_eq!(judge([10, 28], None, None, 17), (29, true));
+        assert_eq!(judged([10, 27], None, None), (27, false));
+        assert_eq!(judged([10, 28], None, None), (28, true));
     }
 
     #[test]
     fn a_floor_that_straddles_two_slices_is_one() {
         // Nine levels from 250 to 259.
-        assert_eq!(judge([250, 254], None, Some([0, 4]), 17), (255, false), "it goes on above");
-        assert_eq!(judge([0, 4], Some([250, 254]), None, 17), (5, false));
+        assert_eq!(judged([250, 253], None, Some([0, 4])), (254, false), "it goes on above");
+        assert_eq!(judged([0, 4], Some([250, 253]), None), (4, false));
         // Too steep together: a wall cut by the border of its slices.
-        assert_eq!(judge([240, 254], None, Some([0, 10]), 17), (255, true));
-        assert_eq!(judge([0, 10], Some([240, 254]), None, 17), (11, true));
+        assert_eq!(judged([240, 253], None, Some([0, 10])), (253, true));
+        assert_eq!(judged([0, 10], Some([240, 253]), None), (10, true));
         // Far apart: a floor and something that hangs over it.
-        assert_eq!(judge([100, 104], None, Some([10, 12]), 17), (105, false));
-        assert_eq!(judge([10, 12], Some([100, 104]), None, 17), (13, false));
+        assert_eq!(judged([100, 104], None, Some([10, 12])), (104, false));
+        assert_eq!(judged([10, 12], Some([100, 104]), None), (12, false));
     }
 
     #[test]

@@ -66,9 +66,17 @@ impl Grid {
         if !(0..3).all(|k| q[k] >= 0.0 && q[k] < f64::from(self.counts[k])) {
             return None;
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the counts, a u32")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the counts, a u32"
+        )]
         let [column, row, slice] = q.map(|x| x as u32);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 255 but for rounding")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "below 255 but for rounding"
+        )]
         let level = ((q[2] - f64::from(slice)) * f64::from(LEVELS)) as u8;
         let pixel = row as usize * self.counts[0] as usize + column as usize;
         Some(Voxel { slice: slice as usize, pixel, level: level.min(254) })
@@ -83,7 +91,11 @@ impl Grid {
         if !(from <= to && from <= last && to >= 0.0) {
             return None;
         }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the counts, a u32")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "within the counts, a u32"
+        )]
         let [from, to] = [from.max(0.0), to.min(last)].map(|x| x as u32);
         Some(from..=to)
     }
@@ -139,10 +151,16 @@ mod tests {
         assert_eq!(voxel([1.0, -2.0, 0.5]), Some(Voxel { slice: 0, pixel: 0, level: 0 }));
         assert_eq!(voxel([1.3, -1.3, 1.0]), Some(Voxel { slice: 1, pixel: 9, level: 0 }));
         assert_eq!(voxel([1.3, -1.3, 1.0_f64.next_down()]), Some(Voxel { slice: 0, pixel: 9, level: 254 }));
-        for outside in [[0.999, -2.0, 0.5], [2.0, -2.0, 0.5], [1.0, -1.25, 0.5], [1.0, -2.0, 1.5], [f64::NAN; 3]] {
+        for outside in
+            [[0.999, -2.0, 0.5], [2.0, -2.0, 0.5], [1.0, -1.25, 0.5], [1.0, -2.0, 1.5], [f64::NAN; 3]]
+        {
             assert_eq!(voxel(outside), None, "{outside:?}");
         }
-        assert_eq!(GRID.range(0, [1.25, 1.5]), Some(1..=2), "a box that ends on a line meets what is behind it");
+        assert_eq!(
+            GRID.range(0, [1.25, 1.5]),
+            Some(1..=2),
+            "a box that ends on a line meets what is behind it"
+        );
         assert_eq!(GRID.range(0, [-9.0, 9.0]), Some(0..=3));
         assert_eq!(GRID.range(2, [1.5, 2.0]), None);
         assert_eq!(GRID.range(2, [f64::NAN, 2.0]), None);

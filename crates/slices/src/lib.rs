@@ -38,7 +38,7 @@ pub use options::{Obstacle, Pixel, SliceOptions, SlicePlan};
 pub use query::{Floor, Occupancy};
 pub use response::{Back, Response, Slide};
 pub use route::{Building, Ended, Route};
-pub use slice::Slice;
+pub use slice::{Content, Slice};
 pub use store::{SliceFolder, StoreError};
 pub use up::{UnknownAxis, Up};
 pub use walk::{Avatar, AvatarOptions, Step, WalkError, Walker, step_each};

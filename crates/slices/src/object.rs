@@ -14,7 +14,9 @@ const UPRIGHT: f64 = 1e-6;
 #[non_exhaustive]
 pub enum ObjectError {
     /// The pose tilts the object.
-    #[error("the pose tilts the object's axis by {degrees} degrees; turn it about the axis that points up only")]
+    #[error(
+        "the pose tilts the object's axis by {degrees} degrees; turn it about the axis that points up only"
+    )]
     Tilted {
         /// Between the axis as posed and the building's.
         degrees: f64,
@@ -137,8 +139,8 @@ impl SliceMap {
                 }
                 for slice in block.slices.clone() {
                     match self.slice(slice)?.pixel(column, row) {
-                        Some((_, true)) => return Ok(Some(true)),
-                        Some((_, false)) => met = Some(false),
+                        Some(found) if found.is_obstacle => return Ok(Some(true)),
+                        Some(_) => met = Some(false),
                         None => {}
                     }
                 }

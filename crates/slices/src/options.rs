@@ -9,9 +9,9 @@ use crate::{Grid, Up};
 /// Pixels of a slice that can be told apart.
 const MOST_PIXELS: f64 = 2_147_483_648.0;
 
-/// Bytes a voxel takes while a map is built, lowest and highest point (2), and when it is done, height and two flags
-/// (1¼).
-const BYTES: f64 = 3.25;
+/// Bytes a voxel takes while a map is built, lowest and highest level (2), and when it is done, the same in fewer steps and two
+/// flags (1¾).
+const BYTES: f64 = 3.75;
 
 /// How large a pixel is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -2,14 +2,22 @@
 
 /// Sums what `work` tells of each chunk.
 #[cfg(feature = "rayon")]
-pub(crate) fn each_chunk<P: Sync>(points: &[P], size: usize, work: impl Fn(&[P]) -> u64 + Sync + Send) -> u64 {
+pub(crate) fn each_chunk<P: Sync>(
+    points: &[P],
+    size: usize,
+    work: impl Fn(&[P]) -> u64 + Sync + Send,
+) -> u64 {
     use rayon::prelude::*;
     points.par_chunks(size).map(work).sum()
 }
 
 /// Sums what `work` tells of each chunk.
 #[cfg(not(feature = "rayon"))]
-pub(crate) fn each_chunk<P: Sync>(points: &[P], size: usize, work: impl Fn(&[P]) -> u64 + Sync + Send) -> u64 {
+pub(crate) fn each_chunk<P: Sync>(
+    points: &[P],
+    size: usize,
+    work: impl Fn(&[P]) -> u64 + Sync + Send,
+) -> u64 {
     points.chunks(size).map(work).sum()
 }
 
@@ -28,14 +36,28 @@ pub(crate) fn map_each<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync +
 
 /// Fills every answer by its question.
 #[cfg(feature = "rayon")]
-pub(crate) fn fill_each<Q: Sync, A: Send>(questions: &[Q], answers: &mut [A], size: usize, work: impl Fn(&Q) -> A + Sync + Send) {
+pub(crate) fn fill_each<Q: Sync, A: Send>(
+    questions: &[Q],
+    answers: &mut [A],
+    size: usize,
+    work: impl Fn(&Q) -> A + Sync + Send,
+) {
     use rayon::prelude::*;
-    questions.par_iter().zip(answers).with_min_len(size).for_each(|(question, answer)| *answer = work(question));
+    questions
+        .par_iter()
+        .zip(answers)
+        .with_min_len(size)
+        .for_each(|(question, answer)| *answer = work(question));
 }
 
 /// Fills every answer by its question.
 #[cfg(not(feature = "rayon"))]
-pub(crate) fn fill_each<Q: Sync, A: Send>(questions: &[Q], answers: &mut [A], _size: usize, work: impl Fn(&Q) -> A + Sync + Send) {
+pub(crate) fn fill_each<Q: Sync, A: Send>(
+    questions: &[Q],
+    answers: &mut [A],
+    _size: usize,
+    work: impl Fn(&Q) -> A + Sync + Send,
+) {
     questions.iter().zip(answers).for_each(|(question, answer)| *answer = work(question));
 }
 

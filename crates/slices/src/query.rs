@@ -122,8 +122,8 @@ impl SliceMap {
     pub(crate) fn floor_below(&self, [column, row]: [u32; 2], base: f64) -> Result<Option<f64>, Unloaded> {
         let slices = (self.grid().slice_at(base) + 1).clamp(0, i64::from(self.grid().counts[2]));
         for s in (0..u32::try_from(slices).unwrap_or(0)).rev() {
-            if let Some((level, is_obstacle)) = self.slice(s)?.pixel(column, row) {
-                return Ok(if is_obstacle { None } else { Some(self.grid().height(s, level)) });
+            if let Some(found) = self.slice(s)?.pixel(column, row) {
+                return Ok(if found.is_obstacle { None } else { Some(self.grid().height(s, found.top)) });
             }
         }
         Ok(None)

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use bytemuck::cast_slice;
 use xxhash_rust::xxh3::Xxh3;
 
-/// A layer of voxels. A pixel takes 1¼ bytes, whatever it holds.
+/// A layer of voxels. A pixel takes 1¾ bytes, whatever it holds.
 ///
 /// Bits of a row begin at a word of their own, so that a run of pixels is tested 64 at a time.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,32 +18,83 @@ pub struct Slice {
     obstacle: Vec<u64>,
     /// Level of the highest point plus one, 0 where nothing is.
     tops: Vec<u8>,
+    /// Level of the lowest point, divided by 16, in half a byte a pixel; 0 where nothing is.
+    bottoms: Vec<u8>,
     checksum: u64,
 }
 
-impl Slice {
-    /// `tops` and the obstacles' bits of a slice of this size; occupied is what has a top.
-    pub(crate) fn new(width: u32, height: u32, tops: Vec<u8>, obstacle: Vec<u64>) -> Self {
-        let words = words(width);
-        debug_assert_eq!(tops.len(), width as usize * height as usize, "a top a pixel");
-        debug_assert_eq!(obstacle.len(), words * height as usize, "whole words a row");
+/// What a pixel holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Content {
+    /// Level of the highest point; 254 where a floor goes on in the next slice.
+    pub top: u8,
+    /// A level that no point is below, at most 15 below the lowest point.
+    pub bottom: u8,
+    /// Whether it is an obstacle.
+    pub is_obstacle: bool,
+}
+
+impl Content {
+    /// Levels that one step of a bottom spans.
+    pub(crate) const STEP: u8 = 16;
+}
+
+/// A slice that is being filled.
+#[derive(Debug)]
+pub(crate) struct Canvas {
+    width: u32,
+    height: u32,
+    tops: Vec<u8>,
+    bottoms: Vec<u8>,
+    obstacle: Vec<u64>,
+}
+
+impl Canvas {
+    pub(crate) fn new(width: u32, height: u32) -> Self {
+        let rows = height as usize;
+        Self {
+            width,
+            height,
+            tops: vec![0; width as usize * rows],
+            bottoms: vec![0; halves(width) * rows],
+            obstacle: vec![0; words(width) * rows],
+        }
+    }
+
+    /// Sets an empty pixel.
+    #[inline]
+    pub(crate) fn set(&mut self, column: usize, row: usize, content: Content) {
+        self.tops[row * self.width as usize + column] = content.top + 1;
+        self.bottoms[row * halves(self.width) + column / 2] |=
+            content.bottom / Content::STEP << (4 * (column % 2));
+        self.obstacle[row * words(self.width) + column / 64] |=
+            u64::from(content.is_obstacle) << (column % 64);
+    }
+
+    /// The slice; what has a top is occupied.
+    pub(crate) fn finish(self) -> Slice {
+        let Self { width, height, tops, bottoms, obstacle } = self;
         let mut occupied = vec![0_u64; obstacle.len()];
-        if words > 0 {
-            for (row, bits) in tops.chunks_exact(width as usize).zip(occupied.chunks_exact_mut(words)) {
+        if width > 0 {
+            let rows = occupied.chunks_exact_mut(words(width));
+            for (row, bits) in tops.chunks_exact(width as usize).zip(rows) {
                 for (pixels, word) in row.chunks(64).zip(bits) {
                     *word = bits_of(pixels);
                 }
             }
         }
-        let mut slice = Self { width, height, occupied, obstacle, tops, checksum: 0 };
+        let mut slice = Slice { width, height, occupied, obstacle, tops, bottoms, checksum: 0 };
         slice.checksum = slice.hash();
         slice
     }
+}
 
+impl Slice {
     fn hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(cast_slice(&[self.width, self.height]));
         hash.update(&self.tops);
+        hash.update(&self.bottoms);
         hash.update(cast_slice(&self.obstacle));
         hash.digest()
     }
@@ -60,7 +111,7 @@ impl Slice {
         self.height
     }
 
-    /// xxh3-64 of size, tops and obstacles: two slices of one checksum are the same image.
+    /// xxh3-64 of all it holds: two slices of one checksum are the same image.
     #[must_use]
     pub fn checksum(&self) -> u64 {
         self.checksum
@@ -69,25 +120,28 @@ impl Slice {
     /// Bytes in memory.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.tops.len() + 8 * (self.occupied.len() + self.obstacle.len())
+        self.tops.len() + self.bottoms.len() + 8 * (self.occupied.len() + self.obstacle.len())
     }
 
     /// How many pixels hold something, and how many of them are obstacles.
     #[must_use]
     pub fn counts(&self) -> [u64; 2] {
-        [&self.occupied, &self.obstacle].map(|bits| bits.iter().map(|word| u64::from(word.count_ones())).sum())
+        [&self.occupied, &self.obstacle]
+            .map(|bits| bits.iter().map(|word| u64::from(word.count_ones())).sum())
     }
 
-    /// The level of the highest point in a pixel and whether it is an obstacle; none if nothing is there.
+    /// What a pixel holds; none if nothing is there.
     ///
     /// # Panics
     /// When there is no such pixel.
+    #[inline]
     #[must_use]
-    pub fn pixel(&self, column: u32, row: u32) -> Option<(u8, bool)> {
-        let i = row as usize * self.width as usize + column as usize;
-        let word = row as usize * words(self.width) + column as usize / 64;
-        let level = self.tops[i].checked_sub(1)?;
-        Some((level, self.obstacle[word] >> (column % 64) & 1 == 1))
+    pub fn pixel(&self, column: u32, row: u32) -> Option<Content> {
+        let (column, row) = (column as usize, row as usize);
+        let top = self.tops[row * self.width as usize + column].checked_sub(1)?;
+        let half = self.bottoms[row * halves(self.width) + column / 2] >> (4 * (column % 2)) & 15;
+        let word = self.obstacle[row * words(self.width) + column / 64];
+        Some(Content { top, bottom: half * Content::STEP, is_obstacle: word >> (column % 64) & 1 == 1 })
     }
 
     /// The image as the paper encodes it, red green blue a pixel, the last row first: red is the height in the slice, green is full
@@ -98,7 +152,7 @@ impl Slice {
         for row in (0..self.height).rev() {
             for column in 0..self.width {
                 bytes.extend(match self.pixel(column, row) {
-                    Some((level, is_obstacle)) => [level, 255, if is_obstacle { 255 } else { 26 }],
+                    Some(found) => [found.top, 255, if found.is_obstacle { 255 } else { 26 }],
                     None => [0; 3],
                 });
             }
@@ -130,7 +184,7 @@ impl Slice {
         &self.tops[first + *columns.start() as usize..=first + *columns.end() as usize]
     }
 
-    /// Whether something that is no obstacle is in a pixel of this row, which holds something.
+    /// Whether a pixel of this row is an obstacle.
     #[inline]
     pub(crate) fn is_obstacle(&self, column: u32, row: u32) -> bool {
         let word = row as usize * words(self.width) + column as usize / 64;
@@ -145,8 +199,13 @@ impl Slice {
     }
 }
 
+/// Bytes of a row of half bytes.
+const fn halves(width: u32) -> usize {
+    (width as usize).div_ceil(2)
+}
+
 /// Words of a row of bits.
-pub(crate) const fn words(width: u32) -> usize {
+const fn words(width: u32) -> usize {
     (width as usize).div_ceil(64)
 }
 
@@ -177,7 +236,11 @@ impl Mask {
 
     /// The words of each of these rows.
     #[inline]
-    fn rows<'a>(&self, bits: &'a [u64], rows: &RangeInclusive<u32>) -> impl Iterator<Item = &'a [u64]> + use<'a> {
+    fn rows<'a>(
+        &self,
+        bits: &'a [u64],
+        rows: &RangeInclusive<u32>,
+    ) -> impl Iterator<Item = &'a [u64]> + use<'a> {
         let block = &bits[*rows.start() as usize * self.stride..(*rows.end() as usize + 1) * self.stride];
         let words = self.words.clone();
         block.chunks_exact(self.stride).map(move |row| &row[words.clone()])

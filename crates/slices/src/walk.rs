@@ -14,6 +14,7 @@ use thiserror::Error;
 use crate::grid::LEVELS;
 use crate::map::{SliceMap, Unloaded};
 use crate::parallel::walk_each;
+use crate::slice::Slice;
 use crate::{Grid, Response};
 
 /// Levels of a slice.
@@ -26,9 +27,9 @@ const CHUNK: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct AvatarOptions {
-    /// Of the box, along the two axes across in the caller's order. Default: 0.6 each.
+    /// Of the box, along the two axes across in the caller's order. Default: 0.4 each.
     pub base: [f64; 2],
-    /// Of the box. Default: 1.8.
+    /// Of the box. Default: 1.7.
     pub height: f64,
     /// How far it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
     pub climb: f64,
@@ -38,7 +39,7 @@ pub struct AvatarOptions {
 
 impl Default for AvatarOptions {
     fn default() -> Self {
-        Self { base: [0.6; 2], height: 1.8, climb: 0.35, step: 0.05 }
+        Self { base: [0.4; 2], height: 1.7, climb: 0.35, step: 0.05 }
     }
 }
 
@@ -89,7 +90,9 @@ pub enum WalkError {
         index: usize,
     },
     /// Nobody can stand there.
-    #[error("the start {place:?} is inside an obstacle or too low under a ceiling; start elsewhere, or with a smaller avatar")]
+    #[error(
+        "the start {place:?} is inside an obstacle or too low under a ceiling; start elsewhere, or with a smaller avatar"
+    )]
     Blocked {
         /// As given.
         place: [f64; 3],
@@ -252,7 +255,12 @@ impl Walker {
     ///
     /// # Errors
     /// When a slice that is needed is not loaded; then it is where it was.
-    pub fn step(&mut self, map: &SliceMap, target: [f64; 2], response: &dyn Response) -> Result<Step, Unloaded> {
+    pub fn step(
+        &mut self,
+        map: &SliceMap,
+        target: [f64; 2],
+        response: &dyn Response,
+    ) -> Result<Step, Unloaded> {
         let mut blocked = false;
         let is_falling = self.falling;
         if is_falling {
@@ -352,9 +360,14 @@ impl Walker {
             }
         }
         let head = found.support.unwrap_or(self.place[2]) + self.avatar.options.height;
-        let above = (most.div_euclid(SLICE) + 1).max(0)..=grid.slice_at(head).min(last);
+        let crown = grid.level_at(head);
+        let above = (most.div_euclid(SLICE) + 1).max(0)..=crown.div_euclid(SLICE).min(last);
         for s in above {
-            if map.slice(u32::try_from(s).unwrap_or(0))?.any(&columns, &rows) {
+            let below_head = crown - s * SLICE;
+            let slice = map.slice(u32::try_from(s).unwrap_or(0))?;
+            if slice.any(&columns, &rows)
+                && (below_head >= SLICE - 1 || reaches(slice, &columns, &rows, below_head))
+            {
                 return Ok(Look { blocked: true, ..found });
             }
         }
@@ -370,6 +383,14 @@ impl Walker {
         });
         Step { position: self.position(grid), blocked, falling, slices }
     }
+}
+
+/// Whether anything in these pixels begins at this level or lower: a ceiling above the head does not.
+fn reaches(slice: &Slice, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>, level: i64) -> bool {
+    rows.clone().any(|row| {
+        let mut contents = columns.clone().filter_map(|column| slice.pixel(column, row));
+        contents.any(|content| i64::from(content.bottom) <= level)
+    })
 }
 
 /// Levels of a slice that would carry the avatar.

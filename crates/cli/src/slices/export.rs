@@ -37,6 +37,10 @@ pub(super) fn run(args: &SlicesExportArgs) -> Result<(), CliError> {
     }
     drop(bar);
     let mut results = Results::new();
-    results.line(format_args!("{} written to {}", count(u64::from(slices), "image"), args.output.display()))?;
+    results.line(format_args!(
+        "{} written to {}",
+        count(u64::from(slices), "image"),
+        args.output.display()
+    ))?;
     results.flush()
 }

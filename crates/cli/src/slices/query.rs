@@ -109,7 +109,9 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
             let found = map.meets(&object, &pose, floor);
             let took = micros(start);
             match found {
-                Err(ObjectError::Tilted { .. }) => Err(found.map_or_else(|e| e.to_string(), |_| String::new())),
+                Err(ObjectError::Tilted { .. }) => {
+                    Err(found.map_or_else(|e| e.to_string(), |_| String::new()))
+                }
                 found => Ok(tell(found, took)),
             }
         })?;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use nearmiss::slices::{
-    Avatar, AvatarOptions, Back, CacheOptions, Ended, Response, Route, Slide, SliceCache, Step, StoreError,
+    Avatar, AvatarOptions, Back, CacheOptions, Ended, Response, Route, SliceCache, Slide, Step, StoreError,
     WalkError,
 };
 use serde::Serialize;
@@ -27,7 +27,7 @@ pub struct WalkArgs {
     #[arg(long, value_name = "FILE.json")]
     pub route: PathBuf,
     /// Width, depth and height of the avatar
-    #[arg(long, value_name = "W,D,H", default_value = "0.6,0.6,1.8", value_parser = parse_avatar)]
+    #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.7", value_parser = parse_avatar)]
     pub avatar: AvatarBox,
     /// How far it climbs at once, and falls in a step
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
@@ -134,8 +134,7 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
             let counts = cache.counts();
             let Step { position, blocked, falling, slices } = *step;
             let (hits, misses, stalls) = (counts.hits, counts.misses, counts.stalls);
-            closed =
-                results.json(&StepLine { position, blocked, falling, slices, hits, misses, stalls });
+            closed = results.json(&StepLine { position, blocked, falling, slices, hits, misses, stalls });
         }
         Ok::<(), StoreError>(())
     });
@@ -167,7 +166,7 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
             steps.iter().filter(|step| step.blocked).count(),
             steps.iter().filter(|step| step.falling).count(),
             count(counts.hits, "hit"),
-            count(counts.misses, "miss"),
+            format_args!("{} misses", counts.misses),
             count(counts.stalls, "stall"),
         ))?;
     }
@@ -228,7 +227,11 @@ fn sentence(ended: Ended, route: &Route, steps: &[Step], track: &Track) -> Strin
     match ended {
         Ended::Arrived => format!("Arrived at {} {far}.", place(end)),
         Ended::Stuck { point } => {
-            format!("Stopped at {} {far}, on the way to point {}: something is in the way.", place(end), point + 1)
+            format!(
+                "Stopped at {} {far}, on the way to point {}: something is in the way.",
+                place(end),
+                point + 1
+            )
         }
         Ended::LeftMap { point } => {
             format!("Fell below the map at {} {far}, on the way to point {}.", place(end), point + 1)

@@ -91,16 +91,21 @@ fn storey(canvas: &mut Canvas, area: Area, map: &SliceMap, [low, high]: [f64; 2]
             let mut colour = EMPTY;
             for slice in slices.clone().filter_map(|s| map.slice(s).ok()) {
                 match slice.pixel(column, row) {
-                    Some((_, true)) => colour = OBSTACLE,
-                    Some((_, false)) if colour == EMPTY => colour = FLOOR,
+                    Some(found) if found.is_obstacle => colour = OBSTACLE,
+                    Some(_) if colour == EMPTY => colour = FLOOR,
                     _ => {}
                 }
             }
             if colour != EMPTY {
                 let [x0, x1] = [column, column + 1].map(|c| c as usize * area.width / width as usize);
-                let [y0, y1] = [depth - 1 - row, depth - row].map(|r| r as usize * area.height / depth as usize);
-                let pixel =
-                    Area { left: area.left + x0, top: area.top + y0, width: (x1 - x0).max(1), height: (y1 - y0).max(1) };
+                let [y0, y1] =
+                    [depth - 1 - row, depth - row].map(|r| r as usize * area.height / depth as usize);
+                let pixel = Area {
+                    left: area.left + x0,
+                    top: area.top + y0,
+                    width: (x1 - x0).max(1),
+                    height: (y1 - y0).max(1),
+                };
                 canvas.fill(pixel, colour);
             }
         }
