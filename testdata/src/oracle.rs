@@ -9,6 +9,7 @@ mod eigen;
 mod proximity;
 mod radii;
 mod side;
+mod slices;
 mod surface;
 mod thickened;
 
@@ -23,5 +24,6 @@ pub use radii::{
     spacings,
 };
 pub use side::{Signs, falls, winding};
+pub use slices::{SliceTwin, TwinVoxel};
 pub use surface::{BORDER, Bandwidth, Evaluation, GAP, Kernel, Parameters, Status, SurfaceTwin, THIN};
 pub use thickened::{Nearest, least_distance, nearest, touches};

@@ -1,0 +1,140 @@
+//! Samples lie on the mesh, as dense as asked for everywhere.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use nearmiss_geometry::TriangleMesh;
+use nearmiss_mesh::{SampleError, SampleOptions, Samples, lattice_samples, sample};
+
+/// Shapes of triangles: right, flat, needle-thin, obtuse, tiny, huge, without area, a point.
+const CORNERS: [[[f64; 3]; 3]; 9] = [
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+    [[0.0, 0.0, 1.0], [2.0, 0.3, 1.0], [1.0, 0.1, 1.5]],
+    [[0.0, 5.0, 0.0], [6.0, 5.0, 0.2], [0.0, 5.003, 0.0]],
+    [[0.0, 0.0, 2.0], [3.0, 0.0, 2.0], [-1.0, 0.2, 2.2]],
+    [[9.0, 9.0, 9.0], [9.001, 9.0, 9.0], [9.0, 9.001, 9.0]],
+    [[-8.0, -8.0, 0.0], [-2.0, -7.0, 3.0], [-8.0, -1.0, -3.0]],
+    [[4.0, 0.0, 0.0], [5.0, 1.0, 1.0], [4.5, 0.5, 0.5]],
+    [[7.0, 7.0, 7.0], [7.0, 7.0, 7.0], [7.0, 7.0, 7.0]],
+    [[0.0, -3.0, 0.0], [0.0, -3.0, 1.0], [0.0, -2.0, 0.5]],
+];
+
+fn mesh() -> TriangleMesh {
+    let vertices: Vec<[f64; 3]> = CORNERS.iter().flatten().copied().collect();
+    let triangles = (0..9).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    TriangleMesh::new(vertices, triangles).unwrap()
+}
+
+/// Places of a triangle: its corners, sides and inside.
+fn places([a, b, c]: [[f64; 3]; 3], n: u16) -> impl Iterator<Item = [f64; 3]> {
+    (0..=n).flat_map(move |i| {
+        (0..=n - i).map(move |j| {
+            let [s, t] = [i, j].map(|x| f64::from(x) / f64::from(n));
+            [0, 1, 2].map(|k| a[k] + s * (b[k] - a[k]) + t * (c[k] - a[k]))
+        })
+    })
+}
+
+fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
+    (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// From a place to the nearest of a dense lattice of places of any triangle, at most half a step off.
+fn off_the_mesh(p: [f64; 3]) -> f64 {
+    CORNERS
+        .iter()
+        .flat_map(|corners| places(*corners, 60))
+        .map(|q| distance(p, q))
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn no_place_is_further_from_a_sample_than_asked() {
+    for seed in [None, Some(3)] {
+        for spacing in [0.5, 0.13] {
+            let mut options = SampleOptions::new(Samples::Spacing(spacing));
+            options.seed = seed;
+            let points = sample(&mesh(), &options).unwrap();
+            let mut farthest = 0.0_f64;
+            for corners in CORNERS {
+                for p in places(corners, 40) {
+                    let nearest = points.iter().map(|q| distance(p, *q)).fold(f64::INFINITY, f64::min);
+                    farthest = farthest.max(nearest);
+                }
+            }
+            assert!(farthest <= spacing, "{farthest} from a sample at spacing {spacing}");
+            assert!(
+                farthest > 0.4 * spacing,
+                "{farthest} at spacing {spacing}: far more samples than needed"
+            );
+            for p in points.iter().step_by(17) {
+                assert!(off_the_mesh(*p) < 0.12, "{p:?} is off the mesh");
+            }
+            assert_eq!(sample(&mesh(), &options).unwrap(), points, "the same again");
+        }
+    }
+    let rows = sample(&mesh(), &SampleOptions::new(Samples::Spacing(0.13))).unwrap();
+    let moved = sample(&mesh(), &SampleOptions::new(Samples::Spacing(0.13)).with_seed(1)).unwrap();
+    assert!(moved.len() < 2 * rows.len(), "{} in rows, {} moved", rows.len(), moved.len());
+}
+
+#[test]
+fn a_number_of_samples_is_spread_by_area() {
+    // Two squares, one of nine times the area, in four triangles.
+    let square =
+        |x: f64, side: f64| [[x, 0.0, 0.0], [x + side, 0.0, 0.0], [x + side, side, 0.0], [x, side, 0.0]];
+    let vertices = [square(0.0, 1.0), square(5.0, 3.0)].concat();
+    let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]).unwrap();
+    for seed in 0..5 {
+        let points = sample(&mesh, &SampleOptions::new(Samples::Count(10_000)).with_seed(seed)).unwrap();
+        assert_eq!(points.len(), 10_000);
+        let small = points.iter().filter(|p| p[0] <= 1.0).count();
+        assert!(small.abs_diff(1000) <= 2, "{small} of 10000 on a tenth of the area");
+        // Even within a triangle: 300 on each of 9 equal squares, within five deviations of a random count.
+        for cell in 0..9_u32 {
+            let [x, y] = [f64::from(cell % 3), f64::from(cell / 3)];
+            let here = |p: &&[f64; 3]| {
+                (p[0] - 5.0 - x).clamp(0.0, 1.0) == p[0] - 5.0 - x && p[1] >= y && p[1] < y + 1.0
+            };
+            let count = points.iter().filter(here).count();
+            assert!(count.abs_diff(1000) < 160, "{count} in cell {cell}");
+        }
+    }
+    let drawn = |seed| sample(&mesh, &SampleOptions::new(Samples::Count(100)).with_seed(seed)).unwrap();
+    assert_ne!(drawn(1), drawn(2));
+}
+
+#[test]
+fn every_box_that_a_triangle_passes_gets_a_sample_with_its_extremes() {
+    let (origin, sides) = ([-8.3, -8.1, -3.2], [0.31, 0.27, 0.5]);
+    let cell = |p: [f64; 3]| [0, 1, 2].map(|k| ((p[k] - origin[k]) / sides[k]).floor());
+    let mut compared = 0;
+    for corners in CORNERS {
+        let mut samples = Vec::new();
+        lattice_samples(corners, origin, sides, |p| samples.push(p));
+        for p in places(corners, 150) {
+            let here: Vec<&[f64; 3]> = samples.iter().filter(|q| cell(**q) == cell(p)).collect();
+            assert!(!here.is_empty(), "{p:?} of {corners:?} is in an empty box");
+            for k in 0..3 {
+                let least = here.iter().map(|q| q[k]).fold(f64::INFINITY, f64::min);
+                let most = here.iter().map(|q| q[k]).fold(f64::NEG_INFINITY, f64::max);
+                assert!(p[k] > least - 1e-5 && p[k] < most + 1e-5, "{p:?} beyond {least} to {most}");
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared > 100_000, "{compared} places");
+}
+
+#[test]
+fn what_cannot_be_sampled_is_refused() {
+    let refused = |mesh: &TriangleMesh, samples| sample(mesh, &SampleOptions::new(samples)).unwrap_err();
+    assert_eq!(refused(&mesh(), Samples::Spacing(0.0)), SampleError::Spacing { spacing: 0.0 });
+    assert!(matches!(refused(&mesh(), Samples::Spacing(f64::NAN)), SampleError::Spacing { .. }));
+    assert!(matches!(refused(&mesh(), Samples::Spacing(1e-9)), SampleError::TooMany { .. }));
+    let flat = TriangleMesh::new(vec![[0.0; 3], [1.0; 3]], vec![[0, 1, 1]]).unwrap();
+    assert_eq!(refused(&flat, Samples::Count(10)), SampleError::NoArea);
+    assert!(!sample(&flat, &SampleOptions::new(Samples::Spacing(0.1))).unwrap().is_empty(), "a line");
+    let broken = TriangleMesh::new(vec![[0.0; 3], [1.0, f64::NAN, 0.0]], vec![[0, 1, 1]]).unwrap();
+    assert_eq!(refused(&broken, Samples::Spacing(0.1)), SampleError::NotFinite { vertex: 1 });
+    assert_eq!(refused(&TriangleMesh::default(), Samples::Count(1)), SampleError::NoArea);
+    assert!(sample(&TriangleMesh::default(), &SampleOptions::new(Samples::Spacing(1.0))).unwrap().is_empty());
+}

@@ -1,0 +1,152 @@
+//! What is floor and what is obstacle in a generated house, scanned with noise or sampled from its triangles.
+
+use std::ops::RangeInclusive;
+
+use nearmiss_slices::{Content, Obstacle, Pixel, SliceMap, SliceOptions};
+use nearmiss_testdata::house::{COLUMN, COLUMNS, Quad, STOREY, house, scanned};
+
+use crate::built::{built, of_quads};
+
+fn options(pixel: f64, obstacle: Obstacle) -> SliceOptions {
+    SliceOptions::default().with_pixel(Pixel::Side(pixel)).with_obstacle(obstacle)
+}
+
+const SLOPE: Obstacle = Obstacle::Slope { degrees: 45.0, noise: None };
+
+/// Contents of the pixels whose middles lie in a rectangle, between two heights, the highest of each column.
+fn contents(map: &SliceMap, [x, y, z]: [RangeInclusive<f64>; 3]) -> Vec<Content> {
+    let grid = map.grid();
+    let mut found = Vec::new();
+    for row in 0..grid.counts[1] {
+        for column in 0..grid.counts[0] {
+            let [px, py] = grid.middle(column, row);
+            if x.contains(&px) && y.contains(&py) {
+                let slices = grid.range(2, [*z.start(), *z.end()]).unwrap();
+                let highest = slices.rev().find_map(|s| map.slice(s).unwrap().pixel(column, row));
+                found.extend(highest);
+            }
+        }
+    }
+    found
+}
+
+fn share(contents: &[Content]) -> f64 {
+    let obstacles = contents.iter().filter(|content| content.is_obstacle).count();
+    ratio(obstacles, contents.len())
+}
+
+fn ratio(part: usize, whole: usize) -> f64 {
+    let [part, whole] = [part, whole].map(|n| f64::from(u32::try_from(n).unwrap()));
+    part / whole
+}
+
+#[test]
+fn floors_are_floor_and_walls_are_obstacles() {
+    for (noise, spacing) in [(0.0, 0.02), (0.004, 0.02), (0.01, 0.025), (0.02, 0.03)] {
+        let map = built(&scanned(&house(), spacing, noise, 7), &options(0.05, SLOPE)).unwrap();
+        let [low, upper] = [0.0, STOREY].map(|z| z - 0.1..=z + 0.1);
+        // Away from walls, ramps and columns.
+        let floors = [
+            contents(&map, [1.0..=8.0, 3.5..=9.5, low.clone()]),
+            contents(&map, [7.0..=15.5, 6.2..=11.5, upper]),
+        ];
+        for floor in floors {
+            assert!(floor.len() > 10_000, "noise {noise}: {} pixels of floor", floor.len());
+            assert!(share(&floor) < 0.02, "noise {noise}: {:.4} of a floor are obstacles", share(&floor));
+        }
+        let wall = obstacle_columns(&map, 11.9..=12.1, 1.5);
+        assert!(wall > 0.99, "noise {noise}: {wall:.4} of a wall is an obstacle");
+        let estimated = map.about().noise;
+        assert!(
+            estimated >= 1.5 * noise && estimated <= 6.0 * noise + 0.001,
+            "noise {noise} is taken for {estimated}"
+        );
+    }
+}
+
+/// Of the columns of the map the share that has an obstacle in these rows, in the slice at a height.
+fn obstacle_columns(map: &SliceMap, y: RangeInclusive<f64>, z: f64) -> f64 {
+    let grid = map.grid();
+    let slice = map.slice(*grid.range(2, [z, z]).unwrap().start()).unwrap();
+    let rows = grid.range(1, [*y.start(), *y.end()]).unwrap();
+    let is_obstacle = |column: &u32| {
+        rows.clone().any(|row| slice.pixel(*column, row).is_some_and(|content| content.is_obstacle))
+    };
+    ratio((0..grid.counts[0]).filter(is_obstacle).count(), grid.counts[0] as usize)
+}
+
+#[test]
+fn the_papers_rule_calls_noise_and_gentle_slopes_obstacles() {
+    let points = scanned(&house(), 0.02, 0.01, 7);
+    let floor = |rule| {
+        share(&contents(&built(&points, &options(0.05, rule)).unwrap(), [1.0..=8.0, 3.5..=9.5, -0.1..=0.1]))
+    };
+    let (paper, ours) = (floor(Obstacle::Share(0.07)), floor(SLOPE));
+    assert!(paper > 0.5 && ours < 0.02, "{paper} of a floor by 7 %, {ours} by slope and noise");
+}
+
+/// A ramp along y at this angle, with no end in sight.
+fn ramp(degrees: f64) -> Vec<Quad> {
+    let height = 3.0 * degrees.to_radians().tan();
+    vec![
+        Quad { corner: [0.0; 3], sides: [[2.0, 0.0, 0.0], [0.0, 3.0, height]] },
+        // So that slices begin lower than the ramp.
+        Quad { corner: [0.0, 0.0, -0.4], sides: [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0]] },
+    ]
+}
+
+#[test]
+fn ramps_switch_at_the_angle_asked_for() {
+    for degrees in [15.0, 30.0, 45.0, 55.0] {
+        let rule = Obstacle::Slope { degrees, noise: Some(0.0) };
+        let at = |angle| {
+            let map = of_quads(&ramp(angle), &options(0.05, rule));
+            let inner = contents(&map, [0.2..=1.8, 0.2..=2.8, -0.1..=9.0]);
+            assert!(inner.len() > 1500, "{} pixels", inner.len());
+            share(&inner)
+        };
+        // Levels divide 5 cm at 45° into 85: a level is a third of a degree there, and 0.6° at 15°.
+        let (gentle, steep) = (at(degrees - 0.6), at(degrees + 0.6));
+        assert!(gentle < 1e-9 && steep > 1.0 - 1e-9, "{degrees}°: {gentle} below, {steep} above");
+    }
+}
+
+#[test]
+fn no_pixel_of_a_meshs_surface_stays_empty() {
+    let quads = house();
+    let map = of_quads(&quads, &options(0.07, SLOPE));
+    let (mut seen, mut empty) = (0, 0);
+    for p in scanned(&quads, 0.01, 0.0, 1) {
+        let bounds = nearmiss_geometry::Aabb { min: p, max: p };
+        seen += 1;
+        empty += usize::from(!map.touches(&bounds).unwrap());
+    }
+    assert!(seen > 5_000_000 / 2, "{seen} places");
+    assert_eq!(empty, 0, "places of the surface in empty pixels");
+}
+
+/// How far the pixels of a round column reach beyond it: less than their diagonal.
+#[test]
+fn columns_are_as_round_as_pixels_allow() {
+    let pixel = 0.04;
+    let map = built(&scanned(&house(), 0.01, 0.0, 9), &options(pixel, SLOPE)).unwrap();
+    let grid = map.grid();
+    let slice = map.slice(u32::try_from(5).unwrap()).unwrap();
+    for [x, y] in COLUMNS {
+        let (mut inside, mut obstacles, mut farthest) = (0, 0, 0.0_f64);
+        for row in 0..grid.counts[1] {
+            for column in 0..grid.counts[0] {
+                let [px, py] = grid.middle(column, row);
+                let away = (px - x).hypot(py - y);
+                if let Some(content) = slice.pixel(column, row).filter(|_| away < 2.0 * COLUMN) {
+                    inside += 1;
+                    // But for pixels that the column only grazes.
+                    obstacles += usize::from(content.is_obstacle);
+                    farthest = farthest.max((away - COLUMN).abs());
+                }
+            }
+        }
+        assert!(inside > 30 && ratio(obstacles, inside) > 0.9, "{obstacles} of {inside} pixels");
+        assert!(farthest < 0.5 * pixel * 2.0_f64.sqrt() + 1e-3, "{farthest} off");
+    }
+}

@@ -1,0 +1,10 @@
+//! Maps against their naive twin, in a generated house, on disk, and with bad input.
+#![cfg(test)]
+
+mod bad_input;
+mod built;
+mod house;
+mod objects;
+mod stored;
+mod twin;
+mod walking;

@@ -1,0 +1,215 @@
+//! Maps in folders: whole, replaced, damaged, and loaded as they are needed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nearmiss_slices::{
+    Avatar, AvatarOptions, Back, CacheOptions, Ended, Floor, Pixel, Route, SliceCache, SliceFolder, SliceMap,
+    SliceOptions, Step, StoreError,
+};
+use nearmiss_testdata::house::{STAIRS, house, scanned};
+
+use crate::built::{built, of_quads};
+
+fn map() -> SliceMap {
+    built(&scanned(&house(), 0.04, 0.003, 2), &SliceOptions::default().with_pixel(Pixel::Side(0.05))).unwrap()
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn maps_come_back_whole_and_equal_slices_are_stored_once() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("house");
+    let map = map();
+    let bytes = map.save(&folder).unwrap();
+    let opened = SliceFolder::open(&folder).unwrap();
+    assert_eq!((opened.grid(), opened.about()), (map.grid(), map.about()));
+    assert_eq!(opened.bytes(), bytes);
+    let (loaded, faults) = opened.load_all();
+    assert!(faults.is_empty() && loaded == map);
+    // On disk at most a tenth of what it takes in memory, which is at most two bytes a pixel.
+    assert!(bytes as usize * 10 < map.bytes(), "{bytes} on disk, {} in memory", map.bytes());
+    assert!(map.bytes() <= 2 * map.grid().area() * map.slices().len());
+
+    // Walls of triangles are the same at every height between floor and ceiling.
+    let plain = of_quads(&house(), &SliceOptions::default().with_pixel(Pixel::Side(0.05)));
+    let second = place.path().join("plain");
+    plain.save(&second).unwrap();
+    let opened = SliceFolder::open(&second).unwrap();
+    assert!(
+        opened.distinct() < plain.slices().len(),
+        "{} distinct of {}",
+        opened.distinct(),
+        plain.slices().len()
+    );
+    assert_eq!(files(&second).len(), opened.distinct() + 1, "a file a distinct slice, and the index");
+    let (loaded, _) = opened.load_all();
+    assert_eq!(loaded.distinct(), opened.distinct(), "in memory too");
+    let again = place.path().join("again");
+    plain.save(&again).unwrap();
+    for (a, b) in files(&second).iter().zip(&files(&again)) {
+        assert_eq!(
+            (a.file_name(), fs::read(a).unwrap()),
+            (b.file_name(), fs::read(b).unwrap()),
+            "the same bytes"
+        );
+    }
+}
+
+#[test]
+fn a_map_replaces_another_and_nothing_else() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("map");
+    let (first, second) = (map(), of_quads(&house(), &SliceOptions::default().with_pixel(Pixel::Side(0.1))));
+    first.save(&folder).unwrap();
+    let before = files(&folder).len();
+    second.save(&folder).unwrap();
+    let opened = SliceFolder::open(&folder).unwrap();
+    assert_eq!(opened.load_all().0, second);
+    assert_eq!(files(&folder).len(), opened.distinct() + 1, "{before} files before");
+    // What a killed writer leaves does no harm; what is somebody else's is not touched.
+    fs::write(folder.join("0123456789abcdef.nms"), b"half").unwrap();
+    second.save(&folder).unwrap();
+    assert_eq!(files(&folder).len(), opened.distinct() + 1);
+    let others = place.path().join("letters");
+    fs::create_dir(&others).unwrap();
+    fs::write(others.join("letter.txt"), b"dear").unwrap();
+    assert!(matches!(second.save(&others), Err(StoreError::Foreign { .. })));
+    assert_eq!(files(&others).len(), 1);
+    assert!(matches!(SliceFolder::open(&others), Err(StoreError::Open(_))), "no index");
+    let occupied = place.path().join("letters/letter.txt");
+    assert!(matches!(second.save(&occupied), Err(StoreError::Folder { .. })), "a file is no folder");
+}
+
+#[test]
+fn damage_is_named_and_the_others_serve() {
+    let place = tempfile::tempdir().unwrap();
+    let map = map();
+    map.save(place.path()).unwrap();
+    let opened = SliceFolder::open(place.path()).unwrap();
+    let file = |slice: usize| place.path().join(format!("{:016x}.nms", opened.checksums()[slice]));
+    let (missing, cut, flipped, swapped) = (file(5), file(8), file(12), file(20));
+    fs::remove_file(&missing).unwrap();
+    let bytes = fs::read(&cut).unwrap();
+    fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    let mut bytes = fs::read(&flipped).unwrap();
+    let at = bytes.len() - 100;
+    bytes[at] ^= 4;
+    fs::write(&flipped, bytes).unwrap();
+    fs::copy(file(30), &swapped).unwrap();
+    let (loaded, faults) = opened.load_all();
+    let texts: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    assert_eq!(faults.len(), 4, "{texts:?}");
+    for (slice, path, word) in [
+        (5, &missing, "no such file"),
+        (8, &cut, "cut short"),
+        (12, &flipped, "build"),
+        (20, &swapped, "does not hold"),
+    ] {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let text = texts.iter().find(|text| text.contains(name));
+        let text = text.unwrap_or_else(|| panic!("{name} is not in {texts:?}"));
+        assert!(text.contains(&format!("slice {slice}")) && text.contains(word), "{text}");
+    }
+    // A box above them is answered, one in them is not.
+    let grid = *opened.grid();
+    let boxed = |slices: [u32; 2]| {
+        let height = |s: u32| grid.origin[2] + (f64::from(s) + 0.5) * grid.slice_height;
+        nearmiss_geometry::Aabb { min: [1.0, 3.0, height(slices[0])], max: [9.5, 9.0, height(slices[1])] }
+    };
+    assert_eq!(loaded.touches(&boxed([21, 25])), map.touches(&boxed([21, 25])));
+    assert_eq!(loaded.query(&boxed([4, 6]), Floor::Max).unwrap_err().slice, 5);
+    assert!(loaded.query(&boxed([0, 3]), Floor::Max).is_ok());
+    // An index that is damaged anywhere is refused.
+    let index = place.path().join("index.nms");
+    let bytes = fs::read(&index).unwrap();
+    for i in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[i] ^= 0x20;
+        fs::write(&index, damaged).unwrap();
+        assert!(SliceFolder::open(place.path()).is_err(), "byte {i}");
+    }
+}
+
+const Y: f64 = 0.5 * (STAIRS[0] + STAIRS[1]);
+
+fn up_the_stairs() -> Route {
+    Route { start: [1.2, 8.0, 0.2], points: vec![[1.2, Y], [8.0, Y], [1.2, Y]] }
+}
+
+fn walked(folder: &SliceFolder, slices: u32, prefetch: bool) -> (Vec<Step>, [u64; 2], usize) {
+    let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
+    let options = CacheOptions::default().with_slices(slices).with_prefetch(prefetch);
+    let mut cache = SliceCache::new(folder, &options, avatar.slices(folder.grid()));
+    let capacity = cache.capacity();
+    let mut steps = Vec::new();
+    let ended = up_the_stairs().walk(&mut cache, &avatar, &Back, |cache: &SliceCache, step| {
+        assert!(cache.map().slices().iter().flatten().count() <= capacity, "never more than {capacity}");
+        steps.push(*step);
+        Ok::<(), StoreError>(())
+    });
+    assert_eq!(ended.unwrap(), Ended::Arrived);
+    let counts = cache.counts();
+    (steps, [counts.hits, counts.misses], capacity)
+}
+
+#[test]
+fn a_cache_never_changes_a_walk_and_counts_the_same_every_time() {
+    let place = tempfile::tempdir().unwrap();
+    let map = map();
+    map.save(place.path()).unwrap();
+    let folder = SliceFolder::open(place.path()).unwrap();
+    let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
+    let mut expected = Vec::new();
+    let in_memory = up_the_stairs().walk(&mut &map, &avatar, &Back, |_, step| {
+        expected.push(*step);
+        Ok(())
+    });
+    assert_eq!(in_memory.unwrap(), Ended::Arrived);
+    let span = avatar.slices(folder.grid()) as usize;
+    let mut misses = Vec::new();
+    for (slices, prefetch) in [(1, false), (20, false), (60, false), (1, true), (20, true), (60, true)] {
+        let (steps, counts, capacity) = walked(&folder, slices, prefetch);
+        assert_eq!(steps, expected, "{slices} slices");
+        assert_eq!(capacity, span.max(slices as usize), "raised to what is needed");
+        for _ in 0..3 {
+            assert_eq!(walked(&folder, slices, prefetch).1, counts, "{slices} slices, {prefetch}");
+        }
+        assert!(counts[0] > 50 * counts[1], "{counts:?}");
+        misses.push(counts[1]);
+    }
+    // Fewer slices are loaded twice, more ahead are missed less.
+    assert!(misses[0] > misses[2] && misses[4] <= misses[1] && misses[5] < misses[2], "{misses:?}");
+    let all = folder.grid().counts[2];
+    assert!(misses[2] <= u64::from(all), "each once: {misses:?} of {all}");
+}
+
+#[test]
+fn a_walk_into_a_damaged_slice_ends_there_with_its_name() {
+    let place = tempfile::tempdir().unwrap();
+    map().save(place.path()).unwrap();
+    let folder = SliceFolder::open(place.path()).unwrap();
+    let name = format!("{:016x}.nms", folder.checksums()[24]);
+    fs::remove_file(place.path().join(&name)).unwrap();
+    let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
+    for prefetch in [false, true] {
+        let mut cache = SliceCache::new(
+            &folder,
+            &CacheOptions::default().with_prefetch(prefetch),
+            avatar.slices(folder.grid()),
+        );
+        let mut steps = 0;
+        let ended = up_the_stairs().walk(&mut cache, &avatar, &Back, |_: &SliceCache, _| {
+            steps += 1;
+            Ok::<(), StoreError>(())
+        });
+        let text = ended.unwrap_err().to_string();
+        assert!(text.contains(&name) && text.contains("slice 24"), "{text}");
+        assert!(steps > 40, "{steps} steps before");
+    }
+}

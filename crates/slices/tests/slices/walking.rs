@@ -1,0 +1,230 @@
+//! Walks through the generated house.
+
+use nearmiss_geometry::Aabb;
+use nearmiss_slices::{
+    Avatar, AvatarOptions, Back, Ended, Pixel, Response, Route, SliceMap, SliceOptions, Slide, Step, Up,
+    Walker, step_each,
+};
+use nearmiss_testdata::arbitrary::rng;
+use nearmiss_testdata::house::{DOOR, LOW, RAMP, RAMPS, STAIRS, STOREY, house, ramp_corner, scanned};
+use rand::RngExt;
+
+use crate::built::{built, of_quads};
+
+const PIXEL: f64 = 0.05;
+
+fn scan() -> Vec<[f64; 3]> {
+    scanned(&house(), 0.025, 0.003, 11)
+}
+
+fn map_of(points: &[[f64; 3]], up: Up) -> SliceMap {
+    built(points, &SliceOptions::default().with_pixel(Pixel::Side(PIXEL)).with_up(up)).unwrap()
+}
+
+fn avatar() -> Avatar {
+    Avatar::new(&AvatarOptions::default()).unwrap()
+}
+
+fn walk(map: &SliceMap, start: [f64; 3], points: &[[f64; 2]], response: &dyn Response) -> (Ended, Vec<Step>) {
+    let mut steps = Vec::new();
+    let route = Route { start, points: points.to_vec() };
+    let ended = route.walk(&mut &*map, &avatar(), response, |_, step| {
+        steps.push(*step);
+        Ok(())
+    });
+    (ended.unwrap(), steps)
+}
+
+fn end(steps: &[Step]) -> [f64; 3] {
+    steps.last().unwrap().position
+}
+
+/// The middle of the stairs, their foot and their head.
+const Y: f64 = 0.5 * (STAIRS[0] + STAIRS[1]);
+const UP_AND_DOWN: [[f64; 2]; 4] = [[1.2, Y], [8.0, Y], [8.0, 9.5], [14.0, 9.0]];
+
+#[test]
+fn stairs_lead_up_and_down_again() {
+    let points = scan();
+    let map = map_of(&points, Up::Z);
+    let back: Vec<[f64; 2]> = UP_AND_DOWN.iter().rev().skip(1).copied().collect();
+    let (ended, steps) = walk(&map, [1.2, 8.0, 0.2], &[&UP_AND_DOWN[..], &back].concat(), &Back);
+    assert_eq!(ended, Ended::Arrived);
+    let highest = steps.iter().map(|step| step.position[2]).fold(0.0, f64::max);
+    assert!((highest - STOREY).abs() < 0.02, "the upper floor is at {STOREY}, not {highest}");
+    let [x, y, z] = end(&steps);
+    assert!((x - 1.2).abs() < 1e-9 && (y - Y).abs() < 1e-9 && z.abs() < 0.02, "back at {x}, {y}, {z}");
+    assert!(steps.iter().all(|step| !step.blocked && !step.falling), "nothing was in the way");
+    // Every step of the stairs was stood on: 16 heights between the floors, going up and going down.
+    let stood =
+        |i: u8| steps.iter().filter(|s| (s.position[2] - f64::from(i) * STOREY / 17.0).abs() < 0.02).count();
+    assert!((1..17).all(|i| stood(i) >= 4), "{:?}", (1..17).map(stood).collect::<Vec<_>>());
+
+    // Never inside anything: no point of the scan between what can be climbed and the crown, well within the box.
+    let AvatarOptions { base, height, climb, .. } = *avatar().options();
+    let mut near = 0;
+    for step in &steps {
+        let [x, y, z] = step.position;
+        let inside = |p: &&[f64; 3]| {
+            (p[0] - x).abs() < 0.5 * base[0]
+                && (p[1] - y).abs() < 0.5 * base[1]
+                && p[2] > z - 0.1
+                && p[2] < z + height
+        };
+        for p in points.iter().filter(inside) {
+            near += 1;
+            assert!(p[2] <= z + climb, "{p:?} in the body at {:?}", step.position);
+        }
+    }
+    assert!(near > 10_000, "{near} points under the feet");
+}
+
+#[test]
+fn any_axis_may_point_up() {
+    let points = scan();
+    let (_, expected) = walk(&map_of(&points, Up::Z), [1.2, 8.0, 0.2], &UP_AND_DOWN, &Back);
+    for up in [Up::X, Up::Y, Up::NegX, Up::NegY, Up::NegZ] {
+        let turned: Vec<[f64; 3]> = points.iter().map(|p| up.from_map(*p)).collect();
+        let map = map_of(&turned, up);
+        // `across` is its own inverse.
+        let route: Vec<[f64; 2]> = UP_AND_DOWN.iter().map(|p| up.across(*p)).collect();
+        let (ended, steps) = walk(&map, up.from_map([1.2, 8.0, 0.2]), &route, &Back);
+        assert_eq!(ended, Ended::Arrived, "{up}");
+        assert_eq!(steps.len(), expected.len(), "{up}");
+        for (step, expected) in steps.iter().zip(&expected) {
+            let place = up.to_map(step.position);
+            assert!((0..3).all(|k| (place[k] - expected.position[k]).abs() < 1e-9), "{up}: {place:?}");
+        }
+    }
+}
+
+#[test]
+fn walls_gaps_and_low_ceilings_stop() {
+    let map = map_of(&scan(), Up::Z);
+    let half = 0.5 * avatar().options().base[0];
+    // Where the avatar's front ends, and where it was stopped.
+    for (from, to, front) in [
+        ([7.0, 6.5], [12.0, 6.5], 9.0),
+        // The gap is 0.3 wide, the avatar 0.4.
+        ([7.0, 8.95], [12.0, 8.95], 9.0),
+        // A ceiling at 1.5 over an avatar of 1.7; from beyond the door.
+        ([9.6, 8.0], [12.0, 8.0], LOW.0[0]),
+        ([14.5, 3.0], [17.5, 3.0], 16.0),
+    ] {
+        let (ended, steps) = walk(&map, [from[0], from[1], 0.1], &[to], &Back);
+        assert_eq!(ended, Ended::Stuck { point: 0 }, "towards {to:?}");
+        assert!(steps.last().unwrap().blocked, "towards {to:?}");
+        let gap = front - (end(&steps)[0] + half);
+        // A step short, and what a pixel adds.
+        assert!((-0.02..PIXEL + 0.05 + 0.02).contains(&gap), "towards {to:?}: {gap} before {front}");
+    }
+}
+
+#[test]
+fn doors_wider_than_the_avatar_let_it_through() {
+    let map = map_of(&scan(), Up::Z);
+    let middle = 0.5 * (DOOR[0] + DOOR[1]);
+    let (ended, steps) = walk(&map, [7.0, middle, 0.1], &[[10.5, middle]], &Back);
+    assert_eq!(ended, Ended::Arrived, "at {:?}", end(&steps));
+    // Aslant and beside it, sliding along the wall finds the door.
+    let slides = |response: &dyn Response| walk(&map, [7.0, 6.6, 0.1], &[[10.5, 7.6]], response).0;
+    assert_eq!(slides(&Back), Ended::Stuck { point: 0 });
+    assert_eq!(slides(&Slide), Ended::Arrived);
+}
+
+#[test]
+fn edges_are_fallen_off_onto_the_floor_below() {
+    let map = map_of(&scan(), Up::Z);
+    let (ended, steps) = walk(&map, [10.0, 6.5, STOREY + 0.1], &[[10.0, 4.5]], &Back);
+    assert_eq!(ended, Ended::Arrived);
+    let falls = steps.iter().filter(|step| step.falling).count();
+    let climb = avatar().options().climb;
+    assert!((8..=11).contains(&falls), "{falls} steps of {climb} down {STOREY}");
+    assert!(end(&steps)[2].abs() < 0.02, "on the lower floor: {:?}", end(&steps));
+    for pair in steps.windows(2) {
+        assert!(pair[1].position[2] > pair[0].position[2] - climb - 1e-9, "no faster than it climbs");
+    }
+    // Over the edge of the map: nothing below.
+    let (ended, steps) = walk(&map, [20.0, 20.0, 1.0], &[[30.0, 30.0]], &Back);
+    assert_eq!(ended, Ended::LeftMap { point: 0 });
+    assert!(steps.len() < 10 && steps.iter().all(|step| step.falling), "{} steps", steps.len());
+}
+
+#[test]
+fn ramps_are_climbed_as_far_as_the_rule_says() {
+    // From triangles: where points are few, some pixels of a steep slope hold too little of it to tell.
+    let map = of_quads(&house(), &SliceOptions::default().with_pixel(Pixel::Side(PIXEL)));
+    for (i, angle) in (0_u8..).zip(RAMPS) {
+        let [x, y] = ramp_corner(i);
+        let middle = x + 0.5 * RAMP[1];
+        let (_, steps) = walk(&map, [middle, 0.4, 0.1], &[[middle, y + RAMP[0] - 0.1]], &Back);
+        let reached = steps.iter().map(|step| step.position[2]).fold(0.0, f64::max);
+        let top = (RAMP[0] - 0.1) * angle.to_radians().tan();
+        if angle < 45.0 {
+            assert!(reached > 0.9 * top, "{angle}°: {reached} of {top}");
+        } else if angle > 55.0 {
+            assert!(reached < avatar().options().climb + 0.02, "{angle}°: {reached} of {top}");
+        }
+    }
+}
+
+#[test]
+fn starts_that_do_not_serve_are_refused() {
+    let map = map_of(&scan(), Up::Z);
+    let start = |place| Walker::new(avatar(), &map, place).map(|walker| walker.position(map.grid()));
+    assert!(start([9.0, 6.5, 0.1]).unwrap_err().to_string().contains("inside an obstacle"));
+    assert!(start([12.0, 8.0, 0.1]).unwrap_err().to_string().contains("ceiling"));
+    assert!(start([2.0, 6.0, f64::NAN]).unwrap_err().to_string().contains("not finite"));
+    assert!(start([2.0, 6.0, 0.2]).unwrap()[2].abs() < 0.02, "put onto the floor");
+    let route = Route { start: [2.0, 6.0, 0.2], points: vec![[2.0, 6.5], [f64::INFINITY, 0.0]] };
+    let refused = route.walk(&mut &map, &avatar(), &Back, |_, _| Ok(())).unwrap_err();
+    assert!(refused.to_string().contains("point 2"), "{refused}");
+    for (what, options) in [
+        ("width", AvatarOptions::default().with_box([0.0, 1.0], 1.7)),
+        ("height", AvatarOptions::default().with_box([1.0, 1.0], f64::NAN)),
+        ("step", AvatarOptions::default().with_step(-1.0)),
+        ("climb", AvatarOptions::default().with_climb(2.0)),
+    ] {
+        let refused = Avatar::new(&options).unwrap_err().to_string();
+        assert!(refused.contains(what), "{refused}");
+    }
+}
+
+#[test]
+fn many_avatars_walk_as_each_would_alone() {
+    let map = map_of(&scan(), Up::Z);
+    let rng = &mut rng(2);
+    let mut walkers = Vec::new();
+    while walkers.len() < 300 {
+        let start =
+            [rng.random_range(0.5..15.5), rng.random_range(0.5..11.5), [0.1, STOREY][walkers.len() % 2]];
+        walkers.extend(Walker::new(avatar(), &map, start));
+    }
+    let targets: Vec<[f64; 2]> =
+        walkers.iter().map(|_| [rng.random_range(0.0..16.0), rng.random_range(0.0..12.0)]).collect();
+    let mut alone = walkers.clone();
+    let mut steps = vec![Ok(alone[0].step(&map, targets[0], &Back).unwrap()); walkers.len()];
+    alone[0] = walkers[0];
+    let (mut blocked, mut falling) = (0, 0);
+    for _ in 0..120 {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        pool.install(|| step_each(&map, &mut walkers, &targets, &Slide, &mut steps));
+        for ((walker, target), step) in alone.iter_mut().zip(&targets).zip(&steps) {
+            let expected = walker.step(&map, *target, &Slide).unwrap();
+            assert_eq!(*step, Ok(expected));
+            blocked += usize::from(expected.blocked);
+            falling += usize::from(expected.falling);
+        }
+    }
+    assert_eq!(walkers, alone);
+    assert!(blocked > 1000 && falling > 10, "{blocked} blocked, {falling} falling");
+    // Nobody ended inside anything: the box above what can be climbed is free.
+    let AvatarOptions { climb, .. } = *avatar().options();
+    for walker in &walkers {
+        let feet = walker.position(map.grid());
+        let body = avatar().bounds(map.grid(), feet);
+        let body = Aabb { min: [body.min[0], body.min[1], feet[2] + climb + 0.15], max: body.max };
+        let body = Aabb { max: [body.max[0], body.max[1], body.max[2] - 0.15], ..body };
+        assert!(!map.touches(&body).unwrap(), "{feet:?}");
+    }
+}
