@@ -1,0 +1,307 @@
+//! Slice maps: points a second of building, boxes against a map, avatars stepping, slices loaded; beside them parry's voxels and a
+//! kd-tree on the same points.
+//!
+//! `slices [SCAN]… [--points N] [--pixel T] [--queries N] [--avatars N] [--passes N] [--seed N]`
+//!
+//! A scan is a file, z up, or `house` for the generated one with so many points; without any, `house`.
+#![expect(clippy::print_stdout, reason = "a program for people")]
+
+use std::hint::black_box;
+
+use kiddo::{Chebyshev, ImmutableKdTree};
+use nearmiss::slices::{
+    Avatar, AvatarOptions, Floor, Pixel, Slide, SliceBuilder, SliceFolder, SliceMap, SliceOptions, SlicePlan,
+    Walker, step_each,
+};
+use nearmiss::{Aabb, PointCloud};
+use nearmiss_benches::arguments::Arguments;
+use nearmiss_benches::clock::{nanoseconds, timed};
+use nearmiss_benches::object::Object;
+use nearmiss_benches::sample::count;
+use nearmiss_benches::{Failure, machine};
+use nearmiss_testdata::arbitrary::rng;
+use nearmiss_testdata::house::{house, scanned};
+use parry3d::math::Vector;
+use parry3d::shape::Voxels;
+use rand::seq::SliceRandom;
+use rand::{Rng, RngExt};
+
+/// Who is asked for: 0.6 × 0.6 × 1.8.
+const BODY: [f64; 3] = [0.6, 0.6, 1.8];
+
+/// Frames of avatars that are timed.
+const FRAMES: usize = 240;
+
+struct Asked {
+    points: f64,
+    pixel: f64,
+    queries: usize,
+    avatars: usize,
+    passes: u32,
+    seed: u64,
+}
+
+fn main() -> Result<(), Failure> {
+    let mut arguments = Arguments::of_process();
+    let asked = Asked {
+        points: arguments.value("--points")?.unwrap_or(5e6),
+        pixel: arguments.value("--pixel")?.unwrap_or(0.05),
+        queries: arguments.value("--queries")?.unwrap_or(100_000),
+        avatars: arguments.value("--avatars")?.unwrap_or(10_000),
+        passes: arguments.value("--passes")?.unwrap_or(7),
+        seed: arguments.value("--seed")?.unwrap_or(1),
+    };
+    let mut scans = arguments.words()?;
+    if scans.is_empty() {
+        scans.push("house".into());
+    }
+    println!("{}", machine::description());
+    for scan in &scans {
+        let (name, cloud) = read(scan, &asked)?;
+        println!("## {name}: {} points\n", cloud.len());
+        building(&cloud, &asked)?;
+        let map = built(&cloud, &options(0.04))?;
+        boxes(&cloud, &map, &asked)?;
+        avatars(&map, &asked)?;
+        disk(&cloud)?;
+    }
+    Ok(())
+}
+
+fn read(scan: &str, asked: &Asked) -> Result<(String, PointCloud), Failure> {
+    if scan == "house" {
+        let quads = house();
+        let area: f64 = count(scanned(&quads, 0.1, 0.0, 0).len()) * 0.01;
+        let points = scanned(&quads, (area / asked.points).sqrt(), 0.003, asked.seed);
+        return Ok(("the generated house".into(), PointCloud::from_positions(&points)?));
+    }
+    let object = Object::read(scan)?;
+    Ok((object.name, object.cloud))
+}
+
+fn options(pixel: f64) -> SliceOptions {
+    SliceOptions::default().with_pixel(Pixel::Side(pixel))
+}
+
+fn built(cloud: &PointCloud, options: &SliceOptions) -> Result<SliceMap, Failure> {
+    let mut builder = SliceBuilder::new(&SlicePlan::new(options, &cloud.bounds())?)?;
+    builder.add_cloud(cloud);
+    Ok(builder.finish())
+}
+
+/// The least time of some passes, in nanoseconds, and what the last one made.
+fn least<T>(passes: u32, mut pass: impl FnMut() -> T) -> (f64, T) {
+    let (mut made, time) = timed(&mut pass);
+    let mut best = nanoseconds(time);
+    for _ in 1..passes {
+        let (again, time) = timed(&mut pass);
+        made = again;
+        best = best.min(nanoseconds(time));
+    }
+    (best, made)
+}
+
+fn building(cloud: &PointCloud, asked: &Asked) -> Result<(), Failure> {
+    let plan = SlicePlan::new(&options(asked.pixel), &cloud.bounds())?;
+    let [width, height, slices] = plan.grid().counts;
+    println!("Pixels of {}: {slices} slices of {width} × {height}.\n", asked.pixel);
+    println!("| points in memory to map | Mpoints/s | of it points alone |\n| --- | --: | --: |");
+    let mut points: Vec<[f64; 3]> = (0..cloud.len()).map(|i| cloud.point(i)).collect();
+    let n = count(points.len());
+    let row = |name: &str, [whole, alone]: [f64; 2]| {
+        println!("| {name} | {:.1} | {:.1} |", n / whole * 1e3, n / alone * 1e3);
+    };
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        let times = pool.install(|| times(&plan, asked.passes, |builder| builder.add_cloud(cloud)));
+        row(&format!("ours, {threads} threads"), times);
+    }
+    points.shuffle(&mut rng(asked.seed));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
+    let shuffled = pool.install(|| times(&plan, asked.passes, |builder| builder.add(&points)));
+    row("ours, 2 threads, doubles in random order", shuffled);
+    let singles: Vec<Vector> = (0..cloud.len()).map(|i| vector(cloud.point(i))).collect();
+    let size = vector([plan.grid().pixel, plan.grid().pixel, plan.grid().slice_height]);
+    let (voxels, _) = least(asked.passes.min(3), || Voxels::from_points(size, &singles));
+    row("parry Voxels", [voxels; 2]);
+    let flat: Vec<[f32; 3]> = singles.iter().map(|p| [p.x, p.y, p.z]).collect();
+    let (tree, _) = least(asked.passes.min(3), || ImmutableKdTree::<f32, 3>::new_from_slice(&flat).is_ok());
+    row("kiddo, a tree", [tree; 2]);
+    println!();
+    Ok(())
+}
+
+/// The whole of building, and adding the points alone, in nanoseconds.
+fn times(plan: &SlicePlan, passes: u32, add: impl Fn(&mut SliceBuilder)) -> [f64; 2] {
+    let mut best = [f64::INFINITY; 2];
+    for _ in 0..passes {
+        let (alone, whole) = timed(|| {
+            let mut builder = SliceBuilder::new(plan).ok()?;
+            let ((), alone) = timed(|| add(&mut builder));
+            black_box(builder.finish());
+            Some(alone)
+        });
+        let alone = alone.map_or(f64::INFINITY, nanoseconds);
+        best = [best[0].min(nanoseconds(whole)), best[1].min(alone)];
+    }
+    best
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the rival is single precision")]
+fn vector(p: [f64; 3]) -> Vector {
+    let [x, y, z] = p.map(|c| c as f32);
+    Vector::new(x, y, z)
+}
+
+/// A place on the ground of the map, and a height.
+fn place(rng: &mut impl Rng, bounds: &Aabb, height: f64) -> [f64; 3] {
+    let top = [bounds.max[0], bounds.max[1], (bounds.max[2] - height).max(bounds.min[2] + 1e-3)];
+    [0, 1, 2].map(|k| rng.random_range(bounds.min[k]..top[k]))
+}
+
+fn boxes(cloud: &PointCloud, map: &SliceMap, asked: &Asked) -> Result<(), Failure> {
+    let bounds = cloud.bounds();
+    let rng = &mut rng(asked.seed);
+    let boxes: Vec<Aabb> = (0..asked.queries)
+        .map(|_| {
+            let min = place(rng, &bounds, BODY[2]);
+            Aabb { min, max: [0, 1, 2].map(|k| min[k] + BODY[k]) }
+        })
+        .collect();
+    let n = count(boxes.len());
+    let grid = map.grid();
+    let (touch, hits) =
+        least(asked.passes, || boxes.iter().filter(|b| map.touches(black_box(b)).is_ok_and(|hit| hit)).count());
+    let (query, _) = least(asked.passes, || {
+        let all = boxes.iter().filter_map(|b| map.query(black_box(b), Floor::Max).ok());
+        all.map(|found| found.pixels).sum::<u64>()
+    });
+
+    // The same lattice, so the same answers.
+    let shifted = |p: [f64; 3]| vector([0, 1, 2].map(|k| p[k] - grid.origin[k]));
+    let points: Vec<Vector> = (0..cloud.len()).map(|i| shifted(cloud.point(i))).collect();
+    let voxels = Voxels::from_points(vector([grid.pixel, grid.pixel, grid.slice_height]), &points);
+    let parry_boxes: Vec<parry3d::bounding_volume::Aabb> = boxes
+        .iter()
+        .map(|b| parry3d::bounding_volume::Aabb::new(shifted(b.min), shifted(b.max)))
+        .collect();
+    let (parry, parry_hits) = least(asked.passes.min(3), || {
+        let filled = |b: &&parry3d::bounding_volume::Aabb| {
+            voxels.voxels_intersecting_local_aabb(black_box(b)).any(|voxel| !voxel.state.is_empty())
+        };
+        parry_boxes.iter().filter(filled).count()
+    });
+    drop(voxels);
+
+    // Heights by three: the box becomes a cube, and its points those within half a side by the greatest coordinate.
+    let squeezed = |p: [f64; 3]| {
+        let Vector { x, y, z } = vector([0, 1, 2].map(|k| p[k] * BODY[0] / BODY[k]));
+        [x, y, z]
+    };
+    let flat: Vec<[f32; 3]> = (0..cloud.len()).map(|i| squeezed(cloud.point(i))).collect();
+    let tree = ImmutableKdTree::<f32, 3>::new_from_slice(&flat).map_err(|e| format!("{e:?}"))?;
+    let centres: Vec<[f32; 3]> = boxes.iter().map(|b| squeezed(b.centre())).collect();
+    #[expect(clippy::cast_possible_truncation, reason = "the rival is single precision")]
+    let half = 0.5 * BODY[0] as f32;
+    let (kiddo, kiddo_hits) = least(asked.passes.min(3), || {
+        let near = |c: &&[f32; 3]| {
+            tree.query(black_box(*c)).nearest_one::<Chebyshev<f32>>().execute().distance <= half
+        };
+        centres.iter().filter(near).count()
+    });
+    if hits.abs_diff(parry_hits) > boxes.len() / 1000 || kiddo_hits > hits {
+        return Err(format!("{hits} boxes touch something, {parry_hits} by parry, {kiddo_hits} by kiddo").into());
+    }
+    println!("Boxes of {BODY:?} anywhere, pixels of 0.04, one thread: ns each, and how many touch something.\n");
+    println!("| | ns | touching |\n| --- | --: | --: |");
+    for (name, time, hits) in [
+        ("ours, touches or not", touch, hits),
+        ("ours, with obstacle, floor and number of pixels", query, hits),
+        ("parry Voxels", parry, parry_hits),
+        ("kiddo, nearest point by greatest coordinate (points, no pixels)", kiddo, kiddo_hits),
+    ] {
+        println!("| {name} | {:.0} | {:.3} |", time / n, count(hits) / n);
+    }
+    println!();
+    Ok(())
+}
+
+fn avatars(map: &SliceMap, asked: &Asked) -> Result<(), Failure> {
+    let options = AvatarOptions::default().with_box([BODY[0], BODY[1]], BODY[2]);
+    let avatar = Avatar::new(&options)?;
+    let grid = map.grid();
+    let [width, depth, slices] = grid.counts.map(f64::from);
+    let far = [width * grid.pixel, depth * grid.pixel, slices * grid.slice_height];
+    let bounds = Aabb { min: grid.origin, max: [0, 1, 2].map(|k| grid.origin[k] + far[k]) };
+    let rng = &mut rng(asked.seed);
+    let mut walkers: Vec<Walker> = Vec::new();
+    while walkers.len() < asked.avatars {
+        let start = place(rng, &bounds, BODY[2]);
+        // Those who find a floor.
+        walkers.extend(Walker::new(avatar, map, start).ok().filter(|walker| !walker.is_falling()));
+    }
+    let targets: Vec<[f64; 2]> = walkers
+        .iter()
+        .map(|_| {
+            let [x, y, _] = place(rng, &bounds, 0.0);
+            [x, y]
+        })
+        .collect();
+    let mut steps = Vec::new();
+    for (walker, target) in walkers.iter().zip(&targets) {
+        steps.push(walker.clone().step(map, *target, &Slide));
+    }
+    println!("{} avatars of {BODY:?} stepping {}, sliding along walls: {FRAMES} frames.\n", walkers.len(), options.step);
+    println!("| threads | ms a frame, median | worst | µs a step and thread | frames a second |\n| --: | --: | --: | --: | --: |");
+    for threads in [1, 2_u8] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build()?;
+        let mut crowd = walkers.clone();
+        let mut frames: Vec<f64> = Vec::new();
+        for _ in 0..FRAMES {
+            let ((), time) = timed(|| pool.install(|| step_each(map, &mut crowd, &targets, &Slide, &mut steps)));
+            frames.push(nanoseconds(time) / 1e6);
+        }
+        frames.sort_unstable_by(f64::total_cmp);
+        let (median, worst) = (frames[FRAMES / 2], frames[FRAMES - 1]);
+        let each = median * 1e3 * f64::from(threads) / count(walkers.len());
+        println!("| {threads} | {median:.2} | {worst:.2} | {each:.2} | {:.0} |", 1e3 / median);
+    }
+    println!();
+    Ok(())
+}
+
+fn disk(cloud: &PointCloud) -> Result<(), Failure> {
+    let folder = std::env::temp_dir().join(format!("nearmiss-slices-{}", std::process::id()));
+    println!("700 pixels along the longer side, saved and loaded again.\n");
+    println!("| rule | slices | distinct | MB in memory | bytes a pixel | MB on disk | of memory, % | save, ms | load a slice, µs, mean | worst of the means |");
+    println!("| --- |{}", " --: |".repeat(9));
+    let map = built(cloud, &SliceOptions::default())?;
+    let (bytes, save) = timed(|| map.save(&folder));
+    let bytes = count(usize::try_from(bytes?)?);
+    let opened = SliceFolder::open(&folder)?;
+    let mut means = Vec::new();
+    for slice in 0..opened.grid().counts[2] {
+        let mut total = 0.0;
+        for _ in 0..5 {
+            let (loaded, time) = timed(|| opened.load(slice));
+            black_box(loaded?);
+            total += nanoseconds(time) / 5e3;
+        }
+        means.push(total);
+    }
+    std::fs::remove_dir_all(&folder)?;
+    let worst = means.iter().copied().fold(0.0, f64::max);
+    let memory = count(map.bytes());
+    println!(
+        "| slope | {} | {} | {:.1} | {:.2} | {:.2} | {:.1} | {:.0} | {:.0} | {worst:.0} |\n",
+        map.slices().len(),
+        map.distinct(),
+        memory / 1e6,
+        memory / count(map.distinct() * map.grid().area()),
+        bytes / 1e6,
+        100.0 * bytes / memory,
+        nanoseconds(save) / 1e6,
+        means.iter().sum::<f64>() / count(means.len()),
+    );
+    Ok(())
+}
