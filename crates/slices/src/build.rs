@@ -1,6 +1,7 @@
-//! Points into voxels: of each the lowest and the highest, which no order of the points changes.
-
-use std::sync::atomic::{AtomicU16, Ordering};
+//! Points into voxels: of each the lowest and the highest level, which no order of the points changes.
+//!
+//! A block of points at a time is sorted by the part of the map that they lie in; then every part is filled by one thread. So nothing
+//! is shared between threads, and what is written lies close together.
 
 use nearmiss_geometry::{PointCloud, TriangleMesh};
 use nearmiss_mesh::lattice_samples;
@@ -8,23 +9,29 @@ use nearmiss_mesh::lattice_samples;
 use crate::error::SliceError;
 use crate::map::About;
 use crate::options::SlicePlan;
-use crate::parallel::each_chunk;
+use crate::parallel::{change_each, map_each};
 use crate::{Grid, SliceMap, finish};
 
-/// Points that a thread takes at a time; any number gives the same map.
-const CHUNK: usize = 1 << 14;
+/// Points that a thread sorts at a time: they and what becomes of them fit its cache.
+const BLOCK: usize = 1 << 15;
+
+/// Blocks that are sorted before the map is filled from them; any number gives the same map.
+const BLOCKS: usize = 16;
+
+/// Cells of a part of a slice: as many as fit a cache, so that one large floor keeps several threads busy.
+const PART: usize = 1 << 16;
 
 /// Samples of a mesh that are kept before they are poured into the map.
-const BATCH: usize = 1 << 16;
+const BATCH: usize = BLOCK * BLOCKS;
 
 /// What a voxel has seen: 255 less the lowest level in the high byte, the highest level plus one in the low byte; 0 if
 /// nothing. So either byte only ever grows, and memory that is zero is a map without points.
-pub(crate) type Cell = AtomicU16;
+pub(crate) type Cell = u16;
 
 /// Lowest and highest level of a cell; none if nothing is in it.
 #[inline]
-pub(crate) fn span(cell: &Cell) -> Option<[i32; 2]> {
-    match cell.load(Ordering::Relaxed) {
+pub(crate) fn span(cell: Cell) -> Option<[i32; 2]> {
+    match cell {
         0 => None,
         seen => Some([255 - i32::from(seen >> 8), i32::from(seen & 0xff) - 1]),
     }
@@ -32,8 +39,8 @@ pub(crate) fn span(cell: &Cell) -> Option<[i32; 2]> {
 
 /// Takes points in any number of pieces and makes a map of them.
 ///
-/// Takes 2 bytes a voxel until it is done, touched only where points are. The map depends on the points alone, not on
-/// their order, their pieces or the number of threads.
+/// Takes 2 bytes a voxel until it is done, touched only where points are, and some 20 MB to sort in. The map depends on the points
+/// alone, not on their order, their pieces or the number of threads.
 #[derive(Debug)]
 pub struct SliceBuilder {
     plan: SlicePlan,
@@ -94,19 +101,22 @@ impl SliceBuilder {
     }
 
     fn pour<P: Sync>(&mut self, points: &[P], to_map: impl Fn(&P) -> [f64; 3] + Sync + Send) {
-        let (grid, layers): (Grid, &[Vec<Cell>]) = (*self.plan.grid(), &self.layers);
-        let outside = each_chunk(points, CHUNK, |chunk| {
-            let mut outside = 0;
-            for point in chunk {
-                match grid.voxel(to_map(point)) {
-                    Some(voxel) => see(&layers[voxel.slice][voxel.pixel], voxel.level),
-                    None => outside += 1,
+        let grid = *self.plan.grid();
+        let parts = grid.area().div_ceil(PART);
+        for points in points.chunks(BLOCK * BLOCKS) {
+            let blocks: Vec<&[P]> = points.chunks(BLOCK).collect();
+            let sorted = map_each(blocks.len(), |i| Sorted::new(&grid, parts, blocks[i], &to_map));
+            change_each(&mut self.layers, PART, |slice, part, cells| {
+                for block in &sorted {
+                    for &(cell, level) in block.part(slice * parts + part) {
+                        see(&mut cells[usize::from(cell)], level);
+                    }
                 }
-            }
-            outside
-        });
-        self.outside += outside;
-        self.points += points.len() as u64 - outside;
+            });
+            let inside: usize = sorted.iter().map(|block| block.entries.len()).sum();
+            self.points += inside as u64;
+            self.outside += (points.len() - inside) as u64;
+        }
     }
 
     /// How many points are in, and how many were left out.
@@ -134,14 +144,47 @@ const MOST_SHARE: f64 = 0.9;
 
 /// Most points of a voxel change nothing.
 #[inline]
-fn see(cell: &Cell, level: u8) {
+fn see(cell: &mut Cell, level: u8) {
     let [low, high] = [u16::from(255 - level), u16::from(level) + 1];
-    let mut seen = cell.load(Ordering::Relaxed);
-    while seen >> 8 < low || seen & 0xff < high {
-        let wider = (seen >> 8).max(low) << 8 | (seen & 0xff).max(high);
-        match cell.compare_exchange_weak(seen, wider, Ordering::Relaxed, Ordering::Relaxed) {
-            Ok(_) => return,
-            Err(other) => seen = other,
+    *cell = (*cell >> 8).max(low) << 8 | (*cell & 0xff).max(high);
+}
+
+/// Points of a block by the part of the map that they are in.
+struct Sorted {
+    /// Where each part's entries begin, and where the last ends.
+    starts: Vec<u32>,
+    /// Cell in the part, and level.
+    entries: Vec<(u16, u8)>,
+}
+
+impl Sorted {
+    /// Sorts by counting. `parts` are those of a slice.
+    fn new<P>(grid: &Grid, parts: usize, points: &[P], to_map: impl Fn(&P) -> [f64; 3]) -> Self {
+        let mut starts = vec![0_u32; parts * grid.counts[2] as usize + 1];
+        let mut found: Vec<(u32, u16, u8)> = Vec::with_capacity(points.len());
+        for voxel in points.iter().filter_map(|point| grid.voxel(to_map(point))) {
+            let part = voxel.slice * parts + voxel.pixel / PART;
+            starts[part + 1] += 1;
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "parts are far fewer than 2^32, cells of one 2^16"
+            )]
+            found.push((part as u32, (voxel.pixel % PART) as u16, voxel.level));
         }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut entries = vec![(0, 0); found.len()];
+        for (part, cell, level) in found {
+            let place = &mut next[part as usize];
+            entries[*place as usize] = (cell, level);
+            *place += 1;
+        }
+        Self { starts, entries }
+    }
+
+    fn part(&self, part: usize) -> &[(u16, u8)] {
+        &self.entries[self.starts[part] as usize..self.starts[part + 1] as usize]
     }
 }

@@ -11,15 +11,15 @@ const OBSTACLE: u8 = 16;
 
 /// The bytes of a slice.
 pub(crate) fn encode(slice: &Slice) -> Vec<u8> {
-    let (width, tops) = (slice.width() as usize, slice.tops());
-    let row_bytes = width.div_ceil(8);
-    let mut raw = vec![0_u8; row_bytes * slice.height() as usize];
+    let row_bytes = (slice.width() as usize).div_ceil(8);
+    let mut raw = Vec::with_capacity(row_bytes * slice.height() as usize);
     let (mut kinds, mut steps) = (Vec::new(), Vec::new());
     let mut before = 0_u8;
-    for (row, tops) in (0..slice.height()).zip(tops.chunks_exact(width.max(1))) {
-        for (column, _) in (0..slice.width()).zip(tops).filter(|(_, top)| **top != 0) {
+    for row in 0..slice.height() {
+        let words = slice.occupied().row(row);
+        raw.extend(words.iter().flat_map(|word| word.to_le_bytes()).take(row_bytes));
+        for column in columns(words) {
             let Some(Content { top, bottom, is_obstacle }) = slice.pixel(column, row) else { continue };
-            raw[row as usize * row_bytes + column as usize / 8] |= 1 << (column % 8);
             let depth = (top / Content::STEP).wrapping_sub(bottom / Content::STEP);
             kinds.push(depth % OBSTACLE + OBSTACLE * u8::from(is_obstacle));
             steps.push(top.wrapping_sub(before));
@@ -32,6 +32,15 @@ pub(crate) fn encode(slice: &Slice) -> Vec<u8> {
     let mut bytes = count.to_le_bytes().to_vec();
     bytes.extend(lz4_flex::block::compress(&raw));
     bytes
+}
+
+/// Which columns are set in the words of a row.
+fn columns(words: &[u64]) -> impl Iterator<Item = u32> {
+    (0_u32..).zip(words).flat_map(|(i, word)| {
+        let next = |left: u64| Some(left).filter(|left| *left != 0);
+        let bits = std::iter::successors(next(*word), move |left| next(left & (left - 1)));
+        bits.map(move |left| 64 * i + left.trailing_zeros())
+    })
 }
 
 /// The slice of this size that these bytes are; none if they are those of no slice.

@@ -8,6 +8,8 @@
 //! the one above is at most ε σ, both are obstacles if together they span more than ε σ; if not, they are one floor,
 //! whose height is that of the upper one.
 
+use std::ops::Range;
+
 use crate::Grid;
 use crate::build::{Cell, span};
 use crate::grid::LEVELS;
@@ -46,13 +48,12 @@ pub(crate) fn noise(grid: &Grid, layers: &[Vec<Cell>]) -> f64 {
         let layer = &layers[s];
         let others = [s.checked_sub(1), Some(s + 1)].map(|s| s.and_then(|s| layers.get(s)));
         for row in 1..(grid.counts[1] as usize).saturating_sub(1) {
-            for i in row * width + 1..((row + 1) * width).saturating_sub(1) {
-                let Some([low, high]) = span(&layer[i]) else { continue };
-                let beside = [i - 1, i + 1, i - width, i + width].map(|j| span(&layer[j]));
+            for i in filled(layer, row * width + 1..((row + 1) * width).saturating_sub(1)) {
+                let beside = [i - 1, i + 1, i - width, i + width].map(|j| span(layer[j]));
                 let [Some(left), Some(right), Some(front), Some(back)] = beside else { continue };
                 let is_level = (left[1] - right[1]).abs() <= step && (front[1] - back[1]).abs() <= step;
-                let is_alone = others.iter().flatten().all(|other| span(&other[i]).is_none());
-                if is_level && is_alone {
+                let is_alone = others.iter().flatten().all(|other| other[i] == 0);
+                if let Some([low, high]) = span(layer[i]).filter(|_| is_level && is_alone) {
                     spans[usize::try_from(high - low).unwrap_or(0)] += 1;
                 }
             }
@@ -103,15 +104,23 @@ fn slice(grid: &Grid, layers: &[Vec<Cell>], s: usize, most: i32) -> Slice {
     let above = layers.get(s + 1);
     let below = s.checked_sub(1).map(|s| &layers[s]);
     for row in 0..height as usize {
-        for column in 0..columns {
-            let i = row * columns + column;
-            let Some(own) = span(&layers[s][i]) else { continue };
-            let up = above.and_then(|layer| span(&layer[i]));
-            let down = below.and_then(|layer| span(&layer[i]));
-            canvas.set(column, row, judge(own, down, up, most));
+        for i in filled(&layers[s], row * columns..(row + 1) * columns) {
+            let Some(own) = span(layers[s][i]) else { continue };
+            let up = above.and_then(|layer| span(layer[i]));
+            let down = below.and_then(|layer| span(layer[i]));
+            canvas.set(i - row * columns, row, judge(own, down, up, most));
         }
     }
     canvas.finish()
+}
+
+/// Which of these cells have seen something. Most have not, so many are looked at together.
+fn filled(layer: &[Cell], range: Range<usize>) -> impl Iterator<Item = usize> {
+    const TOGETHER: usize = 32;
+    let starts = range.clone().step_by(TOGETHER);
+    let runs = starts.map(move |start| start..range.end.min(start + TOGETHER));
+    let runs = runs.filter(|run| layer[run.clone()].iter().fold(0, |any, cell| any | cell) != 0);
+    runs.flatten().filter(|i| layer[*i] != 0)
 }
 
 /// What a voxel that spans these levels holds, given what lies right below and above.

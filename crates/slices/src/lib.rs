@@ -5,6 +5,7 @@
 mod grid;
 mod up;
 
+mod bits;
 mod slice;
 
 mod build;

@@ -98,19 +98,16 @@ impl SliceMap {
                     }
                 }
                 if is_filled {
-                    floors.add(self.floor_at(centre, base)?);
+                    let [x, y] = [0, 1].map(|axis| self.grid().range(axis, [centre[axis]; 2]));
+                    if let (Some(x), Some(y)) = (x, y) {
+                        self.floors_below(&x, y, base, &mut floors)?;
+                    }
                 }
             }
         }
         found.collides = found.pixels > 0;
         found.floor = floors.height(floor).map(|height| self.grid().up.coordinate(height));
         Ok(found)
-    }
-
-    fn floor_at(&self, [x, y]: [f64; 2], base: f64) -> Result<Option<f64>, Unloaded> {
-        let [column, row] = [(0, x), (1, y)].map(|(axis, x)| self.grid().range(axis, [x, x]));
-        let (Some(column), Some(row)) = (column, row) else { return Ok(None) };
-        self.floor_below([*column.start(), *row.start()], base)
     }
 
     /// Whether an upright box with a square base, turned, meets something, and whether that is an obstacle.

@@ -1,26 +1,5 @@
 //! The same work on one thread or on all of them.
 
-/// Sums what `work` tells of each chunk.
-#[cfg(feature = "rayon")]
-pub(crate) fn each_chunk<P: Sync>(
-    points: &[P],
-    size: usize,
-    work: impl Fn(&[P]) -> u64 + Sync + Send,
-) -> u64 {
-    use rayon::prelude::*;
-    points.par_chunks(size).map(work).sum()
-}
-
-/// Sums what `work` tells of each chunk.
-#[cfg(not(feature = "rayon"))]
-pub(crate) fn each_chunk<P: Sync>(
-    points: &[P],
-    size: usize,
-    work: impl Fn(&[P]) -> u64 + Sync + Send,
-) -> u64 {
-    points.chunks(size).map(work).sum()
-}
-
 /// What `work` makes of each number below `count`, in order.
 #[cfg(feature = "rayon")]
 pub(crate) fn map_each<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
@@ -86,5 +65,31 @@ pub(crate) fn walk_each<W: Send, Q: Sync, A: Send>(
 ) {
     for ((walker, question), answer) in walkers.iter_mut().zip(questions).zip(answers) {
         *answer = work(walker, question);
+    }
+}
+
+/// Does `work` on every part of every layer: it gets the number of the layer, that of the part, and its cells.
+#[cfg(feature = "rayon")]
+pub(crate) fn change_each<C: Send>(
+    layers: &mut [Vec<C>],
+    size: usize,
+    work: impl Fn(usize, usize, &mut [C]) + Sync + Send,
+) {
+    use rayon::prelude::*;
+    let all = layers.par_iter_mut().enumerate();
+    all.for_each(|(i, layer)| {
+        layer.par_chunks_mut(size).enumerate().for_each(|(j, part)| work(i, j, part));
+    });
+}
+
+/// Does `work` on every part of every layer: it gets the number of the layer, that of the part, and its cells.
+#[cfg(not(feature = "rayon"))]
+pub(crate) fn change_each<C: Send>(
+    layers: &mut [Vec<C>],
+    size: usize,
+    work: impl Fn(usize, usize, &mut [C]) + Sync + Send,
+) {
+    for (i, layer) in layers.iter_mut().enumerate() {
+        layer.chunks_mut(size).enumerate().for_each(|(j, part)| work(i, j, part));
     }
 }

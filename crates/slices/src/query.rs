@@ -3,9 +3,12 @@
 //! S4, §3.1: the pixels under the box in every slice between its bottom and its top; O(pixels · slices). Where the paper counts
 //! size/t pixels about the centre, these are all that the closed box meets.
 
+use std::ops::RangeInclusive;
+
 use nearmiss_geometry::Aabb;
 use serde::{Deserialize, Serialize};
 
+use crate::bits::Run;
 use crate::map::{SliceMap, Unloaded};
 use crate::parallel::fill_each;
 use crate::{Block, Grid};
@@ -100,11 +103,7 @@ impl SliceMap {
         let [columns, rows] = [0, 1].map(|axis| grid.range(axis, [min[axis], max[axis]]));
         let (Some(columns), Some(rows)) = (columns, rows) else { return Ok(found) };
         let mut floors = Floors::default();
-        for row in rows {
-            for column in columns.clone() {
-                floors.add(self.floor_below([column, row], min[2])?);
-            }
-        }
+        self.floors_below(&columns, rows, min[2], &mut floors)?;
         found.floor = floors.height(floor).map(|height| grid.up.coordinate(height));
         Ok(found)
     }
@@ -118,15 +117,40 @@ impl SliceMap {
         fill_each(boxes, answers, CHUNK, |bounds| self.query(bounds, floor));
     }
 
-    /// Height, in the map's coordinates, of the highest thing in a column in the slice of `base` or lower, unless it is an obstacle.
-    pub(crate) fn floor_below(&self, [column, row]: [u32; 2], base: f64) -> Result<Option<f64>, Unloaded> {
-        let slices = (self.grid().slice_at(base) + 1).clamp(0, i64::from(self.grid().counts[2]));
-        for s in (0..u32::try_from(slices).unwrap_or(0)).rev() {
-            if let Some(found) = self.slice(s)?.pixel(column, row) {
-                return Ok(if found.is_obstacle { None } else { Some(self.grid().height(s, found.top)) });
+    /// Adds, for each column, the height in the map's coordinates of the highest thing in the slice of `base` or lower, unless it is an
+    /// obstacle.
+    pub(crate) fn floors_below(
+        &self,
+        columns: &RangeInclusive<u32>,
+        rows: RangeInclusive<u32>,
+        base: f64,
+        floors: &mut Floors,
+    ) -> Result<(), Unloaded> {
+        let grid = self.grid();
+        let slices = (grid.slice_at(base) + 1).clamp(0, i64::from(grid.counts[2]));
+        let slices = u32::try_from(slices).unwrap_or(0);
+        let run = Run::new(columns);
+        for row in rows {
+            for i in run.range() {
+                // Columns whose highest thing has not been found yet.
+                let mut open = run.mask(i);
+                for s in (0..slices).rev() {
+                    let slice = self.slice(s)?;
+                    let mut found = slice.occupied().row(row)[i] & open;
+                    open &= !found;
+                    while found != 0 {
+                        let column = 64 * u32::try_from(i).unwrap_or(0) + found.trailing_zeros();
+                        found &= found - 1;
+                        let content = slice.pixel(column, row).filter(|content| !content.is_obstacle);
+                        floors.add(content.map(|content| grid.height(s, content.top)));
+                    }
+                    if open == 0 {
+                        break;
+                    }
+                }
             }
         }
-        Ok(None)
+        Ok(())
     }
 }
 

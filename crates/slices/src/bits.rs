@@ -1,0 +1,175 @@
+//! A bit a pixel, and a bit a tile of pixels over it.
+
+use std::ops::RangeInclusive;
+
+/// Side of a tile in pixels, a power of two. An avatar's base meets three by three; the bits of all tiles of a map fit a cache.
+const TILE: u32 = 8;
+
+/// Bits of a rectangle of pixels, each row from a word of its own, so that a run of pixels is tested 64 at a time.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Bits {
+    words: Vec<u64>,
+    stride: usize,
+}
+
+impl Bits {
+    /// No bit set.
+    pub(crate) fn new(width: u32, height: u32) -> Self {
+        let stride = (width as usize).div_ceil(64);
+        Self { words: vec![0; stride * height as usize], stride }
+    }
+
+    /// As tiles of so many pixels.
+    pub(crate) fn of_tiles(width: u32, height: u32) -> Self {
+        Self::new(width.div_ceil(TILE), height.div_ceil(TILE))
+    }
+
+    #[inline]
+    pub(crate) fn set(&mut self, column: usize, row: usize) {
+        self.words[row * self.stride + column / 64] |= 1 << (column % 64);
+    }
+
+    /// Sets the tile of a pixel.
+    #[inline]
+    pub(crate) fn set_tile(&mut self, column: usize, row: usize) {
+        self.set(column / TILE as usize, row / TILE as usize);
+    }
+
+    #[inline]
+    pub(crate) fn is_set(&self, column: u32, row: u32) -> bool {
+        self.words[row as usize * self.stride + column as usize / 64] >> (column % 64) & 1 == 1
+    }
+
+    /// All words, row by row.
+    pub(crate) fn words(&self) -> &[u64] {
+        &self.words
+    }
+
+    /// The words of a row.
+    #[inline]
+    pub(crate) fn row(&self, row: u32) -> &[u64] {
+        &self.words[row as usize * self.stride..(row as usize + 1) * self.stride]
+    }
+
+    /// Bytes in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        8 * self.words.len()
+    }
+
+    /// How many bits are set.
+    pub(crate) fn count_all(&self) -> u64 {
+        self.words.iter().map(|word| u64::from(word.count_ones())).sum()
+    }
+
+    /// Whether any of these bits, which are there, is set.
+    #[inline]
+    pub(crate) fn any(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> bool {
+        let (run, block) = (Run::new(columns), self.block(rows));
+        block.chunks_exact(self.stride).any(|row| run.any(row))
+    }
+
+    /// [`Bits::any`] of the tiles that these pixels are in.
+    #[inline]
+    pub(crate) fn any_tile(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> bool {
+        let tiles = |range: &RangeInclusive<u32>| range.start() / TILE..=range.end() / TILE;
+        self.any(&tiles(columns), &tiles(rows))
+    }
+
+    /// How many of these bits, which are there, are set.
+    pub(crate) fn count(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> u64 {
+        let (run, block) = (Run::new(columns), self.block(rows));
+        block
+            .chunks_exact(self.stride)
+            .map(|row| run.words(row).map(|word| u64::from(word.count_ones())).sum::<u64>())
+            .sum()
+    }
+
+    fn block(&self, rows: &RangeInclusive<u32>) -> &[u64] {
+        &self.words[*rows.start() as usize * self.stride..(*rows.end() as usize + 1) * self.stride]
+    }
+}
+
+/// A run of columns: words, and which bits of the first and the last belong to it.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    first: usize,
+    last: usize,
+    from: u64,
+    to: u64,
+}
+
+impl Run {
+    #[inline]
+    pub(crate) fn new(columns: &RangeInclusive<u32>) -> Self {
+        let (from, to) = (*columns.start(), *columns.end());
+        Self {
+            first: from as usize / 64,
+            last: to as usize / 64,
+            from: u64::MAX << (from % 64),
+            to: u64::MAX >> (63 - to % 64),
+        }
+    }
+
+    /// Numbers of its words.
+    pub(crate) fn range(&self) -> RangeInclusive<usize> {
+        self.first..=self.last
+    }
+
+    /// Which bits of its `i`-th word, counted in the row, belong to it.
+    #[inline]
+    pub(crate) fn mask(&self, i: usize) -> u64 {
+        let from = if i == self.first { self.from } else { u64::MAX };
+        let to = if i == self.last { self.to } else { u64::MAX };
+        from & to
+    }
+
+    /// Its words in a row of bits, without those that do not belong to it.
+    #[inline]
+    fn words<'a>(&'a self, row: &'a [u64]) -> impl Iterator<Item = u64> + 'a {
+        self.range().map(|i| row[i] & self.mask(i))
+    }
+
+    #[inline]
+    fn any(&self, row: &[u64]) -> bool {
+        if self.first == self.last {
+            return row[self.first] & self.from & self.to != 0;
+        }
+        self.words(row).any(|word| word != 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_every_length_find_and_count_every_bit() {
+        let (width, height) = (200_u32, 9_u32);
+        let mut bits = Bits::new(width, height);
+        let mut tiles = Bits::of_tiles(width, height);
+        let is_set = |column: u32, row: u32| (column * 7 + row * 13) % 31 == 0;
+        for row in 0..height {
+            for column in (0..width).filter(|column| is_set(*column, row)) {
+                bits.set(column as usize, row as usize);
+                tiles.set_tile(column as usize, row as usize);
+            }
+        }
+        let mut empty = 0;
+        for from in 0..width {
+            for to in from..width {
+                for rows in [0..=0, 3..=3, 2..=4, 8..=8, 0..=8] {
+                    let naive: u64 = rows
+                        .clone()
+                        .map(|row| (from..=to).map(|column| u64::from(is_set(column, row))).sum::<u64>())
+                        .sum();
+                    assert_eq!(bits.count(&(from..=to), &rows), naive, "{from} to {to}");
+                    assert_eq!(bits.any(&(from..=to), &rows), naive > 0, "{from} to {to}");
+                    assert!(tiles.any_tile(&(from..=to), &rows) || naive == 0, "{from} to {to}");
+                    empty += u32::from(naive == 0);
+                }
+            }
+        }
+        assert!(empty > 3000, "{empty} empty runs");
+        assert!(bits.is_set(31, 0) && !bits.is_set(30, 0));
+    }
+}
