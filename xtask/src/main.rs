@@ -2,7 +2,8 @@
 //!
 //! * `demo` — the main job on a real scan, with a table and a picture.
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
-//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, and those of their paper of 2005, measured.
+//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, those of their paper of 2005, and tables and plots of dos Anjos et al. 2012,
+//!   measured.
 //! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
 //! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
@@ -40,12 +41,12 @@ of the repository
                  whether what `collide A B --prove PROOF` wrote holds, by means of its own
   field SCAN [--noise 0.1] -o OUT.png
                  a picture of f over a slice of a noisy scan; --table counts where its normal flips
-  tables -o FOLDER [--data FOLDER] [--2005] [--only NUMBER] [--quick]
-                 Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, measured
+  tables -o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--quick]
+                 Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, their paper of 2005, dos Anjos et al. 2012, measured
   fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
-  preprocess, inspect, eval, collide, curve, poses, export";
+  preprocess, inspect, eval, collide, curve, poses, export, sample, slices";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

@@ -1,9 +1,12 @@
-//! `cargo xtask tables`: the table and plots of Klein & Zachmann 2004 and 2005, measured.
+//! `cargo xtask tables`: the tables and plots of Klein & Zachmann 2004 and 2005 and of dos Anjos et al. 2012, measured.
 
 use crate::repository::{Outcome, root, run_cargo};
 
 /// Where the objects lie that are no part of the repository, from its root.
 const OBJECTS: &str = "../shared/data";
+
+/// Papers that can be asked for alone.
+const YEARS: [(&str, &str); 2] = [("--2005", "klein2005"), ("--2012", "anjos2012")];
 
 /// Measures, with these words after the program's name; with the folder of objects, if it is there and none is named.
 pub(crate) fn run(words: &[&str]) -> Outcome {
@@ -21,15 +24,14 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
             absolute.push(here.join(path).to_string_lossy().into_owned());
         }
     }
-    let only_2005 = absolute.iter().position(|word| word == "--2005");
-    let papers: &[&str] = if only_2005.is_some() { &["klein2005"] } else { &["klein2004", "klein2005"] };
-    if let Some(place) = only_2005 {
-        absolute.remove(place);
-    }
+    let asked = YEARS.iter().filter(|(year, _)| absolute.iter().any(|word| word == year));
+    let asked: Vec<&str> = asked.map(|(_, paper)| *paper).collect();
+    absolute.retain(|word| YEARS.iter().all(|(year, _)| word != year));
     let words: Vec<&str> = absolute.iter().map(String::as_str).collect();
-    for &paper in papers {
+    let papers = if asked.is_empty() { vec!["klein2004", "klein2005", "anjos2012"] } else { asked };
+    for (i, paper) in papers.into_iter().enumerate() {
         // Numbers of figures are those of one paper.
-        if paper == "klein2005" && only_2005.is_none() && words.contains(&"--only") {
+        if i > 0 && words.contains(&"--only") {
             continue;
         }
         let program = ["run", "--release", "--quiet", "-p", "nearmiss-benches", "--bin", paper, "--"];

@@ -104,8 +104,7 @@ pub fn sample(mesh: &TriangleMesh, options: &SampleOptions) -> Result<Vec<[f64; 
 fn spaced(triangles: &[Triangle], spacing: f64, seed: Option<u64>) -> Result<Vec<[f64; 3]>, SampleError> {
     let step = STEP * spacing * if seed.is_some() { 1.0 - JITTER } else { 1.0 };
     let count: f64 = triangles.iter().map(|t| t.count(step)).sum();
-    // Written so that an overflow is refused.
-    if !(count < MOST) {
+    if count.is_nan() || count >= MOST {
         return Err(SampleError::TooMany { count });
     }
     let mut rng = seed.map(Xoshiro256PlusPlus::seed_from_u64);

@@ -147,7 +147,7 @@ mod tests {
         let (width, height) = (200_u32, 9_u32);
         let mut bits = Bits::new(width, height);
         let mut tiles = Bits::of_tiles(width, height);
-        let is_set = |column: u32, row: u32| (column * 7 + row * 13) % 31 == 0;
+        let is_set = |column: u32, row: u32| (column * 7 + row * 13).is_multiple_of(31);
         for row in 0..height {
             for column in (0..width).filter(|column| is_set(*column, row)) {
                 bits.set(column as usize, row as usize);

@@ -170,11 +170,13 @@ impl SlicePlan {
 
     fn check_rule(&self) -> Result<(), SliceError> {
         match self.obstacle {
-            Obstacle::Share(share) if !(share > 0.0) => return Err(SliceError::Share { share }),
+            Obstacle::Share(share) if share.is_nan() || share <= 0.0 => {
+                return Err(SliceError::Share { share });
+            }
             Obstacle::Slope { degrees, .. } if !(degrees > 0.0 && degrees < 90.0) => {
                 return Err(SliceError::Slope { degrees });
             }
-            Obstacle::Slope { noise: Some(noise), .. } if !(noise >= 0.0) => {
+            Obstacle::Slope { noise: Some(noise), .. } if noise.is_nan() || noise < 0.0 => {
                 return Err(SliceError::Noise { noise });
             }
             _ => {}

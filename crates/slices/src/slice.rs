@@ -70,7 +70,7 @@ impl Canvas {
         }
         slice.tops[row * slice.width as usize + column] = content.top + 1;
         slice.bottoms[row * halves(slice.width) + column / 2] |=
-            content.bottom / Content::STEP << (4 * (column % 2));
+            (content.bottom / Content::STEP) << (4 * (column % 2));
     }
 
     /// The slice.

@@ -29,7 +29,8 @@ const CHUNK: usize = 64;
 pub struct AvatarOptions {
     /// Of the box, along the two axes across in the caller's order. Default: 0.4 each.
     pub base: [f64; 2],
-    /// Of the box. Default: 1.7.
+    /// Of the box. Default: 1.6: on stairs a box stands on the highest step under it, a quarter of a metre higher than whoever it
+    /// stands for.
     pub height: f64,
     /// How far it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
     pub climb: f64,
@@ -39,7 +40,7 @@ pub struct AvatarOptions {
 
 impl Default for AvatarOptions {
     fn default() -> Self {
-        Self { base: [0.4; 2], height: 1.7, climb: 0.35, step: 0.05 }
+        Self { base: [0.4; 2], height: 1.6, climb: 0.35, step: 0.05 }
     }
 }
 

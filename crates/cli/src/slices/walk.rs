@@ -27,7 +27,7 @@ pub struct WalkArgs {
     #[arg(long, value_name = "FILE.json")]
     pub route: PathBuf,
     /// Width, depth and height of the avatar
-    #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.7", value_parser = parse_avatar)]
+    #[arg(long, value_name = "W,D,H", default_value = "0.4,0.4,1.6", value_parser = parse_avatar)]
     pub avatar: AvatarBox,
     /// How far it climbs at once, and falls in a step
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]

@@ -12,3 +12,4 @@ mod making_poses;
 mod prepare;
 mod running;
 mod touching;
+mod slicing;

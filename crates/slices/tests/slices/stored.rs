@@ -33,7 +33,7 @@ fn maps_come_back_whole_and_equal_slices_are_stored_once() {
     let (loaded, faults) = opened.load_all();
     assert!(faults.is_empty() && loaded == map);
     // On disk at most a tenth of what it takes in memory, which is at most two bytes a pixel.
-    assert!(bytes as usize * 10 < map.bytes(), "{bytes} on disk, {} in memory", map.bytes());
+    assert!(10 * bytes < map.bytes() as u64, "{bytes} on disk, {} in memory", map.bytes());
     assert!(map.bytes() <= 2 * map.grid().area() * map.slices().len());
 
     // Walls of triangles are the same at every height between floor and ceiling.

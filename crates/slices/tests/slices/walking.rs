@@ -107,7 +107,7 @@ fn walls_gaps_and_low_ceilings_stop() {
         ([7.0, 6.5], [12.0, 6.5], 9.0),
         // The gap is 0.3 wide, the avatar 0.4.
         ([7.0, 8.95], [12.0, 8.95], 9.0),
-        // A ceiling at 1.5 over an avatar of 1.7; from beyond the door.
+        // A ceiling at 1.5 over an avatar of 1.6; from beyond the door.
         ([9.6, 8.0], [12.0, 8.0], LOW.0[0]),
         ([14.5, 3.0], [17.5, 3.0], 16.0),
     ] {

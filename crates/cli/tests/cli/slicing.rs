@@ -1,0 +1,297 @@
+//! `slices` and `sample`.
+
+use std::fs;
+
+use nearmiss_testdata::house::{Quad, STAIRS, STOREY, house, scanned, triangles};
+use serde_json::Value;
+
+use crate::running::{Place, keys, numbers, sorted, text};
+
+const FIELDS: &str = "slices distinct width height pixel slice_height points bytes seconds";
+
+/// The generated house as points, and its map.
+fn with_house() -> Place {
+    let place = Place::new();
+    place.write("house.xyz", text(&scanned(&house(), 0.04, 0.003, 3)));
+    place.ok(&["slices", "build", "house.xyz", "-o", "house", "--pixel", "0.05", "--quiet"]);
+    place
+}
+
+/// Surfaces as an OBJ file.
+fn obj(quads: &[Quad]) -> String {
+    let mesh = triangles(quads);
+    let vertices = mesh.vertices().iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+    let faces = mesh.triangles().iter().map(|t| {
+        let [a, b, c] = t.map(|v| v + 1);
+        format!("f {a} {b} {c}\n")
+    });
+    vertices.chain(faces).collect()
+}
+
+#[test]
+fn a_map_is_built_inspected_and_exported() {
+    let place = with_house();
+    let built = place.ok(&[
+        "slices",
+        "build",
+        "house.xyz",
+        "-o",
+        "again",
+        "--pixel",
+        "0.05",
+        "--threads",
+        "1",
+        "--json",
+    ]);
+    let built = built.json().remove(0);
+    assert_eq!(keys(&built), sorted(FIELDS));
+    assert_eq!(built["pixel"], 0.05);
+    assert!((built["slice_height"].as_f64().unwrap() - 0.15).abs() < 1e-12, "three pixels");
+    assert_eq!((&built["width"], &built["height"]), (&321.into(), &241.into()), "{built}");
+    for file in fs::read_dir(place.path("house")).unwrap() {
+        let file = file.unwrap();
+        let other = place.path("again").join(file.file_name());
+        assert_eq!(
+            fs::read(file.path()).unwrap(),
+            fs::read(other).unwrap(),
+            "the same on any number of threads"
+        );
+    }
+    let mut told = place.ok(&["slices", "inspect", "house", "--verify", "--json"]).json().remove(0);
+    told["seconds"] = built["seconds"].clone();
+    assert_eq!(told, built);
+    let people = place.ok(&["slices", "inspect", "house"]).results;
+    assert!(people.contains("321 × 241 pixels") && people.contains("up is z"), "{people}");
+
+    place.ok(&["slices", "export", "house", "-o", "images", "--quiet"]);
+    let slices = usize::try_from(built["slices"].as_u64().unwrap()).unwrap();
+    assert_eq!(fs::read_dir(place.path("images")).unwrap().count(), slices);
+    let decoder = png::Decoder::new(std::io::BufReader::new(
+        fs::File::open(place.path("images/slice-0005.png")).unwrap(),
+    ));
+    let mut reader = decoder.read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    let frame = reader.next_frame(&mut pixels).unwrap();
+    assert_eq!((frame.width, frame.height, frame.color_type), (321, 241, png::ColorType::Rgb));
+    // Between the floors: black, or green with blue that tells walls from the few pixels that they only graze.
+    let mut kinds = [0_u32; 3];
+    for pixel in pixels.chunks(3) {
+        match pixel {
+            [0, 0, 0] => kinds[0] += 1,
+            [_, 255, 26] => kinds[1] += 1,
+            [_, 255, 255] => kinds[2] += 1,
+            other => panic!("{other:?} is no colour of the paper's"),
+        }
+    }
+    assert!(kinds[0] > 60_000 && kinds[2] > 1000 && kinds[1] < kinds[2], "{kinds:?}");
+}
+
+#[test]
+fn meshes_are_sampled_and_the_papers_rule_can_be_asked_for() {
+    let place = Place::new();
+    place.write("house.obj", obj(&house()));
+    let built = place
+        .ok(&["slices", "build", "house.obj", "-o", "map", "--resolution", "200", "--json"])
+        .json()
+        .remove(0);
+    assert_eq!(built["width"], 200, "{built}");
+    assert!(
+        built["distinct"].as_u64() < built["slices"].as_u64(),
+        "walls are the same all the way up: {built}"
+    );
+    let people = place
+        .ok(&["slices", "build", "house.obj", "-o", "map", "--obstacle", "0.07", "--resolution", "200"])
+        .results;
+    assert!(people.contains("(7.0 % of a slice)"), "{people}");
+    // A floor of two triangles has fewer corners than a cloud needs points.
+    place.write("ramp.obj", "v 0 0 0\nv 4 0 0\nv 4 3 1\nv 0 3 1\nf 1 2 3\nf 1 3 4\n");
+    let built =
+        place.ok(&["slices", "build", "ramp.obj", "-o", "ramp", "--pixel", "0.1", "--json"]).json().remove(0);
+    assert_eq!((&built["width"], &built["height"]), (&41.into(), &31.into()), "{built}");
+
+    let told =
+        place.ok(&["sample", "ramp.obj", "-o", "ramp.ply", "--spacing", "0.1", "--json"]).json().remove(0);
+    assert_eq!(keys(&told), sorted("points triangles seconds"));
+    let many = told["points"].as_u64().unwrap();
+    assert!((1200..4000).contains(&many), "{told}");
+    place.ok(&["sample", "ramp.obj", "-o", "thousand.ply", "--points", "1000", "--seed", "4"]);
+    let ply = fs::read(place.path("thousand.ply")).unwrap();
+    assert!(String::from_utf8_lossy(&ply[..200]).contains("element vertex 1000\n"));
+    let again = place.ok(&["sample", "ramp.obj", "-o", "again.ply", "--points", "1000", "--seed", "4"]);
+    assert!(again.results.starts_with("1000 points on 2 triangles"), "{}", again.results);
+    assert_eq!(fs::read(place.path("again.ply")).unwrap(), ply);
+}
+
+fn answers(place: &Place, args: &[&str]) -> Vec<Value> {
+    place.ok(&[&["slices", "query", "house", "--json"], args].concat()).json()
+}
+
+#[test]
+fn boxes_and_objects_are_answered() {
+    let place = with_house();
+    place.write(
+        "boxes.jsonl",
+        "{\"min\":[3,6,0.5],\"max\":[3.5,6.5,2]}\n\n{\"min\":[8.9,6.2,0.5],\"max\":[9.1,6.4,2],\"name\":\"wall\"}\n\
+         {\"min\":[10,8,3.2],\"max\":[10.2,8.2,4]}\n{\"min\":[90,0,0],\"max\":[91,1,1]}\n",
+    );
+    let found = answers(&place, &["--boxes", "boxes.jsonl"]);
+    assert_eq!(found.len(), 4);
+    for answer in &found {
+        assert_eq!(keys(answer), sorted("collides obstacle floor pixels micros"));
+    }
+    assert_eq!((&found[0]["collides"], &found[0]["pixels"]), (&false.into(), &0.into()), "{}", found[0]);
+    assert!(found[0]["floor"].as_f64().unwrap().abs() < 0.02, "{}", found[0]);
+    assert_eq!((&found[1]["collides"], &found[1]["obstacle"]), (&true.into(), &true.into()), "{}", found[1]);
+    assert!((found[2]["floor"].as_f64().unwrap() - STOREY).abs() < 0.02, "{}", found[2]);
+    assert!(found[3]["floor"].is_null(), "{}", found[3]);
+    let mean = answers(&place, &["--boxes", "boxes.jsonl", "--floor", "mean"]);
+    assert!(
+        mean[0]["floor"].as_f64() < found[0]["floor"].as_f64(),
+        "the mean of noise is below its greatest"
+    );
+    let people = place.ok(&["slices", "query", "house", "--boxes", "boxes.jsonl"]).results;
+    assert!(people.starts_with("Free; the floor below is at "), "{people}");
+    assert!(people.contains("Obstacles among "), "{people}");
+
+    let crate_corners: Vec<[f64; 3]> =
+        (0..8_u8).map(|i| [0, 1, 2].map(|k| f64::from(i >> k & 1) * 0.5)).collect();
+    place.write("crate.xyz", text(&crate_corners));
+    place.ok(&["slices", "build", "crate.xyz", "-o", "crate", "--pixel", "0.05"]);
+    place.write(
+        "poses.jsonl",
+        "{\"b\":[0,-1,0,8.9, 1,0,0,6.5, 0,0,1,0.5, 0,0,0,1]}\n\
+         {\"a\":[1,0,0,5, 0,1,0,0, 0,0,1,0, 0,0,0,1],\"b\":[0,-1,0,9, 1,0,0,6.5, 0,0,1,0.5, 0,0,0,1]}\n",
+    );
+    let found = answers(&place, &["--map", "crate", "--poses", "poses.jsonl"]);
+    assert_eq!(keys(&found[0]), sorted("collides obstacle floor pixels micros"));
+    assert_eq!(found[0]["collides"], false, "turned, it stands before the wall: {}", found[0]);
+    assert_eq!(found[1]["collides"], false, "the house is moved: {}", found[1]);
+    place.write("into.jsonl", "{\"b\":[1,0,0,8.9, 0,1,0,6.5, 0,0,1,0.5, 0,0,0,1]}\n");
+    assert_eq!(
+        answers(&place, &["--map", "crate", "--poses", "into.jsonl"])[0]["collides"],
+        false,
+        "only corners"
+    );
+    place.write("wall.jsonl", "{\"b\":[1,0,0,9, 0,1,0,6.5, 0,0,1,0.5, 0,0,0,1]}\n");
+    let found = answers(&place, &["--map", "crate", "--poses", "wall.jsonl"]);
+    assert_eq!(
+        (&found[0]["collides"], &found[0]["pixels"]),
+        (&true.into(), &4.into()),
+        "four corners: {}",
+        found[0]
+    );
+}
+
+#[test]
+fn an_avatar_walks_up_the_stairs_and_leaves_a_trace() {
+    let place = with_house();
+    let y = 0.5 * (STAIRS[0] + STAIRS[1]);
+    place.write("route.json", format!("{{\"start\":[1.2,{y},0.1],\"points\":[[8,{y}],[8,9]]}}"));
+    let walk = [
+        "slices",
+        "walk",
+        "house",
+        "--route",
+        "route.json",
+        "--cache",
+        "3",
+        "--trace",
+        "t.csv",
+        "--image",
+        "w.png",
+    ];
+    let done = place.ok(&[&walk[..], &["--json"]].concat());
+    assert!(done.errors.contains("warning: --cache 3 is raised to "), "{}", done.errors);
+    let steps = done.json();
+    assert!(steps.len() > 150, "{} steps", steps.len());
+    for step in &steps {
+        assert_eq!(keys(step), sorted("position blocked falling slices hits misses stalls"));
+    }
+    let last = numbers(&steps.last().unwrap()["position"]);
+    assert!(
+        (last[0] - 8.0).abs() < 1e-9 && (last[1] - 9.0).abs() < 1e-9 && (last[2] - STOREY).abs() < 0.02,
+        "{last:?}"
+    );
+    let trace = fs::read_to_string(place.path("t.csv")).unwrap();
+    assert_eq!(trace.lines().count(), steps.len() + 1);
+    assert!(trace.starts_with("distance,x,y,z,blocked,falling\n"), "{trace}");
+    assert!(fs::read(place.path("w.png")).unwrap().starts_with(b"\x89PNG"));
+    let strip = |steps: &[Value]| -> Vec<Value> {
+        steps.iter().map(|step| serde_json::json!([step["position"], step["hits"], step["misses"]])).collect()
+    };
+    let again = place.ok(&[&walk[..], &["--json"]].concat()).json();
+    assert_eq!(strip(&again), strip(&steps), "but for stalls the same again");
+    let people = place.ok(&walk).results;
+    assert!(people.starts_with("Arrived at (8, 9, 3"), "{people}");
+    place.write("wall.json", "{\"start\":[7,6.5,0.1],\"points\":[[12,6.5]]}");
+    let people = place.ok(&["slices", "walk", "house", "--route", "wall.json"]).results;
+    assert!(people.contains("on the way to point 1: something is in the way"), "{people}");
+}
+
+#[test]
+fn what_does_not_serve_is_refused_by_name() {
+    let place = with_house();
+    place.write(
+        "flat.xyz",
+        text(&(0..20_u8).map(|i| [f64::from(i), f64::from(i % 7), 1.0]).collect::<Vec<_>>()),
+    );
+    place.write("boxes.jsonl", "{\"min\":[0,0,0],\"max\":[1,1,1]}\n{\"min\":[0,0,0],\"max\":[1,1]}\n");
+    place.write("empty.jsonl", "\n");
+    place.write("inside.jsonl", "{\"min\":[0,0,9],\"max\":[1,1,1]}\n");
+    place.write("tilted.jsonl", "{\"b\":[1,0,0,0, 0,0,-1,0, 0,1,0,0, 0,0,0,1]}\n");
+    place.write("nan.json", "{\"start\":[1,1,1e999],\"points\":[]}");
+    place.write("blocked.json", "{\"start\":[9,6.5,0.1],\"points\":[[1,1]]}");
+    place.write("route.json", "{\"start\":[3,6,0.1],\"points\":[[4,6]]}");
+    let build =
+        |options: &[&'static str]| [&["slices", "build", "house.xyz", "-o", "new"][..], options].concat();
+    let query = |file: &'static str| vec!["slices", "query", "house", "--boxes", file];
+    let walk = |options: &[&'static str]| [&["slices", "walk", "house", "--route"][..], options].concat();
+    for (status, args, words) in [
+        (1, vec!["slices", "build", "flat.xyz", "-o", "new"], &["flat.xyz", "no extent along z"][..]),
+        (1, build(&["--pixel", "0.00001"]), &["house.xyz", "2^31"]),
+        (1, build(&["--pixel", "0.002", "--memory", "64"]), &["house.xyz", "64 are allowed"]),
+        (2, build(&["--pixel", "0"]), &["more than zero"]),
+        (2, build(&["--pixel", "1", "--resolution", "3"]), &["cannot be used with"]),
+        (2, build(&["--obstacle", "0.1", "--noise", "1"]), &["cannot be used with"]),
+        (1, build(&["--max-slope", "90"]), &["below 90"]),
+        (2, build(&["--up", "w"]), &["no axis"]),
+        (1, vec!["slices", "build", "none.xyz", "-o", "new"], &["none.xyz", "no such file"]),
+        (1, vec!["slices", "build", "house.xyz", "-o", "."], &["other files"]),
+        (1, vec!["slices", "inspect", "."], &["index.nms", "no such file"]),
+        (1, query("boxes.jsonl"), &["boxes.jsonl", "line 2", "column"]),
+        (1, query("empty.jsonl"), &["holds no lines"]),
+        (1, query("inside.jsonl"), &["line 1", "min is greater"]),
+        (2, vec!["slices", "query", "house"], &["--boxes"]),
+        (
+            1,
+            vec!["slices", "query", "house", "--map", "house", "--poses", "tilted.jsonl"],
+            &["line 1", "tilts"],
+        ),
+        (1, walk(&["nan.json"]), &["nan.json"]),
+        (1, walk(&["blocked.json"]), &["blocked.json", "inside an obstacle"]),
+        (2, walk(&["route.json", "--avatar", "1,1"]), &["three lengths"]),
+        (2, walk(&["route.json", "--climb", "5"]), &["cannot climb"]),
+        (2, walk(&["route.json", "--image", "w.jpg"]), &["PNG"]),
+        (1, vec!["sample", "house.xyz", "-o", "s.ply", "--points", "9"], &["house.xyz", "faces"]),
+    ] {
+        place.refused(status, &args, words);
+    }
+
+    // A slice that is missing: the others serve, and the command says what is wrong.
+    let files = fs::read_dir(place.path("house")).unwrap().map(|entry| entry.unwrap().path());
+    let largest =
+        files.filter(|path| !path.ends_with("index.nms")).max_by_key(|path| path.metadata().unwrap().len());
+    fs::remove_file(largest.unwrap()).unwrap();
+    place
+        .write("far.jsonl", "{\"min\":[3,6,0.5],\"max\":[3.5,6.5,2]}\n{\"min\":[90,0,0],\"max\":[91,1,1]}\n");
+    let done = place.run(&["slices", "query", "house", "--boxes", "far.jsonl", "--json"]);
+    assert_eq!(done.status, 1, "{}", done.errors);
+    assert!(
+        done.errors.contains("warning: slice ") && done.errors.contains("error: slice "),
+        "{}",
+        done.errors
+    );
+    let found = done.json();
+    assert!(found[0].is_null() && found[1]["collides"] == false, "{found:?}");
+    place.refused(1, &["slices", "inspect", "house", "--verify"], &["no such file"]);
+}
