@@ -10,8 +10,8 @@ use std::hint::black_box;
 
 use kiddo::{Chebyshev, ImmutableKdTree};
 use nearmiss::slices::{
-    Avatar, AvatarOptions, Floor, Pixel, SliceBuilder, SliceFolder, SliceMap, SliceOptions, SlicePlan, Slide,
-    Walker, step_each,
+    Avatar, AvatarOptions, Floor, Obstacle, Pixel, SliceBuilder, SliceFolder, SliceMap, SliceOptions,
+    SlicePlan, Slide, Walker, step_each,
 };
 use nearmiss::{Aabb, PointCloud};
 use nearmiss_benches::arguments::Arguments;
@@ -61,6 +61,7 @@ fn main() -> Result<(), Failure> {
         println!("## {name}: {} points\n", cloud.len());
         building(&cloud, &asked)?;
         let map = built(&cloud, &options(0.04))?;
+        floors(&cloud, &map)?;
         boxes(&cloud, &map, &asked)?;
         avatars(&map, &asked)?;
         disk(&cloud)?;
@@ -151,6 +152,64 @@ fn times(plan: &SlicePlan, passes: u32, add: impl Fn(&mut SliceBuilder)) -> [f64
 fn vector(p: [f64; 3]) -> Vector {
     let [x, y, z] = p.map(|c| c as f32);
     Vector::new(x, y, z)
+}
+
+/// How much of the floors is taken for an obstacle, by both rules.
+fn floors(cloud: &PointCloud, map: &SliceMap) -> Result<(), Failure> {
+    println!(
+        "Pixels of floor, {:.4} of noise estimated: surface all around at the same height, and nothing above for a metre.\n",
+        map.about().noise
+    );
+    println!(
+        "| rule | of a slice, % | pixels of floor | taken for obstacles, % |\n| --- | --: | --: | --: |"
+    );
+    let paper = built(cloud, &options(0.04).with_obstacle(Obstacle::Share(0.07)))?;
+    for (name, map) in [("slope of 45°", map), ("the paper's", &paper)] {
+        let [floor, wrong] = false_obstacles(map)?;
+        println!(
+            "| {name} | {:.1} | {floor} | {:.2} |",
+            100.0 * map.about().share,
+            100.0 * count(wrong) / count(floor.max(1))
+        );
+    }
+    println!();
+    Ok(())
+}
+
+/// Pixels of floor, and those of them that are obstacles. Of floor are pixels with tops in at least twelve of the 24 around them, in their own slice,
+/// half of which are within a pixel's side of theirs, and with nothing above the nine around for a metre.
+fn false_obstacles(map: &SliceMap) -> Result<[usize; 2], Failure> {
+    let grid = map.grid();
+    let [width, depth, slices] = grid.counts;
+    let mut counts = [0; 2];
+    for s in 0..slices {
+        let slice = map.slice(s)?;
+        let bottom = grid.origin[2] + f64::from(s + 1) * grid.slice_height;
+        for row in 2..depth - 2 {
+            for column in 2..width - 2 {
+                let Some(own) = slice.pixel(column, row) else { continue };
+                let around = (0..25_u32)
+                    .filter(|i| *i != 12)
+                    .filter_map(|i| slice.pixel(column + i % 5 - 2, row + i / 5 - 2));
+                let tops: Vec<u8> = around.map(|content| content.top).collect();
+                let step = grid.pixel / grid.slice_height * 255.0;
+                let level = tops.iter().filter(|top| f64::from(top.abs_diff(own.top)) <= step).count();
+                if tops.len() < 12 || 2 * level < tops.len() {
+                    continue;
+                }
+                let [x, y] = grid.middle(column, row);
+                let above = Aabb {
+                    min: [x - grid.pixel, y - grid.pixel, bottom + 1e-9],
+                    max: [x + grid.pixel, y + grid.pixel, bottom + 1.0],
+                };
+                if !map.touches(&above)? {
+                    counts[0] += 1;
+                    counts[1] += usize::from(own.is_obstacle);
+                }
+            }
+        }
+    }
+    Ok(counts)
 }
 
 /// A place on the ground of the map, and a height.

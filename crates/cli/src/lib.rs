@@ -13,9 +13,9 @@ mod inspect;
 mod poses;
 mod preprocess;
 mod proof;
-mod touch;
 mod sample;
 mod slices;
+mod touch;
 
 mod input;
 mod output;
@@ -61,11 +61,11 @@ pub use posing::{PairArgs, PoseRefused};
 pub use preprocess::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
 pub use sample::SampleArgs;
 pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
-pub use touch::TouchArgs;
 pub use slices::{
     AvatarBox, BuildArgs, FloorName, PixelArgs, QueryArgs, ResponseName, SlicesCommand, SlicesExportArgs,
     SlicesInspectArgs, WalkArgs,
 };
+pub use touch::TouchArgs;
 
 /// Whether, where and how near scanned things meet, straight from their points.
 ///

@@ -11,5 +11,5 @@ mod looking_inside;
 mod making_poses;
 mod prepare;
 mod running;
-mod touching;
 mod slicing;
+mod touching;
