@@ -34,7 +34,7 @@ pub struct BuildArgs {
     /// What is steeper than this is an obstacle, in degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, default_value_t = 45.0)]
     pub max_slope: f64,
-    /// How far points of a level floor spread upwards within a pixel; by default estimated from the points
+    /// How far points of a level floor spread upwards within a pixel; by default estimated from points, and 0 for a mesh
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
     /// Which way is up: x, y, z, -x, -y or -z
@@ -89,7 +89,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
         }
     };
     let unfit = |cause| CliError::Slices { path: args.input.clone(), cause };
-    let plan = SlicePlan::new(&options(args), &bounds).map_err(unfit)?;
+    let plan = SlicePlan::new(&options(args, &source), &bounds).map_err(unfit)?;
     let [width, height, slices] = plan.grid().counts;
     let bar = console.spinner(format_args!("filling {slices} slices of {width} × {height} pixels"));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
@@ -124,14 +124,18 @@ fn read(args: &BuildArgs) -> Result<Source, CliError> {
     }
 }
 
-fn options(args: &BuildArgs) -> SliceOptions {
+fn options(args: &BuildArgs, source: &Source) -> SliceOptions {
     let pixel = match (args.pixel.pixel, args.pixel.resolution) {
         (Some(side), _) => Pixel::Side(side),
         (None, count) => Pixel::Count(count.unwrap_or(700)),
     };
     let obstacle = match args.obstacle {
         Some(share) => Obstacle::Share(share),
-        None => Obstacle::Slope { degrees: args.max_slope, noise: args.noise },
+        None => {
+            // What is sampled for the map lies where the mesh is.
+            let of_mesh = matches!(source, Source::Mesh(_)).then_some(0.0);
+            Obstacle::Slope { degrees: args.max_slope, noise: args.noise.or(of_mesh) }
+        }
     };
     SliceOptions::default()
         .with_pixel(pixel)

@@ -115,7 +115,8 @@ fn storey(canvas: &mut Canvas, area: Area, map: &SliceMap, [low, high]: [f64; 2]
 /// Height over distance.
 fn heights(canvas: &mut Canvas, area: Area, track: &Track) {
     canvas.fill(area, EMPTY);
-    let length = track.distances.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    let way = track.distances.last().copied().unwrap_or(0.0);
+    let length = way.max(f64::MIN_POSITIVE);
     let ends = track.places.iter().map(|p| p[2]);
     let [low, high] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], z| [l.min(z), h.max(z)]);
     let rise = (high - low).max(1e-3 * length);
@@ -128,6 +129,6 @@ fn heights(canvas: &mut Canvas, area: Area, track: &Track) {
     for i in 1..track.places.len() {
         canvas.line(area, [at(i - 1), at(i)], 4.0, WAY);
     }
-    let title = format!("height {} to {} over a way of {}", short(low), short(high), short(length));
+    let title = format!("height {} to {} over a way of {}", short(low), short(high), short(way));
     canvas.text([area.left + 8 * FINE, area.top + 6 * FINE], 2 * FINE, INK, &title);
 }
