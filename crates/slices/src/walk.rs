@@ -252,7 +252,8 @@ impl Walker {
 
     /// One step towards a place, given as the two coordinates across in the caller's order; or, while it falls, one step down.
     ///
-    /// If something is in the way, `response` says where else it may go; if that does not serve either, it stays.
+    /// If something is in the way, `response` says where else it may go; if that does not serve either, it stays. So it does if the place is
+    /// not finite.
     ///
     /// # Errors
     /// When a slice that is needed is not loaded; then it is where it was.
@@ -285,7 +286,10 @@ impl Walker {
         let way = [target[0] - self.place[0], target[1] - self.place[1]];
         let length = (way[0] * way[0] + way[1] * way[1]).sqrt();
         let step = self.avatar.options.step;
-        // Written so that rounding never leaves a last step without length.
+        if !length.is_finite() {
+            return [self.place[0], self.place[1]];
+        }
+        // Rounding never leaves a last step without length.
         if length <= step * (1.0 + 1e-9) {
             return target;
         }

@@ -5,6 +5,7 @@ mod bad_input;
 mod built;
 mod house;
 mod objects;
+mod real;
 mod stored;
 mod twin;
 mod walking;

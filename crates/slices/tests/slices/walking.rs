@@ -176,6 +176,10 @@ fn starts_that_do_not_serve_are_refused() {
     assert!(start([12.0, 8.0, 0.1]).unwrap_err().to_string().contains("ceiling"));
     assert!(start([2.0, 6.0, f64::NAN]).unwrap_err().to_string().contains("not finite"));
     assert!(start([2.0, 6.0, 0.2]).unwrap()[2].abs() < 0.02, "put onto the floor");
+    let mut walker = Walker::new(avatar(), &map, [2.0, 6.0, 0.2]).unwrap();
+    let before = walker;
+    let step = walker.step(&map, [f64::NAN, 3.0], &Slide).unwrap();
+    assert!(walker == before && !step.blocked, "nowhere to go");
     let route = Route { start: [2.0, 6.0, 0.2], points: vec![[2.0, 6.5], [f64::INFINITY, 0.0]] };
     let refused = route.walk(&mut &map, &avatar(), &Back, |_, _| Ok(())).unwrap_err();
     assert!(refused.to_string().contains("point 2"), "{refused}");
