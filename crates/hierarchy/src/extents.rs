@@ -8,7 +8,6 @@ use nearmiss_surface::PointBlock;
 
 use crate::boxes::OrientedBox;
 use crate::lanes::{along, greatest, lanes_of, least, load};
-use crate::neighbours::chunks;
 use crate::spacing::map;
 use crate::split::id32;
 use crate::surfels::THICKNESS;
@@ -54,8 +53,7 @@ pub(crate) fn boxes_of_discs(nodes: &[Node], about: &[OrientedBox], discs: &Disc
 impl Discs<'_> {
     fn blocks(&self) -> Vec<DiscBlock> {
         let numbers: Vec<usize> = (0..self.positions.len().div_ceil(WIDTH)).collect();
-        chunks(&numbers, |numbers| numbers.iter().map(|&number| self.block(number)).collect::<Vec<_>>())
-            .concat()
+        map(&numbers, |&number| self.block(number))
     }
 
     fn block(&self, number: usize) -> DiscBlock {
