@@ -268,7 +268,7 @@ fn what_does_not_serve_is_refused_by_name() {
             &["line 1", "tilts"],
         ),
         (1, walk(&["nan.json"]), &["nan.json"]),
-        (1, walk(&["blocked.json"]), &["blocked.json", "inside an obstacle"]),
+        (1, walk(&["blocked.json", "--cache", "40"]), &["blocked.json", "inside an obstacle"]),
         (2, walk(&["route.json", "--avatar", "1,1"]), &["three lengths"]),
         (2, walk(&["route.json", "--climb", "5"]), &["cannot climb"]),
         (2, walk(&["route.json", "--image", "w.jpg"]), &["PNG"]),
