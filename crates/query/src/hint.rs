@@ -1,7 +1,7 @@
 //! Temporal coherence: what the last query about two scans found helps the next one, a small motion later.
 //!
-//! Where they met they probably still meet, so those two leaves are compared first. Where they were apart, the pairs of
-//! nodes that parted them are a front across the tree of pairs; a pair whose gap was g stays apart until b has travelled
+//! Where they met they probably still meet, so the two points whose discs crossed are tried alone, then their leaves. Where they were
+//! apart and move slowly, the pairs of nodes that parted them are a front across the tree of pairs; a pair whose gap was g stays apart until b has travelled
 //! so far. So only pairs whose time has come are compared again, and split where they do not part the scans any more; and as
 //! long as none has come, nothing at all. Travel is the length of b's way in a's frame, at the point that moves most.
 
