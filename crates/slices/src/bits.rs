@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-/// Side of a tile in pixels, a power of two. An avatar's base meets three by three; the bits of all tiles of a map fit a cache.
+/// Side of a tile in pixels, a power of two from eight on, so that eight pixels of a byte are in one. An avatar's base meets three by three; the bits of all tiles of a map fit a cache.
 const TILE: u32 = 8;
 
 /// Bits of a rectangle of pixels, each row from a word of its own, so that a run of pixels is tested 64 at a time.
@@ -33,6 +33,12 @@ impl Bits {
     #[inline]
     pub(crate) fn set_tile(&mut self, column: usize, row: usize) {
         self.set(column / TILE as usize, row / TILE as usize);
+    }
+
+    /// Sets those of eight pixels, from a multiple of eight on, whose bits are set.
+    #[inline]
+    pub(crate) fn set_eight(&mut self, column: usize, row: usize, bits: u8) {
+        self.words[row * self.stride + column / 64] |= u64::from(bits) << (column % 64);
     }
 
     #[inline]

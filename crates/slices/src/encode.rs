@@ -61,6 +61,7 @@ pub(crate) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Option<Slice> {
     let mut top = 0_u8;
     for (row, bits) in bits.chunks_exact(row_bytes.max(1)).enumerate() {
         for (i, &byte) in bits.iter().enumerate().filter(|(_, byte)| **byte != 0) {
+            canvas.mark_eight(8 * i, row, byte);
             let mut left = byte;
             while left != 0 {
                 let column = 8 * i + left.trailing_zeros() as usize;
@@ -71,7 +72,7 @@ pub(crate) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Option<Slice> {
                 if column >= columns || top == u8::MAX {
                     return None;
                 }
-                canvas.set(column, row, Content { top, bottom, is_obstacle: kind & OBSTACLE != 0 });
+                canvas.fill(column, row, Content { top, bottom, is_obstacle: kind & OBSTACLE != 0 });
             }
         }
     }

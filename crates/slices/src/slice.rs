@@ -62,9 +62,22 @@ impl Canvas {
     /// Sets an empty pixel.
     #[inline]
     pub(crate) fn set(&mut self, column: usize, row: usize, content: Content) {
+        self.0.occupied.set(column, row);
+        self.0.tiles.set_tile(column, row);
+        self.fill(column, row, content);
+    }
+
+    /// Says which of eight empty pixels, from a multiple of eight on, hold something; what, is for [`Canvas::fill`].
+    #[inline]
+    pub(crate) fn mark_eight(&mut self, column: usize, row: usize, bits: u8) {
+        self.0.occupied.set_eight(column, row, bits);
+        self.0.tiles.set_tile(column, row);
+    }
+
+    /// Fills a pixel that is said to hold something.
+    #[inline]
+    pub(crate) fn fill(&mut self, column: usize, row: usize, content: Content) {
         let Self(slice) = self;
-        slice.occupied.set(column, row);
-        slice.tiles.set_tile(column, row);
         if content.is_obstacle {
             slice.obstacle.set(column, row);
         }
