@@ -286,7 +286,7 @@ fn wrong_usage_ends_with_status_2() {
         (&["--threads", "many"], "--threads"),
         (&["--poses", "p.jsonl", "--pose-a", "x"], "cannot be used with"),
         (&["--image", "ball.nm"], "would replace the input"),
-        (&["--detail", "manifold"], "manifold"),
+        (&["--detail", "everything"], "manifold"),
         (&["--first"], "--poses"),
         (&["--margin", "-1"], "--margin"),
         (&["--evidence", "proven"], "certified"),
