@@ -230,7 +230,13 @@ impl Solid {
     /// The contact itself, where no point tells more.
     fn alone(&self, contact: &Contact) -> ManifoldPoint {
         let towards = Vector3::from(contact.normals.map_or_else(|| self.apart().into(), |[_, of_b]| of_b));
-        let away = (self.centres[self.lesser] - Vector3::from(contact.point)) * [1.0, -1.0][self.lesser];
+        let middle = (self.centres[self.lesser] - Vector3::from(contact.point)) * [1.0, -1.0][self.lesser];
+        let away = match contact.normals.filter(|_| self.oriented[1] || self.oriented[0]) {
+            // Out of b, or into a.
+            Some([_, of_b]) if self.oriented[1] => Vector3::from(of_b),
+            Some([of_a, _]) => -Vector3::from(of_a),
+            None => middle,
+        };
         let gap = if self.margin > 0.0 { (2.0 * contact.residual).min(self.margin) } else { 0.0 };
         ManifoldPoint {
             point: contact.point,

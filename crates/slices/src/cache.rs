@@ -79,7 +79,9 @@ impl SliceCache {
     /// kept.
     #[must_use]
     pub fn new(folder: &SliceFolder, options: &CacheOptions, span: u32) -> Self {
-        let capacity = options.slices.max(span).max(1) as usize;
+        // No more than there are.
+        let most = folder.grid().counts[2].max(1);
+        let capacity = options.slices.max(span).clamp(1, most) as usize;
         let loader = options.prefetch.then(|| Loader::start(folder.clone()));
         Self {
             map: folder.unloaded(),

@@ -127,7 +127,7 @@ impl SliceMap {
         floors: &mut Floors,
     ) -> Result<(), Unloaded> {
         let grid = self.grid();
-        let slices = (grid.slice_at(base) + 1).clamp(0, i64::from(grid.counts[2]));
+        let slices = grid.slice_at(base).saturating_add(1).clamp(0, i64::from(grid.counts[2]));
         let slices = u32::try_from(slices).unwrap_or(0);
         let run = Run::new(columns);
         for row in rows {

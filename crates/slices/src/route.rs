@@ -93,10 +93,15 @@ impl Route {
         mut each: impl FnMut(&B, &Step) -> Result<(), B::Error>,
     ) -> Result<Ended, B::Error> {
         self.check()?;
-        let needs = Walker::needs_at(avatar, building.grid(), self.start);
-        let feet = building.grid().up.to_map(self.start)[2];
+        let grid = building.grid();
+        let mut start = grid.up.to_map(self.start);
+        // A fall from above the map begins where there may be something.
+        let top = grid.origin[2] + f64::from(grid.counts[2]) * grid.slice_height + avatar.options().climb;
+        start[2] = start[2].min(top);
+        let (feet, start) = (start[2], grid.up.from_map(start));
+        let needs = Walker::needs_at(avatar, grid, start);
         let map = building.with_slices(needs.unwrap_or(NONE), feet)?;
-        let mut walker = Walker::new(*avatar, map, self.start)?;
+        let mut walker = Walker::new(*avatar, map, start)?;
         for (point, target) in self.points.iter().enumerate() {
             loop {
                 if walker.is_at(building.grid(), *target) && !walker.is_falling() {
@@ -107,7 +112,8 @@ impl Route {
                 let before = walker;
                 let step = walker.step(map, *target, response).map_err(unloaded)?;
                 each(building, &step)?;
-                if walker == before {
+                let is_there = walker.is_at(building.grid(), *target);
+                if walker == before || (walker.creeps(&before) && !is_there) {
                     return Ok(Ended::Stuck { point });
                 }
                 if walker.feet() < building.grid().origin[2] - avatar.options().climb {

@@ -184,6 +184,9 @@ pub struct Walker {
     falling: bool,
 }
 
+/// Steps that gain less, in steps, are none.
+const LEAST_GAIN: f64 = 1e-3;
+
 /// What is at a place.
 struct Look {
     /// Something the avatar can neither climb nor pass under.
@@ -235,6 +238,14 @@ impl Walker {
     #[must_use]
     pub fn is_falling(&self) -> bool {
         self.falling
+    }
+
+    /// Whether it got on so little since it was `before`, though it does not fall and is not there, that it is as good as stuck: along
+    /// a wall, ever shorter steps of which only the part along it counts.
+    pub(crate) fn creeps(&self, before: &Self) -> bool {
+        let way = [0, 1, 2].map(|k| self.place[k] - before.place[k]);
+        let gained = way.iter().map(|x| x * x).sum::<f64>().sqrt();
+        !self.falling && !before.falling && gained < LEAST_GAIN * self.avatar.options.step
     }
 
     /// Whether it is at this place, given as the two coordinates across in the caller's order.
@@ -303,9 +314,15 @@ impl Walker {
         if look.blocked {
             return Ok(false);
         }
-        self.place = [place[0], place[1], look.support.unwrap_or(self.place[2])];
+        let height = look.support.unwrap_or(self.place[2]);
+        let footing = look.floor.unwrap_or(self.footing).min(height);
+        // What is too high for the floor below it could never be left.
+        if look.support.is_some() && height > footing + climb {
+            return Ok(false);
+        }
+        self.place = [place[0], place[1], height];
         self.falling = look.support.is_none();
-        self.footing = look.floor.unwrap_or(self.footing).min(self.place[2]);
+        self.footing = footing;
         Ok(true)
     }
 
@@ -331,7 +348,8 @@ impl Walker {
         let last = i64::from(grid.counts[2]) - 1;
         let mut found = nothing;
         // From the highest that can be climbed downwards, until a floor is found.
-        let carrying = least.div_euclid(SLICE).max(0)..=most.div_euclid(SLICE).min(last);
+        // The lowest level is below what carries.
+        let carrying = (least + 1).div_euclid(SLICE).max(0)..=most.div_euclid(SLICE).min(last);
         for s in carrying.rev() {
             let s = u32::try_from(s).unwrap_or(0);
             let slice = map.slice(s)?;

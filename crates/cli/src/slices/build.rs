@@ -117,8 +117,8 @@ fn read(args: &BuildArgs) -> Result<Source, CliError> {
     match input::read(path, args.format.0) {
         Ok(model) => Ok(model.mesh.map_or_else(|| Source::Points(model.cloud), Source::Mesh)),
         // Faces may have fewer corners than a cloud needs points.
-        Err(CliError::Read(ReadError::Cloud { cause: CloudError::TooFew { .. }, .. })) => {
-            Ok(Source::Mesh(nearmiss::io::read_mesh(path, args.format.0)?))
+        Err(few @ CliError::Read(ReadError::Cloud { cause: CloudError::TooFew { .. }, .. })) => {
+            nearmiss::io::read_mesh(path, args.format.0).map(Source::Mesh).or(Err(few))
         }
         Err(other) => Err(other),
     }

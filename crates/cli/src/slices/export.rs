@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::open;
-use crate::console::{Console, Results};
+use crate::console::{self, Console, Results};
 use crate::digits::count;
 use crate::error::CliError;
 use crate::picture::Picture;
@@ -28,19 +28,30 @@ pub(super) fn run(args: &SlicesExportArgs) -> Result<(), CliError> {
     std::fs::create_dir_all(&args.output).map_err(CliError::writing(&args.output))?;
     let slices = folder.grid().counts[2];
     let bar = Console::new(args.quiet).steps("slices", u64::from(slices));
+    let mut faults = Vec::new();
     for slice in 0..slices {
-        let image = folder.load(slice)?;
+        bar.advance(1);
+        let image = match folder.load(slice) {
+            Ok(image) => image,
+            Err(fault) => {
+                faults.push(fault);
+                continue;
+            }
+        };
         let [width, height] = [image.width(), image.height()].map(|side| side as usize);
         let picture = Picture { width, height, pixels: image.rgb() };
         picture.save(&args.output.join(format!("slice-{slice:04}.png")))?;
-        bar.advance(1);
     }
     drop(bar);
     let mut results = Results::new();
     results.line(format_args!(
         "{} written to {}",
-        count(u64::from(slices), "image"),
+        count(u64::from(slices) - faults.len() as u64, "image"),
         args.output.display()
     ))?;
-    results.flush()
+    results.flush()?;
+    // The others serve.
+    let last = faults.pop();
+    faults.iter().for_each(console::warn);
+    last.map_or(Ok(()), |fault| Err(fault.into()))
 }

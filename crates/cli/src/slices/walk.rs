@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nearmiss::slices::{
@@ -38,9 +38,9 @@ pub struct WalkArgs {
     /// What it does where something is in the way
     #[arg(long, value_enum, default_value_t = ResponseName::Back)]
     pub response: ResponseName,
-    /// Slices kept in memory; raised to what the avatar spans
-    #[arg(long, value_name = "N", default_value_t = 16)]
-    pub cache: u32,
+    /// Slices kept in memory, by default 16; raised to what the avatar spans
+    #[arg(long, value_name = "N")]
+    pub cache: Option<u32>,
     /// Load slices only when they are needed
     #[arg(long)]
     pub no_prefetch: bool,
@@ -95,9 +95,14 @@ struct StepLine {
 }
 
 pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
-    let inputs = [args.route.as_path()];
+    let mut inputs = vec![args.route.clone()];
+    inputs.extend(std::fs::read_dir(&args.folder).into_iter().flatten().flatten().map(|file| file.path()));
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
     for path in args.image.iter().chain(&args.trace) {
         output::check_apart(path, &inputs)?;
+    }
+    if args.image.is_some() && args.image == args.trace {
+        return Err(CliError::Usage("--image and --trace name the same file; name two".into()));
     }
     if let Some(path) = &args.image {
         picture::check_name(path)?;
@@ -110,13 +115,14 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
         .with_climb(args.climb)
         .with_step(args.step.unwrap_or(folder.grid().pixel));
     let avatar = Avatar::new(&options).map_err(|e| CliError::Usage(e.to_string()))?;
-    let cache = CacheOptions::default().with_slices(args.cache).with_prefetch(!args.no_prefetch);
+    let cache =
+        args.cache.map_or(CacheOptions::default(), |slices| CacheOptions::default().with_slices(slices));
+    let cache = cache.with_prefetch(!args.no_prefetch);
     let mut cache = SliceCache::new(&folder, &cache, avatar.slices(folder.grid()));
-    if cache.capacity() > args.cache as usize {
+    if let Some(asked) = args.cache.filter(|&asked| cache.capacity() > asked as usize) {
+        let capacity = cache.capacity();
         console::warn(format_args!(
-            "--cache {} is raised to {}: the avatar needs as many slices at once",
-            args.cache,
-            cache.capacity()
+            "--cache {asked} is raised to {capacity}: the avatar needs as many slices at once"
         ));
     }
     let response: &dyn Response = match args.response {

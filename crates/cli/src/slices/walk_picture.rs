@@ -24,10 +24,15 @@ const INK: Colour = [30, 34, 40];
 /// A view shows the walk where it was within so much of the avatar's height.
 const STOREY: f64 = 1.5;
 
+/// A long fall is not shown in more views than this.
+const MOST_VIEWS: f64 = 12.0;
+
 /// A view for each storey that the walk was on, lowest first, with the part of the walk on it; below them its height over its
 /// length. `height` is the avatar's.
 pub(super) fn paint(map: &SliceMap, track: &Track, height: f64) -> Picture {
-    let storeys = storeys(track, STOREY * height);
+    let low = track.places.iter().fold(f64::INFINITY, |least, p| least.min(p[2]));
+    let high = track.places.iter().fold(f64::NEG_INFINITY, |most, p| most.max(p[2]));
+    let storeys = storeys(track, (STOREY * height).max((high - low) / MOST_VIEWS));
     let [width, depth, _] = map.grid().counts.map(|n| n as usize);
     let zoom = (VIEW / width.max(depth)).max(1);
     let shrink = width.max(depth).div_ceil(VIEW);

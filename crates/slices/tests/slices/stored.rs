@@ -176,7 +176,12 @@ fn a_cache_never_changes_a_walk_and_counts_the_same_every_time() {
     for (slices, prefetch) in [(1, false), (20, false), (60, false), (1, true), (20, true), (60, true)] {
         let (steps, counts, capacity) = walked(&folder, slices, prefetch);
         assert_eq!(steps, expected, "{slices} slices");
-        assert_eq!(capacity, span.max(slices as usize), "raised to what is needed");
+        let most = folder.grid().counts[2] as usize;
+        assert_eq!(
+            capacity,
+            span.max(slices as usize).min(most),
+            "raised to what is needed, if there is so much"
+        );
         for _ in 0..3 {
             assert_eq!(walked(&folder, slices, prefetch).1, counts, "{slices} slices, {prefetch}");
         }

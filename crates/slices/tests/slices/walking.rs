@@ -168,6 +168,76 @@ fn ramps_are_climbed_as_far_as_the_rule_says() {
     }
 }
 
+/// A level patch of points.
+fn level(from: [f64; 2], to: [f64; 2], height: f64) -> Vec<[f64; 3]> {
+    let steps =
+        |from: f64, to: f64| (0..).map(move |i| from + 0.01 * f64::from(i)).take_while(move |x| *x <= to);
+    let row = |y: f64| steps(from[0], to[0]).map(move |x| [x, y, height]);
+    steps(from[1], to[1]).flat_map(row).collect()
+}
+
+#[test]
+fn no_height_is_fallen_from_at_once() {
+    let mut points = level([0.0, 0.0], [2.0, 2.0], 0.0);
+    points.push([0.0, 0.0, 2.0]);
+    let map = map_of(&points, Up::Z);
+    for i in 0..4000_u32 {
+        // A start within reach of a floor stands on it; from any other the feet come down by what it climbs at most.
+        let start = 0.36 + 0.0005 * f64::from(i);
+        let (ended, steps) = walk(&map, [1.0, 1.0, start], &[[1.0, 1.0]], &Back);
+        assert_eq!(ended, Ended::Arrived, "from {start}");
+        let mut feet = start;
+        for step in &steps {
+            assert!(feet - step.position[2] <= 0.35 + 1e-9, "from {start}: {feet} to {:?}", step.position);
+            feet = step.position[2];
+        }
+        assert!(feet.abs() < 0.001 && steps[0].falling, "from {start}: {steps:?}");
+    }
+}
+
+#[test]
+fn what_is_climbed_can_be_left_again() {
+    // A floor, a lower one beyond its edge, and there a block whose top is a climb above the first, two above the second.
+    let mut stopped = 0;
+    for block in 0..20_u32 {
+        let x = 1.26 + 0.01 * f64::from(block);
+        let mut points = level([0.0, 0.0], [0.99, 2.0], 0.0);
+        points.extend(level([1.0, 0.0], [3.0, 2.0], -0.3));
+        for i in 0..59_u32 {
+            points.extend(level([x, 0.0], [x + 0.02, 2.0], -0.3 + 0.01 * f64::from(i)));
+        }
+        points.push([0.0, 0.0, 2.0]);
+        let map = built(&points, &SliceOptions::default().with_pixel(Pixel::Side(0.04))).unwrap();
+        let (ended, steps) = walk(&map, [0.4, 1.0, 0.0], &[[2.6, 1.0]], &Back);
+        // Beyond the block there is no way back up; wherever else it comes to, it gets away from.
+        if ended == Ended::Arrived {
+            continue;
+        }
+        stopped += 1;
+        let reached = end(&steps);
+        let (ended, _) = walk(&map, [0.4, 1.0, 0.0], &[[reached[0], 1.0], [0.5, 1.0]], &Back);
+        assert_eq!(ended, Ended::Arrived, "block at {x}: {reached:?}");
+    }
+    assert!(stopped > 3, "{stopped}");
+}
+
+#[test]
+fn falls_from_the_sky_and_creeping_along_walls_end() {
+    let map = map_of(&scan(), Up::Z);
+    let (_, steps) = walk(&map, [1.2, 8.0, 1e9], &[[1.2, 8.0]], &Back);
+    assert!(steps.len() < 100 && end(&steps)[2] < 4.0, "{} steps", steps.len());
+    let (_, steps) = walk(&map, [-1e6, 8.0, 1e9], &[[-1e6, 8.0]], &Back);
+    assert!(steps.len() < 100, "{} steps", steps.len());
+    let points = [
+        level([0.0, 0.0], [4.0, 4.0], 0.0),
+        (0..50_u32).flat_map(|i| level([2.0, 0.0], [2.02, 4.0], 0.02 * f64::from(i))).collect(),
+    ]
+    .concat();
+    let (ended, steps) = walk(&map_of(&points, Up::Z), [1.0, 0.5, 0.0], &[[3.0, 2.0]], &Slide);
+    assert!(matches!(ended, Ended::Stuck { .. }) && steps.len() < 400, "{ended:?} after {}", steps.len());
+    assert!((end(&steps)[1] - 2.0).abs() < 0.05, "{:?}", end(&steps));
+}
+
 #[test]
 fn starts_that_do_not_serve_are_refused() {
     let map = map_of(&scan(), Up::Z);
