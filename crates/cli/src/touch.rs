@@ -18,8 +18,8 @@ use crate::preprocess::parse_threads;
 pub struct TouchArgs {
     /// The scan: prepared, or a raw input, prepared on the fly
     pub scan: PathBuf,
-    /// A shape a line, in world units: {"sphere":{"centre":[x,y,z],"radius":r}}, {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}} or
-    /// {"box":{"pose":[16 numbers],"half":[x,y,z]}}; an answer a line, in order
+    /// A shape a line, in world units: `{"sphere":{"centre":[x,y,z],"radius":r}}`, `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}` or
+    /// `{"box":{"pose":[16 numbers],"half":[x,y,z]}}`; an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl")]
     pub shapes: PathBuf,
     /// Pose of the scan, object to world: 16 numbers, row-major, in one argument, or a file that holds them

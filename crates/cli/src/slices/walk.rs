@@ -23,7 +23,7 @@ use crate::{output, picture};
 pub struct WalkArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// The route: {"start":[x,y,z],"points":[[x,y],…]}, the points by the two coordinates across the axis that points up
+    /// The route: `{"start":[x,y,z],"points":[[x,y],…]}`, the points by the two coordinates across the axis that points up
     #[arg(long, value_name = "FILE.json")]
     pub route: PathBuf,
     /// Width, depth and height of the avatar
