@@ -43,7 +43,7 @@ impl BlockTree<'_> {
         ))
     }
 
-    /// As [`Self::any_within`], for a ball about `centre`, given what [`Cells::near`] tells of it: a few blocks instead of a descent.
+    /// As [`Self::any_within`], for a ball about `centre`, given what [`Cells::near`](crate::Cells::near) tells of it: a few blocks instead of a descent.
     ///
     /// # Panics
     /// When a block is named that is none.
