@@ -7,7 +7,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::bits::Bits;
 
-/// A layer of voxels. A pixel takes 1¾ bytes, whatever it holds.
+/// A layer of voxels. A pixel takes 1¾ bytes, whatever it holds; the bits of a row take whole words of 64.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Slice {
     width: u32,
