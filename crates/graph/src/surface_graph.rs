@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::length::distance;
 use crate::orient::{Decision, OrientedPart, Sides, orient};
+use crate::parallel::both;
 use crate::{
     Adjacency, ClosePairs, Flaw, GeodesicKernel, GraphCounts, GraphError, GraphMeta, GraphOptions, LazyPath,
-    Levels, LoadError, Network, PointGraph, edge_lengths,
+    Levels, LoadError, Network, Paths, PointGraph, edge_lengths,
 };
 
 /// Ways over virtual edges stay where the sum of the distances from both ends is at most so many times their distance.
@@ -44,7 +45,8 @@ pub struct SurfaceGraph {
     parts: Array<StoredPart>,
     /// Of the points, then of the cells of each level; none, or all.
     close_pairs: Vec<ClosePairs>,
-    levels: Levels,
+    /// There and stored with the map of close pairs, or made when first wanted.
+    levels: OnceLock<Levels>,
     /// Made when first wanted.
     lengths: OnceLock<Vec<f32>>,
     areas: OnceLock<Vec<f64>>,
@@ -101,27 +103,32 @@ impl SurfaceGraph {
     ) -> Result<Self, GraphError> {
         let points = PointGraph::build(samples.positions, options)?;
         let oriented = orient(points.edges(), samples.positions, samples.radii, sides, normals);
-        let lengths = edge_lengths(points.edges(), samples.positions);
-        let network = Network::new(points.edges(), &lengths);
-        let levels = Levels::build(network, samples.radii);
-        let plan = samples.plan;
-        let close_pairs = options.close_pairs.map_or_else(Vec::new, |paths| {
-            let of_points = (network, samples.radii);
-            let of_cells = levels.cells().iter().map(|cells| (cells.network(), cells.radii()));
-            let map = |(network, radii)| ClosePairs::build(network, &horizons(plan, radii), paths);
-            std::iter::once(of_points).chain(of_cells).map(map).collect()
-        });
         let parts: Vec<StoredPart> = oriented.parts.iter().map(StoredPart::of).collect();
-        Ok(Self {
+        let graph = Self {
             points,
             confidence: oriented.confidence.into(),
             parts: parts.into(),
-            close_pairs,
-            levels,
-            lengths: lengths.into(),
+            close_pairs: Vec::new(),
+            levels: OnceLock::new(),
+            lengths: OnceLock::new(),
             areas: OnceLock::new(),
             bridged: OnceLock::new(),
+        };
+        Ok(match options.close_pairs {
+            None => graph,
+            Some(paths) => graph.with_close_pairs(samples, paths),
         })
+    }
+
+    fn with_close_pairs(self, samples: Samples<'_>, paths: Paths) -> Self {
+        let network = self.network(samples.positions);
+        let map = |network, radii: &[f32]| ClosePairs::build(network, &horizons(samples.plan, radii), paths);
+        // Levels are made on one core.
+        let (of_points, levels) =
+            both(|| map(network, samples.radii), || self.levels(samples.positions, samples.radii));
+        let of_cells = levels.cells().iter().map(|cells| map(cells.network(), cells.radii()));
+        let close_pairs = std::iter::once(of_points).chain(of_cells).collect();
+        Self { close_pairs, ..self }
     }
 
     /// Who is joined to whom.
@@ -154,10 +161,14 @@ impl SurfaceGraph {
         self.close_pairs.get(level.checked_add(1)?)
     }
 
-    /// Coarser graphs over ever fewer of the points.
+    /// Coarser graphs over ever fewer of the points. With a map of close pairs they are there; without they are made when first wanted,
+    /// some second for a million points.
+    ///
+    /// # Panics
+    /// When there is not a position and a radius for each point.
     #[must_use]
-    pub fn levels(&self) -> &Levels {
-        &self.levels
+    pub fn levels(&self, positions: &[[f32; 3]], radii: &[f32]) -> &Levels {
+        self.levels.get_or_init(|| Levels::build(self.network(positions), radii))
     }
 
     /// The edges with their lengths, for searches; these are made when first wanted.
@@ -195,10 +206,10 @@ impl SurfaceGraph {
         })
     }
 
-    /// Makes what searches along the graph make when they first want it: lengths, [areas](Self::areas) and [bridges](Self::bridged_network).
-    /// O(e) for e edges. For those who want the first search to be as fast as the next.
+    /// Makes what searches along the graph make when they first want it: lengths, [areas](Self::areas), [bridges](Self::bridged_network) and
+    /// [levels](Self::levels). O(e log e) for e edges. For those who want the first search to be as fast as the next.
     pub fn make_ready(&self, samples: Samples<'_>) {
-        let _ = self.network(samples.positions);
+        let _ = self.levels(samples.positions, samples.radii);
         let _ = self.bridged_network(samples.positions);
         let _ = self.areas(samples.radii);
     }
@@ -206,9 +217,9 @@ impl SurfaceGraph {
     /// Makes `path` one from `a` to `b` along the surface, as [`LazyPath::lead`] does. False, with no path, where none leads there.
     ///
     /// # Panics
-    /// When there is no such point, or not a position for each.
-    pub fn lead(&self, positions: &[[f32; 3]], ends: [u32; 2], path: &mut LazyPath) -> bool {
-        path.lead(&self.levels, self.network(positions), positions, ends)
+    /// When there is no such point, or not a position and a radius for each.
+    pub fn lead(&self, positions: &[[f32; 3]], radii: &[f32], ends: [u32; 2], path: &mut LazyPath) -> bool {
+        path.lead(self.levels(positions, radii), self.network(positions), positions, ends)
     }
 
     /// Makes `path` a shortest one from `a` to `b` over virtual edges too, as far as it stays near both: the sum of the distances
@@ -245,7 +256,11 @@ impl SurfaceGraph {
     #[must_use]
     pub fn byte_lens(&self) -> [usize; 3] {
         let graph = self.points.bytes() + self.confidence.len() + size_of_val::<[_]>(&self.parts);
-        [graph, self.close_pairs.iter().map(ClosePairs::byte_len).sum(), self.levels.byte_len()]
+        [
+            graph,
+            self.close_pairs.iter().map(ClosePairs::byte_len).sum(),
+            self.levels.get().map_or(0, Levels::byte_len),
+        ]
     }
 
     /// What is stored beside the arrays.
@@ -264,7 +279,10 @@ impl SurfaceGraph {
         for (part, pairs) in (0..).zip(&self.close_pairs) {
             pairs.add_to(writer, part)?;
         }
-        self.levels.add_to(writer)
+        match self.levels.get() {
+            Some(levels) if !self.close_pairs.is_empty() => levels.add_to(writer),
+            _ => Ok(()),
+        }
     }
 
     /// The graph of `samples` in `file`, its arrays in place. With either `check` no use of it fails. With [`Check::Full`]
@@ -297,11 +315,15 @@ impl SurfaceGraph {
         if check == Check::Full {
             check_parts(&parts, points.components())?;
         }
-        let levels = Levels::load(file, count, check)?;
-        let radii = std::iter::once(samples.radii).chain(levels.cells().iter().map(|cells| cells.radii()));
-        let maps = (0..).zip(radii).filter(|_| meta.has_close_pairs);
-        let map = |(part, radii)| ClosePairs::load(file, part, &horizons(samples.plan, radii), check);
-        let close_pairs = maps.map(map).collect::<Result<_, _>>()?;
+        let (mut close_pairs, mut levels) = (Vec::new(), OnceLock::new());
+        if meta.has_close_pairs {
+            let stored = Levels::load(file, count, check)?;
+            let radii =
+                std::iter::once(samples.radii).chain(stored.cells().iter().map(|cells| cells.radii()));
+            let map = |(part, radii)| ClosePairs::load(file, part, &horizons(samples.plan, radii), check);
+            close_pairs = (0..).zip(radii).map(map).collect::<Result<_, _>>()?;
+            levels = stored.into();
+        }
         Ok(Self {
             points,
             confidence,

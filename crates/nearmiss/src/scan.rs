@@ -59,8 +59,11 @@ impl From<nearmiss_graph::LoadError> for LoadError {
 /// What a container of ours holds.
 const KIND: [u8; 4] = *b"SCAN";
 
-/// Version of the layout of a scan's sections and metadata. Older versions are refused by name.
-const VERSION: u32 = 6;
+/// Version of the layout of a scan's sections and metadata.
+const VERSION: u32 = 7;
+
+/// Versions before this are refused by name. In this one graphs have levels even without a map of close pairs.
+const OLDEST: u32 = 6;
 
 /// What a scan's file holds beside arrays.
 #[derive(Debug, Serialize, Deserialize)]
@@ -204,7 +207,7 @@ impl Scan {
     }
 
     /// Makes what searches along the graph make when they first want it, if there is a graph: some tenths of a second for a million
-    /// points. So the first [`Interpolation`](crate::Interpolation) takes no longer than the next, and keeps its deadline.
+    /// points with a map of close pairs, some second and a half without. So the first [`Interpolation`](crate::Interpolation) takes no longer than the next, and keeps its deadline.
     pub fn make_ready(&self) {
         if let Some(graph) = &self.graph {
             graph.make_ready(samples(&self.hierarchy));
@@ -282,7 +285,7 @@ impl Scan {
     }
 
     fn load(file: &File, check: Check) -> Result<Self, LoadError> {
-        file.expect(KIND, VERSION..=VERSION)?;
+        file.expect(KIND, OLDEST..=VERSION)?;
         let meta: ScanMeta = file.metadata()?;
         let hierarchy = PointHierarchy::load(file, meta.hierarchy, check)?;
         let graph =

@@ -84,11 +84,12 @@ fn a_graph_is_kept_as_it_was_asked_for() {
             assert_eq!(read.graph().unwrap().close_pairs().map(|map| map.paths()), pairs);
             assert_eq!(read.geodesic_kernel().is_some(), pairs.is_some());
             let graph = read.graph().unwrap();
-            for level in 0..graph.levels().cells().len() {
+            let levels = graph.levels(read.positions(), read.radii());
+            for level in 0..levels.cells().len() {
                 let map = graph.close_cells(level);
-                assert_eq!(map.map(ClosePairs::len), pairs.map(|_| graph.levels().cells()[level].len()));
+                assert_eq!(map.map(ClosePairs::len), pairs.map(|_| levels.cells()[level].len()));
             }
-            assert!(!graph.levels().cells().is_empty() && graph.close_cells(9).is_none(), "some levels");
+            assert!(!levels.cells().is_empty() && graph.close_cells(9).is_none(), "some levels");
             assert!(read.is_oriented(), "normals were turned");
         }
     }

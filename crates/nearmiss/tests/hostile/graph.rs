@@ -39,7 +39,7 @@ pub(crate) fn exercise_graph(scan: &Scan) -> Option<GraphAnswers> {
             answers.paths.push(path.clone());
         };
         keep(search.path(network, i, j, &mut path), &path);
-        keep(graph.levels().path(network, [i, j], &mut far, &mut path), &path);
+        keep(graph.levels(positions, scan.radii()).path(network, [i, j], &mut far, &mut path), &path);
         answers.counts.push(search.within(network, i, scan.radii()[i as usize]).len());
         let Some(pairs) = graph.close_pairs() else { continue };
         for close in pairs.of(i as usize).take(20) {
@@ -49,7 +49,7 @@ pub(crate) fn exercise_graph(scan: &Scan) -> Option<GraphAnswers> {
             answers.paths.push(path.clone());
         }
     }
-    for cells in graph.levels().cells() {
+    for cells in graph.levels(positions, scan.radii()).cells() {
         let network = cells.network();
         let goal = u32::try_from(cells.len()).unwrap() - 1;
         let length = search.path(network, 0, goal, &mut path);
