@@ -21,6 +21,12 @@ use crate::split::id32;
 /// Children of a node.
 const WIDTH: usize = 4;
 
+/// Pairs of children.
+const LANES: usize = WIDTH * WIDTH;
+
+/// How often a descent turns to the best pair of all.
+const TURNS: u32 = 64;
+
 type Lanes = [f32; WIDTH];
 
 /// A leaf by its number in the order of the points, or an inner node by its place in the [`WideTree`].
@@ -141,6 +147,9 @@ pub trait LeafVisitor {
         let _ = least;
     }
 
+    /// Whether it is after any pair of leaves that meets, not after all: then the likeliest come first.
+    fn wants_any(&self) -> bool;
+
     /// So many pairs of boxes were compared; may end the descent.
     fn compared(&mut self, pairs: u32) -> ControlFlow<()>;
 
@@ -151,7 +160,15 @@ pub trait LeafVisitor {
 /// The pairs that a descent has still to look at.
 #[derive(Debug, Clone, Default)]
 pub struct WideStack {
-    pairs: Vec<[Child; 2]>,
+    pairs: Vec<Open>,
+}
+
+/// A pair that is not apart.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    pair: [Child; 2],
+    /// The distance of the centres as a share of how far the boxes reach: less where they overlap more.
+    share: f32,
 }
 
 impl WideStack {
@@ -160,14 +177,35 @@ impl WideStack {
         self.pairs.clear();
     }
 
+    /// Brings the pair to the top that overlaps most, of several the first, if there are turns left.
+    #[inline(always)]
+    fn turn_to_best(&mut self, turns: &mut u32) {
+        let Some(left) = turns.checked_sub(1) else { return };
+        *turns = left;
+        let (mut best, mut least) = (0, f32::INFINITY);
+        for (i, open) in self.pairs.iter().enumerate() {
+            if open.share < least {
+                (best, least) = (i, open.share);
+            }
+        }
+        if let Some(last) = self.pairs.len().checked_sub(1) {
+            self.pairs.swap(best, last);
+        }
+    }
+
     /// The pairs still there, as those of the binary trees of `a` and `b`, the next first.
     pub fn open(&self, a: &Slices<'_>, b: &Slices<'_>) -> impl Iterator<Item = NodePair> {
-        self.pairs.iter().rev().map(|&[of_a, of_b]| NodePair { a: a.wide.id(of_a), b: b.wide.id(of_b) })
+        let pairs = self.pairs.iter().rev();
+        pairs.map(|open| NodePair { a: a.wide.id(open.pair[0]), b: b.wide.id(open.pair[1]) })
     }
 }
 
-/// Visits the pairs of leaves of `a` and `b` whose boxes are no further apart than `reach`, in a's frame, until `visitor` ends it: depth
-/// first, of siblings those that overlap most first. The other fifteen are not sorted, which costs what it saves.
+/// Visits the pairs of leaves of `a` and `b` whose boxes are no further apart than `reach`, in a's frame, until `visitor` ends it.
+///
+/// Of siblings the pair that overlaps most comes first, and so on down to the leaves. Where nothing is found there and the visitor wants
+/// any, the next is the pair that overlaps most of all that are left: the neighbours of leaves that do not meet seldom do (plunging, as
+/// branch and bound calls it; docs/decisions). After so many turns, the others are looked at depth first: what meets would have
+/// been found, and looking for the best would take longer than looking at all.
 pub fn descend_wide<V: LeafVisitor>(
     (a, b): (&Slices<'_>, &Slices<'_>),
     relative: &Relative,
@@ -176,16 +214,34 @@ pub fn descend_wide<V: LeafVisitor>(
     stack: &mut WideStack,
     visitor: &mut V,
 ) -> ControlFlow<()> {
-    stack.pairs.clear();
-    stack.pairs.push([a.wide.root(), b.wide.root()]);
-    while let Some(pair) = stack.pairs.pop() {
+    stack.clear();
+    stack.pairs.push(Open { pair: [a.wide.root(), b.wide.root()], share: 0.0 });
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || descend_by(simd, (a, b), relative, reach, stack, visitor),
+    ))
+}
+
+#[inline(always)]
+fn descend_by<S: Simd, V: LeafVisitor>(
+    simd: S,
+    (a, b): (&Slices<'_>, &Slices<'_>),
+    relative: &Relative,
+    reach: f32,
+    stack: &mut WideStack,
+    visitor: &mut V,
+) -> ControlFlow<()> {
+    let mut turns = if visitor.wants_any() { TURNS } else { 0 };
+    while let Some(open) = stack.pairs.pop() {
+        let pair = open.pair;
         if pair[0].is_leaf() && pair[1].is_leaf() {
             let flow = visitor.leaf_pair(pair.map(Child::index));
             if flow.is_break() {
                 // It was not looked at to the end, so it is still open.
-                stack.pairs.push(pair);
+                stack.pairs.push(open);
                 return flow;
             }
+            stack.turn_to_best(&mut turns);
             continue;
         }
         let [whole_a, whole_b] = whole([a.wide, b.wide], pair, relative.scale());
@@ -202,23 +258,27 @@ pub fn descend_wide<V: LeafVisitor>(
         } else {
             &b.wide.nodes[pair[1].index()]
         };
-        let Near { mut lanes, most, compared, apart } = dispatch!(level, simd => simd.vectorize(
-            #[inline(always)]
-            || compare(simd, relative, [below_a, below_b], (reach, V::NOTES_GAPS)),
-        ));
+        let Near { mut lanes, most, shares, compared, apart } =
+            compare(simd, relative, [below_a, below_b], (reach, V::NOTES_GAPS));
         if V::NOTES_GAPS {
             visitor.apart(apart);
         }
-        if lanes != 0 {
-            let child = |lane: u32| {
-                [below_a.children[lane as usize % WIDTH], below_b.children[lane as usize / WIDTH]]
+        if lanes == 0 {
+            stack.turn_to_best(&mut turns);
+        } else {
+            let open = |lane: u32| Open {
+                pair: [
+                    below_a.children[lane as usize % WIDTH],
+                    below_b.children[lane as usize / WIDTH % WIDTH],
+                ],
+                share: shares[lane as usize % LANES],
             };
             lanes &= !(1 << most);
             while lanes != 0 {
-                stack.pairs.push(child(lanes.trailing_zeros()));
+                stack.pairs.push(open(lanes.trailing_zeros()));
                 lanes &= lanes - 1;
             }
-            stack.pairs.push(child(most));
+            stack.pairs.push(open(most));
         }
         visitor.compared(compared)?;
     }
@@ -234,10 +294,16 @@ fn whole(trees: [&WideTree; 2], pair: [Child; 2], scale: f32) -> [bool; 2] {
     }
     let longest = |side: usize| {
         let [a, b, c, d] = trees[side].nodes[pair[side].index()].half[0];
-        a.max(b).max(c.max(d))
+        greater(greater(a, b), greater(c, d))
     };
     let (a, b) = (longest(0), longest(1) * scale);
     [b > 2.0 * a, a > 2.0 * b]
+}
+
+/// Of two numbers.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 impl Slices<'_> {
@@ -256,6 +322,8 @@ struct Near {
     lanes: u32,
     /// The one of these that overlaps most: as [`Relative::gaps_and_overlaps`] has it.
     most: u32,
+    /// How far they are from each other, in that sense.
+    shares: [f32; LANES],
     /// How many there are at all.
     compared: u32,
     /// How far those that are apart are at least, if that is wanted.
@@ -319,6 +387,7 @@ fn compare<S: Simd>(
         lanes,
         // What is no number has no least.
         most: if most == 0 { lanes } else { most }.trailing_zeros(),
+        shares: share.to_array(),
         compared: of_a.count_ones() * of_b.count_ones(),
         apart,
     }

@@ -1,7 +1,7 @@
 //! The query: do two scans meet?
 //!
 //! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
-//! children of both, or of the much larger one; the deepest overlap first.
+//! children of both, or of the much larger one; the deepest overlap first, after nothing that of all that is left.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -159,7 +159,7 @@ impl Contacts {
 
 /// As [`collide_with`], but looks on after the first contact and leaves all of them in `contacts`: one for each pair of leaves of which
 /// two discs cross (two points are near enough, a test point saw the crossing, as `plan` means it), to first order. The
-/// answer's is the first that is certified, of the first few, or else the first.
+/// answer's is the first that is certified, of the first few, or else the first; [`collide_with`], which looks for any, may tell of another of them.
 ///
 /// Costs a descent to all leaves that meet; does not allocate once `scratch` and `contacts` are warm.
 pub fn collide_all(

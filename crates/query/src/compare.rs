@@ -12,6 +12,12 @@ use crate::verdict::Reason;
 
 impl LeafVisitor for Surfaces<'_> {
     #[inline]
+    fn wants_any(&self) -> bool {
+        // Within a margin boxes that overlap most are beside each other rather than near, and fewer witnesses verify there.
+        self.all.is_none() && self.margin == 0.0
+    }
+
+    #[inline]
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.pair.meter.spent.node_pairs += u64::from(pairs);
         self.pair.meter.go_on()

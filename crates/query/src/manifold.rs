@@ -257,6 +257,11 @@ struct Near<'a, 'p> {
 
 impl LeafVisitor for Near<'_, '_> {
     #[inline]
+    fn wants_any(&self) -> bool {
+        false
+    }
+
+    #[inline]
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.pair.meter.spent.node_pairs += u64::from(pairs);
         self.pair.meter.go_on()

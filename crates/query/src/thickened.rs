@@ -58,6 +58,11 @@ impl LeafVisitor for Balls<'_> {
     const NOTES_GAPS: bool = true;
 
     #[inline]
+    fn wants_any(&self) -> bool {
+        self.all.is_none()
+    }
+
+    #[inline]
     fn apart(&mut self, least: f32) {
         let bound = f64::from(least - self.pair.relative.slack()) * self.pair.views[0].placed().scale();
         self.apart = self.apart.min(bound);

@@ -24,9 +24,14 @@ struct All {
     leaves: Vec<[usize; 2]>,
     most: usize,
     compared: u64,
+    wants_any: bool,
 }
 
 impl LeafVisitor for All {
+    fn wants_any(&self) -> bool {
+        self.wants_any
+    }
+
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.compared += u64::from(pairs);
         ControlFlow::Continue(())
@@ -154,6 +159,10 @@ fn sixteen_pairs_at_once_are_what_one_by_one_is() {
             ));
             assert_eq!((found.lanes, found.compared), (near, compared), "round {round}, {level:?}");
             assert_eq!(found.apart.to_bits(), apart.to_bits(), "round {round}, {level:?}");
+            for lane in (0..16).filter(|lane| near >> lane & 1 == 1) {
+                let expected = overlap(lane).map(|(_, overlap)| overlap);
+                assert_eq!(Some(1.0 - found.shares[lane as usize]), expected, "{round}, {level:?}");
+            }
             if near != 0 {
                 assert_eq!(overlap(found.most).map(|(_, overlap)| overlap), Some(most), "{round}, {level:?}");
             }
@@ -215,4 +224,83 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
         }
     }
     assert!(found_any > 200, "{found_any}");
+}
+
+/// The leaves that are near in the order of the descent, one pair of boxes after the other, from the binary trees.
+fn plunged([a, b]: [&PointHierarchy; 2], relative: &Relative, reach: f32, mut turns: u32) -> Vec<[usize; 2]> {
+    let number = |scan: &PointHierarchy, id: NodeId| (scan.nodes[id.index()].first / scan.leaf_size) as usize;
+    let is_leaf = |scan: &PointHierarchy, id: NodeId| scan.nodes[id.index()].is_leaf();
+    let below = |scan: &PointHierarchy, id: NodeId| -> Vec<NodeId> {
+        let children = |id: NodeId| {
+            if is_leaf(scan, id) { vec![id] } else { scan.nodes[id.index()].children(id).to_vec() }
+        };
+        children(id).into_iter().flat_map(children).collect()
+    };
+    let longest = |scan: &PointHierarchy, id: NodeId| {
+        below(scan, id).into_iter().map(|id| scan.boxes[id.index()].half[0]).fold(0.0, f32::max)
+    };
+    let mut order = Vec::new();
+    let mut open = vec![(NodeId::ROOT, NodeId::ROOT, 1.0)];
+    while let Some((of_a, of_b, _)) = open.pop() {
+        let leaves = [is_leaf(a, of_a), is_leaf(b, of_b)];
+        let mut whole = leaves;
+        if leaves == [true; 2] {
+            order.push([number(a, of_a), number(b, of_b)]);
+        } else if leaves == [false; 2] {
+            let lengths = [longest(a, of_a), longest(b, of_b) * relative.scale()];
+            whole = [lengths[1] > 2.0 * lengths[0], lengths[0] > 2.0 * lengths[1]];
+        }
+        let mut near = Vec::new();
+        if leaves != [true; 2] {
+            let split = |scan, id, whole: bool| if whole { vec![id] } else { below(scan, id) };
+            for &b_id in &split(b, of_b, whole[1]) {
+                for &a_id in &split(a, of_a, whole[0]) {
+                    let boxes = ([&a.boxes[a_id.index()]; 2], [&b.boxes[b_id.index()]; 2]);
+                    let (gaps, overlaps) = relative.gaps_and_overlaps(boxes.0, boxes.1, f32::MIN_POSITIVE);
+                    if gaps[0] <= reach {
+                        near.push((a_id, b_id, overlaps[0]));
+                    }
+                }
+            }
+        }
+        // The first of those that overlap most.
+        let best = |pairs: &[(NodeId, NodeId, f32)]| {
+            (0..pairs.len()).rev().max_by(|&i, &j| pairs[i].2.total_cmp(&pairs[j].2))
+        };
+        if let Some(most) = best(&near) {
+            let most = near.remove(most);
+            open.extend(near);
+            open.push(most);
+        } else if let Some(most) = best(&open).filter(|_| turns > 0) {
+            turns -= 1;
+            let last = open.len() - 1;
+            open.swap(most, last);
+        }
+    }
+    order
+}
+
+#[test]
+fn after_nothing_comes_what_overlaps_most_of_all_that_is_left() {
+    let rng = &mut rng(6);
+    let (mut pairs, mut turns) = (0, 0);
+    for round in 0..40_usize {
+        let leaf_size = [16, 7][round % 2];
+        let a = scan(rng, [700, 60, 1500][round % 3], [1.0, 1.0, 0.1], leaf_size);
+        let b = scan(rng, [900, 1100, 40][round / 3 % 3], [1.0, 0.7, 0.2], leaf_size);
+        let pose = Pose::from_axis_angle(unit_vector(rng), 2.0).with_scale([1.0, 0.3, 4.0][round % 3]);
+        let relative = Relative::new(&pose.with_translation(point_in(rng, 0.5)), 64.0);
+        let wants_any = round % 4 != 0;
+        let expected = plunged([&a, &b], &relative, 0.05, if wants_any { TURNS } else { 0 });
+        for level in levels() {
+            let mut visitor = All { most: usize::MAX, wants_any, ..All::default() };
+            let stack = &mut WideStack::default();
+            let trees = (&a.slices(), &b.slices());
+            assert!(descend_wide(trees, &relative, 0.05, level, stack, &mut visitor).is_continue());
+            assert_eq!(visitor.leaves, expected, "round {round}, {level:?}");
+        }
+        pairs += expected.len();
+        turns += expected.windows(2).filter(|two| two[0][0].abs_diff(two[1][0]) > 8).count();
+    }
+    assert!(pairs > 2000 && turns > 200, "{pairs} {turns}");
 }

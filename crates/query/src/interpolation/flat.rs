@@ -180,11 +180,11 @@ impl Surfaces<'_> {
 
     /// Looks for an intersection on the path between two points on either side.
     fn search_between(&mut self, bracket: &Bracket, ways: &mut Ways<'_>) -> ControlFlow<()> {
-        let positions = self.pair.a.positions;
+        let (positions, radii) = (self.pair.a.positions, self.pair.a.radii);
         let Ways { search, graph, path, .. } = ways;
         let tries = self.tries;
         let mut length = f64::INFINITY;
-        if graph.lead(positions, bracket.points, path) {
+        if graph.lead(positions, radii, bracket.points, path) {
             length = path.length();
             self.search_along(path, bracket, graph, search)?;
         }
@@ -214,8 +214,8 @@ impl Surfaces<'_> {
         let arrived = ARRIVED * f64::from(self.pair.b.radii[hint as usize]) * self.scale_of_b();
         let nearer = usize::from(last.distance.abs() < first.distance.abs());
         let slope = self.slope(bracket.points[nearer], &bracket.sides[nearer]);
-        let positions = self.pair.a.positions;
-        let mut along = GraphPath { path, levels: graph.levels(), positions, slope };
+        let (positions, radii) = (self.pair.a.positions, self.pair.a.radii);
+        let mut along = GraphPath { path, levels: graph.levels(positions, radii), positions, slope };
         let root = find_root(&mut along, [first.distance, last.distance], arrived, |along, k| {
             if self.pair.meter.go_on().is_break() {
                 return None;
