@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nearmiss_geometry::CloudError;
 use thiserror::Error;
@@ -355,5 +355,11 @@ impl Broken {
     pub(crate) fn within(mut self, element: &str, index: u64) -> Self {
         self.place.item = Some(Item { element: element.into(), index });
         self
+    }
+
+    /// As the fault of this file.
+    pub(crate) fn of(self, path: &Path) -> ReadError {
+        let Self { place, fault } = self;
+        ReadError::Malformed { path: path.into(), place, fault }
     }
 }

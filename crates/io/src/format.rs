@@ -59,12 +59,13 @@ impl fmt::Display for Format {
 /// Endings of names of text files that hold points and nothing else.
 const TEXT_ENDINGS: [&str; 9] = ["xyz", "csv", "txt", "asc", "pts", "xyzn", "xyzrgb", "3d", "neu"];
 
-/// The format of a file; refuses those that are known but cannot be read.
-pub(crate) fn recognise(bytes: &[u8], name: &Path) -> Result<Format, ReadError> {
+/// The format of a file of this length from its start, 64 KiB unless it is shorter; refuses those that are known but cannot be
+/// read.
+pub(crate) fn recognise(bytes: &[u8], length: u64, name: &Path) -> Result<Format, ReadError> {
     let unsupported = |format| ReadError::Unsupported { path: name.into(), format };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let ending = ending.to_ascii_lowercase();
-    if let Some(foreign) = foreign_magic(bytes) {
+    if let Some(foreign) = foreign_magic(bytes, length) {
         return Err(unsupported(foreign));
     }
     if let Some(format) = magic(bytes) {
@@ -88,7 +89,7 @@ fn magic(bytes: &[u8]) -> Option<Format> {
     is_pcd.then_some(Format::Pcd)
 }
 
-fn foreign_magic(bytes: &[u8]) -> Option<Foreign> {
+fn foreign_magic(bytes: &[u8], length: u64) -> Option<Foreign> {
     // Of the byte that holds the point format, laszip sets the highest bit.
     let is_laz = bytes.get(104).is_some_and(|format| format & 0x80 != 0);
     let is_ascii_stl = || {
@@ -103,17 +104,17 @@ fn foreign_magic(bytes: &[u8]) -> Option<Foreign> {
         [b'P', b'K', 3, 4, ..] => Some(Foreign::Zip),
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some(Foreign::Utf16),
         _ if bytes.starts_with(b"ASTM-E57") => Some(Foreign::E57),
-        _ if is_ascii_stl() || is_binary_stl(bytes) => Some(Foreign::Stl),
+        _ if is_ascii_stl() || is_binary_stl(bytes, length) => Some(Foreign::Stl),
         _ if matches!(first_word(bytes)?, b"OFF" | b"COFF" | b"NOFF" | b"STOFF") => Some(Foreign::Off),
         _ => None,
     }
 }
 
 /// Binary STL has no magic, but its length follows from a count: a header of 80 bytes, then 50 a triangle.
-fn is_binary_stl(bytes: &[u8]) -> bool {
+fn is_binary_stl(bytes: &[u8], length: u64) -> bool {
     let count = bytes.get(80..84).and_then(<[u8]>::first_chunk);
     let promised = count.map(|count| 84 + 50 * u64::from(u32::from_le_bytes(*count)));
-    promised == Some(bytes.len() as u64)
+    promised == Some(length)
 }
 
 fn foreign_ending(ending: &str) -> Option<Foreign> {
@@ -155,7 +156,7 @@ mod tests {
     use super::*;
 
     fn of(bytes: &[u8], name: &str) -> Result<Format, String> {
-        recognise(bytes, Path::new(name)).map_err(|e| e.to_string())
+        recognise(bytes, bytes.len() as u64, Path::new(name)).map_err(|e| e.to_string())
     }
 
     #[test]

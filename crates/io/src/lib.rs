@@ -12,6 +12,8 @@ mod pcd;
 mod ply;
 mod xyz;
 
+mod pieces;
+
 mod columns;
 mod scalar;
 mod text;
@@ -20,6 +22,7 @@ mod write;
 
 pub use error::{At, Fault, Foreign, Item, Place, ReadError};
 pub use format::{Format, UnknownFormatName};
+pub use pieces::{Pieces, PointPieces, read_in_pieces};
 pub use read::{read, read_bytes, read_mesh, read_mesh_bytes};
 pub use sink::Model;
 pub use write::{Column, PlyPoints, WriteError};

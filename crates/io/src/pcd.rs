@@ -8,9 +8,10 @@ mod lzf;
 
 use crate::columns::Row;
 use crate::error::{Broken, Fault};
+use crate::pieces::{self, Layout, Rows};
 use crate::scalar::{Order, Scalar};
 use crate::sink::Sink;
-use crate::text::{Lines, number, shown, whole};
+use crate::text::{Line, Lines, number, shown, whole};
 use header::{Encoding, Field, Header, Part};
 
 /// Memory that reading takes for each point, beside its bytes: in double precision, then rounded and sorted.
@@ -30,6 +31,40 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
         Encoding::Ascii => ascii(&header, lines),
         Encoding::Binary => binary(&header, bytes, lines.offset()),
         Encoding::Compressed => compressed(&header, bytes, lines.offset()),
+    }
+}
+
+/// How to go over the points of a file that begins like this, unless they are compressed or it is broken.
+pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
+    let (header, lines) = header::parse(head).ok()?;
+    let encoding = match header.encoding {
+        Encoding::Ascii => pieces::Encoding::of_text(&lines),
+        Encoding::Binary => pieces::Encoding::Binary { stride: header.stride },
+        Encoding::Compressed => return None,
+    };
+    let promised = Some((header.points, header.line));
+    Some(Layout {
+        start: lines.offset(),
+        encoding,
+        element: "point".into(),
+        promised,
+        rows: Box::new(header),
+    })
+}
+
+impl Rows for Header {
+    fn is_row(&self, line: &Line<'_>) -> bool {
+        !line.text.trim_ascii().is_empty()
+    }
+
+    fn line(&self, line: Line<'_>, row: &mut Row) -> Result<(), Fault> {
+        words_to_row(self, line.words(), row)
+    }
+
+    fn record(&self, bytes: &[u8], row: &mut Row) {
+        for field in &self.fields {
+            field.read(&bytes[field.offset..], row);
+        }
     }
 }
 

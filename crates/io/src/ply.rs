@@ -10,7 +10,10 @@ mod source;
 
 use crate::columns::{Holds, Row};
 use crate::error::{Broken, Fault};
+use crate::pieces::{self, Layout, Rows};
+use crate::scalar::Order;
 use crate::sink::{Sink, corner};
+use crate::text::Line;
 use header::{Element, Encoding, Header, Part, Role};
 use source::{Ascii, Binary, Source};
 
@@ -28,12 +31,66 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     }
 }
 
+/// How to go over the vertices of a file that begins like this, if there is nothing else in it and it is not broken.
+pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
+    let (header, lines) = header::parse(head).ok()?;
+    let mut elements = header.elements.into_iter().filter(|e| !e.properties.is_empty() && e.count > 0);
+    let vertex = elements.next().filter(|element| element.role == Role::Vertex)?;
+    Holds::among(vertex.slots()).ok()?;
+    if elements.next().is_some() {
+        return None;
+    }
+    let (encoding, order) = match header.encoding {
+        Encoding::Ascii => (pieces::Encoding::of_text(&lines), Order::Little),
+        Encoding::Binary(_) if vertex.properties.iter().any(|property| property.list.is_some()) => {
+            return None;
+        }
+        Encoding::Binary(order) => {
+            let stride = Binary::new(&[], 0, order).least_size(&vertex);
+            (pieces::Encoding::Binary { stride }, order)
+        }
+    };
+    let (element, promised) = (vertex.name.clone(), Some((vertex.count, vertex.line)));
+    let rows = Box::new(Vertices { element: vertex, order });
+    Some(Layout { start: lines.offset(), encoding, element, promised, rows })
+}
+
+/// Rows of nothing but vertices.
+struct Vertices {
+    element: Element,
+    /// Of binary numbers.
+    order: Order,
+}
+
+impl Vertices {
+    fn read<'a>(&self, source: &mut impl Source<'a>, row: &mut Row) -> Result<(), Fault> {
+        let mut reader = Reader { row: *row, ..Reader::new(self.element.count) };
+        let read = reader.read(&self.element, source);
+        *row = reader.row;
+        read
+    }
+}
+
+impl Rows for Vertices {
+    fn is_row(&self, line: &Line<'_>) -> bool {
+        !line.text.trim_ascii().is_empty()
+    }
+
+    fn line(&self, line: Line<'_>, row: &mut Row) -> Result<(), Fault> {
+        self.read(&mut Ascii::of_line(line), row)
+    }
+
+    fn record(&self, bytes: &[u8], row: &mut Row) {
+        // Nothing but numbers, as many as there are bytes for.
+        let _ = self.read(&mut Binary::new(bytes, 0, self.order), row);
+    }
+}
+
 fn elements<'a>(header: &Header, source: &mut impl Source<'a>) -> Result<Sink, Broken> {
     let mut sink = Sink::default();
     let vertex = header.vertices()?;
     let holds = Holds::among(vertex.slots()).map_err(|fault| fault.on_line(vertex.line))?;
-    let mut reader =
-        Reader { vertices: vertex.count, row: Row::default(), corners: Vec::new(), strip: Vec::new() };
+    let mut reader = Reader::new(vertex.count);
     // An element without properties takes no space, so its count says nothing.
     for element in header.elements.iter().filter(|e| !e.properties.is_empty()) {
         if element.role == Role::Vertex {
@@ -68,6 +125,10 @@ struct Reader {
 }
 
 impl Reader {
+    fn new(vertices: u64) -> Self {
+        Self { vertices, row: Row::default(), corners: Vec::new(), strip: Vec::new() }
+    }
+
     fn read<'a>(&mut self, element: &Element, source: &mut impl Source<'a>) -> Result<(), Fault> {
         self.corners.clear();
         for property in &element.properties {

@@ -47,33 +47,41 @@ pub fn read_mesh_bytes(bytes: &[u8], format: Option<Format>, name: &Path) -> Res
     parse(bytes, format, name)?.into_mesh(name)?.ok_or_else(no_faces)
 }
 
-fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let failed = |cause| ReadError::Io { path: path.into(), cause };
-    // Asked first, because merely opening a pipe waits for its other end.
-    if !fs::metadata(path).map_err(failed)?.is_file() {
-        return Err(ReadError::NotAFile { path: path.into() });
+/// What some programs begin text with.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Checks that it is a file; asked first, because merely opening a pipe waits for its other end.
+pub(crate) fn check_file(path: &Path) -> Result<(), ReadError> {
+    match fs::metadata(path).map_err(|cause| ReadError::Io { path: path.into(), cause })?.is_file() {
+        true => Ok(()),
+        false => Err(ReadError::NotAFile { path: path.into() }),
     }
-    fs::read(path).map_err(failed)
+}
+
+fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
+    check_file(path)?;
+    fs::read(path).map_err(|cause| ReadError::Io { path: path.into(), cause })
 }
 
 fn parse(bytes: &[u8], format: Option<Format>, name: &Path) -> Result<Sink, ReadError> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     if bytes.is_empty() {
         return Err(ReadError::Empty { path: name.into() });
     }
     let format = match format {
         Some(format) => format,
-        None => recognise(bytes, name)?,
+        None => recognise(bytes, bytes.len() as u64, name)?,
     };
+    parse_as(format, bytes, name)
+}
+
+/// Content of this format, without a byte order mark.
+pub(crate) fn parse_as(format: Format, bytes: &[u8], name: &Path) -> Result<Sink, ReadError> {
     let parsed = match format {
         Format::Ply => ply::parse(bytes),
         Format::Pcd => pcd::parse(bytes),
         Format::Xyz => xyz::parse(bytes),
         Format::Obj => obj::parse(bytes),
     };
-    parsed.map_err(|broken| ReadError::Malformed {
-        path: name.into(),
-        place: broken.place,
-        fault: broken.fault,
-    })
+    parsed.map_err(|broken| broken.of(name))
 }

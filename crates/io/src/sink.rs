@@ -99,6 +99,11 @@ impl Sink {
         Ok(cloud)
     }
 
+    /// The file's points, if it has no faces; else what there is.
+    pub(crate) fn into_points(self) -> Result<Vec<[f64; 3]>, Self> {
+        if self.triangles.is_empty() { Ok(self.points) } else { Err(self) }
+    }
+
     /// The file's triangles, if there are any.
     pub(crate) fn into_mesh(self, path: &Path) -> Result<Option<TriangleMesh>, ReadError> {
         if self.triangles.is_empty() {

@@ -28,6 +28,16 @@ impl<'a> Lines<'a> {
         Self { bytes, offset: 0, number: 0, end }
     }
 
+    /// The lines of a further piece of a text, of which the last line before has this number, and every line ends with this byte.
+    pub(crate) fn going_on(bytes: &'a [u8], number: u64, end: u8) -> Self {
+        Self { bytes, offset: 0, number, end }
+    }
+
+    /// The byte that lines end with, maybe after another.
+    pub(crate) fn end(&self) -> u8 {
+        self.end
+    }
+
     /// Where the next line starts.
     pub(crate) fn offset(&self) -> usize {
         self.offset

@@ -6,17 +6,14 @@
 
 use crate::columns::{Holds, Row, slot};
 use crate::error::{Broken, Fault};
+use crate::pieces::{Encoding, Layout, Rows};
 use crate::sink::Sink;
 use crate::text::{Line, Lines, number, shown, whole};
 
 /// The content of a text file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let mut lines = Lines::new(bytes);
-    let count = lines.clone().find(has_values).and_then(|line| {
-        let points: u64 = whole(line.text.trim_ascii())?;
-        lines.find(has_values);
-        Some((points, line.number))
-    });
+    let count = count(&mut lines);
     let Some(first) = lines.clone().find(has_values) else {
         return match count {
             Some((promised, line)) if promised > 0 => Err(short(promised, 0, line)),
@@ -42,6 +39,42 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
         Some((promised, line)) if index < promised => Err(short(promised, index, line)),
         _ => Ok(sink),
     }
+}
+
+/// The number of points, and the line of it, if the text begins with one.
+fn count(lines: &mut Lines<'_>) -> Option<(u64, u64)> {
+    let line = lines.clone().find(has_values)?;
+    let points: u64 = whole(line.text.trim_ascii())?;
+    lines.find(has_values);
+    Some((points, line.number))
+}
+
+/// How to go over the rows of a text that begins like this; none where too little of it is there.
+pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
+    let mut lines = Lines::new(head);
+    let promised = count(&mut lines);
+    let mut ahead = lines.clone();
+    let table = Table::from_first(ahead.find(has_values)?).ok()?;
+    if ahead.left() == 0 {
+        return None;
+    }
+    if table.named {
+        lines = ahead;
+    }
+    let encoding = Encoding::of_text(&lines);
+    Some(Layout { start: lines.offset(), encoding, element: "point".into(), promised, rows: Box::new(table) })
+}
+
+impl Rows for Table {
+    fn is_row(&self, line: &Line<'_>) -> bool {
+        has_values(line)
+    }
+
+    fn line(&self, line: Line<'_>, row: &mut Row) -> Result<(), Fault> {
+        self.read(line, row)
+    }
+
+    fn record(&self, _: &[u8], _: &mut Row) {}
 }
 
 fn has_values(line: &Line<'_>) -> bool {

@@ -58,39 +58,62 @@ impl Piece {
         parts
     }
 
-    /// Cuts at every wall across `axis` and hands out what lies between two.
-    fn cut(mut self, axis: usize, mut each: impl FnMut(Self)) {
+    /// What lies from the first wall across `axis` to the last, cut at every wall; hands out what lies between two.
+    fn cut(mut self, axis: usize, boxes: u32, mut each: impl FnMut(Self)) {
+        let boxes = f64::from(boxes);
         let [low, high] = self.extent(axis);
-        let mut wall = low.floor() + 1.0;
-        while wall <= high {
+        if high < 0.0 || low >= boxes {
+            return;
+        }
+        if low < 0.0 {
+            [_, self] = self.split(axis, 0.0);
+        }
+        let mut wall = low.max(0.0).floor() + 1.0;
+        while wall <= high.min(boxes) {
             let [below, above] = self.split(axis, wall);
             each(below);
             self = above;
             wall += 1.0;
         }
-        each(self);
+        if wall <= boxes {
+            each(self);
+        }
     }
 }
 
-/// Cuts a triangle along the walls of a lattice of boxes of these `sides`, one of which has its least corner at `origin`, and hands out
-/// the corners of the pieces, each drawn a millionth of the way to the middle of its piece.
+/// Boxes side by side, the first of which has its least corner at an origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// The corner.
+    pub origin: [f64; 3],
+    /// Of a box along each axis, above 0.
+    pub sides: [f64; 3],
+    /// How many boxes there are along each axis.
+    pub counts: [u32; 3],
+}
+
+/// In sides of boxes; coordinates further out may overflow on the way to where they are cut.
+const FARTHEST: f64 = 1e150;
+
+/// Cuts a triangle along the walls of a lattice and hands out the corners of the pieces, each drawn a millionth of the way to the middle
+/// of its piece. Tells whether the whole triangle lies in the lattice: what does not is left out, and all of a triangle with a corner that
+/// is not finite, or further out than 1e150 boxes.
 ///
 /// So every box that holds more of the surface than rounding gets a sample, and its least and greatest coordinates are those of the surface in
 /// it, to a millionth. Boxes are half open: what lies in a wall belongs to the box above. Costs some ten nanoseconds
-/// a sample, and a step a box along each axis: sides must be positive, and coordinates finite.
-pub fn lattice_samples(
-    triangle: [[f64; 3]; 3],
-    origin: [f64; 3],
-    sides: [f64; 3],
-    mut each: impl FnMut([f64; 3]),
-) {
-    let mut whole = Piece::EMPTY;
-    for corner in triangle {
-        whole.push([0, 1, 2].map(|k| (corner[k] - origin[k]) / sides[k]));
+/// a sample, and a step a box along each axis, however far the triangle reaches.
+pub fn lattice_samples(triangle: [[f64; 3]; 3], lattice: &Lattice, mut each: impl FnMut([f64; 3])) -> bool {
+    let Lattice { origin, sides, counts } = *lattice;
+    let corners = triangle.map(|corner| [0, 1, 2].map(|k| (corner[k] - origin[k]) / sides[k]));
+    // Written so that what is not a number is left out.
+    if !corners.iter().flatten().all(|x| x.abs() <= FARTHEST) {
+        return false;
     }
-    whole.cut(0, |slab| {
-        slab.cut(1, |column| {
-            column.cut(2, |piece| {
+    let mut whole = Piece::EMPTY;
+    corners.into_iter().for_each(|corner| whole.push(corner));
+    whole.cut(0, counts[0], |slab| {
+        slab.cut(1, counts[1], |column| {
+            column.cut(2, counts[2], |piece| {
                 let corners = piece.corners();
                 let mut middle = [0.0; 3];
                 for corner in corners {
@@ -105,6 +128,7 @@ pub fn lattice_samples(
             });
         });
     });
+    corners.iter().all(|corner| (0..3).all(|k| corner[k] >= 0.0 && corner[k] < f64::from(counts[k])))
 }
 
 /// One divided by a number of corners.

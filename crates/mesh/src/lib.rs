@@ -5,5 +5,5 @@ mod lattice;
 mod sample;
 mod triangle;
 
-pub use lattice::lattice_samples;
+pub use lattice::{Lattice, lattice_samples};
 pub use sample::{SampleError, SampleOptions, Samples, sample};

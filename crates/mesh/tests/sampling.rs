@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::TriangleMesh;
-use nearmiss_mesh::{SampleError, SampleOptions, Samples, lattice_samples, sample};
+use nearmiss_mesh::{Lattice, SampleError, SampleOptions, Samples, lattice_samples, sample};
 
 /// Shapes of triangles: right, flat, needle-thin, obtuse, tiny, huge, without area, a point.
 const CORNERS: [[[f64; 3]; 3]; 9] = [
@@ -105,11 +105,12 @@ fn a_number_of_samples_is_spread_by_area() {
 #[test]
 fn every_box_that_a_triangle_passes_gets_a_sample_with_its_extremes() {
     let (origin, sides) = ([-8.3, -8.1, -3.2], [0.31, 0.27, 0.5]);
+    let lattice = Lattice { origin, sides, counts: [64, 64, 26] };
     let cell = |p: [f64; 3]| [0, 1, 2].map(|k| ((p[k] - origin[k]) / sides[k]).floor());
     let mut compared = 0;
     for corners in CORNERS {
         let mut samples = Vec::new();
-        lattice_samples(corners, origin, sides, |p| samples.push(p));
+        assert!(lattice_samples(corners, &lattice, |p| samples.push(p)), "{corners:?} is within");
         for p in places(corners, 150) {
             let here: Vec<&[f64; 3]> = samples.iter().filter(|q| cell(**q) == cell(p)).collect();
             assert!(!here.is_empty(), "{p:?} of {corners:?} is in an empty box");
@@ -122,6 +123,60 @@ fn every_box_that_a_triangle_passes_gets_a_sample_with_its_extremes() {
         }
     }
     assert!(compared > 100_000, "{compared} places");
+}
+
+#[test]
+fn of_what_reaches_beyond_the_lattice_the_part_inside_is_sampled_in_bounded_time() {
+    let (origin, sides) = ([-1.0, 2.0, 0.5], [0.5, 0.25, 0.125]);
+    let lattice = Lattice { origin, sides, counts: [9, 7, 5] };
+    let wide = Lattice { origin: origin.map(|x| x - 20.0), sides, counts: [99, 199, 399] };
+    let cell = |p: [f64; 3]| [0, 1, 2].map(|k| ((p[k] - origin[k]) / sides[k]).floor());
+    let is_within = |p: [f64; 3]| (0..3).all(|k| (0.0..[9.0, 7.0, 5.0][k]).contains(&cell(p)[k]));
+    let sampled = |triangle, lattice: &Lattice| {
+        let mut samples = Vec::new();
+        let whole = lattice_samples(triangle, lattice, |p| samples.push(p));
+        (whole, samples)
+    };
+    let mut inside = 0;
+    let shifted = |i: u8| {
+        let by = [0.113_7, 0.071_9, 0.031_3].map(|x| x * f64::from(i));
+        CORNERS.map(|corners| {
+            corners.map(|c| [c[0] + by[0] - 1.503, c[1] + by[1] + 2.009, c[2] + by[2] - 0.407])
+        })
+    };
+    for triangle in (0..40).flat_map(shifted) {
+        let (whole, samples) = sampled(triangle, &lattice);
+        let (is_within_wide, all) = sampled(triangle, &wide);
+        assert!(is_within_wide);
+        assert_eq!(whole, triangle.iter().all(|c| is_within(*c)), "{triangle:?}");
+        // The same boxes as those of the larger lattice, as far as they are in the smaller one.
+        let of = |samples: &[[f64; 3]]| {
+            let within = samples.iter().filter(|p| is_within(**p));
+            let mut cells: Vec<[u64; 3]> = within.map(|p| cell(*p).map(f64::to_bits)).collect();
+            cells.sort_unstable();
+            cells.dedup();
+            cells
+        };
+        assert_eq!(of(&samples), of(&all), "{triangle:?}");
+        // But for rounding of what ends in the last wall.
+        let inwards = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] + 1e-9 * (1.0 - p[k]).signum() * sides[k]);
+        assert!(samples.iter().all(|p| is_within(*p) || is_within(inwards(*p))), "nothing outside");
+        inside += samples.len();
+    }
+    assert!(inside > 1000, "{inside} samples");
+    // A plane as wide as doubles allow still passes every box once; what is nowhere passes none.
+    for reach in [1e3, 1e9, 1e18, 1e100, 1e148] {
+        let z = 0.8;
+        let huge = [[-reach, -reach, z], [3.0 * reach, -reach, z], [-reach, 3.0 * reach, z]];
+        let (whole, samples) = sampled(huge, &lattice);
+        assert!(!whole && samples.len() == 4 * 63, "{reach}: {} samples", samples.len());
+        let (whole, samples) = sampled(huge.map(|c| [c[0], c[1], -z]), &lattice);
+        assert!(!whole && samples.is_empty(), "below");
+    }
+    for broken in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX] {
+        let (whole, samples) = sampled([[0.0, 2.5, 0.6], [1.0, 2.5, 0.6], [0.0, broken, 0.6]], &lattice);
+        assert!(!whole && samples.is_empty(), "{broken}");
+    }
 }
 
 #[test]

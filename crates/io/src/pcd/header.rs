@@ -15,7 +15,7 @@ pub(super) struct Header {
     /// Bytes of a point in binary files; never 0.
     pub(super) stride: usize,
     /// Where the number of points is declared.
-    line: u64,
+    pub(super) line: u64,
 }
 
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 use super::header::{Element, Property};
 use crate::error::{At, Broken, Fault};
 use crate::scalar::{Order, Scalar};
-use crate::text::{Lines, number, shown, whole};
+use crate::text::{Line, Lines, number, shown, whole};
 
 /// The elements' values in the order of the header.
 pub(super) trait Source<'a> {
@@ -35,6 +35,11 @@ pub(super) struct Ascii<'a> {
 impl<'a> Ascii<'a> {
     pub(super) fn new(lines: Lines<'a>) -> Self {
         Self { lines, row: &[], number: 0 }
+    }
+
+    /// A row of which the line is at hand.
+    pub(super) fn of_line(line: Line<'a>) -> Self {
+        Self { lines: Lines::new(&[]), row: line.text, number: line.number }
     }
 
     /// Checks that the file ends with the last element.

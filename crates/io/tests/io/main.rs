@@ -3,6 +3,7 @@
 mod errors;
 mod expansion;
 mod mutations;
+mod pieces;
 mod real_data;
 mod round_trips;
 mod samples;

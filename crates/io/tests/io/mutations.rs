@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nearmiss_io::{Format, Model, ReadError, read_bytes, read_mesh_bytes};
+use nearmiss_io::{Format, Model, Pieces, ReadError, read_bytes, read_in_pieces, read_mesh_bytes};
 use proptest::prelude::*;
 
 use crate::samples;
@@ -27,8 +27,49 @@ fn check(bytes: &[u8], format: Option<Format>, name: &str) {
             assert!(!message.chars().any(char::is_control), "{message:?}");
         }
     };
+    check_pieces(bytes, format, name);
     check(read_bytes(bytes, format, Path::new(name)));
     let _mesh_or_error = read_mesh_bytes(bytes, format, Path::new(name));
+}
+
+/// In pieces, a few rows each, there are the same points, or the same is wrong.
+fn check_pieces(bytes: &[u8], format: Option<Format>, name: &str) {
+    let place = tempfile::tempdir().expect("a folder for a file");
+    let path = place.path().join(name);
+    std::fs::write(&path, bytes).expect("a file");
+    let whole = read_bytes(bytes, format, &path);
+    for block in [30, 200] {
+        let pieces = read_in_pieces(&path, format, block).and_then(|pieces| match pieces {
+            Pieces::Mesh(mesh) => Ok(mesh.vertices().to_vec()),
+            Pieces::Points(pieces) => {
+                let mut points = Vec::new();
+                pieces.each(|piece| points.extend_from_slice(piece))?;
+                let mut again = 0;
+                pieces.each(|piece| again += piece.len())?;
+                assert_eq!(again, points.len(), "{name}");
+                Ok(points)
+            }
+        });
+        match (&whole, pieces) {
+            (Ok(Model { cloud, .. }), Ok(points)) => {
+                let dropped = cloud.dropped();
+                assert_eq!(points.len(), cloud.len() + dropped.duplicate + dropped.not_finite, "{name}");
+                for (i, source) in cloud.source().iter().enumerate() {
+                    let (rounded, exact) = (cloud.point(i), points[*source as usize]);
+                    assert!(
+                        (0..3).all(|k| (rounded[k] - exact[k]).abs() <= cloud.step()),
+                        "{name}: {exact:?}"
+                    );
+                }
+            }
+            // Too few, too large: a matter of clouds.
+            (Err(ReadError::Cloud { .. }), Ok(_) | Err(ReadError::MeshNotFinite { .. })) => {}
+            (Err(broken), Err(in_pieces)) => {
+                assert_eq!(broken.to_string(), in_pieces.to_string(), "in the same words");
+            }
+            (whole, pieces) => panic!("{name}: {whole:?} whole, {pieces:?} in pieces"),
+        }
+    }
 }
 
 fn any_sample() -> impl Strategy<Value = (&'static str, Vec<u8>)> {
