@@ -15,3 +15,4 @@ pub mod house;
 pub mod instructions;
 pub mod matrices;
 pub mod scanner;
+pub mod scenes;

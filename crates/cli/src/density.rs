@@ -201,6 +201,7 @@ impl Tests<'_> {
             let answer = collide_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, scratch);
             answer.verdict.is_intersecting()
         };
+        self.scan.make_ready();
         Ok(self.poses.par_iter().map_init(CollideScratch::default, ask).collect())
     }
 }

@@ -149,13 +149,19 @@ pub(crate) fn with_graph(
 
 /// Reads a raw input.
 pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliError> {
+    check_raw(path)?;
+    Ok(nearmiss::io::read(path, format)?)
+}
+
+/// Checks that an input is there and no prepared scan.
+pub(crate) fn check_raw(path: &Path) -> Result<(), CliError> {
     check_there(path)?;
     if is_prepared(path) {
         let what =
             "this is, or is named like, a prepared scan; name the point cloud or mesh it came from".into();
         return Err(CliError::Unfit { path: path.to_owned(), what });
     }
-    Ok(nearmiss::io::read(path, format)?)
+    Ok(())
 }
 
 /// Prepares what was read, and warns where the points do not do the input justice.

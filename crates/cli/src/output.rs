@@ -42,11 +42,22 @@ pub(crate) fn check_apart(path: &Path, inputs: &[&Path]) -> Result<(), CliError>
     }
 }
 
-/// Replaces the file at `path` by what `write` writes, or leaves everything as it was.
-pub(crate) fn replace(
+/// Whether both name one file, there or not, however they spell it.
+pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        path.canonicalize().or_else(|_| {
+            let folder = folder(path).canonicalize()?;
+            Ok::<_, io::Error>(folder.join(path.file_name().unwrap_or_default()))
+        })
+    };
+    matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Replaces the file at `path` by what `write` writes, or leaves everything as it was; hands on what `write` tells.
+pub(crate) fn replace<T>(
     path: &Path,
-    write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<(), CliError>,
-) -> Result<(), CliError> {
+    write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<T, CliError>,
+) -> Result<T, CliError> {
     check(path)?;
     let failed = CliError::writing;
     // A link stays a link.
@@ -63,12 +74,12 @@ pub(crate) fn replace(
     }
     let temporary = builder.tempfile_in(folder(&target)).map_err(failed(path))?;
     let mut out = BufWriter::with_capacity(1 << 16, temporary.as_file());
-    write(&mut out)?;
+    let told = write(&mut out)?;
     out.flush().map_err(failed(path))?;
     drop(out);
     temporary.as_file().sync_all().map_err(failed(path))?;
     temporary.persist(&target).map_err(|refused| failed(path)(refused.error))?;
-    Ok(())
+    Ok(told)
 }
 
 /// The same for writers that fail with the system's errors alone.

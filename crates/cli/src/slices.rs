@@ -3,7 +3,9 @@
 mod build;
 mod export;
 mod inspect;
+mod labels;
 mod query;
+mod track;
 mod walk;
 mod walk_picture;
 
@@ -11,7 +13,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use clap::Subcommand;
-use nearmiss::slices::{SliceFolder, SliceMap, StoreError};
+use nearmiss::slices::{About, Obstacle, SliceFolder};
 use serde::Serialize;
 
 pub use build::{BuildArgs, PixelArgs};
@@ -75,13 +77,17 @@ struct Report {
     pixel: f64,
     slice_height: f64,
     points: u64,
+    dropped: u64,
+    obstacle: f64,
+    noise: f64,
+    noise_estimated: bool,
     bytes: u64,
     seconds: f64,
 }
 
 impl Report {
     fn new(folder: &SliceFolder, took: Duration) -> Self {
-        let grid = folder.grid();
+        let (grid, about) = (folder.grid(), folder.about());
         let [width, height, slices] = grid.counts;
         Self {
             slices,
@@ -90,7 +96,11 @@ impl Report {
             height,
             pixel: grid.pixel,
             slice_height: grid.slice_height,
-            points: folder.about().points,
+            points: about.points,
+            dropped: about.left_out,
+            obstacle: about.share,
+            noise: about.noise,
+            noise_estimated: about.is_noise_estimated(),
             bytes: folder.bytes(),
             seconds: took.as_secs_f64(),
         }
@@ -114,27 +124,37 @@ impl Report {
             short(self.slice_height)
         ))?;
         results.line(format_args!(
-            "obstacles  what spans more than {} upwards in a pixel ({:.1} % of a slice); noise {}",
+            "obstacles  what spans more than {} upwards in a pixel ({:.1} % of a slice){}",
             short(about.share * grid.slice_height),
             100.0 * about.share,
-            short(about.noise)
+            of_noise(about)
         ))?;
         #[expect(clippy::cast_precision_loss, reason = "for people")]
         let megabytes = self.bytes as f64 / 1e6;
-        results.line(format_args!("files      {megabytes:.2} MB, of {}", count(self.points, "point")))?;
+        let left_out = match self.dropped {
+            0 => String::new(),
+            n => format!(", {} left out", count(n, "other")),
+        };
+        results.line(format_args!(
+            "files      {megabytes:.2} MB, of {}{left_out}",
+            count(self.points, "point")
+        ))?;
         results.line(format_args!("seconds    {:.2}", self.seconds))?;
         results.flush()
     }
 }
 
-/// The map in a folder, whole; what of it cannot be loaded is warned about, and the rest serves.
-fn open_all(folder: &Path) -> Result<(SliceMap, Vec<StoreError>), CliError> {
-    let folder = open(folder)?;
-    let (map, faults) = folder.load_all();
-    for fault in &faults {
-        crate::console::warn(fault);
+/// How the rule of a map reckons with noise, for people.
+fn of_noise(about: &About) -> String {
+    let noise = short(about.noise);
+    match about.rule {
+        Obstacle::Share(_) => String::new(),
+        Obstacle::Slope { noise: Some(_), .. } => format!("; noise {noise}"),
+        Obstacle::Slope { .. } if about.is_noise_capped() => {
+            format!("; noise {noise}, estimated, of which no more is allowed for: give higher slices")
+        }
+        Obstacle::Slope { .. } => format!("; noise {noise}, estimated"),
     }
-    Ok((map, faults))
 }
 
 fn open(folder: &Path) -> Result<SliceFolder, CliError> {

@@ -20,6 +20,16 @@ impl Bits {
         Self { words: vec![0; stride * height as usize], stride }
     }
 
+    /// Bytes that so many take.
+    pub(crate) fn bytes_of(width: u32, height: u32) -> usize {
+        8 * (width as usize).div_ceil(64) * height as usize
+    }
+
+    /// Bytes that their tiles take.
+    pub(crate) fn bytes_of_tiles(width: u32, height: u32) -> usize {
+        Self::bytes_of(width.div_ceil(TILE), height.div_ceil(TILE))
+    }
+
     /// As tiles of so many pixels.
     pub(crate) fn of_tiles(width: u32, height: u32) -> Self {
         Self::new(width.div_ceil(TILE), height.div_ceil(TILE))
@@ -36,10 +46,19 @@ impl Bits {
         self.set(column / TILE as usize, row / TILE as usize);
     }
 
-    /// Sets those of eight pixels, from a multiple of eight on, whose bits are set.
+    /// Sets those of the `word`-th 64 bits of a row that are set in `bits`.
     #[inline]
-    pub(crate) fn set_eight(&mut self, column: usize, row: usize, bits: u8) {
-        self.words[row * self.stride + column / 64] |= u64::from(bits) << (column % 64);
+    pub(crate) fn set_word(&mut self, word: usize, row: usize, bits: u64) {
+        self.words[row * self.stride + word] |= bits;
+    }
+
+    /// Sets the tiles of those of the `word`-th 64 pixels of a row that are set in `bits`.
+    #[inline]
+    pub(crate) fn set_tiles(&mut self, word: usize, row: usize, bits: u64) {
+        let tiles = filled_of_eight(bits.to_le_bytes());
+        // Eight of them a word, so never over the end of one.
+        let first = word * 64 / TILE as usize;
+        self.words[row / TILE as usize * self.stride + first / 64] |= tiles << (first % 64);
     }
 
     #[inline]
@@ -56,11 +75,6 @@ impl Bits {
     #[inline]
     pub(crate) fn row(&self, row: u32) -> &[u64] {
         &self.words[row as usize * self.stride..(row as usize + 1) * self.stride]
-    }
-
-    /// Bytes in memory.
-    pub(crate) fn bytes(&self) -> usize {
-        8 * self.words.len()
     }
 
     /// How many bits are set.
@@ -94,6 +108,18 @@ impl Bits {
     fn block(&self, rows: &RangeInclusive<u32>) -> &[u64] {
         &self.words[*rows.start() as usize * self.stride..(*rows.end() as usize + 1) * self.stride]
     }
+}
+
+/// Which of eight bytes are not 0, a bit each.
+#[inline]
+pub(crate) fn filled_of_eight(bytes: [u8; 8]) -> u64 {
+    /// Of each byte all bits but the highest.
+    const LOW: u64 = 0x7f7f_7f7f_7f7f_7f7f;
+    let bytes = u64::from_le_bytes(bytes);
+    // The highest bit of a byte is set if any is: the sum reaches it, and never beyond.
+    let filled = ((((bytes & LOW) + LOW) | bytes) & !LOW) >> 7;
+    // Bit 8i times 2^(56 - 7i) is bit 56 + i; all other products are distinct bits below 56, or overflow.
+    filled.wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
 /// A run of columns: words, and which bits of the first and the last belong to it.
@@ -148,6 +174,16 @@ impl Run {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bytes_that_are_not_zero_are_found() {
+        for set in 0..=u8::MAX {
+            for filled in [1, 0x7f, 0x80, 0xff, set.max(1)] {
+                let bytes = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| (set >> i & 1) * filled);
+                assert_eq!(filled_of_eight(bytes), u64::from(set), "{bytes:?}");
+            }
+        }
+    }
 
     #[test]
     fn runs_of_every_length_find_and_count_every_bit() {

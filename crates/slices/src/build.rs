@@ -3,12 +3,14 @@
 //! A block of points at a time is sorted by the part of the map that they lie in; then every part is filled by one thread. So nothing
 //! is shared between threads, and what is written lies close together.
 
+use std::ops::Range;
+
 use nearmiss_geometry::{PointCloud, TriangleMesh};
-use nearmiss_mesh::lattice_samples;
+use nearmiss_mesh::{Lattice, lattice_samples};
 
 use crate::error::SliceError;
-use crate::map::About;
-use crate::options::SlicePlan;
+use crate::map::{About, Index};
+use crate::options::{Obstacle, SlicePlan};
 use crate::parallel::{change_each, map_each};
 use crate::{Grid, SliceMap, finish};
 
@@ -16,10 +18,10 @@ use crate::{Grid, SliceMap, finish};
 const BLOCK: usize = 1 << 15;
 
 /// Blocks that are sorted before the map is filled from them; any number gives the same map.
-const BLOCKS: usize = 16;
+pub(crate) const BLOCKS: usize = 16;
 
 /// Cells of a part of a slice: as many as fit a cache, so that one large floor keeps several threads busy.
-const PART: usize = 1 << 16;
+pub(crate) const PART: usize = 1 << 16;
 
 /// Samples of a mesh that are kept before they are poured into the map.
 const BATCH: usize = BLOCK * BLOCKS;
@@ -28,12 +30,76 @@ const BATCH: usize = BLOCK * BLOCKS;
 /// nothing. So either byte only ever grows, and memory that is zero is a map without points.
 pub(crate) type Cell = u16;
 
-/// Lowest and highest level of a cell; none if nothing is in it.
-#[inline]
-pub(crate) fn span(cell: Cell) -> Option<[i32; 2]> {
-    match cell {
-        0 => None,
-        seen => Some([255 - i32::from(seen >> 8), i32::from(seen & 0xff) - 1]),
+/// What the voxels of a slice have seen.
+#[derive(Debug, Default)]
+pub(crate) struct Layer {
+    /// A cell a pixel.
+    cells: Vec<Cell>,
+    /// A bit a cell, whether it has seen something: most have not.
+    filled: Vec<u64>,
+}
+
+impl Layer {
+    /// One that has seen nothing.
+    fn new(area: usize) -> Result<Self, SliceError> {
+        let cells = bytemuck::allocation::try_zeroed_vec(area);
+        let filled = bytemuck::allocation::try_zeroed_vec(area.div_ceil(64));
+        match (cells, filled) {
+            (Ok(cells), Ok(filled)) => Ok(Self { cells, filled }),
+            _ => Err(SliceError::OutOfMemory { bytes: Self::bytes_of(area) }),
+        }
+    }
+
+    /// Bytes that one of so many pixels takes.
+    pub(crate) fn bytes_of(area: usize) -> usize {
+        size_of::<Self>() + area * size_of::<Cell>() + area.div_ceil(64) * size_of::<u64>()
+    }
+
+    /// Which of these cells, have seen something.
+    pub(crate) fn filled(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
+        let words = range.start / 64..range.end.div_ceil(64);
+        let bits = words.flat_map(|i| {
+            let next = |left: u64| Some(left).filter(|left| *left != 0);
+            let bits = std::iter::successors(next(self.filled[i]), move |left| next(left & (left - 1)));
+            bits.map(move |left| 64 * i + left.trailing_zeros() as usize)
+        });
+        bits.filter(move |i| range.contains(i))
+    }
+
+    /// Whether a cell has seen something.
+    #[inline]
+    pub(crate) fn is_filled(&self, i: usize) -> bool {
+        self.filled[i / 64] >> (i % 64) & 1 == 1
+    }
+
+    /// Lowest and highest level of a cell; none if it has seen nothing, for which its bit is enough: the bits of a layer fit a cache.
+    #[inline]
+    pub(crate) fn span(&self, i: usize) -> Option<[i32; 2]> {
+        let seen = || self.cells[i];
+        self.is_filled(i).then(seen).map(|seen| [255 - i32::from(seen >> 8), i32::from(seen & 0xff) - 1])
+    }
+
+    /// Parts of [`PART`] cells, with their bits.
+    pub(crate) fn parts(&mut self) -> Vec<Part<'_>> {
+        let parts = self.cells.chunks_mut(PART).zip(self.filled.chunks_mut(PART / 64));
+        parts.map(|(cells, filled)| Part { cells, filled }).collect()
+    }
+}
+
+/// A part of a layer.
+pub(crate) struct Part<'a> {
+    cells: &'a mut [Cell],
+    filled: &'a mut [u64],
+}
+
+impl Part<'_> {
+    /// Most points of a voxel change nothing.
+    #[inline]
+    fn see(&mut self, cell: u16, level: u8) {
+        let (cell, [low, high]) = (usize::from(cell), [u16::from(255 - level), u16::from(level) + 1]);
+        let seen = &mut self.cells[cell];
+        *seen = (*seen >> 8).max(low) << 8 | (*seen & 0xff).max(high);
+        self.filled[cell / 64] |= 1 << (cell % 64);
     }
 }
 
@@ -44,10 +110,10 @@ pub(crate) fn span(cell: Cell) -> Option<[i32; 2]> {
 #[derive(Debug)]
 pub struct SliceBuilder {
     plan: SlicePlan,
-    /// A layer a slice, a cell a pixel.
-    layers: Vec<Vec<Cell>>,
+    /// A layer a slice.
+    layers: Vec<Layer>,
     points: u64,
-    outside: u64,
+    left_out: u64,
 }
 
 impl SliceBuilder {
@@ -57,10 +123,8 @@ impl SliceBuilder {
     /// When the system gives no memory.
     pub fn new(plan: &SlicePlan) -> Result<Self, SliceError> {
         let area = plan.grid().area();
-        let layers = (0..plan.grid().counts[2]).map(|_| bytemuck::allocation::try_zeroed_vec(area)).collect();
-        let layers: Result<_, ()> = layers;
-        let layers = layers.map_err(|()| SliceError::OutOfMemory { bytes: 2 * area })?;
-        Ok(Self { plan: *plan, layers, points: 0, outside: 0 })
+        let layers = (0..plan.grid().counts[2]).map(|_| Layer::new(area)).collect::<Result<_, _>>()?;
+        Ok(Self { plan: *plan, layers, points: 0, left_out: 0 })
     }
 
     /// Adds points given in the caller's coordinates. Those outside the bounds of the plan, and those with a coordinate that is
@@ -69,84 +133,87 @@ impl SliceBuilder {
     /// Some ten nanoseconds a point and thread.
     pub fn add(&mut self, points: &[[f64; 3]]) {
         let up = self.plan.grid().up;
-        self.pour(points, |p| up.to_map(*p));
+        self.left_out += self.pour(points, |p| up.to_map(*p));
     }
 
     /// Adds the points of a cloud.
     pub fn add_cloud(&mut self, cloud: &PointCloud) {
         let (up, frame) = (self.plan.grid().up, cloud.frame());
-        self.pour(cloud.positions(), |p| up.to_map(frame.to_world(*p)));
+        self.left_out += self.pour(cloud.positions(), |p| up.to_map(frame.to_world(*p)));
     }
 
     /// Adds a mesh by samples of its own making: every voxel that its surface passes gets the lowest and the highest point of the
     /// surface in it, up to rounding. Tells how many samples that took.
+    ///
+    /// Of a triangle that reaches beyond the bounds of the plan the part inside is added; of one with a corner that is not finite,
+    /// nothing. Each such triangle counts as one left out.
     pub fn add_mesh(&mut self, mesh: &TriangleMesh) -> u64 {
-        let grid = *self.plan.grid();
-        let before = self.points + self.outside;
+        let Grid { up, origin, pixel, slice_height, counts } = *self.plan.grid();
+        let lattice = Lattice { origin, sides: [pixel, pixel, slice_height], counts };
+        let before = self.points;
         let mut batch = Vec::with_capacity(BATCH);
         let corners = mesh.vertices();
-        let cells = [grid.pixel, grid.pixel, grid.slice_height];
         for triangle in mesh.triangles() {
-            let triangle = triangle.map(|v| grid.up.to_map(corners[v as usize]));
-            lattice_samples(triangle, grid.origin, cells, |p| {
+            let triangle = triangle.map(|v| up.to_map(corners[v as usize]));
+            let is_whole = lattice_samples(triangle, &lattice, |p| {
                 batch.push(p);
                 if batch.len() == BATCH {
                     self.pour(&batch, |p| *p);
                     batch.clear();
                 }
             });
+            self.left_out += u64::from(!is_whole);
         }
         self.pour(&batch, |p| *p);
-        self.points + self.outside - before
+        self.points - before
     }
 
-    fn pour<P: Sync>(&mut self, points: &[P], to_map: impl Fn(&P) -> [f64; 3] + Sync + Send) {
+    /// Tells how many of the points are outside.
+    fn pour<P: Sync>(&mut self, points: &[P], to_map: impl Fn(&P) -> [f64; 3] + Sync + Send) -> u64 {
         let grid = *self.plan.grid();
         let parts = grid.area().div_ceil(PART);
+        let mut added = 0;
         for points in points.chunks(BLOCK * BLOCKS) {
             let blocks: Vec<&[P]> = points.chunks(BLOCK).collect();
             let sorted = map_each(blocks.len(), |i| Sorted::new(&grid, parts, blocks[i], &to_map));
-            change_each(&mut self.layers, PART, |slice, part, cells| {
-                for block in &sorted {
-                    for &(cell, level) in block.part(slice * parts + part) {
-                        see(&mut cells[usize::from(cell)], level);
+            change_each(&mut self.layers, |slice, layer| {
+                change_each(&mut layer.parts(), |part, cells| {
+                    for block in &sorted {
+                        for &(cell, level) in block.part(slice * parts + part) {
+                            cells.see(cell, level);
+                        }
                     }
-                }
+                });
             });
             let inside: usize = sorted.iter().map(|block| block.entries.len()).sum();
-            self.points += inside as u64;
-            self.outside += (points.len() - inside) as u64;
+            added += inside as u64;
         }
+        self.points += added;
+        points.len() as u64 - added
     }
 
-    /// How many points are in, and how many were left out.
+    /// How many points are in, samples of meshes among them; and how many points, or triangles at least a part of which, were left out.
     #[must_use]
     pub fn counts(&self) -> [u64; 2] {
-        [self.points, self.outside]
+        [self.points, self.left_out]
     }
 
     /// The map.
     #[must_use]
     pub fn finish(self) -> SliceMap {
         let grid = *self.plan.grid();
-        let noise = finish::noise(&grid, &self.layers);
-        // A noise as high as a slice would leave no obstacle.
-        let share = self.plan.share(noise).min(MOST_SHARE.max(self.plan.share(0.0)));
+        let rule = self.plan.obstacle();
+        let noise = match rule {
+            Obstacle::Share(_) => 0.0,
+            Obstacle::Slope { noise, .. } => noise.unwrap_or_else(|| finish::noise(&grid, &self.layers)),
+        };
+        let share = self.plan.share(noise);
         let most = finish::most_levels(share);
         let mut layers = self.layers;
         let slices = finish::slices(&grid, &mut layers, most);
-        SliceMap::of_slices(grid, slices, About { share, noise, points: self.points })
+        let about = About { rule, share, noise, points: self.points, left_out: self.left_out };
+        SliceMap::of_slices(Index { grid, about }, slices)
     }
-}
-
-/// However noisy points are, what spans more than this share of a slice is an obstacle.
-const MOST_SHARE: f64 = 0.9;
-
-/// Most points of a voxel change nothing.
-#[inline]
-fn see(cell: &mut Cell, level: u8) {
-    let [low, high] = [u16::from(255 - level), u16::from(level) + 1];
-    *cell = (*cell >> 8).max(low) << 8 | (*cell & 0xff).max(high);
 }
 
 /// Points of a block by the part of the map that they are in.

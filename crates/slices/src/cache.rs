@@ -3,9 +3,10 @@
 //! S4, §3.1: new slices are loaded until there are n; from then on each takes the place of the one furthest from the avatar. Beside that
 //! a thread of its own loads what comes next in the direction of movement (the paper's figures are without one).
 
+use std::collections::VecDeque;
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use crate::Grid;
@@ -65,11 +66,11 @@ pub struct SliceCache {
     map: SliceMap,
     /// Which slices have a place, in no order; those not yet on the map are on their way.
     kept: Vec<u32>,
-    /// What of them could not be loaded ahead.
-    faults: Vec<(u32, StoreError)>,
     capacity: usize,
-    /// Where the feet were.
+    /// Where the feet were when they last were a slice's height from where they had been.
     feet: Option<f64>,
+    /// Whether they went up to there, if they have gone anywhere.
+    is_rising: Option<bool>,
     counts: CacheCounts,
     loader: Option<Loader>,
 }
@@ -87,9 +88,9 @@ impl SliceCache {
             map: folder.unloaded(),
             folder: folder.clone(),
             kept: Vec::with_capacity(capacity),
-            faults: Vec::new(),
             capacity,
             feet: None,
+            is_rising: None,
             counts: CacheCounts::default(),
             loader: loader.flatten(),
         }
@@ -126,7 +127,7 @@ impl SliceCache {
         for slice in slices.clone() {
             if self.kept.contains(&slice) {
                 self.counts.hits += 1;
-                waited |= self.await_slice(slice)?;
+                waited |= self.complete(slice)?;
             } else {
                 self.counts.misses += 1;
                 waited = true;
@@ -141,28 +142,39 @@ impl SliceCache {
         Ok(&self.map)
     }
 
-    /// Waits for a slice that has a place. Tells whether that took any waiting.
-    fn await_slice(&mut self, slice: u32) -> Result<bool, StoreError> {
-        let mut waited = false;
-        while self.map.slice(slice).is_err() {
-            if let Some(i) = self.faults.iter().position(|(failed, _)| *failed == slice) {
-                self.kept.retain(|kept| *kept != slice);
-                return Err(self.faults.swap_remove(i).1);
-            }
-            waited = true;
-            let arrived = self.loader.as_ref().and_then(Loader::wait);
-            self.receive(arrived.ok_or(StoreError::Loader { slice })?);
+    /// Loads a slice that has a place, if it is not there yet. Tells whether that took any waiting.
+    ///
+    /// A thread that has begun to load it may have to wait for a processor longer than loading takes, so nobody waits for it.
+    fn complete(&mut self, slice: u32) -> Result<bool, StoreError> {
+        if self.map.slice(slice).is_ok() {
+            return Ok(false);
         }
-        Ok(waited)
+        self.forget(slice);
+        match self.folder.load(slice) {
+            Ok(image) => self.put(slice, image),
+            Err(fault) => {
+                self.kept.retain(|kept| *kept != slice);
+                return Err(fault);
+            }
+        }
+        Ok(true)
     }
 
-    /// Takes in what the thread has loaded, unless its place has gone to another meanwhile.
+    /// Takes in what the thread has loaded, unless it is there already or its place has gone to another. What cannot be loaded is told when
+    /// it is wanted.
     fn receive(&mut self, (slice, image): (u32, Result<Slice, StoreError>)) {
-        if self.kept.contains(&slice) && self.map.slice(slice).is_err() {
-            match image {
-                Ok(image) => self.put(slice, image),
-                Err(fault) => self.faults.push((slice, fault)),
-            }
+        if let Ok(image) = image
+            && self.kept.contains(&slice)
+            && self.map.slice(slice).is_err()
+        {
+            self.put(slice, image);
+        }
+    }
+
+    /// Asks the thread for a slice no more.
+    fn forget(&self, slice: u32) {
+        if let Some(loader) = &self.loader {
+            loader.withdraw(slice);
         }
     }
 
@@ -186,31 +198,32 @@ impl SliceCache {
         let furthest = candidates.max_by_key(|&i| (away(self.kept[i]), self.kept[i]));
         if let Some(i) = furthest {
             let slice = self.kept.swap_remove(i);
-            self.faults.retain(|(failed, _)| *failed != slice);
+            self.forget(slice);
             self.map.put(slice, None);
         }
         furthest.is_some()
     }
 
-    /// Asks for slices beyond those wanted, on the side the avatar moves to, as many as there is room for.
+    /// Asks for slices beyond those wanted, on the side the avatar moves to: half of those that there is room for, as it may turn round.
     fn ask_ahead(&mut self, slices: &RangeInclusive<u32>, feet: f64) {
-        let before = self.feet.replace(feet);
-        if self.loader.is_none() {
-            return;
+        let before = *self.feet.get_or_insert(feet);
+        // Unevenness of a floor is no movement.
+        if (feet - before).abs() >= self.map.grid().slice_height {
+            self.is_rising = Some(feet > before);
+            self.feet = Some(feet);
         }
-        let rise = before.map_or(0.0, |before| feet - before);
+        let Some(is_rising) = self.is_rising.filter(|_| self.loader.is_some()) else { return };
         let (first, last) = (*slices.start(), *slices.end());
         let room = u32::try_from(self.capacity.saturating_sub(slices.clone().count())).unwrap_or(0);
-        let spared = if rise > 0.0 {
-            first..=last.saturating_add(room).min(self.map.grid().counts[2] - 1)
-        } else if rise < 0.0 {
-            first.saturating_sub(room)..=last
+        let many = room.div_ceil(2);
+        let spared = if is_rising {
+            first..=last.saturating_add(many).min(self.map.grid().counts[2] - 1)
         } else {
-            return;
+            first.saturating_sub(many)..=last
         };
         // The nearest first.
         let ahead =
-            (1..=room).filter_map(|i| if rise > 0.0 { last.checked_add(i) } else { first.checked_sub(i) });
+            (1..=many).filter_map(|i| if is_rising { last.checked_add(i) } else { first.checked_sub(i) });
         for slice in ahead.filter(|slice| spared.contains(slice)) {
             let is_new = !self.kept.contains(&slice) && self.make_room(slices, &spared);
             if is_new && self.loader.as_ref().is_some_and(|loader| loader.ask(slice)) {
@@ -238,35 +251,48 @@ impl Building for SliceCache {
 /// A thread that loads slices; it ends when the cache does.
 #[derive(Debug)]
 struct Loader {
-    wanted: Sender<u32>,
+    wanted: Arc<Mutex<VecDeque<u32>>>,
+    /// One for each slice that is asked for.
+    calls: Sender<()>,
     loaded: Receiver<(u32, Result<Slice, StoreError>)>,
 }
 
 impl Loader {
     /// None where no thread can be started: then nothing is loaded ahead.
     fn start(folder: SliceFolder) -> Option<Self> {
-        let (wanted, requests) = channel::<u32>();
+        let wanted = Arc::new(Mutex::new(VecDeque::new()));
+        let (calls, requests) = channel::<()>();
         let (answers, loaded) = channel();
+        let queue = Arc::clone(&wanted);
         let load = move || {
-            while let Ok(slice) = requests.recv() {
-                if answers.send((slice, folder.load(slice))).is_err() {
+            while requests.recv().is_ok() {
+                // What was withdrawn leaves a request without a slice.
+                let next = locked(&queue).pop_front();
+                if next.is_some_and(|slice| answers.send((slice, folder.load(slice))).is_err()) {
                     return;
                 }
             }
         };
         thread::Builder::new().name("slices".into()).spawn(load).ok()?;
-        Some(Self { wanted, loaded })
+        Some(Self { wanted, calls, loaded })
     }
 
     fn ask(&self, slice: u32) -> bool {
-        self.wanted.send(slice).is_ok()
+        locked(&self.wanted).push_back(slice);
+        self.calls.send(()).is_ok()
+    }
+
+    /// Asks for a slice no more; too late if it is being loaded.
+    fn withdraw(&self, slice: u32) {
+        locked(&self.wanted).retain(|waiting| *waiting != slice);
     }
 
     fn arrived(&self) -> Option<(u32, Result<Slice, StoreError>)> {
         self.loaded.try_recv().ok()
     }
+}
 
-    fn wait(&self) -> Option<(u32, Result<Slice, StoreError>)> {
-        self.loaded.recv().ok()
-    }
+/// A queue of numbers is whole whatever became of a thread.
+fn locked(queue: &Mutex<VecDeque<u32>>) -> MutexGuard<'_, VecDeque<u32>> {
+    queue.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,46 +1,35 @@
-//! A slice in few bytes: which pixels hold something, and what those hold, compressed.
+//! A slice in few bytes: what is in memory, but for words of 64 pixels in which nothing is, compressed.
 //!
-//! Four bytes, the number of occupied pixels; then, as one LZ4 block, a bit a pixel (row by row, each from a byte of its own); of every
-//! occupied pixel a byte, half of which is its bottom in steps of 16 levels, counted from that of its top, and a bit of which says
-//! whether it is an obstacle; and a byte for its top, as the difference to that of the occupied pixel before.
+//! Four bytes, the number of words in which something is; then, as one LZ4 block, a bit a pixel (row by row, each from a byte of its own);
+//! of every such word 64 tops, then 32 bytes of bottoms, then 8 of obstacles, each all words together; beyond the end of a row zeros. So
+//! nothing is put together pixel by pixel, and what repeats from row to row LZ4 finds.
 
-use crate::slice::{Canvas, Content, Slice};
+use crate::slice::{Canvas, Slice, Word};
 
-/// The bit of an obstacle.
-const OBSTACLE: u8 = 16;
+/// Bytes of a word: tops, bottoms, obstacles.
+const WORD: usize = 64 + 32 + 8;
+
+/// LZ4 makes at most so many bytes of one: that is what a byte more adds to the length of a match.
+const LZ4_MOST: usize = 255;
 
 /// The bytes of a slice.
 pub(crate) fn encode(slice: &Slice) -> Vec<u8> {
     let row_bytes = (slice.width() as usize).div_ceil(8);
-    let mut raw = Vec::with_capacity(row_bytes * slice.height() as usize);
-    let (mut kinds, mut steps) = (Vec::new(), Vec::new());
-    let mut before = 0_u8;
+    let (mut bits, mut tops, mut bottoms, mut obstacles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for row in 0..slice.height() {
         let words = slice.occupied().row(row);
-        raw.extend(words.iter().flat_map(|word| word.to_le_bytes()).take(row_bytes));
-        for column in columns(words) {
-            let Some(Content { top, bottom, is_obstacle }) = slice.pixel(column, row) else { continue };
-            let depth = (top / Content::STEP).wrapping_sub(bottom / Content::STEP);
-            kinds.push(depth % OBSTACLE + OBSTACLE * u8::from(is_obstacle));
-            steps.push(top.wrapping_sub(before));
-            before = top;
+        bits.extend(words.iter().flat_map(|word| word.to_le_bytes()).take(row_bytes));
+        for (i, _) in words.iter().enumerate().filter(|(_, word)| **word != 0) {
+            let word = slice.word(i, row as usize);
+            tops.extend(word.tops);
+            bottoms.extend(word.bottoms);
+            obstacles.extend(word.obstacles.to_le_bytes());
         }
     }
-    let count = u32::try_from(steps.len()).unwrap_or(u32::MAX);
-    raw.extend(kinds);
-    raw.extend(steps);
+    let count = u32::try_from(tops.len() / 64).unwrap_or(u32::MAX);
     let mut bytes = count.to_le_bytes().to_vec();
-    bytes.extend(lz4_flex::block::compress(&raw));
+    bytes.extend(lz4_flex::block::compress(&[bits, tops, bottoms, obstacles].concat()));
     bytes
-}
-
-/// Which columns are set in the words of a row.
-fn columns(words: &[u64]) -> impl Iterator<Item = u32> {
-    (0_u32..).zip(words).flat_map(|(i, word)| {
-        let next = |left: u64| Some(left).filter(|left| *left != 0);
-        let bits = std::iter::successors(next(*word), move |left| next(left & (left - 1)));
-        bits.map(move |left| 64 * i + left.trailing_zeros())
-    })
 }
 
 /// The slice of this size that these bytes are; none if they are those of no slice.
@@ -49,39 +38,45 @@ pub(crate) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Option<Slice> {
     let count = u32::from_le_bytes(*count) as usize;
     let (columns, rows) = (width as usize, height as usize);
     let row_bytes = columns.div_ceil(8);
-    if count > columns * rows {
+    if count > columns.div_ceil(64) * rows {
         return None;
     }
-    let length = row_bytes * rows + 2 * count;
+    let length = row_bytes * rows + WORD * count;
+    // Refused before memory is asked for.
+    if length / LZ4_MOST > packed.len() {
+        return None;
+    }
     let raw = lz4_flex::block::decompress(packed, length).ok().filter(|raw| raw.len() == length)?;
     let (bits, rest) = raw.split_at(row_bytes * rows);
-    let (kinds, steps) = rest.split_at(count);
-    let mut pixels = kinds.iter().zip(steps);
+    let (tops, rest) = rest.split_at(64 * count);
+    let (bottoms, obstacles) = rest.split_at(32 * count);
+    let planes = tops.as_chunks::<64>().0.iter().zip(bottoms.as_chunks::<32>().0);
+    let mut words = planes.zip(obstacles.as_chunks::<8>().0);
     let mut canvas = Canvas::new(width, height);
-    let mut top = 0_u8;
     for (row, bits) in bits.chunks_exact(row_bytes.max(1)).enumerate() {
-        for (i, &byte) in bits.iter().enumerate().filter(|(_, byte)| **byte != 0) {
-            canvas.mark_eight(8 * i, row, byte);
-            let mut left = byte;
-            while left != 0 {
-                let column = 8 * i + left.trailing_zeros() as usize;
-                left &= left - 1;
-                let (kind, step) = pixels.next()?;
-                top = top.wrapping_add(*step);
-                let bottom = (top / Content::STEP).wrapping_sub(kind % OBSTACLE) % 16 * Content::STEP;
-                if column >= columns || top == u8::MAX {
-                    return None;
-                }
-                canvas.fill(column, row, Content { top, bottom, is_obstacle: kind & OBSTACLE != 0 });
+        for (i, bytes) in bits.chunks(8).enumerate() {
+            let mut occupied = [0; 8];
+            occupied[..bytes.len()].copy_from_slice(bytes);
+            let occupied = u64::from_le_bytes(occupied);
+            if occupied == 0 {
+                continue;
             }
+            let ((tops, bottoms), obstacles) = words.next()?;
+            let word = Word { tops: *tops, bottoms: *bottoms, obstacles: u64::from_le_bytes(*obstacles) };
+            let end = 64 * (i + 1) - occupied.leading_zeros() as usize;
+            if end > columns || !word.is_sound(occupied) {
+                return None;
+            }
+            canvas.set_word(i, row, occupied, &word);
         }
     }
-    pixels.next().is_none().then(|| canvas.finish())
+    words.next().is_none().then(|| canvas.finish())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::slice::Content;
 
     /// Pixels of many kinds: rows that end within a word, floors, lone pixels, all that a top can be.
     fn slice(width: u32, height: u32) -> Slice {
@@ -113,6 +108,10 @@ mod tests {
         let bytes = encode(&empty);
         assert!(bytes.len() < 400, "{} bytes of nothing", bytes.len());
         assert_eq!(decode(&bytes, [700, 700]), Some(empty));
+        let empty = Canvas::new(1 << 13, 1 << 10).finish();
+        let bytes = encode(&empty);
+        assert!(bytes.len() < (1 << 20) / 250, "{} bytes, near the least that LZ4 can do", bytes.len());
+        assert_eq!(decode(&bytes, [1 << 13, 1 << 10]), Some(empty));
     }
 
     #[test]
@@ -134,5 +133,7 @@ mod tests {
         }
         assert!(others > 100, "only {others} kinds of damage reach the checksum");
         assert!(decode(&bytes, [64, 5]).is_none() && decode(&bytes, [0, 0]).is_none());
+        // More than any machine has.
+        assert!(decode(&[0xff; 1000], [u32::MAX; 2]).is_none());
     }
 }

@@ -8,10 +8,8 @@
 //! the one above is at most ε σ, both are obstacles if together they span more than ε σ; if not, they are one floor,
 //! whose height is that of the upper one.
 
-use std::ops::Range;
-
 use crate::Grid;
-use crate::build::{Cell, span};
+use crate::build::Layer;
 use crate::grid::LEVELS;
 use crate::parallel::map_each;
 use crate::slice::{Canvas, Content, Slice};
@@ -22,6 +20,9 @@ const QUANTILE: f64 = 0.95;
 
 /// Fewer level voxels than this say nothing about noise.
 const LEAST: u64 = 100;
+
+/// Runs of layers whose spans are counted apart: enough for any number of threads, few where layers are many and thin.
+const RUNS: usize = 256;
 
 /// Layers that are finished together; their cells are then let go of.
 const WAVE: usize = 16;
@@ -39,29 +40,35 @@ pub(crate) fn most_levels(share: f64) -> i32 {
 /// no part in the choice. 0 where there are too few.
 ///
 /// Voxels with something right below or above are left out: they may hold half a floor.
-pub(crate) fn noise(grid: &Grid, layers: &[Vec<Cell>]) -> f64 {
+pub(crate) fn noise(grid: &Grid, layers: &[Layer]) -> f64 {
     let width = grid.counts[0] as usize;
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
     let step = (0.5 * grid.pixel / grid.slice_height * f64::from(LEVELS)) as i32;
-    let of_layer = |s: usize| {
-        let mut spans = [0_u64; LEVELS as usize];
+    let add_layer = |spans: &mut [u64; LEVELS as usize], s: usize| {
         let layer = &layers[s];
         let others = [s.checked_sub(1), Some(s + 1)].map(|s| s.and_then(|s| layers.get(s)));
         for row in 1..(grid.counts[1] as usize).saturating_sub(1) {
-            for i in filled(layer, row * width + 1..((row + 1) * width).saturating_sub(1)) {
-                let beside = [i - 1, i + 1, i - width, i + width].map(|j| span(layer[j]));
+            for i in layer.filled(row * width + 1..((row + 1) * width).saturating_sub(1)) {
+                if others.iter().flatten().any(|other| other.is_filled(i)) {
+                    continue;
+                }
+                let beside = [i - 1, i + 1, i - width, i + width].map(|j| layer.span(j));
                 let [Some(left), Some(right), Some(front), Some(back)] = beside else { continue };
                 let is_level = (left[1] - right[1]).abs() <= step && (front[1] - back[1]).abs() <= step;
-                let is_alone = others.iter().flatten().all(|other| other[i] == 0);
-                if let Some([low, high]) = span(layer[i]).filter(|_| is_level && is_alone) {
+                if let Some([low, high]) = layer.span(i).filter(|_| is_level) {
                     spans[usize::try_from(high - low).unwrap_or(0)] += 1;
                 }
             }
         }
+    };
+    let runs = layers.len().min(RUNS);
+    let of_run = |run: usize| {
+        let mut spans = [0_u64; LEVELS as usize];
+        (run * layers.len() / runs..(run + 1) * layers.len() / runs).for_each(|s| add_layer(&mut spans, s));
         spans
     };
     let mut all = [0_u64; LEVELS as usize];
-    for spans in map_each(layers.len(), of_layer) {
+    for spans in map_each(runs, of_run) {
         all.iter_mut().zip(spans).for_each(|(sum, n)| *sum += n);
     }
     let count: u64 = all.iter().sum();
@@ -85,42 +92,33 @@ pub(crate) fn noise(grid: &Grid, layers: &[Vec<Cell>]) -> f64 {
 }
 
 /// The slices, lowest first; takes the cells away.
-pub(crate) fn slices(grid: &Grid, layers: &mut [Vec<Cell>], most: i32) -> Vec<Slice> {
+pub(crate) fn slices(grid: &Grid, layers: &mut [Layer], most: i32) -> Vec<Slice> {
     let mut slices = Vec::with_capacity(layers.len());
     while slices.len() < layers.len() {
         let first = slices.len();
         let wave = map_each(WAVE.min(layers.len() - first), |i| slice(grid, layers, first + i, most));
         slices.extend(wave);
         // The last of them is still needed by the one above.
-        layers[first.saturating_sub(1)..slices.len() - 1].fill_with(Vec::new);
+        layers[first.saturating_sub(1)..slices.len() - 1].fill_with(Layer::default);
     }
     slices
 }
 
-fn slice(grid: &Grid, layers: &[Vec<Cell>], s: usize, most: i32) -> Slice {
+fn slice(grid: &Grid, layers: &[Layer], s: usize, most: i32) -> Slice {
     let [width, height, _] = grid.counts;
     let columns = width as usize;
     let mut canvas = Canvas::new(width, height);
     let above = layers.get(s + 1);
     let below = s.checked_sub(1).map(|s| &layers[s]);
     for row in 0..height as usize {
-        for i in filled(&layers[s], row * columns..(row + 1) * columns) {
-            let Some(own) = span(layers[s][i]) else { continue };
-            let up = above.and_then(|layer| span(layer[i]));
-            let down = below.and_then(|layer| span(layer[i]));
+        for i in layers[s].filled(row * columns..(row + 1) * columns) {
+            let Some(own) = layers[s].span(i) else { continue };
+            let up = above.and_then(|layer| layer.span(i));
+            let down = below.and_then(|layer| layer.span(i));
             canvas.set(i - row * columns, row, judge(own, down, up, most));
         }
     }
     canvas.finish()
-}
-
-/// Which of these cells have seen something. Most have not, so many are looked at together.
-fn filled(layer: &[Cell], range: Range<usize>) -> impl Iterator<Item = usize> {
-    const TOGETHER: usize = 32;
-    let starts = range.clone().step_by(TOGETHER);
-    let runs = starts.map(move |start| start..range.end.min(start + TOGETHER));
-    let runs = runs.filter(|run| layer[run.clone()].iter().fold(0, |any, cell| any | cell) != 0);
-    runs.flatten().filter(|i| layer[*i] != 0)
 }
 
 /// What a voxel that spans these levels holds, given what lies right below and above.

@@ -9,6 +9,9 @@ use crate::Up;
 /// Heights in a slice are told apart in so many steps: with empty, what a byte holds.
 pub const LEVELS: u32 = 255;
 
+/// In levels, 2^53: beyond all maps, whose slices a `u32` counts.
+const FARTHEST: f64 = 9_007_199_254_740_992.0;
+
 /// The lattice of a map: pixels of side t, slices of height σ, counted from a corner.
 ///
 /// A place p of the map's coordinates ([`Up::to_map`]) lies in column ⌊(p₀ − o₀)/t⌋, row ⌊(p₁ − o₁)/t⌋ and slice
@@ -114,12 +117,13 @@ impl Grid {
         self.origin[2] + (f64::from(slice) + share) * self.slice_height
     }
 
-    /// The greatest level, counted through all slices, whose height is at most `height`; negative below the map.
+    /// The greatest level, counted through all slices, whose height is at most `height`; negative below the map. Far from it, that of a
+    /// nearer height, so that levels can be added.
     #[must_use]
     pub(crate) fn level_at(&self, height: f64) -> i64 {
         let level = (height - self.origin[2]) / self.slice_height * f64::from(LEVELS) - 0.5;
-        #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
-        let level = level.floor() as i64;
+        #[expect(clippy::cast_possible_truncation, reason = "whole and at most 2^53")]
+        let level = level.floor().clamp(-FARTHEST, FARTHEST) as i64;
         level
     }
 
@@ -180,5 +184,8 @@ mod tests {
             }
         }
         assert!(GRID.level_at(0.0) < 0 && GRID.slice_at(0.0) == -1);
+        let [lowest, highest] = [-1e300, f64::INFINITY].map(|height| GRID.level_at(height));
+        assert!(lowest < -i64::from(u32::MAX) * 255 && highest > i64::from(u32::MAX) * 255, "beyond all");
+        assert!(lowest.checked_sub(highest).is_some(), "and can be added");
     }
 }

@@ -26,6 +26,7 @@ mod walk;
 mod cache;
 mod encode;
 mod store;
+mod target;
 
 mod parallel;
 
@@ -41,5 +42,6 @@ pub use response::{Back, Response, Slide};
 pub use route::{Building, Ended, Route};
 pub use slice::{Content, Slice};
 pub use store::{SliceFolder, StoreError};
+pub use target::SliceTarget;
 pub use up::{UnknownAxis, Up};
 pub use walk::{Avatar, AvatarOptions, Step, WalkError, Walker, step_each};

@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::options::{MOST_SHARE, Obstacle};
 use crate::slice::Slice;
 use crate::{Block, Grid};
 
@@ -13,20 +15,45 @@ use crate::{Block, Grid};
 /// A clone costs a reference count a slice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SliceMap {
-    grid: Grid,
+    index: Index,
     slices: Vec<Option<Arc<Slice>>>,
-    about: About,
+}
+
+/// What is known of a map without any of its slices.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Index {
+    pub(crate) grid: Grid,
+    pub(crate) about: About,
 }
 
 /// What a map was made of.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct About {
+    /// The rule as it was asked for.
+    pub rule: Obstacle,
     /// ε: a voxel whose points span more than ε σ is an obstacle.
     pub share: f64,
-    /// How far points of a level floor spread upwards within a pixel, estimated; 0 where nothing could be told.
+    /// How far points of a level floor spread upwards within a pixel, as far as ε allows for it: as given, or estimated, which is 0 where
+    /// nothing could be told; and 0 where the rule is ε itself.
     pub noise: f64,
     /// How many points are in it.
     pub points: u64,
+    /// How many points were left out ([`SliceBuilder::counts`](crate::SliceBuilder::counts)).
+    pub left_out: u64,
+}
+
+impl About {
+    /// Whether the noise was estimated from the points.
+    #[must_use]
+    pub fn is_noise_estimated(&self) -> bool {
+        matches!(self.rule, Obstacle::Slope { noise: None, .. })
+    }
+
+    /// Whether the noise is so great that ε does not allow for all of it ([`Obstacle::Slope`]).
+    #[must_use]
+    pub fn is_noise_capped(&self) -> bool {
+        self.is_noise_estimated() && self.noise > 0.0 && self.share >= MOST_SHARE
+    }
 }
 
 /// A slice that would be needed is not there.
@@ -39,19 +66,23 @@ pub struct Unloaded {
 
 impl SliceMap {
     /// A map of all its slices, equal ones joined.
-    pub(crate) fn of_slices(grid: Grid, slices: Vec<Slice>, about: About) -> Self {
+    pub(crate) fn of_slices(index: Index, slices: Vec<Slice>) -> Self {
         let mut known: BTreeMap<u64, Arc<Slice>> = BTreeMap::new();
         let slices = slices.into_iter().map(|slice| {
             let slice = Arc::new(slice);
             let first = known.entry(slice.checksum()).or_insert_with(|| Arc::clone(&slice));
             Some(if **first == *slice { Arc::clone(first) } else { slice })
         });
-        Self { grid, slices: slices.collect(), about }
+        Self { index, slices: slices.collect() }
     }
 
     /// A map none of whose slices is loaded.
-    pub(crate) fn unloaded(grid: Grid, about: About) -> Self {
-        Self { grid, slices: vec![None; grid.counts[2] as usize], about }
+    pub(crate) fn unloaded(index: Index) -> Self {
+        Self { index, slices: vec![None; index.grid.counts[2] as usize] }
+    }
+
+    pub(crate) fn index(&self) -> &Index {
+        &self.index
     }
 
     /// Puts a slice in its place, or takes it out.
@@ -62,13 +93,13 @@ impl SliceMap {
     /// Where pixels and slices lie.
     #[must_use]
     pub fn grid(&self) -> &Grid {
-        &self.grid
+        &self.index.grid
     }
 
     /// What it was made of.
     #[must_use]
     pub fn about(&self) -> &About {
-        &self.about
+        &self.index.about
     }
 
     /// All slices, lowest first; missing ones are not loaded.

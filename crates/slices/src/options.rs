@@ -3,15 +3,28 @@
 use nearmiss_geometry::Aabb;
 use serde::{Deserialize, Serialize};
 
+use crate::build::{BLOCKS, Layer, PART};
 use crate::error::SliceError;
+use crate::slice::Slice;
 use crate::{Grid, Up};
 
-/// Pixels of a slice that can be told apart.
-const MOST_PIXELS: f64 = 2_147_483_648.0;
+/// Pixels of a slice, and slices, that can be told apart.
+const MOST: f64 = 2_147_483_648.0;
 
-/// Bytes a voxel takes while a map is built, lowest and highest level (2), and when it is done, the same in fewer steps and two
-/// flags (1¾).
-const BYTES: f64 = 3.75;
+/// However noisy points are, what spans more than this share of a slice is an obstacle.
+pub(crate) const MOST_SHARE: f64 = 0.9;
+
+/// Bytes that allocators take beside what a slice is given, in eight pieces: sixteen each, and as much lost to rounding.
+const ALLOCATIONS: usize = 8 * 32;
+
+/// Most bytes that a slice of so many pixels takes while a map is built: what its voxels have seen, the image made of that, its
+/// places in lists of slices, where each block of points begins in each of its parts, and what the system adds.
+fn bytes([width, height]: [u32; 2]) -> usize {
+    let area = width as usize * height as usize;
+    let lists = 2 * size_of::<Slice>() + 4 * size_of::<usize>();
+    let blocks = 2 * BLOCKS * area.div_ceil(PART) * size_of::<u32>();
+    Layer::bytes_of(area) + Slice::bytes_of(width, height) + lists + blocks + ALLOCATIONS
+}
 
 /// How large a pixel is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -32,12 +45,13 @@ pub enum Obstacle {
         /// θ, above 0 and below 90 degrees.
         degrees: f64,
         /// How far points of a level floor spread upwards within a pixel, in the units of the points; estimated from the
-        /// points if not given.
+        /// points if not given. What is estimated makes ε no more than 0.9, however noisy the points: else walls would
+        /// become floors ([`About::is_noise_capped`](crate::About::is_noise_capped) tells).
         noise: Option<f64>,
     },
 }
 
-/// How a map is made. Plain numbers, checked by [`SlicePlan::new`].
+/// How a map is made. Plain numbers, checked by [`SlicePlan::new`], and without points by [`SliceOptions::check`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SliceOptions {
@@ -95,6 +109,73 @@ impl SliceOptions {
     pub const fn with_memory(self, memory: u64) -> Self {
         Self { memory, ..self }
     }
+
+    /// Checks what makes no sense whatever the points: before they are read.
+    ///
+    /// # Errors
+    /// Names the option.
+    pub fn check(&self) -> Result<(), SliceError> {
+        match self.pixel {
+            Pixel::Side(t) if !(t > 0.0 && self.height(t).is_finite()) => {
+                return Err(SliceError::Pixel { side: t });
+            }
+            Pixel::Count(0) => return Err(SliceError::NoPixels),
+            _ => {}
+        }
+        match self.slice_height {
+            Some(height) if !(height > 0.0 && height.is_finite()) => {
+                return Err(SliceError::SliceHeight { height });
+            }
+            _ => {}
+        }
+        match self.obstacle {
+            Obstacle::Share(share) if share.is_nan() || share <= 0.0 => Err(SliceError::Share { share }),
+            Obstacle::Slope { degrees, .. } if !(degrees > 0.0 && degrees < 90.0) => {
+                Err(SliceError::Slope { degrees })
+            }
+            Obstacle::Slope { noise: Some(noise), .. } if !(noise >= 0.0 && noise.is_finite()) => {
+                Err(SliceError::Noise { noise })
+            }
+            rule => match (self.pixel, self.slice_height) {
+                (Pixel::Side(t), _) => rule.check(t, self.height(t)),
+                // t is not known yet, but that it is a third of σ, or more than nothing.
+                (Pixel::Count(_), None) => rule.without_noise().check(1.0, self.height(1.0)),
+                (Pixel::Count(_), Some(height)) => rule.check(0.0, height),
+            },
+        }
+    }
+
+    /// σ for this t.
+    fn height(&self, pixel: f64) -> f64 {
+        self.slice_height.unwrap_or(3.0 * pixel)
+    }
+}
+
+impl Obstacle {
+    fn without_noise(self) -> Self {
+        match self {
+            Self::Slope { degrees, .. } => Self::Slope { degrees, noise: None },
+            Self::Share(_) => self,
+        }
+    }
+
+    /// ε, where noise that was not given is this; it alone never makes ε more than [`MOST_SHARE`].
+    fn share(self, pixel: f64, slice_height: f64, estimated: f64) -> f64 {
+        match self {
+            Self::Share(share) => share,
+            Self::Slope { degrees, noise } => {
+                let rise = pixel * degrees.to_radians().tan();
+                let share = |noise: f64| (rise + noise) / slice_height;
+                noise.map_or_else(|| share(estimated).min(MOST_SHARE.max(share(0.0))), share)
+            }
+        }
+    }
+
+    /// The points of a voxel span less than σ.
+    fn check(self, pixel: f64, slice_height: f64) -> Result<(), SliceError> {
+        let share = self.share(pixel, slice_height, 0.0);
+        if share < 1.0 { Ok(()) } else { Err(SliceError::NoObstacles { share }) }
+    }
 }
 
 /// Options that make sense, and the lattice that they make over given bounds.
@@ -111,49 +192,56 @@ impl SlicePlan {
     /// Names the option that makes no sense, or what of the bounds does not serve; says how many bytes are needed where more
     /// are than allowed.
     pub fn new(options: &SliceOptions, bounds: &Aabb) -> Result<Self, SliceError> {
+        options.check()?;
         let up = options.up;
         let turned = [bounds.min, bounds.max].map(|corner| up.to_map(corner));
         let Aabb { min, max } = Aabb::of(turned);
         let extent = [0, 1, 2].map(|k| max[k] - min[k]);
         if !extent.iter().all(|e| e.is_finite()) {
-            return Err(SliceError::Bounds);
+            return Err(SliceError::Bounds { bounds: *bounds });
         }
         if extent[2] <= 0.0 {
             return Err(SliceError::Flat { up });
         }
         let pixel = match options.pixel {
-            Pixel::Side(t) if t > 0.0 && t.is_finite() => t,
-            Pixel::Side(t) => return Err(SliceError::Pixel { side: t }),
-            Pixel::Count(0) => return Err(SliceError::NoPixels),
+            Pixel::Side(t) => t,
             // So much longer that the farthest point still lies in the last pixel.
             Pixel::Count(n) => extent[0].max(extent[1]) / f64::from(n) * (1.0 + 1e-9),
         };
         if pixel <= 0.0 {
             return Err(SliceError::NoWidth { up });
         }
-        let slice_height = options.slice_height.unwrap_or(3.0 * pixel);
-        if !(slice_height > 0.0 && slice_height.is_finite()) {
-            return Err(SliceError::SliceHeight { height: slice_height });
+        let slice_height = options.height(pixel);
+        if !slice_height.is_finite() {
+            return Err(SliceError::Bounds { bounds: *bounds });
         }
         let sizes = [pixel, pixel, slice_height];
         let counts = [0, 1, 2].map(|k| (extent[k] / sizes[k]).floor() + 1.0);
         let pixels = counts[0] * counts[1];
-        if pixels > MOST_PIXELS {
-            return Err(SliceError::TooManyPixels { pixels, side: pixel });
+        if pixels > MOST {
+            return Err(SliceError::TooManyPixels { pixels, side: pixel, bounds: *bounds });
         }
-        let bytes = pixels * counts[2] * BYTES;
-        #[expect(clippy::cast_precision_loss, reason = "a limit of memory needs no more digits")]
-        let allowed = options.memory as f64;
-        // The second holds by itself unless pixels are far larger than the building.
-        if bytes > allowed || counts[2] > MOST_PIXELS {
-            return Err(SliceError::Memory { bytes, allowed: options.memory });
-        }
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "whole and at most 2^31")]
+        let slices = counts[2];
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "whole and at most 2^31; slices saturate, and are then too many"
+        )]
         let counts = counts.map(|n| n as u32);
-        let plan =
-            Self { grid: Grid { up, origin: min, pixel, slice_height, counts }, obstacle: options.obstacle };
-        plan.check_rule()?;
-        Ok(plan)
+        let [width, height, _] = counts;
+        #[expect(clippy::cast_precision_loss, reason = "a limit of memory needs no more digits")]
+        let (bytes, allowed) = (slices * bytes([width, height]) as f64, options.memory as f64);
+        if bytes > allowed || slices > MOST {
+            return Err(SliceError::Memory {
+                slices,
+                pixels: [width, height],
+                bytes,
+                allowed: options.memory,
+                bounds: *bounds,
+            });
+        }
+        options.obstacle.check(pixel, slice_height)?;
+        Ok(Self { grid: Grid { up, origin: min, pixel, slice_height, counts }, obstacle: options.obstacle })
     }
 
     /// The lattice.
@@ -168,32 +256,8 @@ impl SlicePlan {
         self.obstacle
     }
 
-    fn check_rule(&self) -> Result<(), SliceError> {
-        match self.obstacle {
-            Obstacle::Share(share) if share.is_nan() || share <= 0.0 => {
-                return Err(SliceError::Share { share });
-            }
-            Obstacle::Slope { degrees, .. } if !(degrees > 0.0 && degrees < 90.0) => {
-                return Err(SliceError::Slope { degrees });
-            }
-            Obstacle::Slope { noise: Some(noise), .. } if noise.is_nan() || noise < 0.0 => {
-                return Err(SliceError::Noise { noise });
-            }
-            _ => {}
-        }
-        let share = self.share(0.0);
-        // The points of a voxel span less than σ.
-        if share < 1.0 { Ok(()) } else { Err(SliceError::NoObstacles { share }) }
-    }
-
     /// ε, where noise that was not given is this.
     pub(crate) fn share(&self, estimated: f64) -> f64 {
-        match self.obstacle {
-            Obstacle::Share(share) => share,
-            Obstacle::Slope { degrees, noise } => {
-                let rise = self.grid.pixel * degrees.to_radians().tan();
-                (rise + noise.unwrap_or(estimated)) / self.grid.slice_height
-            }
-        }
+        self.obstacle.share(self.grid.pixel, self.grid.slice_height, estimated)
     }
 }

@@ -68,28 +68,15 @@ pub(crate) fn walk_each<W: Send, Q: Sync, A: Send>(
     }
 }
 
-/// Does `work` on every part of every layer: it gets the number of the layer, that of the part, and its cells.
+/// Does `work` on everything, given its number.
 #[cfg(feature = "rayon")]
-pub(crate) fn change_each<C: Send>(
-    layers: &mut [Vec<C>],
-    size: usize,
-    work: impl Fn(usize, usize, &mut [C]) + Sync + Send,
-) {
+pub(crate) fn change_each<T: Send>(all: &mut [T], work: impl Fn(usize, &mut T) + Sync + Send) {
     use rayon::prelude::*;
-    let all = layers.par_iter_mut().enumerate();
-    all.for_each(|(i, layer)| {
-        layer.par_chunks_mut(size).enumerate().for_each(|(j, part)| work(i, j, part));
-    });
+    all.par_iter_mut().enumerate().for_each(|(i, one)| work(i, one));
 }
 
-/// Does `work` on every part of every layer: it gets the number of the layer, that of the part, and its cells.
+/// Does `work` on everything, given its number.
 #[cfg(not(feature = "rayon"))]
-pub(crate) fn change_each<C: Send>(
-    layers: &mut [Vec<C>],
-    size: usize,
-    work: impl Fn(usize, usize, &mut [C]) + Sync + Send,
-) {
-    for (i, layer) in layers.iter_mut().enumerate() {
-        layer.chunks_mut(size).enumerate().for_each(|(j, part)| work(i, j, part));
-    }
+pub(crate) fn change_each<T: Send>(all: &mut [T], work: impl Fn(usize, &mut T) + Sync + Send) {
+    all.iter_mut().enumerate().for_each(|(i, one)| work(i, one));
 }

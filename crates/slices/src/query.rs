@@ -16,6 +16,9 @@ use crate::{Block, Grid};
 /// Questions that a thread takes at a time.
 const CHUNK: usize = 64;
 
+/// Rows that are looked at together for floors: of slices that are empty there only tiles are.
+const BAND: u32 = 32;
+
 /// What the floor under a base is, where it is not level (S4, §3.1).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Floor {
@@ -129,25 +132,46 @@ impl SliceMap {
         let grid = self.grid();
         let slices = grid.slice_at(base).saturating_add(1).clamp(0, i64::from(grid.counts[2]));
         let slices = u32::try_from(slices).unwrap_or(0);
-        let run = Run::new(columns);
-        for row in rows {
-            for i in run.range() {
-                // Columns whose highest thing has not been found yet.
-                let mut open = run.mask(i);
-                for s in (0..slices).rev() {
-                    let slice = self.slice(s)?;
-                    let mut found = slice.occupied().row(row)[i] & open;
-                    open &= !found;
-                    while found != 0 {
-                        let column = 64 * u32::try_from(i).unwrap_or(0) + found.trailing_zeros();
-                        found &= found - 1;
-                        let content = slice.pixel(column, row).filter(|content| !content.is_obstacle);
-                        floors.add(content.map(|content| grid.height(s, content.top)));
-                    }
-                    if open == 0 {
-                        break;
-                    }
+        let (first, last) = (*rows.start(), *rows.end());
+        for from in (first..=last).step_by(BAND as usize) {
+            let band = from..=last.min(from.saturating_add(BAND - 1));
+            for word in (columns.start() / 64)..=(columns.end() / 64) {
+                let within = (*columns.start()).max(64 * word)..=(*columns.end()).min(64 * word + 63);
+                self.floors_of_band(slices, &within, &band, floors)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Those of so many of the lowest `slices`, for some rows and columns of one word.
+    fn floors_of_band(
+        &self,
+        slices: u32,
+        columns: &RangeInclusive<u32>,
+        band: &RangeInclusive<u32>,
+        floors: &mut Floors,
+    ) -> Result<(), Unloaded> {
+        let word = columns.start() / 64;
+        // Columns whose highest thing has not been found yet.
+        let mut open = [Run::new(columns).mask(word as usize); BAND as usize];
+        let open = &mut open[..band.clone().count()];
+        for s in (0..slices).rev() {
+            let slice = self.slice(s)?;
+            if !slice.any(columns, band) {
+                continue;
+            }
+            for (row, open) in band.clone().zip(&mut *open) {
+                let mut found = slice.occupied().row(row)[word as usize] & *open;
+                *open &= !found;
+                while found != 0 {
+                    let column = 64 * word + found.trailing_zeros();
+                    found &= found - 1;
+                    let content = slice.pixel(column, row).filter(|content| !content.is_obstacle);
+                    floors.add(content.map(|content| self.grid().height(s, content.top)));
                 }
+            }
+            if open.iter().all(|&open| open == 0) {
+                break;
             }
         }
         Ok(())

@@ -57,7 +57,7 @@ pub enum Ended {
         /// Which.
         point: usize,
     },
-    /// It fell below the map on its way to this point.
+    /// It fell below the map on its way to this point; or from its start, 0, if there are no points.
     LeftMap {
         /// Which.
         point: usize,
@@ -79,30 +79,85 @@ impl Route {
         }
     }
 
+    /// Checks that walking and falling comes to an end while somebody waits for it.
+    fn check_steps(&self, grid: &Grid, avatar: &Avatar) -> Result<(), WalkError> {
+        let places = || std::iter::once(self.start_across(grid)).chain(self.points.iter().copied());
+        let ways =
+            places().zip(&self.points).map(|(from, to)| (to[0] - from[0]).abs() + (to[1] - from[1]).abs());
+        let (what, length) = avatar.stride();
+        let steps = ways.sum::<f64>() / length;
+        if steps > MOST_STEPS {
+            #[expect(clippy::cast_precision_loss, reason = "a bound")]
+            let on_map = self.points.len() as f64 * (width(grid, 0) + width(grid, 1));
+            // Where as many points on the map would do, it is not the step's fault.
+            let far = places().map(|place| off(grid, place)).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+            return Err(match far.filter(|_| on_map / length <= MOST_STEPS) {
+                Some((index, away)) => WalkError::FarOff { index, away },
+                None => WalkError::TooShort { what, length, steps },
+            });
+        }
+        let (what, length) = ("a climb", avatar.options().climb);
+        let steps = f64::from(grid.counts[2]) * grid.slice_height / length;
+        if steps > MOST_STEPS { Err(WalkError::TooShort { what, length, steps }) } else { Ok(()) }
+    }
+
+    /// The start, by the two coordinates across in the caller's order.
+    fn start_across(&self, grid: &Grid) -> [f64; 2] {
+        let [u, v, _] = grid.up.to_map(self.start);
+        // Which is its own inverse.
+        grid.up.across([u, v])
+    }
+
     /// Walks along the route, straight from point to point, until it ends; hands out the building and every step.
     ///
-    /// Every step but a fall comes nearer to the next point, so it ends.
-    ///
     /// # Errors
-    /// When a place is not finite, there is no room at the start, or a slice cannot be loaded; or what `each` ends it with.
+    /// As [`Route::stand`] and [`Route::follow`].
     pub fn walk<B: Building>(
         &self,
         building: &mut B,
         avatar: &Avatar,
         response: &dyn Response,
-        mut each: impl FnMut(&B, &Step) -> Result<(), B::Error>,
+        each: impl FnMut(&B, &Step) -> Result<(), B::Error>,
     ) -> Result<Ended, B::Error> {
+        let walker = self.stand(building, avatar)?;
+        self.follow(building, walker, response, each)
+    }
+
+    /// Puts an avatar at the start, as [`Walker::new`] does; a fall from above the map begins where there may be something.
+    ///
+    /// # Errors
+    /// When a place is not finite or far off the map, there is no room at the start, steps or climb are so short that there would be more
+    /// than 2^32 of them, or a slice cannot be loaded.
+    pub fn stand<B: Building>(&self, building: &mut B, avatar: &Avatar) -> Result<Walker, B::Error> {
         self.check()?;
         let grid = building.grid();
+        self.check_steps(grid, avatar)?;
         let mut start = grid.up.to_map(self.start);
-        // A fall from above the map begins where there may be something.
         let top = grid.origin[2] + f64::from(grid.counts[2]) * grid.slice_height + avatar.options().climb;
         start[2] = start[2].min(top);
         let (feet, start) = (start[2], grid.up.from_map(start));
         let needs = Walker::needs_at(avatar, grid, start);
         let map = building.with_slices(needs.unwrap_or(NONE), feet)?;
-        let mut walker = Walker::new(*avatar, map, start)?;
-        for (point, target) in self.points.iter().enumerate() {
+        Ok(Walker::new(*avatar, map, start)?)
+    }
+
+    /// Walks on from the start ([`Route::stand`]), straight from point to point, until it ends; without points, down to what is below.
+    /// Hands out the building and every step.
+    ///
+    /// Every step but a fall comes nearer to the next point, so it ends.
+    ///
+    /// # Errors
+    /// When a slice cannot be loaded; or what `each` ends it with.
+    pub fn follow<B: Building, E: From<B::Error>>(
+        &self,
+        building: &mut B,
+        mut walker: Walker,
+        response: &dyn Response,
+        mut each: impl FnMut(&B, &Step) -> Result<(), E>,
+    ) -> Result<Ended, E> {
+        let start = [self.start_across(building.grid())];
+        let targets = if self.points.is_empty() { &start } else { &self.points[..] };
+        for (point, target) in targets.iter().enumerate() {
             loop {
                 if walker.is_at(building.grid(), *target) && !walker.is_falling() {
                     break;
@@ -110,20 +165,37 @@ impl Route {
                 let needs = walker.needs(building.grid());
                 let map = building.with_slices(needs.unwrap_or(NONE), walker.feet())?;
                 let before = walker;
-                let step = walker.step(map, *target, response).map_err(unloaded)?;
+                let step = walker.step(map, *target, response).map_err(unloaded::<B::Error>)?;
                 each(building, &step)?;
+                // First, since what is far below falls by less than its height can tell.
+                if walker.feet() < building.grid().origin[2] - walker.climb() {
+                    return Ok(Ended::LeftMap { point });
+                }
                 let is_there = walker.is_at(building.grid(), *target);
                 if walker == before || (walker.creeps(&before) && !is_there) {
                     return Ok(Ended::Stuck { point });
-                }
-                if walker.feet() < building.grid().origin[2] - avatar.options().climb {
-                    return Ok(Ended::LeftMap { point });
                 }
             }
         }
         Ok(Ended::Arrived)
     }
 }
+
+/// Of the map, along an axis across.
+fn width(grid: &Grid, axis: usize) -> f64 {
+    f64::from(grid.counts[axis]) * grid.pixel
+}
+
+/// How far a place, by the two coordinates across in the caller's order, is off the map, along an axis.
+fn off(grid: &Grid, place: [f64; 2]) -> f64 {
+    let place = grid.up.across(place);
+    let low = |k: usize| grid.origin[k];
+    let beyond = |k: usize| (low(k) - place[k]).max(place[k] - (low(k) + width(grid, k)));
+    beyond(0).max(beyond(1)).max(0.0)
+}
+
+/// Of a walk; some hours' worth.
+const MOST_STEPS: f64 = 4_294_967_296.0;
 
 /// No slices.
 #[expect(clippy::reversed_empty_ranges, reason = "that is what makes it empty")]

@@ -1,11 +1,11 @@
 //! One image: which pixels hold something, how high, and whether it is an obstacle.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use bytemuck::cast_slice;
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::bits::Bits;
+use crate::bits::{Bits, filled_of_eight};
 
 /// A layer of voxels. A pixel takes 1¾ bytes, whatever it holds; the bits of a row take whole words of 64.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,6 +40,25 @@ impl Content {
     pub(crate) const STEP: u8 = 16;
 }
 
+/// Sixty-four pixels side by side; beyond the end of a row nothing is.
+#[derive(Debug)]
+pub(crate) struct Word {
+    /// As in a slice.
+    pub(crate) tops: [u8; 64],
+    pub(crate) bottoms: [u8; 32],
+    pub(crate) obstacles: u64,
+}
+
+impl Word {
+    /// Whether exactly these pixels have tops, and none but them is an obstacle.
+    #[inline]
+    pub(crate) fn is_sound(&self, occupied: u64) -> bool {
+        let eights = self.tops.as_chunks().0.iter().map(|eight| filled_of_eight(*eight));
+        let filled = (0..).zip(eights).fold(0, |bits, (i, eight)| bits | eight << (8 * i));
+        filled == occupied && self.obstacles & !occupied == 0
+    }
+}
+
 /// A slice that is being filled.
 #[derive(Debug)]
 pub(crate) struct Canvas(Slice);
@@ -54,7 +73,7 @@ impl Canvas {
             tiles: Bits::of_tiles(width, height),
             obstacle: Bits::new(width, height),
             tops: vec![0; width as usize * rows],
-            bottoms: vec![0; halves(width) * rows],
+            bottoms: vec![0; halves(width as usize) * rows],
             checksum: 0,
         })
     }
@@ -62,28 +81,29 @@ impl Canvas {
     /// Sets an empty pixel.
     #[inline]
     pub(crate) fn set(&mut self, column: usize, row: usize, content: Content) {
-        self.0.occupied.set(column, row);
-        self.0.tiles.set_tile(column, row);
-        self.fill(column, row, content);
-    }
-
-    /// Says which of eight empty pixels, from a multiple of eight on, hold something; what, is for [`Canvas::fill`].
-    #[inline]
-    pub(crate) fn mark_eight(&mut self, column: usize, row: usize, bits: u8) {
-        self.0.occupied.set_eight(column, row, bits);
-        self.0.tiles.set_tile(column, row);
-    }
-
-    /// Fills a pixel that is said to hold something.
-    #[inline]
-    pub(crate) fn fill(&mut self, column: usize, row: usize, content: Content) {
         let Self(slice) = self;
+        let width = slice.width as usize;
+        slice.occupied.set(column, row);
+        slice.tiles.set_tile(column, row);
         if content.is_obstacle {
             slice.obstacle.set(column, row);
         }
-        slice.tops[row * slice.width as usize + column] = content.top + 1;
-        slice.bottoms[row * halves(slice.width) + column / 2] |=
+        slice.tops[row * width + column] = content.top + 1;
+        slice.bottoms[row * halves(width) + column / 2] |=
             (content.bottom / Content::STEP) << (4 * (column % 2));
+    }
+
+    /// Sets the `word`-th 64 pixels of a row, all empty, of which those of `occupied` hold something.
+    #[inline]
+    pub(crate) fn set_word(&mut self, word: usize, row: usize, occupied: u64, pixels: &Word) {
+        let Self(slice) = self;
+        slice.occupied.set_word(word, row, occupied);
+        slice.tiles.set_tiles(word, row, occupied);
+        slice.obstacle.set_word(word, row, pixels.obstacles);
+        let [tops, bottoms] = slice.places(word, row);
+        let (tops, bottoms) = (&mut slice.tops[tops], &mut slice.bottoms[bottoms]);
+        tops.copy_from_slice(&pixels.tops[..tops.len()]);
+        bottoms.copy_from_slice(&pixels.bottoms[..bottoms.len()]);
     }
 
     /// The slice.
@@ -95,23 +115,47 @@ impl Canvas {
 }
 
 impl Slice {
-    /// Of what is there alone: most of a slice is empty.
+    /// Of what is there alone: most of a slice is empty. Words side by side with something in them are taken together.
     fn hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(cast_slice(&[self.width, self.height]));
         hash.update(cast_slice(self.occupied.words()));
         let width = self.width as usize;
         for row in 0..self.height {
-            let (tops, bottoms) = (row as usize * width, row as usize * halves(self.width));
-            let words = self.occupied.row(row).iter().zip(self.obstacle.row(row)).enumerate();
-            for (i, (_, obstacle)) in words.filter(|(_, (occupied, _))| **occupied != 0) {
-                let (from, to) = (64 * i, width.min(64 * i + 64));
-                hash.update(&self.tops[tops + from..tops + to]);
-                hash.update(&self.bottoms[bottoms + from / 2..bottoms + to.div_ceil(2)]);
-                hash.update(&obstacle.to_le_bytes());
+            let (tops, bottoms) = (row as usize * width, row as usize * halves(width));
+            let mut word = 0;
+            for run in self.occupied.row(row).chunk_by(|a, b| (*a != 0) == (*b != 0)) {
+                let words = word..word + run.len();
+                word = words.end;
+                if run[0] != 0 {
+                    let (from, to) = (64 * words.start, width.min(64 * words.end));
+                    hash.update(&self.tops[tops + from..tops + to]);
+                    hash.update(&self.bottoms[bottoms + from / 2..bottoms + to.div_ceil(2)]);
+                    hash.update(cast_slice(&self.obstacle.row(row)[words]));
+                }
             }
         }
         hash.digest()
+    }
+
+    /// Where the `word`-th 64 pixels of a row are among tops and bottoms.
+    #[inline]
+    fn places(&self, word: usize, row: usize) -> [Range<usize>; 2] {
+        let width = self.width as usize;
+        let (from, to) = (64 * word, width.min(64 * word + 64));
+        let (tops, bottoms) = (row * width, row * halves(width));
+        [tops + from..tops + to, bottoms + from / 2..bottoms + to.div_ceil(2)]
+    }
+
+    /// The `word`-th 64 pixels of a row.
+    pub(crate) fn word(&self, word: usize, row: usize) -> Word {
+        let [tops, bottoms] = self.places(word, row);
+        let (tops, bottoms) = (&self.tops[tops], &self.bottoms[bottoms]);
+        let row = u32::try_from(row).unwrap_or(u32::MAX);
+        let mut pixels = Word { tops: [0; 64], bottoms: [0; 32], obstacles: self.obstacle.row(row)[word] };
+        pixels.tops[..tops.len()].copy_from_slice(tops);
+        pixels.bottoms[..bottoms.len()].copy_from_slice(bottoms);
+        pixels
     }
 
     /// Columns.
@@ -135,8 +179,13 @@ impl Slice {
     /// Bytes in memory.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let bits: usize = [&self.occupied, &self.tiles, &self.obstacle].map(Bits::bytes).iter().sum();
-        self.tops.len() + self.bottoms.len() + bits
+        Self::bytes_of(self.width, self.height)
+    }
+
+    /// Bytes that an image of this size takes.
+    pub(crate) fn bytes_of(width: u32, height: u32) -> usize {
+        let bits = 2 * Bits::bytes_of(width, height) + Bits::bytes_of_tiles(width, height);
+        (width as usize + halves(width as usize)) * height as usize + bits
     }
 
     /// How many pixels hold something, and how many of them are obstacles.
@@ -155,7 +204,7 @@ impl Slice {
         let is_obstacle = self.obstacle.is_set(column, row);
         let (column, row) = (column as usize, row as usize);
         let top = self.tops[row * self.width as usize + column].checked_sub(1)?;
-        let half = self.bottoms[row * halves(self.width) + column / 2] >> (4 * (column % 2)) & 15;
+        let half = self.bottoms[row * halves(self.width as usize) + column / 2] >> (4 * (column % 2)) & 15;
         Some(Content { top, bottom: half * Content::STEP, is_obstacle })
     }
 
@@ -215,6 +264,6 @@ impl Slice {
 }
 
 /// Bytes of a row of half bytes.
-const fn halves(width: u32) -> usize {
-    (width as usize).div_ceil(2)
+const fn halves(width: usize) -> usize {
+    width.div_ceil(2)
 }

@@ -34,7 +34,8 @@ pub struct AvatarOptions {
     pub height: f64,
     /// How far it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
     pub climb: f64,
-    /// How far it moves in a step. Default: 0.05.
+    /// How far it moves in a step, at most the lesser side of its base: then bases at both ends meet, and it steps over nothing.
+    /// Default: 0.05.
     pub step: f64,
 }
 
@@ -76,6 +77,18 @@ pub enum WalkError {
         /// As given.
         length: f64,
     },
+    /// A length so short that a walk would not end while anybody waits.
+    #[error(
+        "with {what} of {length} the route may take {steps:e} steps, more than 2^32; give a greater length"
+    )]
+    TooShort {
+        /// Which.
+        what: &'static str,
+        /// As given.
+        length: f64,
+        /// How many.
+        steps: f64,
+    },
     /// An avatar that climbs over its own head.
     #[error("an avatar {height} high cannot climb {climb}; give less than its height")]
     Climb {
@@ -89,6 +102,14 @@ pub enum WalkError {
     NotFinite {
         /// Which, the start being 0.
         index: usize,
+    },
+    /// A place so far off the map that a walk would not end while anybody waits.
+    #[error("point {index} of the route is {away:.2e} off the map; give one on it")]
+    FarOff {
+        /// Which, the start being 0.
+        index: usize,
+        /// How far, along an axis.
+        away: f64,
     },
     /// Nobody can stand there.
     #[error(
@@ -138,6 +159,13 @@ impl Avatar {
     #[must_use]
     pub fn options(&self) -> &AvatarOptions {
         &self.options
+    }
+
+    /// How far it moves in a step, and what makes it so.
+    pub(crate) fn stride(&self) -> (&'static str, f64) {
+        let AvatarOptions { base: [width, depth], step, .. } = self.options;
+        let base = width.min(depth);
+        if step <= base { ("a step", step) } else { ("an avatar's base", base) }
     }
 
     /// Its box, in the caller's coordinates, when its feet stand on this place.
@@ -234,6 +262,11 @@ impl Walker {
         self.place[2]
     }
 
+    /// How far it falls in a step.
+    pub(crate) fn climb(&self) -> f64 {
+        self.avatar.options.climb
+    }
+
     /// Whether it stands on nothing.
     #[must_use]
     pub fn is_falling(&self) -> bool {
@@ -245,7 +278,7 @@ impl Walker {
     pub(crate) fn creeps(&self, before: &Self) -> bool {
         let way = [0, 1, 2].map(|k| self.place[k] - before.place[k]);
         let gained = way.iter().map(|x| x * x).sum::<f64>().sqrt();
-        !self.falling && !before.falling && gained < LEAST_GAIN * self.avatar.options.step
+        !self.falling && !before.falling && gained < LEAST_GAIN * self.avatar.stride().1
     }
 
     /// Whether it is at this place, given as the two coordinates across in the caller's order.
@@ -296,7 +329,7 @@ impl Walker {
     fn towards(&self, target: [f64; 2]) -> [f64; 2] {
         let way = [target[0] - self.place[0], target[1] - self.place[1]];
         let length = (way[0] * way[0] + way[1] * way[1]).sqrt();
-        let step = self.avatar.options.step;
+        let (_, step) = self.avatar.stride();
         if !length.is_finite() {
             return [self.place[0], self.place[1]];
         }
@@ -346,7 +379,7 @@ impl Walker {
         let (Some(columns), Some(rows)) = ranges else { return Ok(nothing) };
         let [least, most] = reach.map(|height| grid.level_at(height));
         let last = i64::from(grid.counts[2]) - 1;
-        let mut found = nothing;
+        let (mut found, mut is_over) = (nothing, false);
         // From the highest that can be climbed downwards, until a floor is found.
         // The lowest level is below what carries.
         let carrying = (least + 1).div_euclid(SLICE).max(0)..=most.div_euclid(SLICE).min(last);
@@ -361,10 +394,8 @@ impl Walker {
             let (mut support, mut floor) = (None, None);
             for row in rows.clone() {
                 let tops = slice.row(&columns, row);
-                let (is_over, top) = span.greatest(tops);
-                if is_over {
-                    return Ok(Look { blocked: true, ..found });
-                }
+                let (has_over, top) = span.greatest(tops);
+                is_over |= has_over;
                 support = support.max(top);
                 if top > floor {
                     if slice.any_obstacle(&columns, row) {
@@ -384,12 +415,13 @@ impl Walker {
         }
         let head = found.support.unwrap_or(self.place[2]) + self.avatar.options.height;
         let crown = grid.level_at(head);
-        let above = (most.div_euclid(SLICE) + 1).max(0)..=crown.div_euclid(SLICE).min(last);
-        for s in above {
-            let below_head = crown - s * SLICE;
+        // What is above all that can be climbed, be it in the slice where the climb ends.
+        let lowest = most.div_euclid(SLICE) + i64::from(!is_over);
+        for s in lowest.max(0)..=crown.div_euclid(SLICE).min(last) {
+            let [over, below_head] = [most, crown].map(|level| level - s * SLICE);
             let slice = map.slice(u32::try_from(s).unwrap_or(0))?;
             if slice.any(&columns, &rows)
-                && (below_head >= SLICE - 1 || reaches(slice, &columns, &rows, below_head))
+                && (below_head >= SLICE - 1 || reaches(slice, [&columns, &rows], [over, below_head]))
             {
                 return Ok(Look { blocked: true, ..found });
             }
@@ -408,11 +440,11 @@ impl Walker {
     }
 }
 
-/// Whether anything in these pixels begins at this level or lower: a ceiling above the head does not.
-fn reaches(slice: &Slice, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>, level: i64) -> bool {
+/// Whether anything in these pixels tops a level and begins at another or lower: a ceiling above the head does not.
+fn reaches(slice: &Slice, [columns, rows]: [&RangeInclusive<u32>; 2], [over, level]: [i64; 2]) -> bool {
     rows.clone().any(|row| {
         let mut contents = columns.clone().filter_map(|column| slice.pixel(column, row));
-        contents.any(|content| i64::from(content.bottom) <= level)
+        contents.any(|content| i64::from(content.top) > over && i64::from(content.bottom) <= level)
     })
 }
 

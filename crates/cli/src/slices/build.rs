@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::geometry::TriangleMesh;
-use nearmiss::io::ReadError;
-use nearmiss::slices::{Obstacle, Pixel, SliceBuilder, SliceOptions, SlicePlan, Up};
-use nearmiss::{Aabb, CloudError, PointCloud};
+use nearmiss::io::{Pieces, PointPieces, ReadError, read_in_pieces};
+use nearmiss::slices::{Obstacle, Pixel, SliceBuilder, SliceOptions, SlicePlan, SliceTarget, Up};
+use nearmiss::{Aabb, CloudError};
 
 use super::{Report, open, parse_length};
 use crate::console::{Console, now};
@@ -17,7 +16,8 @@ use crate::preprocess::{FormatChoice, parse_format, parse_threads};
 /// Options of `slices build`.
 #[derive(Debug, Clone, Args)]
 pub struct BuildArgs {
-    /// Point cloud (PLY, PCD, XYZ or CSV text) or mesh (OBJ, PLY with faces), whose surface is sampled so that no pixel of it stays empty
+    /// Point cloud (PLY, PCD, XYZ or CSV text), read piece by piece unless it is compressed, so it may be larger than memory; or mesh
+    /// (OBJ, PLY with faces), whose surface is sampled so that no pixel of it stays empty
     pub input: PathBuf,
     /// Folder for the map: new, empty, or with a map, which is replaced
     #[arg(short, long, value_name = "DIR")]
@@ -34,7 +34,8 @@ pub struct BuildArgs {
     /// What is steeper than this is an obstacle, in degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, default_value_t = 45.0)]
     pub max_slope: f64,
-    /// How far points of a level floor spread upwards within a pixel; by default estimated from points, and 0 for a mesh
+    /// How far points of a level floor spread upwards within a pixel; by default 0 for a mesh, and estimated from points, of which no more counts than makes
+    /// 90 % of a slice an obstacle
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
     /// Which way is up: x, y, z, -x, -y or -z
@@ -44,12 +45,12 @@ pub struct BuildArgs {
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
     /// Mebibytes that building may take
-    #[arg(long, value_name = "MIB", default_value_t = 4096)]
+    #[arg(long, value_name = "MIB", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
     pub memory: u32,
     /// Threads to work on, 0 for all cores; the result is the same
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub threads: usize,
-    /// One object of JSON instead of sentences
+    /// One object of JSON instead of sentences; its points are all that are in the map, those that are given twice twice
     #[arg(long)]
     pub json: bool,
     /// No progress on the terminal
@@ -69,62 +70,73 @@ pub struct PixelArgs {
     pub resolution: Option<u32>,
 }
 
-/// What maps are made of.
-enum Source {
-    Points(PointCloud),
-    Mesh(TriangleMesh),
-}
+/// Bytes of a file that are read at a time.
+const BLOCK: usize = 1 << 22;
+
+/// Fewer different points than this make no cloud.
+const LEAST_POINTS: usize = 8;
 
 pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let start = now();
+    // What needs no points is refused before they are read, which may take minutes.
+    options(args, false).check().map_err(|cause| CliError::Usage(cause.to_string()))?;
+    input::check_raw(&args.input)?;
+    let target = SliceTarget::new(&args.output)?;
     let bar = console.spinner(format_args!("reading {}", args.input.display()));
-    let source = read(args)?;
-    drop(bar);
+    let source = read_in_pieces(&args.input, args.format.0, BLOCK)?;
     let bounds = match &source {
-        Source::Points(cloud) => cloud.bounds(),
-        Source::Mesh(mesh) => {
+        Pieces::Points(points) => bounds(&args.input, points)?,
+        Pieces::Mesh(mesh) => {
             let corners = mesh.triangles().iter().flatten();
             Aabb::of(corners.map(|&v| mesh.vertices()[v as usize]))
         }
     };
+    drop(bar);
     let unfit = |cause| CliError::Slices { path: args.input.clone(), cause };
-    let plan = SlicePlan::new(&options(args, &source), &bounds).map_err(unfit)?;
+    let plan = SlicePlan::new(&options(args, matches!(source, Pieces::Mesh(_))), &bounds).map_err(unfit)?;
     let [width, height, slices] = plan.grid().counts;
     let bar = console.spinner(format_args!("filling {slices} slices of {width} × {height} pixels"));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.or(Err(CliError::Threads(args.threads)))?;
     let map = pool.install(|| {
-        let mut builder = SliceBuilder::new(&plan)?;
+        let mut builder = SliceBuilder::new(&plan).map_err(unfit)?;
         match &source {
-            Source::Points(cloud) => builder.add_cloud(cloud),
-            Source::Mesh(mesh) => _ = builder.add_mesh(mesh),
+            Pieces::Points(points) => points.each(|piece| builder.add(piece))?,
+            Pieces::Mesh(mesh) => _ = builder.add_mesh(mesh),
         }
-        Ok(builder.finish())
-    });
-    let map = map.map_err(unfit)?;
+        Ok::<_, CliError>(builder.finish())
+    })?;
     drop(bar);
     let bar = console.spinner(format_args!("writing {}", args.output.display()));
-    pool.install(|| map.save(&args.output))?;
+    pool.install(|| target.save(&map))?;
     drop(bar);
     let folder = open(&args.output)?;
     Report::new(&folder, start.elapsed()).tell(&folder, args.json)
 }
 
-/// A mesh if there are faces, otherwise points.
-fn read(args: &BuildArgs) -> Result<Source, CliError> {
-    let path: &Path = &args.input;
-    match input::read(path, args.format.0) {
-        Ok(model) => Ok(model.mesh.map_or_else(|| Source::Points(model.cloud), Source::Mesh)),
-        // Faces may have fewer corners than a cloud needs points.
-        Err(few @ CliError::Read(ReadError::Cloud { cause: CloudError::TooFew { .. }, .. })) => {
-            nearmiss::io::read_mesh(path, args.format.0).map(Source::Mesh).or(Err(few))
+/// Of all points that are finite, of which there must be enough for a cloud.
+fn bounds(path: &Path, points: &PointPieces) -> Result<Aabb, CliError> {
+    let mut bounds = Aabb::EMPTY;
+    let mut distinct: Vec<[f64; 3]> = Vec::with_capacity(LEAST_POINTS);
+    let mut given = 0;
+    points.each(|piece| {
+        given += piece.len();
+        for &p in piece.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
+            bounds.grow(p);
+            if distinct.len() < LEAST_POINTS && !distinct.contains(&p) {
+                distinct.push(p);
+            }
         }
-        Err(other) => Err(other),
+    })?;
+    if distinct.len() < LEAST_POINTS {
+        let cause = CloudError::TooFew { distinct: distinct.len(), given };
+        return Err(ReadError::Cloud { path: path.to_owned(), cause }.into());
     }
+    Ok(bounds)
 }
 
-fn options(args: &BuildArgs, source: &Source) -> SliceOptions {
+fn options(args: &BuildArgs, is_mesh: bool) -> SliceOptions {
     let pixel = match (args.pixel.pixel, args.pixel.resolution) {
         (Some(side), _) => Pixel::Side(side),
         (None, count) => Pixel::Count(count.unwrap_or(700)),
@@ -133,7 +145,7 @@ fn options(args: &BuildArgs, source: &Source) -> SliceOptions {
         Some(share) => Obstacle::Share(share),
         None => {
             // What is sampled for the map lies where the mesh is.
-            let of_mesh = matches!(source, Source::Mesh(_)).then_some(0.0);
+            let of_mesh = is_mesh.then_some(0.0);
             Obstacle::Slope { degrees: args.max_slope, noise: args.noise.or(of_mesh) }
         }
     };

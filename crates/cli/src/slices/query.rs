@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use nearmiss::slices::{Floor, ObjectError, Occupancy, SliceMap};
+use nearmiss::slices::{Floor, ObjectError, Occupancy, SliceFolder, SliceMap, StoreError, Unloaded};
 use nearmiss::{Aabb, Pose};
 use serde::{Deserialize, Serialize};
 
-use super::open_all;
-use crate::console::{Results, now};
+use super::open;
+use crate::console::{self, Results, now};
 use crate::digits::{count, short};
 use crate::error::CliError;
 use crate::input::TextLines;
@@ -75,7 +75,9 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         FloorName::Max => Floor::Max,
         FloorName::Mean => Floor::Mean,
     };
-    let (map, mut faults) = open_all(&args.folder)?;
+    let folder = open(&args.folder)?;
+    let (map, mut faults) = folder.load_all();
+    let mut folders = vec![folder];
     let mut results = Results::new();
     let mut failed = None;
     let mut tell = |found: Result<Occupancy, ObjectError>, micros: f64| match found {
@@ -83,7 +85,7 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         Ok(found) => results.line(sentence(&found)),
         Err(ObjectError::Unloaded(cause)) => {
             // The others serve; this one is null, and the command fails in the end.
-            failed = Some(cause);
+            failed.get_or_insert(cause);
             let text = format!("Cannot tell: {cause}.");
             if args.json { results.json(&serde_json::Value::Null) } else { results.line(text) }
         }
@@ -101,8 +103,11 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         })?;
     }
     if let (Some(other), Some(path)) = (&args.map, &args.poses) {
-        let (object, more) = open_all(other)?;
+        let folder = open(other)?;
+        let (object, more) = folder.load_all();
         faults.extend(more);
+        // All of an object is needed, wherever it is held.
+        folders.insert(0, folder);
         each_line(path, POSE_LINE, |line: PoseLine| {
             let pose = pose(&line, &map, &object)?;
             let start = now();
@@ -117,10 +122,16 @@ pub(super) fn run(args: &QueryArgs) -> Result<(), CliError> {
         })?;
     }
     results.flush()?;
-    match (failed, faults.pop()) {
-        (Some(_), Some(fault)) => Err(fault.into()),
-        _ => Ok(()),
-    }
+    let cause = failed.and_then(|missing| why(&folders, missing));
+    let text = cause.as_ref().map(ToString::to_string);
+    faults.iter().filter(|fault| Some(fault.to_string()) != text).for_each(console::warn);
+    cause.map_or(Ok(()), |cause| Err(cause.into()))
+}
+
+/// Why a slice is not there.
+fn why(folders: &[SliceFolder], Unloaded { slice }: Unloaded) -> Option<StoreError> {
+    let with_it = folders.iter().filter(|folder| slice < folder.grid().counts[2]);
+    with_it.filter_map(|folder| folder.load(slice).err()).next()
 }
 
 const BOX_LINE: &str = r#"a box is {"min":[x,y,z],"max":[x,y,z]}"#;

@@ -1,16 +1,16 @@
 //! `slices walk`: an avatar along a route.
 
-use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use nearmiss::slices::{
-    Avatar, AvatarOptions, Back, CacheOptions, Ended, Response, Route, SliceCache, Slide, Step, StoreError,
-    WalkError,
+    Avatar, AvatarOptions, Back, CacheCounts, CacheOptions, Ended, Response, Route, SliceCache, Slide, Step,
+    StoreError, Up, WalkError, Walker,
 };
 use serde::Serialize;
 
+use super::track::Track;
 use super::{open, parse_length, walk_picture};
 use crate::console::{self, Console, Results};
 use crate::digits::{count, short};
@@ -32,7 +32,7 @@ pub struct WalkArgs {
     /// How far it climbs at once, and falls in a step
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
     pub climb: f64,
-    /// Length of a step; by default a pixel's side
+    /// Length of a step, at most the lesser side of the avatar's base, so that it steps over nothing; by default a pixel's side
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
     pub step: Option<f64>,
     /// What it does where something is in the way
@@ -50,7 +50,8 @@ pub struct WalkArgs {
     /// A line a step: distance,x,y,z,blocked,falling
     #[arg(long, value_name = "OUT.csv")]
     pub trace: Option<PathBuf>,
-    /// One object of JSON a step instead of sentences
+    /// One object of JSON a step instead of sentences; all of it is the same again but for stalls, which depend on how fast slices are
+    /// loaded ahead: with --no-prefetch they do not
     #[arg(long)]
     pub json: bool,
     /// No progress on the terminal
@@ -94,19 +95,16 @@ struct StepLine {
     stalls: u64,
 }
 
+impl StepLine {
+    fn new(step: &Step, counts: CacheCounts) -> Self {
+        let Step { position, blocked, falling, slices } = *step;
+        let CacheCounts { hits, misses, stalls } = counts;
+        Self { position, blocked, falling, slices, hits, misses, stalls }
+    }
+}
+
 pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
-    let mut inputs = vec![args.route.clone()];
-    inputs.extend(std::fs::read_dir(&args.folder).into_iter().flatten().flatten().map(|file| file.path()));
-    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
-    for path in args.image.iter().chain(&args.trace) {
-        output::check_apart(path, &inputs)?;
-    }
-    if args.image.is_some() && args.image == args.trace {
-        return Err(CliError::Usage("--image and --trace name the same file; name two".into()));
-    }
-    if let Some(path) = &args.image {
-        picture::check_name(path)?;
-    }
+    check_outputs(args)?;
     let route = read_route(args)?;
     let folder = open(&args.folder)?;
     let AvatarBox([width, depth, height]) = args.avatar;
@@ -125,58 +123,140 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
             "--cache {asked} is raised to {capacity}: the avatar needs as many slices at once"
         ));
     }
-    let response: &dyn Response = match args.response {
-        ResponseName::Back => &Back,
-        ResponseName::Slide => &Slide,
-    };
-
-    let mut results = Results::new();
-    let mut steps: Vec<Step> = Vec::new();
-    let bar = Console::new(args.quiet).spinner("walking");
-    let mut closed = Ok(());
-    let ended = route.walk(&mut cache, &avatar, response, |cache: &SliceCache, step| {
-        steps.push(*step);
-        if args.json && closed.is_ok() {
-            let counts = cache.counts();
-            let Step { position, blocked, falling, slices } = *step;
-            let (hits, misses, stalls) = (counts.hits, counts.misses, counts.stalls);
-            closed = results.json(&StepLine { position, blocked, falling, slices, hits, misses, stalls });
-        }
-        Ok::<(), StoreError>(())
-    });
-    drop(bar);
-    closed?;
-    results.flush()?;
-    let ended = ended.map_err(|cause| match cause {
-        StoreError::Walk(cause @ (WalkError::Blocked { .. } | WalkError::NotFinite { .. })) => {
-            CliError::Unfit { path: args.route.clone(), what: cause.to_string() }
-        }
-        other => other.into(),
-    })?;
-
-    let track = Track::new(&route, &steps, &folder);
-    if let Some(path) = &args.trace {
-        output::replace_plain(path, |out| out.write_all(track.csv(&steps).as_bytes()))?;
-    }
-    if let Some(path) = &args.image {
+    let walker = route.stand(&mut cache, &avatar).map_err(|cause| refused(args, cause))?;
+    let (ended, tally, track) = walk(args, &route, &mut cache, walker)?;
+    if let (Some(path), Some(track)) = (&args.image, &track) {
         let (map, faults) = folder.load_all();
         faults.iter().for_each(console::warn);
-        walk_picture::paint(&map, &track, height).save(path)?;
+        walk_picture::paint(&map, track, &avatar).save(path)?;
     }
     if !args.json {
-        results.line(sentence(ended, &route, &steps, &track))?;
+        let mut results = Results::new();
+        results.line(sentence(ended, &route, &tally))?;
         let counts = cache.counts();
         results.line(format_args!(
             "{}, {} blocked, {} falling; slices: {}, {}, {}",
-            count(steps.len() as u64, "step"),
-            steps.iter().filter(|step| step.blocked).count(),
-            steps.iter().filter(|step| step.falling).count(),
+            count(tally.steps, "step"),
+            tally.blocked,
+            tally.falling,
             count(counts.hits, "hit"),
             format_args!("{} misses", counts.misses),
             count(counts.stalls, "stall"),
         ))?;
+        results.flush()?;
     }
-    results.flush()
+    Ok(())
+}
+
+/// What a walk comes to, step by step.
+struct Tally {
+    up: Up,
+    /// Where the feet are, in the caller's coordinates.
+    position: [f64; 3],
+    /// Along the ground.
+    distance: f64,
+    steps: u64,
+    blocked: u64,
+    falling: u64,
+}
+
+impl Tally {
+    fn new(up: Up, start: [f64; 3]) -> Self {
+        Self { up, position: start, distance: 0.0, steps: 0, blocked: 0, falling: 0 }
+    }
+
+    /// Where the feet are, in the map's coordinates.
+    fn place(&self) -> [f64; 3] {
+        self.up.to_map(self.position)
+    }
+
+    fn add(&mut self, step: &Step) {
+        let before = self.place();
+        self.position = step.position;
+        let now = self.place();
+        self.distance += (now[0] - before[0]).hypot(now[1] - before[1]);
+        self.steps += 1;
+        self.blocked += u64::from(step.blocked);
+        self.falling += u64::from(step.falling);
+    }
+}
+
+/// Walks on, and tells every step at once: as JSON and in the trace, if asked for. Of the steps themselves only what a picture needs is
+/// kept.
+fn walk(
+    args: &WalkArgs,
+    route: &Route,
+    cache: &mut SliceCache,
+    walker: Walker,
+) -> Result<(Ended, Tally, Option<Track>), CliError> {
+    let response: &dyn Response = match args.response {
+        ResponseName::Back => &Back,
+        ResponseName::Slide => &Slide,
+    };
+    let grid = *cache.map().grid();
+    let mut tally = Tally::new(grid.up, walker.position(&grid));
+    let mut track = args.image.as_ref().map(|_| Track::new(route, &grid, tally.place()));
+    let mut results = Results::new();
+    let _bar = Console::new(args.quiet).spinner("walking");
+    let mut follow = |trace: &mut dyn FnMut(f64, &Step) -> Result<(), CliError>| {
+        route.follow(cache, walker, response, |cache: &SliceCache, step| {
+            tally.add(step);
+            if let Some(track) = &mut track {
+                track.add(tally.place(), tally.distance);
+            }
+            if args.json {
+                results.json(&StepLine::new(step, cache.counts()))?;
+            }
+            trace(tally.distance, step)
+        })
+    };
+    let ended = match &args.trace {
+        None => follow(&mut |_, _| Ok(()))?,
+        Some(path) => output::replace(path, |out| {
+            let failed = |cause| CliError::writing(path)(cause);
+            writeln!(out, "distance,x,y,z,blocked,falling").map_err(failed)?;
+            follow(&mut |distance, step| {
+                let [x, y, z] = step.position;
+                let [blocked, falling] = [step.blocked, step.falling].map(u8::from);
+                writeln!(out, "{distance},{x},{y},{z},{blocked},{falling}").map_err(failed)
+            })
+        })?,
+    };
+    results.flush()?;
+    if let Some(track) = &mut track {
+        track.end(tally.place(), tally.distance);
+    }
+    Ok((ended, tally, track))
+}
+
+/// Refuses to write over what is read, or twice to one file.
+fn check_outputs(args: &WalkArgs) -> Result<(), CliError> {
+    let mut inputs = vec![args.route.clone()];
+    inputs.extend(std::fs::read_dir(&args.folder).into_iter().flatten().flatten().map(|file| file.path()));
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    for path in args.image.iter().chain(&args.trace) {
+        output::check_apart(path, &inputs)?;
+    }
+    if let (Some(image), Some(trace)) = (&args.image, &args.trace)
+        && output::is_same(image, trace)
+    {
+        return Err(CliError::Usage("--image and --trace name the same file; name two".into()));
+    }
+    if let Some(path) = &args.image {
+        picture::check_name(path)?;
+    }
+    Ok(())
+}
+
+/// Why there is no walk: the route, an option, or the map.
+fn refused(args: &WalkArgs, cause: StoreError) -> CliError {
+    match cause {
+        StoreError::Walk(
+            cause @ (WalkError::Blocked { .. } | WalkError::NotFinite { .. } | WalkError::FarOff { .. }),
+        ) => CliError::Unfit { path: args.route.clone(), what: cause.to_string() },
+        StoreError::Walk(cause @ WalkError::TooShort { .. }) => CliError::Usage(cause.to_string()),
+        other => other.into(),
+    }
 }
 
 fn read_route(args: &WalkArgs) -> Result<Route, CliError> {
@@ -189,58 +269,21 @@ fn read_route(args: &WalkArgs) -> Result<Route, CliError> {
     Ok(route)
 }
 
-/// Where it went, in the map's coordinates, and how far that was.
-pub(super) struct Track {
-    /// The start first.
-    pub(super) places: Vec<[f64; 3]>,
-    /// Along the ground, for each place.
-    pub(super) distances: Vec<f64>,
-    /// The points of the route, in the map's coordinates.
-    pub(super) targets: Vec<[f64; 2]>,
-}
-
-impl Track {
-    fn new(route: &Route, steps: &[Step], folder: &nearmiss::slices::SliceFolder) -> Self {
-        let up = folder.grid().up;
-        let all = std::iter::once(route.start).chain(steps.iter().map(|step| step.position));
-        let places: Vec<[f64; 3]> = all.map(|p| up.to_map(p)).collect();
-        let mut distances = vec![0.0];
-        let mut so_far = 0.0;
-        for pair in places.windows(2) {
-            so_far += (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-            distances.push(so_far);
-        }
-        Self { places, distances, targets: route.points.iter().map(|p| up.across(*p)).collect() }
-    }
-
-    fn csv(&self, steps: &[Step]) -> String {
-        let mut text = String::from("distance,x,y,z,blocked,falling\n");
-        for (step, distance) in steps.iter().zip(&self.distances[1..]) {
-            let [x, y, z] = step.position;
-            let [blocked, falling] = [step.blocked, step.falling].map(u8::from);
-            let _ = writeln!(text, "{distance},{x},{y},{z},{blocked},{falling}");
-        }
-        text
-    }
-}
-
 /// For people.
-fn sentence(ended: Ended, route: &Route, steps: &[Step], track: &Track) -> String {
-    let place = |p: [f64; 3]| format!("({})", p.map(short).join(", "));
-    let end = steps.last().map_or(route.start, |step| step.position);
-    let walked = track.distances.last().copied().unwrap_or(0.0);
-    let far = format!("after {}", short(walked));
+fn sentence(ended: Ended, route: &Route, tally: &Tally) -> String {
+    let end = tally.position.map(short).join(", ");
+    let far = short(tally.distance);
+    let on_the_way = |point: usize| match route.points.len() {
+        0 => String::new(),
+        _ => format!(", on the way to point {}", point + 1),
+    };
     match ended {
-        Ended::Arrived => format!("Arrived at {} {far}.", place(end)),
+        Ended::Arrived => format!("Arrived at ({end}) after {far}."),
         Ended::Stuck { point } => {
-            format!(
-                "Stopped at {} {far}, on the way to point {}: something is in the way.",
-                place(end),
-                point + 1
-            )
+            format!("Stopped at ({end}) after {far}{}: something is in the way.", on_the_way(point))
         }
         Ended::LeftMap { point } => {
-            format!("Fell below the map at {} {far}, on the way to point {}.", place(end), point + 1)
+            format!("Fell below the map at ({end}) after {far}{}.", on_the_way(point))
         }
     }
 }

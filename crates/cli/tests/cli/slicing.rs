@@ -1,13 +1,15 @@
 //! `slices` and `sample`.
 
 use std::fs;
+use std::io::BufRead;
 
+use nearmiss::slices::SliceFolder;
 use nearmiss_testdata::house::{Quad, STAIRS, STOREY, house, scanned, triangles};
 use serde_json::Value;
 
 use crate::running::{Place, keys, numbers, sorted, text};
 
-const FIELDS: &str = "slices distinct width height pixel slice_height points bytes seconds";
+const FIELDS: &str = "slices distinct width height pixel slice_height points dropped obstacle noise noise_estimated bytes seconds";
 
 /// The generated house as points, and its map.
 fn with_house() -> Place {
@@ -122,6 +124,44 @@ fn meshes_are_sampled_and_the_papers_rule_can_be_asked_for() {
     assert_eq!(fs::read(place.path("again.ply")).unwrap(), ply);
 }
 
+#[test]
+fn what_is_dropped_and_what_noise_is_reckoned_with_is_told() {
+    let place = Place::new();
+    let mut points = text(&scanned(&house(), 0.04, 0.003, 3));
+    points.push_str("nan 1 1\n1 inf 1\n2 2 -inf\n");
+    place.write("house.xyz", points);
+    let build = ["slices", "build", "house.xyz", "-o", "map", "--pixel", "0.05"];
+    let told = |options: &[&str]| {
+        let people = place.ok(&[&build[..], options].concat()).results;
+        assert!(people.contains(", 3 others left out"), "{people}");
+        let told = place.ok(&["slices", "inspect", "map", "--json"]).json().remove(0);
+        assert_eq!(told["dropped"], 3, "{told}");
+        (people, told)
+    };
+    let (people, json) = told(&[]);
+    let noise = json["noise"].as_f64().unwrap();
+    assert!((0.005..0.02).contains(&noise) && json["noise_estimated"] == true, "{json}");
+    assert!(people.contains("; noise 0.0") && people.contains(", estimated\n"), "{people}");
+    let (people, json) = told(&["--noise", "0.02"]);
+    assert_eq!((&json["noise"], &json["noise_estimated"]), (&0.02.into(), &false.into()), "{json}");
+    assert!(people.contains("; noise 0.02\n"), "{people}");
+    let share = json["obstacle"].as_f64().unwrap();
+    assert!((share - (0.05 + 0.02) / 0.15).abs() < 1e-12, "{json}");
+    let (people, json) = told(&["--obstacle", "0.07"]);
+    assert_eq!((&json["noise"], &json["obstacle"]), (&0.0.into(), &0.07.into()), "{json}");
+    assert!(people.contains("(7.0 % of a slice)\n") && !people.contains("noise"), "{people}");
+    // Slices hardly higher than what a slope of 45° spans: noise has no room.
+    let (people, json) = told(&["--slice-height", "0.057"]);
+    assert!(json["obstacle"].as_f64().unwrap() < 0.91, "{json}");
+    assert!(people.contains("give higher slices"), "{people}");
+
+    place.write("house.obj", obj(&house()));
+    let built = place.ok(&["slices", "build", "house.obj", "-o", "of-mesh", "--pixel", "0.1", "--json"]);
+    let built = built.json().remove(0);
+    assert_eq!((&built["noise"], &built["noise_estimated"]), (&0.0.into(), &false.into()), "{built}");
+    assert_eq!(built["dropped"], 0, "{built}");
+}
+
 fn answers(place: &Place, args: &[&str]) -> Vec<Value> {
     place.ok(&[&["slices", "query", "house", "--json"], args].concat()).json()
 }
@@ -229,12 +269,50 @@ fn an_avatar_walks_up_the_stairs_and_leaves_a_trace() {
 }
 
 #[test]
+fn walks_without_steps_and_off_the_map_are_told_as_they_were() {
+    let place = with_house();
+    for (route, words) in [
+        ("[3,6,0.2],\"points\":[]", "Arrived at (3, 6, 0.0"),
+        ("[3,6,0.2],\"points\":[[3,6]]", "Arrived at (3, 6, 0.0"),
+        ("[3,6,1.2],\"points\":[]", "Arrived at (3, 6, 0.0"),
+        ("[1e300,1e300,0],\"points\":[]", "Fell below the map at "),
+        ("[90,6,0],\"points\":[]", "Fell below the map at (90, 6, -0"),
+        ("[90,6,0],\"points\":[[3,6]]", "after 0, on the way to point 1."),
+        ("[3,6,-1e300],\"points\":[[3,6]]", "Fell below the map at (3, 6, -1"),
+    ] {
+        place.write("route.json", format!("{{\"start\":{route}}}"));
+        let told = place.ok(&["slices", "walk", "house", "--route", "route.json", "--image", "w.png"]);
+        assert!(told.results.contains(words), "{route}: {}", told.results);
+        assert!(fs::read(place.path("w.png")).unwrap().starts_with(b"\x89PNG"), "{route}");
+    }
+}
+
+#[test]
+fn a_walk_ends_when_nobody_reads_it() {
+    let place = with_house();
+    place.write("route.json", "{\"start\":[3,6,0.1],\"points\":[[7,6]]}");
+    // Two thousand million steps.
+    let args = ["slices", "walk", "house", "--route", "route.json", "--step", "2e-9", "--json"];
+    let mut walk = std::process::Command::new(env!("CARGO_BIN_EXE_nearmiss"))
+        .args(args)
+        .current_dir(place.path(""))
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    std::io::BufReader::new(walk.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    assert!(line.starts_with("{\"position\":"), "{line}");
+    assert_eq!(walk.wait().unwrap().code(), Some(0));
+}
+
+#[test]
 fn what_does_not_serve_is_refused_by_name() {
     let place = with_house();
     place.write(
         "flat.xyz",
         text(&(0..20_u8).map(|i| [f64::from(i), f64::from(i % 7), 1.0]).collect::<Vec<_>>()),
     );
+    place.write("letters.xyz", "dear all\n");
     place.write("boxes.jsonl", "{\"min\":[0,0,0],\"max\":[1,1,1]}\n{\"min\":[0,0,0],\"max\":[1,1]}\n");
     place.write("empty.jsonl", "\n");
     place.write("inside.jsonl", "{\"min\":[0,0,9],\"max\":[1,1,1]}\n");
@@ -242,6 +320,8 @@ fn what_does_not_serve_is_refused_by_name() {
     place.write("nan.json", "{\"start\":[1,1,1e999],\"points\":[]}");
     place.write("blocked.json", "{\"start\":[9,6.5,0.1],\"points\":[[1,1]]}");
     place.write("route.json", "{\"start\":[3,6,0.1],\"points\":[[4,6]]}");
+    place.write("far.json", "{\"start\":[3,6,0.1],\"points\":[[4,6],[1e300,6]]}");
+    place.write("from-far.json", "{\"start\":[1e300,6,0.1],\"points\":[[4,6]]}");
     let build =
         |options: &[&'static str]| [&["slices", "build", "house.xyz", "-o", "new"][..], options].concat();
     let query = |file: &'static str| vec!["slices", "query", "house", "--boxes", file];
@@ -250,10 +330,32 @@ fn what_does_not_serve_is_refused_by_name() {
         (1, vec!["slices", "build", "flat.xyz", "-o", "new"], &["flat.xyz", "no extent along z"][..]),
         (1, build(&["--pixel", "0.00001"]), &["house.xyz", "2^31"]),
         (1, build(&["--pixel", "0.002", "--memory", "64"]), &["house.xyz", "64 are allowed"]),
+        (
+            1,
+            build(&["--pixel", "100", "--slice-height", "1.2e-8", "--obstacle", "0.5"]),
+            &["house.xyz", "slices of 1 × 1 pixels", "4096 are allowed", "higher slices"],
+        ),
         (2, build(&["--pixel", "0"]), &["more than zero"]),
         (2, build(&["--pixel", "1", "--resolution", "3"]), &["cannot be used with"]),
         (2, build(&["--obstacle", "0.1", "--noise", "1"]), &["cannot be used with"]),
-        (1, build(&["--max-slope", "90"]), &["below 90"]),
+        (2, build(&["--max-slope", "90"]), &["below 90"]),
+        (2, build(&["--max-slope", "nan"]), &["below 90"]),
+        (2, build(&["--noise", "-1"]), &["at least 0"]),
+        (2, build(&["--noise", "nan"]), &["at least 0"]),
+        (2, build(&["--obstacle", "nan"]), &["above 0"]),
+        (2, build(&["--obstacle", "0"]), &["above 0"]),
+        (2, build(&["--obstacle", "1"]), &["no wall"]),
+        (2, build(&["--pixel", "1e308"]), &["a pixel of side 1e308"]),
+        (2, build(&["--memory", "0"]), &["0 is not in 1.."]),
+        (2, vec!["slices", "build", "none.xyz", "-o", "new", "--obstacle", "2"], &["no wall"]),
+        // Before the input is read.
+        (
+            1,
+            vec!["slices", "build", "letters.xyz", "-o", "flat.xyz"],
+            &["flat.xyz", "cannot make the folder"],
+        ),
+        (1, vec!["slices", "build", "letters.xyz", "-o", "."], &["other files"]),
+        (1, vec!["slices", "build", "letters.xyz", "-o", "new"], &["letters.xyz"]),
         (2, build(&["--up", "w"]), &["no axis"]),
         (1, vec!["slices", "build", "none.xyz", "-o", "new"], &["none.xyz", "no such file"]),
         (1, vec!["slices", "build", "house.xyz", "-o", "."], &["other files"]),
@@ -271,27 +373,56 @@ fn what_does_not_serve_is_refused_by_name() {
         (1, walk(&["blocked.json", "--cache", "40"]), &["blocked.json", "inside an obstacle"]),
         (2, walk(&["route.json", "--avatar", "1,1"]), &["three lengths"]),
         (2, walk(&["route.json", "--climb", "5"]), &["cannot climb"]),
+        (2, walk(&["route.json", "--climb", "1e300"]), &["cannot climb"]),
+        (2, walk(&["route.json", "--climb", "1e-15"]), &["a climb of", "greater length"]),
+        (2, walk(&["route.json", "--step", "1e-15"]), &["a step of", "greater length"]),
         (2, walk(&["route.json", "--image", "w.jpg"]), &["PNG"]),
+        (2, walk(&["route.json", "--image", "./w.png", "--trace", "w.png"]), &["same file"]),
+        (2, walk(&["route.json", "--image", "w.png", "--trace", "house/../w.png"]), &["same file"]),
+        (1, walk(&["far.json"]), &["far.json", "point 2", "off the map"]),
+        (1, walk(&["from-far.json"]), &["from-far.json", "point 0", "off the map"]),
         (1, vec!["sample", "house.xyz", "-o", "s.ply", "--points", "9"], &["house.xyz", "faces"]),
     ] {
         place.refused(status, &args, words);
     }
+    assert!(!place.path("new").exists(), "what is refused leaves nothing");
+}
 
-    // A slice that is missing: the others serve, and the command says what is wrong.
-    let files = fs::read_dir(place.path("house")).unwrap().map(|entry| entry.unwrap().path());
-    let largest =
-        files.filter(|path| !path.ends_with("index.nms")).max_by_key(|path| path.metadata().unwrap().len());
-    fs::remove_file(largest.unwrap()).unwrap();
-    place
-        .write("far.jsonl", "{\"min\":[3,6,0.5],\"max\":[3.5,6.5,2]}\n{\"min\":[90,0,0],\"max\":[91,1,1]}\n");
-    let done = place.run(&["slices", "query", "house", "--boxes", "far.jsonl", "--json"]);
+#[test]
+fn the_slice_that_is_needed_and_missing_is_named() {
+    let place = with_house();
+    let folder = SliceFolder::open(&place.path("house")).unwrap();
+    let image = |slice: usize| place.path(&format!("house/{:016x}.nms", folder.checksums()[slice]));
+    // By checksum they come in another order.
+    let lost = [6, 9, 15, 20, 3];
+    assert!(!lost.map(|slice| folder.checksums()[slice]).is_sorted());
+    for slice in lost {
+        fs::remove_file(image(slice)).unwrap();
+    }
+    let needs = |slice: f64| {
+        let grid = folder.grid();
+        let z = grid.origin[2] + (slice + 0.5) * grid.slice_height;
+        format!("{{\"min\":[3,6,{z}],\"max\":[3.5,6.5,{z}]}}\n")
+    };
+    place.write("boxes.jsonl", needs(9.0) + &needs(3.0) + "{\"min\":[90,0,0],\"max\":[91,1,1]}\n");
+    let done = place.run(&["slices", "query", "house", "--boxes", "boxes.jsonl", "--json"]);
     assert_eq!(done.status, 1, "{}", done.errors);
-    assert!(
-        done.errors.contains("warning: slice ") && done.errors.contains("error: slice "),
-        "{}",
-        done.errors
-    );
     let found = done.json();
-    assert!(found[0].is_null() && found[1]["collides"] == false, "{found:?}");
-    place.refused(1, &["slices", "inspect", "house", "--verify"], &["no such file"]);
+    assert!(found[0].is_null() && found[1].is_null() && found[2]["collides"] == false, "{found:?}");
+    let said = |done: &str, word: &str| -> Vec<String> {
+        let lines = done.lines().filter_map(|line| line.strip_prefix(&format!("{word}: slice ")));
+        lines.map(|line| line.split(':').next().unwrap().to_owned()).collect()
+    };
+    assert_eq!(said(&done.errors, "error"), ["9"], "the first that is needed: {}", done.errors);
+    assert_eq!(said(&done.errors, "warning"), ["3", "6", "15", "20"], "{}", done.errors);
+    let done = place.run(&["slices", "inspect", "house", "--verify"]);
+    assert_eq!(said(&done.errors, "warning"), ["3", "6", "9", "15"], "{}", done.errors);
+    assert_eq!(said(&done.errors, "error"), ["20"], "{}", done.errors);
+    assert!(done.errors.ends_with(".nms: no such file; build the slices again\n"), "{}", done.errors);
+
+    // Also where it is the object's.
+    place.ok(&["slices", "build", "house.xyz", "-o", "whole", "--pixel", "0.4", "--quiet"]);
+    place.write("pose.jsonl", "{\"b\":[1,0,0,50, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\n");
+    let done = place.run(&["slices", "query", "whole", "--map", "house", "--poses", "pose.jsonl"]);
+    assert_eq!((done.status, said(&done.errors, "error")), (1, vec!["3".to_owned()]), "{}", done.errors);
 }

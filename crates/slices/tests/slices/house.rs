@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use nearmiss_slices::{Content, Obstacle, Pixel, SliceMap, SliceOptions};
-use nearmiss_testdata::house::{COLUMN, COLUMNS, Quad, STOREY, house, scanned};
+use nearmiss_testdata::house::{COLUMN, COLUMNS, STOREY, house, scanned};
 
 use crate::built::{built, of_quads};
 
@@ -83,32 +83,6 @@ fn the_papers_rule_calls_noise_and_gentle_slopes_obstacles() {
     };
     let (paper, ours) = (floor(Obstacle::Share(0.07)), floor(SLOPE));
     assert!(paper > 0.5 && ours < 0.02, "{paper} of a floor by 7 %, {ours} by slope and noise");
-}
-
-/// A ramp along y at this angle, with no end in sight.
-fn ramp(degrees: f64) -> Vec<Quad> {
-    let height = 3.0 * degrees.to_radians().tan();
-    vec![
-        Quad { corner: [0.0; 3], sides: [[2.0, 0.0, 0.0], [0.0, 3.0, height]] },
-        // So that slices begin lower than the ramp.
-        Quad { corner: [0.0, 0.0, -0.4], sides: [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0]] },
-    ]
-}
-
-#[test]
-fn ramps_switch_at_the_angle_asked_for() {
-    for degrees in [15.0, 30.0, 45.0, 55.0] {
-        let rule = Obstacle::Slope { degrees, noise: Some(0.0) };
-        let at = |angle| {
-            let map = of_quads(&ramp(angle), &options(0.05, rule));
-            let inner = contents(&map, [0.2..=1.8, 0.2..=2.8, -0.1..=9.0]);
-            assert!(inner.len() > 1500, "{} pixels", inner.len());
-            share(&inner)
-        };
-        // Levels divide 5 cm at 45° into 85: a level is a third of a degree there, and 0.6° at 15°.
-        let (gentle, steep) = (at(degrees - 0.6), at(degrees + 0.6));
-        assert!(gentle < 1e-9 && steep > 1.0 - 1e-9, "{degrees}°: {gentle} below, {steep} above");
-    }
 }
 
 #[test]

@@ -5,6 +5,8 @@ mod bad_input;
 mod built;
 mod house;
 mod objects;
+mod passages;
+mod ramps;
 mod real;
 mod stored;
 mod twin;

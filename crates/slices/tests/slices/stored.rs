@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use nearmiss_slices::{
     Avatar, AvatarOptions, Back, CacheOptions, Ended, Floor, Pixel, Route, SliceCache, SliceFolder, SliceMap,
-    SliceOptions, Step, StoreError,
+    SliceOptions, SliceTarget, Step, StoreError,
 };
 use nearmiss_testdata::house::{STAIRS, house, scanned};
 
@@ -72,10 +72,18 @@ fn a_map_replaces_another_and_nothing_else() {
     let opened = SliceFolder::open(&folder).unwrap();
     assert_eq!(opened.load_all().0, second);
     assert_eq!(files(&folder).len(), opened.distinct() + 1, "{before} files before");
-    // What a killed writer leaves does no harm; what is somebody else's is not touched.
-    fs::write(folder.join("0123456789abcdef.nms"), b"half").unwrap();
+    // What killed writers leave goes; what is somebody else's is not touched, whatever its name.
+    let image = files(&folder)[0].clone();
+    fs::copy(&image, folder.join("0123456789abcdef.nms")).unwrap();
+    fs::write(folder.join("0123456789abcdee.nms.tmp-abcdefghijkl"), b"half").unwrap();
+    fs::write(folder.join("index.lock"), b"").unwrap();
     second.save(&folder).unwrap();
     assert_eq!(files(&folder).len(), opened.distinct() + 1);
+    for name in ["0123456789abcdef.nms", "0123456789abcdee.nms.tmp-letter", "notes.txt"] {
+        fs::write(folder.join(name), b"dear").unwrap();
+    }
+    second.save(&folder).unwrap();
+    assert_eq!(files(&folder).len(), opened.distinct() + 4);
     let others = place.path().join("letters");
     fs::create_dir(&others).unwrap();
     fs::write(others.join("letter.txt"), b"dear").unwrap();
@@ -84,6 +92,86 @@ fn a_map_replaces_another_and_nothing_else() {
     assert!(matches!(SliceFolder::open(&others), Err(StoreError::Open(_))), "no index");
     let occupied = place.path().join("letters/letter.txt");
     assert!(matches!(second.save(&occupied), Err(StoreError::Folder { .. })), "a file is no folder");
+}
+
+#[test]
+fn files_named_like_a_maps_are_not_taken_for_one() {
+    let place = tempfile::tempdir().unwrap();
+    let map = of_quads(&house(), &SliceOptions::default().with_pixel(Pixel::Side(0.1)));
+    for name in ["0123456789abcdef.nms", "index.nms"] {
+        let folder = place.path().join(name);
+        fs::create_dir(&folder).unwrap();
+        fs::write(folder.join(name), b"1 2 3").unwrap();
+        assert!(matches!(map.save(&folder), Err(StoreError::Foreign { .. })), "{name}");
+        assert_eq!((files(&folder).len(), fs::read(folder.join(name)).unwrap()), (1, b"1 2 3".to_vec()));
+        fs::remove_file(folder.join(name)).unwrap();
+        fs::create_dir(folder.join(name)).unwrap();
+        assert!(matches!(map.save(&folder), Err(StoreError::Foreign { .. })), "{name} is a folder");
+        assert_eq!(files(&folder).len(), 1);
+    }
+    // A damaged index is one.
+    let folder = place.path().join("damaged");
+    map.save(&folder).unwrap();
+    fs::write(folder.join("index.nms"), b"").unwrap();
+    map.save(&folder).unwrap();
+    assert_eq!(SliceFolder::open(&folder).unwrap().load_all().0, map);
+}
+
+#[test]
+fn only_one_writes_into_a_folder() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("map");
+    let [first, second] =
+        [0.1, 0.11].map(|t| of_quads(&house(), &SliceOptions::default().with_pixel(Pixel::Side(t))));
+    let target = SliceTarget::new(&folder).unwrap();
+    let refused = second.save(&folder).unwrap_err();
+    assert!(matches!(&refused, StoreError::Busy { path } if *path == folder), "{refused}");
+    target.save(&first).unwrap();
+    second.save(&folder).unwrap();
+    let write = |map: &SliceMap| {
+        let saved = map.save(&folder);
+        assert!(matches!(saved, Ok(_) | Err(StoreError::Busy { .. })), "{saved:?}");
+        u32::from(saved.is_ok())
+    };
+    for _ in 0..20 {
+        let done: u32 = std::thread::scope(|scope| {
+            let threads = [&first, &second, &first].map(|map| scope.spawn(move || write(map)));
+            threads.into_iter().map(|thread| thread.join().unwrap()).sum()
+        });
+        assert!(done > 0, "nobody has written");
+        let (map, faults) = SliceFolder::open(&folder).unwrap().load_all();
+        assert!(faults.is_empty() && (map == first || map == second), "{faults:?}");
+    }
+}
+
+#[test]
+fn what_fails_leaves_nothing() {
+    let place = tempfile::tempdir().unwrap();
+    let [first, second] =
+        [0.1, 0.11].map(|t| of_quads(&house(), &SliceOptions::default().with_pixel(Pixel::Side(t))));
+    let (folder, other) = (place.path().join("map"), place.path().join("other"));
+    first.save(&folder).unwrap();
+    second.save(&other).unwrap();
+    // One of its slices cannot be written.
+    let name = image(&other, 9);
+    fs::create_dir(folder.join(name.file_name().unwrap())).unwrap();
+    let before = files(&folder);
+    assert!(matches!(second.save(&folder), Err(StoreError::Write(_))));
+    assert_eq!(files(&folder), before);
+    assert_eq!(SliceFolder::open(&folder).unwrap().load_all().0, first);
+    // Nor can a map of which a slice is missing; folders that were made for it go.
+    fs::remove_file(image(&other, 9)).unwrap();
+    let (missing, _) = SliceFolder::open(&other).unwrap().load_all();
+    let deep = place.path().join("new/and/deep");
+    assert!(matches!(missing.save(&deep), Err(StoreError::Incomplete { .. })));
+    drop(SliceTarget::new(&deep).unwrap());
+    assert!(!place.path().join("new").exists());
+}
+
+/// The file of a slice.
+fn image(folder: &Path, slice: usize) -> PathBuf {
+    let checksum = SliceFolder::open(folder).unwrap().checksums()[slice];
+    folder.join(format!("{checksum:016x}.nms"))
 }
 
 #[test]
@@ -106,8 +194,8 @@ fn damage_is_named_and_the_others_serve() {
     let texts: Vec<String> = faults.iter().map(ToString::to_string).collect();
     assert_eq!(faults.len(), 4, "{texts:?}");
     for (slice, path, word) in [
-        (5, &missing, "no such file"),
-        (8, &cut, "cut short"),
+        (5, &missing, "no such file; build the slices again"),
+        (8, &cut, "are there; build the slices again"),
         (12, &flipped, "build"),
         (20, &swapped, "does not hold"),
     ] {
@@ -116,6 +204,13 @@ fn damage_is_named_and_the_others_serve() {
         let text = text.unwrap_or_else(|| panic!("{name} is not in {texts:?}"));
         assert!(text.contains(&format!("slice {slice}")) && text.contains(word), "{text}");
     }
+    assert!(
+        ["slice 5:", "slice 8:", "slice 12:", "slice 20:"]
+            .iter()
+            .zip(&texts)
+            .all(|(s, text)| text.starts_with(s)),
+        "lowest first: {texts:?}"
+    );
     // A box above them is answered, one in them is not.
     let grid = *opened.grid();
     let boxed = |slices: [u32; 2]| {
@@ -132,8 +227,19 @@ fn damage_is_named_and_the_others_serve() {
         let mut damaged = bytes.clone();
         damaged[i] ^= 0x20;
         fs::write(&index, damaged).unwrap();
-        assert!(SliceFolder::open(place.path()).is_err(), "byte {i}");
+        let refused = SliceFolder::open(place.path()).unwrap_err().to_string();
+        assert!(!refused.contains("prepare") && refused.contains("; "), "byte {i}: {refused}");
     }
+    for bytes in [&b""[..], b"1 2 3"] {
+        fs::write(&index, bytes).unwrap();
+        let refused = SliceFolder::open(place.path()).unwrap_err().to_string();
+        assert!(
+            refused.contains("index.nms: is ") && refused.contains("; build the slices again"),
+            "{refused}"
+        );
+    }
+    fs::remove_file(&index).unwrap();
+    assert!(SliceFolder::open(place.path()).unwrap_err().to_string().contains("check the path"));
 }
 
 const Y: f64 = 0.5 * (STAIRS[0] + STAIRS[1]);
@@ -142,13 +248,34 @@ fn up_the_stairs() -> Route {
     Route { start: [1.2, 8.0, 0.2], points: vec![[1.2, Y], [8.0, Y], [1.2, Y]] }
 }
 
-fn walked(folder: &SliceFolder, slices: u32, prefetch: bool) -> (Vec<Step>, [u64; 2], usize) {
+/// Up the stairs, then off the edge of the upper floor, and up again.
+fn up_and_over_the_edge() -> Route {
+    let points = [[1.2, Y], [8.0, Y], [8.0, 9.5], [10.0, 9.0], [10.0, 4.5], [7.0, 4.5], [1.2, 4.5], [1.2, Y]];
+    Route { points: [&points[..], &[[8.0, Y]]].concat(), ..up_the_stairs() }
+}
+
+/// The map in a folder, and the steps of a walk through it with all in memory.
+fn saved_and_walked(route: &Route, avatar: &Avatar) -> (tempfile::TempDir, SliceFolder, Vec<Step>) {
+    let place = tempfile::tempdir().unwrap();
+    let map = map();
+    map.save(place.path()).unwrap();
+    let mut steps = Vec::new();
+    let ended = route.walk(&mut &map, avatar, &Back, |_, step| {
+        steps.push(*step);
+        Ok(())
+    });
+    assert_eq!(ended.unwrap(), Ended::Arrived);
+    let folder = SliceFolder::open(place.path()).unwrap();
+    (place, folder, steps)
+}
+
+fn walked(folder: &SliceFolder, route: &Route, slices: u32, prefetch: bool) -> (Vec<Step>, [u64; 2], usize) {
     let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
     let options = CacheOptions::default().with_slices(slices).with_prefetch(prefetch);
     let mut cache = SliceCache::new(folder, &options, avatar.slices(folder.grid()));
     let capacity = cache.capacity();
     let mut steps = Vec::new();
-    let ended = up_the_stairs().walk(&mut cache, &avatar, &Back, |cache: &SliceCache, step| {
+    let ended = route.walk(&mut cache, &avatar, &Back, |cache: &SliceCache, step| {
         assert!(cache.map().slices().iter().flatten().count() <= capacity, "never more than {capacity}");
         steps.push(*step);
         Ok::<(), StoreError>(())
@@ -160,21 +287,12 @@ fn walked(folder: &SliceFolder, slices: u32, prefetch: bool) -> (Vec<Step>, [u64
 
 #[test]
 fn a_cache_never_changes_a_walk_and_counts_the_same_every_time() {
-    let place = tempfile::tempdir().unwrap();
-    let map = map();
-    map.save(place.path()).unwrap();
-    let folder = SliceFolder::open(place.path()).unwrap();
     let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
-    let mut expected = Vec::new();
-    let in_memory = up_the_stairs().walk(&mut &map, &avatar, &Back, |_, step| {
-        expected.push(*step);
-        Ok(())
-    });
-    assert_eq!(in_memory.unwrap(), Ended::Arrived);
+    let (_place, folder, expected) = saved_and_walked(&up_the_stairs(), &avatar);
     let span = avatar.slices(folder.grid()) as usize;
     let mut misses = Vec::new();
     for (slices, prefetch) in [(1, false), (20, false), (60, false), (1, true), (20, true), (60, true)] {
-        let (steps, counts, capacity) = walked(&folder, slices, prefetch);
+        let (steps, counts, capacity) = walked(&folder, &up_the_stairs(), slices, prefetch);
         assert_eq!(steps, expected, "{slices} slices");
         let most = folder.grid().counts[2] as usize;
         assert_eq!(
@@ -183,7 +301,11 @@ fn a_cache_never_changes_a_walk_and_counts_the_same_every_time() {
             "raised to what is needed, if there is so much"
         );
         for _ in 0..3 {
-            assert_eq!(walked(&folder, slices, prefetch).1, counts, "{slices} slices, {prefetch}");
+            assert_eq!(
+                walked(&folder, &up_the_stairs(), slices, prefetch).1,
+                counts,
+                "{slices} slices, {prefetch}"
+            );
         }
         assert!(counts[0] > 50 * counts[1], "{counts:?}");
         misses.push(counts[1]);
@@ -192,6 +314,50 @@ fn a_cache_never_changes_a_walk_and_counts_the_same_every_time() {
     assert!(misses[0] > misses[2] && misses[4] <= misses[1] && misses[5] < misses[2], "{misses:?}");
     let all = folder.grid().counts[2];
     assert!(misses[2] <= u64::from(all), "each once: {misses:?} of {all}");
+}
+
+#[test]
+fn an_uneven_floor_is_no_movement_up_or_down() {
+    let place = tempfile::tempdir().unwrap();
+    map().save(place.path()).unwrap();
+    let folder = SliceFolder::open(place.path()).unwrap();
+    let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
+    let route = Route { start: [1.2, 8.0, 0.2], points: vec![[7.0, 8.0], [7.0, 9.0], [1.2, 8.0]] };
+    let mut counted = Vec::new();
+    for prefetch in [false, true] {
+        let options = CacheOptions::default().with_slices(60).with_prefetch(prefetch);
+        let mut cache = SliceCache::new(&folder, &options, avatar.slices(folder.grid()));
+        let (mut steps, mut rises, mut feet) = (0, 0, 0.0);
+        let ended = route.walk(&mut cache, &avatar, &Back, |cache: &SliceCache, step| {
+            rises += u32::from(step.position[2] > feet);
+            feet = step.position[2];
+            steps += 1;
+            counted.push(cache.map().slices().iter().flatten().count());
+            Ok::<(), StoreError>(())
+        });
+        assert_eq!(ended.unwrap(), Ended::Arrived);
+        assert!(rises > 20 && steps > 200, "{rises} times up in {steps} steps");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        cache.want(0..=0, 0.0).unwrap();
+        counted.push(cache.map().slices().iter().flatten().count());
+    }
+    let (without, ahead) = counted.split_at(counted.len() / 2);
+    assert_eq!(without, ahead, "nothing is loaded ahead");
+}
+
+#[test]
+fn a_cache_never_changes_a_fall() {
+    let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
+    let (_place, folder, expected) = saved_and_walked(&up_and_over_the_edge(), &avatar);
+    let falls = expected.iter().filter(|step| step.falling).count();
+    assert!(falls >= 8, "{falls} steps of a fall by a storey");
+    let most = expected.windows(2).map(|pair| pair[0].position[2] - pair[1].position[2]).fold(0.0, f64::max);
+    assert!((most - avatar.options().climb).abs() < 1e-9, "as fast as it climbs: {most}");
+    for (slices, prefetch) in [(1, false), (20, false), (1, true), (20, true), (60, true)] {
+        let (steps, counts, _) = walked(&folder, &up_and_over_the_edge(), slices, prefetch);
+        assert_eq!(steps, expected, "{slices} slices, ahead: {prefetch}");
+        assert_eq!(walked(&folder, &up_and_over_the_edge(), slices, prefetch).1, counts);
+    }
 }
 
 #[test]

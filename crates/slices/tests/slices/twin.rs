@@ -142,7 +142,9 @@ fn mean(values: &[f64]) -> Option<f64> {
 fn arbitrary_box(rng: &mut impl Rng, map: &SliceMap) -> Aabb {
     let grid = map.grid();
     let mut corner = [0, 1, 2].map(|k| rng.random_range([-1.0, -1.0, -1.0][k]..[17.0, 13.0, 6.5][k]));
-    let size = [0, 1, 2].map(|_| rng.random_range(0.0..1.2_f64));
+    // Some of more rows and columns than are looked at together.
+    let most = if rng.random_range(0..6_u8) == 0 { 16.0 } else { 1.2 };
+    let size = [most, most, 1.2].map(|most: f64| rng.random_range(0.0..most));
     if rng.random_range(0..3_u8) == 0 {
         for k in 0..2 {
             corner[k] = grid.origin[k] + ((corner[k] - grid.origin[k]) / grid.pixel).round() * grid.pixel;

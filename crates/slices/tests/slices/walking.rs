@@ -3,13 +3,13 @@
 use nearmiss_geometry::Aabb;
 use nearmiss_slices::{
     Avatar, AvatarOptions, Back, Ended, Pixel, Response, Route, SliceMap, SliceOptions, Slide, Step, Up,
-    Walker, step_each,
+    WalkError, Walker, step_each,
 };
 use nearmiss_testdata::arbitrary::rng;
-use nearmiss_testdata::house::{DOOR, LOW, RAMP, RAMPS, STAIRS, STOREY, house, ramp_corner, scanned};
+use nearmiss_testdata::house::{DOOR, LOW, STAIRS, STOREY, house, scanned};
 use rand::RngExt;
 
-use crate::built::{built, of_quads};
+use crate::built::built;
 
 const PIXEL: f64 = 0.05;
 
@@ -150,21 +150,46 @@ fn edges_are_fallen_off_onto_the_floor_below() {
     assert!(steps.len() < 10 && steps.iter().all(|step| step.falling), "{} steps", steps.len());
 }
 
+/// What stands on a line across: so high, of this thickness.
+fn barrier(x: f64, thick: f64, height: f64, depth: f64) -> Vec<[f64; 3]> {
+    let heights = (0..).map(|i| 0.02 * f64::from(i)).take_while(|z| *z <= height);
+    heights.flat_map(|z| level([x, 0.0], [x + thick, depth], z)).collect()
+}
+
 #[test]
-fn ramps_are_climbed_as_far_as_the_rule_says() {
-    // From triangles: where points are few, some pixels of a steep slope hold too little of it to tell.
-    let map = of_quads(&house(), &SliceOptions::default().with_pixel(Pixel::Side(PIXEL)));
-    for (i, angle) in (0_u8..).zip(RAMPS) {
-        let [x, y] = ramp_corner(i);
-        let middle = x + 0.5 * RAMP[1];
-        let (_, steps) = walk(&map, [middle, 0.4, 0.1], &[[middle, y + RAMP[0] - 0.1]], &Back);
-        let reached = steps.iter().map(|step| step.position[2]).fold(0.0, f64::max);
-        let top = (RAMP[0] - 0.1) * angle.to_radians().tan();
-        if angle < 45.0 {
-            assert!(reached > 0.9 * top, "{angle}°: {reached} of {top}");
-        } else if angle > 55.0 {
-            assert!(reached < avatar().options().climb + 0.02, "{angle}°: {reached} of {top}");
+fn nothing_is_stepped_over_however_long_steps_are() {
+    let floor = level([0.0, 0.0], [8.0, 2.0], 0.0);
+    for thick in [0.0, 0.1] {
+        let map = map_of(&[&floor[..], &barrier(4.0, thick, 2.4, 2.0)].concat(), Up::Z);
+        for step in [0.05, 0.2, 0.4, 0.41, 0.7, 1.0, 2.5, 5.0, 1e300] {
+            for base in [[0.4, 0.4], [0.1, 0.6], [0.6, 0.1], [0.02, 0.02]] {
+                for [from, to] in [[1.0, 7.0], [7.0, 1.0], [1.0, 4.1]] {
+                    let options = AvatarOptions::default().with_box(base, 1.6).with_step(step);
+                    let route = Route { start: [from, 0.8, 0.0], points: vec![[to, 1.1]] };
+                    let mut steps = Vec::new();
+                    let ended = route.walk(&mut &map, &Avatar::new(&options).unwrap(), &Back, |_, step| {
+                        steps.push(*step);
+                        Ok(())
+                    });
+                    let told = format!("steps of {step}, base {base:?}, from {from} to {to}: {ended:?}");
+                    assert_eq!(ended, Ok(Ended::Stuck { point: 0 }), "{told}");
+                    let x = end(&steps)[0];
+                    // Before the wall, not farther from it than a step and a pixel.
+                    let gap = if from < to { 4.0 - x } else { x - 4.0 - thick } - 0.5 * base[0];
+                    let stride = step.min(base[0]).min(base[1]);
+                    assert!((-0.001..stride + PIXEL + 0.001).contains(&gap), "{told}: {gap} before the wall");
+                }
+            }
         }
+    }
+    // Over a pit as wide as itself and a step nobody comes without falling.
+    let pit = [level([0.0, 0.0], [4.0, 2.0], 1.0), level([4.9, 0.0], [8.0, 2.0], 1.0)].concat();
+    let map = map_of(&[&pit[..], &level([0.0, 0.0], [8.0, 2.0], 0.0)].concat(), Up::Z);
+    for step in [0.05, 0.3, 5.0] {
+        let options = AvatarOptions::default().with_step(step);
+        let route = Route { start: [1.0, 1.0, 1.0], points: vec![[7.0, 1.0]] };
+        let ended = route.walk(&mut &map, &Avatar::new(&options).unwrap(), &Back, |_, _| Ok(()));
+        assert_eq!(ended, Ok(Ended::Stuck { point: 0 }), "steps of {step}");
     }
 }
 
@@ -222,6 +247,71 @@ fn what_is_climbed_can_be_left_again() {
 }
 
 #[test]
+fn nothing_is_climbed_that_is_too_high_for_the_floor_below_it() {
+    // A floor, a lower one beyond its edge, and there a block whose top is within a climb of the first, not of the second.
+    let mut points = level([0.0, 0.0], [0.99, 2.0], 0.0);
+    points.extend(level([1.0, 0.0], [3.0, 2.0], -0.3));
+    for i in 0..59_u32 {
+        points.extend(level([1.41, 0.0], [1.43, 2.0], -0.3 + 0.01 * f64::from(i)));
+    }
+    points.push([0.0, 0.0, 2.0]);
+    let map = built(&points, &SliceOptions::default().with_pixel(Pixel::Side(0.04))).unwrap();
+    let (ended, steps) = walk(&map, [0.4, 1.0, 0.0], &[[2.6, 1.0]], &Back);
+    // Before the block, which reaches back to where the first floor is not under its base any more.
+    assert_eq!(ended, Ended::Stuck { point: 0 });
+    let highest = steps.iter().map(|step| step.position[2]).fold(f64::NEG_INFINITY, f64::max);
+    assert!(highest < 0.01, "never on the block, whose top is at 0.28: {highest}");
+    assert!((end(&steps)[2] + 0.3).abs() < 0.01 || end(&steps)[2].abs() < 0.01, "{:?}", end(&steps));
+}
+
+#[test]
+fn lengths_of_any_size_neither_overflow_nor_hang() {
+    let points = level([0.0, 0.0], [2.0, 2.0], 0.0);
+    let map = map_of(&[&points[..], &[[0.0, 0.0, 2.0]]].concat(), Up::Z);
+    let walked = |options: &AvatarOptions, start: [f64; 3]| {
+        let route = Route { start, points: vec![[1.5, 1.0]] };
+        let mut steps = Vec::new();
+        let ended = route.walk(&mut &map, &Avatar::new(options).unwrap(), &Back, |_, step| {
+            steps.push(*step);
+            Ok(())
+        });
+        ended.map(|ended| (ended, steps))
+    };
+    let default = AvatarOptions::default();
+    let mut walks = 0;
+    for start in [0.1, 1e18, 1e300, f64::MAX, -1e300, f64::MIN] {
+        for climb in [1e18, 1e300, 1e308, 1.7e308] {
+            let giant = default.with_box([0.4; 2], f64::MAX).with_climb(climb);
+            match walked(&giant, [0.5, 1.0, start]) {
+                Ok((ended, steps)) => {
+                    assert!(steps.len() < 50, "{climb} from {start}: {ended:?}, {} steps", steps.len());
+                    walks += 1;
+                }
+                Err(refused) => assert!(matches!(refused, WalkError::Blocked { .. }), "{refused}"),
+            }
+        }
+    }
+    assert!(walks >= 12, "{walks}");
+    let wide = default.with_box([f64::MAX, 1e300], 1.6).with_step(f64::MAX);
+    let (ended, steps) = walked(&wide, [0.5, 1.0, 0.1]).unwrap();
+    assert_eq!((ended, steps.len()), (Ended::Arrived, 1));
+    // Far along the axis that points up is not far to walk.
+    let turned: Vec<[f64; 3]> = points.iter().map(|p| Up::Y.from_map([p[0], p[1], p[2] + 1e9])).collect();
+    let high = map_of(&[&turned[..], &[Up::Y.from_map([0.0, 0.0, 1e9 + 2.0])]].concat(), Up::Y);
+    let fine = Avatar::new(&default.with_step(0.01).with_box([0.2; 2], 1.6)).unwrap();
+    let route = Route { start: Up::Y.from_map([0.5, 1.0, 1e9 + 0.1]), points: vec![[1.0, 0.6]] };
+    assert_eq!(route.walk(&mut &high, &fine, &Back, |_, _| Ok(())).unwrap(), Ended::Arrived);
+    for (options, what) in [
+        (default.with_step(1e-300), "a step of"),
+        (default.with_step(1e-12), "a step of"),
+        (default.with_climb(1e-12), "a climb of"),
+    ] {
+        let refused = walked(&options, [0.5, 1.0, 0.1]).unwrap_err().to_string();
+        assert!(refused.contains(what) && refused.contains("2^32"), "{refused}");
+    }
+}
+
+#[test]
 fn falls_from_the_sky_and_creeping_along_walls_end() {
     let map = map_of(&scan(), Up::Z);
     let (_, steps) = walk(&map, [1.2, 8.0, 1e9], &[[1.2, 8.0]], &Back);
@@ -236,6 +326,48 @@ fn falls_from_the_sky_and_creeping_along_walls_end() {
     let (ended, steps) = walk(&map_of(&points, Up::Z), [1.0, 0.5, 0.0], &[[3.0, 2.0]], &Slide);
     assert!(matches!(ended, Ended::Stuck { .. }) && steps.len() < 400, "{ended:?} after {}", steps.len());
     assert!((end(&steps)[1] - 2.0).abs() < 0.05, "{:?}", end(&steps));
+}
+
+#[test]
+fn walks_end_as_they_are_told_to() {
+    let map = map_of(&scan(), Up::Z);
+    let walked = |start, points: &[[f64; 2]]| {
+        let route = Route { start, points: points.to_vec() };
+        let mut building = &map;
+        let walker = route.stand(&mut building, &avatar())?;
+        let mut steps = 0;
+        let ended = route.follow(&mut building, walker, &Back, |_, _| {
+            steps += 1;
+            Ok::<(), WalkError>(())
+        })?;
+        Ok::<_, WalkError>((ended, steps, walker.position(map.grid())))
+    };
+    let off = Ended::LeftMap { point: 0 };
+    // From where a fall is less than heights can tell; and without any points.
+    for start in [[2.0, 6.0, -1e300], [2.0, 6.0, -1e18], [2.0, 6.0, -5.0], [1e300, 1e300, -1e300]] {
+        assert_eq!(walked(start, &[[start[0], start[1]]]).unwrap().0, off, "from {start:?}");
+        assert_eq!(walked(start, &[]).unwrap().0, off, "from {start:?}, without points");
+    }
+    for start in [[1e300, 1e300, 0.0], [50.0, 6.0, 0.0], [50.0, 6.0, 1e300]] {
+        let (ended, steps, _) = walked(start, &[]).unwrap();
+        assert!(ended == off && (1..100).contains(&steps), "{ended:?} from {start:?} after {steps}");
+    }
+    // Put down at once, or after a fall.
+    let (ended, steps, [x, y, z]) = walked([2.0, 6.0, 0.2], &[]).unwrap();
+    assert!(ended == Ended::Arrived && steps == 0, "{ended:?} after {steps}");
+    assert!(x == 2.0 && y == 6.0 && z.abs() < 0.02, "stands at {x}, {y}, {z}");
+    let (ended, steps, [_, _, z]) = walked([2.0, 6.0, 1.2], &[]).unwrap();
+    assert!(ended == Ended::Arrived && steps == 4 && z == 1.2, "{ended:?} from {z} after {steps}");
+
+    for (start, points, index) in [
+        ([2.0, 6.0, 0.0], vec![[3.0, 6.0], [1e300, 6.0]], 2),
+        ([2.0, 6.0, 0.0], vec![[3.0, -1e12], [3.0, 6.0]], 1),
+        ([1e13, 6.0, 0.0], vec![[3.0, 6.0]], 0),
+    ] {
+        let refused = walked(start, &points).unwrap_err();
+        assert!(matches!(refused, WalkError::FarOff { index: i, .. } if i == index), "{points:?}: {refused}");
+        assert!(refused.to_string().contains("off the map"), "{refused}");
+    }
 }
 
 #[test]

@@ -1,0 +1,273 @@
+//! Writing a map into a folder, over another or a new one.
+//!
+//! A map that is written over another never changes a file that the other's index names: slices come first, then the index replaces the
+//! old one in one step, then files that it does not name go. So two that write at once would remove each other's slices: whoever writes
+//! holds a lock on a file in the folder.
+
+use std::collections::BTreeMap;
+use std::fs::{self, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use nearmiss_store::{Check, Fault, File, WriteError, Writer};
+
+use crate::SliceMap;
+use crate::encode::encode;
+use crate::parallel::map_each;
+use crate::slice::Slice;
+use crate::store::{CHECKSUMS, IMAGE, INDEX, INDEX_NAME, PIXELS, SliceFolder, StoreError, image_name};
+
+/// Name of the file that is locked, there only as long.
+const LOCK_NAME: &str = "index.lock";
+
+/// Attempts at the lock; each fails only if another process was done within microseconds.
+const ATTEMPTS: usize = 16;
+
+/// Between the name of a file and the twelve letters and digits of its temporary ([`Writer::save`]).
+const TEMPORARY: (&str, usize) = (".tmp-", 12);
+
+/// A folder that a map will be written into, held so that nobody else writes there.
+///
+/// Folders that were made for it go again if nothing is written. Where the file system knows no locks, nobody is kept out.
+#[derive(Debug)]
+pub struct SliceTarget {
+    folder: PathBuf,
+    _lock: fs::File,
+    /// Dropped after the lock.
+    _made: Made,
+}
+
+impl SliceTarget {
+    /// Makes the folder, or checks that it is empty or holds a map, or what is left of one; and takes the lock.
+    ///
+    /// # Errors
+    /// When the folder cannot be made or written to, holds other files and no map, or somebody else is writing there.
+    pub fn new(folder: &Path) -> Result<Self, StoreError> {
+        let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
+        let made = Made(missing.map(Path::to_owned).collect());
+        fs::create_dir_all(folder).map_err(failed(folder, "make"))?;
+        check(folder)?;
+        Ok(Self { folder: folder.to_owned(), _lock: lock(folder)?, _made: made })
+    }
+
+    /// Writes the map, which replaces the one that is there. Tells the bytes of all files.
+    ///
+    /// # Errors
+    /// When something cannot be written, or slices are missing; then nothing new is left, and a map that was there before is whole.
+    pub fn save(self, map: &SliceMap) -> Result<u64, StoreError> {
+        let images = (0..).zip(map.slices()).map(|(slice, image)| match image {
+            Some(image) => Ok(&**image),
+            None => Err(StoreError::Incomplete { slice }),
+        });
+        let images = images.collect::<Result<Vec<_>, _>>()?;
+        let checksums: Vec<u64> = images.iter().map(|image| image.checksum()).collect();
+        let distinct = distinct(checksums.iter().copied().zip(images))?;
+        let before = SliceFolder::open(&self.folder);
+        let before = before.as_ref().map_or(&[][..], SliceFolder::checksums);
+        let added: Vec<PathBuf> =
+            distinct.keys().map(|c| self.image_path(*c)).filter(|p| !p.exists()).collect();
+        let written = self.write(map, &checksums, &distinct);
+        match written {
+            Ok(_) => self.clear(before, &distinct),
+            // What cannot be removed does no harm, here and below.
+            Err(_) => added.iter().for_each(|path| _ = fs::remove_file(path)),
+        }
+        written
+    }
+
+    fn write(
+        &self,
+        map: &SliceMap,
+        checksums: &[u64],
+        distinct: &BTreeMap<u64, &Slice>,
+    ) -> Result<u64, StoreError> {
+        let images: Vec<&Slice> = distinct.values().copied().collect();
+        let mut bytes = 0;
+        for length in map_each(images.len(), |i| self.write_image(images[i])) {
+            bytes += length?;
+        }
+        let mut writer = Writer::new(INDEX.0, INDEX.1);
+        writer.metadata(map.index())?.section(CHECKSUMS, 0, checksums)?;
+        bytes += writer.save(self.folder.join(INDEX_NAME))?;
+        Ok(bytes)
+    }
+
+    fn write_image(&self, image: &Slice) -> Result<u64, WriteError> {
+        let bytes = encode(image);
+        let mut writer = Writer::new(IMAGE.0, IMAGE.1);
+        writer.section(PIXELS, 0, &bytes)?;
+        writer.save(self.image_path(image.checksum()))
+    }
+
+    fn image_path(&self, checksum: u64) -> PathBuf {
+        self.folder.join(image_name(checksum))
+    }
+
+    /// Removes slices of the map that was there before, and what killed writers left.
+    fn clear(&self, before: &[u64], now: &BTreeMap<u64, &Slice>) {
+        let Ok(entries) = fs::read_dir(&self.folder) else { return };
+        for entry in entries.flatten() {
+            let (name, path) = (entry.file_name(), entry.path());
+            let name = name.to_string_lossy();
+            let is_old = checksum_of(&name).is_some_and(|checksum| {
+                !now.contains_key(&checksum) && (before.contains(&checksum) || is_image(&path))
+            });
+            if is_old || is_temporary(&name) && is_abandoned(&path) {
+                let _ = fs::remove_file(path);
+            }
+        }
+    }
+}
+
+/// While the lock is held.
+impl Drop for SliceTarget {
+    fn drop(&mut self) {
+        let _ = fs::remove_file(self.folder.join(LOCK_NAME));
+    }
+}
+
+impl SliceMap {
+    /// Writes the map into a folder, which is made, is empty, or holds another map, which it replaces. Tells the bytes of all files.
+    ///
+    /// # Errors
+    /// As [`SliceTarget::new`] and [`SliceTarget::save`].
+    pub fn save(&self, folder: &Path) -> Result<u64, StoreError> {
+        SliceTarget::new(folder)?.save(self)
+    }
+}
+
+/// Slices by their checksums.
+fn distinct<'a>(
+    images: impl Iterator<Item = (u64, &'a Slice)>,
+) -> Result<BTreeMap<u64, &'a Slice>, StoreError> {
+    let mut distinct = BTreeMap::new();
+    for (checksum, image) in images {
+        let first: &Slice = distinct.entry(checksum).or_insert(image);
+        if !std::ptr::eq(first, image) && first != image {
+            return Err(StoreError::Alike { checksum });
+        }
+    }
+    Ok(distinct)
+}
+
+/// Folders that were made, deepest first; they go if nothing is in them in the end.
+#[derive(Debug)]
+struct Made(Vec<PathBuf>);
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        self.0.iter().for_each(|folder| _ = fs::remove_dir(folder));
+    }
+}
+
+fn failed(folder: &Path, verb: &'static str) -> impl Fn(io::Error) -> StoreError {
+    move |cause| StoreError::Folder { path: folder.to_owned(), verb, cause }
+}
+
+/// Whether a map may be written into a folder. A damaged index is one all the same; without an index there may be what killed writers left.
+fn check(folder: &Path) -> Result<(), StoreError> {
+    let foreign = || StoreError::Foreign { path: folder.to_owned() };
+    let index = File::read(folder.join(INDEX_NAME), Check::Structure);
+    match index.and_then(|file| file.expect(INDEX.0, 0..=u32::MAX)).map_err(|error| error.fault) {
+        Err(Fault::Io { source }) if source.kind() == io::ErrorKind::NotFound => {}
+        Err(Fault::NotAFile { .. } | Fault::NotAContainer { .. } | Fault::Kind { .. }) => {
+            return Err(foreign());
+        }
+        _ => return Ok(()),
+    }
+    for entry in fs::read_dir(folder).map_err(failed(folder, "read"))?.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_ours = [LOCK_NAME, INDEX_NAME].contains(&&*name) || is_temporary(&name);
+        if !is_ours && (checksum_of(&name).is_none() || !is_image(&entry.path())) {
+            return Err(foreign());
+        }
+    }
+    Ok(())
+}
+
+/// The lock of a folder; whoever had it before may have removed the file meanwhile.
+fn lock(folder: &Path) -> Result<fs::File, StoreError> {
+    let path = folder.join(LOCK_NAME);
+    for _ in 0..ATTEMPTS {
+        let file = fs::OpenOptions::new().create(true).truncate(false).write(true).open(&path);
+        let file = file.map_err(failed(folder, "write into"))?;
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            break;
+        }
+        if is_at(&file, &path) {
+            return Ok(file);
+        }
+    }
+    Err(StoreError::Busy { path: folder.to_owned() })
+}
+
+/// Whether an open file is the one at this path.
+#[cfg(unix)]
+fn is_at(file: &fs::File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |about: &fs::Metadata| (about.dev(), about.ino());
+    matches!((&file.metadata(), &fs::metadata(path)), (Ok(a), Ok(b)) if id(a) == id(b))
+}
+
+/// Whether an open file is the one at this path.
+#[cfg(not(unix))]
+fn is_at(_file: &fs::File, path: &Path) -> bool {
+    path.exists()
+}
+
+/// Of which slice a file of this name is.
+fn checksum_of(name: &str) -> Option<u64> {
+    let checksum = u64::from_str_radix(name.split('.').next()?, 16).ok()?;
+    (image_name(checksum) == name).then_some(checksum)
+}
+
+/// Whether a file holds a slice, or is gone by now.
+fn is_image(path: &Path) -> bool {
+    match File::read(path, Check::Structure) {
+        Ok(file) => file.kind() == IMAGE.0,
+        Err(error) => matches!(error.fault, Fault::Io { source } if source.kind() == io::ErrorKind::NotFound),
+    }
+}
+
+/// Whether a file of this name is what becomes one of ours.
+fn is_temporary(name: &str) -> bool {
+    let (infix, length) = TEMPORARY;
+    name.rsplit_once(infix).is_some_and(|(target, random)| {
+        let is_random = random.len() == length && random.bytes().all(|b| b.is_ascii_alphanumeric());
+        is_random && (target == INDEX_NAME || checksum_of(target).is_some())
+    })
+}
+
+/// Whether nobody is writing a temporary any more.
+fn is_abandoned(path: &Path) -> bool {
+    fs::OpenOptions::new().write(true).open(path).is_ok_and(|file| file.try_lock().is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::slice::Canvas;
+
+    #[test]
+    fn slices_of_one_checksum_are_one_only_if_they_are_equal() {
+        let [a, b, c] = [3, 3, 4].map(|width| Canvas::new(width, 2).finish());
+        let found = distinct([(7, &a), (9, &c), (7, &b), (7, &a)].into_iter()).unwrap();
+        assert_eq!(found.into_iter().collect::<Vec<_>>(), [(7, &a), (9, &c)]);
+        let refused = distinct([(7, &a), (7, &c)].into_iter());
+        assert!(matches!(refused, Err(StoreError::Alike { checksum: 7 })), "{refused:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_lock_on_a_file_that_is_gone_is_none() {
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join(LOCK_NAME);
+        let file = fs::File::create(&path).unwrap();
+        assert!(is_at(&file, &path));
+        fs::remove_file(&path).unwrap();
+        assert!(!is_at(&file, &path));
+        fs::write(&path, b"").unwrap();
+        assert!(!is_at(&file, &path), "another of the same name");
+    }
+}
