@@ -1,5 +1,6 @@
 //! `cargo xtask test`: every check, each with a name and the time it took.
 
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::repository::{Outcome, cargo, members, root, run_cargo};
@@ -69,20 +70,27 @@ fn features() -> Outcome {
     Ok(())
 }
 
-/// The same file from one thread and two, from a debug and a release build.
+/// The same file from one thread and two, from a debug and a release build: that which the tests run, and this program.
 fn determinism() -> Outcome {
-    let folder = root().join("target/determinism");
+    if cfg!(debug_assertions) {
+        return Err("run it by `cargo xtask`, which is a release build".into());
+    }
+    run_cargo(&["test", "--workspace", "--no-run", "--quiet"])?;
+    let release = std::env::current_exe()?;
+    let target = release.ancestors().nth(2).ok_or("this program is in no target folder")?;
+    let debug = target.join("debug").join(format!("nearmiss{}", std::env::consts::EXE_SUFFIX));
+    let folder = target.join("determinism");
     std::fs::create_dir_all(&folder)?;
     let scan = nearmiss_testdata::dragon::dragon_path(nearmiss_testdata::dragon::Dragon::Points5k);
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();
-    for profile in ["dev", "release"] {
+    for (build, program) in [("debug", &debug), ("release", &release)] {
         for threads in ["1", "2"] {
-            let file = folder.join(format!("{profile}-{threads}.nm"));
-            let mut command = cargo();
-            command.args(["run", "--quiet", "-p", "nearmiss-cli", "--profile", profile, "--", "preprocess"]);
-            command.arg(&scan).arg("-o").arg(&file).args(["--threads", threads, "--quiet", "--json"]);
-            crate::repository::run(command.stdout(std::process::Stdio::null()), "nearmiss preprocess")?;
-            files.push((format!("{profile}, {threads} threads"), std::fs::read(&file)?));
+            let file = folder.join(format!("{build}-{threads}.nm"));
+            let mut command = Command::new(program);
+            command.arg("preprocess").arg(&scan).arg("-o").arg(&file);
+            command.args(["--threads", threads, "--quiet", "--json"]).stdout(Stdio::null());
+            crate::repository::run(&mut command, "nearmiss preprocess")?;
+            files.push((format!("{build}, {threads} threads"), std::fs::read(&file)?));
         }
     }
     let (first, bytes) = &files[0];
