@@ -3,7 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::repository::{Outcome, cargo, members, root, run_cargo};
+use crate::repository::{Outcome, cargo, members, run_cargo};
 use crate::tidy;
 
 type Check = fn() -> Outcome;

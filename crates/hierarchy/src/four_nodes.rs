@@ -1,10 +1,10 @@
 //! The boxes of four nodes side by side, with what their enclosures reach further.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, u32x4};
+use fearless_simd::{Level, Simd, dispatch, f32x4, u32x4};
 use nearmiss_geometry::NodeId;
 
-use crate::boxes::OrientedBox;
+use crate::boxes::{OrientedBox, Relative};
 use crate::build::Slices;
 use crate::growth::Growth;
 
@@ -77,6 +77,106 @@ impl Slices<'_> {
     }
 }
 
+impl<S: Simd> FourNodes<S> {
+    /// The enclosures instead of the boxes, in the order of operations of [`Growth::of`].
+    #[inline(always)]
+    fn grown(mut self) -> Self {
+        for k in 0..3 {
+            let shift = (self.high[k] - self.low[k]) * 0.5;
+            for i in 0..3 {
+                self.centre[i] += shift * self.axes[k][i];
+            }
+            self.half[k] += (self.high[k] + self.low[k]) * 0.5;
+        }
+        self
+    }
+}
+
+impl Relative {
+    /// How far the enclosures of either of two nodes of the first scan and either of two of the second are apart: as
+    /// [`Relative::gaps`] of [`Growth::of`] each, by any instructions.
+    ///
+    /// # Panics
+    /// When there are no such nodes.
+    #[inline]
+    #[must_use]
+    pub fn gaps_of_enclosures(
+        &self,
+        level: Level,
+        [of_a, of_b]: [&Slices<'_>; 2],
+        a: [NodeId; 2],
+        b: [NodeId; 2],
+    ) -> [f32; 4] {
+        let [a0, a1] = a.map(|id| (&of_a.boxes[id.index()], &of_a.growths[id.index()]));
+        let [b0, b1] = b.map(|id| (&of_b.boxes[id.index()], &of_b.growths[id.index()]));
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.gaps_of_grown(simd, &FourNodes::new(simd, [a0.0, a1.0, b0.0, b1.0], [a0.1, a1.1, b0.1, b1.1])),
+        ))
+    }
+
+    /// The first two nodes are of a, the others of b.
+    #[inline(always)]
+    fn gaps_of_grown<S: Simd>(&self, simd: S, four: &FourNodes<S>) -> [f32; 4] {
+        let own = four.grown();
+        let scale = self.scale();
+        let centre_b = second(&self.points_of_four(own.centre));
+        let half_b = second(&[own.half[0] * scale, own.half[1] * scale, own.half[2] * scale]);
+        let axes_b = [
+            second(&self.directions_of_four(own.axes[0])),
+            second(&self.directions_of_four(own.axes[1])),
+            second(&self.directions_of_four(own.axes[2])),
+        ];
+        let (centre_a, half_a) = (first(&own.centre), first(&own.half));
+        let axes_a = [first(&own.axes[0]), first(&own.axes[1]), first(&own.axes[2])];
+        let d = [centre_b[0] - centre_a[0], centre_b[1] - centre_a[1], centre_b[2] - centre_a[2]];
+        let mut gap = f32x4::splat(simd, f32::MIN);
+        let mut reach_b = half_b;
+        for i in 0..3 {
+            let mut reach_a = half_a[i];
+            for j in 0..3 {
+                let cosine = product(&axes_a[i], &axes_b[j]).abs();
+                reach_a += half_b[j] * cosine;
+                reach_b[j] += half_a[i] * cosine;
+            }
+            gap = greater(simd, gap, product(&axes_a[i], &d).abs() - reach_a);
+        }
+        for j in 0..3 {
+            gap = greater(simd, gap, product(&axes_b[j], &d).abs() - reach_b[j]);
+        }
+        gap.to_array()
+    }
+}
+
+/// The first two lanes, either twice in a row.
+#[inline(always)]
+fn first<S: Simd>([x, y, z]: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    [x.zip_low(*x), y.zip_low(*y), z.zip_low(*z)]
+}
+
+/// The last two lanes, both twice.
+#[inline(always)]
+fn second<S: Simd>([x, y, z]: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    [second_one(*x), second_one(*y), second_one(*z)]
+}
+
+#[inline(always)]
+fn second_one<S: Simd>(lanes: f32x4<S>) -> f32x4<S> {
+    let twice = lanes.zip_high(lanes);
+    twice.unzip_low(twice)
+}
+
+#[inline(always)]
+fn product<S: Simd>(x: &[f32x4<S>; 3], y: &[f32x4<S>; 3]) -> f32x4<S> {
+    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+}
+
+/// Of what is no number the second, as one by one.
+#[inline(always)]
+fn greater<S: Simd>(simd: S, x: f32x4<S>, y: f32x4<S>) -> f32x4<S> {
+    simd.select_f32x4(x.simd_gt(y), x, y)
+}
+
 #[inline(always)]
 fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
     let (ac_low, ac_high, bd_low, bd_high) = (a.zip_low(c), a.zip_high(c), b.zip_low(d), b.zip_high(d));
@@ -85,7 +185,9 @@ fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, dispatch};
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
+    use nearmiss_testdata::instructions::levels;
+    use rand::RngExt;
 
     use super::*;
     use crate::boxes::dot;
@@ -126,5 +228,52 @@ mod tests {
                 }
             });
         }
+    }
+
+    #[test]
+    fn gaps_of_enclosures_are_those_one_by_one_by_any_instructions() {
+        let rng = &mut rng(31);
+        let single = |v: [f64; 3]| v.map(|c| c as f32);
+        let (mut apart, mut boundless) = (0, 0);
+        for round in 0..500 {
+            let boxes: [OrientedBox; 4] = std::array::from_fn(|_| {
+                let turn = rotation(rng);
+                let axis = |k: usize| single(turn.rotation().column(k).into_owned().into());
+                OrientedBox {
+                    centre: single(point_in(rng, 2.0).into()),
+                    half: single(point_in(rng, 1.0).into()).map(f32::abs),
+                    axes: [axis(0), axis(1), axis(2)],
+                    reach: 0.1,
+                }
+            });
+            let growths = boxes.map(|own| {
+                let [low, high] =
+                    [0.0, 0.3].map(|more| own.along(&own.axes).map(|[low, high]| [low - more, high + more]));
+                let far = if rng.random_bool(0.1) { f32::INFINITY } else { high[0][1] };
+                Growth::new(&own, low.map(|side| side[0]), [far, low[1][1], high[2][1]])
+            });
+            let [a0, a1, b0, b1] = std::array::from_fn(|i| growths[i].of(&boxes[i]));
+            let scale = [1.0, 0.4][round % 2];
+            let pose = rotation(rng).with_scale(scale).with_translation(point_in(rng, 2.0));
+            let relative = Relative::new(&pose, 8.0);
+            let expected = relative.gaps([&a0, &a1], [&b0, &b1]).map(f32::to_bits);
+            for level in levels() {
+                let found = dispatch!(level, simd => {
+                    relative.gaps_of_grown(simd, &FourNodes::new(simd, boxes.each_ref(), growths.each_ref()))
+                });
+                let found = found.map(f32::to_bits);
+                for (own, other) in found.iter().zip(&expected) {
+                    let both = [own, other].map(|&bits| f32::from_bits(bits));
+                    assert!(
+                        own == other || both.iter().all(|x| x.is_nan()),
+                        "round {round}, {level:?}: {both:?}"
+                    );
+                }
+            }
+            let gaps = expected.map(f32::from_bits);
+            apart += gaps.iter().filter(|&&gap| gap > 0.0).count();
+            boundless += gaps.iter().filter(|gap| gap.is_nan()).count();
+        }
+        assert!(apart > 300 && boundless > 100, "{apart} {boundless}");
     }
 }

@@ -210,12 +210,18 @@ fn search(
             return Answer { verdict, distance_estimate: None, statistics };
         }
     };
-    let answer = decide(Posed::new([a, b], relative, meter), pose, (plan, budget), scratch, extras);
+    let answer = decide(
+        Posed::new([a, b], relative, meter, scratch.instructions.0),
+        pose,
+        (plan, budget),
+        scratch,
+        extras,
+    );
     match answer.verdict {
         Verdict::Intersecting { contact, .. } if options.detail == Detail::Manifold => {
             let mut spent = self::meter([a, b], options, budget);
             spent.spent = answer.statistics;
-            let mut pair = Posed::new([a, b], relative, spent);
+            let mut pair = Posed::new([a, b], relative, spent, scratch.instructions.0);
             manifold::gather(&mut pair, options, &contact, scratch.instructions.0, &mut scratch.manifold);
             Answer { statistics: pair.meter.spent, ..answer }
         }

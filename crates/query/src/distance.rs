@@ -154,8 +154,9 @@ pub fn distance_with(
     let leaves = views.map(|view| view.slices().nodes.len().div_ceil(2) as u64);
     let points = views.map(|view| u64::from(view.scan().leaf_size()));
     let meter = Meter::new(budget, leaves, points, 0);
-    let motion = Motion::new(Level::new(), views, &pose);
-    let pair = Posed::new(views, relative, meter);
+    let level = Level::new();
+    let motion = Motion::new(level, views, &pose);
+    let pair = Posed::new(views, relative, meter, level);
     let best = PointPair::new(&pair, [0, 0]);
     let search = Apart { plan, budget, motion, pair, best };
     match plan.options.semantics {

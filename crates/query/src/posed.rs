@@ -1,5 +1,6 @@
 //! Two scans in relative motion, and what every search through them does with a pair of nodes.
 
+use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{Ball, NodePair, Relative, SLACK, Slices, Split};
@@ -16,12 +17,14 @@ pub(crate) struct Posed<'a> {
     pub(crate) b: &'a Slices<'a>,
     pub(crate) relative: Relative,
     pub(crate) meter: Meter,
+    /// The instructions that it is looked at by: no result depends on them.
+    pub(crate) level: Level,
 }
 
 impl<'a> Posed<'a> {
-    pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, meter: Meter) -> Self {
+    pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, meter: Meter, level: Level) -> Self {
         let [a, b] = views.map(ScanView::slices);
-        Self { views, a, b, relative, meter }
+        Self { views, a, b, relative, meter, level }
     }
 
     /// The leaves with a point of either scan.
@@ -49,9 +52,7 @@ impl<'a> Posed<'a> {
     /// The gaps between the enclosures of either of `a` and either of `b`.
     #[inline]
     pub(crate) fn gaps_of_enclosures(&self, a: [NodeId; 2], b: [NodeId; 2]) -> [f32; 4] {
-        let [a0, a1] = a.map(|id| self.a.enclosure(id.index()));
-        let [b0, b1] = b.map(|id| self.b.enclosure(id.index()));
-        self.relative.gaps([&a0, &a1], [&b0, &b1])
+        self.relative.gaps_of_enclosures(self.level, [self.a, self.b], a, b)
     }
 
     /// The gaps of boxes, with how much of each other the boxes overlap when `margin` is about them.
