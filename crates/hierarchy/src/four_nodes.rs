@@ -42,38 +42,26 @@ impl<S: Simd> FourNodes<S> {
         let [wx, wy, wz, _] = columns(3);
         let [a, b, c, d] = growths;
         let (a, b, c, d) = (a.pairs(), b.pairs(), c.pairs(), d.pairs());
-        // Of two upper halves in a number the first is its lower one.
-        let halves = |pair: usize| {
-            let both = u32x4::load_array(simd, [a[pair], b[pair], c[pair], d[pair]]);
-            let (first, second): (f32x4<S>, f32x4<S>) =
-                ((both << 16).bitcast(), (both & 0xffff_0000).bitcast());
-            (first, second)
-        };
-        let ((lx, ly), (lz, gx), (gy, gz)) = (halves(0), halves(1), halves(2));
+        let pair = |pair: usize| u32x4::load_array(simd, [a[pair], b[pair], c[pair], d[pair]]);
+        let (low, high) = Self::growth([pair(0), pair(1), pair(2)]);
         Self {
             centre: [cx, cy, cz],
             half: [hx, hy, hz],
             axes: [[ux, uy, uz], [vx, vy, vz], [wx, wy, wz]],
-            low: [lx, ly, lz],
-            high: [gx, gy, gz],
+            low,
+            high,
         }
     }
-}
 
-impl Slices<'_> {
-    /// Four nodes.
-    ///
-    /// # Panics
-    /// When there are no such nodes.
+    /// By how much enclosures reach further against the axes and along them, from [`Growth::pairs`].
     #[inline(always)]
-    #[must_use]
-    pub fn four_nodes<S: Simd>(&self, simd: S, [a, b, c, d]: [NodeId; 4]) -> FourNodes<S> {
-        let (boxes, growths) = (self.boxes, self.growths);
-        FourNodes::new(
-            simd,
-            [&boxes[a.index()], &boxes[b.index()], &boxes[c.index()], &boxes[d.index()]],
-            [&growths[a.index()], &growths[b.index()], &growths[c.index()], &growths[d.index()]],
-        )
+    pub(crate) fn growth([first, second, third]: [u32x4<S>; 3]) -> ([f32x4<S>; 3], [f32x4<S>; 3]) {
+        // Of two upper halves in a number the first is its lower one.
+        let halves = |both: u32x4<S>| -> (f32x4<S>, f32x4<S>) {
+            ((both << 16).bitcast(), (both & 0xffff_0000).bitcast())
+        };
+        let ((lx, ly), (lz, gx), (gy, gz)) = (halves(first), halves(second), halves(third));
+        ([lx, ly, lz], [gx, gy, gz])
     }
 }
 

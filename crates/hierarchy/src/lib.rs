@@ -45,4 +45,4 @@ pub use sanity::Flaw;
 pub use sections::{HierarchyMeta, LoadError};
 pub use surfels::{NormalCone, PointKind, THICKNESS};
 pub use topology::{MOST_LEAF_POINTS, Node};
-pub use wide::{LeafVisitor, WideStack, WideTree, descend_wide};
+pub use wide::{Child, LeafVisitor, WideStack, WideTree, descend_wide, whole};

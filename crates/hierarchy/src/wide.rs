@@ -4,6 +4,7 @@
 //! lanes of a register a pair costs a sixth of what it costs four at a time; the boxes of a level that is left out would have
 //! parted few (docs/decisions). Made from the binary tree whenever that is made or loaded, in O(nodes): nothing of it is stored.
 
+mod family;
 mod nearest;
 
 use std::ops::ControlFlow;
@@ -29,9 +30,9 @@ const TURNS: u32 = 64;
 
 type Lanes = [f32; WIDTH];
 
-/// A leaf by its number in the order of the points, or an inner node by its place in the [`WideTree`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Child(u32);
+/// A node of a [`WideTree`]: a leaf by its number in the order of the points, or an inner node by its place there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Child(u32);
 
 impl Child {
     const LEAF: u32 = 1 << 31;
@@ -41,8 +42,10 @@ impl Child {
         Self(number | Self::LEAF)
     }
 
+    /// Whether it is a leaf.
     #[inline]
-    const fn is_leaf(self) -> bool {
+    #[must_use]
+    pub const fn is_leaf(self) -> bool {
         self.0 & Self::LEAF != 0
     }
 
@@ -93,6 +96,8 @@ impl Siblings {
 #[derive(Debug, Clone, Default)]
 pub struct WideTree {
     nodes: Vec<Siblings>,
+    /// What the enclosures of the same children reach further.
+    growths: Vec<family::Growths>,
     /// The id of each node in the binary tree.
     ids: Vec<u32>,
     /// What leaves are compared by.
@@ -102,13 +107,15 @@ pub struct WideTree {
 impl WideTree {
     /// Every other level of the tree of these nodes, level by level: what all queries look at stands together.
     pub(crate) fn of(scan: &PointHierarchy) -> Self {
-        let Slices { nodes, boxes, leaf_size, .. } = scan.slices();
+        let Slices { nodes, boxes, growths, leaf_size, .. } = scan.slices();
         let is_leaf = |id: NodeId| nodes[id.index()].is_leaf();
         let children = |id: NodeId| nodes[id.index()].children(id);
         let mut ids: Vec<u32> = if nodes.len() > 1 { vec![0] } else { Vec::new() };
         let mut wide: Vec<Siblings> = Vec::with_capacity(nodes.len().div_ceil(WIDTH));
+        let mut wide_growths = Vec::with_capacity(nodes.len().div_ceil(WIDTH));
         while let Some(&id) = ids.get(wide.len()) {
             let mut siblings = Siblings::NONE;
+            let mut grown = family::Growths::default();
             let below = children(NodeId(id))
                 .into_iter()
                 .map(|child| if is_leaf(child) { [Some(child), None] } else { children(child).map(Some) });
@@ -120,19 +127,27 @@ impl WideTree {
                     Child(id32(ids.len() - 1))
                 };
                 siblings.set(lane, &boxes[id.index()], child);
+                grown.set(lane, &growths[id.index()]);
             }
             wide.push(siblings);
+            wide_growths.push(grown);
         }
-        Self { nodes: wide, ids, leaves: Leaves::of(scan) }
+        Self { nodes: wide, growths: wide_growths, ids, leaves: Leaves::of(scan) }
     }
 
-    fn root(&self) -> Child {
+    /// The root.
+    #[must_use]
+    pub fn root(&self) -> Child {
         if self.nodes.is_empty() { Child::leaf(0) } else { Child(0) }
     }
 
-    /// The id of a child in the binary tree.
+    /// The id of a node in the binary tree.
+    ///
+    /// # Panics
+    /// When there is no such node.
     #[inline]
-    fn id(&self, child: Child) -> NodeId {
+    #[must_use]
+    pub fn id(&self, child: Child) -> NodeId {
         NodeId(if child.is_leaf() { self.leaves.id(child.index()) } else { self.ids[child.index()] })
     }
 }
@@ -285,9 +300,14 @@ fn descend_by<S: Simd, V: LeafVisitor>(
     ControlFlow::Continue(())
 }
 
-/// Which nodes of a pair that are not both leaves stay whole: leaves, and those that are less than half as long as the other.
+/// Which nodes of a pair that are not both leaves stay whole: leaves, and those that are less than half as long as the other, of which
+/// lengths are `scale` times as long.
+///
+/// # Panics
+/// When there are no such nodes.
 #[inline]
-fn whole(trees: [&WideTree; 2], pair: [Child; 2], scale: f32) -> [bool; 2] {
+#[must_use]
+pub fn whole(trees: [&WideTree; 2], pair: [Child; 2], scale: f32) -> [bool; 2] {
     let [a, b] = pair.map(Child::is_leaf);
     if a || b {
         return [a, b];

@@ -178,7 +178,7 @@ struct Apart<'a> {
 impl Apart<'_> {
     /// Balls of this radius about the points.
     fn balls(mut self, radius: f64, scratch: &mut DistanceScratch) -> Distance {
-        let mut search = Search::new(&mut scratch.open, false, &self.motion);
+        let mut search = Search::new(&mut scratch.open, false, &self.pair, &self.motion);
         search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         let beyond = |distance: f64| (distance - 2.0 * radius).max(0.0);
         let mut flow = ControlFlow::Continue(());
@@ -207,7 +207,7 @@ impl Apart<'_> {
         let DistanceScratch { open, gathers, collide } = scratch;
         // By the geodesic metric enclosures prove nothing.
         let is_bounded = self.plan.options.metric != Some(Metric::Geodesic);
-        let mut search = Search::new(open, is_bounded, &self.motion);
+        let mut search = Search::new(open, is_bounded, &self.pair, &self.motion);
         search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         // Whether they touch costs a hundredth of the rest. A budget is spent on bounds first.
         let mut is_asked = self.budget.work.is_none() && self.budget.deadline.is_none();

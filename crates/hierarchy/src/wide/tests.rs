@@ -5,6 +5,7 @@ use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
 
 use super::*;
+use crate::four_nodes::FourNodes;
 use crate::options::BuildOptions;
 
 /// A blob, a sheet or a line of so many points.
@@ -303,4 +304,39 @@ fn after_nothing_comes_what_overlaps_most_of_all_that_is_left() {
         turns += expected.windows(2).filter(|two| two[0][0].abs_diff(two[1][0]) > 8).count();
     }
     assert!(pairs > 2000 && turns > 200, "{pairs} {turns}");
+}
+
+#[test]
+fn children_side_by_side_have_the_boxes_and_enclosures_of_the_binary_tree() {
+    let rng = &mut rng(6);
+    for (count, leaf_size) in [(9, 16), (33, 16), (48, 16), (700, 5), (900, 40)] {
+        let scan = scan(rng, count, [1.0, 1.0, 0.1], leaf_size);
+        let slices = scan.slices();
+        let mut open = vec![scan.wide.root()];
+        while let Some(node) = open.pop() {
+            for whole in [false, true] {
+                let (children, known) = scan.wide.children(node, whole);
+                assert_eq!(known == 1, whole || node.is_leaf(), "an inner node has two children or more");
+                let ids =
+                    children.map(|child| if child == Child::NONE { 0 } else { scan.wide.id(child).index() });
+                for level in levels() {
+                    dispatch!(level, simd => {
+                        let own = slices.family(simd, node, whole);
+                        let boxes = ids.map(|id| &slices.boxes[id]);
+                        let expected = FourNodes::new(simd, boxes, ids.map(|id| &slices.growths[id]));
+                        for lane in 0..known {
+                            let of = |four: &FourNodes<_>| {
+                                let [u, v, w] = four.axes;
+                                [four.centre, four.half, u, v, w, four.low, four.high].map(|row| row.map(|x| x[lane]))
+                            };
+                            assert_eq!(of(&own), of(&expected), "{node:?}, {whole}, lane {lane}, {level:?}");
+                        }
+                    });
+                }
+                if !whole && !node.is_leaf() {
+                    open.extend(&children[..known]);
+                }
+            }
+        }
+    }
 }

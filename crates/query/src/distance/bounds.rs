@@ -12,10 +12,9 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
-use nearmiss_geometry::NodeId;
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
-use nearmiss_hierarchy::{FourNodes, SLACK, Slices};
+use nearmiss_hierarchy::{Child, FourNodes, SLACK, Slices};
 
 use crate::view::ScanView;
 
@@ -135,18 +134,22 @@ impl Motion {
         (-self.distance as f32).next_down().next_down()
     }
 
-    /// Four nodes of `of_a` and four of `of_b`.
+    /// What takes the place of a node of `of_a`, up to four, and what of one of `of_b`, each [`whole`](nearmiss_hierarchy::whole) or
+    /// by its children.
     #[inline]
     pub(crate) fn gaps(
         &self,
         [of_a, of_b]: [&Slices<'_>; 2],
-        a: [NodeId; FAN],
-        b: [NodeId; FAN],
+        [a, b]: [Child; 2],
+        whole: [bool; 2],
         limits: Limits,
     ) -> Gaps {
         dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
-            || self.gaps_by(simd, &of_a.four_nodes(simd, a), &of_b.four_nodes(simd, b), limits),
+            || {
+                let (a, b) = (of_a.family(simd, a, whole[0]), of_b.family(simd, b, whole[1]));
+                self.gaps_by(simd, &a, &b, limits)
+            },
         ))
     }
 

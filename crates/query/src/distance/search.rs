@@ -4,8 +4,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Node, NodePair, Split};
+use nearmiss_hierarchy::{Child, NodePair, whole};
 
 use crate::distance::bounds::{FAN, Gaps, Limits, Motion};
 use crate::posed::Posed;
@@ -14,20 +13,29 @@ use crate::posed::Posed;
 /// Ordered so that the nearest is greatest, of equally near ones that of the nearest boxes, then the first.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Open {
-    enclosures: f32,
-    boxes: f32,
-    pair: NodePair,
+    /// How near the enclosures are, and in the lower half the boxes, as numbers in the same order: a heap compares often.
+    key: u64,
+    pair: [Child; 2],
 }
 
 impl Open {
     #[inline]
-    fn key(&self) -> u64 {
-        u64::from(ascending(self.enclosures)) << 32 | u64::from(ascending(self.boxes))
+    fn new(enclosures: f32, boxes: f32, pair: [Child; 2]) -> Self {
+        Self { key: u64::from(ascending(enclosures)) << 32 | u64::from(ascending(boxes)), pair }
     }
 
     #[inline]
-    fn ids(&self) -> u64 {
-        u64::from(self.pair.a.0) << 32 | u64::from(self.pair.b.0)
+    fn enclosures(&self) -> f32 {
+        #[expect(clippy::cast_possible_truncation, reason = "32 bits")]
+        let bits = (self.key >> 32) as u32;
+        from_ascending(bits)
+    }
+
+    #[inline]
+    fn boxes(&self) -> f32 {
+        #[expect(clippy::cast_possible_truncation, reason = "the lower 32 bits")]
+        let bits = self.key as u32;
+        from_ascending(bits)
     }
 }
 
@@ -38,10 +46,16 @@ fn ascending(x: f32) -> u32 {
     if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
 }
 
+/// The number with these bits.
+#[inline]
+fn from_ascending(bits: u32) -> f32 {
+    f32::from_bits(if bits >> 31 == 0 { !bits } else { bits & !(1 << 31) })
+}
+
 impl Ord for Open {
     #[inline]
     fn cmp(&self, other: &Self) -> Ordering {
-        other.key().cmp(&self.key()).then_with(|| other.ids().cmp(&self.ids()))
+        other.key.cmp(&self.key).then_with(|| other.pair.cmp(&self.pair))
     }
 }
 
@@ -104,11 +118,11 @@ pub(crate) struct Search<'s> {
 
 impl<'s> Search<'s> {
     /// From the pair of the roots on; for the nearest points alone, or for the nearest enclosures of leaves as well.
-    pub(crate) fn new(open: &'s mut Frontier, of_surfaces: bool, motion: &Motion) -> Self {
+    pub(crate) fn new(open: &'s mut Frontier, of_surfaces: bool, pair: &Posed<'_>, motion: &Motion) -> Self {
         open.heap.clear();
         open.stack.clear();
-        let pair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
-        open.stack.push(Open { enclosures: motion.least(), boxes: motion.least(), pair });
+        let pair = [pair.a.wide.root(), pair.b.wide.root()];
+        open.stack.push(Open::new(motion.least(), motion.least(), pair));
         let surfaces = if of_surfaces { f32::INFINITY } else { f32::NEG_INFINITY };
         Self { open, of_surfaces, points: f32::INFINITY, surfaces, steps: 0 }
     }
@@ -122,7 +136,7 @@ impl<'s> Search<'s> {
     pub(crate) fn lower(&self, motion: &Motion) -> f64 {
         let known = if self.of_surfaces { self.surfaces } else { self.points };
         let open = self.open.heap.iter().chain(&self.open.stack);
-        motion.bound(open.fold(known, |least, open| least.min(open.enclosures)))
+        motion.bound(open.fold(known, |least, open| least.min(open.enclosures())))
     }
 
     /// What [`Self::lower`] will not exceed.
@@ -134,7 +148,7 @@ impl<'s> Search<'s> {
     pub(crate) fn is_over(&mut self) -> bool {
         let Frontier { heap, stack } = &mut *self.open;
         let (points, surfaces) = (self.points, self.surfaces);
-        let wanted = |open: &Open| open.boxes < points || open.enclosures < surfaces;
+        let wanted = |open: &Open| open.boxes() < points || open.enclosures() < surfaces;
         while stack.last().is_some_and(|open| !wanted(open)) {
             stack.pop();
         }
@@ -158,23 +172,18 @@ impl<'s> Search<'s> {
         self.steps = self.steps.saturating_add(1);
         let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
         let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
-        let nodes = next.pair;
-        let (a, b) = (&pair.a.nodes[nodes.a.index()], &pair.b.nodes[nodes.b.index()]);
-        let split = match (a.is_leaf(), b.is_leaf()) {
-            (true, true) => {
-                self.surfaces = self.surfaces.min(next.enclosures);
-                return (next.boxes < self.points).then_some(nodes);
-            }
-            (true, false) => Split::Second,
-            (false, true) => Split::First,
-            (false, false) => pair.split(nodes),
-        };
-        let (a, count_a) =
-            if split == Split::Second { ([nodes.a; FAN], 1) } else { below(pair.a.nodes, nodes.a) };
-        let (b, count_b) =
-            if split == Split::First { ([nodes.b; FAN], 1) } else { below(pair.b.nodes, nodes.b) };
+        let (of_enclosures, of_boxes) = (next.enclosures(), next.boxes());
+        if next.pair.iter().all(|node| node.is_leaf()) {
+            self.surfaces = self.surfaces.min(of_enclosures);
+            let [a, b] = next.pair;
+            let leaves = || NodePair { a: pair.a.wide.id(a), b: pair.b.wide.id(b) };
+            return (of_boxes < self.points).then(leaves);
+        }
+        let whole = whole([pair.a.wide, pair.b.wide], next.pair, pair.relative.scale());
         let limits = Limits { boxes: self.points, enclosures: self.surfaces };
-        let Gaps { boxes, enclosures, near } = motion.gaps([pair.a, pair.b], a, b, limits);
+        let Gaps { boxes, enclosures, near } = motion.gaps([pair.a, pair.b], next.pair, whole, limits);
+        let (a, count_a) = pair.a.wide.children(next.pair[0], whole[0]);
+        let (b, count_b) = pair.b.wide.children(next.pair[1], whole[1]);
         let enclosures = if self.of_surfaces { enclosures } else { boxes };
         pair.meter.spent.node_pairs += (count_a * count_b) as u64;
         let mut near = near & LANES[count_a - 1][count_b - 1];
@@ -183,11 +192,8 @@ impl<'s> Search<'s> {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
             // What is in its parents is no nearer than they are.
-            let own = Open {
-                enclosures: enclosures[lane].max(next.enclosures),
-                boxes: boxes[lane].max(next.boxes),
-                pair: NodePair { a: a[lane / FAN], b: b[lane % FAN] },
-            };
+            let pair = [a[lane / FAN], b[lane % FAN]];
+            let own = Open::new(enclosures[lane].max(of_enclosures), boxes[lane].max(of_boxes), pair);
             if !dives {
                 self.put_off(own);
             } else if let Some(known) = nearest {
@@ -197,7 +203,9 @@ impl<'s> Search<'s> {
                 nearest = Some(own);
             }
         }
-        self.open.stack.extend(nearest);
+        if let Some(nearest) = nearest {
+            self.open.stack.push(nearest);
+        }
         None
     }
 
@@ -205,23 +213,4 @@ impl<'s> Search<'s> {
     fn put_off(&mut self, open: Open) {
         if self.steps < NEAREST_FIRST { self.open.heap.push(open) } else { self.open.stack.push(open) }
     }
-}
-
-/// The grandchildren of a node that is no leaf, children for those that are leaves; and how many they are.
-#[inline]
-fn below(nodes: &[Node], id: NodeId) -> ([NodeId; FAN], usize) {
-    let mut found = [id; FAN];
-    let mut count = 0;
-    for child in nodes[id.index()].children(id) {
-        let node = &nodes[child.index()];
-        if node.is_leaf() {
-            found[count] = child;
-            count += 1;
-        } else {
-            let [left, right] = node.children(child);
-            (found[count], found[count + 1]) = (left, right);
-            count += 2;
-        }
-    }
-    (found, count)
 }
