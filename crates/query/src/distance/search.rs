@@ -26,9 +26,7 @@ impl Open {
 
     #[inline]
     fn enclosures(&self) -> f32 {
-        #[expect(clippy::cast_possible_truncation, reason = "32 bits")]
-        let bits = (self.key >> 32) as u32;
-        from_ascending(bits)
+        from_ascending((self.key >> 32) as u32)
     }
 
     #[inline]
