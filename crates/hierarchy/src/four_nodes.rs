@@ -218,18 +218,22 @@ mod tests {
         }
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    fn single(v: [f64; 3]) -> [f32; 3] {
+        v.map(|c| c as f32)
+    }
+
     #[test]
     fn gaps_of_enclosures_are_those_one_by_one_by_any_instructions() {
         let rng = &mut rng(31);
-        let single = |v: [f64; 3]| v.map(|c| c as f32);
         let (mut apart, mut boundless) = (0, 0);
         for round in 0..500 {
             let boxes: [OrientedBox; 4] = std::array::from_fn(|_| {
                 let turn = rotation(rng);
                 let axis = |k: usize| single(turn.rotation().column(k).into_owned().into());
                 OrientedBox {
-                    centre: single(point_in(rng, 2.0).into()),
-                    half: single(point_in(rng, 1.0).into()).map(f32::abs),
+                    centre: single(point_in(rng, 2.0)),
+                    half: single(point_in(rng, 1.0)).map(f32::abs),
                     axes: [axis(0), axis(1), axis(2)],
                     reach: 0.1,
                 }
