@@ -7,6 +7,7 @@ use nearmiss_geometry::NodeId;
 use crate::boxes::{OrientedBox, Relative};
 use crate::build::Slices;
 use crate::growth::Growth;
+use crate::lanes::{Boxes, along_normals};
 
 /// Boxes and enclosures of four nodes, a lane each.
 #[derive(Debug, Clone, Copy)]
@@ -108,61 +109,51 @@ impl Relative {
     fn gaps_of_grown<S: Simd>(&self, simd: S, four: &FourNodes<S>) -> [f32; 4] {
         let own = four.grown();
         let scale = self.scale();
-        let centre_b = second(&self.points_of_four(own.centre));
-        let half_b = second(&[own.half[0] * scale, own.half[1] * scale, own.half[2] * scale]);
-        let axes_b = [
-            second(&self.directions_of_four(own.axes[0])),
-            second(&self.directions_of_four(own.axes[1])),
-            second(&self.directions_of_four(own.axes[2])),
-        ];
-        let (centre_a, half_a) = (first(&own.centre), first(&own.half));
-        let axes_a = [first(&own.axes[0]), first(&own.axes[1]), first(&own.axes[2])];
-        let d = [centre_b[0] - centre_a[0], centre_b[1] - centre_a[1], centre_b[2] - centre_a[2]];
+        let a = Boxes {
+            centre: first(own.centre),
+            half: first(own.half),
+            axes: [first(own.axes[0]), first(own.axes[1]), first(own.axes[2])],
+        };
+        let b = Boxes {
+            centre: second(self.points_of_four(own.centre)),
+            half: second([own.half[0] * scale, own.half[1] * scale, own.half[2] * scale]),
+            axes: [
+                second(self.directions_of_four(own.axes[0])),
+                second(self.directions_of_four(own.axes[1])),
+                second(self.directions_of_four(own.axes[2])),
+            ],
+        };
         let mut gap = f32x4::splat(simd, f32::MIN);
-        let mut reach_b = half_b;
-        for i in 0..3 {
-            let mut reach_a = half_a[i];
-            for j in 0..3 {
-                let cosine = product(&axes_a[i], &axes_b[j]).abs();
-                reach_a += half_b[j] * cosine;
-                reach_b[j] += half_a[i] * cosine;
-            }
-            gap = greater(simd, gap, product(&axes_a[i], &d).abs() - reach_a);
-        }
-        for j in 0..3 {
-            gap = greater(simd, gap, product(&axes_b[j], &d).abs() - reach_b[j]);
-        }
+        along_normals(
+            &a,
+            &b,
+            #[inline(always)]
+            |away, reach| {
+                let own = away - reach;
+                // Of what is no number the second, as one by one.
+                gap = simd.select_f32x4(gap.simd_gt(own), gap, own);
+            },
+        );
         gap.to_array()
     }
 }
 
 /// The first two lanes, either twice in a row.
 #[inline(always)]
-fn first<S: Simd>([x, y, z]: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
-    [x.zip_low(*x), y.zip_low(*y), z.zip_low(*z)]
+fn first<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    [x.zip_low(x), y.zip_low(y), z.zip_low(z)]
 }
 
 /// The last two lanes, both twice.
 #[inline(always)]
-fn second<S: Simd>([x, y, z]: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
-    [second_one(*x), second_one(*y), second_one(*z)]
+fn second<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
+    [second_one(x), second_one(y), second_one(z)]
 }
 
 #[inline(always)]
 fn second_one<S: Simd>(lanes: f32x4<S>) -> f32x4<S> {
     let twice = lanes.zip_high(lanes);
     twice.unzip_low(twice)
-}
-
-#[inline(always)]
-fn product<S: Simd>(x: &[f32x4<S>; 3], y: &[f32x4<S>; 3]) -> f32x4<S> {
-    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
-}
-
-/// Of what is no number the second, as one by one.
-#[inline(always)]
-fn greater<S: Simd>(simd: S, x: f32x4<S>, y: f32x4<S>) -> f32x4<S> {
-    simd.select_f32x4(x.simd_gt(y), x, y)
 }
 
 #[inline(always)]

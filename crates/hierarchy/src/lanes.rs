@@ -1,4 +1,4 @@
-//! Vectors of three coordinates, sixteen side by side.
+//! Vectors of three coordinates side by side, sixteen if nothing else is said, and boxes.
 
 use std::ops::Range;
 
@@ -30,10 +30,38 @@ pub(crate) fn along<S: Simd>([x, y, z]: Vectors<S>, axis: [f32; 3]) -> f32x16<S>
     x * axis[0] + y * axis[1] + z * axis[2]
 }
 
-/// The products of vectors, in that order too.
+/// The products of any number of vectors, in that order too.
 #[inline(always)]
-pub(crate) fn product<S: Simd>(a: Vectors<S>, b: Vectors<S>) -> f32x16<S> {
+pub(crate) fn product<S: Simd, V: SimdBase<S>>(a: [V; 3], b: [V; 3]) -> V {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Boxes in lanes: their middles, half their edge lengths and the directions of these.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Boxes<V> {
+    pub(crate) centre: [V; 3],
+    pub(crate) half: [V; 3],
+    pub(crate) axes: [[V; 3]; 3],
+}
+
+/// Tells of boxes of a and b in each lane, along each of the six face normals, the distance of their centres and how far both
+/// reach: in the order of operations of [`Relative::gaps`](crate::Relative::gaps).
+#[inline(always)]
+pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>, mut tell: impl FnMut(V, V)) {
+    let d = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];
+    let mut reach_b = b.half;
+    for i in 0..3 {
+        let mut reach_a = a.half[i];
+        for j in 0..3 {
+            let cosine = product(a.axes[i], b.axes[j]).abs();
+            reach_a += b.half[j] * cosine;
+            reach_b[j] += a.half[i] * cosine;
+        }
+        tell(product(a.axes[i], d).abs(), reach_a);
+    }
+    for j in 0..3 {
+        tell(product(b.axes[j], d).abs(), reach_b[j]);
+    }
 }
 
 /// The lanes of a block in which those of some points stand that are its, as bits: point i in lane i % 16 of block i / 16.

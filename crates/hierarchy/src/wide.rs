@@ -16,6 +16,7 @@ use nearmiss_geometry::NodeId;
 use crate::boxes::{OrientedBox, Relative};
 use crate::build::{PointHierarchy, Slices};
 use crate::descend::NodePair;
+use crate::lanes::{Boxes, along_normals};
 use crate::leaf_block::Leaves;
 use crate::split::id32;
 
@@ -358,38 +359,33 @@ fn compare<S: Simd>(
     [a, b]: [&Siblings; 2],
     (reach, notes_gaps): (f32, bool),
 ) -> Near {
-    let centre_a = each(simd, &a.centre);
-    let half_a = each(simd, &a.half);
-    let axes_a = [each(simd, &a.axes[0]), each(simd, &a.axes[1]), each(simd, &a.axes[2])];
-    let centre_b = spread(relative.points_of_four(four(simd, &b.centre)));
+    let boxes_a = Boxes {
+        centre: each(simd, &a.centre),
+        half: each(simd, &a.half),
+        axes: [each(simd, &a.axes[0]), each(simd, &a.axes[1]), each(simd, &a.axes[2])],
+    };
     let [hx, hy, hz] = four(simd, &b.half);
     let scale = relative.scale();
-    let half_b = spread([hx * scale, hy * scale, hz * scale]);
-    let axes_b = [
-        spread(relative.directions_of_four(four(simd, &b.axes[0]))),
-        spread(relative.directions_of_four(four(simd, &b.axes[1]))),
-        spread(relative.directions_of_four(four(simd, &b.axes[2]))),
-    ];
-    let d = [centre_b[0] - centre_a[0], centre_b[1] - centre_a[1], centre_b[2] - centre_a[2]];
+    let boxes_b = Boxes {
+        centre: spread(relative.points_of_four(four(simd, &b.centre))),
+        half: spread([hx * scale, hy * scale, hz * scale]),
+        axes: [
+            spread(relative.directions_of_four(four(simd, &b.axes[0]))),
+            spread(relative.directions_of_four(four(simd, &b.axes[1]))),
+            spread(relative.directions_of_four(four(simd, &b.axes[2]))),
+        ],
+    };
     let mut gap = f32x16::splat(simd, f32::MIN);
     let mut share = f32x16::splat(simd, 0.0);
-    let mut reach_b = half_b;
-    for i in 0..3 {
-        let mut reach_a = half_a[i];
-        for j in 0..3 {
-            let cosine = product(&axes_a[i], &axes_b[j]).abs();
-            reach_a += half_b[j] * cosine;
-            reach_b[j] += half_a[i] * cosine;
-        }
-        let away = product(&axes_a[i], &d).abs();
-        gap = gap.max(away - reach_a);
-        share = share.max(away / (reach_a + f32::MIN_POSITIVE));
-    }
-    for j in 0..3 {
-        let away = product(&axes_b[j], &d).abs();
-        gap = gap.max(away - reach_b[j]);
-        share = share.max(away / (reach_b[j] + f32::MIN_POSITIVE));
-    }
+    along_normals(
+        &boxes_a,
+        &boxes_b,
+        #[inline(always)]
+        |away, reach| {
+            gap = gap.max(away - reach);
+            share = share.max(away / (reach + f32::MIN_POSITIVE));
+        },
+    );
     let [of_a, of_b] = [a.lanes(), b.lanes()];
     // Those of b are the first few.
     let there = (of_a * 0x1111) & ((1 << (4 * of_b.count_ones())) - 1);
@@ -438,11 +434,6 @@ fn spread_one<S: Simd>(row: f32x4<S>) -> f32x16<S> {
     let row = f32x16::block_splat(row);
     let row = row.zip_low(row);
     row.zip_low(row)
-}
-
-#[inline(always)]
-fn product<S: Simd>(x: &[f32x16<S>; 3], y: &[f32x16<S>; 3]) -> f32x16<S> {
-    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 }
 
 #[inline(always)]
