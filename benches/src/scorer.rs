@@ -38,6 +38,16 @@ const CERTIFIED_SHARE: f64 = 0.95;
 /// # Errors
 /// When the tree refuses the points.
 pub fn radius(cloud: &PointCloud) -> Result<f64, Failure> {
+    let mut spacings = spacings(cloud)?;
+    spacings.sort_unstable_by(f64::total_cmp);
+    Ok(quantile(&spacings, QUANTILE))
+}
+
+/// The distance from each point to its 6th distinct neighbour, in the caller's units.
+///
+/// # Errors
+/// When the tree refuses the points.
+pub fn spacings(cloud: &PointCloud) -> Result<Vec<f64>, Failure> {
     // Turned, because the tree cannot split many points of one coordinate; distances do not change.
     let turn = Pose::from_axis_angle(AXIS, 1.0);
     let points: Vec<[f64; 3]> = cloud.positions().iter().map(|p| turn.apply(p.map(f64::from))).collect();
@@ -46,11 +56,9 @@ pub fn radius(cloud: &PointCloud) -> Result<f64, Failure> {
     let wanted = NonZero::new(RANK + 1).ok_or("no rank")?;
     let spacing = |p: &[f64; 3]| {
         let near = tree.query(p).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
-        near.last().map_or(0.0, |n| n.distance.sqrt())
+        near.last().map_or(0.0, |n| n.distance.sqrt() * cloud.frame().scale)
     };
-    let mut spacings: Vec<f64> = points.iter().map(spacing).collect();
-    spacings.sort_unstable_by(f64::total_cmp);
-    Ok(quantile(&spacings, QUANTILE) * cloud.frame().scale)
+    Ok(points.iter().map(spacing).collect())
 }
 
 /// A verdict that is wrong or missing.

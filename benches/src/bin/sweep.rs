@@ -161,10 +161,10 @@ fn for_geodesic(object: &Object, scan: &Scan) -> Result<Scan, Failure> {
         100.0 * count(count_turned) / count(scan.len()),
         100.0 * scan.usable(),
         100.0 * along.usable(),
-        100.0 * scan.share(PointKind::Ambiguous),
-        100.0 * along.share(PointKind::Ambiguous),
-        100.0 * scan.share(PointKind::Isolated),
-        100.0 * along.share(PointKind::Isolated),
+        100.0 * scan.share(PointKind::Noisy),
+        100.0 * along.share(PointKind::Noisy),
+        100.0 * scan.share(PointKind::Stray),
+        100.0 * along.share(PointKind::Stray),
     );
     Ok(along)
 }

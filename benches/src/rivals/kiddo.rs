@@ -44,6 +44,25 @@ impl PointScan {
     }
 }
 
+impl PointScan {
+    /// The nearest pair of one of these points and one of `body` at `pose`: their distance in double precision and
+    /// their indices.
+    #[must_use]
+    pub fn nearest_pair(&self, body: &PointCloud, pose: &Pose) -> (f64, usize, usize) {
+        let mut best = (f64::INFINITY, 0, 0);
+        for j in 0..body.len() {
+            let q = pose.apply(body.point(j));
+            let nearest = self.tree.query(&single(q)).nearest_one::<SquaredEuclidean<f32>>().execute();
+            let i = nearest.item as usize;
+            let distance = (0..3).map(|k| (f64::from(self.points[i][k]) - q[k]).powi(2)).sum::<f64>().sqrt();
+            if distance < best.0 {
+                best = (distance, i, j);
+            }
+        }
+        best
+    }
+}
+
 #[expect(clippy::cast_possible_truncation, reason = "the tree is single precision")]
 fn single(p: [f64; 3]) -> [f32; 3] {
     p.map(|x| x as f32)

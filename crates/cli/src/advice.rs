@@ -13,14 +13,14 @@ const MANY_AMBIGUOUS: f64 = 0.2;
 /// A line about the scan's health, and some about what ails it.
 pub(crate) fn health(scan: &Scan) -> Vec<String> {
     let [lines, ambiguous, isolated] =
-        [PointKind::Line, PointKind::Ambiguous, PointKind::Isolated].map(|kind| scan.share(kind));
+        [PointKind::Line, PointKind::Noisy, PointKind::Stray].map(|kind| scan.share(kind));
     let spacing = f64::from(median(scan.radii())) * scan.frame().scale;
     let mut said = vec![format!(
         "health     spacing {}; {} of the points usable ({} at borders), {} sampled as lines, {} ambiguous, \
          {} isolated",
         short(spacing),
         percent(scan.usable()),
-        percent(scan.share(PointKind::Border)),
+        percent(scan.share(PointKind::Edge)),
         percent(lines),
         percent(ambiguous),
         percent(isolated)
@@ -88,7 +88,7 @@ pub(crate) fn for_sparse(view: &ScanView<'_>, radius: f64, thickened_already: bo
     let scan = view.scan();
     let mut ways = Vec::new();
     let balls = (!thickened_already).then(|| thickened(radius));
-    if scan.share(PointKind::Line) >= scan.share(PointKind::Isolated) {
+    if scan.share(PointKind::Line) >= scan.share(PointKind::Stray) {
         ways.extend(wider_along_lines(scan));
         ways.extend(balls);
         ways.push("merge several frames before preparing".to_owned());

@@ -109,11 +109,11 @@ impl ScanReport {
             bytes_per_node: scan.bytes_of_nodes() as f64 / nodes as f64,
             usable: scan.usable(),
             kinds: KindsReport {
-                surface: scan.share(PointKind::Surface),
-                border: scan.share(PointKind::Border),
+                surface: scan.share(PointKind::Sheet),
+                border: scan.share(PointKind::Edge),
                 line: scan.share(PointKind::Line),
-                isolated: scan.share(PointKind::Isolated),
-                ambiguous: scan.share(PointKind::Ambiguous),
+                isolated: scan.share(PointKind::Stray),
+                ambiguous: scan.share(PointKind::Noisy),
             },
             graph: scan.graph().map(GraphReport::new),
         }

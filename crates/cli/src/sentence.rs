@@ -92,7 +92,7 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], thickened: bool) -> String {
         Reason::Undersampled => {
             let lines = |v: &ScanView<'_>| v.scan().share(PointKind::Line);
             let sparse =
-                |v: &ScanView<'_>| v.scan().share(PointKind::Line) + v.scan().share(PointKind::Isolated);
+                |v: &ScanView<'_>| v.scan().share(PointKind::Line) + v.scan().share(PointKind::Stray);
             let (name, view, share) = worse(sparse);
             let how = if lines(view) >= 0.5 * share { "sampled as lines" } else { "sampled too sparsely" };
             let ways = advice::for_sparse(view, radius, thickened);
@@ -104,7 +104,7 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], thickened: bool) -> String {
             format!("{near}{} of {name} is {how}; try {ways}", percent(share))
         }
         Reason::Ambiguous => {
-            let (name, _, share) = worse(|v| v.scan().share(PointKind::Ambiguous));
+            let (name, _, share) = worse(|v| v.scan().share(PointKind::Noisy));
             let ways = advice::for_ambiguous(views, radius, thickened);
             format!(
                 "where they meet the points do not look like one sheet, as do {} of {name}; try {ways}",

@@ -2,22 +2,23 @@
 
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
 use nearmiss_store::Array;
-use nearmiss_surface::{Metric, PointBlock, SurfacePlan};
+use nearmiss_surface::{BlockTree, Metric, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot};
+use crate::classes::{sheets_first, vote};
 use crate::covering::{Covering, Ground, coverings};
 use crate::enclosure::growths;
 use crate::extents::{Discs, boxes_of_discs};
 use crate::gather::Index;
 use crate::growth::Growth;
 use crate::levels::samples;
-use crate::neighbours::{NeighbourList, groups, neighbours};
+use crate::neighbours::{self, NeighbourList, groups as groups_of, neighbours};
 use crate::options::{BuildError, BuildOptions};
 use crate::outline::Outline;
 use crate::samples::lists;
-use crate::sampling::Sampling;
-use crate::split::{Item, split};
-use crate::surfels::{NormalCone, PointKind, Surfels, align, surfels};
+use crate::sampling::{Sampling, set_reaches};
+use crate::split::{Item, id32, split};
+use crate::surfels::{Known, NormalCone, PointKind, Surfels, THICKNESS, align, fits, surfels};
 use crate::topology::Node;
 use crate::wide::WideTree;
 
@@ -32,6 +33,8 @@ pub struct PointHierarchy {
     pub(crate) dropped: Dropped,
     pub(crate) step: f64,
     pub(crate) sampling_radius: f32,
+    pub(crate) reach: f32,
+    pub(crate) sheets: u32,
     pub(crate) leaf_size: u32,
     pub(crate) radius_neighbours: u32,
     pub(crate) samples_a_node: u32,
@@ -49,6 +52,7 @@ pub struct PointHierarchy {
     pub(crate) wide: WideTree,
     pub(crate) outline: Outline,
     pub(crate) growths: Array<Growth>,
+    pub(crate) obstacle_growths: Array<Growth>,
     pub(crate) sample_lists: Array<u32>,
     pub(crate) coverings: Array<Covering>,
     pub(crate) cones: Array<NormalCone>,
@@ -82,6 +86,8 @@ pub struct Slices<'a> {
     pub outline: &'a Outline,
     /// What the boxes must grow by to contain each node's part of the surface.
     pub growths: &'a [Growth],
+    /// What the boxes must grow by to contain each node's part of the obstacle.
+    pub obstacle_growths: &'a [Growth],
     /// The points in blocks: see [`PointHierarchy::blocks`].
     pub blocks: &'a [PointBlock],
     /// The samples of the inner nodes in their order, [`samples_a_node`](Self::samples_a_node) of each; see
@@ -97,9 +103,37 @@ pub struct Slices<'a> {
     pub plan: &'a SurfacePlan,
     /// The scan's sampling radius.
     pub sampling_radius: f32,
+    /// The scan's reach L.
+    pub reach: f32,
+    /// Points before this sample sheets; those from here on stand in the obstacle as balls. A leaf has points of
+    /// one sort alone.
+    pub sheets: usize,
+}
+
+/// What an enclosure of a node holds beside its points and their discs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The node's part of the implicit surface.
+    Surface = 0,
+    /// The node's part of the obstacle.
+    Obstacle = 1,
+}
+
+impl Part {
+    pub(crate) const BOTH: [Self; 2] = [Self::Surface, Self::Obstacle];
 }
 
 impl Slices<'_> {
+    /// What the boxes of the nodes must grow by to contain this part of each.
+    #[inline]
+    #[must_use]
+    pub fn growths_of(&self, part: Part) -> &[Growth] {
+        match part {
+            Part::Surface => self.growths,
+            Part::Obstacle => self.obstacle_growths,
+        }
+    }
+
     /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's box, and
     /// contains it.
     ///
@@ -109,6 +143,53 @@ impl Slices<'_> {
     #[must_use]
     pub fn enclosure(&self, node: usize) -> OrientedBox {
         self.growths[node].of(&self.boxes[node])
+    }
+
+    /// A box about the part of the obstacle of a node (`docs/theory/obstacle.md`); it has the axes of the node's
+    /// box, and contains it.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[inline]
+    #[must_use]
+    pub fn obstacle_enclosure(&self, node: usize) -> OrientedBox {
+        self.obstacle_growths[node].of(&self.boxes[node])
+    }
+
+    /// The radius of the ball that stands for a point in the obstacle, half its local radius; zero for points on sheets.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn obstacle_ball(&self, i: usize) -> f32 {
+        obstacle_ball(i, self.sheets, self.radii[i])
+    }
+
+    /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its part of a
+    /// sheet, the lesser of its local radius and half the reach.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn obstacle_reach(&self, i: usize) -> f32 {
+        if i < self.sheets {
+            self.cell_radius(i).max(self.discs[i] * DISC_REACH)
+        } else {
+            self.obstacle_ball(i)
+        }
+    }
+
+    /// How far from a point on a sheet the surface belongs to the obstacle: the lesser of its local radius and half the
+    /// reach.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn cell_radius(&self, i: usize) -> f32 {
+        cell_radius(self.radii[i], self.reach)
     }
 
     /// About a [sparse](PointKind::is_sparse) point, the radius of the ball in which surface may be that no disc
@@ -122,6 +203,22 @@ impl Slices<'_> {
     pub fn ball(&self, i: usize) -> f32 {
         ball(PointKind::from_code(self.kinds[i]), self.radii[i], self.sampling_radius)
     }
+}
+
+/// See [`Slices::cell_radius`].
+#[inline]
+pub(crate) fn cell_radius(radius: f32, reach: f32) -> f32 {
+    radius.min(0.5 * reach)
+}
+
+/// How far a disc with its thickness reaches, in its radius.
+const DISC_REACH: f32 = 1.0 + THICKNESS;
+
+/// See [`Slices::obstacle_ball`]. Half the local radius is the most at which two balls that touch are no further
+/// apart than the greater of their local radii.
+#[inline]
+pub(crate) fn obstacle_ball(i: usize, sheets: usize, radius: f32) -> f32 {
+    if i < sheets { 0.0 } else { 0.5 * radius }
 }
 
 /// See [`Slices::ball`].
@@ -161,6 +258,7 @@ impl PointHierarchy {
             wide: &self.wide,
             outline: &self.outline,
             growths: &self.growths,
+            obstacle_growths: &self.obstacle_growths,
             blocks: &self.blocks,
             sample_lists: &self.sample_lists,
             coverings: &self.coverings,
@@ -168,6 +266,8 @@ impl PointHierarchy {
             samples_a_node: self.samples_a_node,
             plan: &self.plan,
             sampling_radius: self.sampling_radius,
+            reach: self.reach,
+            sheets: self.sheets as usize,
         }
     }
 
@@ -206,6 +306,20 @@ impl PointHierarchy {
     #[must_use]
     pub fn sampling_radius(&self) -> f64 {
         f64::from(self.sampling_radius) * self.frame.scale
+    }
+
+    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and no local
+    /// radius exceeds it.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        f64::from(self.reach) * self.frame.scale
+    }
+
+    /// Share of the points that stand in the obstacle by a sheet; the others stand there as balls.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+    pub fn sheet_share(&self) -> f64 {
+        f64::from(self.sheets) / self.len() as f64
     }
 
     /// What defines the surface.
@@ -295,10 +409,10 @@ impl PointHierarchy {
         PointKind::from_code(self.kinds[i])
     }
 
-    /// Share of the points at which the surface is defined.
+    /// Share of the points that sample a sheet.
     #[must_use]
     pub fn usable(&self) -> f64 {
-        self.share(PointKind::Surface) + self.share(PointKind::Border)
+        self.share(PointKind::Sheet) + self.share(PointKind::Edge)
     }
 
     /// Share of the points of this kind.
@@ -352,6 +466,7 @@ impl PointHierarchy {
         size_of_val::<[_]>(&self.nodes)
             + size_of_val::<[_]>(&self.boxes)
             + size_of_val::<[_]>(&self.growths)
+            + size_of_val::<[_]>(&self.obstacle_growths)
             + size_of_val::<[_]>(&self.cones)
             + size_of_val::<[_]>(&self.sample_lists)
             + size_of_val::<[_]>(&self.coverings)
@@ -368,23 +483,41 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let leaf_size = options.leaf_size as usize;
     let mut items: Vec<Item> =
         (0..).zip(cloud.positions()).map(|(index, &position)| Item { position, index }).collect();
-    let (nodes, mut boxes) = split(&mut items, leaf_size);
-    let positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
-    let source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
+    let (mut nodes, mut boxes) = split(&mut items, leaf_size, 0);
+    let mut positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
+    let mut source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
     drop(items);
 
-    let Sampling { spacings, radii, sampling_radius, plan, blocks } =
+    let Sampling { spacings, mut radii, sampling_radius, reach, plan, mut blocks } =
         Sampling::of(&positions, (&nodes, &mut boxes), options, 1.0 / cloud.frame().scale)?;
-    let groups = groups(&blocks);
+    let mut groups = groups_of(&blocks);
+    let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
+    let mut fits = fits(&index, &positions, (&radii, &spacings));
+    drop(spacings);
+    vote(&BlockTree::new(&blocks, positions.len()), &positions, &radii, &mut fits);
+    let mut sheets = positions.len();
+    if let Some((mut items, count)) = sheets_first(&positions, &fits, leaf_size) {
+        sheets = count;
+        (nodes, boxes) = split(&mut items, leaf_size, sheets);
+        positions = items.iter().map(|item| item.position).collect();
+        source = reordered(&items, &source);
+        radii = reordered(&items, &radii);
+        fits = reordered(&items, &fits);
+        set_reaches(&nodes, &mut boxes, &radii);
+        blocks = neighbours::blocks(&plan, &positions, &radii);
+        groups = groups_of(&blocks);
+    }
     let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);
-    let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves } =
-        surfels(&index, &positions, &radii, (&spacings, sampling_radius));
-    drop(spacings);
+    let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, sheets };
+    let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves, obstacles } =
+        surfels(&index, &known, &fits);
+    drop(fits);
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
     boxes = boxes_of_discs(&nodes, &boxes, &of_points);
     drop(balls);
+    let obstacle_growths = growths(&nodes, &boxes, &obstacles);
     let growths = growths(&nodes, &boxes, &leaves);
     let sample_lists = lists(&positions, &nodes, (options.leaf_size, options.samples));
     let ground = Ground {
@@ -408,6 +541,8 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         dropped: cloud.dropped(),
         step: cloud.step(),
         sampling_radius,
+        reach,
+        sheets: id32(sheets),
         leaf_size: options.leaf_size,
         radius_neighbours: options.radius_neighbours,
         samples_a_node: options.samples,
@@ -425,6 +560,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         nodes: nodes.into(),
         boxes: boxes.into(),
         growths: growths.into(),
+        obstacle_growths: obstacle_growths.into(),
         sample_lists: sample_lists.into(),
         coverings: coverings.into(),
         cones: cones.into(),
@@ -435,4 +571,9 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     };
     hierarchy.derive();
     Ok(hierarchy)
+}
+
+/// The values of points in the order of `items`, whose indices are their places before.
+fn reordered<T: Copy>(items: &[Item], values: &[T]) -> Vec<T> {
+    items.iter().map(|item| values[item.index as usize]).collect()
 }

@@ -194,6 +194,11 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
+    /// The part of it no further than `across` from the axis and `height` from the plane.
+    pub(crate) fn within(&self, across: f32, height: f32) -> Self {
+        Self { across: self.across.min(across), low: self.low.max(-height), high: self.high.min(height) }
+    }
+
     /// The greatest height to either side.
     pub(crate) fn height(&self) -> f32 {
         self.high.max(-self.low)
@@ -256,6 +261,11 @@ impl LeafBounds {
     /// Begins to bound the leaf by its points' cells.
     pub(crate) fn cells(&self) -> Cells {
         Cells { leaf: *self, low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] }
+    }
+
+    /// The same axes without an extent: what is enclosed lies in the box already.
+    pub(crate) fn empty(&self) -> Self {
+        Self { low: [0.0; 3], high: [0.0; 3], ..*self }
     }
 
     /// What `bounds`, a box of the same axes, must grow by.

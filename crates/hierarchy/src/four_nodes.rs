@@ -5,7 +5,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x4, u32x4};
 use nearmiss_geometry::NodeId;
 
 use crate::boxes::{OrientedBox, Relative};
-use crate::build::Slices;
+use crate::build::{Part, Slices};
 use crate::growth::Growth;
 use crate::lanes::{Boxes, along_normals};
 
@@ -82,7 +82,7 @@ impl<S: Simd> FourNodes<S> {
 }
 
 impl Relative {
-    /// How far the enclosures of either of two nodes of the first scan and either of two of the second are apart: as
+    /// How far the enclosures of this part of either of two nodes of the first scan and either of two of the second are apart: as
     /// [`Relative::gaps`] of [`Growth::of`] each, by any instructions.
     ///
     /// # Panics
@@ -92,12 +92,13 @@ impl Relative {
     pub fn gaps_of_enclosures(
         &self,
         level: Level,
+        part: Part,
         [of_a, of_b]: [&Slices<'_>; 2],
         a: [NodeId; 2],
         b: [NodeId; 2],
     ) -> [f32; 4] {
-        let [a0, a1] = a.map(|id| (&of_a.boxes[id.index()], &of_a.growths[id.index()]));
-        let [b0, b1] = b.map(|id| (&of_b.boxes[id.index()], &of_b.growths[id.index()]));
+        let [a0, a1] = a.map(|id| (&of_a.boxes[id.index()], &of_a.growths_of(part)[id.index()]));
+        let [b0, b1] = b.map(|id| (&of_b.boxes[id.index()], &of_b.growths_of(part)[id.index()]));
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || self.gaps_of_grown(simd, &FourNodes::new(simd, [a0.0, a1.0, b0.0, b1.0], [a0.1, a1.1, b0.1, b1.1])),

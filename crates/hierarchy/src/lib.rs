@@ -4,6 +4,7 @@
 mod apart;
 mod boxes;
 mod build;
+mod classes;
 mod covering;
 mod descend;
 mod enclosure;
@@ -30,7 +31,8 @@ mod wide;
 
 pub use apart::{Extent, apart};
 pub use boxes::{OrientedBox, Relative, SLACK};
-pub use build::{PointHierarchy, Slices};
+pub use build::{Part, PointHierarchy, Slices};
+pub use classes::SLAB;
 pub use covering::Covering;
 pub use descend::{Frontier, Heap, NodePair, Split, Stack, Visitor, descend, resume};
 pub use four_nodes::FourNodes;

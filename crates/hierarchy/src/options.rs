@@ -22,6 +22,10 @@ pub struct BuildOptions {
     /// Sample points of an inner node, 8 to 32, default 16. More make finer levels and tighter coverings, at four bytes
     /// each.
     pub samples: u32,
+    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and no local
+    /// radius exceeds it. `None`, the default: twice the sampling radius, so that nothing is interpolated further from
+    /// a measured point than nine tenths of the points have six neighbours. A tenth of outliers does not change it.
+    pub reach: Option<f64>,
     /// Threads to build on; 0, the default, takes what the process's pool has. Never changes the result.
     pub threads: usize,
 }
@@ -33,6 +37,7 @@ impl Default for BuildOptions {
             radius_neighbours: 6,
             leaf_size: 16,
             samples: 16,
+            reach: None,
             threads: 0,
         }
     }
@@ -63,6 +68,12 @@ impl BuildOptions {
         Self { samples, ..self }
     }
 
+    /// The same options with this reach.
+    #[must_use]
+    pub const fn with_reach(self, reach: f64) -> Self {
+        Self { reach: Some(reach), ..self }
+    }
+
     /// The same options on this many threads.
     #[must_use]
     pub const fn with_threads(self, threads: usize) -> Self {
@@ -79,7 +90,10 @@ impl BuildOptions {
         if !SAMPLES.contains(&self.samples) {
             return Err(BuildError::Samples(self.samples));
         }
-        Ok(())
+        match self.reach {
+            Some(reach) if !(reach > 0.0 && reach.is_finite()) => Err(BuildError::Reach(reach)),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -99,6 +113,9 @@ pub enum BuildError {
     /// Too few or too many samples of a node.
     #[error("{0} samples of a node; 8 to 32 are possible")]
     Samples(u32),
+    /// A reach that is not a length, or vanishes beside the scan's extent.
+    #[error("reach must be positive, finite and no less than the rounding of positions, got {0}")]
+    Reach(f64),
     /// The threads could not be started.
     #[error("cannot start {0} threads")]
     Threads(usize),

@@ -28,6 +28,8 @@ pub struct Outline {
     pub identity: u64,
     /// About the surface.
     pub surface: Ball,
+    /// About the obstacle.
+    pub obstacle: Ball,
     /// About the points with their discs.
     pub discs: Ball,
 }
@@ -38,12 +40,15 @@ impl Outline {
         let mut hash = Xxh3::new();
         let frame = scan.frame();
         hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
-        hash.update(bytes_of(&[scan.leaf_size(), scan.samples_a_node, slices.sampling_radius.to_bits()]));
+        let numbers = [scan.leaf_size(), scan.samples_a_node, scan.sheets];
+        hash.update(bytes_of(&numbers));
+        hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
         hash.update(bytemuck::cast_slice(slices.positions));
         hash.update(bytemuck::cast_slice(slices.discs));
         Self {
             identity: hash.digest(),
             surface: Ball::about(&slices.enclosure(0)),
+            obstacle: Ball::about(&slices.obstacle_enclosure(0)),
             discs: Ball::about(&slices.boxes[0]),
         }
     }

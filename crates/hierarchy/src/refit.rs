@@ -8,11 +8,12 @@ use std::ops::Range;
 use nearmiss_surface::{Evaluation, Metric, PointBlock};
 
 use crate::boxes::dot;
-use crate::build::{PointHierarchy, ball};
+use crate::build::{PointHierarchy, ball, obstacle_ball};
 use crate::covering::{Ground, Solid, coverings};
 use crate::extents::{Discs, boxes_of_discs};
 use crate::levels::samples;
 use crate::neighbours::chunks;
+use crate::spacing::Look;
 use crate::split::id32;
 use crate::surfels::{NormalCone, PointKind, Surfel, align, cone, surfel_among};
 
@@ -67,9 +68,12 @@ impl PointHierarchy {
 
     /// The disc of point `i`, at which f is `at` and the points in `near` are heard.
     fn surfel(&self, i: usize, at: &Evaluation, near: &[PointBlock]) -> Surfel {
-        let size = (&self.plan, self.radii[i], self.sampling_radius);
-        let is_line = self.kind(i) == PointKind::Line;
-        let mut surfel = surfel_among(self.positions[i], at, size, is_line, near);
+        let look = match self.kind(i) {
+            PointKind::Line => Look::Line,
+            PointKind::Sparse => Look::Sparse,
+            _ => Look::Area,
+        };
+        let mut surfel = surfel_among(self.positions[i], at, (self.radii[i], self.reach), look, near);
         if dot(surfel.normal, self.normals[i]) < 0.0 {
             surfel.normal = surfel.normal.map(|c| -c);
         }
@@ -81,8 +85,11 @@ impl PointHierarchy {
         let leaf_size = self.leaf_size as usize;
         let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
         let discs: Vec<f32> = surfels.iter().map(|s| s.disc).collect();
-        let balls: Vec<f32> =
-            surfels.iter().zip(&self.radii).map(|(s, &r)| ball(s.kind, r, self.sampling_radius)).collect();
+        let sheets = self.sheets as usize;
+        let ball = |(i, (s, &r)): (usize, (&Surfel, &f32))| {
+            ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, sheets, r))
+        };
+        let balls: Vec<f32> = surfels.iter().zip(&self.radii).enumerate().map(ball).collect();
         let cones: Vec<NormalCone> = if self.is_oriented {
             normals.chunks(leaf_size).map(cone).collect()
         } else {

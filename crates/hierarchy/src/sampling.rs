@@ -4,17 +4,22 @@ use nearmiss_surface::{BlockTree, PointBlock, SurfacePlan};
 
 use crate::boxes::OrientedBox;
 use crate::options::{BuildError, BuildOptions};
-use crate::spacing::{Spacing, fold_nodes, smooth, spacings};
+use crate::spacing::{Spacing, fold_nodes, limit, smooth, spacings};
 use crate::topology::Node;
 
 /// Share of the points whose local radius is at most the scan's sampling radius.
 const SAMPLING_QUANTILE: f64 = 0.9;
+
+/// The default reach in sampling radii: a gap whose middle is a sampling radius from either side is bridged, and no wider one.
+const REACH: f32 = 2.0;
 
 /// How densely points lie, and what follows from it.
 pub(crate) struct Sampling {
     pub(crate) spacings: Vec<Spacing>,
     pub(crate) radii: Vec<f32>,
     pub(crate) sampling_radius: f32,
+    /// No radius exceeds it.
+    pub(crate) reach: f32,
     pub(crate) plan: SurfacePlan,
     /// The points with their horizons.
     pub(crate) blocks: Vec<PointBlock>,
@@ -30,19 +35,35 @@ impl Sampling {
     ) -> Result<Self, BuildError> {
         let mut blocks: Vec<PointBlock> = PointBlock::silent(positions).collect();
         let tree = BlockTree::new(&blocks, positions.len());
-        let spacings = spacings(positions, &tree, options.radius_neighbours as usize);
-        let radii = smooth(&tree, &spacings);
+        let mut spacings = spacings(positions, &tree, options.radius_neighbours as usize);
+        let mut radii = smooth(&tree, &spacings);
+        #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+        let reach = options.reach.map_or_else(|| REACH * quantile(&radii), |reach| (reach * unit) as f32);
+        if !(reach.is_normal() && reach >= f32::EPSILON * extent(positions)) {
+            return Err(BuildError::Reach(f64::from(reach) / unit));
+        }
+        limit(&mut spacings, &mut radii, reach);
         let sampling_radius = quantile(&radii);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
-        let reaches = fold_nodes(nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
-        for (bounds, reach) in boxes.iter_mut().zip(reaches) {
-            bounds.reach = reach;
-        }
+        set_reaches(nodes, boxes, &radii);
         for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
             block.tune(&plan, radii);
         }
-        Ok(Self { spacings, radii, sampling_radius, plan, blocks })
+        Ok(Self { spacings, radii, sampling_radius, reach, plan, blocks })
     }
+}
+
+/// Sets in the boxes of all nodes the greatest radius of their points.
+pub(crate) fn set_reaches(nodes: &[Node], boxes: &mut [OrientedBox], radii: &[f32]) {
+    let reaches = fold_nodes(nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
+    for (bounds, reach) in boxes.iter_mut().zip(reaches) {
+        bounds.reach = reach;
+    }
+}
+
+/// The greatest coordinate.
+fn extent(positions: &[[f32; 3]]) -> f32 {
+    positions.iter().flatten().fold(0.0, |most, x| most.max(x.abs()))
 }
 
 fn quantile(radii: &[f32]) -> f32 {

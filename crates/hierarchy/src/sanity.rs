@@ -108,6 +108,7 @@ impl PointHierarchy {
         self.check_metadata()?;
         nodes::check_ranges(&self.boxes)?;
         nodes::check_growths(&self.growths)?;
+        nodes::check_growths(&self.obstacle_growths)?;
         samples::check_ranges(self)?;
         lists::check_ranges(&self.lists, self.listed.len())
     }
@@ -155,7 +156,7 @@ impl PointHierarchy {
         let bounds = &self.boxes[id];
         let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));
         let d = double(self.positions[i]) - double(bounds.centre);
-        let ball = f64::from(self.slices().ball(i));
+        let ball = f64::from(self.slices().ball(i).max(self.slices().obstacle_ball(i)));
         (0..3).all(|k| {
             let axis = double(bounds.axes[k]);
             let spread = f64::from(self.discs[i]) * double(self.normals[i]).cross(&axis).norm();

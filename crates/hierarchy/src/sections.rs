@@ -21,6 +21,7 @@ const SOURCE: [u8; 4] = *b"SRCE";
 const NODES: [u8; 4] = *b"NODE";
 const BOXES: [u8; 4] = *b"BOXS";
 const GROWTHS: [u8; 4] = *b"GROW";
+const OBSTACLE_GROWTHS: [u8; 4] = *b"OBST";
 const SAMPLES: [u8; 4] = *b"SMPL";
 const COVERINGS: [u8; 4] = *b"COVR";
 const CONES: [u8; 4] = *b"CONE";
@@ -36,6 +37,8 @@ pub struct HierarchyMeta {
     dropped: Dropped,
     step: f64,
     sampling_radius: f32,
+    reach: f32,
+    sheets: u32,
     leaf_size: u32,
     radius_neighbours: u32,
     samples: u32,
@@ -69,6 +72,8 @@ impl PointHierarchy {
             dropped: self.dropped,
             step: self.step,
             sampling_radius: self.sampling_radius,
+            reach: self.reach,
+            sheets: self.sheets,
             leaf_size: self.leaf_size,
             radius_neighbours: self.radius_neighbours,
             samples: self.samples_a_node,
@@ -87,6 +92,7 @@ impl PointHierarchy {
             .section(NODES, 0, &self.nodes)?
             .section(BOXES, 0, &self.boxes)?
             .section(GROWTHS, 0, &self.growths)?
+            .section(OBSTACLE_GROWTHS, 0, &self.obstacle_growths)?
             .section(SAMPLES, 0, &self.sample_lists)?
             .section(COVERINGS, 0, &self.coverings)?
             .section(CONES, 0, &self.cones)?
@@ -115,6 +121,8 @@ impl PointHierarchy {
             dropped: meta.dropped,
             step: meta.step,
             sampling_radius: meta.sampling_radius,
+            reach: meta.reach,
+            sheets: meta.sheets,
             leaf_size: meta.leaf_size,
             radius_neighbours: meta.radius_neighbours,
             samples_a_node: meta.samples,
@@ -132,6 +140,7 @@ impl PointHierarchy {
             wide: WideTree::default(),
             outline: Outline::default(),
             growths: file.array(GROWTHS, 0)?,
+            obstacle_growths: file.array(OBSTACLE_GROWTHS, 0)?,
             sample_lists: file.array(SAMPLES, 0)?,
             coverings: file.array(COVERINGS, 0)?,
             cones: file.array(CONES, 0)?,

@@ -33,6 +33,8 @@ const GROWTH: f32 = 0.3;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Spacing {
     pub(crate) radius: f32,
+    /// The distance of the K-th neighbour, which is less than the radius along a ring.
+    plain: f32,
     pub(crate) look: Look,
 }
 
@@ -48,6 +50,8 @@ pub(crate) enum Look {
     Line,
     /// The first K spread, but only because a ring bends there or is jagged: most points about see a ring.
     Bend,
+    /// The spacing exceeds the reach of the scan.
+    Sparse,
 }
 
 /// The spacing of every one of the distinct `points`, those of the `tree`.
@@ -185,7 +189,7 @@ impl<'a> Search<'a> {
     fn area(&self, i: usize, neighbours: usize) -> Spacing {
         let last = self.found.ranked(i % WIDTH, neighbours - 1);
         let radius = last.map_or(0.0, |last| length(&self.exact(i, last.id as usize)));
-        Spacing { radius, look: Look::Area }
+        Spacing { radius, plain: radius, look: Look::Area }
     }
 
     /// The squared distance of point `j` from point `i` in double precision, and its index.
@@ -215,7 +219,7 @@ impl<'a> Search<'a> {
         let mut sums = Sums::default();
         self.near.iter().for_each(|n| sums.add(self.points, i, n.1));
         if self.near.len() <= neighbours || !sums.is_line() {
-            return Spacing { radius, look: Look::Area };
+            return Spacing { radius, plain: radius, look: Look::Area };
         }
         let mut count = LINE_NEIGHBOURS;
         while sums.count < MOST_NEIGHBOURS {
@@ -224,7 +228,7 @@ impl<'a> Search<'a> {
             for k in known..self.near.len() {
                 sums.add(self.points, i, self.near[k].1);
                 if !sums.is_line() && sums.lies_across(self.points, &self.near[..=k]) {
-                    return Spacing { radius: length(&self.near[k]), look: Look::Ring };
+                    return Spacing { radius: length(&self.near[k]), plain: radius, look: Look::Ring };
                 }
             }
             if self.near.len() <= count {
@@ -232,7 +236,7 @@ impl<'a> Search<'a> {
             }
             count *= 2;
         }
-        Spacing { radius, look: Look::Line }
+        Spacing { radius, plain: radius, look: Look::Line }
     }
 }
 
@@ -319,7 +323,7 @@ pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
     // How near points are along a line says nothing of the surface about it.
     let tips = map(spacings, |s| match s.look {
         Look::Area | Look::Ring => s.radius,
-        Look::Line | Look::Bend => f32::INFINITY,
+        Look::Line | Look::Bend | Look::Sparse => f32::INFINITY,
     });
     let (cones, level) = (tree.cones(&tips, GROWTH), Level::new());
     let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
@@ -339,6 +343,25 @@ pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
         radii
     });
     smoothed.concat()
+}
+
+/// Limits `radii`, the smoothed `spacings`, to `reach`. A ring whose next ring is further away than that is a line,
+/// with its K-th neighbour's distance; any other point with a greater spacing is [`Look::Sparse`].
+///
+/// The least of the spacings about a point and the reach is the least of the limited spacings about it, so
+/// this equals a limit before smoothing.
+pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
+    for (spacing, radius) in spacings.iter_mut().zip(radii) {
+        if spacing.radius > reach {
+            if spacing.look == Look::Ring {
+                spacing.look = Look::Line;
+                *radius = radius.min(spacing.plain);
+            } else if spacing.look != Look::Line {
+                spacing.look = Look::Sparse;
+            }
+        }
+        *radius = radius.min(reach);
+    }
 }
 
 /// A value for each node from its points, leaves first: `leaf` of a leaf's range, `join` of two children's.

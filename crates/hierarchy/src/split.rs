@@ -33,13 +33,15 @@ const WORTH_A_TRY: f32 = 0.5;
 /// Splits need no more than this many points to tell which axis is better.
 const JUDGED_BY: usize = 512;
 
-/// Orders `items` into leaves and returns the nodes with their boxes about the points. O(n log n).
-pub(crate) fn split(items: &mut [Item], leaf_size: usize) -> (Vec<Node>, Vec<OrientedBox>) {
+/// Orders `items` into leaves and returns the nodes with their boxes about the points; the root parts the first
+/// `sheets`, which fill whole leaves, from the others. O(n log n).
+pub(crate) fn split(items: &mut [Item], leaf_size: usize, sheets: usize) -> (Vec<Node>, Vec<OrientedBox>) {
     let count = node_count(items.len(), leaf_size);
     let mut nodes = vec![Node::default(); count];
     let mut boxes = vec![OrientedBox::default(); count];
+    let points = items.len();
     let place = Place { items, nodes: &mut nodes, boxes: &mut boxes, first: 0, id: 0 };
-    place.split(leaf_size);
+    place.split(leaf_size, (0 < sheets && sheets < points).then_some(sheets));
     (nodes, boxes)
 }
 
@@ -53,21 +55,25 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    fn split(self, leaf_size: usize) {
+    /// `parted`: how many of the items go to the left child, which are the first already.
+    fn split(self, leaf_size: usize, parted: Option<usize>) {
         let Place { items, nodes, boxes, first, id } = self;
         let count = items.len();
         let level = Level::new();
         let axes = principal_axes(level, items);
         let (low, high) = extents(level, items, &axes);
         boxes[0] = OrientedBox::spanned(axes, low, high, 0.0);
-        if count <= leaf_size {
+        if count <= leaf_size && parted.is_none() {
             items.sort_unstable_by_key(|item| item.index);
             nodes[0] = Node { first: id32(first), count: id32(count), right: 0 };
             return;
         }
-        let left = left_count(count, leaf_size);
-        let axis = best_axis(level, items, &boxes[0], left);
-        partition(items, axis, left);
+        let left = parted.unwrap_or_else(|| {
+            let left = left_count(count, leaf_size);
+            let axis = best_axis(level, items, &boxes[0], left);
+            partition(items, axis, left);
+            left
+        });
         let left_nodes = node_count(left, leaf_size);
         nodes[0] = Node { first: id32(first), count: id32(count), right: id32(id + 1 + left_nodes) };
         let (items_l, items_r) = items.split_at_mut(left);
@@ -83,11 +89,11 @@ impl Place<'_> {
         };
         #[cfg(feature = "rayon")]
         if count > TASK {
-            rayon::join(|| l.split(leaf_size), || r.split(leaf_size));
+            rayon::join(|| l.split(leaf_size, None), || r.split(leaf_size, None));
             return;
         }
-        l.split(leaf_size);
-        r.split(leaf_size);
+        l.split(leaf_size, None);
+        r.split(leaf_size, None);
     }
 }
 

@@ -5,24 +5,24 @@
 //! sector of the tangent plane without a neighbour: the discs of two scans whose borders face each other a
 //! sampling radius apart must not meet.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_surface::{
-    Centre, Evaluation, HalfBlock, Moments, PointBlock, Status, SurfacePlan, symmetric_eigen,
-};
+use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, PointBlock, Status, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
-use crate::boxes::{OrientedBox, dot};
-use crate::build::ball;
+use crate::boxes::{OrientedBox, dot, sub};
+use crate::build::{ball, cell_radius, obstacle_ball};
+use crate::classes::SLAB;
 use crate::covering::Solid;
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::Index;
 use crate::lanes::{along, product, seen_from};
 use crate::neighbours::{Locality, chunks};
 use crate::spacing::{Look, Spacing};
-use crate::topology::Node;
 
 /// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a square
 /// lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
@@ -48,47 +48,62 @@ pub const THICKNESS: f32 = 0.05;
 /// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
 const LINE: f64 = 0.05;
 
-/// What the neighbourhood of a point looks like.
+/// How the points about a point lie: its class (`docs/theory/obstacle.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[repr(u8)]
 #[non_exhaustive]
 pub enum PointKind {
-    /// One sheet: the disc is to be trusted.
-    Surface = 0,
-    /// At or beyond the border of its surface.
-    Border = 1,
-    /// No single plane fits: two sheets, an edge of several, or a blob.
-    Ambiguous = 2,
-    /// A line, as along one LiDAR ring.
+    /// On one sheet: its tangent disc stands for the surface about it.
+    Sheet = 0,
+    /// At or beyond the border of a sheet; its disc is narrower.
+    Edge = 1,
+    /// No single plane fits: noise, foliage, or several sheets closer than the bandwidth.
+    Noisy = 2,
+    /// On a line, as along one LiDAR ring or a wire.
     Line = 3,
-    /// Too few neighbours.
-    Isolated = 4,
+    /// Alone: fewer neighbours within its support radius than the surface needs.
+    Stray = 4,
+    /// Its neighbours are further away than the scan's [reach](crate::PointHierarchy::reach).
+    Sparse = 5,
 }
 
 impl PointKind {
-    /// The kind stored as `code`; anything unknown is ambiguous.
+    /// All kinds, in the order of their codes.
+    pub const ALL: [Self; 6] = [Self::Sheet, Self::Edge, Self::Noisy, Self::Line, Self::Stray, Self::Sparse];
+
+    /// Returns the kind stored as `code`; an unknown code is [`Self::Noisy`].
     #[must_use]
     pub const fn from_code(code: u8) -> Self {
         match code {
-            0 => Self::Surface,
-            1 => Self::Border,
+            0 => Self::Sheet,
+            1 => Self::Edge,
             3 => Self::Line,
-            4 => Self::Isolated,
-            _ => Self::Ambiguous,
+            4 => Self::Stray,
+            5 => Self::Sparse,
+            _ => Self::Noisy,
         }
     }
 
-    /// The greatest number that a kind is stored as.
-    pub(crate) const LAST: u8 = Self::Isolated.code();
-    /// Whether too little is known about the point for its disc to be trusted: there is some surface within about
-    /// a local radius.
+    /// The greatest code of a kind.
+    pub(crate) const LAST: u8 = Self::Sparse.code();
+
+    /// Returns `true` if so little is known about the point that its disc is not to be trusted: some surface lies
+    /// within about a local radius.
     #[inline]
     #[must_use]
     pub const fn is_sparse(self) -> bool {
-        matches!(self, Self::Line | Self::Isolated)
+        matches!(self, Self::Line | Self::Stray | Self::Sparse)
     }
 
-    /// The number it is stored as.
+    /// Returns `true` if the point samples a sheet, so that its tangent disc stands for it in the
+    /// obstacle. All other points stand there as balls.
+    #[inline]
+    #[must_use]
+    pub const fn is_sheet(self) -> bool {
+        matches!(self, Self::Sheet | Self::Edge)
+    }
+
+    /// Returns the number that the kind is stored as.
     #[must_use]
     pub const fn code(self) -> u8 {
         self as u8
@@ -103,6 +118,13 @@ pub struct NormalCone {
     pub axis: [f32; 3],
     /// Cosine of the half angle, 0 to 1.
     pub cosine: f32,
+}
+
+/// The surface at a point to first order, and the point's class.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fit {
+    pub(crate) normal: [f32; 3],
+    pub(crate) kind: PointKind,
 }
 
 /// A point's disc.
@@ -121,13 +143,15 @@ pub(crate) struct Surfels {
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) discs: Vec<f32>,
     pub(crate) kinds: Vec<u8>,
-    /// See [`Slices::ball`](crate::Slices::ball).
+    /// Those of [`Slices::ball`](crate::Slices::ball) and [`Slices::obstacle_ball`](crate::Slices::obstacle_ball): the greater.
     pub(crate) balls: Vec<f32>,
     /// About the disc and the ball of each point.
     pub(crate) flat: Vec<Solid>,
     /// About its cell as well.
     pub(crate) cells: Vec<Solid>,
     pub(crate) leaves: Vec<LeafBounds>,
+    /// Bounds of the leaves' parts of the obstacle.
+    pub(crate) obstacles: Vec<LeafBounds>,
 }
 
 impl Surfels {
@@ -140,6 +164,7 @@ impl Surfels {
             flat: Vec::with_capacity(points),
             cells: Vec::with_capacity(points),
             leaves: Vec::new(),
+            obstacles: Vec::new(),
         }
     }
 
@@ -157,7 +182,6 @@ impl Surfels {
 /// Reused from leaf to leaf.
 #[derive(Debug)]
 struct LeafScratch {
-    level: Level,
     locality: Locality,
     surroundings: Surroundings,
     /// The blocks that are heard at a point.
@@ -169,7 +193,6 @@ struct LeafScratch {
 impl Default for LeafScratch {
     fn default() -> Self {
         Self {
-            level: Level::new(),
             locality: Locality::default(),
             surroundings: Surroundings::default(),
             near: Vec::new(),
@@ -179,152 +202,189 @@ impl Default for LeafScratch {
     }
 }
 
-/// The discs of all points and the bounds of all leaves, in order.
-pub(crate) fn surfels(
+/// What is known of all points before their discs, in order.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known<'a> {
+    pub(crate) positions: &'a [[f32; 3]],
+    pub(crate) radii: &'a [f32],
+    /// The scan's sampling radius.
+    pub(crate) ordinary: f32,
+    /// The scan's reach.
+    pub(crate) reach: f32,
+    /// Points before this are on sheets.
+    pub(crate) sheets: usize,
+}
+
+/// The surface at every point, and the class that follows from it. O(n).
+pub(crate) fn fits(
     index: &Index<'_>,
     positions: &[[f32; 3]],
-    radii: &[f32],
-    (spacings, ordinary): (&[Spacing], f32),
-) -> Surfels {
-    let leaf = |(node, about): (&Node, &'_ OrientedBox)| (node.points(), *about);
-    let leaves: Vec<_> =
-        index.nodes.iter().zip(index.boxes).filter(|(node, _)| node.is_leaf()).map(leaf).collect();
+    (radii, spacings): (&[f32], &[Spacing]),
+) -> Vec<Fit> {
+    let leaves = leaves(index);
+    let level = Level::new();
+    let parts = chunks(&leaves, |leaves| {
+        let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
+        for (points, about) in leaves {
+            let spacings = &spacings[points.clone()];
+            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
+            dispatch!(level, simd => leaf.fit(simd, index, &mut scratch, |at, i| {
+                fits.push(fitted(&at, spacings[i].look));
+            }));
+        }
+        fits
+    });
+    parts.concat()
+}
+
+/// The ranges of points of all leaves, and the boxes about them.
+fn leaves(index: &Index<'_>) -> Vec<(Range<usize>, OrientedBox)> {
+    let nodes = index.nodes.iter().zip(index.boxes);
+    nodes.filter(|(node, _)| node.is_leaf()).map(|(node, about)| (node.points(), *about)).collect()
+}
+
+/// The discs of all points and the bounds of all leaves, in order.
+pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Surfels {
+    let leaves = leaves(index);
+    let level = Level::new();
     let parts = chunks(&leaves, |leaves| {
         let (mut scratch, mut surfels) = (LeafScratch::default(), Vec::new());
         let bounds = leaves
             .iter()
             .map(|(points, about)| {
-                let leaf = Leaf {
-                    positions: &positions[points.clone()],
-                    radii: &radii[points.clone()],
-                    spacings: &spacings[points.clone()],
-                    about,
-                    ordinary,
-                };
-                leaf.surfels(index, &mut scratch, &mut surfels)
+                let Known { positions, radii, reach, sheets, .. } = *known;
+                let leaf =
+                    Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
+                let are_sheets = points.start < sheets;
+                let fits = &fits[points.clone()];
+                dispatch!(level, simd => {
+                    leaf.look_about(simd, index, (fits, reach, are_sheets), &mut scratch, &mut surfels)
+                })
             })
             .collect::<Vec<_>>();
         (surfels, bounds)
     });
-    let mut all = Surfels::with_capacity(positions.len());
-    let mut radii = radii.iter();
-    for (surfels, leaves) in parts {
-        for (surfel, &radius) in surfels.iter().zip(&mut radii) {
-            all.push(surfel, ball(surfel.kind, radius, ordinary));
+    let mut all = Surfels::with_capacity(known.positions.len());
+    let mut radii = known.radii.iter().enumerate();
+    for (surfels, bounds) in parts {
+        for (surfel, (i, &radius)) in surfels.iter().zip(&mut radii) {
+            let own = obstacle_ball(i, known.sheets, radius);
+            all.push(surfel, ball(surfel.kind, radius, known.ordinary).max(own));
         }
-        all.leaves.extend(leaves);
+        for [surface, obstacle] in bounds {
+            all.leaves.push(surface);
+            all.obstacles.push(obstacle);
+        }
     }
     all
 }
 
-/// The points of a leaf, and what of them is known already.
+/// The points of a leaf, and the box about them.
 #[derive(Debug, Clone, Copy)]
 struct Leaf<'a> {
-    pub(crate) positions: &'a [[f32; 3]],
-    pub(crate) radii: &'a [f32],
-    pub(crate) spacings: &'a [Spacing],
-    pub(crate) about: &'a OrientedBox,
-    /// The scan's sampling radius.
-    pub(crate) ordinary: f32,
+    positions: &'a [[f32; 3]],
+    radii: &'a [f32],
+    about: &'a OrientedBox,
 }
 
 impl Leaf<'_> {
-    /// The discs of the points, and bounds of their part of the surface.
-    pub(crate) fn surfels(
-        &self,
-        index: &Index<'_>,
-        scratch: &mut LeafScratch,
-        surfels: &mut Vec<Surfel>,
-    ) -> LeafBounds {
-        let (level, first) = (scratch.level, surfels.len());
-        dispatch!(level, simd => self.fit(simd, index, scratch, surfels));
-        let surfels = &mut surfels[first..];
-        dispatch!(level, simd => self.look_about(simd, index, scratch, surfels))
-    }
-
     /// The surface at every point.
     #[inline(always)]
-    fn fit<S: Simd>(&self, simd: S, index: &Index<'_>, scratch: &mut LeafScratch, surfels: &mut Vec<Surfel>) {
+    fn fit<S: Simd>(
+        &self,
+        simd: S,
+        index: &Index<'_>,
+        scratch: &mut LeafScratch,
+        mut found: impl FnMut(Evaluation, usize),
+    ) {
         simd.vectorize(
             #[inline(always)]
             || {
                 let LeafScratch { locality, near, halves, fits, .. } = scratch;
-                // Radii grow by at most 0.3 per length, and few as fast.
-                locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
+                let middle = self.about.centre;
+                let own = self.positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
+                let own = own.fold(0.0, f32::max).sqrt();
+                index.collect(middle, own, &mut locality.groups);
                 fits.clear();
                 for p in self.positions {
                     let x = Centre::new(p.map(f64::from));
                     fits.push(index.moments(simd, &x, &locality.groups, near, halves));
                 }
-                Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| {
-                    surfels.push(surfel(
-                        &at,
-                        index.plan,
-                        self.radii[i],
-                        self.spacings[i].look == Look::Line,
-                        self.ordinary,
-                    ));
-                });
+                Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| found(at, i));
             },
         );
     }
 
-    /// Narrows the discs at borders, and bounds the surface about them.
+    /// The discs of the points, narrowed at borders, and bounds of their part of the surface and of the obstacle.
     #[inline(always)]
     fn look_about<S: Simd>(
         &self,
         simd: S,
         index: &Index<'_>,
+        (fits, reach, are_sheets): (&[Fit], f32, bool),
         scratch: &mut LeafScratch,
-        surfels: &mut [Surfel],
-    ) -> LeafBounds {
+        surfels: &mut Vec<Surfel>,
+    ) -> [LeafBounds; 2] {
         simd.vectorize(
             #[inline(always)]
             || {
                 let LeafScratch { locality, surroundings, near, .. } = scratch;
+                // Radii grow by at most 0.3 per length, and few as fast.
+                locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
                 surroundings.fill(index, self.positions[0], locality);
-                let mut cells = LeafBounds::new(simd, self.positions, self.about, surroundings).cells();
-                for ((p, radius), surfel) in self.positions.iter().zip(self.radii).zip(surfels) {
+                let bounds = LeafBounds::new(simd, self.positions, self.about, surroundings);
+                let (mut cells, mut obstacle) = (bounds.cells(), bounds.cells());
+                for ((p, &radius), fit) in self.positions.iter().zip(self.radii).zip(fits) {
                     let near = index.heard(simd, &locality.groups, *p, 0.0, near);
                     let blocks = || near.iter().map(|&block| &index.blocks[block as usize]);
-                    let gap = widest_gap(simd, *p, surfel.normal, blocks());
-                    surfel.disc = surfel.disc.min(radius * disc(gap));
-                    surfel.cell = surroundings.cell(simd, *p, surfel.normal, *radius, blocks());
-                    cells.include(*p, surfel.normal, &surfel.cell);
+                    let gap = widest_gap(simd, *p, fit.normal, blocks());
+                    let cell = surroundings.cell(simd, *p, fit.normal, radius, blocks());
+                    cells.include(*p, fit.normal, &cell);
+                    if are_sheets {
+                        obstacle.include(
+                            *p,
+                            fit.normal,
+                            &cell.within(cell_radius(radius, reach), SLAB * radius),
+                        );
+                    }
+                    surfels.push(Surfel { cell, ..surfel(fit, radius, reach, gap) });
                 }
-                cells.close()
+                let obstacle = if are_sheets { obstacle.close() } else { bounds.empty() };
+                [cells.close(), obstacle]
             },
         )
     }
 }
 
-/// The disc of a point at which f is `at`, as if it were in the interior, without its cell.
-fn surfel(at: &Evaluation, plan: &SurfacePlan, radius: f32, is_line: bool, ordinary: f32) -> Surfel {
-    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-    let normal = at.normal.map(|c| c as f32);
-    let kind = kind(at, is_line);
-    // What is further than an ordinary horizon from all points is no surface (S0 eq. 6) but a hole, however sparse
-    // the points about it; what a lone point knows of ends with its ball.
-    let widest = if kind.is_sparse() { ordinary } else { plan.horizon(ordinary) };
-    Surfel { normal, disc: (radius * DISC).min(widest), kind, cell: Cell::default() }
+/// The disc of a point with this many empty sectors about it.
+fn surfel(fit: &Fit, radius: f32, reach: f32, gap: u32) -> Surfel {
+    // What is further than half the reach from all points is a hole.
+    let disc = (radius * disc(gap)).min(0.5 * reach);
+    Surfel { normal: fit.normal, disc, kind: fit.kind, cell: Cell::default() }
 }
 
-/// The disc of the point `p` at which f is `at`, narrowed where the sectors about it are empty of the points in `near`, those
-/// that are heard there.
+/// What f at a point says of it.
+fn fitted(at: &Evaluation, look: Look) -> Fit {
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    let normal = at.normal.map(|c| c as f32);
+    Fit { normal, kind: kind(at, look) }
+}
+
+/// The disc of the point `p` at which f is `at`, narrowed where the sectors about it are empty of the points in `near`,
+/// whose support radii reach `p`.
 pub(crate) fn surfel_among(
     p: [f32; 3],
     at: &Evaluation,
-    (plan, radius, ordinary): (&SurfacePlan, f32, f32),
-    is_line: bool,
+    (radius, reach): (f32, f32),
+    look: Look,
     near: &[PointBlock],
 ) -> Surfel {
-    let mut surfel = surfel(at, plan, radius, is_line, ordinary);
+    let fit = fitted(at, look);
     let gap = dispatch!(Level::new(), simd => simd.vectorize(
         #[inline(always)]
-        || widest_gap(simd, p, surfel.normal, near.iter()),
+        || widest_gap(simd, p, fit.normal, near.iter()),
     ));
-    surfel.disc = surfel.disc.min(radius * disc(gap));
-    surfel
+    surfel(&fit, radius, reach, gap)
 }
 
 /// The radius of a disc over the local sampling radius, given how many sectors beside each other are empty.
@@ -390,14 +450,15 @@ pub(crate) fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
     ([1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y])
 }
 
-fn kind(at: &Evaluation, is_line: bool) -> PointKind {
+fn kind(at: &Evaluation, look: Look) -> PointKind {
     let [_, l2, l3] = at.eigenvalues;
     match at.status {
-        Status::Outside => PointKind::Isolated,
-        _ if is_line || l2 < LINE * l3 => PointKind::Line,
-        Status::Ok => PointKind::Surface,
-        Status::Border => PointKind::Border,
-        _ => PointKind::Ambiguous,
+        Status::Outside => PointKind::Stray,
+        _ if look == Look::Line || l2 < LINE * l3 => PointKind::Line,
+        _ if look == Look::Sparse => PointKind::Sparse,
+        Status::Ok => PointKind::Sheet,
+        Status::Border => PointKind::Edge,
+        _ => PointKind::Noisy,
     }
 }
 

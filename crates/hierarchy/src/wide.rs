@@ -14,7 +14,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 
 use crate::boxes::{OrientedBox, Relative};
-use crate::build::{PointHierarchy, Slices};
+use crate::build::{Part, PointHierarchy, Slices};
 use crate::descend::NodePair;
 use crate::lanes::{Boxes, along_normals};
 use crate::leaf_block::Leaves;
@@ -97,8 +97,8 @@ impl Siblings {
 #[derive(Debug, Clone, Default)]
 pub struct WideTree {
     nodes: Vec<Siblings>,
-    /// What the enclosures of the same children reach further.
-    growths: Vec<family::Growths>,
+    /// What the enclosures of the same children reach further, by [`Part`].
+    growths: [Vec<family::Growths>; 2],
     /// The id of each node in the binary tree.
     ids: Vec<u32>,
     /// What leaves are compared by.
@@ -108,15 +108,16 @@ pub struct WideTree {
 impl WideTree {
     /// Every other level of the tree of these nodes, level by level: what all queries look at stands together.
     pub(crate) fn of(scan: &PointHierarchy) -> Self {
-        let Slices { nodes, boxes, growths, leaf_size, .. } = scan.slices();
+        let slices = scan.slices();
+        let Slices { nodes, boxes, leaf_size, .. } = slices;
         let is_leaf = |id: NodeId| nodes[id.index()].is_leaf();
         let children = |id: NodeId| nodes[id.index()].children(id);
         let mut ids: Vec<u32> = if nodes.len() > 1 { vec![0] } else { Vec::new() };
         let mut wide: Vec<Siblings> = Vec::with_capacity(nodes.len().div_ceil(WIDTH));
-        let mut wide_growths = Vec::with_capacity(nodes.len().div_ceil(WIDTH));
+        let mut wide_growths = Part::BOTH.map(|_| Vec::with_capacity(nodes.len().div_ceil(WIDTH)));
         while let Some(&id) = ids.get(wide.len()) {
             let mut siblings = Siblings::NONE;
-            let mut grown = family::Growths::default();
+            let mut grown = [family::Growths::default(); 2];
             let below = children(NodeId(id))
                 .into_iter()
                 .map(|child| if is_leaf(child) { [Some(child), None] } else { children(child).map(Some) });
@@ -128,10 +129,14 @@ impl WideTree {
                     Child(id32(ids.len() - 1))
                 };
                 siblings.set(lane, &boxes[id.index()], child);
-                grown.set(lane, &growths[id.index()]);
+                for part in Part::BOTH {
+                    grown[part as usize].set(lane, &slices.growths_of(part)[id.index()]);
+                }
             }
             wide.push(siblings);
-            wide_growths.push(grown);
+            for part in Part::BOTH {
+                wide_growths[part as usize].push(grown[part as usize]);
+            }
         }
         Self { nodes: wide, growths: wide_growths, ids, leaves: Leaves::of(scan) }
     }

@@ -29,7 +29,7 @@ fn rings_of_a_scanner_make_a_surface() {
         assert!(scan.usable() > 0.8, "{label}: {} usable", scan.usable());
         assert!(scan.share(PointKind::Line) < 0.1, "{label}: {} lines", scan.share(PointKind::Line));
         let (mut turned, mut trusted) = (0, 0);
-        for i in (0..scan.len()).filter(|&i| scan.kind(i) == PointKind::Surface) {
+        for i in (0..scan.len()).filter(|&i| scan.kind(i) == PointKind::Sheet) {
             let p = scan.positions()[i].map(f64::from);
             let origin = scan.frame().origin;
             let (_, normal) = scanner::off([0, 1, 2].map(|k| p[k] * scan.frame().scale + origin[k]));
@@ -66,8 +66,8 @@ fn blobs_wires_and_lone_points_are_named() {
     let mut rng = rng(5);
     let blob: Vec<[f64; 3]> = (0..3000).map(|_| point_in(&mut rng, 1.0)).collect();
     let scan = prepared(&blob);
-    assert!(scan.share(PointKind::Ambiguous) > 0.7, "{} of a blob", scan.share(PointKind::Ambiguous));
-    assert!(scan.share(PointKind::Surface) < 0.2, "{} of a blob", scan.share(PointKind::Surface));
+    assert!(scan.share(PointKind::Noisy) > 0.7, "{} of a blob", scan.share(PointKind::Noisy));
+    assert!(scan.share(PointKind::Sheet) < 0.2, "{} of a blob", scan.share(PointKind::Sheet));
 
     let wire: Vec<[f64; 3]> =
         (0..2000_u16).map(|i| f64::from(i) * 0.01).map(|t| [t, 0.3 * t.sin(), 0.0]).collect();
@@ -80,10 +80,10 @@ fn blobs_wires_and_lone_points_are_named() {
     points.extend([[1.0, 1.0, 2.0], [3.0, 2.0, 3.0]]);
     let scan = prepared(&points);
     let lone = scan.source().iter().position(|&s| s == 1600).unwrap();
-    assert_eq!(scan.kind(lone), PointKind::Isolated);
+    assert_eq!(scan.kind(lone), PointKind::Stray);
     let ball = scan.slices().ball(lone);
     assert!(scan.discs()[lone] <= ball && f64::from(ball) <= scan.sampling_radius(), "{ball}");
-    assert!(scan.share(PointKind::Isolated) < 0.002, "no other");
+    assert!(scan.share(PointKind::Stray) < 0.002, "no other");
 }
 
 #[test]

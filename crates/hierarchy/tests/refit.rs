@@ -79,7 +79,7 @@ fn what_a_fit_says_is_kept() {
     });
     assert_eq!(scan.sanity_check(), Ok(()), "boxes hold the new discs");
     assert_eq!((old.metric(), scan.metric()), (Metric::Euclidean, Metric::Geodesic), "said");
-    let kinds = [PointKind::Surface, PointKind::Border, PointKind::Ambiguous, PointKind::Isolated];
+    let kinds = [PointKind::Sheet, PointKind::Edge, PointKind::Noisy, PointKind::Stray];
     for i in 0..scan.len() {
         assert_eq!(scan.kind(i), kinds[i % 4], "point {i}");
         let (n, was) = (scan.normals()[i], oriented.normals()[i]);

@@ -91,7 +91,7 @@ fn discs_of_close_plates_lie_on_them() {
         let scans = pair_of_plates(s * h);
         let [straight, geodesic] = [0, 1].map(|k: usize| {
             let angles = leaning(&scans[k]);
-            (scans[k].share(PointKind::Ambiguous), angles[angles.len() / 2], angles[angles.len() - 1])
+            (scans[k].share(PointKind::Noisy), angles[angles.len() / 2], angles[angles.len() - 1])
         });
         assert!(geodesic.0 < ambiguous[0] && straight.0 > ambiguous[1], "{s} h: {geodesic:?}, {straight:?}");
         assert!(geodesic.1 < angle[0] && straight.1 > angle[1], "{s} h: {geodesic:?}, {straight:?}");

@@ -44,6 +44,7 @@ pub struct BatchScratch {
 
 /// The answer to a question that a deadline left no time to ask: nothing was spent, and nothing is known.
 const UNASKED: Answer = Answer {
+    band: f64::INFINITY,
     verdict: Verdict::Undecided(Reason::Budget { likelihood: 0.5 }),
     distance_estimate: None,
     statistics: Statistics { evaluations: 0, node_pairs: 0, leaf_pairs: 0, neighbour_steps: 0 },

@@ -15,7 +15,7 @@ use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Frontier, NodePair, Split, Stack, Visitor, descend, resume};
+use nearmiss_hierarchy::{Frontier, NodePair, Part, Split, Stack, Visitor, descend, resume};
 
 use crate::posed::{Posed, balls_apart};
 
@@ -109,6 +109,23 @@ impl<'a> Certifier<'a> {
         ControlFlow::Continue(())
     }
 
+    /// Proves these pairs of leaves, which were compared without a hit; or breaks. Their boxes overlap, and so do their
+    /// enclosures: only of obstacles may their points tell more.
+    pub(crate) fn prove_leaves(&mut self, compared: &[NodePair]) -> ControlFlow<()> {
+        for &pair in compared {
+            let gap = match self.pair.part {
+                Part::Obstacle => self.pair.gap_of_leaves(pair),
+                Part::Surface => f32::MIN,
+            };
+            if gap.is_nan() || gap <= self.reach {
+                self.doubtful = Some(pair);
+                return ControlFlow::Break(());
+            }
+            self.proven.push(Bound { gap, pair, shown_by: pair });
+        }
+        ControlFlow::Continue(())
+    }
+
     /// Splits the pair with the least bound again and again, until that is two leaves, or an eighth as many node pairs
     /// more were compared as until now. The least bound of all then, in the world.
     pub(crate) fn tighten(&mut self) -> f64 {
@@ -138,7 +155,7 @@ impl<'a> Certifier<'a> {
         let least = heap.peek().map_or(f64::INFINITY, |least| self.in_world(least.gap));
         *self.proven = heap.into_vec();
         // Along the axes of boxes little is seen of a distance between them.
-        let balls = balls_apart(self.pair.views) / self.pair.views[0].placed().scale();
+        let balls = balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].placed().scale();
         #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
         let gap = (balls * (1.0 - 1e-6)) as f32;
         if self.in_world(gap) <= least {
@@ -148,6 +165,11 @@ impl<'a> Certifier<'a> {
         self.proven.clear();
         self.proven.push(Bound { gap, pair: roots, shown_by: roots });
         self.in_world(gap)
+    }
+
+    /// The pair that was proven with the least gap. The last that [`Self::tighten`] left comes first.
+    pub(crate) fn nearest(&self) -> Option<NodePair> {
+        self.proven.first().map(|bound| bound.pair)
     }
 
     /// What was proven, in the world.
@@ -172,9 +194,10 @@ impl<'a> Certifier<'a> {
                 continue;
             }
             self.pair.meter.spent.node_pairs += 1;
-            if gaps[i] > self.reach {
-                let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
-                self.proven.push(Bound { gap: gaps[i], pair, shown_by: pair });
+            let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
+            let gap = if gaps[i] > self.reach { gaps[i] } else { self.pair.better_gap(pair, gaps[i]) };
+            if gap > self.reach {
+                self.proven.push(Bound { gap, pair, shown_by: pair });
             } else {
                 overlaps[i] = Some(-gaps[i]);
             }

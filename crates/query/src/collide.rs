@@ -201,32 +201,38 @@ fn search(
             }
             let verdict = early.map_or(Verdict::Undecided(Reason::Pose), |distance| {
                 if let Some(proof) = extras.proof {
-                    let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
-                    proof.pairs.push((roots, distance));
+                    proof.pairs.push((ROOTS, distance));
                 }
                 apart(options, distance, true)
             });
             let statistics = Statistics { node_pairs: 1, ..meter.spent };
-            return Answer { verdict, distance_estimate: None, statistics };
+            let band = if early.is_some() { greatest_band([a, b]) } else { f64::INFINITY };
+            return Answer { verdict, band, distance_estimate: None, statistics };
         }
     };
-    let answer = decide(
-        Posed::new([a, b], relative, meter, scratch.instructions.0),
-        pose,
-        (plan, budget),
-        scratch,
-        extras,
-    );
+    let by = (scratch.instructions.0, options.semantics.part());
+    let answer = decide(Posed::new([a, b], relative, meter, by), pose, (plan, budget), scratch, extras);
     match answer.verdict {
         Verdict::Intersecting { contact, .. } if options.detail == Detail::Manifold => {
             let mut spent = self::meter([a, b], options, budget);
             spent.spent = answer.statistics;
-            let mut pair = Posed::new([a, b], relative, spent, scratch.instructions.0);
+            let mut pair = Posed::new([a, b], relative, spent, by);
             manifold::gather(&mut pair, options, &contact, scratch.instructions.0, &mut scratch.manifold);
             Answer { statistics: pair.meter.spent, ..answer }
         }
         _ => answer,
     }
+}
+
+/// The pair of all points.
+const ROOTS: NodePair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
+
+/// The greatest local radius of any point of two scans, in the world.
+fn greatest_band(views: [&ScanView<'_>; 2]) -> f64 {
+    views
+        .map(|view| f64::from(view.slices().boxes[0].reach) * view.placed().scale())
+        .into_iter()
+        .fold(0.0, f64::max)
 }
 
 /// What a query may spend.
@@ -265,16 +271,19 @@ fn decide(
             && let Some((contact, evidence)) = still_meet(&pair, plan, met)
         {
             known.still_met(pose);
-            return Some(Verdict::Intersecting { contact, evidence });
+            return Some((Verdict::Intersecting { contact, evidence }, pair.band(met)));
         }
         known.come_to(pose, &pair);
-        Some(apart(options, known.distance(&pair, plan.reach())?, true))
+        let distance = known.distance(&pair, plan.reach())?;
+        Some((apart(options, distance, true), pair.band_of(ROOTS)))
     });
-    if let Some(verdict) = early {
-        return Answer { verdict, distance_estimate: None, statistics: pair.meter.spent };
+    if let Some((verdict, band)) = early {
+        return Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent };
     }
     match options.semantics {
-        Semantics::Surface => surfaces(pair, options, budget, scratch, (known, extras.proof, extras.all)),
+        Semantics::Obstacle | Semantics::Surface => {
+            surfaces(pair, options, budget, scratch, (known, extras.proof, extras.all))
+        }
         Semantics::Thickened(_) => balls(pair, plan, scratch, known, extras.all),
     }
 }
@@ -285,9 +294,10 @@ fn still_meet(pair: &Posed<'_>, plan: &CollidePlan, [i, j]: [usize; 2]) -> Optio
         Semantics::Thickened(_) => {
             balls_meet(pair, plan.reach(), [i, j]).map(|contact| (contact, Evidence::Certified))
         }
+        Semantics::Obstacle if !pair.are_sheets([i, j]) => pair.ball_contact([i, j], plan.reach()),
         // A witness takes a search of its own.
-        Semantics::Surface if plan.options().detail == Detail::Witness => None,
-        Semantics::Surface => pair.crosses([i, j]).then(|| (pair.shared_chord(i, j), Evidence::Estimated)),
+        _ if plan.options().detail == Detail::Witness => None,
+        _ => pair.crosses([i, j]).then(|| (pair.shared_chord(i, j), Evidence::Estimated)),
     }
 }
 
@@ -319,7 +329,8 @@ fn surfaces(
     {
         let (verdict, statistics) = (apart(options, distance, true), certifier.pair.meter.spent);
         *longest_stretch = certifier.pair.meter.longest_stretch;
-        return Answer { verdict, distance_estimate: None, statistics };
+        let band = certifier.pair.band_of(ROOTS);
+        return Answer { verdict, band, distance_estimate: None, statistics };
     }
     let Certifier { pair, proven, .. } = certifier;
     let is_slow = known.as_ref().is_some_and(|known| known.keeps_front(&pair));
@@ -334,6 +345,7 @@ fn surfaces(
     let parted = !ended && search.found.is_none();
     let Surfaces { pair, found, doubt, estimate, excluded, compared, met, is_plain, .. } = search;
     let mut certifier = Certifier::new(pair, reach, proven);
+    let mut band = met.map_or_else(|| certifier.pair.band_of(ROOTS), |met| certifier.pair.band(met));
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
@@ -342,15 +354,22 @@ fn surfaces(
         }
         (None, Some(reason)) => Verdict::Undecided(reason),
         _ if !options.certifies() => apart(options, 0.0, false),
-        // Leaves whose boxes overlap have enclosures that overlap.
-        _ if !compared.is_empty() || known.as_ref().is_some_and(|known| known.is_doubtful()) => {
-            certifier.doubtful = compared.first().copied();
+        _ if known.as_ref().is_some_and(|known| known.is_doubtful())
+            || certifier.prove_leaves(compared).is_break() =>
+        {
             apart(options, 0.0, false)
         }
         _ => {
+            // Otherwise all there is will be proven.
             let noted = (!is_plain).then_some(&**excluded);
+            if is_plain {
+                certifier.proven.clear();
+            }
             let whole = certifier.prove(noted, &mut frontiers.stack).is_continue();
             let distance = if whole { certifier.tighten() } else { 0.0 };
+            if whole && let Some(nearest) = certifier.nearest() {
+                band = certifier.pair.band_of(nearest);
+            }
             if let Some(proof) = proof.filter(|_| whole) {
                 certifier.hand_out(proof);
             }
@@ -374,7 +393,7 @@ fn surfaces(
     }
     *longest_stretch = certifier.pair.meter.longest_stretch;
     let distance_estimate = Some(estimate).filter(|distance| distance.is_finite());
-    Answer { verdict, distance_estimate, statistics: certifier.pair.meter.spent }
+    Answer { verdict, band, distance_estimate, statistics: certifier.pair.meter.spent }
 }
 
 /// Looks for a contact: where there was one, then from what kept the scans apart, or from the roots.
@@ -461,7 +480,9 @@ fn balls(
         }
     }
     scratch.longest_stretch = search.pair.meter.longest_stretch;
-    Answer { verdict, distance_estimate: None, statistics: search.pair.meter.spent }
+    let band =
+        search.found.map_or_else(|| search.pair.band_of(ROOTS), |(_, points)| search.pair.band(points));
+    Answer { verdict, band, distance_estimate: None, statistics: search.pair.meter.spent }
 }
 
 /// Apart, by at least `distance` between surfaces or points if that is `proven`.
@@ -470,9 +491,9 @@ fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
         Semantics::Thickened(radius) => {
             Verdict::Separated { gap: (distance - 2.0 * radius).max(0.0), evidence: Evidence::Certified }
         }
-        Semantics::Surface if proven && options.certifies() => {
+        _ if proven && options.certifies() => {
             Verdict::Separated { gap: distance.max(0.0), evidence: Evidence::Certified }
         }
-        Semantics::Surface => Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
+        _ => Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{LeafBlock, LeafVisitor, NodePair};
+use nearmiss_hierarchy::{LeafBlock, LeafVisitor, Leaves, NodePair, Part};
 
 use crate::disc_pair::FAR;
 use crate::leaf_pair::{Discs, LeafPair, Near};
@@ -41,7 +41,14 @@ impl Surfaces<'_> {
     pub(crate) fn compare_leaves(&mut self, [leaf_a, leaf_b]: [usize; 2], by_discs: bool) -> ControlFlow<()> {
         let (a, b) = (self.pair.a, self.pair.b);
         let (of_a, of_b) = (&a.wide.leaves, &b.wide.leaves);
-        let sparse = [of_a.is_sparse(leaf_a), of_b.is_sparse(leaf_b)];
+        if self.pair.part == Part::Obstacle {
+            let first = [of_a.points(leaf_a).start, of_b.points(leaf_b).start];
+            if !self.pair.are_sheets(first) {
+                return self.compare_balls([leaf_a, leaf_b]);
+            }
+        }
+        let is_sparse = |leaves: &Leaves, leaf| self.pair.part == Part::Surface && leaves.is_sparse(leaf);
+        let sparse = [is_sparse(of_a, leaf_a), is_sparse(of_b, leaf_b)];
         if !by_discs && sparse == [false; 2] {
             return ControlFlow::Continue(());
         }

@@ -1,7 +1,7 @@
 //! A point of either scan: their tangent discs, whether these cross so that it says something, and where.
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::PointKind;
+use nearmiss_hierarchy::{Part, PointKind};
 
 use crate::crossing::Disc;
 use crate::leaf_pair::{Discs, LeafPair};
@@ -31,10 +31,14 @@ impl Posed<'_> {
     }
 
     /// Why a crossing of the discs of points `i` and `j` says little, if it does.
+    /// Discs of sheets, of which alone an obstacle has some, are beyond doubt.
     pub(crate) fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
+        if self.part == Part::Obstacle {
+            return None;
+        }
         match self.views[0].scan().kind(i).max(self.views[1].scan().kind(j)) {
-            PointKind::Surface | PointKind::Border => None,
-            PointKind::Line | PointKind::Isolated => Some(Reason::Undersampled),
+            PointKind::Sheet | PointKind::Edge => None,
+            kind if kind.is_sparse() => Some(Reason::Undersampled),
             _ => {
                 let (distance, [ra, rb]) = self.points(i, j);
                 (distance > NEAR * ra.min(rb)).then_some(Reason::Ambiguous)
@@ -91,7 +95,8 @@ impl Posed<'_> {
     /// takes more to say.
     pub(crate) fn crosses(&self, [i, j]: [usize; 2]) -> bool {
         let (a, b) = (&self.a.wide.leaves, &self.b.wide.leaves);
-        if a.is_sparse(a.leaf_of(i)) || b.is_sparse(b.leaf_of(j)) {
+        let is_sparse = || a.is_sparse(a.leaf_of(i)) || b.is_sparse(b.leaf_of(j));
+        if self.part == Part::Surface && is_sparse() {
             return false;
         }
         let ((discs_a, lane_a), (discs_b, lane_b)) = (Discs::about(a, i), Discs::about(b, j));

@@ -13,6 +13,7 @@ use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 use nearmiss_geometry::PointId;
+use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointHierarchy;
 use nearmiss_surface::Metric;
 
@@ -24,20 +25,35 @@ use crate::verdict::{Evidence, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
 use approach::{Approach, Feet};
 use bounds::Motion;
-pub(crate) use nearest_points::{PointPair, nearest};
+pub(crate) use nearest_points::{PointPair, blocks, lanes, nearest};
 use search::{Frontier, Search};
 
 /// What is asked. Plain values; [`DistancePlan::new`] validates them.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct DistanceOptions {
-    /// What is to be apart. Default: surfaces.
+    /// What is to be apart. Default: obstacles.
     pub semantics: Semantics,
+    /// Of obstacles, how far below the upper bound the lower one may be left, as a share of it: 0 to less than 1, default
+    /// 0.1. Where that is less than the local spacing, within which nothing is promised, the spacing counts.
+    pub relative: f64,
     /// By which distances surfaces are defined. None, the default: as both scans were prepared.
     pub metric: Option<Metric>,
 }
 
+impl Default for DistanceOptions {
+    fn default() -> Self {
+        Self { semantics: Semantics::default(), relative: 0.1, metric: None }
+    }
+}
+
 impl DistanceOptions {
+    /// The same options with this relative precision of the lower bound.
+    #[must_use]
+    pub const fn with_relative(self, relative: f64) -> Self {
+        Self { relative, ..self }
+    }
+
     /// The same options with these semantics.
     #[must_use]
     pub const fn with_semantics(self, semantics: Semantics) -> Self {
@@ -65,9 +81,12 @@ impl DistancePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// [`PlanError::Radius`] for one that is no length; [`PlanError::Metric`] and [`PlanError::Metrics`] for scans whose surfaces
+    /// [`PlanError::Radius`] for one that is no length; [`PlanError::Relative`]; [`PlanError::Metric`] and [`PlanError::Metrics`] for scans whose surfaces
     /// are not defined as it is asked, or not alike.
     pub fn new(options: &DistanceOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
+        if !(0.0..1.0).contains(&options.relative) {
+            return Err(PlanError::Relative(options.relative));
+        }
         let asked = CollideOptions { metric: options.metric, ..CollideOptions::default() }
             .with_semantics(options.semantics)
             .with_detail(Detail::Witness);
@@ -90,6 +109,9 @@ impl DistancePlan {
 pub struct Distance {
     /// They are no nearer than this: proven.
     pub lower: f64,
+    /// The band at the nearest places: the greater of the local radii of the two points there, at most the greater reach,
+    /// in the world. Nothing is promised of where the scanned things themselves are within it.
+    pub band: f64,
     /// They are no further apart than this; see [`Self::evidence`]. Infinite for poses that are none.
     pub upper: f64,
     /// A place of either scan: of the surfaces those that show [`Self::upper`], of points the samples.
@@ -143,6 +165,7 @@ pub fn distance_with(
     let Ok((pose, relative)) = relative(a, b, &plan.boundless) else {
         return Distance {
             lower: 0.0,
+            band: f64::INFINITY,
             upper: f64::INFINITY,
             points: views.map(|view| view.point(0)),
             sources: views.map(|view| view.scan().id(0)),
@@ -156,12 +179,12 @@ pub fn distance_with(
     let meter = Meter::new(budget, leaves, points, 0);
     let level = Level::new();
     let motion = Motion::new(level, views, &pose);
-    let pair = Posed::new(views, relative, meter, level);
+    let pair = Posed::new(views, relative, meter, (level, plan.options.semantics.part()));
     let best = PointPair::new(&pair, [0, 0]);
     let search = Apart { plan, budget, motion, pair, best };
     match plan.options.semantics {
         Semantics::Thickened(radius) => search.balls(radius, scratch),
-        Semantics::Surface => search.surfaces(scratch),
+        Semantics::Obstacle | Semantics::Surface => search.surfaces(scratch),
     }
 }
 
@@ -232,6 +255,8 @@ impl Apart<'_> {
         let lower = if is_bounded { self.motion.proven(search.lower(&self.motion)) } else { 0.0 };
         let feet = if flow.is_continue() { self.approach(gathers) } else { None };
         let found = Distance { lower, complete: flow.is_continue(), ..self.samples() };
+        let of_points = self.of_obstacles();
+        let feet = feet.filter(|feet| !of_points || feet.distance < found.upper && self.are_obstacle(feet));
         let found = feet.map_or(found, |feet| Distance {
             upper: feet.distance,
             points: feet.points,
@@ -247,8 +272,43 @@ impl Apart<'_> {
             let (a, b) = (&self.pair.a.nodes[leaves.a.index()], &self.pair.b.nodes[leaves.b.index()]);
             self.pair.meter.leaf_pair(a.count as usize, b.count as usize);
             self.best = nearest(self.motion.level(), &self.pair, leaves, self.best);
-            search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
+            search.found_points(self.motion.bound_of(self.best.distance.max(0.0)), &self.motion);
+            if self.of_obstacles() {
+                let upper = self.best.distance.max(0.0);
+                let enough = (upper * (1.0 - self.plan.options.relative)).max(upper - self.band());
+                search.is_content_with(self.motion.bound_of(enough), &self.motion);
+            }
         }
+    }
+
+    fn of_obstacles(&self) -> bool {
+        self.plan.options.semantics == Semantics::Obstacle
+    }
+
+    /// The greater local radius of the two nearest points, in the world.
+    fn band(&self) -> f64 {
+        self.pair.band(self.best.points)
+    }
+
+    /// The places of the balls about the nearest points, which lie at `centres`, that are nearest to each other.
+    fn places_of_balls(&self, centres: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
+        let [p, q] = centres.map(Vector3::from);
+        let balls = self.pair.balls(self.best.points);
+        let (way, both) = (q - p, balls[0] + balls[1]);
+        let length = way.norm();
+        if both == 0.0 || length == 0.0 {
+            return centres;
+        }
+        // Balls that overlap share a place.
+        let shares =
+            if both < length { balls.map(|ball| ball / length) } else { [balls[0] / both, balls[1] / both] };
+        [(p + way * shares[0]).into(), (q - way * shares[1]).into()]
+    }
+
+    /// Whether both feet belong to their obstacles.
+    fn are_obstacle(&self, feet: &Feet) -> bool {
+        let views = self.pair.views;
+        (0..2).all(|k| views[k].is_obstacle(self.best.points[k], feet.points[k]))
     }
 
     /// The answer if the surfaces meet.
@@ -264,6 +324,7 @@ impl Apart<'_> {
         let Verdict::Intersecting { contact, evidence } = answer.verdict else { return None };
         Some(Distance {
             lower: 0.0,
+            band: answer.band,
             upper: 0.0,
             points: [contact.point; 2],
             sources: contact.sources,
@@ -288,12 +349,15 @@ impl Apart<'_> {
         let PointPair { distance, points } = self.best;
         let views = self.pair.views;
         let half = |k: usize| 0.5 * f64::from(views[k].slices().radii[points[k]]) * views[k].placed().scale();
+        let of_obstacles = self.of_obstacles();
+        let places = [0, 1].map(|k| views[k].point(points[k]));
         Distance {
             lower: 0.0,
-            upper: distance + half(0) + half(1),
-            points: [0, 1].map(|k| views[k].point(points[k])),
+            band: self.band(),
+            upper: if of_obstacles { distance.max(0.0) } else { distance + half(0) + half(1) },
+            points: if of_obstacles { self.places_of_balls(places) } else { places },
             sources: [0, 1].map(|k| views[k].scan().id(points[k])),
-            evidence: Evidence::Estimated,
+            evidence: if of_obstacles { Evidence::Certified } else { Evidence::Estimated },
             complete: false,
             statistics: self.pair.meter.spent,
         }

@@ -173,9 +173,7 @@ impl Known {
 
     /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail again.
     pub(crate) fn has_front(&self, pair: &Posed<'_>, reach: f32, certifies: bool) -> bool {
-        let fails = |&leaves: &NodePair| {
-            are_leaves(pair, leaves) && pair.gaps_of_enclosures([leaves.a; 2], [leaves.b; 2])[0] <= reach
-        };
+        let fails = |&leaves: &NodePair| are_leaves(pair, leaves) && pair.gap_of_parts(leaves) <= reach;
         self.is_slow(pair, SLOW)
             && self.is_there(pair)
             && !self.is_proof
@@ -220,7 +218,7 @@ impl Known {
         let (reach, slack) = (certifier.reach, certifier.pair.relative.slack());
         let gap = |pair: NodePair| {
             certifier.pair.meter.spent.node_pairs += 1;
-            certifier.pair.gaps_of_enclosures([pair.a; 2], [pair.b; 2])[0]
+            certifier.pair.gap_of_parts(pair)
         };
         let whole = self.advance(reach, slack, stack, gap)
             && resume(nodes_a, nodes_b, certifier, stack).is_continue();

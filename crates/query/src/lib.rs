@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod ball_pair;
 mod batch;
 mod budget;
 mod certify;
@@ -18,6 +19,7 @@ mod manifold;
 mod margin;
 mod options;
 mod pacer;
+mod point_gap;
 mod posed;
 mod priority;
 mod resolution;

@@ -157,7 +157,7 @@ impl Solid {
     /// How far from each other points may be that tell of the contact.
     fn reach(&self) -> f64 {
         match self.semantics {
-            Semantics::Surface => self.margin.max(self.spacing),
+            Semantics::Obstacle | Semantics::Surface => self.margin.max(self.spacing),
             Semantics::Thickened(radius) => 2.0 * radius + self.margin,
         }
     }
@@ -172,7 +172,12 @@ impl Solid {
                 let normal = if distance > 0.0 { between / distance } else { self.apart() };
                 (normal, distance - 2.0 * radius)
             }
-            Semantics::Surface => {
+            Semantics::Obstacle if !pair.are_sheets([i, j]) => {
+                let distance = between.norm();
+                let normal = if distance > 0.0 { between / distance } else { self.apart() };
+                (normal, distance - pair.balls([i, j]).iter().sum::<f64>())
+            }
+            Semantics::Obstacle | Semantics::Surface => {
                 if pair.doubt_about(i, j).is_some() {
                     return None;
                 }
@@ -189,7 +194,12 @@ impl Solid {
             }
         };
         let own = if neighbour.of_b { q + 0.5 * gap * normal } else { p - 0.5 * gap * normal };
-        let middle = if self.semantics == Semantics::Surface { own } else { 0.5 * (p + q) };
+        let is_ball = match self.semantics {
+            Semantics::Obstacle => !pair.are_sheets([i, j]),
+            Semantics::Surface => false,
+            Semantics::Thickened(_) => true,
+        };
+        let middle = if is_ball { 0.5 * (p + q) } else { own };
         (gap <= self.margin).then(|| ManifoldPoint {
             point: middle.into(),
             normal: normal.into(),

@@ -1,6 +1,6 @@
 //! What is asked: options as plain numbers, and the plan that they validate to.
 
-use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_hierarchy::{Part, PointHierarchy};
 use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -12,11 +12,32 @@ use crate::verdict::Evidence;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Semantics {
-    /// Their surfaces have a point in common. Two-sided: a ball wholly inside a hollow ball does not meet it.
+    /// Their obstacles have a point in common (`docs/theory/obstacle.md`). The obstacle of a scan is its surface where
+    /// points sample a sheet, a ball about every other point, and every measured point itself; none of it is
+    /// further from a measured point than that point's local radius or half the scan's reach. Two-sided: a ball
+    /// wholly inside a hollow ball does not meet it.
     #[default]
+    Obstacle,
+    /// Their implicit surfaces have a point in common, as the papers define them: points that sample no sheet are no
+    /// obstacles. Two-sided likewise.
     Surface,
     /// Balls of this radius (world units, zero or more) about the points of both overlap or touch: exact.
     Thickened(f64),
+}
+
+impl Semantics {
+    /// What the volumes of nodes must hold for a certificate of these semantics.
+    pub(crate) const fn part(self) -> Part {
+        match self {
+            Self::Obstacle => Part::Obstacle,
+            Self::Surface | Self::Thickened(_) => Part::Surface,
+        }
+    }
+
+    /// Returns `true` if surfaces are compared, alone or as parts of obstacles, not points alone.
+    pub(crate) const fn is_of_surfaces(self) -> bool {
+        matches!(self, Self::Obstacle | Self::Surface)
+    }
 }
 
 /// How much to say of a contact.
@@ -128,7 +149,7 @@ pub enum Order {
 #[serde(default)]
 #[non_exhaustive]
 pub struct CollideOptions {
-    /// What it means to meet. Default: surfaces.
+    /// What it means to meet. Default: obstacles.
     pub semantics: Semantics,
     /// How much to say of a contact. Default: a witness.
     pub detail: Detail,
@@ -140,15 +161,15 @@ pub struct CollideOptions {
     /// two to three times as much, and says a proven distance; where the proof fails, the separation is still answered
     /// as estimated. By the geodesic kernel it always is, for enclosures are proven of straight distances alone.
     pub evidence: Evidence,
-    /// By which distances surfaces are defined, for [`Semantics::Surface`]. None, the default: as both scans were prepared.
+    /// By which distances surfaces are defined; balls about points know none. None, the default: as both scans were prepared.
     pub metric: Option<Metric>,
-    /// How two leaves are compared, for [`Semantics::Surface`]. Default: by tangent discs.
+    /// How two leaves are compared. Default: by tangent discs. Any other method compares surfaces alone.
     pub method: Method,
-    /// Which pairs of nodes are looked at first, for [`Semantics::Surface`]. None, the default: what measuring found best
+    /// Which pairs of nodes are looked at first, of surfaces and obstacles. None, the default: what measuring found best
     /// (benches/record), depth first, or by overlap where a budget of work or time may end the search.
     pub order: Option<Order>,
-    /// Whether nodes whose boxes overlap are also parted by their sphere coverings (S0 §5.1), for
-    /// [`Semantics::Surface`]. Default: no, for that costs more than it saves (benches/record).
+    /// Whether nodes whose boxes overlap are also parted by their sphere coverings (S0 §5.1), of surfaces and
+    /// obstacles. Default: no, for that costs more than it saves (benches/record).
     pub coverings: bool,
 }
 
@@ -194,7 +215,7 @@ impl CollideOptions {
 
     /// Whether separations are to be proven; of points they always are.
     pub(crate) fn certifies(&self) -> bool {
-        self.semantics == Semantics::Surface && self.evidence == Evidence::Certified
+        self.semantics.is_of_surfaces() && self.evidence == Evidence::Certified
     }
 
     /// The same options with this method.
@@ -232,6 +253,9 @@ pub enum PlanError {
     /// A margin that is no length.
     #[error("a margin of {0}; it must be finite and not negative")]
     Margin(f64),
+    /// A relative precision out of range.
+    #[error("relative must be at least 0 and less than 1, got {0}")]
+    Relative(f64),
     /// Too few or too many test points.
     #[error("{0} test points; 1 to 65536 are possible")]
     TestPoints(u32),
@@ -322,7 +346,7 @@ fn check_method(options: &CollideOptions) -> Result<(), PlanError> {
             }
         }
     }
-    let alone = options.semantics != Semantics::Surface || options.margin > 0.0;
+    let alone = !options.semantics.is_of_surfaces() || options.margin > 0.0;
     if alone { Err(PlanError::SamplingAlone) } else { Ok(()) }
 }
 
@@ -347,7 +371,11 @@ impl CollidePlan {
         }
         check_method(options)?;
         let mut options = *options;
-        if options.semantics == Semantics::Surface {
+        if options.method != Method::Traversal {
+            // The papers' methods compare surfaces.
+            options.semantics = Semantics::Surface;
+        }
+        if options.semantics.is_of_surfaces() {
             let metric = common_metric(options.metric, a, b)?;
             options.metric = Some(metric);
             if metric == Metric::Geodesic {
@@ -361,7 +389,7 @@ impl CollidePlan {
     pub(crate) fn reach(&self) -> f64 {
         match self.options.semantics {
             Semantics::Thickened(radius) => 2.0 * radius + self.options.margin,
-            Semantics::Surface => self.options.margin,
+            Semantics::Obstacle | Semantics::Surface => self.options.margin,
         }
     }
 

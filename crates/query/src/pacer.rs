@@ -111,6 +111,7 @@ mod tests {
 
     fn answer(leaf_pairs: u64) -> Answer {
         Answer {
+            band: f64::INFINITY,
             verdict: Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
             distance_estimate: None,
             statistics: Statistics { leaf_pairs, ..Statistics::default() },

@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Ball, NodePair, Relative, SLACK, Slices, Split};
+use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, Slices, Split};
 
 use crate::budget::Meter;
 use crate::options::{CollidePlan, Semantics};
@@ -17,20 +17,43 @@ pub(crate) struct Posed<'a> {
     pub(crate) b: &'a Slices<'a>,
     pub(crate) relative: Relative,
     pub(crate) meter: Meter,
+    /// What enclosures hold.
+    pub(crate) part: Part,
     /// The instructions that it is looked at by: no result depends on them.
     pub(crate) level: Level,
 }
 
 impl<'a> Posed<'a> {
-    pub(crate) fn new(views: [&'a ScanView<'a>; 2], relative: Relative, meter: Meter, level: Level) -> Self {
+    pub(crate) fn new(
+        views: [&'a ScanView<'a>; 2],
+        relative: Relative,
+        meter: Meter,
+        (level, part): (Level, Part),
+    ) -> Self {
         let [a, b] = views.map(ScanView::slices);
-        Self { views, a, b, relative, meter, level }
+        Self { views, a, b, relative, meter, part, level }
     }
 
     /// The leaves with a point of either scan.
     pub(crate) fn leaves_of(&self, [i, j]: [usize; 2]) -> NodePair {
         let (a, b) = (&self.a.wide.leaves, &self.b.wide.leaves);
         NodePair { a: NodeId(a.id(a.leaf_of(i))), b: NodeId(b.id(b.leaf_of(j))) }
+    }
+
+    /// The band at two points, in the world: the greater of their local radii.
+    pub(crate) fn band(&self, [i, j]: [usize; 2]) -> f64 {
+        self.in_world([self.a.radii[i], self.b.radii[j]])
+    }
+
+    /// The band where the nearest places are of two nodes, in the world: the greatest local radius of any point of theirs.
+    pub(crate) fn band_of(&self, nodes: NodePair) -> f64 {
+        self.in_world([self.a.boxes[nodes.a.index()].reach, self.b.boxes[nodes.b.index()].reach])
+    }
+
+    /// The greater of two lengths in the frames of the scans.
+    fn in_world(&self, [of_a, of_b]: [f32; 2]) -> f64 {
+        let [a, b] = self.views.map(|view| view.placed().scale());
+        (f64::from(of_a) * a).max(f64::from(of_b) * b)
     }
 
     /// A length of the world in a's stored frame, and a little more: what rounding may take from a gap there.
@@ -52,7 +75,21 @@ impl<'a> Posed<'a> {
     /// The gaps between the enclosures of either of `a` and either of `b`.
     #[inline]
     pub(crate) fn gaps_of_enclosures(&self, a: [NodeId; 2], b: [NodeId; 2]) -> [f32; 4] {
-        self.relative.gaps_of_enclosures(self.level, [self.a, self.b], a, b)
+        self.relative.gaps_of_enclosures(self.level, self.part, [self.a, self.b], a, b)
+    }
+
+    /// The gap between the parts of two nodes: that of their enclosures or, of obstacles, that of their points if it is more.
+    pub(crate) fn gap_of_parts(&self, pair: NodePair) -> f32 {
+        self.better_gap(pair, self.gaps_of_enclosures([pair.a; 2], [pair.b; 2])[0])
+    }
+
+    /// `gap`, that of the enclosures of two nodes, or the gap that their points show if it is more.
+    #[inline]
+    pub(crate) fn better_gap(&self, pair: NodePair, gap: f32) -> f32 {
+        match self.part {
+            Part::Obstacle => self.gap_by_points(pair).map_or(gap, |by_points| by_points.max(gap)),
+            Part::Surface => gap,
+        }
     }
 
     /// The gaps of boxes, with how much of each other the boxes overlap when `margin` is about them.
@@ -103,6 +140,7 @@ pub(crate) fn relative(
         return Err(None);
     }
     let about = |view: &ScanView<'_>| match plan.options().semantics {
+        Semantics::Obstacle => view.slices().outline.obstacle,
         Semantics::Surface => view.slices().outline.surface,
         Semantics::Thickened(_) => view.slices().outline.discs,
     };
@@ -156,9 +194,14 @@ impl Balls {
     }
 }
 
-/// A lower bound of the distance of two surfaces in the world: that of balls about them, which is less than 0 where these overlap.
-pub(crate) fn balls_apart([a, b]: [&ScanView<'_>; 2]) -> f64 {
-    Balls::of([a, b], [a.slices().outline.surface, b.slices().outline.surface]).gap
+/// A lower bound of the distance of this part of two scans in the world: that of balls about them, which is less than 0 where
+/// these overlap.
+pub(crate) fn balls_apart([a, b]: [&ScanView<'_>; 2], part: Part) -> f64 {
+    let about = |view: &ScanView<'_>| match part {
+        Part::Obstacle => view.slices().outline.obstacle,
+        Part::Surface => view.slices().outline.surface,
+    };
+    Balls::of([a, b], [about(a), about(b)]).gap
 }
 
 /// Of 2⁻⁵³ each: some ten roundings where poses are composed and applied.

@@ -10,7 +10,7 @@ use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Node, NodePair, Slices, Split, Visitor};
+use nearmiss_hierarchy::{Node, NodePair, Part, Slices, Split, Visitor};
 use nearmiss_surface::meet;
 
 use crate::budget::Budget;
@@ -157,7 +157,7 @@ impl<'a> Surfaces<'a> {
         self.tries += 1;
         self.met.get_or_insert([i, j]);
         let certified = if self.is_settled() { None } else { self.refine(&contact, i, j) };
-        let enough = self.detail != Detail::Witness || certified.is_some() || self.tries >= TRIES;
+        let enough = self.detail == Detail::Verdict || certified.is_some() || self.tries >= TRIES;
         let flow = self.record(contact, certified);
         if enough { flow } else { ControlFlow::Continue(()) }
     }
@@ -179,7 +179,7 @@ impl<'a> Surfaces<'a> {
 
     /// Whether no witness is looked for, or no more.
     pub(crate) fn is_settled(&self) -> bool {
-        self.detail != Detail::Witness
+        self.detail == Detail::Verdict
             || self.tries > TRIES
             || self.found.is_some_and(|(_, evidence)| evidence == Evidence::Certified)
     }
@@ -209,7 +209,9 @@ impl<'a> Surfaces<'a> {
         })?;
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();
         let nearby = NEARBY * radius * va.placed().scale();
-        (meeting.verified && moved <= nearby).then(|| Contact {
+        let is_obstacle = || va.is_obstacle(i, meeting.point) && vb.is_obstacle(j, meeting.point);
+        let holds = meeting.verified && moved <= nearby;
+        (holds && (self.pair.part == Part::Surface || is_obstacle())).then(|| Contact {
             point: meeting.point,
             normals: Some(meeting.at.map(|e| e.normal)),
             residual: meeting.residual(),

@@ -2,7 +2,7 @@
 
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{GeodesicKernel, KernelScratch, SurfaceGraph};
-use nearmiss_hierarchy::{GatherScratch, PointHierarchy, Slices};
+use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, Slices};
 use nearmiss_surface::{Evaluation, Metric};
 
 /// Memory for evaluations of f, used again by the next; never influences a result.
@@ -76,6 +76,19 @@ impl<'a> ScanView<'a> {
     /// Whether its pose is one.
     pub(crate) fn is_proper(&self) -> bool {
         self.is_proper
+    }
+
+    /// Returns `true` if `x`, a place of the implicit surface in the world near the stored point `i`, belongs to the
+    /// obstacle: it lies in the cell of its nearest stored point, which samples a sheet (`docs/theory/obstacle.md`).
+    pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
+        let x = self.placed.apply_inverse(x);
+        let nearest = self.scan.nearest_point_near(i, x) as usize;
+        let Slices { positions, normals, radii, sheets, .. } = self.slices;
+        let away = [0, 1, 2].map(|k| x[k] - f64::from(positions[nearest][k]));
+        let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
+        let distance_sq: f64 = away.iter().map(|d| d * d).sum();
+        let most = f64::from(self.slices.cell_radius(nearest));
+        nearest < sheets && height.abs() <= f64::from(SLAB * radii[nearest]) && distance_sq <= most * most
     }
 
     /// The `i`-th stored point in the world.

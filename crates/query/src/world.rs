@@ -336,7 +336,12 @@ impl<S: Deref<Target = PointHierarchy> + Sync> World<S> {
             [Some(a), Some(b)] => collide_with(&a, &b, plan, budget, scratch),
             _ => {
                 let verdict = Verdict::Undecided(Reason::Pose);
-                Answer { verdict, distance_estimate: None, statistics: Statistics::default() }
+                Answer {
+                    verdict,
+                    band: f64::INFINITY,
+                    distance_estimate: None,
+                    statistics: Statistics::default(),
+                }
             }
         };
         ask_all(pairs.len(), ask, budget.deadline, until, scratch)

@@ -43,7 +43,7 @@ fn crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> [BTreeSet<[usize; 2]>; 2] {
         radius: f64::from(view.scan().discs()[i]) * view.placed().scale(),
     };
     let trusted =
-        |view: &ScanView<'_>, i: usize| matches!(view.scan().kind(i), PointKind::Surface | PointKind::Border);
+        |view: &ScanView<'_>, i: usize| matches!(view.scan().kind(i), PointKind::Sheet | PointKind::Edge);
     let radius = |view: &ScanView<'_>, i: usize| f64::from(view.scan().radii()[i]) * view.placed().scale();
     let (leaves_a, leaves_b) = (leaves(a.scan()), leaves(b.scan()));
     let [mut surely, mut maybe] = [BTreeSet::new(), BTreeSet::new()];

@@ -174,7 +174,7 @@ fn nothing_deeper_is_left_out() {
             if balls {
                 return Some(between.norm() - 0.8 * r).filter(|gap| *gap <= 0.0);
             }
-            let sound = |kind| matches!(kind, PointKind::Surface | PointKind::Border);
+            let sound = |kind| matches!(kind, PointKind::Sheet | PointKind::Edge);
             if !(sound(scans[0].kind(i)) && sound(scans[1].kind(j))) || between.norm() > r {
                 return None;
             }

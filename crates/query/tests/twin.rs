@@ -45,7 +45,7 @@ fn best_crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> (f64, bool) {
                     radius: f64::from(scan.discs()[i]) * view.placed().scale(),
                 };
                 let radius = f64::from(scan.radii()[i]) * view.placed().scale();
-                (disc, matches!(scan.kind(i), PointKind::Surface | PointKind::Border), radius)
+                (disc, matches!(scan.kind(i), PointKind::Sheet | PointKind::Edge), radius)
             })
             .collect()
     };

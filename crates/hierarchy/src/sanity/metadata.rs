@@ -23,6 +23,7 @@ impl PointHierarchy {
             ("source", self.source.len(), points),
             ("boxes", self.boxes.len(), nodes),
             ("growths", self.growths.len(), nodes),
+            ("growths of the obstacle", self.obstacle_growths.len(), nodes),
             (
                 "samples",
                 self.sample_lists.len(),
@@ -57,6 +58,18 @@ impl PointHierarchy {
         }
         if !(self.sampling_radius > 0.0 && self.sampling_radius <= FARTHEST) {
             return wrong("the sampling radius");
+        }
+        if !(self.reach > 0.0 && self.reach <= FARTHEST) {
+            return wrong("the reach");
+        }
+        let fills_leaves = self.leaf_size > 0 && self.sheets % self.leaf_size == 0;
+        let is_parted = || match &self.nodes[..] {
+            [_, left, ..] => left.count == self.sheets,
+            _ => false,
+        };
+        let all = self.sheets as usize == self.len();
+        if !(all || self.sheets == 0 || fills_leaves && is_parted()) {
+            return wrong("the number of points on sheets");
         }
         if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
             return wrong("the number of neighbours for a radius");

@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, u32x4};
 
 use super::{Child, WIDTH, WideTree};
-use crate::build::Slices;
+use crate::build::{Part, Slices};
 use crate::four_nodes::FourNodes;
 use crate::growth::Growth;
 
@@ -38,19 +38,19 @@ impl WideTree {
 }
 
 impl Slices<'_> {
-    /// Boxes and enclosures of [`WideTree::children`], in the same order; what there is in other lanes says nothing.
+    /// Boxes and enclosures of this part of [`WideTree::children`], in the same order; what there is in other lanes says nothing.
     ///
     /// # Panics
     /// When there is no such node.
     #[inline(always)]
     #[must_use]
-    pub fn family<S: Simd>(&self, simd: S, node: Child, whole: bool) -> FourNodes<S> {
+    pub fn family<S: Simd>(&self, simd: S, part: Part, node: Child, whole: bool) -> FourNodes<S> {
         if whole || node.is_leaf() {
             let id = self.wide.id(node).index();
-            return FourNodes::new(simd, [&self.boxes[id]; WIDTH], [&self.growths[id]; WIDTH]);
+            return FourNodes::new(simd, [&self.boxes[id]; WIDTH], [&self.growths_of(part)[id]; WIDTH]);
         }
         let siblings = &self.wide.nodes[node.index()];
-        let Growths(growths) = &self.wide.growths[node.index()];
+        let Growths(growths) = &self.wide.growths[part as usize][node.index()];
         let rows = |[x, y, z]: &[[f32; WIDTH]; 3]| -> [f32x4<S>; 3] {
             [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
         };

@@ -5,6 +5,7 @@ use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
 
 use super::*;
+use crate::build::Part;
 use crate::four_nodes::FourNodes;
 use crate::options::BuildOptions;
 
@@ -321,7 +322,7 @@ fn children_side_by_side_have_the_boxes_and_enclosures_of_the_binary_tree() {
                     children.map(|child| if child == Child::NONE { 0 } else { scan.wide.id(child).index() });
                 for level in levels() {
                     dispatch!(level, simd => {
-                        let own = slices.family(simd, node, whole);
+                        let own = slices.family(simd, Part::Surface, node, whole);
                         let boxes = ids.map(|id| &slices.boxes[id]);
                         let expected = FourNodes::new(simd, boxes, ids.map(|id| &slices.growths[id]));
                         for lane in 0..known {

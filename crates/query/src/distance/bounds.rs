@@ -14,7 +14,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
-use nearmiss_hierarchy::{Child, FourNodes, SLACK, Slices};
+use nearmiss_hierarchy::{Child, FourNodes, Part, SLACK, Slices};
 
 use crate::view::ScanView;
 
@@ -128,6 +128,12 @@ impl Motion {
         ((bound - self.distance) as f32).next_up().next_up()
     }
 
+    /// So much further away than the centres of the scans, or a little less, is what is no nearer than this `bound`.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn no_nearer(&self, bound: f64) -> f32 {
+        ((bound - self.distance) as f32).next_down().next_down().max(self.least())
+    }
+
     /// The least that nodes are [apart](Self::gaps): its bound is 0.
     #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
     pub(crate) fn least(&self) -> f32 {
@@ -139,7 +145,7 @@ impl Motion {
     #[inline]
     pub(crate) fn gaps(
         &self,
-        [of_a, of_b]: [&Slices<'_>; 2],
+        ([of_a, of_b], part): ([&Slices<'_>; 2], Part),
         [a, b]: [Child; 2],
         whole: [bool; 2],
         limits: Limits,
@@ -147,7 +153,7 @@ impl Motion {
         dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
             || {
-                let (a, b) = (of_a.family(simd, a, whole[0]), of_b.family(simd, b, whole[1]));
+                let (a, b) = (of_a.family(simd, part, a, whole[0]), of_b.family(simd, part, b, whole[1]));
                 self.gaps_by(simd, &a, &b, limits)
             },
         ))

@@ -4,14 +4,14 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Node, NodePair};
+use nearmiss_hierarchy::{Node, NodePair, Part, Slices};
 use nearmiss_surface::PointBlock;
 
 use crate::posed::Posed;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Two points, and how far apart they are in the world.
+/// Two points, and how far apart they are in the world: of obstacles less the balls that stand for them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PointPair {
     pub(crate) distance: f64,
@@ -22,8 +22,15 @@ pub(crate) struct PointPair {
 impl PointPair {
     pub(crate) fn new(pair: &Posed<'_>, points: [usize; 2]) -> Self {
         let [p, q] = [0, 1].map(|k| Vector3::from(pair.views[k].point(points[k])));
-        Self { distance: (p - q).norm(), points }
+        let balls = if has_balls(pair, points) { pair.balls(points).iter().sum() } else { 0.0 };
+        Self { distance: (p - q).norm() - balls, points }
     }
+}
+
+/// Whether a ball stands for either point.
+#[inline(always)]
+fn has_balls(pair: &Posed<'_>, points: [usize; 2]) -> bool {
+    pair.part == Part::Obstacle && !pair.are_sheets(points)
 }
 
 /// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that is found.
@@ -39,7 +46,8 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
     let (a, b) = (&pair.a.nodes[leaves.a.index()], &pair.b.nodes[leaves.b.index()]);
     let bounds = &pair.b.boxes[leaves.b.index()];
     let zero = f32x16::simd_from(simd, 0.0);
-    let mut reach_sq = reach_of(pair, best.distance);
+    let mut reach = reach_of(pair, best.distance);
+    let has_balls = has_balls(pair, [a.points().start, b.points().start]);
     for block_a in blocks(a) {
         let [x, y, z] = &pair.a.blocks[block_a].position;
         let own = [
@@ -57,9 +65,12 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
             let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(zero);
             off_sq += beyond * beyond;
         }
+        let balls_a = if has_balls { balls(pair.a, a, block_a) } else { [0.0; WIDTH] };
+        let balls_a = f32x16::load_array_ref(simd, &balls_a) * pair.relative.scale_back();
         let mut left = lanes(a, block_a);
         loop {
-            let near: mask32x16<S> = off_sq.simd_le(reach_sq);
+            let most = balls_a + reach;
+            let near: mask32x16<S> = off_sq.simd_le(most * most);
             left &= bits(near);
             if left == 0 {
                 break;
@@ -74,9 +85,12 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
                     f32x16::load_array_ref(simd, z) - places[2][lane],
                 ];
                 let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let balls_b = if has_balls { balls(pair.b, b, block_b) } else { [0.0; WIDTH] };
+                let both = f32x16::load_array_ref(simd, &balls_b) + balls_a.to_array()[lane];
                 let mut left_b = lanes(b, block_b);
                 loop {
-                    let near: mask32x16<S> = d_sq.simd_le(reach_sq);
+                    let most = both + reach;
+                    let near: mask32x16<S> = d_sq.simd_le(most * most);
                     left_b &= bits(near);
                     if left_b == 0 {
                         break;
@@ -87,7 +101,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
                     let own = PointPair::new(pair, points);
                     if own.distance < best.distance {
                         best = own;
-                        reach_sq = reach_of(pair, best.distance);
+                        reach = reach_of(pair, best.distance);
                     }
                 }
             }
@@ -96,12 +110,23 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
     best
 }
 
-/// The square of how far apart, in b's stored frame, points may come out that are no further apart than `distance`.
+/// How far apart, in b's stored frame, points may come out that are no further apart than `distance`, beside their balls.
 #[inline(always)]
 fn reach_of(pair: &Posed<'_>, distance: f64) -> f32 {
-    let stored = pair.stored(distance) + 3.0 * pair.relative.slack();
-    let reach = stored * pair.relative.scale_back() * (1.0 + 2e-6);
-    reach * reach
+    let stored = pair.stored(distance.max(0.0)) + 3.0 * pair.relative.slack();
+    stored * pair.relative.scale_back() * (1.0 + 2e-6)
+}
+
+/// The radii of the balls about the points of a leaf in this block, in its scan's stored frame.
+fn balls(scan: &Slices<'_>, leaf: &Node, block: usize) -> [f32; WIDTH] {
+    let mut balls = [0.0; WIDTH];
+    let lanes = lanes(leaf, block);
+    for (lane, ball) in balls.iter_mut().enumerate() {
+        if lanes >> lane & 1 != 0 {
+            *ball = scan.obstacle_ball(block * WIDTH + lane);
+        }
+    }
+    balls
 }
 
 /// The lane of the least of those in `lanes`, of which there are some; the first of equals.
@@ -118,14 +143,14 @@ fn least(values: &[f32; WIDTH], lanes: u32) -> usize {
 
 /// The blocks in which a leaf's points lie.
 #[inline(always)]
-fn blocks(leaf: &Node) -> std::ops::RangeInclusive<usize> {
+pub(crate) fn blocks(leaf: &Node) -> std::ops::RangeInclusive<usize> {
     let points = leaf.points();
     points.start / WIDTH..=(points.end - 1) / WIDTH
 }
 
 /// The lanes of a block that are the leaf's, as bits.
 #[inline(always)]
-fn lanes(leaf: &Node, block: usize) -> u32 {
+pub(crate) fn lanes(leaf: &Node, block: usize) -> u32 {
     let (points, first) = (leaf.points(), block * WIDTH);
     let below = |i: usize| (1_u32 << i.saturating_sub(first).min(WIDTH)) - 1;
     below(points.end) & !below(points.start)

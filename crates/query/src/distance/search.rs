@@ -4,7 +4,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use nearmiss_hierarchy::{Child, NodePair, whole};
+use nearmiss_hierarchy::{Child, NodePair, Part, whole};
 
 use crate::distance::bounds::{FAN, Gaps, Limits, Motion};
 use crate::posed::Posed;
@@ -130,6 +130,13 @@ impl<'s> Search<'s> {
         self.points = motion.beyond(bound);
     }
 
+    /// Bounds from below beyond this `bound` are good enough: what is no nearer is not looked at for them any more.
+    pub(crate) fn is_content_with(&mut self, bound: f64, motion: &Motion) {
+        if self.of_surfaces {
+            self.surfaces = self.surfaces.min(motion.no_nearer(bound));
+        }
+    }
+
     /// How near, in a's stored frame, surfaces are at least, or points where these alone are looked for. O(open pairs).
     pub(crate) fn lower(&self, motion: &Motion) -> f64 {
         let known = if self.of_surfaces { self.surfaces } else { self.points };
@@ -171,15 +178,18 @@ impl<'s> Search<'s> {
         let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
         let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
         let (of_enclosures, of_boxes) = (next.enclosures(), next.boxes());
+        let nodes = |[a, b]: [Child; 2]| NodePair { a: pair.a.wide.id(a), b: pair.b.wide.id(b) };
         if next.pair.iter().all(|node| node.is_leaf()) {
-            self.surfaces = self.surfaces.min(of_enclosures);
-            let [a, b] = next.pair;
-            let leaves = || NodePair { a: pair.a.wide.id(a), b: pair.b.wide.id(b) };
-            return (of_boxes < self.points).then(leaves);
+            let leaves = nodes(next.pair);
+            if of_enclosures < self.surfaces {
+                self.surfaces = self.surfaces.min(better(pair, motion, leaves, of_enclosures));
+            }
+            return (of_boxes < self.points).then_some(leaves);
         }
         let whole = whole([pair.a.wide, pair.b.wide], next.pair, pair.relative.scale());
         let limits = Limits { boxes: self.points, enclosures: self.surfaces };
-        let Gaps { boxes, enclosures, near } = motion.gaps([pair.a, pair.b], next.pair, whole, limits);
+        let Gaps { boxes, enclosures, near } =
+            motion.gaps(([pair.a, pair.b], pair.part), next.pair, whole, limits);
         let (a, count_a) = pair.a.wide.children(next.pair[0], whole[0]);
         let (b, count_b) = pair.b.wide.children(next.pair[1], whole[1]);
         let enclosures = if self.of_surfaces { enclosures } else { boxes };
@@ -190,8 +200,18 @@ impl<'s> Search<'s> {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
             // What is in its parents is no nearer than they are.
-            let pair = [a[lane / FAN], b[lane % FAN]];
-            let own = Open::new(enclosures[lane].max(of_enclosures), boxes[lane].max(of_boxes), pair);
+            let children = [a[lane / FAN], b[lane % FAN]];
+            let (mut of_enclosures, mut of_boxes) =
+                (enclosures[lane].max(of_enclosures), boxes[lane].max(of_boxes));
+            if children[0].is_leaf() != children[1].is_leaf() {
+                // The points of a loose leaf say more than its box, also of points.
+                of_enclosures = better(pair, motion, nodes(children), of_enclosures);
+                of_boxes = of_boxes.max(of_enclosures);
+                if of_boxes >= self.points && of_enclosures >= self.surfaces {
+                    continue;
+                }
+            }
+            let own = Open::new(of_enclosures, of_boxes, children);
             if !dives {
                 self.put_off(own);
             } else if let Some(known) = nearest {
@@ -210,5 +230,16 @@ impl<'s> Search<'s> {
     #[inline]
     fn put_off(&mut self, open: Open) {
         if self.steps < NEAREST_FIRST { self.open.heap.push(open) } else { self.open.stack.push(open) }
+    }
+}
+
+/// The greater of a bound by enclosures and that by points, if nodes have one, both relative to the centres of the scans.
+#[inline]
+fn better(pair: &Posed<'_>, motion: &Motion, nodes: NodePair, by_enclosures: f32) -> f32 {
+    match pair.part {
+        Part::Obstacle => pair
+            .gap_by_points(nodes)
+            .map_or(by_enclosures, |gap| by_enclosures.max(motion.no_nearer(f64::from(gap)))),
+        Part::Surface => by_enclosures,
     }
 }

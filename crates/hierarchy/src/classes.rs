@@ -1,0 +1,111 @@
+//! Which points sample a sheet, and which stand for themselves as balls (`docs/theory/obstacle.md`).
+//!
+//! The fit at a point gives its class. A vote of its neighbours then corrects single flips: a noisy point in the
+//! plane of the sheet about it belongs to that sheet, and a plane fitted to a few points of a blob is none. Points
+//! of sheets come first in the order of the points and have a subtree of their own, so that a stray never
+//! widens the bounds of a wall.
+
+use fearless_simd::Level;
+use nearmiss_surface::{BlockTree, Nearest, PointBlock};
+
+use crate::boxes::{dot, sub};
+use crate::neighbours::chunks;
+use crate::split::{Item, id32};
+use crate::surfels::{Fit, PointKind};
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// Neighbours that vote.
+const VOTERS: usize = 8;
+
+/// So many of them make a noisy point one of their sheet: half.
+const MAJORITY: usize = VOTERS / 2;
+
+/// A sheet point with fewer sheet points among its neighbours is noisy: one may be a chance.
+const ALONE: usize = 2;
+
+/// Half the thickness of a sheet at a point, in its local radius: the surface nearest to the point, and a noisy point
+/// of the same sheet, lie no further from its tangent plane. A curvature of 0.6 over the local radius rises so
+/// far at its distance, and so do two standard deviations of a noise of a fifth of the spacing.
+pub const SLAB: f32 = 0.3;
+
+/// Corrects the classes of single points by those of their neighbours. O(n) where all points are on sheets.
+pub(crate) fn vote(tree: &BlockTree<'_>, positions: &[[f32; 3]], radii: &[f32], fits: &mut [Fit]) {
+    let in_doubt = |fits: &[Fit]| fits.iter().any(|fit| fit.kind == PointKind::Noisy);
+    let numbers: Vec<usize> = (0..tree.blocks().len())
+        .filter(|&block| in_doubt(&fits[block * WIDTH..(block * WIDTH + WIDTH).min(fits.len())]))
+        .collect();
+    let (level, before) = (Level::new(), &*fits);
+    let changed = chunks(&numbers, |blocks| {
+        let (mut found, mut changed) = (Nearest::default(), Vec::new());
+        for &block in blocks {
+            tree.nearest(level, block, VOTERS, &mut found);
+            let first = block * WIDTH;
+            for i in first..(first + WIDTH).min(positions.len()) {
+                let near = found.of(i % WIDTH).take(VOTERS).map(|n| n.id as usize);
+                if let Some(fit) = corrected(i, near, positions, radii, before) {
+                    changed.push((i, fit));
+                }
+            }
+        }
+        changed
+    });
+    for (i, fit) in changed.into_iter().flatten() {
+        fits[i] = fit;
+    }
+}
+
+/// The fit of point `i` by the vote of its neighbours, if that is another.
+fn corrected(
+    i: usize,
+    near: impl Iterator<Item = usize>,
+    positions: &[[f32; 3]],
+    radii: &[f32],
+    fits: &[Fit],
+) -> Option<Fit> {
+    let sheets = near.filter(|&j| fits[j].kind.is_sheet());
+    match fits[i].kind {
+        PointKind::Noisy => {
+            let height = |j: usize| dot(fits[j].normal, sub(positions[i], positions[j])).abs();
+            let mut for_sheet = sheets.filter(|&j| height(j) <= SLAB * radii[i].min(radii[j]));
+            // The nearest comes first.
+            let normal = fits[for_sheet.next()?].normal;
+            (for_sheet.count() + 1 >= MAJORITY).then_some(Fit { normal, kind: PointKind::Sheet })
+        }
+        PointKind::Sheet | PointKind::Edge => {
+            (sheets.count() < ALONE).then_some(Fit { kind: PointKind::Noisy, ..fits[i] })
+        }
+        _ => None,
+    }
+}
+
+/// The points in their order again, those of sheets first, and how many these are: as many as fill leaves. Sheet
+/// points that are left over stand for themselves, those at edges before others. `None` if all points are on sheets.
+pub(crate) fn sheets_first(
+    positions: &[[f32; 3]],
+    fits: &[Fit],
+    leaf_size: usize,
+) -> Option<(Vec<Item>, usize)> {
+    let item = |i: usize| Item { position: positions[i], index: id32(i) };
+    let (mut sheets, mut balls): (Vec<usize>, Vec<usize>) =
+        (0..fits.len()).partition(|&i| fits[i].kind.is_sheet());
+    if balls.is_empty() {
+        return None;
+    }
+    let mut over = sheets.len() % leaf_size;
+    for kind in [PointKind::Edge, PointKind::Sheet] {
+        sheets.reverse();
+        sheets.retain(|&i| {
+            let leaves = over > 0 && fits[i].kind == kind;
+            if leaves {
+                over -= 1;
+                balls.push(i);
+            }
+            !leaves
+        });
+        sheets.reverse();
+    }
+    balls.sort_unstable();
+    let count = sheets.len();
+    Some((sheets.into_iter().chain(balls).map(item).collect(), count))
+}

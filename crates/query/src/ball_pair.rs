@@ -1,0 +1,230 @@
+//! The balls that stand in an obstacle for points that sample no sheet, against balls and against discs.
+//!
+//! Where a leaf of balls is near another leaf, each of its points that reaches the other's box is held against
+//! sixteen points there at a time. Whether a ball meets a ball is a matter of arithmetic; whether it
+//! meets a sheet is one too where it holds a point of that sheet, and to first order where it meets a disc.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{LeafBlock, Slices};
+use nearmiss_surface::project;
+
+use crate::posed::Posed;
+use crate::surface::Surfaces;
+use crate::verdict::{Contact, Evidence};
+
+const WIDTH: usize = LeafBlock::WIDTH;
+
+/// What of a place may meet it: up to sixteen points of a leaf, in their scan's stored frame.
+#[derive(Debug, Clone, Copy)]
+struct Targets<'a> {
+    block: &'a LeafBlock,
+    positions: [[f32; WIDTH]; 3],
+    /// The radii of balls; zero for discs.
+    balls: [f32; WIDTH],
+    /// Whether they are discs.
+    are_discs: bool,
+    count: usize,
+}
+
+impl<'a> Targets<'a> {
+    fn new(scan: &Slices<'_>, (block, first, count): (&'a LeafBlock, usize, usize)) -> Self {
+        let (mut positions, mut balls) = ([[0.0; WIDTH]; 3], [0.0; WIDTH]);
+        for lane in 0..count {
+            let p = scan.positions[first + lane];
+            for k in 0..3 {
+                positions[k][lane] = p[k];
+            }
+            balls[lane] = scan.obstacle_ball(first + lane);
+        }
+        Self { block, positions, balls, are_discs: first < scan.sheets, count }
+    }
+
+    /// The lanes of points no further from `x` than `radius`, beside their own discs and balls, as bits.
+    fn within(&self, level: Level, x: [f32; 3], radius: f32) -> u32 {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.within_by(simd, x, radius),
+        ))
+    }
+
+    #[inline(always)]
+    fn within_by<S: Simd>(&self, simd: S, x: [f32; 3], radius: f32) -> u32 {
+        let [px, py, pz] = &self.positions;
+        let d = [
+            f32x16::load_array_ref(simd, px) - x[0],
+            f32x16::load_array_ref(simd, py) - x[1],
+            f32x16::load_array_ref(simd, pz) - x[2],
+        ];
+        let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        let near: mask32x16<S> = if self.are_discs {
+            let zero = f32x16::splat(simd, 0.0);
+            let [nx, ny, nz] = self.block.normals(simd);
+            let height = d[0] * nx + d[1] * ny + d[2] * nz;
+            let beside = (d_sq - height * height).max(zero).sqrt() - self.block.discs(simd);
+            let beside = beside.max(zero);
+            (height * height + beside * beside).simd_le(radius * radius)
+        } else {
+            let reach = f32x16::load_array_ref(simd, &self.balls) + radius;
+            d_sq.simd_le(reach * reach)
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+        let bits = near.to_bitmask() as u32;
+        bits & ((1 << self.count) - 1)
+    }
+
+    /// The squared distance of a place from the box of the leaf.
+    fn distance_sq(&self, x: [f32; 3]) -> f32 {
+        let LeafBlock { centre, half, axes, .. } = self.block;
+        let d = [x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]];
+        (0..3)
+            .map(|k| {
+                let along = d[0] * axes[k][0] + d[1] * axes[k][1] + d[2] * axes[k][2];
+                (along.abs() - half[k]).max(0.0).powi(2)
+            })
+            .sum()
+    }
+}
+
+impl Posed<'_> {
+    /// Returns `true` if both points stand in their obstacles by sheets.
+    #[inline]
+    pub(crate) fn are_sheets(&self, [i, j]: [usize; 2]) -> bool {
+        i < self.a.sheets && j < self.b.sheets
+    }
+
+    /// The radii, in the world, of the balls of points `i` and `j`; zero where they are on sheets.
+    pub(crate) fn balls(&self, [i, j]: [usize; 2]) -> [f64; 2] {
+        let [sa, sb] = self.views.map(|view| view.placed().scale());
+        [f64::from(self.a.obstacle_ball(i)) * sa, f64::from(self.b.obstacle_ball(j)) * sb]
+    }
+
+    /// The contact of a ball, of point `i` or `j` or both, with what the other stands for, if these are no further
+    /// apart than `margin` in the world.
+    ///
+    /// Certified where a ball meets a ball or holds a measured point, estimated where it meets a tangent disc.
+    pub(crate) fn ball_contact(&self, [i, j]: [usize; 2], margin: f64) -> Option<(Contact, Evidence)> {
+        let [p, q] = [self.views[0].point(i), self.views[1].point(j)].map(Vector3::from);
+        let [ra, rb] = self.balls([i, j]);
+        let (distance, most) = ((p - q).norm(), ra + rb + margin);
+        let sources = [self.views[0].scan().id(i), self.views[1].scan().id(j)];
+        let contact = |point: Vector3<f64>, apart: f64| Contact {
+            point: point.into(),
+            normals: None,
+            residual: 0.5 * apart,
+            sources,
+        };
+        if distance <= most {
+            let share = if most > 0.0 { (ra + 0.5 * margin) / most } else { 0.5 };
+            return Some((contact(p + (q - p) * share, distance), Evidence::Certified));
+        }
+        let (centre, side, k) = if ra > 0.0 && rb == 0.0 {
+            (p, 1, j)
+        } else if rb > 0.0 && ra == 0.0 {
+            (q, 0, i)
+        } else {
+            return None;
+        };
+        let foot = self.nearest_of_disc(side, k, centre);
+        let distance = (foot - centre).norm();
+        (distance <= most).then(|| {
+            let way = if distance > 0.0 { (ra + rb + 0.5 * margin).min(distance) / distance } else { 0.0 };
+            (contact(centre + (foot - centre) * way, distance), Evidence::Estimated)
+        })
+    }
+
+    /// The place of the tangent disc of point `k` of a scan that is the nearest to `x`, in the world.
+    fn nearest_of_disc(&self, side: usize, k: usize, x: Vector3<f64>) -> Vector3<f64> {
+        let (view, scan) = (self.views[side], [self.a, self.b][side]);
+        let centre = Vector3::from(view.point(k));
+        let normal = Vector3::from(view.placed().rotate(scan.normals[k].map(f64::from)));
+        let radius = f64::from(scan.discs[k]) * view.placed().scale();
+        let away = x - centre;
+        let across = away - normal * normal.dot(&away);
+        let length = across.norm();
+        centre + if length > radius { across * (radius / length) } else { across }
+    }
+}
+
+impl Surfaces<'_> {
+    /// The points of two leaves, of which one or both hold balls, against each other.
+    #[cold]
+    pub(crate) fn compare_balls(&mut self, [leaf_a, leaf_b]: [usize; 2]) -> ControlFlow<()> {
+        let (a, b) = (self.pair.a, self.pair.b);
+        let (of_a, of_b) = (&a.wide.leaves, &b.wide.leaves);
+        let a_has_balls = of_a.points(leaf_a).start >= a.sheets;
+        let relative = self.pair.relative;
+        // Two places as near as this in the world may come out so much further apart.
+        let reach = self.reach + 2.0 * relative.slack();
+        let level = self.instructions.0;
+        if a_has_balls {
+            for block in of_b.blocks(leaf_b) {
+                let targets = Targets::new(b, block);
+                for i in of_a.points(leaf_a) {
+                    let x = relative.point_back(a.positions[i]);
+                    let radius = (a.obstacle_ball(i) + reach) * relative.scale_back();
+                    if targets.distance_sq(x) <= radius * radius {
+                        let near = targets.within(level, x, radius);
+                        self.balls_meet(near, |lane| [i, block.1 + lane])?;
+                    }
+                }
+            }
+            return ControlFlow::Continue(());
+        }
+        for block in of_a.blocks(leaf_a) {
+            let targets = Targets::new(a, block);
+            for j in of_b.points(leaf_b) {
+                let x = relative.point(b.positions[j]);
+                let radius = b.obstacle_ball(j) * relative.scale() + reach;
+                if targets.distance_sq(x) <= radius * radius {
+                    let near = targets.within(level, x, radius);
+                    self.balls_meet(near, |lane| [block.1 + lane, j])?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Takes down the contacts among the pairs of points that have a bit in `near`.
+    fn balls_meet(&mut self, mut near: u32, points: impl Fn(usize) -> [usize; 2]) -> ControlFlow<()> {
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            let pair = points(lane);
+            self.pair.meter.leaf_work(1);
+            let Some((contact, evidence)) = self.pair.ball_contact(pair, self.margin) else { continue };
+            self.tries += 1;
+            self.met.get_or_insert(pair);
+            let certified = match evidence {
+                Evidence::Certified => Some(contact),
+                Evidence::Estimated if self.is_settled() => None,
+                Evidence::Estimated => self.ball_on_sheet(&contact, pair),
+            };
+            let enough = self.is_settled() || certified.is_some();
+            let flow = self.record(contact, certified);
+            if enough {
+                return flow;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// A verified place of the one scan's sheet in the other's ball, or within the margin of it.
+    fn ball_on_sheet(&mut self, contact: &Contact, [i, j]: [usize; 2]) -> Option<Contact> {
+        if !self.verifies() {
+            return None;
+        }
+        let [ra, rb] = self.pair.balls([i, j]);
+        let (side, k) = if ra > 0.0 { (1, j) } else { (0, i) };
+        let centre = [self.pair.views[0].point(i), self.pair.views[1].point(j)][1 - side];
+        let (view, scratch) = (self.pair.views[side], &mut self.gathers[side]);
+        let foot = project(centre, |y| view.evaluate_near(k, y, scratch));
+        self.pair.meter.spent.evaluations += u64::from(foot.evaluations);
+        let apart = (Vector3::from(foot.point) - Vector3::from(centre)).norm();
+        let holds = foot.converged && apart <= ra + rb + self.margin && view.is_obstacle(k, foot.point);
+        holds.then(|| Contact { point: foot.point, residual: 0.5 * apart, ..*contact })
+    }
+}

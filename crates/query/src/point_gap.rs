@@ -1,0 +1,173 @@
+//! Lower bounds of the distance of obstacles from the points of a leaf.
+//!
+//! No place of the obstacle is further from its nearest point than that point's reach
+//! ([`Slices::obstacle_reach`]). So the balls of these radii about the points of a leaf contain its part of the
+//! obstacle. Where a leaf straddles a gap, as one of a depth frame does at a silhouette, or holds strays, its
+//! box is mostly empty, and these balls tell far more.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
+use nearmiss_hierarchy::{Node, NodePair, OrientedBox, Slices};
+use nearmiss_surface::PointBlock;
+
+use crate::distance::{blocks, lanes};
+use crate::posed::Posed;
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// A leaf longer than so many of its greatest local radii is not a patch of a sheet. Half the length of a patch of 16 points
+/// is some two.
+const LOOSE: f32 = 3.0;
+
+/// Points of a leaf in lanes, in one of the two stored frames, with how far the obstacle reaches from each.
+#[derive(Clone, Copy)]
+struct Balls {
+    centres: [[f32; WIDTH]; 3],
+    reaches: [f32; WIDTH],
+    lanes: u32,
+}
+
+impl Balls {
+    fn of(scan: &Slices<'_>, leaf: &Node, block: usize) -> Self {
+        let lanes = lanes(leaf, block);
+        let mut reaches = [0.0; WIDTH];
+        for (lane, reach) in reaches.iter_mut().enumerate() {
+            if lanes >> lane & 1 != 0 {
+                *reach = scan.obstacle_reach(block * WIDTH + lane);
+            }
+        }
+        Self { centres: scan.blocks[block].position, reaches, lanes }
+    }
+
+    /// The same moved by a motion of this scale.
+    fn moved(&self, scale: f32, to: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
+        let mut moved = *self;
+        for lane in 0..WIDTH {
+            let p = to([self.centres[0][lane], self.centres[1][lane], self.centres[2][lane]]);
+            for k in 0..3 {
+                moved.centres[k][lane] = p[k];
+            }
+            moved.reaches[lane] *= scale;
+        }
+        moved
+    }
+
+    /// The least distance of any ball from the box.
+    #[inline(always)]
+    fn from_box<S: Simd>(&self, simd: S, bounds: &OrientedBox) -> f32 {
+        let d = self.seen_from(simd, bounds.centre);
+        let mut beyond_sq = f32x16::splat(simd, 0.0);
+        for k in 0..3 {
+            let [x, y, z] = bounds.axes[k];
+            let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(0.0);
+            beyond_sq += beyond * beyond;
+        }
+        self.least(simd, beyond_sq.sqrt() - f32x16::load_array_ref(simd, &self.reaches))
+    }
+
+    /// The least distance of any ball from the ball about `p`.
+    #[inline(always)]
+    fn from_ball<S: Simd>(&self, simd: S, p: [f32; 3], radius: f32) -> f32 {
+        let [x, y, z] = self.seen_from(simd, p);
+        let away = (x * x + y * y + z * z).sqrt();
+        self.least(simd, away - f32x16::load_array_ref(simd, &self.reaches)) - radius
+    }
+
+    #[inline(always)]
+    fn seen_from<S: Simd>(&self, simd: S, p: [f32; 3]) -> [f32x16<S>; 3] {
+        let [x, y, z] = &self.centres;
+        [
+            f32x16::load_array_ref(simd, x) - p[0],
+            f32x16::load_array_ref(simd, y) - p[1],
+            f32x16::load_array_ref(simd, z) - p[2],
+        ]
+    }
+
+    #[inline(always)]
+    fn least<S: Simd>(&self, simd: S, of: f32x16<S>) -> f32 {
+        let there = mask32x16::from_bitmask(simd, u64::from(self.lanes));
+        there.select(of, f32x16::splat(simd, f32::INFINITY)).reduce_min()
+    }
+}
+
+impl Posed<'_> {
+    /// Returns `true` if the points of this node of a, or of b, may tell more of its obstacle than its box.
+    #[inline]
+    fn is_loose(scan: &Slices<'_>, id: NodeId) -> bool {
+        let bounds = &scan.boxes[id.index()];
+        scan.nodes[id.index()].is_leaf() && bounds.half[0] > LOOSE * bounds.reach
+    }
+
+    /// A lower bound of the distance of the obstacles of two nodes by the points of a loose leaf, or of two leaves; `None` where
+    /// boxes tell as much.
+    #[inline]
+    pub(crate) fn gap_by_points(&self, pair: NodePair) -> Option<f32> {
+        let [a, b] = [self.a.nodes[pair.a.index()].is_leaf(), self.b.nodes[pair.b.index()].is_leaf()];
+        if a && b {
+            return Some(self.gap_of_leaves(pair));
+        }
+        let [loose_a, loose_b] = [a && Self::is_loose(self.a, pair.a), b && Self::is_loose(self.b, pair.b)];
+        if !(loose_a || loose_b) {
+            return None;
+        }
+        let level = self.level;
+        Some(dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.gap_of_loose(simd, pair, loose_a),
+        )))
+    }
+
+    /// By the points of the loose leaf, which is that of a or else that of b, and the enclosure of the other node.
+    #[inline(always)]
+    fn gap_of_loose<S: Simd>(&self, simd: S, pair: NodePair, of_a: bool) -> f32 {
+        let mut least = f32::INFINITY;
+        if of_a {
+            let leaf = &self.a.nodes[pair.a.index()];
+            let bounds = self.b.obstacle_enclosure(pair.b.index());
+            let back = self.relative.scale_back();
+            for block in blocks(leaf) {
+                let balls = Balls::of(self.a, leaf, block).moved(back, |p| self.relative.point_back(p));
+                least = least.min(balls.from_box(simd, &bounds));
+            }
+            return least * self.relative.scale();
+        }
+        let leaf = &self.b.nodes[pair.b.index()];
+        let bounds = self.a.obstacle_enclosure(pair.a.index());
+        let scale = self.relative.scale();
+        for block in blocks(leaf) {
+            let balls = Balls::of(self.b, leaf, block).moved(scale, |p| self.relative.point(p));
+            least = least.min(balls.from_box(simd, &bounds));
+        }
+        least
+    }
+
+    /// The same of two leaves, by the points of both.
+    pub(crate) fn gap_of_leaves(&self, pair: NodePair) -> f32 {
+        let level = self.level;
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.gap_of_leaves_by(simd, pair),
+        ))
+    }
+
+    #[inline(always)]
+    fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair) -> f32 {
+        let (leaf_a, leaf_b) = (&self.a.nodes[pair.a.index()], &self.b.nodes[pair.b.index()]);
+        let scale = self.relative.scale();
+        let mut least = f32::INFINITY;
+        for block_b in blocks(leaf_b) {
+            let of_b = Balls::of(self.b, leaf_b, block_b).moved(scale, |p| self.relative.point(p));
+            for block_a in blocks(leaf_a) {
+                let of_a = Balls::of(self.a, leaf_a, block_a);
+                for lane in 0..WIDTH {
+                    if of_a.lanes >> lane & 1 != 0 {
+                        let p = [of_a.centres[0][lane], of_a.centres[1][lane], of_a.centres[2][lane]];
+                        least = least.min(of_b.from_ball(simd, p, of_a.reaches[lane]));
+                    }
+                }
+            }
+        }
+        least
+    }
+}
