@@ -5,8 +5,8 @@
 //! whatever the order.
 //!
 //! A surface that crosses from a slice into the next is one surface: where the gap between the highest point of a voxel and the lowest of
-//! the one above is at most ε σ, both are obstacles if together they span more than ε σ; if not, they are one floor,
-//! whose height is that of the upper one.
+//! the one above is at most ε σ, both are obstacles if together they span more than ε σ; if not, they are one floor.
+//! Either voxel keeps its own highest level, so a floor that is looked up in the lower slice has the height of a point.
 
 use crate::Grid;
 use crate::build::Layer;
@@ -130,8 +130,6 @@ fn judge([low, high]: [i32; 2], down: Option<[i32; 2]>, up: Option<[i32; 2]>, mo
     let down = down.map(|span| span.map(|level| level - SLICE)).filter(|[_, to]| low - to <= most);
     let spans = [Some(high - low), up.map(|[_, to]| to - low), down.map(|[from, _]| high - from)];
     let is_obstacle = spans.iter().flatten().any(|span| *span > most);
-    // A floor that is joined to one above goes on there.
-    let top = if up.is_some() && !is_obstacle { u8::MAX - 1 } else { top };
     Content { top, bottom, is_obstacle }
 }
 
@@ -154,7 +152,8 @@ mod tests {
     #[test]
     fn a_floor_that_straddles_two_slices_is_one() {
         // Nine levels from 250 to 259.
-        assert_eq!(judged([250, 253], None, Some([0, 4])), (254, false), "it goes on above");
+        assert_eq!(judged([250, 253], None, Some([0, 4])), (253, false), "its own height");
+        assert_eq!(judged([242, 244], None, Some([0, 4])), (244, false), "never the border of the slices");
         assert_eq!(judged([0, 4], Some([250, 253]), None), (4, false));
         // Too steep together: a wall cut by the border of its slices.
         assert_eq!(judged([240, 253], None, Some([0, 10])), (253, true));

@@ -27,7 +27,7 @@ pub struct Slice {
 /// What a pixel holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Content {
-    /// Level of the highest point; 254 where a floor goes on in the next slice.
+    /// Level of the highest point.
     pub top: u8,
     /// A level that no point is below, at most 15 below the lowest point.
     pub bottom: u8,

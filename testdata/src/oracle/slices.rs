@@ -20,7 +20,7 @@ pub struct SliceTwin {
 /// What a voxel holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TwinVoxel {
-    /// Level of the highest point; 254 where a floor goes on above.
+    /// Level of the highest point.
     pub top: i64,
     /// Level of the lowest point.
     pub low: i64,
@@ -66,8 +66,7 @@ impl SliceTwin {
         if let Some(below) = below {
             is_obstacle |= is_wide(below.0, high);
         }
-        let goes_on = above.is_some() && !is_obstacle;
-        Some(TwinVoxel { top: if goes_on { 254 } else { high - 255 * s }, low: low - 255 * s, is_obstacle })
+        Some(TwinVoxel { top: high - 255 * s, low: low - 255 * s, is_obstacle })
     }
 
     /// What a closed box holds: how many voxels with something, whether one is an obstacle; and the heights of the floors below it, column

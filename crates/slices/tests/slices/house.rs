@@ -2,7 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use nearmiss_slices::{Content, Obstacle, Pixel, SliceMap, SliceOptions};
+use nearmiss_geometry::Aabb;
+use nearmiss_slices::{Content, Floor, Obstacle, Pixel, SliceMap, SliceOptions};
 use nearmiss_testdata::house::{COLUMN, COLUMNS, STOREY, house, scanned};
 
 use crate::built::{built, of_quads};
@@ -64,6 +65,54 @@ fn floors_are_floor_and_walls_are_obstacles() {
     }
 }
 
+/// A floor just below the border of two slices and points just above it are joined to one floor. Its height must be that of a point,
+/// not that of the border.
+#[test]
+fn floors_have_the_heights_of_points_where_slices_join() {
+    let step = |i: u16| f64::from(i) * 0.02 + 0.01;
+    let heights = [0.28, 0.32];
+    let mut points = Vec::new();
+    for (i, j) in (0..60).flat_map(|i| (0..60).map(move |j| (i, j))) {
+        let [x, y] = [step(i), step(j)];
+        points.push([x, y, 0.0]);
+        // In every pixel both heights; on some of the table only the lower.
+        points.extend(heights[..if i < 40 { 2 } else { 1 }].iter().map(|&z| [x, y, z]));
+    }
+    let map = built(&points, &options(0.05, Obstacle::Share(0.3))).unwrap();
+    let grid = map.grid();
+    let level = grid.slice_height / 255.0;
+    let border = grid.origin[2] + 2.0 * grid.slice_height;
+    assert!(heights[0] < border - 10.0 * level && heights[1] > border + 10.0 * level, "a border at {border}");
+
+    let floor = |x: f64, base: f64, rule: Floor| {
+        let bounds = Aabb { min: [x, 0.52, base], max: [x + 0.04, 0.56, base + 0.02] };
+        map.query(&bounds, rule).unwrap().floor.unwrap()
+    };
+    for rule in [Floor::Max, Floor::Mean] {
+        for (x, base, expected) in [
+            (0.52, 0.27, 0.28),
+            (0.52, 0.29, 0.28),
+            (0.52, 0.33, 0.32),
+            (1.0, 0.29, 0.28),
+            (1.0, 0.4, 0.28),
+            (0.52, 0.1, 0.0),
+        ] {
+            let found = floor(x, base, rule);
+            assert!((found - expected).abs() <= level, "{found} at {x} below {base}, expected {expected}");
+        }
+    }
+    // Wherever a box stands, the floor below it is a point's.
+    let mut seen = 0;
+    for i in 0..1000_u16 {
+        let [x, base] = [f64::from(i % 25) * 0.04 + 0.1, f64::from(i / 25) * 0.01];
+        let found = floor(x, base, Floor::Max);
+        let off = [0.0, 0.28, 0.32].map(|z: f64| (found - z).abs()).into_iter().fold(f64::INFINITY, f64::min);
+        assert!(off <= level, "{found} at {x} below {base} is {off} from every point");
+        seen += usize::from(found > 0.1);
+    }
+    assert!(seen > 200, "{seen} times on the table");
+}
+
 /// Of the columns of the map the share that has an obstacle in these rows, in the slice at a height.
 fn obstacle_columns(map: &SliceMap, y: RangeInclusive<f64>, z: f64) -> f64 {
     let grid = map.grid();
@@ -91,7 +140,7 @@ fn no_pixel_of_a_meshs_surface_stays_empty() {
     let map = of_quads(&quads, &options(0.07, SLOPE));
     let (mut seen, mut empty) = (0, 0);
     for p in scanned(&quads, 0.01, 0.0, 1) {
-        let bounds = nearmiss_geometry::Aabb { min: p, max: p };
+        let bounds = Aabb { min: p, max: p };
         seen += 1;
         empty += usize::from(!map.touches(&bounds).unwrap());
     }
