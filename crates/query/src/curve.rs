@@ -14,7 +14,7 @@ use nearmiss_hierarchy::PointHierarchy;
 
 use crate::budget::{Budget, Meter};
 use crate::collide::{CollideScratch, Contacts, collide_all};
-use crate::options::{CollideOptions, CollidePlan, Detail, Order, PlanError};
+use crate::options::{CollideOptions, CollidePlan, Detail, Order, PlanError, Semantics};
 use crate::verdict::{Contact, Evidence, Statistics};
 use crate::view::{ScanView, ViewScratch};
 use follow::{Follower, LONGEST, PARALLEL, SAME_TURN};
@@ -70,6 +70,8 @@ impl CurvePlan {
             return Err(PlanError::CurveLength(length));
         }
         let contacts = CollideOptions::default()
+            // Balls about points have no curves.
+            .with_semantics(Semantics::Surface)
             .with_detail(Detail::Verdict)
             .with_evidence(Evidence::Estimated)
             .with_order(Order::DepthFirst);

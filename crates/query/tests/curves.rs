@@ -14,7 +14,8 @@ use nearmiss_surface::meet;
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::cuts;
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
-use nearmiss_testdata::shapes::{Order, Sampling};
+use nearmiss_testdata::shapes::{Form, Order, Sampling, patch, sphere};
+use rand::RngExt;
 
 /// How far beyond a border, or before it, a curve may end, in sampling radii: f's domain ends where the mean of the points is 0.56 h
 /// away, and how they lie moves that.
@@ -104,6 +105,61 @@ fn poses_swaps_and_densities_change_little() {
     }
 }
 
+/// A step that ends just short of the start must close the loop, wherever the steps happen to fall.
+#[test]
+fn circles_are_closed_in_every_pose_and_no_chord_is_walked_twice() {
+    let mut rng = arbitrary::rng(12);
+    let build = |form: Form, order, seed| {
+        let points = form.sample(Sampling { spacing: 0.08, noise: 0.0, order, seed }).points;
+        PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
+            .unwrap()
+    };
+    let ball = build(sphere(1.0), Order::Regular, 0);
+    let plates: Vec<_> = (0..4).map(|seed| build(patch(3.2, 3.2), Order::Random, seed)).collect();
+    let r = ball.sampling_radius();
+    let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
+    let mut short_edges = 0;
+    for round in 0..6000 {
+        let plate = &plates[round % plates.len()];
+        let d: f64 = rng.random_range(0.0..0.85);
+        let pose = arbitrary::rotation(&mut rng);
+        // The plate's normal is its third axis.
+        let pose = pose.with_translation(pose.rotate([0.0, 0.0, d]));
+        let views = [ScanView::new(&ball, &Pose::IDENTITY), ScanView::new(plate, &pose)];
+        let spacing = [None, Some(0.5 * r), Some(1.1 * r)][round % 3];
+        let mut options = CurveOptions::default();
+        options.spacing = spacing;
+        let plan = CurvePlan::new(&options, &ball, plate).unwrap();
+        curves_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut found, &mut scratch);
+        assert_eq!(found.curves.len(), 1, "round {round}: {:?}", found.curves);
+        assert_eq!(found.curves[0].ends, None, "round {round}: {:?}", found.curves);
+
+        let radius = (1.0 - d * d).sqrt();
+        let share = found.length() / (std::f64::consts::TAU * radius);
+        // The bias of the sphere's radius, r²H/2 or so, is that of the circle's over the sine of the angle.
+        assert!((share - 1.0).abs() < 0.01 / (radius * radius), "round {round}: {share} of the circle");
+        let angle = |i: usize| {
+            let [x, y, _] = pose.apply_inverse(found.points[i]);
+            y.atan2(x)
+        };
+        let mut turns = 0.0;
+        for [i, j] in found.curves[0].edges() {
+            let turn = (angle(j) - angle(i) + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU);
+            turns += (turn - std::f64::consts::PI).abs();
+            let step = to_segment(found.points[i], found.points[j], found.points[j]);
+            assert!(
+                step <= spacing.unwrap_or(2.0 * r) * (1.0 + 1e-9),
+                "round {round}: a step of {} r",
+                step / r
+            );
+            short_edges += usize::from(step < 1e-3 * r);
+        }
+        let turns = turns / std::f64::consts::TAU;
+        assert!((turns - 1.0).abs() < 1e-3, "round {round}: {turns} times round");
+    }
+    assert!(short_edges < 6, "{short_edges} edges without length");
+}
+
 #[test]
 fn spacing_and_tolerance_are_kept() {
     let cut = cuts::torus_and_upright(1.0, 0.5, 0.3);
@@ -170,7 +226,7 @@ fn a_figure_of_eight_is_followed_to_where_it_crosses_itself() {
 
 #[test]
 fn surfaces_that_coincide_touch_in_points() {
-    let points = nearmiss_testdata::shapes::sphere(1.0).sample(Sampling::clean(0.1)).points;
+    let points = sphere(1.0).sample(Sampling::clean(0.1)).points;
     let scan = PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
         .unwrap();
     let view = ScanView::new(&scan, &Pose::IDENTITY);

@@ -201,7 +201,7 @@ impl Follower<'_> {
         let chord = (next.point - here.point).norm();
         if !turns(here, next, chord, self.longest) {
             let passed = self.trail.passed(here, next, SAME_TURN * chord);
-            if passed.is_none() {
+            if passed.is_none_or(|i| self.needs_between(here, next, &self.trail.places[i])) {
                 self.trail.push(*next);
             }
             return Ok(passed);
@@ -214,6 +214,14 @@ impl Follower<'_> {
             None => self.join(&between, next, way, bridges - 1),
             passed => Ok(passed),
         }
+    }
+
+    /// Returns `true` if `passed` lies beyond `next` and a chord from `here` would be too long or turn too far to leave `next` out.
+    fn needs_between(&self, here: &Place, next: &Place, passed: &Place) -> bool {
+        let direct = passed.point - here.point;
+        let is_beyond = (passed.point - next.point).dot(&(next.point - here.point)) > 0.0;
+        let chord = direct.norm();
+        is_beyond && (chord > self.longest || turns(here, &passed.turned_like(here), chord, self.longest))
     }
 
     /// The place on the curve near `aim`, which is about `length` from `here`, or why there is none.

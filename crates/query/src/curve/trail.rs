@@ -79,6 +79,10 @@ impl Trail {
 
     const FEWEST: usize = 256;
 
+    /// Share of its length by which a chord is extended to look for places: [`SAME_TURN`] times the tangent of [`MOST_TURN`]. Within
+    /// `SAME_TURN` of its length aside, no place then lies between two chords that turn by `MOST_TURN`.
+    const BEYOND: f64 = 0.07;
+
     pub(super) fn clear(&mut self, origin: Vector3<f64>, longest: f64) {
         self.places.clear();
         self.next.clear();
@@ -127,7 +131,9 @@ impl Trail {
     fn near(&self, x: Vector3<f64>) -> impl Iterator<Item = usize> {
         let [x, y, z] = self.cube(x, 0.5);
         (0..8).flat_map(move |corner| {
-            let cube = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];
+            // Coordinates saturate far from the origin, as they do in damaged files.
+            let next = |c: i64, axis: i64| c.saturating_add(corner >> axis & 1);
+            let cube = [next(x, 0), next(y, 1), next(z, 2)];
             let existing = |i: u32| Some(i as usize).filter(|_| i != NONE);
             let first = existing(self.heads[self.list(cube)]);
             std::iter::successors(first, move |&i| existing(self.next[i]))
@@ -149,16 +155,19 @@ impl Trail {
     }
 
     /// The nearest place that the chord from `here` to `next` passes within `aside`, in the same direction.
+    ///
+    /// The chord is extended by [`Self::BEYOND`] of its length. Otherwise a place just beyond `next` would be missed where the
+    /// next chord turns away from it: that place is then neither before the end of this chord nor ahead of the next one.
     pub(super) fn passed(&self, here: &Place, next: &Place, aside: f64) -> Option<usize> {
         let chord = next.point - here.point;
         let length = chord.norm();
         let direction = chord / length;
-        let mut nearest = (length, None);
+        let mut nearest = (length * (1.0 + Self::BEYOND), None);
         for i in self.near(here.point) {
             let offset = self.places[i].point - here.point;
             let along = offset.dot(&direction);
-            // Whoever stands here was not passed.
-            let ahead = along > 1e-3 * length && along <= nearest.0;
+            // `here` itself, exactly 0 along, was not passed.
+            let ahead = along > 0.0 && along <= nearest.0;
             if ahead && (offset - direction * along).norm() <= aside && self.places[i].agrees(here) {
                 nearest = (along, Some(i));
             }
@@ -218,6 +227,34 @@ mod tests {
         assert!(seen.iter().all(|&n| n > 500), "both answers: {seen:?}");
     }
 
+    /// Damaged files hold any numbers. Looking far from the origin of the grid must not overflow.
+    #[test]
+    fn places_without_a_cube_are_looked_for_without_overflow() {
+        let normals = [Vector3::y(), Vector3::z()];
+        let far = [f64::MAX, -f64::MAX, f64::INFINITY, -f64::INFINITY, f64::NAN, 1e300, 3.7e19, -3.7e19, 0.0];
+        let mut trail = Trail::default();
+        for longest in [1.0, f64::MIN_POSITIVE, 0.0, f64::MAX, f64::INFINITY, f64::NAN] {
+            for origin in [0.0, -f64::MAX, f64::NAN] {
+                trail.clear(Vector3::repeat(origin), longest);
+                for i in 0..far.len().pow(3) {
+                    let at = |k: u32| far[i / far.len().pow(k) % far.len()];
+                    let place = Place::between(Vector3::new(at(0), at(1), at(2)), normals, 0.0);
+                    assert_eq!(trail.passed(&place, &place, 0.1), None, "a chord without length");
+                    // Any answer will do, as long as there is one.
+                    let _ = trail.has_passed(&place, 0.1);
+                    trail.push(place);
+                }
+                assert_eq!(trail.places.len(), far.len().pow(3));
+            }
+        }
+        // Places are found where the coordinates of cubes saturate, too.
+        trail.clear(Vector3::zeros(), 1.0);
+        let place = Place::between(Vector3::repeat(f64::MAX), normals, 0.0);
+        assert!(!trail.has_passed(&place, 0.1));
+        trail.push(place);
+        assert!(trail.has_passed(&place, 0.1));
+    }
+
     #[test]
     fn a_chord_passes_what_lies_ahead_of_it_and_runs_its_way() {
         let place = |x: f64, y: f64, way: f64| {
@@ -230,6 +267,10 @@ mod tests {
             trail.push(place(x, y, 1.0));
             assert_eq!(trail.passed(&here, &next, 0.1), None, "({x}, {y})");
         }
+        // Just short of a place counts as there; from `next` on it would be aside or behind.
+        let mut short = trail.clone();
+        short.push(place(1.0 + 1e-9, 0.0, 1.0));
+        assert_eq!(short.passed(&here, &next, 0.1), Some(4));
         trail.push(place(0.9, 0.05, 1.0));
         assert_eq!(trail.passed(&here, &next, 0.1), Some(4));
         // Unoriented normals say nothing of a way.
