@@ -1,9 +1,12 @@
 //! `cargo xtask check-proof`: whether what certified answers rest on holds, without the code that found them.
 //!
-//! * Apart: the pairs of nodes cover all pairs of points, and their enclosures are apart, in interval arithmetic.
-//! * Intersecting: the witness is a zero of both functions, summed over all points in double precision.
-//! * Of each scan: a million points of its surface lie in the enclosures of the nodes of their nearest points. That is
-//!   a trial, not a proof; the proof is docs/theory/certificates.md.
+//! * Apart: the pairs of nodes cover all pairs of points, and their enclosures are apart, in interval arithmetic; or,
+//!   of obstacles, the balls about their points in which the obstacle lies.
+//! * Intersecting: the witness is a zero of both functions, summed over all points in double precision; of obstacles a
+//!   zero in a cell, a place in a ball, or a measured point.
+//! * Of each scan: a million points of its surface lie in the enclosures of the nodes of their nearest points, and so
+//!   do those in cells, and the balls, in the enclosures of the obstacle. That is a trial, not a proof; the proofs are
+//!   docs/theory/certificates.md and docs/theory/obstacle.md.
 
 mod boxes;
 mod claim;
@@ -122,6 +125,7 @@ struct Tally {
     separated: usize,
     intersecting: usize,
     pairs: usize,
+    by_points: usize,
     claimed: f64,
     between: usize,
     off: f64,
@@ -167,6 +171,7 @@ impl Tally {
         self.separated += usize::from(finding.kind == Kind::Separated);
         self.intersecting += usize::from(finding.kind == Kind::Intersecting);
         self.pairs += finding.pairs;
+        self.by_points += finding.by_points;
         self.claimed = self.claimed.max(finding.claimed);
         self.between += usize::from(finding.between);
         self.off = self.off.max(finding.off);
@@ -176,12 +181,12 @@ impl Tally {
     }
 
     fn print(&self, poses: Option<&Poses>) {
-        let Self { lines, separated, intersecting, pairs, claimed, .. } = self;
+        let Self { lines, separated, intersecting, pairs, by_points, claimed, .. } = self;
         let Self { between, off, on_the_brink, mended, .. } = self;
         let unproven = lines - separated - intersecting;
         println!("{lines} answers, {unproven} of them not certified");
         println!(
-            "{separated} certified apart, by {pairs} pairs of enclosures; a gap claims at most {:.4} % of what is proven",
+            "{separated} certified apart, by {pairs} pairs of nodes, {by_points} of them by their points; a gap claims at most {:.4} % of what is proven",
             100.0 * claimed
         );
         println!(
@@ -199,9 +204,9 @@ impl Tally {
 }
 
 fn print_sampled(path: &Path, sampled: &Sampled) {
-    let Sampled { starts, points, places, fill, far, .. } = sampled;
+    let Sampled { starts, points, places, in_cells, fill, far, .. } = sampled;
     println!(
-        "{}: {points} surface points from {starts} starts, {places} of them of status ok themselves; at most {:.2} % out \
+        "{}: {points} surface points from {starts} starts, {places} of them of status ok themselves, {in_cells} of all in cells; at most {:.2} % out \
          to a face of an enclosure and {far:.3} local radii from the nearest point",
         path.display(),
         100.0 * fill

@@ -171,7 +171,7 @@ impl Question {
         let [a, b] = self.views(&asked.poses);
         if let (Some((path, file)), Some(proof)) = (&mut out.proof, &asked.proof) {
             let line = asked.line.unwrap_or(0);
-            proof::write(file, line, [&a, &b], args.margin, &asked.answer, proof)
+            proof::write(file, line, [&a, &b], self.plan.options(), &asked.answer, proof)
                 .map_err(CliError::writing(path))?;
         }
         let results = &mut *out.results;

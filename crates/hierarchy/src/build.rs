@@ -156,14 +156,15 @@ impl Slices<'_> {
         self.obstacle_growths[node].of(&self.boxes[node])
     }
 
-    /// The radius of the ball that stands for a point in the obstacle, half its local radius; zero for points on sheets.
+    /// The radius of the ball that stands for a point in the obstacle: half its local radius, a third where it has others
+    /// all around it, zero for points on sheets.
     ///
     /// # Panics
     /// When there is no such point.
     #[inline]
     #[must_use]
     pub fn obstacle_ball(&self, i: usize) -> f32 {
-        obstacle_ball(i, self.sheets, self.radii[i])
+        obstacle_ball(i, self.sheets, PointKind::from_code(self.kinds[i]), self.radii[i])
     }
 
     /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its part of a
@@ -214,11 +215,24 @@ pub(crate) fn cell_radius(radius: f32, reach: f32) -> f32 {
 /// How far a disc with its thickness reaches, in its radius.
 const DISC_REACH: f32 = 1.0 + THICKNESS;
 
-/// See [`Slices::obstacle_ball`]. Half the local radius is the most at which two balls that touch are no further
-/// apart than the greater of their local radii.
+/// The ball of a point that has others all around, in its local radius: half the radius of a disc of a sheet. The nearest
+/// neighbour is 0.36 local radii away on average, so such balls overlap.
+const BALL_AMONG_OTHERS: f32 = 0.325;
+
+/// The ball of any other point. Half the local radius is the most at which the centres of two balls that touch are no further apart
+/// than the greater of their local radii.
+const BALL_OF_SPARSE: f32 = 0.5;
+
+/// See [`Slices::obstacle_ball`].
 #[inline]
-pub(crate) fn obstacle_ball(i: usize, sheets: usize, radius: f32) -> f32 {
-    if i < sheets { 0.0 } else { 0.5 * radius }
+pub(crate) fn obstacle_ball(i: usize, sheets: usize, kind: PointKind, radius: f32) -> f32 {
+    if i < sheets {
+        0.0
+    } else if kind.is_sparse() {
+        BALL_OF_SPARSE * radius
+    } else {
+        BALL_AMONG_OTHERS * radius
+    }
 }
 
 /// See [`Slices::ball`].

@@ -5,17 +5,18 @@
 
 use std::ops::Range;
 
-use nearmiss_surface::{Evaluation, Metric, PointBlock};
+use nearmiss_surface::{BlockTree, Evaluation, Metric, PointBlock};
 
 use crate::boxes::dot;
 use crate::build::{PointHierarchy, ball, obstacle_ball};
+use crate::classes::vote;
 use crate::covering::{Ground, Solid, coverings};
 use crate::extents::{Discs, boxes_of_discs};
 use crate::levels::samples;
 use crate::neighbours::chunks;
 use crate::spacing::Look;
 use crate::split::id32;
-use crate::surfels::{NormalCone, PointKind, Surfel, align, cone, surfel_among};
+use crate::surfels::{Fit, NormalCone, PointKind, Surfel, align, cone, fitted, surfel_of};
 
 impl PointHierarchy {
     /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about them. Only of the
@@ -48,7 +49,24 @@ impl PointHierarchy {
             };
             leaves.iter().cloned().flatten().map(surfel).collect::<Vec<_>>()
         });
-        let surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
+        let mut surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
+        let mut fits: Vec<Fit> = surfels.iter().map(|s| Fit { normal: s.normal, kind: s.kind }).collect();
+        vote(&BlockTree::new(&self.blocks, self.positions.len()), &self.positions, &self.radii, &mut fits);
+        let corrected: Vec<usize> = (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].kind).collect();
+        let discs = chunks(&corrected, |points| {
+            let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
+            let surfel = |&i: &usize| {
+                heard.clear();
+                fit(id32(i), &mut scratch, &mut heard);
+                self.gather(&heard, &mut near);
+                let fit = Fit { normal: self.on_its_side(i, fits[i].normal), ..fits[i] };
+                surfel_of(&fit, self.positions[i], (self.radii[i], self.reach), &near)
+            };
+            points.iter().map(surfel).collect::<Vec<_>>()
+        });
+        for (i, disc) in corrected.into_iter().zip(discs.into_iter().flatten()) {
+            surfels[i] = disc;
+        }
         self.metric = metric;
         self.replace(&surfels);
     }
@@ -73,11 +91,14 @@ impl PointHierarchy {
             PointKind::Sparse => Look::Sparse,
             _ => Look::Area,
         };
-        let mut surfel = surfel_among(self.positions[i], at, (self.radii[i], self.reach), look, near);
-        if dot(surfel.normal, self.normals[i]) < 0.0 {
-            surfel.normal = surfel.normal.map(|c| -c);
-        }
-        surfel
+        let fit = fitted(at, look);
+        let surfel = surfel_of(&fit, self.positions[i], (self.radii[i], self.reach), near);
+        Surfel { normal: self.on_its_side(i, surfel.normal), ..surfel }
+    }
+
+    /// A normal of point `i`, on the side of that which it has.
+    fn on_its_side(&self, i: usize, normal: [f32; 3]) -> [f32; 3] {
+        if dot(normal, self.normals[i]) < 0.0 { normal.map(|c| -c) } else { normal }
     }
 
     /// Takes these discs for its own, and bounds them.
@@ -87,7 +108,7 @@ impl PointHierarchy {
         let discs: Vec<f32> = surfels.iter().map(|s| s.disc).collect();
         let sheets = self.sheets as usize;
         let ball = |(i, (s, &r)): (usize, (&Surfel, &f32))| {
-            ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, sheets, r))
+            ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, sheets, s.kind, r))
         };
         let balls: Vec<f32> = surfels.iter().zip(&self.radii).enumerate().map(ball).collect();
         let cones: Vec<NormalCone> = if self.is_oriented {

@@ -268,7 +268,7 @@ pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Sur
     let mut radii = known.radii.iter().enumerate();
     for (surfels, bounds) in parts {
         for (surfel, (i, &radius)) in surfels.iter().zip(&mut radii) {
-            let own = obstacle_ball(i, known.sheets, radius);
+            let own = obstacle_ball(i, known.sheets, surfel.kind, radius);
             all.push(surfel, ball(surfel.kind, radius, known.ordinary).max(own));
         }
         for [surface, obstacle] in bounds {
@@ -364,27 +364,25 @@ fn surfel(fit: &Fit, radius: f32, reach: f32, gap: u32) -> Surfel {
 }
 
 /// What f at a point says of it.
-fn fitted(at: &Evaluation, look: Look) -> Fit {
+pub(crate) fn fitted(at: &Evaluation, look: Look) -> Fit {
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
     let normal = at.normal.map(|c| c as f32);
     Fit { normal, kind: kind(at, look) }
 }
 
-/// The disc of the point `p` at which f is `at`, narrowed where the sectors about it are empty of the points in `near`,
-/// whose support radii reach `p`.
-pub(crate) fn surfel_among(
+/// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose support radii
+/// reach `p`.
+pub(crate) fn surfel_of(
+    fit: &Fit,
     p: [f32; 3],
-    at: &Evaluation,
     (radius, reach): (f32, f32),
-    look: Look,
     near: &[PointBlock],
 ) -> Surfel {
-    let fit = fitted(at, look);
     let gap = dispatch!(Level::new(), simd => simd.vectorize(
         #[inline(always)]
         || widest_gap(simd, p, fit.normal, near.iter()),
     ));
-    surfel(&fit, radius, reach, gap)
+    surfel(fit, radius, reach, gap)
 }
 
 /// The radius of a disc over the local sampling radius, given how many sectors beside each other are empty.

@@ -146,7 +146,9 @@ fn sampling_radii_equal_the_twin() {
             let found = f64::from(scan.slices().sampling_radius_of(id));
             let (mut low, mut high) = (0.0_f64, 0.0_f64);
             for i in node.points() {
-                let (disc, ball) = (f64::from(scan.discs()[i]), f64::from(scan.slices().ball(i)));
+                let slices = scan.slices();
+                let ball = f64::from(slices.ball(i).max(slices.obstacle_ball(i)));
+                let disc = f64::from(scan.discs()[i]);
                 let about = to_nearest(&centres, scan.positions()[i].map(f64::from)) + ball;
                 low = low.max(radius_of(i, &centres, disc, 0.0)).max(about);
                 high = high.max(radius_of(i, &centres, (1.05 * disc).max(ball), (0.05 * disc).max(ball)));

@@ -87,17 +87,26 @@ fn blobs_wires_and_lone_points_are_named() {
 }
 
 #[test]
-fn where_samples_are_far_fewer_than_elsewhere_discs_end_at_the_horizon() {
+fn nothing_is_interpolated_beyond_the_reach() {
     // A twentieth of the points, thirty times as far from each other, and too far away to be smoothed.
     let far = lattice(15, 3.0, |_, _| 0.0).into_iter().map(|[x, y, z]| [x + 500.0, y, z]);
     let points: Vec<[f64; 3]> = lattice(70, 0.1, |_, _| 0.0).into_iter().chain(far).collect();
     let scan = prepared(&points);
-    let greatest = |of: &[f32]| f64::from(of.iter().copied().fold(0.0, f32::max));
-    let horizon = f64::from(scan.plan().horizon(1.0)) * scan.sampling_radius();
-    assert!(greatest(scan.radii()) > 4.0, "{}", greatest(scan.radii()));
-    assert!(
-        (greatest(scan.discs()) / horizon - 1.0).abs() < 1e-5,
-        "{} for {horizon}",
-        greatest(scan.discs())
-    );
+    let (reach, scale) = (scan.reach(), scan.frame().scale);
+    assert!((reach / (2.0 * scan.sampling_radius()) - 1.0).abs() < 1e-6, "{reach}");
+    for i in 0..scan.len() {
+        let is_far = scan.source()[i] >= 4900;
+        assert_eq!(scan.kind(i).is_sparse(), is_far, "point {i}: {:?}", scan.kind(i));
+        let [radius, disc] = [scan.radii()[i], scan.discs()[i]].map(|x| f64::from(x) * scale);
+        let ball = f64::from(scan.slices().obstacle_ball(i)) * scale;
+        let limit = reach * (1.0 + 1e-6);
+        assert!(radius <= limit && disc <= 0.5 * limit && ball <= 0.5 * limit, "point {i}");
+        if is_far {
+            assert!((ball / (0.5 * reach) - 1.0).abs() < 1e-5, "point {i}: {ball}");
+        }
+    }
+    // A greater reach bridges what the default does not.
+    let cloud = PointCloud::from_positions(&points).unwrap();
+    let wide = PointHierarchy::build(&cloud, &BuildOptions::default().with_reach(12.0)).unwrap();
+    assert!(wide.share(PointKind::Stray) < 1e-9 && wide.share(PointKind::Sheet) > 0.9);
 }

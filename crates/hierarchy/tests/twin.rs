@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::PointCloud;
-use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy};
+use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy, PointKind};
 use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::instructions::levels;
@@ -57,8 +57,12 @@ fn radii_equal_the_twin() {
         let scan = prepared(&arbitrary::cloud(kind, 700, 3), &BuildOptions::default());
         let expected = oracle::radii(&stored(&scan));
         let mut differ = 0;
-        for (found, expected) in scan.radii().iter().zip(&expected) {
-            differ += u32::from((f64::from(*found) / expected - 1.0).abs() > 1e-5);
+        let reach = scan.reach() / scan.frame().scale;
+        for (i, expected) in expected.iter().enumerate() {
+            let (found, expected) = (f64::from(scan.radii()[i]), expected.min(reach));
+            // A ring whose next ring is beyond the reach has the distance of its sixth neighbour.
+            let is_line = scan.kind(i) == PointKind::Line && found < expected;
+            differ += u32::from((found / expected - 1.0).abs() > 1e-5 && !is_line);
         }
         // Which of several equally near neighbours counts is open; it matters where they are judged as a line.
         let most = if matches!(kind, CloudKind::Lattice | CloudKind::Rings) { 20 } else { 0 };

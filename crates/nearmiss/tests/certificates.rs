@@ -159,11 +159,19 @@ fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
         let mut bytes = Vec::new();
         scan.write_to(&mut bytes).unwrap();
         let scan = Scan::from_bytes(bytes, Check::Full).unwrap();
-        let options = CollideOptions::default().with_evidence(Evidence::Certified);
-        let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
-        let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.0, 20.0, 0.0])));
-        let verdict = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict;
-        assert_eq!(verdict, Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated }, "{h}");
+        let asked = |semantics| {
+            let options = CollideOptions::default().with_semantics(semantics).with_evidence(Evidence::Certified);
+            let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
+            let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.0, 20.0, 0.0])));
+            collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict
+        };
+        let nothing = Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated };
+        assert_eq!(asked(Semantics::Surface), nothing, "{h}");
+        // Cells end where no point vouches for the surface, whatever its bandwidth.
+        let Verdict::Separated { gap, evidence: Evidence::Certified } = asked(Semantics::Obstacle) else {
+            panic!("{h}: obstacles are apart");
+        };
+        assert!(gap > 10.0 && gap <= 18.1, "{h}: {gap}");
     }
 }
 

@@ -83,7 +83,8 @@ fn one_contact_of_every_pair_of_leaves_whose_discs_cross() {
             let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
             let [surely, maybe] = crossing(&va, &vb);
             for detail in [Detail::Verdict, Detail::Witness] {
-                let options = CollideOptions::default().with_detail(detail);
+                let options =
+                    CollideOptions::default().with_semantics(Semantics::Surface).with_detail(detail);
                 let plan = CollidePlan::new(&options, &a, &b).unwrap();
                 let answer = collide_all(&va, &vb, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
                 assert!(contacts.complete, "without a budget");

@@ -52,11 +52,14 @@ fn hints_change_no_verdict() {
         let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
         let r = a.sampling_radius();
         let base = CollideOptions::default().with_detail(Detail::Verdict);
+        let surfaces = base.with_semantics(Semantics::Surface);
         let questions = [
             base,
             base.with_order(Order::Overlap),
             base.with_margin(r),
             base.with_evidence(Evidence::Certified),
+            surfaces,
+            surfaces.with_evidence(Evidence::Certified),
             base.with_evidence(Evidence::Certified).with_margin(0.5 * r),
             base.with_semantics(Semantics::Thickened(0.3 * r)),
         ];
@@ -81,8 +84,9 @@ fn hints_change_no_verdict() {
                         kind(&warm.verdict).0,
                         "{cloud:?} {options:?} {step}: {cold:?} {warm:?}"
                     );
-                    if let (Verdict::Separated { gap, evidence: Evidence::Certified }, Semantics::Surface) =
-                        (warm.verdict, options.semantics)
+                    let of_points = matches!(options.semantics, Semantics::Thickened(_));
+                    if let Verdict::Separated { gap, evidence: Evidence::Certified } = warm.verdict
+                        && !of_points
                     {
                         // Enclosures hold the points.
                         let least = least_distance(&views);
@@ -92,7 +96,7 @@ fn hints_change_no_verdict() {
                         );
                         proven += 1;
                     }
-                    if options.semantics == Semantics::Surface {
+                    if !of_points {
                         evident += usize::from(kind(&cold.verdict).1 != kind(&warm.verdict).1);
                     }
                     seen[usize::from(kind(&cold.verdict).0)] += 1;

@@ -4,7 +4,7 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::{Budget, CollideOptions, CollidePlan, Reason, ScanView, Verdict, collide};
+use nearmiss_query::{Budget, CollideOptions, CollidePlan, Reason, ScanView, Semantics, Verdict, collide};
 use nearmiss_testdata::{arbitrary, oracle};
 
 fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
@@ -12,7 +12,8 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
 }
 
 fn ask(a: &ScanView<'_>, b: &ScanView<'_>) -> Verdict {
-    let plan = CollidePlan::new(&CollideOptions::default(), a.scan(), b.scan()).unwrap();
+    let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
+    let plan = CollidePlan::new(&surfaces, a.scan(), b.scan()).unwrap();
     collide(a, b, &plan, &Budget::UNLIMITED).verdict
 }
 

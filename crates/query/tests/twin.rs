@@ -123,7 +123,8 @@ fn surfaces_meet_where_some_discs_cross() {
             let pose = arbitrary::rotation(&mut rng).with_translation(spread);
             let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
             let (slack, doubtful) = best_crossing(&va, &vb);
-            let options = CollideOptions::default().with_detail(Detail::Verdict);
+            let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
+            let options = surfaces.with_detail(Detail::Verdict);
             let verdict = ask(&va, &vb, options, &Budget::UNLIMITED).verdict;
             // Rounding, and the thickness of nearly parallel discs, decide in between.
             if slack > 1e-3 {

@@ -33,6 +33,11 @@ impl Placed {
         Self { centre, axes, half: enclosure.half.map(f64::from), about, directions }
     }
 
+    /// The point of this stored position where `matrix` puts it.
+    pub(crate) fn point(position: [f32; 3], matrix: &Matrix) -> Self {
+        Self::new(&Enclosure { first: 0, count: 1, centre: position, half: [0.0; 3], axes: [[0.0; 3]; 3] }, matrix)
+    }
+
     /// About how far the box extends from its centre along `d`.
     fn extent(&self, d: Vector) -> f64 {
         (0..3).map(|k| self.half[k] * times(d, self.directions[k]).abs()).sum()
@@ -57,6 +62,20 @@ pub(crate) fn distance(a: &Placed, b: &Placed, wanted: f64) -> Option<f64> {
     let best = ranked.max_by(|x, y| x.0.total_cmp(&y.0));
     let proven = best.and_then(|(_, d)| distance_along(a, b, d, wanted));
     proven.or_else(|| distance_along(a, b, between_nearest(a, b), wanted))
+}
+
+/// About how far two sets of balls are apart, if it is proven that they are disjoint and at least `wanted` apart: of each its
+/// centre, or a box of which every place is a centre, and the radius.
+pub(crate) fn distance_of_balls(a: &[(Placed, f64)], b: &[(Placed, f64)], wanted: f64) -> Option<f64> {
+    let mut least = f64::INFINITY;
+    for (p, of_a) in a {
+        for (q, of_b) in b {
+            let radii = Interval::new(*of_a) + Interval::new(*of_b);
+            let apart = distance(p, q, (Interval::new(wanted) + radii).high)?;
+            least = least.min(apart - radii.high);
+        }
+    }
+    Some(least)
 }
 
 /// What `direction`, of any length, proves.

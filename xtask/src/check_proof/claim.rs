@@ -1,9 +1,9 @@
 //! Whether what a line of a proof claims holds.
 
-use super::boxes::{Placed, distance};
+use super::boxes::{Placed, distance, distance_of_balls};
 use super::cover::{Rectangle, uncovered};
 use super::placement::Placement;
-use super::proof::{Enclosure, Line, Matrix, Poses, Verdict};
+use super::proof::{Enclosure, Line, Matrix, Of, Poses, Verdict};
 use super::subject::Subject;
 use super::witness;
 
@@ -15,6 +15,9 @@ const RESIDUAL: f64 = 1e-5;
 
 /// What it may do to a distance in the world, relatively.
 const ROUNDING: f64 = 1e-6;
+
+/// Nodes of at most so many points are also looked at point by point.
+const POINT_BY_POINT: u32 = 64;
 
 /// What a line claims.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,8 +33,10 @@ pub(crate) enum Kind {
 pub(crate) struct Finding {
     pub(crate) kind: Kind,
     pub(crate) faults: Vec<String>,
-    /// Pairs of enclosures seen to be apart.
+    /// Pairs of nodes seen to be apart.
     pub(crate) pairs: usize,
+    /// Of these, those whose points show it.
+    pub(crate) by_points: usize,
     /// The greatest part of what could be proven of a pair that the gap claims.
     pub(crate) claimed: f64,
     /// Whether the witness lies between two surfaces nearer than the margin, not on both.
@@ -62,6 +67,7 @@ impl Checker<'_> {
             kind,
             faults: Vec::new(),
             pairs: 0,
+            by_points: 0,
             claimed: 0.0,
             between: false,
             off: 0.0,
@@ -70,7 +76,7 @@ impl Checker<'_> {
         };
         let checked = match kind {
             Kind::Separated => {
-                self.placements(line, &mut finding).and_then(|_| self.separated(line, &mut finding))
+                self.placements(line, &mut finding).and_then(|placements| self.separated(line, &placements, &mut finding))
             }
             Kind::Intersecting => self
                 .placements(line, &mut finding)
@@ -103,12 +109,17 @@ impl Checker<'_> {
     }
 
     /// The pairs cover all pairs of points, their nodes are the scans', and their enclosures are far enough apart.
-    fn separated(&self, line: &Line, finding: &mut Finding) -> Result<(), String> {
+    fn separated(
+        &self,
+        line: &Line,
+        placements: &[Placement; 2],
+        finding: &mut Finding,
+    ) -> Result<(), String> {
         let gap = line.gap.filter(|gap| *gap >= 0.0).ok_or("certified apart without a gap")?;
         for (name, nodes, subject) in
             [("a", &line.nodes_a, self.subjects[0]), ("b", &line.nodes_b, self.subjects[1])]
         {
-            nodes.iter().try_for_each(|node| subject.check_node(node)).map_err(|e| format!("{name}: {e}"))?;
+            nodes.iter().try_for_each(|node| subject.check_node(node, line.of)).map_err(|e| format!("{name}: {e}"))?;
         }
         let known = |[i, j]: [usize; 2]| i < line.nodes_a.len() && j < line.nodes_b.len();
         if let Some(pair) = line.pairs.iter().find(|pair| !known(**pair)) {
@@ -131,7 +142,11 @@ impl Checker<'_> {
         let (a, b) = (place(&line.nodes_a, &line.placed_a), place(&line.nodes_b, &line.placed_b));
         let wanted = gap.max(line.margin);
         for &[i, j] in &line.pairs {
-            let Some(proven) = distance(&a[i], &b[j], wanted) else {
+            let proven = distance(&a[i], &b[j], wanted).or_else(|| {
+                finding.by_points += 1;
+                self.by_points(line, placements, [i, j], [&a[i], &b[j]], wanted)
+            });
+            let Some(proven) = proven else {
                 let [a, b] = [&line.nodes_a[i], &line.nodes_b[j]].map(points);
                 return Err(format!("the enclosures of {a:?} of a and {b:?} of b are not {wanted} apart"));
             };
@@ -139,6 +154,35 @@ impl Checker<'_> {
             finding.claimed = finding.claimed.max(wanted / proven);
         }
         Ok(())
+    }
+
+    /// About how far the obstacles of a pair of nodes are apart, if their points show that it is at least `wanted`: the balls
+    /// about the points of either, or of both, in which the obstacle lies.
+    fn by_points(
+        &self,
+        line: &Line,
+        placements: &[Placement; 2],
+        [i, j]: [usize; 2],
+        [a, b]: [&Placed; 2],
+        wanted: f64,
+    ) -> Option<f64> {
+        if line.of != Of::Obstacle {
+            return None;
+        }
+        let balls = |side: usize, node: &Enclosure, matrix: &Matrix| -> Option<Vec<(Placed, f64)>> {
+            let subject = self.subjects[side];
+            let scale = placements[side].scale * (1.0 + 1e-12);
+            let range = node.first as usize..(node.first + node.count) as usize;
+            let ball = |k: usize| (Placed::point(subject.scan.positions()[k], matrix), subject.reach(k) * scale);
+            (node.count <= POINT_BY_POINT).then(|| range.map(ball).collect())
+        };
+        let (of_a, of_b) =
+            (balls(0, &line.nodes_a[i], &line.placed_a), balls(1, &line.nodes_b[j], &line.placed_b));
+        let (box_a, box_b) = ([(*a, 0.0)], [(*b, 0.0)]);
+        let one = of_a.as_ref().and_then(|of_a| distance_of_balls(of_a, &box_b, wanted));
+        let other = || of_b.as_ref().and_then(|of_b| distance_of_balls(&box_a, of_b, wanted));
+        let both = || distance_of_balls(of_a.as_ref()?, of_b.as_ref()?, wanted);
+        one.or_else(other).or_else(both)
     }
 
     /// The witness lies on both surfaces; or, if these count as meeting from a margin on, points of either are so near
@@ -151,6 +195,9 @@ impl Checker<'_> {
     ) -> Result<(), String> {
         let witness = line.witness.ok_or("certified to intersect without a witness")?;
         let claimed = line.residual.filter(|r| *r >= 0.0).ok_or("a witness without a residual")?;
+        if line.of == Of::Obstacle {
+            return self.obstacles_meet(line, placements, witness, finding);
+        }
         let on = |i: usize, name: &str| {
             witness::check(self.subjects[i], &placements[i], witness).map_err(|e| format!("{name}: {e}"))
         };
@@ -178,6 +225,46 @@ impl Checker<'_> {
         let residual = a.residual.max(b.residual);
         if !finding.between && (residual - claimed).abs() > RESIDUAL * a.bandwidth.max(b.bandwidth) {
             return Err(format!("the residual is {residual:.2e}, not {claimed:.2e}"));
+        }
+        Ok(())
+    }
+
+    /// The witness lies in both obstacles, or together no further from them than the margin: on the surface in a cell, in a ball,
+    /// or at a measured point.
+    fn obstacles_meet(
+        &self,
+        line: &Line,
+        placements: &[Placement; 2],
+        x: [f64; 3],
+        finding: &mut Finding,
+    ) -> Result<(), String> {
+        let away = [0, 1].map(|i| {
+            let (subject, placement) = (self.subjects[i], &placements[i]);
+            if let Ok(seen) = witness::check(subject, placement, x)
+                && subject.is_in_cell(placement.stored(x))
+            {
+                finding.off = finding.off.max(seen.off);
+                finding.on_the_brink |= seen.on_the_brink;
+                return 0.0;
+            }
+            let of_matter = witness::distance_of_balls(subject, placement, x);
+            if line.margin == 0.0 || of_matter == 0.0 {
+                return of_matter;
+            }
+            finding.between = true;
+            let claimed = line.residual.unwrap_or(0.0);
+            let near = witness::check_near(subject, placement, x, claimed.min(0.5 * line.margin));
+            near.map_or(of_matter, |(_, of_surface)| of_surface.min(of_matter))
+        });
+        let radius = |i: usize| {
+            let scan = &self.subjects[i].scan;
+            scan.sampling_radius() / scan.frame().scale * placements[i].scale
+        };
+        if away[0] + away[1] > line.margin * (1.0 + ROUNDING) + ROUNDING * radius(0).max(radius(1)) {
+            return Err(format!(
+                "the witness is {:.4e} and {:.4e} from the obstacles, together more than the margin",
+                away[0], away[1]
+            ));
         }
         Ok(())
     }

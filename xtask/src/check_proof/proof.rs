@@ -22,6 +22,8 @@ pub(crate) struct Line {
     pub(crate) placed_a: Matrix,
     pub(crate) placed_b: Matrix,
     pub(crate) margin: f64,
+    #[serde(default)]
+    pub(crate) of: Of,
     pub(crate) verdict: Verdict,
     pub(crate) evidence: Option<Evidence>,
     pub(crate) gap: Option<f64>,
@@ -30,6 +32,17 @@ pub(crate) struct Line {
     pub(crate) nodes_a: Vec<Enclosure>,
     pub(crate) nodes_b: Vec<Enclosure>,
     pub(crate) pairs: Vec<[usize; 2]>,
+}
+
+/// What of the scans is enclosed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Of {
+    Obstacle,
+    /// Also of older proofs, which do not say.
+    #[default]
+    Surface,
+    Points,
 }
 
 /// Whether two scans meet.
@@ -49,7 +62,7 @@ pub(crate) enum Evidence {
     Estimated,
 }
 
-/// A node: its points, and the box that is claimed to contain their part of the surface, in the stored frame.
+/// A node: its points, and the box that is claimed to contain their part of the surface or obstacle, in the stored frame.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(crate) struct Enclosure {
     pub(crate) first: u32,

@@ -6,14 +6,17 @@ use std::io::Read;
 use std::path::Path;
 
 use nearmiss::hierarchy::Node;
-use nearmiss::{Bandwidth, BuildOptions, Check, Kernel, Scan};
+use nearmiss::{Bandwidth, BuildOptions, Check, Kernel, PointKind, Scan};
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 
-use super::proof::Enclosure;
+use super::proof::{Enclosure, Of};
 use crate::repository::Outcome;
 
 /// First bytes of a prepared scan.
 const MAGIC: &[u8] = b"\x8Enmiss";
+
+/// How far, in local radii, the obstacle goes from the plane of a point on a sheet.
+const SLAB: f64 = 0.3;
 
 /// A prepared scan.
 pub(crate) struct Subject {
@@ -58,14 +61,66 @@ impl Subject {
         Ok(Self { scan, twin, horizon, ids, bounds })
     }
 
+    /// The radius of the ball that stands for point `i` in the obstacle; zero if it samples a sheet.
+    pub(crate) fn ball(&self, i: usize) -> f64 {
+        if i < self.scan.slices().sheets {
+            return 0.0;
+        }
+        let is_alone =
+            matches!(self.scan.kind(i), PointKind::Line | PointKind::Stray | PointKind::Sparse);
+        self.radius(i) * if is_alone { 0.5 } else { 0.325 }
+    }
+
+    /// How far the obstacle lies at most from point `i` where that is its nearest point: the radius of its ball; or that of
+    /// its cell, or of its disc with the thickness of a twentieth of its radius.
+    pub(crate) fn reach(&self, i: usize) -> f64 {
+        let slices = self.scan.slices();
+        if i < slices.sheets { self.cell(i).max(1.05 * f64::from(slices.discs[i])) } else { self.ball(i) }
+    }
+
+    /// Whether `x`, a place of the surface in the stored frame, belongs to the obstacle, up to rounding: it is in the cell
+    /// of its nearest point, which samples a sheet.
+    pub(crate) fn is_in_cell(&self, x: [f64; 3]) -> bool {
+        let slices = self.scan.slices();
+        let away = |p: &[f32; 3]| [0, 1, 2].map(|k| x[k] - f64::from(p[k]));
+        let length_sq = |d: [f64; 3]| d.iter().map(|x| x * x).sum::<f64>();
+        let least = |(i, p): (usize, &[f32; 3])| (length_sq(away(p)), i);
+        let nearest = slices.positions.iter().enumerate().map(least).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((distance_sq, nearest)) = nearest else { return false };
+        // Of places half-way between two points either may be the nearest.
+        let is_nearest = |p: &[f32; 3]| length_sq(away(p)) <= rounded(distance_sq);
+        self.is_in_cell_of(nearest, x)
+            || slices.positions.iter().enumerate().any(|(i, p)| is_nearest(p) && self.is_in_cell_of(i, x))
+    }
+
+    /// Whether `x` in the stored frame is in the cell of point `i`, up to rounding, if that is its nearest point.
+    pub(crate) fn is_in_cell_of(&self, i: usize, x: [f64; 3]) -> bool {
+        let slices = self.scan.slices();
+        let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.positions[i][k]));
+        let height: f64 = (0..3).map(|k| d[k] * f64::from(slices.normals[i][k])).sum();
+        let distance = d.iter().map(|x| x * x).sum::<f64>().sqrt();
+        i < slices.sheets
+            && height.abs() <= rounded(SLAB * self.radius(i))
+            && distance <= rounded(self.cell(i))
+    }
+
+    fn radius(&self, i: usize) -> f64 {
+        f64::from(self.scan.radii()[i])
+    }
+
+    fn cell(&self, i: usize) -> f64 {
+        self.radius(i).min(0.5 * f64::from(self.scan.slices().reach))
+    }
+
     /// # Errors
     /// When no node has these points, or its enclosure differs in a bit.
-    pub(crate) fn check_node(&self, claimed: &Enclosure) -> Result<(), String> {
+    pub(crate) fn check_node(&self, claimed: &Enclosure, of: Of) -> Result<(), String> {
         let Enclosure { first, count, .. } = *claimed;
         let Some(&id) = self.ids.get(&(first, count)) else {
             return Err(format!("no node has the points {first} to {first} + {count}"));
         };
-        let stored = self.scan.slices().enclosure(id);
+        let slices = self.scan.slices();
+        let stored = if of == Of::Obstacle { slices.obstacle_enclosure(id) } else { slices.enclosure(id) };
         let bits = |[a, b, c]: [f32; 3]| [a.to_bits(), b.to_bits(), c.to_bits()];
         let same = bits(stored.centre) == bits(claimed.centre)
             && bits(stored.half) == bits(claimed.half)
@@ -76,6 +131,11 @@ impl Subject {
             Err(format!("node {id} ({first} to {first} + {count}) has another enclosure"))
         }
     }
+}
+
+/// A little more than `x`, by what rounding may do.
+fn rounded(x: f64) -> f64 {
+    x * (1.0 + 1e-6)
 }
 
 /// Whether every node has the points of its two children, the root all of them: then the nodes that have a point are

@@ -5,7 +5,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use nearmiss::Status;
-use nearmiss::hierarchy::GatherScratch;
+use nearmiss::hierarchy::{GatherScratch, OrientedBox};
 use nearmiss::surface::project;
 use rayon::prelude::*;
 
@@ -31,6 +31,8 @@ pub(crate) struct Sampled {
     pub(crate) points: u64,
     /// Starts of status ok, on the surface or not.
     pub(crate) places: u64,
+    /// Of all these, those in cells, which belong to the obstacle.
+    pub(crate) in_cells: u64,
     /// The greatest `|t_k|/half_k` of a point in an enclosure; above 1 it is outside.
     pub(crate) fill: f64,
     /// The greatest distance of a point from its nearest cloud point, in the latter's local radii.
@@ -72,6 +74,8 @@ struct Tree<'a> {
     subject: &'a Subject,
     neighbours: Neighbours<'a>,
     boxes: Vec<Inverse>,
+    /// Those about the obstacle.
+    of_obstacle: Vec<Inverse>,
     /// Of each node; the root's own.
     parents: Vec<usize>,
     /// Of each point.
@@ -81,7 +85,10 @@ struct Tree<'a> {
 impl<'a> Tree<'a> {
     fn new(subject: &'a Subject) -> Self {
         let scan = &subject.scan;
-        let boxes = scan.enclosures().map(|b| Inverse::new(b.centre, b.half, b.axes)).collect();
+        let inverse = |b: OrientedBox| Inverse::new(b.centre, b.half, b.axes);
+        let boxes = scan.enclosures().map(inverse).collect();
+        let slices = scan.slices();
+        let of_obstacle = (0..scan.nodes().len()).map(|id| inverse(slices.obstacle_enclosure(id))).collect();
         let mut parents = vec![0; scan.nodes().len()];
         let mut leaves = vec![0; scan.len()];
         for (id, node) in scan.nodes().iter().enumerate() {
@@ -93,7 +100,7 @@ impl<'a> Tree<'a> {
                 parents[node.right as usize] = id;
             }
         }
-        Self { subject, neighbours: Neighbours::new(scan.positions()), boxes, parents, leaves }
+        Self { subject, neighbours: Neighbours::new(scan.positions()), boxes, of_obstacle, parents, leaves }
     }
 
     /// Checks `x` (stored frame), a place of status ok.
@@ -102,14 +109,33 @@ impl<'a> Tree<'a> {
         let point = nearest.index as usize;
         let radius = f64::from(self.subject.scan.radii()[point]);
         sampled.far = sampled.far.max(nearest.distance_sq.sqrt() / radius);
-        self.check_enclosed(x, point, "the place", sampled);
+        self.check_enclosed(&self.boxes, x, point, "the place", sampled);
+        if self.subject.is_in_cell_of(point, x) {
+            sampled.in_cells += 1;
+            self.check_enclosed(&self.of_obstacle, x, point, "the place of the obstacle", sampled);
+        }
+    }
+
+    /// Checks a place of the ball of `point`, `away` from its centre in its radius, and the point itself.
+    fn check_ball(&self, point: usize, away: [f64; 3], sampled: &mut Sampled) {
+        let p = self.subject.scan.positions()[point].map(f64::from);
+        let radius = self.subject.ball(point);
+        let x = [0, 1, 2].map(|k| p[k] + radius * away[k]);
+        self.check_enclosed(&self.of_obstacle, x, point, "the place of the ball", sampled);
     }
 
     /// Whether `x`, which belongs to `point`, is in the enclosures of all nodes above.
-    fn check_enclosed(&self, x: [f64; 3], point: usize, what: &str, sampled: &mut Sampled) {
+    fn check_enclosed(
+        &self,
+        boxes: &[Inverse],
+        x: [f64; 3],
+        point: usize,
+        what: &str,
+        sampled: &mut Sampled,
+    ) {
         let mut id = self.leaves[point];
         loop {
-            let fill = self.boxes[id].fill(x);
+            let fill = boxes[id].fill(x);
             sampled.fill = sampled.fill.max(fill);
             if fill.is_nan() || fill > 1.0 {
                 sampled.faults.push(format!(
@@ -136,6 +162,10 @@ impl<'a> Tree<'a> {
             let start = [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + radius * away[k]);
             let end = project(start, |x| scan.evaluate_with(x, &mut scratch));
             sampled.starts += 1;
+            let length = away.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if length > 0.0 {
+                self.check_ball(i, away.map(|x| x / length * (1.0 - 1e-9)), &mut sampled);
+            }
             if end.converged {
                 sampled.points += 1;
                 self.check(end.point, &mut sampled);
@@ -165,12 +195,16 @@ pub(crate) fn check(subject: &Subject, points: u64, seed: u64, done: &AtomicU64)
         .collect();
     let mut all = Sampled::default();
     for (point, p) in subject.scan.positions().iter().enumerate() {
-        tree.check_enclosed(p.map(f64::from), point, "the cloud point", &mut all);
+        let p = p.map(f64::from);
+        for boxes in [&tree.boxes, &tree.of_obstacle] {
+            tree.check_enclosed(boxes, p, point, "the cloud point", &mut all);
+        }
     }
     for chunk in chunks {
         all.starts += chunk.starts;
         all.points += chunk.points;
         all.places += chunk.places;
+        all.in_cells += chunk.in_cells;
         all.fill = all.fill.max(chunk.fill);
         all.far = all.far.max(chunk.far);
         all.faults.extend(chunk.faults);

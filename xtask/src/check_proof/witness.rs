@@ -86,6 +86,15 @@ pub(crate) fn check_near(
     seen.ok_or_else(|| "no point of the surface was found near the witness".into())
 }
 
+/// How far `x` of the world is from the nearest ball that stands for a point in the obstacle; points on sheets have none,
+/// and are places of it themselves.
+pub(crate) fn distance_of_balls(subject: &Subject, placement: &Placement, x: [f64; 3]) -> f64 {
+    let x = placement.stored(x);
+    let away = |(i, p): (usize, &[f32; 3])| (distance(&p.map(f64::from), &x) - subject.ball(i)).max(0.0);
+    let least = subject.scan.positions().iter().enumerate().map(away).fold(f64::INFINITY, f64::min);
+    least * placement.scale
+}
+
 /// Points of the surface from near `start` towards `to`, stepping along the surface.
 fn walk(subject: &Subject, start: [f64; 3], to: [f64; 3]) -> Vec<[f64; 3]> {
     let mut scratch = GatherScratch::default();

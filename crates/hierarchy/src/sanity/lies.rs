@@ -102,7 +102,7 @@ fn points_that_no_build_writes() {
             let (tangent, _) = tangents(scan.normals[i]);
             scan.normals.to_mut()[i] = tangent;
         });
-        deep(&named("the kind"), |scan| scan.kinds.to_mut()[i] = 5);
+        deep(&named("the kind"), |scan| scan.kinds.to_mut()[i] = 6);
         deep(&named("the place in the input"), |scan| scan.source.to_mut()[i] = 301);
     }
 }
