@@ -17,8 +17,10 @@ use crate::digits::{count, rough, short};
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::export::refused;
+use crate::no_curve::NoCurve;
 use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
+use crate::report::AnswerReport;
 use crate::{input, output, picture, posing};
 
 /// Options of `curve`.
@@ -68,6 +70,8 @@ fn parse_length(text: &str) -> Result<f64, String> {
 /// What `curve` finds.
 #[derive(Debug, Serialize)]
 struct CurveReport {
+    /// Whether the scans meet: no curve does not mean that they do not.
+    verdict: &'static str,
     points: usize,
     curves: usize,
     closed: usize,
@@ -78,6 +82,12 @@ struct CurveReport {
     complete: Option<bool>,
     evaluations: u64,
     micros: f64,
+    /// What `collide` answers of the surfaces, where no curve was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    surfaces: Option<AnswerReport>,
+    /// The same of obstacles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    obstacles: Option<AnswerReport>,
 }
 
 pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
@@ -106,6 +116,13 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     (budget.work, budget.deadline) =
         (args.work, args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
     curves_with(&a, &b, &plan, &budget, &mut found, &mut scratch);
+    let missed = if found.curves.is_empty() && found.complete {
+        let spent = found.statistics.evaluations + found.statistics.node_pairs;
+        budget.work = budget.work.map(|units| units.saturating_sub(spent));
+        Some(NoCurve::ask([&a, &b], &budget)?)
+    } else {
+        None
+    };
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
 
@@ -115,7 +132,7 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
         curve_picture::paint([&a, &b], &found, &names(inputs)).save(path)?;
         drop(bar);
     }
-    tell(&found, [&a, &b], micros, args.json)
+    tell(&found, missed.as_ref(), [&a, &b], micros, args.json)
 }
 
 /// The points in the world, each with the number of its curve, and the edges.
@@ -132,30 +149,50 @@ fn write(path: &Path, found: &Curves) -> Result<(), CliError> {
     })
 }
 
-fn tell(found: &Curves, views: [&ScanView<'_>; 2], micros: f64, json: bool) -> Result<(), CliError> {
+fn tell(
+    found: &Curves,
+    missed: Option<&NoCurve>,
+    views: [&ScanView<'_>; 2],
+    micros: f64,
+    json: bool,
+) -> Result<(), CliError> {
     let mut results = Results::new();
+    let (mut evaluations, mut node_pairs) = (found.statistics.evaluations, found.statistics.node_pairs);
+    for statistics in missed.iter().flat_map(|missed| missed.statistics()) {
+        evaluations += statistics.evaluations;
+        node_pairs += statistics.node_pairs;
+    }
+    let verdict = match missed {
+        _ if !found.curves.is_empty() => "intersecting",
+        Some(missed) => missed.word(),
+        None => "undecided",
+    };
+    let [surfaces, obstacles] = missed.map_or([None, None], |missed| missed.reports().map(Some));
     let report = CurveReport {
+        verdict,
         points: found.points.len(),
         curves: found.curves.len(),
         closed: found.closed(),
         length: found.length(),
         max_residual: found.max_residual,
         complete: (!found.complete).then_some(false),
-        evaluations: found.statistics.evaluations,
+        evaluations,
         micros,
+        surfaces,
+        obstacles,
     };
     if json {
         results.json(&report)?;
         return results.flush();
     }
-    results.line(sentence(found))?;
+    results.line(missed.map_or_else(|| sentence(found), |missed| missed.sentence(views)))?;
     if !found.complete {
         results.line(unfinished(views))?;
     }
     results.line(format_args!(
         "{}, {}, {}, {:.1} µs",
         count(report.points as u64, "point"),
-        count(found.statistics.node_pairs, "node pair"),
+        count(node_pairs, "node pair"),
         count(report.evaluations, "evaluation"),
         micros
     ))?;
@@ -175,7 +212,7 @@ fn sentence(found: &Curves) -> String {
         parts.push(count(open as u64, "open curve"));
     }
     let mut text = match (parts.is_empty(), touching) {
-        (true, 0) => return "They do not cut each other.".to_owned(),
+        (true, 0) => return "No curve found.".to_owned(),
         (true, _) => format!("They touch in {}", count(touching as u64, "point")),
         (false, 0) => format!("They cut each other in {}", parts.join(" and ")),
         (false, _) => {

@@ -32,6 +32,7 @@ mod curve_picture;
 mod font;
 mod geodesic;
 mod level;
+mod no_curve;
 mod picture;
 
 use std::ffi::OsString;

@@ -1,8 +1,8 @@
 //! `curve`.
 
-use nearmiss_testdata::shapes::{bowl, patch, sphere};
+use nearmiss_testdata::shapes::{Sampling, bowl, patch, sphere};
 
-use crate::running::{Place, keys, numbers, shift, sorted};
+use crate::running::{Place, keys, numbers, shift, sorted, text};
 
 #[test]
 fn two_spheres_cut_each_other_in_a_circle() {
@@ -13,8 +13,9 @@ fn two_spheres_cut_each_other_in_a_circle() {
     let asked =
         ["curve", "one.xyz", "other.xyz", "--pose-b", &pose, "-o", "c.ply", "--json", "--image", "c.png"];
     let told = place.ok(&asked).json().remove(0);
-    assert_eq!(keys(&told), sorted("points curves closed length max_residual evaluations micros"));
+    assert_eq!(keys(&told), sorted("verdict points curves closed length max_residual evaluations micros"));
     assert_eq!((&told["curves"], &told["closed"]), (&1.into(), &1.into()), "{told}");
+    assert_eq!(told["verdict"], "intersecting");
     let circle = std::f64::consts::TAU * 0.75_f64.sqrt();
     assert!((told["length"].as_f64().unwrap() / circle - 1.0).abs() < 0.01, "{told} for {circle}");
     assert!(told["max_residual"].as_f64().unwrap() < 1e-3 * 0.08, "{told}");
@@ -68,15 +69,74 @@ fn ends_misses_and_budgets_are_said() {
     assert!(people.contains("Ends: 2 at the border of a."), "{people}");
     let short = place.ok(&[&asked[..], &["--work", "300", "--json"]].concat()).json().remove(0);
     assert_eq!(short["complete"], false, "{short}");
+    let expected = if short["curves"] == 0 { "undecided" } else { "intersecting" };
+    assert_eq!(short["verdict"], expected, "{short}");
     let short = place.ok(&[&asked[..], &["--budget", "0us"]].concat()).results;
-    assert!(short.contains("budget ran out"), "{short}");
+    assert!(short.starts_with("No curve found.\n") && short.contains("budget ran out"), "{short}");
 
     let away = shift(0.0, 0.0, 9.0);
     let missed = ["curve", "bowl.nm", "wall.xyz", "--pose-b", &away, "-o", "none.ply"];
-    assert!(place.ok(&missed).results.starts_with("They do not cut each other."));
+    let people = place.ok(&missed).results;
+    let gap = people
+        .strip_prefix("They do not cut; at least ")
+        .and_then(|rest| rest.split_once(" apart (certified).\n"));
+    let gap: f64 = gap.unwrap_or_else(|| panic!("{people}")).0.parse().unwrap();
+    assert!((7.0..9.0).contains(&gap), "{people}");
     let told = place.ok(&[&missed[..], &["--json"]].concat()).json().remove(0);
     assert_eq!(numbers(&serde_json::json!([told["points"], told["curves"], told["length"]])), [0.0; 3]);
+    assert_eq!(told["verdict"], "separated", "{told}");
+    for what in ["surfaces", "obstacles"] {
+        let answer = &told[what];
+        assert_eq!(
+            (&answer["verdict"], &answer["evidence"]),
+            (&"separated".into(), &"certified".into()),
+            "{told}"
+        );
+        assert!(answer["gap"].as_f64().unwrap() >= gap, "{told}");
+    }
     assert!(std::fs::read_to_string(place.path("none.ply")).unwrap().contains("element vertex 0\n"));
+}
+
+/// Scans that meet without a curve are not said to be apart, nor is a contact of points said to be one of surfaces.
+#[test]
+fn contacts_without_a_curve_are_said() {
+    let place = Place::new();
+    let floor = patch(3.0, 3.0).sample(Sampling::clean(0.1)).points;
+    let pole = (0..80_u8).map(|i| [0.52, 0.53, 0.6 + 0.01 * f64::from(i)]);
+    place.write("pole.xyz", text(&floor.iter().copied().chain(pole).collect::<Vec<_>>()));
+    place.cloud("plate.xyz", patch(1.0, 1.0), 0.1);
+    let pose = shift(0.5, 0.5, 1.0);
+    let asked = ["curve", "pole.xyz", "plate.xyz", "--pose-b", &pose, "-o", "c.ply"];
+    let people = place.ok(&asked).results;
+    assert!(!people.contains("They do not cut"), "{people}");
+    assert!(
+        people.contains("But they touch at (0.5") && people.contains("where no surface is sampled"),
+        "{people}"
+    );
+    let told = place.ok(&[&asked[..], &["--json"]].concat()).json().remove(0);
+    assert_eq!((&told["verdict"], &told["curves"]), (&"intersecting".into(), &0.into()), "{told}");
+    assert_eq!(told["obstacles"]["verdict"], "intersecting", "{told}");
+    assert_ne!(told["surfaces"]["verdict"], "intersecting", "{told}");
+    let witness = numbers(&told["obstacles"]["witness"]);
+    assert!((witness[2] - 1.0).abs() < 0.05, "{told}");
+
+    // A ball that rests on a plate: their discs cross, and no curve leads anywhere.
+    place.cloud("ball.xyz", sphere(1.0), 0.1);
+    let mut met = 0;
+    for height in ["0.97", "0.98", "0.99", "1", "1.01", "1.02", "1.03"] {
+        let pose = shift(0.0, 0.0, height.parse().unwrap());
+        let asked = ["curve", "pole.xyz", "ball.xyz", "--pose-b", &pose, "-o", "c.ply"];
+        let told = place.ok(&[&asked[..], &["--json"]].concat()).json().remove(0);
+        let people = place.ok(&asked).results;
+        if told["curves"] != 0 {
+            continue;
+        }
+        let meet = told["surfaces"]["verdict"] == "intersecting";
+        assert_eq!(told["verdict"] == "intersecting", meet || told["obstacles"]["verdict"] == "intersecting");
+        assert_eq!(people.starts_with("No curve found, but they "), meet, "{height}: {people}");
+        met += usize::from(meet);
+    }
+    assert!(met > 0, "no ball rests on the plate");
 }
 
 #[test]

@@ -1,0 +1,185 @@
+//! The sentence and the JSON of `curve` where no curve was found: what `collide` knows of the same poses.
+
+use nearmiss::{
+    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Contact, Detail, Evidence, PlanError,
+    Reason, ScanView, Semantics, Statistics, Verdict, collide_with,
+};
+
+use crate::console::now;
+use crate::digits::{place, rough, rounded_down};
+use crate::report::{AnswerReport, word};
+use crate::sentence::world_radius;
+
+/// Answers about two scans between which no curve was found, each with its time in µs.
+#[derive(Debug)]
+pub(crate) struct NoCurve {
+    /// Of [`Semantics::Surface`]: a curve is of the surfaces alone.
+    surfaces: (Answer, f64),
+    /// Of [`Semantics::Obstacle`]: points that sample no surface may touch where no curve can be.
+    obstacles: (Answer, f64),
+}
+
+impl NoCurve {
+    /// Asks `collide` of both semantics, each within `budget`.
+    pub(crate) fn ask([a, b]: [&ScanView<'_>; 2], budget: &Budget) -> Result<Self, PlanError> {
+        let mut scratch = CollideScratch::default();
+        let mut ask = |semantics| {
+            let options = CollideOptions::default()
+                .with_semantics(semantics)
+                .with_detail(Detail::Witness)
+                .with_evidence(Evidence::Certified);
+            let plan = CollidePlan::new(&options, a.scan(), b.scan())?;
+            let start = now();
+            let answer = collide_with(a, b, &plan, budget, &mut scratch);
+            #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+            let micros = start.elapsed().as_nanos() as f64 / 1e3;
+            Ok((answer, micros))
+        };
+        Ok(Self { surfaces: ask(Semantics::Surface)?, obstacles: ask(Semantics::Obstacle)? })
+    }
+
+    /// The work of both answers.
+    pub(crate) fn statistics(&self) -> [Statistics; 2] {
+        [self.surfaces.0.statistics, self.obstacles.0.statistics]
+    }
+
+    /// The verdict as `collide` writes it. A contact of the surfaces is a contact; otherwise that of the obstacles.
+    pub(crate) fn word(&self) -> &'static str {
+        let (surfaces, obstacles) = (self.surfaces.0.verdict, self.obstacles.0.verdict);
+        if surfaces.is_intersecting() || obstacles.is_intersecting() {
+            "intersecting"
+        } else if obstacles.is_separated() {
+            "separated"
+        } else {
+            "undecided"
+        }
+    }
+
+    /// Both answers for scripts: of the surfaces, of the obstacles.
+    pub(crate) fn reports(&self) -> [AnswerReport; 2] {
+        [&self.surfaces, &self.obstacles].map(|(answer, micros)| AnswerReport::new(answer, None, *micros))
+    }
+
+    /// Both answers for people.
+    pub(crate) fn sentence(&self, views: [&ScanView<'_>; 2]) -> String {
+        let [ra, rb] = views.map(world_radius);
+        sentence([self.surfaces.0.verdict, self.obstacles.0.verdict], ra.min(rb) / 100.0)
+    }
+}
+
+/// The verdicts of the surfaces and of the obstacles in words, with lengths to `unit`.
+fn sentence([surfaces, obstacles]: [Verdict; 2], unit: f64) -> String {
+    let at = |contact: Contact, evidence: Evidence| {
+        (place(contact.point, unit), format!("within {} ({})", rough(contact.residual), word(evidence)))
+    };
+    if let Verdict::Intersecting { contact, evidence } = surfaces {
+        let verb = if evidence == Evidence::Certified { "touch" } else { "seem to touch" };
+        let (place, within) = at(contact, evidence);
+        return format!("No curve found, but they {verb} at {place}, {within}. Curves may be missing there.");
+    }
+    let proven = |verdict| match verdict {
+        Verdict::Separated { gap, evidence: Evidence::Certified } => Some(gap),
+        _ => None,
+    };
+    let least = |gap: f64| {
+        if gap > 0.0 {
+            format!("; at least {} apart (certified)", rounded_down(gap, unit))
+        } else {
+            " (certified)".into()
+        }
+    };
+    match (proven(surfaces), obstacles) {
+        (of_surfaces, Verdict::Intersecting { contact, evidence }) => {
+            let (place, within) = at(contact, evidence);
+            let cut = of_surfaces.map_or_else(
+                || "No curve found".into(),
+                |gap| format!("The surfaces do not cut{}", least(gap)),
+            );
+            format!("{cut}. But they touch at {place}, where no surface is sampled, {within}.")
+        }
+        (Some(of_surfaces), Verdict::Separated { gap, evidence: Evidence::Certified }) => {
+            format!("They do not cut{}.", least(gap.min(of_surfaces)))
+        }
+        (None, Verdict::Separated { gap, evidence: Evidence::Certified }) => {
+            format!("No curve found, nor any contact{}.", least(gap))
+        }
+        (_, Verdict::Separated { evidence: Evidence::Estimated, .. }) => {
+            "No curve found, nor any contact (estimated).".into()
+        }
+        (_, Verdict::Undecided(reason)) => {
+            format!("No curve found. Whether they touch cannot be told: {}.", why(reason))
+        }
+    }
+}
+
+/// The reason in words.
+fn why(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Budget { .. } => "the budget ran out first; try a greater --budget or --work",
+        Reason::Undersampled => "they come near each other only where points are too sparse",
+        Reason::Ambiguous => "they come near each other only where points do not look like one sheet",
+        Reason::Pose => "a pose is not finite or makes one object vanish beside the other",
+        _ => "`nearmiss collide` may say why",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss::PointId;
+
+    use super::*;
+
+    const UNIT: f64 = 0.001;
+
+    fn touch(evidence: Evidence) -> Verdict {
+        let contact = Contact {
+            point: [1.0, 2.0, 3.0],
+            normals: None,
+            residual: 0.0004,
+            sources: [PointId(1), PointId(2)],
+        };
+        Verdict::Intersecting { contact, evidence }
+    }
+
+    const fn apart(gap: f64, evidence: Evidence) -> Verdict {
+        Verdict::Separated { gap, evidence }
+    }
+
+    #[test]
+    fn a_contact_without_a_curve_is_never_called_apart() {
+        use Evidence::{Certified, Estimated};
+        let unknown = Verdict::Undecided(Reason::Undersampled);
+        let said = |surfaces, obstacles| sentence([surfaces, obstacles], UNIT);
+        assert_eq!(
+            said(touch(Certified), touch(Estimated)),
+            "No curve found, but they touch at (1.000, 2.000, 3.000), within 0.0004 (certified). Curves may be missing there."
+        );
+        assert!(
+            said(touch(Estimated), unknown)
+                .contains("seem to touch at (1.000, 2.000, 3.000), within 0.0004 (estimated)")
+        );
+        assert_eq!(
+            said(apart(0.25, Certified), touch(Certified)),
+            "The surfaces do not cut; at least 0.250 apart (certified). But they touch at (1.000, 2.000, 3.000), where no \
+             surface is sampled, within 0.0004 (certified)."
+        );
+        assert!(
+            said(apart(0.0, Estimated), touch(Certified)).starts_with("No curve found. But they touch at (1")
+        );
+        assert_eq!(
+            said(apart(0.25, Certified), apart(0.125, Certified)),
+            "They do not cut; at least 0.125 apart (certified)."
+        );
+        assert_eq!(said(apart(0.0, Certified), apart(0.0, Certified)), "They do not cut (certified).");
+        assert_eq!(
+            said(unknown, apart(0.125, Certified)),
+            "No curve found, nor any contact; at least 0.125 apart (certified)."
+        );
+        assert_eq!(said(unknown, apart(0.0, Estimated)), "No curve found, nor any contact (estimated).");
+        let budget = Verdict::Undecided(Reason::Budget { likelihood: 0.5 });
+        assert_eq!(
+            said(apart(0.25, Certified), budget),
+            "No curve found. Whether they touch cannot be told: the budget ran out first; try a greater --budget or --work."
+        );
+    }
+}
