@@ -17,6 +17,7 @@ mod sample;
 mod slices;
 mod touch;
 
+mod filters;
 mod input;
 mod output;
 mod posing;
@@ -52,6 +53,7 @@ pub use distance::DistanceArgs;
 pub use error::CliError;
 pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
+pub use filters::{CropBox, FilterArgs, LeastNeighbours, Outliers};
 pub use geodesic::geodesic_picture;
 pub use inspect::InspectArgs;
 pub use level::level_picture;

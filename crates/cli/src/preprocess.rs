@@ -11,6 +11,7 @@ use crate::advice::health;
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
 use crate::eval::KernelName;
+use crate::filters::FilterArgs;
 use crate::input::{self, pieces};
 use crate::output;
 use crate::report::ScanReport;
@@ -26,6 +27,9 @@ pub struct PreprocessArgs {
     /// Format of the input: ply, pcd, xyz, obj, or auto, by content and name
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
+    /// Which points to leave out
+    #[command(flatten)]
+    pub filters: FilterArgs,
     /// K: local radii reach to the K-th neighbour, further where the points look like lines; 3 to 32
     #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32))]
     pub radius_neighbours: u32,
@@ -161,8 +165,9 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
 
     let start = now();
     let bar = console.spinner(format_args!("reading {name}"));
-    let model = input::read(&args.input, args.format.0)?;
+    let mut model = input::read(&args.input, args.format.0)?;
     drop(bar);
+    let filtered = args.filters.apply(&args.input, &mut model.cloud, args.threads, console)?;
     let read = start.elapsed().as_secs_f64();
 
     let start = now();
@@ -196,7 +201,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     let write = start.elapsed().as_secs_f64();
 
     let seconds = Seconds { read, hierarchy, graph, write };
-    let report = Report { scan: ScanReport::new(&scan, bytes), seconds };
+    let report = Report { scan: ScanReport::new(&scan, bytes).with_filtered(filtered), seconds };
     let mut results = Results::new();
     if args.json {
         results.json(&report)?;

@@ -6,6 +6,7 @@ mod collide;
 mod curves;
 mod distances;
 mod faults;
+mod filtering;
 mod interpolating;
 mod looking_inside;
 mod making_poses;
