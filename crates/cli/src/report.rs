@@ -71,9 +71,12 @@ impl GraphReport {
 struct DroppedReport {
     not_finite: usize,
     duplicate: usize,
-    /// Of `preprocess` only.
+    /// By all filters together, if any were applied.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    filtered: Option<usize>,
+    /// By each filter, of `preprocess` only.
     #[serde(flatten)]
-    filtered: Filtered,
+    by_filter: Filtered,
 }
 
 /// Shares of the points by what their neighbourhoods look like; together 1.
@@ -99,7 +102,8 @@ impl ScanReport {
             dropped: DroppedReport {
                 not_finite: scan.dropped().not_finite,
                 duplicate: scan.dropped().duplicate,
-                filtered: Filtered::default(),
+                filtered: Some(scan.dropped().filtered).filter(|&filtered| filtered > 0),
+                by_filter: Filtered::default(),
             },
             bounds: [scan.bounds().min, scan.bounds().max],
             kernel: scan.metric(),
@@ -126,7 +130,7 @@ impl ScanReport {
 
     /// The same with the numbers of points that filters removed.
     pub(crate) fn with_filtered(mut self, filtered: Filtered) -> Self {
-        self.dropped.filtered = filtered;
+        self.dropped.by_filter = filtered;
         self
     }
 
@@ -135,10 +139,11 @@ impl ScanReport {
     pub(crate) fn lines(&self) -> Vec<String> {
         let unit = self.sampling_radius / 100.0;
         let [min, max] = self.bounds.map(|p| place(p, unit));
-        let DroppedReport { not_finite, duplicate, .. } = self.dropped;
+        let DroppedReport { not_finite, duplicate, filtered, .. } = self.dropped;
+        let filtered = filtered.map_or(String::new(), |n| format!("; {n} removed by filters"));
         vec![
             format!(
-                "points     {} ({duplicate} duplicates and {not_finite} not finite dropped)",
+                "points     {} ({duplicate} duplicates and {not_finite} not finite dropped{filtered})",
                 self.points
             ),
             format!("bounds     {min} to {max}"),

@@ -88,6 +88,8 @@ pub struct Dropped {
     pub not_finite: usize,
     /// Points at the very place of an earlier one.
     pub duplicate: usize,
+    /// Points that [`PointCloud::select`] left out.
+    pub filtered: usize,
 }
 
 /// Samples of a surface: finite, distinct, at least eight, in the order given.
@@ -152,7 +154,7 @@ impl PointCloud {
         let not_finite = given - kept.len();
         let finite = kept.len();
         let kept = distinct(kept);
-        let dropped = Dropped { not_finite, duplicate: finite - kept.len() };
+        let dropped = Dropped { not_finite, duplicate: finite - kept.len(), filtered: 0 };
         if kept.len() < LEAST_POINTS {
             return Err(CloudError::TooFew { distinct: kept.len(), given });
         }
@@ -181,8 +183,8 @@ impl PointCloud {
     /// Returns the cloud of the points with these `ids`, which are indices into [`PointCloud::positions`] in
     /// ascending order.
     ///
-    /// Normals and colours follow their points. The frame, [`PointCloud::step`] and [`PointCloud::dropped`] stay as
-    /// they are, and [`PointCloud::source`] still leads to indices of the input.
+    /// Normals and colours follow their points. The frame and [`PointCloud::step`] stay as they are,
+    /// [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads to indices of the input.
     ///
     /// ```
     /// # use nearmiss_geometry::PointCloud;
@@ -209,7 +211,9 @@ impl PointCloud {
         if ids.len() < LEAST_POINTS {
             return Err(CloudError::TooFew { distinct: ids.len(), given: points });
         }
+        let filtered = self.dropped.filtered + points - ids.len();
         Ok(Self {
+            dropped: Dropped { filtered, ..self.dropped },
             positions: selected(&self.positions, ids),
             source: selected(&self.source, ids),
             normals: self.normals.as_deref().map(|normals| selected(normals, ids)),
@@ -338,7 +342,7 @@ mod tests {
         points.insert(0, [f64::INFINITY, 0.0, 0.0]);
         let cloud = PointCloud::cleaned(&points).unwrap();
         assert_eq!(cloud.len(), 12);
-        assert_eq!(cloud.dropped(), Dropped { not_finite: 1, duplicate: 2 });
+        assert_eq!(cloud.dropped(), Dropped { not_finite: 1, duplicate: 2, filtered: 0 });
         for i in 0..cloud.len() {
             assert_eq!(cloud.point(i), points[cloud.source()[i] as usize], "point {i}");
         }
@@ -361,7 +365,8 @@ mod tests {
         let cloud = cloud.with_normals(&numbers).unwrap().with_colours(&colours).unwrap();
         let ids: Vec<u32> = (2..20).step_by(2).collect();
         let part = cloud.select(&ids).unwrap();
-        assert_eq!((part.len(), part.frame(), part.dropped()), (ids.len(), cloud.frame(), cloud.dropped()));
+        assert_eq!((part.len(), part.frame()), (ids.len(), cloud.frame()));
+        assert_eq!(part.dropped(), Dropped { not_finite: 1, duplicate: 1, filtered: 24 - ids.len() });
         for (i, &id) in ids.iter().enumerate() {
             let source = part.source()[i] as usize;
             assert_eq!(source, cloud.source()[id as usize] as usize, "point {i}");

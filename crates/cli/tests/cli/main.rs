@@ -5,6 +5,7 @@ mod bad_input;
 mod collide;
 mod curves;
 mod distances;
+mod estimating;
 mod faults;
 mod filtering;
 mod interpolating;
