@@ -21,6 +21,7 @@ use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::search::SearchArgs;
 use crate::sentence::{hint, sentence};
+use crate::units::SizeCheck;
 use crate::{input, output, picture, proof};
 
 /// Options of `collide`.
@@ -132,6 +133,7 @@ struct Question {
     resolution: Option<f64>,
     prove: bool,
     all: bool,
+    sizes: SizeCheck,
 }
 
 impl Question {
@@ -169,6 +171,7 @@ impl Question {
 
     fn tell(&self, out: &mut Outputs<'_, '_>, asked: &Asked, args: &CollideArgs) -> Result<(), CliError> {
         let [a, b] = self.views(&asked.poses);
+        self.sizes.compare([&a, &b]);
         if let (Some((path, file)), Some(proof)) = (&mut out.proof, &asked.proof) {
             let line = asked.line.unwrap_or(0);
             proof::write(file, line, [&a, &b], self.plan.options(), &asked.answer, proof)
@@ -230,7 +233,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
         output::check_apart(path, &args.pair.inputs())?;
     }
     let matrices = args.pair.matrices()?;
-    let mut poses = args.poses.as_ref().map(|path| PoseFile::open(path)).transpose()?;
+    let mut poses = args.pair.pose_file(args.poses.as_ref())?;
 
     let threads = args.threads.unwrap_or(0);
     let [a, b] = open(args, threads, console)?;
@@ -257,7 +260,8 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let plan = CollidePlan::new(&options, &a, &b)?;
     let prove = args.prove.is_some();
     let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);
-    let question = Question { a, b, plan, budget, work, resolution, prove, all: args.all };
+    let sizes = args.pair.size_check(console);
+    let question = Question { a, b, plan, budget, work, resolution, prove, all: args.all, sizes };
 
     let mut results = Results::new();
     let mut answer = |out: &mut Outputs<'_, '_>| match &mut poses {

@@ -14,11 +14,19 @@ use crate::error::CliError;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Console {
     bars: bool,
+    quiet: bool,
 }
 
 impl Console {
     pub(crate) fn new(quiet: bool) -> Self {
-        Self { bars: !quiet && io::stderr().is_terminal() }
+        Self { bars: !quiet && io::stderr().is_terminal(), quiet }
+    }
+
+    /// A line about what was done, unless `--quiet` was given.
+    pub(crate) fn note(self, what: impl Display) {
+        if !self.quiet {
+            let _ = writeln!(io::stderr().lock(), "{what}");
+        }
     }
 
     /// A sign of life for a step of unknown length; gone when dropped.

@@ -16,10 +16,11 @@ use crate::digits::{count, rounded, rounded_down, short};
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::input;
-use crate::posing::{self, PairArgs, PoseFile};
+use crate::posing::{self, PairArgs};
 use crate::preprocess::parse_threads;
 use crate::report::word;
 use crate::sentence::world_radius;
+use crate::units::SizeCheck;
 
 /// Options of `distance`.
 #[derive(Debug, Clone, Args)]
@@ -78,12 +79,13 @@ struct Question<'a> {
     scans: [&'a Scan; 2],
     plan: DistancePlan,
     args: &'a DistanceArgs,
+    sizes: SizeCheck,
 }
 
 pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let matrices = args.pair.matrices()?;
-    let mut poses = args.poses.as_ref().map(|path| PoseFile::open(path)).transpose()?;
+    let mut poses = args.pair.pose_file(args.poses.as_ref())?;
     let inputs = args.pair.inputs();
     let threads = args.threads.unwrap_or(0);
     let [a, b] = if args.thickened.is_some() {
@@ -96,7 +98,7 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let semantics = args.thickened.map_or(Semantics::Surface, Semantics::Thickened);
     let options = DistanceOptions::default().with_semantics(semantics);
     let plan = DistancePlan::new(&options, &a, &b)?;
-    let question = Question { scans: [&a, &b], plan, args };
+    let question = Question { scans: [&a, &b], plan, args, sizes: args.pair.size_check(console) };
     let mut scratch = DistanceScratch::default();
     let mut results = Results::new();
     match &mut poses {
@@ -132,6 +134,7 @@ impl Question<'_> {
         let found = distance_with(&a, &b, &self.plan, &budget, scratch);
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
+        self.sizes.compare([&a, &b]);
         if self.args.json {
             return results.json(&report(&found, micros));
         }

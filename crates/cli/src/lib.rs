@@ -17,9 +17,13 @@ mod sample;
 mod slices;
 mod touch;
 
+mod estimate;
+mod filters;
 mod input;
+mod memory;
 mod output;
 mod posing;
+mod units;
 
 mod advice;
 mod digits;
@@ -53,9 +57,11 @@ pub use distance::DistanceArgs;
 pub use error::CliError;
 pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
+pub use filters::{CropBox, FilterArgs, LeastNeighbours, Outliers};
 pub use geodesic::geodesic_picture;
 pub use inspect::InspectArgs;
 pub use level::level_picture;
+pub use memory::MemoryArgs;
 pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
 pub use posing::{PairArgs, PoseRefused};
@@ -67,6 +73,7 @@ pub use slices::{
     SlicesInspectArgs, WalkArgs,
 };
 pub use touch::TouchArgs;
+pub use units::UnitName;
 
 /// Whether, where and how near scanned things meet, straight from their points.
 ///

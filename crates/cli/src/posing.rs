@@ -7,9 +7,11 @@ use clap::Args;
 use nearmiss::{Pose, PoseError, Scan};
 use serde::Deserialize;
 
+use crate::console::Console;
 use crate::digits::short;
 use crate::error::CliError;
 use crate::input::{TextLines, pieces};
+use crate::units::{SizeCheck, UnitName, scaled};
 
 /// Two scans, and where they are.
 #[derive(Debug, Clone, Args)]
@@ -24,6 +26,13 @@ pub struct PairArgs {
     /// Pose of b
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_b: Option<String>,
+    /// Unit of the lengths of a. With --units-a or --units-b the world is in metres, and so is a scan without a unit: scans are scaled
+    /// to metres before their poses are applied
+    #[arg(long, value_enum, value_name = "U")]
+    pub units_a: Option<UnitName>,
+    /// Unit of the lengths of b
+    #[arg(long, value_enum, value_name = "U")]
+    pub units_b: Option<UnitName>,
 }
 
 impl PairArgs {
@@ -36,7 +45,25 @@ impl PairArgs {
     pub(crate) fn matrices(&self) -> Result<[Matrix; 2], CliError> {
         let [a, b] = [("--pose-a", &self.pose_a), ("--pose-b", &self.pose_b)]
             .map(|(name, given)| from_option(name, given.as_deref()));
-        Ok([a?, b?])
+        let [by_a, by_b] = self.factors().unwrap_or([1.0; 2]);
+        Ok([scaled(a?, by_a), scaled(b?, by_b)])
+    }
+
+    /// The file of poses, if there is one.
+    pub(crate) fn pose_file(&self, path: Option<&PathBuf>) -> Result<Option<PoseFile>, CliError> {
+        let open = |path: &PathBuf| PoseFile::open(path, self.factors().unwrap_or([1.0; 2]));
+        path.map(open).transpose()
+    }
+
+    /// A check that asks about units once if the scans differ too much in size.
+    pub(crate) fn size_check(&self, console: Console) -> SizeCheck {
+        SizeCheck::new(console, self.factors())
+    }
+
+    /// The units in metres, if any is given.
+    fn factors(&self) -> Option<[f64; 2]> {
+        let units = [self.units_a, self.units_b];
+        units.iter().any(Option::is_some).then(|| units.map(|unit| unit.map_or(1.0, UnitName::metres)))
     }
 }
 
@@ -154,11 +181,13 @@ pub(crate) struct PoseFile {
     lines: TextLines,
     /// No line with poses has been met so far.
     is_empty: bool,
+    /// The units of both scans in metres.
+    factors: [f64; 2],
 }
 
 impl PoseFile {
-    pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
-        Ok(Self { lines: TextLines::open(path)?, is_empty: true })
+    fn open(path: &Path, factors: [f64; 2]) -> Result<Self, CliError> {
+        Ok(Self { lines: TextLines::open(path)?, is_empty: true, factors })
     }
 
     /// The next line that is not blank, and its number, counted from 1.
@@ -178,16 +207,17 @@ impl PoseFile {
             let what = message.split(" at line ").next().unwrap_or_default();
             self.lines.fault_on(number, format!("column {}: {what}; {POSE_LINE}", e.column()))
         })?;
-        let pose = |name: &str, numbers: &[f64], scan| {
-            pose(numbers, scan).map_err(|what| self.lines.fault_on(number, format!("`{name}`{what}")))
+        let pose = |name: &str, numbers: &[f64], side: usize| {
+            pose(numbers, self.factors[side], scans[side])
+                .map_err(|what| self.lines.fault_on(number, format!("`{name}`{what}")))
         };
-        Ok([pose("a", &line.a, scans[0])?, pose("b", &line.b, scans[1])?])
+        Ok([pose("a", &line.a, 0)?, pose("b", &line.b, 1)?])
     }
 }
 
-fn pose(numbers: &[f64], scan: &Scan) -> Result<Pose, String> {
-    let matrix: &Matrix = numbers.try_into().map_err(|_wrong_count| {
+fn pose(numbers: &[f64], factor: f64, scan: &Scan) -> Result<Pose, String> {
+    let matrix: Matrix = numbers.try_into().map_err(|_wrong_count| {
         format!(" has {} numbers where 16 belong, a row-major 4×4 matrix", numbers.len())
     })?;
-    of_scan(matrix, scan).map_err(|refused| format!(": {refused}"))
+    of_scan(&scaled(matrix, factor), scan).map_err(|refused| format!(": {refused}"))
 }

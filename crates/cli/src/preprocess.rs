@@ -10,8 +10,11 @@ use serde::Serialize;
 use crate::advice::health;
 use crate::console::{Console, Results, now};
 use crate::error::CliError;
+use crate::estimate::{Forecast, Preparation};
 use crate::eval::KernelName;
+use crate::filters::FilterArgs;
 use crate::input::{self, pieces};
+use crate::memory::MemoryArgs;
 use crate::output;
 use crate::report::ScanReport;
 
@@ -26,6 +29,9 @@ pub struct PreprocessArgs {
     /// Format of the input: ply, pcd, xyz, obj, or auto, by content and name
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
+    /// Which points to leave out
+    #[command(flatten)]
+    pub filters: FilterArgs,
     /// K: local radii reach to the K-th neighbour, further where the points look like lines; 3 to 32
     #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32))]
     pub radius_neighbours: u32,
@@ -60,6 +66,9 @@ pub struct PreprocessArgs {
     /// Threads to work on, 0 for all cores; the result is the same
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub threads: usize,
+    /// How much memory may be used
+    #[command(flatten)]
+    pub memory: MemoryArgs,
     /// One object of JSON instead of sentences
     #[arg(long)]
     pub json: bool,
@@ -159,11 +168,19 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let name = args.input.display();
 
+    let forecast = forecast(args, console);
+    let is_announced = foresee(args, &forecast)?;
     let start = now();
     let bar = console.spinner(format_args!("reading {name}"));
-    let model = input::read(&args.input, args.format.0)?;
+    let mut model = input::read(&args.input, args.format.0)?;
     drop(bar);
+    let filtered = args.filters.apply(&args.input, &mut model.cloud, args.threads, console)?;
     let read = start.elapsed().as_secs_f64();
+    let points = model.cloud.len() as u64;
+    forecast.check_preparing(points, Some(&model.cloud.bounds()))?;
+    if !is_announced {
+        forecast.announce(points);
+    }
 
     let start = now();
     let bar = console.spinner(format_args!("preparing {} points", model.cloud.len()));
@@ -196,7 +213,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     let write = start.elapsed().as_secs_f64();
 
     let seconds = Seconds { read, hierarchy, graph, write };
-    let report = Report { scan: ScanReport::new(&scan, bytes), seconds };
+    let report = Report { scan: ScanReport::new(&scan, bytes).with_filtered(filtered), seconds };
     let mut results = Results::new();
     if args.json {
         results.json(&report)?;
@@ -213,6 +230,33 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
         }
     }
     results.flush()
+}
+
+/// What to expect of the preparation.
+fn forecast(args: &PreprocessArgs, console: Console) -> Forecast<'_> {
+    let preparation = match (args.no_graph, args.no_close_pairs, args.kernel) {
+        (true, ..) => Preparation::Hierarchy,
+        (_, true, _) => Preparation::Graph,
+        (_, _, KernelName::Euclidean) => Preparation::ClosePairs,
+        (_, _, KernelName::Geodesic) => Preparation::Geodesic,
+    };
+    let (limit, threads) = (args.memory.limit(), args.threads);
+    Forecast { path: &args.input, limit, threads, console, preparation }
+}
+
+/// Refuses the input before it is read if it cannot fit, as far as its header and length tell. Returns `true` if a long run was
+/// announced.
+fn foresee(args: &PreprocessArgs, forecast: &Forecast<'_>) -> Result<bool, CliError> {
+    input::check_raw(&args.input)?;
+    let Some(seen) = nearmiss::io::glance(&args.input, args.format.0) else { return Ok(false) };
+    forecast.check_reading(seen.points, seen.bytes)?;
+    if !args.filters.is_empty() {
+        // How many points stay is known once they are filtered.
+        return Ok(false);
+    }
+    forecast.check_preparing(seen.points, seen.bounds.as_ref())?;
+    forecast.announce(seen.points);
+    Ok(true)
 }
 
 fn options(args: &PreprocessArgs) -> BuildOptions {

@@ -8,6 +8,7 @@ use nearmiss::{
 use serde::Serialize;
 
 use crate::digits::{bytes, count, percent, place, short};
+use crate::filters::Filtered;
 
 /// What a prepared scan holds.
 #[derive(Debug, Serialize)]
@@ -70,6 +71,12 @@ impl GraphReport {
 struct DroppedReport {
     not_finite: usize,
     duplicate: usize,
+    /// By all filters together, if any were applied.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    filtered: Option<usize>,
+    /// By each filter, of `preprocess` only.
+    #[serde(flatten)]
+    by_filter: Filtered,
 }
 
 /// Shares of the points by what their neighbourhoods look like; together 1.
@@ -95,6 +102,8 @@ impl ScanReport {
             dropped: DroppedReport {
                 not_finite: scan.dropped().not_finite,
                 duplicate: scan.dropped().duplicate,
+                filtered: Some(scan.dropped().filtered).filter(|&filtered| filtered > 0),
+                by_filter: Filtered::default(),
             },
             bounds: [scan.bounds().min, scan.bounds().max],
             kernel: scan.metric(),
@@ -119,15 +128,22 @@ impl ScanReport {
         }
     }
 
+    /// The same with the numbers of points that filters removed.
+    pub(crate) fn with_filtered(mut self, filtered: Filtered) -> Self {
+        self.dropped.by_filter = filtered;
+        self
+    }
+
     /// The same for people, some lines.
     #[expect(clippy::cast_precision_loss, reason = "statistics")]
     pub(crate) fn lines(&self) -> Vec<String> {
         let unit = self.sampling_radius / 100.0;
         let [min, max] = self.bounds.map(|p| place(p, unit));
-        let DroppedReport { not_finite, duplicate } = self.dropped;
+        let DroppedReport { not_finite, duplicate, filtered, .. } = self.dropped;
+        let filtered = filtered.map_or(String::new(), |n| format!("; {n} removed by filters"));
         vec![
             format!(
-                "points     {} ({duplicate} duplicates and {not_finite} not finite dropped)",
+                "points     {} ({duplicate} duplicates and {not_finite} not finite dropped{filtered})",
                 self.points
             ),
             format!("bounds     {min} to {max}"),

@@ -10,7 +10,9 @@ use serde::Serialize;
 use crate::console::{Console, Results, now};
 use crate::digits::count;
 use crate::error::CliError;
+use crate::estimate::check_sampling;
 use crate::export::refused;
+use crate::memory::MemoryArgs;
 use crate::{input, output};
 
 /// Options of `sample`.
@@ -31,6 +33,9 @@ pub struct SampleArgs {
     /// What is random depends on it; with --spacing, points are moved at random instead of lying in rows
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// How much memory may be used
+    #[command(flatten)]
+    pub memory: MemoryArgs,
     /// One object of JSON instead of a sentence
     #[arg(long)]
     pub json: bool,
@@ -50,9 +55,13 @@ struct Report {
 pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;
     let start = now();
-    let bar = Console::new(args.quiet).spinner(format_args!("sampling {}", args.input.display()));
+    let console = Console::new(args.quiet);
+    let bar = console.spinner(format_args!("sampling {}", args.input.display()));
     input::check_there(&args.input)?;
     let mesh = nearmiss::io::read_mesh(&args.input, None)?;
+    if let Some(spacing) = args.spacing {
+        check_sampling(&args.input, args.memory.limit(), console, &mesh, (spacing, args.seed.is_some()))?;
+    }
     let samples = match (args.spacing, args.points) {
         (Some(spacing), _) => Samples::Spacing(spacing),
         (None, points) => Samples::Count(points.unwrap_or(0)),

@@ -63,6 +63,22 @@ pub enum CloudError {
         /// How many points the cloud was made from.
         points: usize,
     },
+    /// An index that no point of the cloud has.
+    #[error("expected indices below {points}, got {index}; use indices of the cloud, not of its input")]
+    NoSuchPoint {
+        /// The first such index.
+        index: u32,
+        /// How many points the cloud has.
+        points: usize,
+    },
+    /// Indices out of order or repeated.
+    #[error("expected ascending indices, got {index} after {before}; sort them and remove duplicates")]
+    NotAscending {
+        /// The first index that is out of order.
+        index: u32,
+        /// The index before it.
+        before: u32,
+    },
 }
 
 /// How many points were left out, and why.
@@ -72,6 +88,8 @@ pub struct Dropped {
     pub not_finite: usize,
     /// Points at the very place of an earlier one.
     pub duplicate: usize,
+    /// Points that [`PointCloud::select`] left out.
+    pub filtered: usize,
 }
 
 /// Samples of a surface: finite, distinct, at least eight, in the order given.
@@ -136,7 +154,7 @@ impl PointCloud {
         let not_finite = given - kept.len();
         let finite = kept.len();
         let kept = distinct(kept);
-        let dropped = Dropped { not_finite, duplicate: finite - kept.len() };
+        let dropped = Dropped { not_finite, duplicate: finite - kept.len(), filtered: 0 };
         if kept.len() < LEAST_POINTS {
             return Err(CloudError::TooFew { distinct: kept.len(), given });
         }
@@ -160,6 +178,48 @@ impl PointCloud {
     pub fn with_colours(mut self, colours: &[[u8; 3]]) -> Result<Self, CloudError> {
         self.colours = Some(self.gathered(colours)?);
         Ok(self)
+    }
+
+    /// Returns the cloud of the points with these `ids`, which are indices into [`PointCloud::positions`] in
+    /// ascending order.
+    ///
+    /// Normals and colours follow their points. The frame and [`PointCloud::step`] stay as they are,
+    /// [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads to indices of the input.
+    ///
+    /// ```
+    /// # use nearmiss_geometry::PointCloud;
+    /// let points: Vec<[f64; 3]> = (0..20).map(|i| [f64::from(i), 0.0, 0.0]).collect();
+    /// let cloud = PointCloud::from_positions(&points)?;
+    /// let every_other: Vec<u32> = (0..20).step_by(2).collect();
+    /// let selected = cloud.select(&every_other)?;
+    /// assert_eq!(selected.len(), 10);
+    /// assert_eq!(selected.point(3), [6.0, 0.0, 0.0]);
+    /// assert_eq!(selected.source()[3], 6);
+    /// # Ok::<(), nearmiss_geometry::CloudError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Names the first index that is out of range or out of order; fails on fewer than 8 indices.
+    pub fn select(&self, ids: &[u32]) -> Result<Self, CloudError> {
+        let points = self.len();
+        if let Some(pair) = ids.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(CloudError::NotAscending { index: pair[1], before: pair[0] });
+        }
+        if let Some(&index) = ids.iter().find(|&&id| id as usize >= points) {
+            return Err(CloudError::NoSuchPoint { index, points });
+        }
+        if ids.len() < LEAST_POINTS {
+            return Err(CloudError::TooFew { distinct: ids.len(), given: points });
+        }
+        let filtered = self.dropped.filtered + points - ids.len();
+        Ok(Self {
+            dropped: Dropped { filtered, ..self.dropped },
+            positions: selected(&self.positions, ids),
+            source: selected(&self.source, ids),
+            normals: self.normals.as_deref().map(|normals| selected(normals, ids)),
+            colours: self.colours.as_deref().map(|colours| selected(colours, ids)),
+            ..*self
+        })
     }
 
     fn gathered<V: Copy>(&self, values: &[V]) -> Result<Vec<V>, CloudError> {
@@ -234,6 +294,10 @@ impl PointCloud {
     }
 }
 
+fn selected<V: Copy>(values: &[V], ids: &[u32]) -> Vec<V> {
+    ids.iter().map(|&id| values[id as usize]).collect()
+}
+
 fn is_finite<T: Coordinate>(p: [T; 3]) -> bool {
     p.iter().all(|x| (*x).into().is_finite())
 }
@@ -278,7 +342,7 @@ mod tests {
         points.insert(0, [f64::INFINITY, 0.0, 0.0]);
         let cloud = PointCloud::cleaned(&points).unwrap();
         assert_eq!(cloud.len(), 12);
-        assert_eq!(cloud.dropped(), Dropped { not_finite: 1, duplicate: 2 });
+        assert_eq!(cloud.dropped(), Dropped { not_finite: 1, duplicate: 2, filtered: 0 });
         for i in 0..cloud.len() {
             assert_eq!(cloud.point(i), points[cloud.source()[i] as usize], "point {i}");
         }
@@ -288,6 +352,43 @@ mod tests {
         assert_eq!(cloud.normals().unwrap()[3], [5.0; 3], "attributes follow their points");
         let count = cloud.with_normals(&numbers[1..]).unwrap_err();
         assert_eq!(count, CloudError::AttributeCount { given: 14, points: 15 });
+    }
+
+    #[test]
+    fn selected_points_keep_their_attributes_and_sources() {
+        let mut points = grid(24);
+        points.insert(0, [f64::NAN; 3]);
+        points.insert(5, points[1]);
+        let numbers: Vec<[f32; 3]> = (0_u8..26).map(|i| [f32::from(i); 3]).collect();
+        let colours: Vec<[u8; 3]> = (0_u8..26).map(|i| [i; 3]).collect();
+        let cloud = PointCloud::cleaned(&points).unwrap();
+        let cloud = cloud.with_normals(&numbers).unwrap().with_colours(&colours).unwrap();
+        let ids: Vec<u32> = (2..20).step_by(2).collect();
+        let part = cloud.select(&ids).unwrap();
+        assert_eq!((part.len(), part.frame()), (ids.len(), cloud.frame()));
+        assert_eq!(part.dropped(), Dropped { not_finite: 1, duplicate: 1, filtered: 24 - ids.len() });
+        for (i, &id) in ids.iter().enumerate() {
+            let source = part.source()[i] as usize;
+            assert_eq!(source, cloud.source()[id as usize] as usize, "point {i}");
+            assert_eq!(part.point(i), points[source], "point {i}");
+            assert_eq!(part.normals().unwrap()[i], numbers[source], "point {i}");
+            assert_eq!(part.colours().unwrap()[i], colours[source], "point {i}");
+        }
+        let again = part.clone().with_normals(&numbers).unwrap();
+        assert_eq!(again, part, "attributes are still indexed like the input");
+        assert_eq!(cloud.select(&(0..24).collect::<Vec<u32>>()).unwrap(), cloud);
+    }
+
+    #[test]
+    fn a_selection_needs_ascending_indices_of_the_cloud() {
+        let cloud = PointCloud::from_positions(&grid(12)).unwrap();
+        let refused = |ids: &[u32]| cloud.select(ids).unwrap_err();
+        assert_eq!(refused(&[0, 1, 2, 2, 3]), CloudError::NotAscending { index: 2, before: 2 });
+        assert_eq!(refused(&[0, 9, 2]), CloudError::NotAscending { index: 2, before: 9 });
+        let beyond: Vec<u32> = (4..14).collect();
+        assert_eq!(refused(&beyond), CloudError::NoSuchPoint { index: 12, points: 12 });
+        assert_eq!(refused(&[]), CloudError::TooFew { distinct: 0, given: 12 });
+        assert_eq!(refused(&[0, 1, 2, 3, 4, 5, 6]), CloudError::TooFew { distinct: 7, given: 12 });
     }
 
     #[test]

@@ -33,6 +33,28 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     Ok(reader.sink)
 }
 
+/// The share of vertices among the bytes of a file, from some pieces of it.
+#[derive(Debug, Default)]
+pub(crate) struct Share {
+    bytes: u64,
+    vertices: u64,
+}
+
+impl Share {
+    /// Looks at another piece, which may start and end within a line.
+    pub(crate) fn add(&mut self, piece: &[u8]) {
+        self.bytes += piece.len() as u64;
+        let lines = piece.split(|byte| *byte == b'\n').skip(1);
+        self.vertices += lines.filter(|line| words(line).next() == Some(b"v")).count() as u64;
+    }
+
+    /// About how many vertices a file of this length has.
+    pub(crate) fn vertices(&self, length: u64) -> u64 {
+        let vertices = u128::from(self.vertices) * u128::from(length) / u128::from(self.bytes.max(1));
+        u64::try_from(vertices).unwrap_or(u64::MAX)
+    }
+}
+
 /// Every line with its number, those that go on in the next ones joined.
 fn each_line(bytes: &[u8], mut each: impl FnMut(&[u8], u64) -> Result<(), Broken>) -> Result<(), Broken> {
     let mut lines = Lines::new(bytes);

@@ -52,6 +52,18 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     })
 }
 
+/// How many points a file of this length that begins like this has, as its header says, and at most as many as fit.
+pub(crate) fn count(head: &[u8], length: u64) -> Option<u64> {
+    let (header, lines) = header::parse(head).ok()?;
+    let room = u128::from(length - lines.offset() as u64);
+    let fit = match header.encoding {
+        Encoding::Ascii => room / (2 * header.fields.len()) as u128 + 1,
+        Encoding::Binary => room / header.stride as u128,
+        Encoding::Compressed => (FREE + BYTES_A_BYTE * room) / BYTES_A_POINT,
+    };
+    Some(header.points.min(u64::try_from(fit).unwrap_or(u64::MAX)))
+}
+
 impl Rows for Header {
     fn is_row(&self, line: &Line<'_>) -> bool {
         !line.text.trim_ascii().is_empty()

@@ -86,6 +86,17 @@ impl Rows for Vertices {
     }
 }
 
+/// How many vertices a file of this length that begins like this has, as its header says, and at most as many as fit.
+pub(crate) fn count(head: &[u8], length: u64) -> Option<u64> {
+    let (header, lines) = header::parse(head).ok()?;
+    let vertex = header.vertices().ok()?;
+    let least = match header.encoding {
+        Encoding::Ascii => Ascii::new(lines.clone()).least_size(vertex),
+        Encoding::Binary(order) => Binary::new(&[], 0, order).least_size(vertex),
+    };
+    Some(vertex.count.min((length - lines.offset() as u64) / least as u64))
+}
+
 fn elements<'a>(header: &Header, source: &mut impl Source<'a>) -> Result<Sink, Broken> {
     let mut sink = Sink::default();
     let vertex = header.vertices()?;

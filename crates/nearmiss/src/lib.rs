@@ -8,6 +8,8 @@ mod scan;
 #[doc = include_str!("../../../README.md")]
 struct FrontPage;
 
+#[cfg(feature = "filter")]
+pub use nearmiss_filter as filter;
 pub use nearmiss_geometry as geometry;
 pub use nearmiss_graph as graph;
 pub use nearmiss_hierarchy as hierarchy;

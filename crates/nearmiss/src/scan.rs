@@ -60,10 +60,10 @@ impl From<nearmiss_graph::LoadError> for LoadError {
 const KIND: [u8; 4] = *b"SCAN";
 
 /// Version of the layout of a scan's sections and metadata.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
-/// Versions before this are refused by name. In this one graphs have levels even without a map of close pairs.
-const OLDEST: u32 = 8;
+/// Versions before this are refused by name. This one counts the points that filters left out.
+const OLDEST: u32 = 9;
 
 /// What a scan's file holds beside arrays.
 #[derive(Debug, Serialize, Deserialize)]

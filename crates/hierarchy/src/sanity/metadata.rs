@@ -1,6 +1,6 @@
 //! The numbers about a whole scan: how many entries its arrays have, and what the metadata say.
 
-use nearmiss_geometry::{Aabb, Frame};
+use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_surface::PointBlock;
 
 use super::{FARTHEST, Flaw};
@@ -85,7 +85,8 @@ impl PointHierarchy {
 
     /// How many points the input had: sources lie below it.
     pub(super) fn given(&self) -> usize {
-        let dropped = self.dropped.not_finite.saturating_add(self.dropped.duplicate);
+        let Dropped { not_finite, duplicate, filtered } = self.dropped;
+        let dropped = not_finite.saturating_add(duplicate).saturating_add(filtered);
         dropped.saturating_add(self.len())
     }
 

@@ -2,6 +2,7 @@
 
 mod errors;
 mod expansion;
+mod glances;
 mod mutations;
 mod pieces;
 mod real_data;

@@ -1,0 +1,329 @@
+//! Memory and time that a command will need, estimated before it starts.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use nearmiss::{Aabb, TriangleMesh};
+
+use crate::console::Console;
+use crate::digits::{grouped, short_up};
+use crate::error::CliError;
+use crate::memory::Limit;
+
+/// A run that is expected to take longer than this many seconds is announced.
+const LONG: f64 = 10.0;
+
+/// Memory of the process itself, whatever it does, in bytes.
+const BASE: f64 = 2e7;
+
+/// Bytes a point while a file is read, beside the file itself: its row in double precision, the rounded point and what finds
+/// duplicates. Counted from the arrays of `io` and `PointCloud::cleaned`.
+const READING: f64 = 72.0;
+
+/// What a step costs for each point.
+#[derive(Debug, Clone, Copy)]
+struct Cost {
+    /// Peak memory in bytes, input included.
+    bytes: f64,
+    /// Processor time in microseconds, on all threads together.
+    micros: f64,
+}
+
+/// What `preprocess` makes, in the order of what it needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Preparation {
+    /// The hierarchy alone.
+    Hierarchy,
+    /// A graph without the map of close pairs.
+    Graph,
+    /// A graph with it.
+    ClosePairs,
+    /// All of it, for the geodesic kernel.
+    Geodesic,
+}
+
+impl Preparation {
+    /// Measured, bytes a point: peak resident memory less [`BASE`], by getrusage, of release builds on x86-64 with AVX2. And microseconds
+    /// a point, user and system time.
+    ///
+    /// | points | hierarchy | graph | with close pairs |
+    /// | --: | --: | --: | --: |
+    /// | 100,250, an object with faces | 159 B, 8.7 µs | 613 B, 11.7 µs | 1444 B, 28.6 µs |
+    /// | 753,423, a house of two storeys | 216 B, 6.4 µs | 585 B, 10.6 µs | 1257 B, 25.6 µs |
+    /// | 3,072,580, an atrium, sampled | 176 B, 6.8 µs | 514 B, 9.1 µs | 1276 B, 21.8 µs |
+    ///
+    /// For the geodesic kernel the house takes GEO.
+    fn cost(self) -> Cost {
+        let [bytes, micros] = match self {
+            Self::Hierarchy => [220.0, 7.0],
+            Self::Graph => [615.0, 11.0],
+            Self::ClosePairs => [1450.0, 26.0],
+            Self::Geodesic => [1600.0, 32.0],
+        };
+        Cost { bytes, micros }
+    }
+
+    fn bytes(self, points: f64) -> f64 {
+        BASE + self.cost().bytes * points
+    }
+
+    /// What needs less, and the option that asks for it.
+    fn lighter(self) -> &'static [(Self, &'static str)] {
+        match self {
+            Self::ClosePairs => &[(Self::Graph, "--no-close-pairs"), (Self::Hierarchy, "--no-graph")],
+            Self::Graph => &[(Self::Hierarchy, "--no-graph")],
+            Self::Hierarchy | Self::Geodesic => &[],
+        }
+    }
+}
+
+/// Checks whether points can be prepared, and announces long runs once.
+#[derive(Debug)]
+pub(crate) struct Forecast<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) limit: Limit,
+    pub(crate) threads: usize,
+    pub(crate) console: Console,
+    pub(crate) preparation: Preparation,
+}
+
+impl Forecast<'_> {
+    /// Refuses a file of `points` points and `bytes` bytes that cannot even be read.
+    pub(crate) fn check_reading(&self, points: u64, bytes: u64) -> Result<(), CliError> {
+        let need = BASE + to_float(bytes) + READING * to_float(points);
+        let what = format!("reading {} points needs", grouped(points));
+        self.refuse(&what, need, &["a part of the file".to_owned()])
+    }
+
+    /// Refuses points that do not fit into memory once they are prepared. `bounds` are those of the points, if known.
+    pub(crate) fn check_preparing(&self, points: u64, bounds: Option<&Aabb>) -> Result<(), CliError> {
+        let count = to_float(points);
+        let need = self.preparation.bytes(count);
+        let mut remedies = Vec::new();
+        if let Some(most) = self.limit.bytes() {
+            let fitting = (0.8 * (most - BASE) / self.preparation.cost().bytes).max(8.0);
+            remedies.push(match bounds.and_then(|bounds| voxel_for(bounds, fitting)) {
+                Some(size) => format!("--voxel {}", short_up(size)),
+                None => "--voxel with a length".to_owned(),
+            });
+            let lighter = self.preparation.lighter().iter().find(|(lighter, _)| lighter.bytes(count) <= most);
+            remedies.extend(lighter.map(|(_, option)| (*option).to_owned()));
+        }
+        self.refuse(&format!("{} points need", grouped(points)), need, &remedies)
+    }
+
+    /// Says how long it will take to prepare so many points, if that is long.
+    pub(crate) fn announce(&self, points: u64) {
+        let seconds = seconds(self.preparation.cost().micros * to_float(points), self.threads);
+        if seconds > LONG {
+            self.console.note(format_args!(
+                "preparing {} points takes about {} and {}",
+                grouped(points),
+                duration(seconds),
+                size(self.preparation.bytes(to_float(points)))
+            ));
+        }
+    }
+
+    fn refuse(&self, what: &str, need: f64, remedies: &[String]) -> Result<(), CliError> {
+        refuse(self.path, self.limit, what, need, remedies)
+    }
+}
+
+/// Measured, bytes a sample: 24.2 at 3,453,074 and at 11,932,842 samples of an atrium. The file is written as it goes.
+const SAMPLE: Cost = Cost { bytes: 24.5, micros: 0.12 };
+
+/// Refuses to sample `mesh` where the samples would not fit into memory, and announces long runs.
+pub(crate) fn check_sampling(
+    path: &Path,
+    limit: Limit,
+    console: Console,
+    mesh: &TriangleMesh,
+    (spacing, is_jittered): (f64, bool),
+) -> Result<(), CliError> {
+    let points = samples(mesh, spacing, is_jittered);
+    // Numbers beyond those of points are refused by name.
+    let is_sensible = spacing > 0.0 && points < f64::from(u32::MAX);
+    if !is_sensible {
+        return Ok(());
+    }
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below 2³²")]
+    let shown = grouped(rounded(points) as u64);
+    let need = BASE + SAMPLE.bytes * points;
+    let wider = limit.bytes().map(|most| {
+        let factor = (need / (most - BASE).max(0.01 * most)).sqrt();
+        format!("--spacing {}", short_up(1.1 * factor * spacing))
+    });
+    refuse(path, limit, &format!("about {shown} samples need"), need, &Vec::from_iter(wider))?;
+    let seconds = 1e-6 * SAMPLE.micros * points;
+    if seconds > LONG {
+        let (time, size) = (duration(seconds), size(need));
+        console.note(format_args!("about {shown} samples take about {time} and {size}"));
+    }
+    Ok(())
+}
+
+/// About how many samples `nearmiss::mesh::sample` makes at a spacing: those of the triangles' areas, and what rounding up of rows
+/// and places adds.
+fn samples(mesh: &TriangleMesh, spacing: f64, is_jittered: bool) -> f64 {
+    // The steps between rows, and between the places in a row, as in `sample`.
+    let step = 2.0 / 5.0_f64.sqrt() * spacing * if is_jittered { 0.8 } else { 1.0 };
+    let of_triangle = |(i, corners): (usize, &[u32; 3])| {
+        let [a, b, c] = corners.map(|v| mesh.vertices()[v as usize]);
+        let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+        let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let twice_area = cross.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let base = mesh.longest_edge(i);
+        let height = if base > 0.0 { twice_area / base } else { 0.0 };
+        ((height / step + 1.5) * (0.5 * base / step + 1.5)).max(3.0)
+    };
+    mesh.triangles().iter().enumerate().map(of_triangle).sum()
+}
+
+/// An edge length of voxels of which about `points` are occupied, if the points lie on surfaces whose area is that of their bounding
+/// box.
+fn voxel_for(bounds: &Aabb, points: f64) -> Option<f64> {
+    let [x, y, z] = bounds.half_extents().map(|h| 2.0 * h);
+    let area = 2.0 * (x * y + y * z + z * x);
+    // A surface at an angle passes about one and a half times as many cells as one along the axes.
+    let size = (1.5 * area / points).sqrt();
+    (size > 0.0 && size.is_finite()).then_some(size)
+}
+
+fn refuse(path: &Path, limit: Limit, what: &str, need: f64, remedies: &[String]) -> Result<(), CliError> {
+    let Some(most) = limit.bytes().filter(|most| need > *most) else { return Ok(()) };
+    let of = if matches!(limit, Limit::Asked(_)) { "allowed by --memory" } else { "available" };
+    let mut said = format!("{what} about {}, {} are {of}; try ", size(need), size(most));
+    for remedy in remedies {
+        let _ = write!(said, "{remedy}, ");
+    }
+    let or = if remedies.is_empty() { "" } else { "or " };
+    let _ = write!(said, "{or}--memory {} to run anyway", enough(need));
+    Err(CliError::Unfit { path: path.to_owned(), what: said })
+}
+
+impl Limit {
+    fn bytes(self) -> Option<f64> {
+        match self {
+            Self::Asked(bytes) | Self::Available(bytes) => Some(to_float(bytes)),
+            Self::Unknown => None,
+        }
+    }
+}
+
+/// Work of so many microseconds on some threads, 0 for all. Measured runs keep a second thread busy for five sixths of the time.
+#[expect(clippy::cast_precision_loss, reason = "a few")]
+fn seconds(micros: f64, threads: usize) -> f64 {
+    let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let threads = if threads == 0 { all() } else { threads } as f64;
+    1e-6 * micros * (0.15 + 0.85 / threads)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "an estimate")]
+fn to_float(n: u64) -> f64 {
+    n as f64
+}
+
+/// Two significant digits.
+fn rounded(x: f64) -> f64 {
+    let unit = 10.0_f64.powf((x.max(1.0).log10().floor() - 1.0).max(0.0));
+    (x / unit).round() * unit
+}
+
+/// A size of memory, to two digits.
+fn size(bytes: f64) -> String {
+    let (number, unit) = match bytes {
+        ..1e6 => (bytes / 1e3, "kB"),
+        1e6..1e9 => (bytes / 1e6, "MB"),
+        _ => (bytes / 1e9, "GB"),
+    };
+    if number < 10.0 { format!("{number:.1} {unit}") } else { format!("{:.0} {unit}", rounded(number)) }
+}
+
+/// A size that is enough, as `--memory` takes it.
+fn enough(bytes: f64) -> String {
+    let (number, unit) = if bytes < 1e9 { (bytes / 1e6, "MB") } else { (bytes / 1e9, "GB") };
+    format!("{}{unit}", (1.05 * number).ceil())
+}
+
+fn duration(seconds: f64) -> String {
+    match seconds {
+        ..100.0 => format!("{:.0} s", rounded(seconds)),
+        100.0..6000.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use nearmiss::mesh::{SampleOptions, Samples, sample};
+
+    use super::*;
+
+    fn forecast(limit: Limit, preparation: Preparation, path: &PathBuf) -> Forecast<'_> {
+        let console = Console::new(true);
+        Forecast { path, limit, threads: 2, console, preparation }
+    }
+
+    #[test]
+    fn refusals_carry_numbers() {
+        let path = PathBuf::from("big.ply");
+        let bounds = Aabb { min: [0.0; 3], max: [30.0, 20.0, 3.0] };
+        let limit = Limit::Available(8_000_000_000);
+        let refused =
+            forecast(limit, Preparation::ClosePairs, &path).check_preparing(30_000_000, Some(&bounds));
+        let message = refused.unwrap_err().to_string();
+        let expected = "big.ply: 30,000,000 points need about 44 GB, 8.0 GB are available; try --voxel ";
+        assert!(message.starts_with(expected), "{message}");
+        assert!(message.ends_with(", --no-graph, or --memory 46GB to run anyway"), "{message}");
+        let size: f64 = message[expected.len()..].split(',').next().unwrap().parse().unwrap();
+        assert!((0.01..0.1).contains(&size), "{message}");
+
+        let refused = forecast(Limit::Asked(20_000_000_000), Preparation::ClosePairs, &path);
+        let message = refused.check_preparing(30_000_000, None).unwrap_err().to_string();
+        assert!(
+            message
+                .contains("20 GB are allowed by --memory; try --voxel with a length, --no-close-pairs, or"),
+            "{message}"
+        );
+        let message = refused.check_reading(1_000_000_000, 0).unwrap_err().to_string();
+        assert!(message.contains("reading 1,000,000,000 points needs about 72 GB"), "{message}");
+
+        for limit in [Limit::Unknown, Limit::Asked(60_000_000_000)] {
+            assert!(
+                forecast(limit, Preparation::ClosePairs, &path).check_preparing(30_000_000, None).is_ok()
+            );
+        }
+    }
+
+    #[test]
+    fn samples_are_estimated_within_a_few_percent_where_faces_are_large() {
+        // A tetrahedron, and a fan of slivers.
+        let corners = vec![[0.0; 3], [1.0, 0.0, 0.2], [0.3, 2.0, 0.0], [0.0, 0.5, 1.5]];
+        let solid = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 1, 3], [1, 2, 3], [0, 2, 3]]).unwrap();
+        let rim = (0..50).map(|i| f64::from(i) * 0.1).map(|t| [t.cos(), t.sin(), 0.0]);
+        let fan = std::iter::once([0.0; 3]).chain(rim).collect();
+        let fan = TriangleMesh::new(fan, (1..50).map(|i| [0, i, i + 1]).collect()).unwrap();
+        for (mesh, spacing, tolerance) in
+            [(&solid, 0.01, 0.05), (&solid, 0.1, 0.2), (&fan, 0.01, 0.2), (&fan, 0.3, 0.5)]
+        {
+            for is_jittered in [false, true] {
+                let mut options = SampleOptions::new(Samples::Spacing(spacing));
+                options.seed = is_jittered.then_some(1);
+                let count = to_float(sample(mesh, &options).unwrap().len() as u64);
+                let share = samples(mesh, spacing, is_jittered) / count;
+                assert!((share - 1.0).abs() < tolerance, "{share} of {count} at {spacing}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_are_rounded_for_people() {
+        assert_eq!([4.12e9, 1.24e10, 9.6e7, 5e4].map(size), ["4.1 GB", "12 GB", "96 MB", "50 kB"]);
+        assert_eq!([1.2e10, 3.1e8].map(enough), ["13GB", "326MB"]);
+        assert_eq!([12.3, 250.0, 7200.0].map(duration), ["12 s", "4 min", "2.0 h"]);
+        assert_eq!([1234.0, 7.0, 98_765.0].map(rounded), [1200.0, 7.0, 99_000.0]);
+    }
+}

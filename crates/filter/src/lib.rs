@@ -1,0 +1,15 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod crop;
+mod error;
+mod neighbours;
+mod outliers;
+mod parallel;
+mod voxel;
+
+pub use crop::crop;
+pub use error::FilterError;
+pub use neighbours::min_neighbours;
+pub use outliers::remove_outliers;
+pub use voxel::voxel;

@@ -1,0 +1,155 @@
+//! A first look at a file: about how many points it holds, and where.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+use nearmiss_geometry::Aabb;
+
+use crate::columns::Row;
+use crate::format::{Format, recognise};
+use crate::pieces::{Encoding, Layout};
+use crate::read::{BYTE_ORDER_MARK, check_file};
+use crate::text::Lines;
+use crate::{obj, pcd, ply, xyz};
+
+/// Bytes at the start that are looked at.
+const HEAD: u64 = 1 << 16;
+
+/// Pieces of the rest that are looked at.
+const PIECES: u64 = 64;
+
+/// Bytes of such a piece.
+const PIECE: u64 = 1 << 12;
+
+/// What a first look at a file tells. Nothing of it is checked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Glance {
+    /// About how many points the file holds, broken ones and duplicates included.
+    pub points: u64,
+    /// Length of the file in bytes.
+    pub bytes: u64,
+    /// Bounds of some hundreds of points throughout the file, if it holds nothing but points that are not compressed.
+    pub bounds: Option<Aabb>,
+}
+
+/// Looks at the header and at some pieces of a file, a third of a mebibyte in all.
+///
+/// Returns `None` if the file cannot be read or is of an unknown format. A header that promises more points than the
+/// file has space for is not believed.
+#[must_use]
+pub fn glance(path: &Path, format: Option<Format>) -> Option<Glance> {
+    check_file(path).ok()?;
+    let mut file = File::open(path).ok()?;
+    let bytes = file.metadata().ok()?.len();
+    let mut head = Vec::new();
+    (&mut file).take(HEAD).read_to_end(&mut head).ok()?;
+    let mark = if head.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
+    let (content, length) = (&head[mark..], bytes - mark as u64);
+    let format = match format {
+        Some(format) => format,
+        None => recognise(content, length, path).ok()?,
+    };
+    let layout = match format {
+        Format::Ply => ply::layout(content),
+        Format::Pcd => pcd::layout(content),
+        Format::Xyz => xyz::layout(content),
+        Format::Obj => None,
+    };
+    let points = match format {
+        Format::Ply => ply::count(content, length)?,
+        Format::Pcd => pcd::count(content, length)?,
+        Format::Xyz => lines(content, length, layout.as_ref()?)?,
+        Format::Obj => {
+            let mut pieces = Pieces { file: &mut file, start: 0, end: bytes };
+            let mut share = obj::Share::default();
+            pieces.each(|piece| share.add(piece));
+            share.vertices(length)
+        }
+    };
+    let bounds = layout.and_then(|layout| {
+        let start = (mark + layout.start) as u64;
+        let mut pieces = Pieces { file: &mut file, start, end: bytes };
+        bounds(&layout, &mut pieces)
+    });
+    Some(Glance { points, bytes, bounds })
+}
+
+/// Rows of a text of this length, by the mean length of those in its head.
+fn lines(head: &[u8], length: u64, layout: &Layout) -> Option<u64> {
+    if let Some((promised, _)) = layout.promised {
+        return Some(promised.min(length / 2));
+    }
+    let rows = head.get(layout.start..)?;
+    let count = Lines::new(rows).count() as u64;
+    let (rows_length, all) = (rows.len() as u64, length - layout.start as u64);
+    // Wide enough for files of any length.
+    let points = u128::from(all) * u128::from(count) / u128::from(rows_length.max(1));
+    u64::try_from(points).ok()
+}
+
+fn bounds(layout: &Layout, pieces: &mut Pieces<'_>) -> Option<Aabb> {
+    let mut found: Vec<[f64; 3]> = Vec::new();
+    let mut row = Row::default();
+    let start = pieces.start;
+    pieces.each_at(|at, piece| match layout.encoding {
+        Encoding::Binary { stride } => {
+            let off = usize::try_from((at - start) % stride as u64).unwrap_or(0);
+            let skipped = if off == 0 { 0 } else { stride - off };
+            let records = piece.get(skipped..).unwrap_or_default().chunks_exact(stride);
+            for record in records.take(ROWS) {
+                layout.rows.record(record, &mut row);
+                found.push([row[0], row[1], row[2]]);
+            }
+        }
+        Encoding::Text { end, .. } => {
+            let whole = Lines::going_on(piece, 0, end);
+            // The first line may lack its start, and the last one its end.
+            let mut rows: Vec<_> =
+                whole.skip(1).filter(|line| layout.rows.is_row(line)).take(ROWS + 1).collect();
+            rows.pop();
+            for line in rows {
+                if layout.rows.line(line, &mut row).is_ok() {
+                    found.push([row[0], row[1], row[2]]);
+                }
+            }
+        }
+    });
+    let finite: Vec<[f64; 3]> = found.into_iter().filter(|p| p.iter().all(|x| x.is_finite())).collect();
+    (!finite.is_empty()).then(|| Aabb::of(finite.into_iter()))
+}
+
+/// Rows of a piece that are looked at.
+const ROWS: usize = 16;
+
+/// Pieces that are evenly spread over a part of a file.
+struct Pieces<'a> {
+    file: &'a mut File,
+    start: u64,
+    end: u64,
+}
+
+impl Pieces<'_> {
+    fn each(&mut self, mut take: impl FnMut(&[u8])) {
+        self.each_at(|_, piece| take(piece));
+    }
+
+    /// Hands out where each piece starts, and what can be read of it.
+    fn each_at(&mut self, mut take: impl FnMut(u64, &[u8])) {
+        let room = self.end.saturating_sub(self.start);
+        let count = room.div_ceil(PIECE).min(PIECES);
+        let mut bytes = Vec::new();
+        for i in 0..count {
+            let at = self.start + room.saturating_sub(PIECE) / (count - 1).max(1) * i;
+            bytes.clear();
+            let read = self
+                .file
+                .seek(SeekFrom::Start(at))
+                .and_then(|_| Read::by_ref(self.file).take(PIECE).read_to_end(&mut bytes));
+            if read.is_ok() {
+                take(at, &bytes);
+            }
+        }
+    }
+}
