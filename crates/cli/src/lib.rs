@@ -23,14 +23,18 @@ mod posing;
 
 mod advice;
 mod digits;
+mod health;
+mod meaning;
 mod report;
 mod search;
 mod sentence;
 
 mod canvas;
 mod curve_picture;
+mod distance_picture;
 mod font;
 mod geodesic;
+mod kinds_picture;
 mod level;
 mod picture;
 
@@ -54,7 +58,9 @@ pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
 pub use geodesic::geodesic_picture;
 pub use inspect::InspectArgs;
+pub use kinds_picture::kinds_picture;
 pub use level::level_picture;
+pub use meaning::MeaningArgs;
 pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;
 pub use posing::{PairArgs, PoseRefused};

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use nearmiss::hierarchy::{Node, NodePair, OrientedBox};
-use nearmiss::{Answer, Evidence, Proof, ScanView, Verdict};
+use nearmiss::{Answer, CollideOptions, Evidence, Proof, ScanView, Semantics, Verdict};
 use serde::Serialize;
 
 use crate::report::word;
@@ -17,6 +17,8 @@ struct Line {
     placed_a: [f64; 16],
     placed_b: [f64; 16],
     margin: f64,
+    /// What was compared, and what enclosures hold: `obstacle` or `surface`.
+    semantics: &'static str,
     verdict: &'static str,
     evidence: Option<&'static str>,
     gap: Option<f64>,
@@ -46,18 +48,19 @@ impl Enclosure {
     }
 }
 
-/// Writes what `answer` to a question with this `margin` rests on.
+/// Writes what `answer` to a question with these `options` rests on.
 pub(crate) fn write(
     out: &mut impl Write,
     query: u64,
     views: [&ScanView<'_>; 2],
-    margin: f64,
+    options: &CollideOptions,
     answer: &Answer,
     proof: &Proof,
 ) -> io::Result<()> {
     let pairs: Vec<NodePair> = proof.pairs.iter().map(|(pair, _)| *pair).collect();
-    let (nodes_a, index_a) = nodes(views[0], pairs.iter().map(|pair| pair.a.index()));
-    let (nodes_b, index_b) = nodes(views[1], pairs.iter().map(|pair| pair.b.index()));
+    let of_obstacles = options.semantics == Semantics::Obstacle;
+    let (nodes_a, index_a) = nodes(views[0], of_obstacles, pairs.iter().map(|pair| pair.a.index()));
+    let (nodes_b, index_b) = nodes(views[1], of_obstacles, pairs.iter().map(|pair| pair.b.index()));
     let (verdict, evidence, gap, contact) = match answer.verdict {
         Verdict::Intersecting { contact, evidence } => ("intersecting", Some(evidence), None, Some(contact)),
         Verdict::Separated { gap, evidence } => ("separated", Some(evidence), Some(gap), None),
@@ -68,7 +71,8 @@ pub(crate) fn write(
         query,
         placed_a: views[0].placed().to_row_major(),
         placed_b: views[1].placed().to_row_major(),
-        margin,
+        margin: options.margin,
+        semantics: if of_obstacles { "obstacle" } else { "surface" },
         verdict,
         evidence: evidence.map(word),
         gap,
@@ -83,14 +87,18 @@ pub(crate) fn write(
 }
 
 /// The nodes of these ids, each once, and where each id is among them.
-fn nodes(view: &ScanView<'_>, ids: impl Iterator<Item = usize>) -> (Vec<Enclosure>, Vec<usize>) {
+fn nodes(
+    view: &ScanView<'_>,
+    of_obstacles: bool,
+    ids: impl Iterator<Item = usize>,
+) -> (Vec<Enclosure>, Vec<usize>) {
     let ids: Vec<usize> = ids.collect();
     let mut distinct = ids.clone();
     distinct.sort_unstable();
     distinct.dedup();
     let slices = view.slices();
-    let enclosures =
-        distinct.iter().map(|&id| Enclosure::new(slices.nodes[id], &slices.enclosure(id))).collect();
+    let bounds = |id: usize| if of_obstacles { slices.obstacle_enclosure(id) } else { slices.enclosure(id) };
+    let enclosures = distinct.iter().map(|&id| Enclosure::new(slices.nodes[id], &bounds(id))).collect();
     let place = |id: &usize| distinct.binary_search(id).unwrap_or_default();
     (enclosures, ids.iter().map(place).collect())
 }
