@@ -85,11 +85,13 @@ impl Uneven {
     fn of(spacings: &[(f64, f64)]) -> Option<Self> {
         let median = quantile(spacings, 0.5);
         let sparse = &spacings[spacings.partition_point(|&(spacing, _)| spacing <= UNEVEN * median)..];
-        let share_by = |of: fn(&(f64, f64)) -> f64| {
-            sparse.iter().map(of).sum::<f64>() / spacings.iter().map(of).sum::<f64>().max(f64::MIN_POSITIVE)
-        };
-        let (share, area) = (share_by(|s| s.1), share_by(|s| s.1 * s.0 * s.0));
         let spacing = quantile(sparse, 0.5);
+        // A stray stands for no area of the square of its distance.
+        let most = UNEVEN * spacing;
+        let area = |&(spacing, weight): &(f64, f64)| weight * spacing.min(most).powi(2);
+        let whole = spacings.iter().map(area).sum::<f64>().max(f64::MIN_POSITIVE);
+        let (share, area) =
+            (sparse.iter().map(|s| s.1).sum::<f64>(), sparse.iter().map(area).sum::<f64>() / whole);
         let matters = median > 0.0 && (share >= MANY || area >= LARGE);
         matters.then(|| Self { share, area, times: spacing / median, spacing, median })
     }

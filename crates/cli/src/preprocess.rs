@@ -30,7 +30,7 @@ pub struct PreprocessArgs {
     #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32))]
     pub radius_neighbours: u32,
     /// L: how far the scan may be interpolated, in the units of the input. No gap wider than this is bridged, and no ball is
-    /// larger. By default twice the sampling radius, within which nine tenths of the points have six neighbours
+    /// wider. By default twice the sampling radius, within which nine tenths of the points have six neighbours
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach)]
     pub reach: Option<f64>,
     /// Weight of a point by its distance

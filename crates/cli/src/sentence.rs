@@ -56,7 +56,13 @@ pub(crate) fn sentence(
             let within = margin.map_or(String::new(), |margin| format!(" within {margin}"));
             let apart = distance.filter(|distance| distance.upper > 0.0).map(|distance| {
                 let distance = Distance { lower: distance.lower.max(gap).min(distance.upper), ..*distance };
-                format!("; {}", bracket(&distance, unit))
+                let is_near = thickened.is_none() && distance.upper < distance.band;
+                let near = if is_near {
+                    format!(", less than the local spacing of {}", rough(distance.band))
+                } else {
+                    String::new()
+                };
+                format!("; {}{near}", bracket(&distance, unit))
             });
             format!("No contact{found}{within}{} ({}).", apart.unwrap_or_default(), word(evidence))
         }

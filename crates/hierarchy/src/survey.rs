@@ -10,6 +10,7 @@ use nearmiss_surface::{BlockTree, Nearest, PointBlock};
 
 use crate::build::PointHierarchy;
 use crate::neighbours::chunks;
+use crate::surfels::PointKind;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
@@ -46,7 +47,7 @@ const LEVEL: f64 = 0.15;
 /// What a sample of a scan's points shows. Lengths are in the caller's units.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Survey {
-    /// Distance of each sampled point to its sixth neighbour, ascending, and the share of all points it stands for.
+    /// Distance of each sampled point but strays to its sixth neighbour, ascending, and the share of all points it stands for.
     pub spacings: Vec<(f64, f64)>,
     /// Estimated share of the points that lie at a border of a sheet.
     pub border: f64,
@@ -59,6 +60,7 @@ pub struct Survey {
 /// What one block shows.
 #[derive(Default)]
 struct Seen {
+    count: usize,
     spacings: Vec<f64>,
     border: usize,
     holes: Vec<f64>,
@@ -83,7 +85,7 @@ impl PointHierarchy {
                 blocks.iter().map(|&block| self.look(&tree, block, &points, &mut found)).collect::<Vec<_>>()
             });
             let seen: Vec<Seen> = seen.into_iter().flatten().collect();
-            let count: usize = seen.iter().map(|seen| seen.spacings.len()).sum();
+            let count: usize = seen.iter().map(|seen| seen.count).sum();
             let weight = points.len() as f64 / self.len() as f64 / count.max(1) as f64;
             let border: usize = seen.iter().map(|seen| seen.border).sum();
             if border > 0 {
@@ -109,7 +111,10 @@ impl PointHierarchy {
         for i in (first..first + WIDTH).filter(|i| points.contains(i)) {
             let near = found.ranked(i % WIDTH, RANK.min(count) - 1);
             let spacing = near.map_or(0.0, |near| f64::from(near.distance_sq).sqrt());
-            seen.spacings.push(spacing * self.frame().scale);
+            seen.count += 1;
+            if self.kind(i) != PointKind::Stray {
+                seen.spacings.push(spacing * self.frame().scale);
+            }
             if i < slices.sheets {
                 let ids = found.of(i % WIDTH).map(|near| near.id as usize);
                 if let Some(outward) = self.outward(i, ids) {

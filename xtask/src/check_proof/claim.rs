@@ -3,7 +3,7 @@
 use super::boxes::{Placed, distance};
 use super::cover::{Rectangle, uncovered};
 use super::placement::Placement;
-use super::proof::{Enclosure, Line, Matrix, Poses, Verdict};
+use super::proof::{Enclosure, Line, Matrix, Poses, Semantics, Verdict};
 use super::subject::Subject;
 use super::witness;
 
@@ -108,7 +108,10 @@ impl Checker<'_> {
         for (name, nodes, subject) in
             [("a", &line.nodes_a, self.subjects[0]), ("b", &line.nodes_b, self.subjects[1])]
         {
-            nodes.iter().try_for_each(|node| subject.check_node(node)).map_err(|e| format!("{name}: {e}"))?;
+            nodes
+                .iter()
+                .try_for_each(|node| subject.check_node(node, line.semantics))
+                .map_err(|e| format!("{name}: {e}"))?;
         }
         let known = |[i, j]: [usize; 2]| i < line.nodes_a.len() && j < line.nodes_b.len();
         if let Some(pair) = line.pairs.iter().find(|pair| !known(**pair)) {
@@ -141,7 +144,7 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// The witness lies on both surfaces; or, if these count as meeting from a margin on, points of either are so near
+    /// The witness lies on both surfaces, or of obstacles in balls or at points; or, if these count as meeting from a margin on, points of either are so near
     /// to it that they are nearer to each other than the margin.
     fn intersecting(
         &self,
@@ -158,8 +161,22 @@ impl Checker<'_> {
             witness::check_near(self.subjects[i], &placements[i], witness, claimed)
                 .map_err(|e| format!("{name}: {e}"))
         };
+        let in_ball = |i: usize, margin: f64| {
+            line.semantics == Semantics::Obstacle
+                && witness::is_in_ball(self.subjects[i], &placements[i], witness, margin)
+        };
         let (a, b) = match (on(0, "a"), on(1, "b")) {
             (Ok(a), Ok(b)) => (a, b),
+            (a, b)
+                if match (a.is_ok(), b.is_ok()) {
+                    (true, _) => in_ball(1, line.margin),
+                    (false, true) => in_ball(0, line.margin),
+                    (false, false) => (0..2).all(|i| in_ball(i, 0.5 * line.margin)),
+                } =>
+            {
+                finding.off = [a, b].into_iter().flatten().map(|seen| seen.off).fold(0.0, f64::max);
+                return Ok(());
+            }
             (a, b) if line.margin == 0.0 => (a?, b?),
             _ => {
                 finding.between = true;

@@ -22,6 +22,8 @@ pub(crate) struct Line {
     pub(crate) placed_a: Matrix,
     pub(crate) placed_b: Matrix,
     pub(crate) margin: f64,
+    #[serde(default)]
+    pub(crate) semantics: Semantics,
     pub(crate) verdict: Verdict,
     pub(crate) evidence: Option<Evidence>,
     pub(crate) gap: Option<f64>,
@@ -30,6 +32,15 @@ pub(crate) struct Line {
     pub(crate) nodes_a: Vec<Enclosure>,
     pub(crate) nodes_b: Vec<Enclosure>,
     pub(crate) pairs: Vec<[usize; 2]>,
+}
+
+/// What was compared: what enclosures hold, and what a witness lies on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Semantics {
+    #[default]
+    Surface,
+    Obstacle,
 }
 
 /// Whether two scans meet.

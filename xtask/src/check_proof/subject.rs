@@ -9,7 +9,7 @@ use nearmiss::hierarchy::Node;
 use nearmiss::{Bandwidth, BuildOptions, Check, Kernel, Scan};
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 
-use super::proof::Enclosure;
+use super::proof::{Enclosure, Semantics};
 use crate::repository::Outcome;
 
 /// First bytes of a prepared scan.
@@ -60,12 +60,15 @@ impl Subject {
 
     /// # Errors
     /// When no node has these points, or its enclosure differs in a bit.
-    pub(crate) fn check_node(&self, claimed: &Enclosure) -> Result<(), String> {
+    pub(crate) fn check_node(&self, claimed: &Enclosure, semantics: Semantics) -> Result<(), String> {
         let Enclosure { first, count, .. } = *claimed;
         let Some(&id) = self.ids.get(&(first, count)) else {
             return Err(format!("no node has the points {first} to {first} + {count}"));
         };
-        let stored = self.scan.slices().enclosure(id);
+        let stored = match semantics {
+            Semantics::Surface => self.scan.slices().enclosure(id),
+            Semantics::Obstacle => self.scan.slices().obstacle_enclosure(id),
+        };
         let bits = |[a, b, c]: [f32; 3]| [a.to_bits(), b.to_bits(), c.to_bits()];
         let same = bits(stored.centre) == bits(claimed.centre)
             && bits(stored.half) == bits(claimed.half)

@@ -36,6 +36,19 @@ pub(crate) fn check(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Re
     check_stored(subject, placement, placement.stored(x))
 }
 
+/// Returns `true` if the point `x` of the world lies in the ball that stands for some point in the obstacle, or within `margin`
+/// of it, or at a measured point.
+pub(crate) fn is_in_ball(subject: &Subject, placement: &Placement, x: [f64; 3], margin: f64) -> bool {
+    let x = placement.stored(x);
+    let slices = subject.scan.slices();
+    let margin = margin / placement.scale;
+    let rounding = DISTANCE * subject.scan.sampling_radius() / subject.scan.frame().scale;
+    slices.positions.iter().enumerate().any(|(i, p)| {
+        let ball = f64::from(slices.obstacle_ball(i));
+        distance(&p.map(f64::from), &x) <= ball + margin + rounding
+    })
+}
+
 /// As [`check`], for a point among the stored positions.
 fn check_stored(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result<Seen, String> {
     let Some(at) = subject.twin.evaluate(x) else { return Err("no point reaches the witness".into()) };
