@@ -169,8 +169,9 @@ fn thickened(radius: f64) -> String {
     format!("--thickened {}", short_up(0.5 * radius))
 }
 
-/// A larger number of neighbours, where that helps against lines: beside sheets, lines are mostly rings jagged by noise, in
-/// which the first few neighbours spread by chance. A scan of little but lines was already searched to 256 neighbours.
+/// A larger number of neighbours, where that helps against lines: beside sheets, lines are mostly
+/// rings jagged by noise, in which the first few neighbours spread by chance. A scan of little but
+/// lines was already searched to 256 neighbours.
 fn wider_along_lines(scan: &PointHierarchy) -> Option<String> {
     (scan.share(PointKind::Line) < scan.usable()).then(|| more_neighbours(scan.radius_neighbours())).flatten()
 }
@@ -186,8 +187,8 @@ fn has_local_bandwidth(bandwidth: Bandwidth) -> bool {
     matches!(bandwidth, Bandwidth::Local)
 }
 
-/// What helps where points of `view` that sample no sheet leave surfaces in doubt. `radius` is the greater sampling radius of
-/// both scans in the world; `first` comes first.
+/// What helps where points of `view` that sample no sheet leave surfaces in doubt. `radius` is the
+/// greater sampling radius of both scans in the world; `first` comes first.
 pub(crate) fn for_sparse(view: &ScanView<'_>, radius: f64, first: Option<&str>) -> String {
     let scan = view.scan();
     let mut ways: Vec<String> = first.map(Into::into).into_iter().collect();

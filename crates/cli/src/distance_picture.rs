@@ -15,7 +15,8 @@ use crate::sentence::{bracket, unit};
 const OF_LENGTH: f64 = 0.8;
 const OF_BAND: f64 = 5.0;
 
-/// How much the close view is turned towards the first scan: by 15 degrees, which shortens the segment by 4 %.
+/// How much the close view is turned towards the first scan: by 15 degrees, which shortens the
+/// segment by 4 %.
 const TILT: f64 = 0.27;
 
 /// Radii of points in fine pixels, and of the ends of the segment.
@@ -23,8 +24,8 @@ const WHOLE_DOT: f64 = 2.5;
 const CLOSE_DOT: f64 = 7.0;
 const END: f64 = 9.0;
 
-/// Both scans as they lie in the world; beside that a close view across the segment between the nearest places, what is before
-/// it taken away.
+/// Both scans as they lie in the world; beside that a close view across the segment between the
+/// nearest places, what is before it taken away.
 pub(crate) fn paint_distance(views: [&ScanView<'_>; 2], found: &Distance, style: &Style) -> Picture {
     let mut canvas = Canvas::new(2 * PANEL + 3 * GAP, PANEL + LEGEND + 2 * GAP, GROUND);
     let segment = Segment::new(found);
@@ -80,8 +81,9 @@ impl Segment {
         count / (count + 4.0)
     }
 
-    /// Obliquely across the segment, which lies level, with as little before it as may be; and the direction at right angles to it from
-    /// which what is before it is cut away. A surface at right angles to the segment is seen as one.
+    /// Obliquely across the segment, which lies level, with as little before it as may be; and the
+    /// direction at right angles to it from which what is before it is cut away. A surface at right
+    /// angles to the segment is seen as one.
     fn camera(&self, points: &[Vector3<f64>], area: Area) -> (Camera, Vector3<f64>) {
         let along = self.ends[1] - self.ends[0];
         let along = along.try_normalize(0.0).unwrap_or_else(Vector3::x);
@@ -101,8 +103,9 @@ impl Segment {
         (Camera { axes: [right, up, toward], centre: self.middle(), scale, area }, cut)
     }
 
-    /// The points of both scans that are `shown`, and the segment over them with its length. No disc is larger than the first
-    /// of `sizes`, in fine pixels; where points are shown, each has the second as its radius.
+    /// The points of both scans that are `shown`, and the segment over them with its length. No
+    /// disc is larger than the first of `sizes`, in fine pixels; where points are shown, each has
+    /// the second as its radius.
     fn paint(
         &self,
         canvas: &mut Canvas,

@@ -30,7 +30,8 @@ pub(crate) struct Health {
     pub(crate) uneven: Option<Uneven>,
     /// Holes wider than the reach, if any were found.
     pub(crate) holes: Option<Holes>,
-    /// 0.9-quantile of the spacing of the points whose spacing exceeds the reach, estimated; 0 without any.
+    /// 0.9-quantile of the spacing of the points whose spacing exceeds the reach, estimated; 0
+    /// without any.
     pub(crate) beyond_reach: f64,
 }
 

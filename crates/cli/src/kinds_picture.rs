@@ -18,7 +18,8 @@ const GROUND: Colour = [255, 255, 255];
 const PANEL_GROUND: Colour = [238, 240, 243];
 const INK: Colour = [30, 34, 40];
 
-/// The colour of a kind in pictures and exported points. All are told apart by eyes that do not see all colours.
+/// The colour of a kind in pictures and exported points. All are told apart by eyes that do not see
+/// all colours.
 pub(crate) const fn colour(kind: PointKind) -> Colour {
     match kind {
         PointKind::Sheet => [158, 166, 178],
@@ -30,8 +31,8 @@ pub(crate) const fn colour(kind: PointKind) -> Colour {
     }
 }
 
-/// The obstacle of `scan`: points on sheets as discs, all others as the balls that they stand for, in the colours of
-/// their kinds.
+/// The obstacle of `scan`: points on sheets as discs, all others as the balls that they stand for,
+/// in the colours of their kinds.
 #[must_use]
 pub fn kinds_picture(scan: &Scan) -> Picture {
     let mut canvas = Canvas::new(WIDTH + 2 * GAP, HEIGHT + 2 * GAP + LEGEND, GROUND);

@@ -5,12 +5,14 @@ use nearmiss::{Metric, Scan, Semantics};
 
 use crate::collide::parse_radius;
 
-/// Options that say what of two scans is compared. By default their obstacles: surfaces where points sample a sheet, balls of
-/// half the local spacing about all other points, and every measured point.
+/// Options that say what of two scans is compared. By default their obstacles: surfaces where
+/// points sample a sheet, balls of half the local spacing about all other points, and every
+/// measured point.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct MeaningArgs {
-    /// Compare surfaces alone, as Klein & Zachmann define them; points that sample no sheet then count for nothing. By
-    /// default they count as balls of half the local spacing. The geodesic kernel always compares surfaces alone
+    /// Compare surfaces alone, as Klein & Zachmann define them; points that sample no sheet then
+    /// count for nothing. By default they count as balls of half the local spacing. The geodesic
+    /// kernel always compares surfaces alone
     #[arg(long, conflicts_with = "thickened")]
     pub surface_only: bool,
     /// Compare balls of this radius about the points, in world units, and no surfaces: exact

@@ -11,8 +11,8 @@ use crate::digits::{percent, place, rough, rounded, rounded_down, short};
 use crate::picture::stored_index;
 use crate::report::word;
 
-/// The answer to a question with these `options`, as a sentence. Without a `distance` a separation is told without one:
-/// the proven gap of a verdict is no clearance.
+/// The answer to a question with these `options`, as a sentence. Without a `distance` a separation
+/// is told without one: the proven gap of a verdict is no clearance.
 pub(crate) fn sentence(
     answer: &Answer,
     views: [&ScanView<'_>; 2],

@@ -17,14 +17,15 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// At most so many blocks of points on sheets are sampled, and half as many of other points.
 const BLOCKS: usize = 128;
 
-/// One block in so many is sampled of a small scan, but no fewer blocks than a quarter of [`BLOCKS`].
+/// One block in so many is sampled of a small scan, but no fewer blocks than a quarter of
+/// [`BLOCKS`].
 const SPARED: usize = 8;
 
 /// The spacing is the distance to the neighbour of this rank.
 const RANK: usize = 6;
 
-/// Neighbours about a point that show a border. Of 24 random directions in a plane, one in ten thousand leaves a
-/// sector of 150° empty.
+/// Neighbours about a point that show a border. Of 24 random directions in a plane, one in ten
+/// thousand leaves a sector of 150° empty.
 const RING: usize = 24;
 
 /// A border leaves at least this sector of the tangent plane empty, 150°, ...
@@ -36,24 +37,27 @@ const LINE: f64 = TAU * 100.0 / 360.0;
 /// A hole is looked for no further than this, in reaches.
 const FAR: f64 = 20.0;
 
-/// The cosine of the angle about the outward direction in which the far side of a hole is looked for: 25°.
+/// The cosine of the angle about the outward direction in which the far side of a hole is looked
+/// for: 25°.
 const CONE: f64 = 0.906;
 
-/// The far side of a hole has a normal within the angle of this cosine of that of the near side, and its height over the
-/// near side's tangent plane is at most this share of the width.
+/// The far side of a hole has a normal within the angle of this cosine of that of the near side,
+/// and its height over the near side's tangent plane is at most this share of the width.
 const PARALLEL: f64 = 0.9;
 const LEVEL: f64 = 0.15;
 
 /// What a sample of a scan's points shows. Lengths are in the caller's units.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Survey {
-    /// Distance of each sampled point but strays to its sixth neighbour, ascending, and the share of all points it stands for.
+    /// Distance of each sampled point but strays to its sixth neighbour, ascending, and the share
+    /// of all points it stands for.
     pub spacings: Vec<(f64, f64)>,
     /// Estimated share of the points that lie at a border of a sheet.
     pub border: f64,
     /// The share of all points that each sampled border point stands for.
     pub border_weight: f64,
-    /// Widths of the holes wider than the reach that sampled border points face across their sheet, ascending.
+    /// Widths of the holes wider than the reach that sampled border points face across their sheet,
+    /// ascending.
     pub holes: Vec<f64>,
 }
 
@@ -67,7 +71,8 @@ struct Seen {
 }
 
 impl PointHierarchy {
-    /// Looks at up to 3,072 points. The same `seed` chooses the same points, whatever the thread count.
+    /// Looks at up to 3,072 points. The same `seed` chooses the same points, whatever the thread
+    /// count.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts")]
     pub fn survey(&self, seed: u64) -> Survey {
@@ -157,8 +162,8 @@ impl PointHierarchy {
         (widest >= BORDER && second <= LINE).then(|| u * middle.cos() + v * middle.sin())
     }
 
-    /// The width of the hole that point `i` faces `outward`, if another part of the same plane is beyond it: more than the
-    /// reach. Stored units.
+    /// The width of the hole that point `i` faces `outward`, if another part of the same plane is
+    /// beyond it: more than the reach. Stored units.
     fn hole(&self, i: usize, outward: Vector3<f64>) -> Option<f64> {
         let slices = self.slices();
         let (p, normal) = (self.place(i), self.normal(i));
