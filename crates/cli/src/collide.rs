@@ -9,13 +9,15 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use nearmiss::{
     Answer, BatchScratch, Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Deadline, Detail,
-    Evidence, ManifoldPoint, Metric, Pose, Proof, Scan, ScanView, Semantics, answer_each, collide_all,
-    collide_proving, collide_with,
+    Evidence, ManifoldPoint, Metric, Pose, Proof, Scan, ScanView, answer_each, collide_all, collide_proving,
+    collide_with,
 };
 
 use crate::console::{self, Console, Results, now};
+use crate::distance::beside;
 use crate::error::CliError;
 use crate::eval::KernelName;
+use crate::meaning::MeaningArgs;
 use crate::posing::{self, PairArgs, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
@@ -40,9 +42,9 @@ pub struct CollideArgs {
     /// ones. By the geodesic kernel separations are estimated
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
-    /// Compare balls of this radius about the points, in world units, instead of surfaces
-    #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
-    pub thickened: Option<f64>,
+    /// What is compared
+    #[command(flatten)]
+    pub meaning: MeaningArgs,
     /// Count as meeting what comes nearer than this, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub margin: f64,
@@ -141,16 +143,7 @@ impl Question {
     fn ask(&self, line: Option<u64>, poses: [Pose; 2], scratch: &mut CollideScratch) -> Asked {
         let start = now();
         let [a, b] = self.views(&poses);
-        let mut budget = Budget::UNLIMITED;
-        if let Some(units) = self.work {
-            budget = budget.with_work(units);
-        }
-        if let Some(length) = self.resolution {
-            budget = budget.with_resolution(length);
-        }
-        if let Some(end) = self.budget.and_then(|time| start.checked_add(time)) {
-            budget = budget.with_deadline(Deadline::at(end));
-        }
+        let budget = self.budget_from(start);
         let mut proof = self.prove.then(Proof::default);
         let mut contacts = self.all.then(Contacts::default);
         let answer = match (&mut proof, &mut contacts) {
@@ -163,6 +156,21 @@ impl Question {
         let wants_manifold = self.plan.options().detail == Detail::Manifold;
         let manifold = wants_manifold.then(|| scratch.manifold().to_vec());
         Asked { line, poses, answer, proof, contacts, manifold, micros }
+    }
+
+    /// The budget of a query that starts at `start`.
+    fn budget_from(&self, start: std::time::Instant) -> Budget {
+        let mut budget = Budget::UNLIMITED;
+        if let Some(units) = self.work {
+            budget = budget.with_work(units);
+        }
+        if let Some(length) = self.resolution {
+            budget = budget.with_resolution(length);
+        }
+        if let Some(end) = self.budget.and_then(|time| start.checked_add(time)) {
+            budget = budget.with_deadline(Deadline::at(end));
+        }
+        budget
     }
 
     fn views(&self, poses: &[Pose; 2]) -> [ScanView<'_>; 2] {
@@ -183,7 +191,11 @@ impl Question {
         if args.json {
             return results.json(&report);
         }
-        let sentence = sentence(&asked.answer, [&a, &b], self.plan.options());
+        let options = self.plan.options();
+        let is_apart = asked.line.is_none() && asked.answer.verdict.is_separated();
+        let distance =
+            is_apart.then(|| beside([&a, &b], options.semantics, &self.budget_from(now()))).flatten();
+        let sentence = sentence(&asked.answer, [&a, &b], options, distance.as_ref());
         if let Some(line) = asked.line {
             return results.line(format_args!("line {line}: {sentence}"));
         }
@@ -237,7 +249,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
 
     let threads = args.threads.unwrap_or(0);
     let [a, b] = open(args, threads, console)?;
-    let semantics = args.thickened.map_or(Semantics::Surface, Semantics::Thickened);
+    let semantics = args.meaning.semantics(&a);
     let detail = match args.detail {
         DetailName::Verdict => Detail::Verdict,
         DetailName::Witness => Detail::Witness,
@@ -280,7 +292,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
 
 /// The scans: balls about points know no kernel, so any do for these.
 fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2], CliError> {
-    if args.thickened.is_some() {
+    if args.meaning.thickened.is_some() {
         let [path_a, path_b] = args.pair.inputs();
         let a = input::open(path_a, threads, console)?;
         let b = if path_a == path_b { a.clone() } else { input::open(path_b, threads, console)? };
@@ -316,7 +328,8 @@ fn answer_one(
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let [a, b] = question.views(&asked.poses);
-        let style = picture::Style { names: names(args.pair.inputs()), points: args.thickened.is_some() };
+        let style =
+            picture::Style { names: names(args.pair.inputs()), points: args.meaning.thickened.is_some() };
         picture::paint([&a, &b], &asked.answer, &style).save(path)?;
         drop(bar);
     }

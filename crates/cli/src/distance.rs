@@ -5,22 +5,24 @@ use std::time::Duration;
 
 use clap::Args;
 use nearmiss::{
-    Budget, Deadline, Distance, DistanceOptions, DistancePlan, DistanceScratch, Evidence, Pose, Scan,
-    ScanView, Semantics, distance_with,
+    Budget, Deadline, Distance, DistanceOptions, DistancePlan, DistanceScratch, Pose, Scan, ScanView,
+    Semantics, distance_with,
 };
 use serde::Serialize;
 
-use crate::collide::{parse_duration, parse_radius};
+use crate::collide::{names, parse_duration};
 use crate::console::{Console, Results, now};
-use crate::digits::{count, rounded, rounded_down, short};
+use crate::digits::{count, rough};
+use crate::distance_picture::paint_distance;
 use crate::error::CliError;
 use crate::eval::KernelName;
-use crate::input;
+use crate::meaning::MeaningArgs;
 use crate::posing::{self, PairArgs};
 use crate::preprocess::parse_threads;
 use crate::report::word;
-use crate::sentence::world_radius;
+use crate::sentence::{bracket, unit, untold};
 use crate::units::SizeCheck;
+use crate::{input, output, picture};
 
 /// Options of `distance`.
 #[derive(Debug, Clone, Args)]
@@ -35,9 +37,13 @@ pub struct DistanceArgs {
     /// proven
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
-    /// Between balls of this radius about the points, in world units, instead of surfaces: exact
-    #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
-    pub thickened: Option<f64>,
+    /// What is compared
+    #[command(flatten)]
+    pub meaning: MeaningArgs,
+    /// Obstacles only: how far below the upper bound the lower one may be left, as a share of it, 0 to less than 1. The
+    /// local spacing counts instead where it is greater
+    #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative)]
+    pub relative: f64,
     /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s. The bounds are then further apart
     #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
@@ -47,6 +53,9 @@ pub struct DistanceArgs {
     /// Threads to prepare raw inputs, 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
+    /// Picture, as PNG, of both scans, the two nearest places, and the lengths between
+    #[arg(long, value_name = "OUT.png", conflicts_with = "poses")]
+    pub image: Option<PathBuf>,
     /// One object of JSON a query instead of sentences
     #[arg(long)]
     pub json: bool,
@@ -61,6 +70,8 @@ struct DistanceReport {
     lower: f64,
     upper: f64,
     points: [[f64; 3]; 2],
+    /// Nothing is promised of where the scanned things are within it.
+    band: f64,
     /// Of the upper bound.
     evidence: &'static str,
     source_a: u32,
@@ -84,19 +95,23 @@ struct Question<'a> {
 
 pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
+    if let Some(path) = &args.image {
+        output::check_apart(path, &args.pair.inputs())?;
+        picture::check_name(path)?;
+    }
     let matrices = args.pair.matrices()?;
     let mut poses = args.pair.pose_file(args.poses.as_ref())?;
     let inputs = args.pair.inputs();
     let threads = args.threads.unwrap_or(0);
-    let [a, b] = if args.thickened.is_some() {
+    let [a, b] = if args.meaning.thickened.is_some() {
         let a = input::open(inputs[0], threads, console)?;
         let b = if inputs[0] == inputs[1] { a.clone() } else { input::open(inputs[1], threads, console)? };
         [a, b]
     } else {
         input::open_both(args.kernel.map(KernelName::metric), inputs, threads, console)?
     };
-    let semantics = args.thickened.map_or(Semantics::Surface, Semantics::Thickened);
-    let options = DistanceOptions::default().with_semantics(semantics);
+    let semantics = args.meaning.semantics(&a);
+    let options = DistanceOptions::default().with_semantics(semantics).with_relative(args.relative);
     let plan = DistancePlan::new(&options, &a, &b)?;
     let question = Question { scans: [&a, &b], plan, args, sizes: args.pair.size_check(console) };
     let mut scratch = DistanceScratch::default();
@@ -135,10 +150,17 @@ impl Question<'_> {
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
         self.sizes.compare([&a, &b]);
+        if let Some(path) = &self.args.image {
+            let style = picture::Style {
+                names: names(self.args.pair.inputs()),
+                points: self.args.meaning.thickened.is_some(),
+            };
+            paint_distance([&a, &b], &found, &style).save(path)?;
+        }
         if self.args.json {
             return results.json(&report(&found, micros));
         }
-        let sentence = sentence(&found, [&a, &b]);
+        let sentence = sentence(&found, [&a, &b], self.plan.options().semantics);
         if let Some(line) = line {
             return results.line(format_args!("line {line}: {sentence}"));
         }
@@ -159,6 +181,7 @@ fn report(found: &Distance, micros: f64) -> DistanceReport {
         lower: found.lower,
         upper: found.upper,
         points: found.points,
+        band: found.band,
         evidence: word(found.evidence),
         source_a: found.sources[0].0,
         source_b: found.sources[1].0,
@@ -171,22 +194,35 @@ fn report(found: &Distance, micros: f64) -> DistanceReport {
 }
 
 /// The distance, for people.
-fn sentence(found: &Distance, views: [&ScanView<'_>; 2]) -> String {
-    let [ra, rb] = views.map(world_radius);
-    let unit = ra.min(rb) / 100.0;
+fn sentence(found: &Distance, views: [&ScanView<'_>; 2], semantics: Semantics) -> String {
     let unfinished = if found.complete { "" } else { " The budget ran out first." };
     if found.upper <= 0.0 {
-        return format!("They touch ({}).{unfinished}", word(found.evidence));
+        let untold = match semantics {
+            Semantics::Thickened(_) => String::new(),
+            _ => format!("; {}", untold(found.band)),
+        };
+        return format!("They touch ({}){untold}.{unfinished}", word(found.evidence));
     }
-    let upper = rounded(found.upper + 0.5 * unit, unit);
-    if found.lower.to_bits() == found.upper.to_bits() {
-        return format!("They are {} apart.{unfinished}", short(found.upper));
+    let bracket = bracket(found, unit(views));
+    match semantics {
+        Semantics::Thickened(_) => format!("They are {bracket}.{unfinished}"),
+        _ => format!(
+            "They are {bracket} ({}), give or take the local spacing of {}.{unfinished}",
+            word(found.evidence),
+            rough(found.band)
+        ),
     }
-    let estimated = if found.evidence == Evidence::Estimated { ", as far as can be told" } else { "" };
-    let lower = if found.lower > 0.0 {
-        format!("at least {} and ", rounded_down(found.lower, unit))
-    } else {
-        String::new()
-    };
-    format!("They are {lower}at most {upper} apart{estimated}.{unfinished}")
+}
+
+/// How far `a` and `b` are apart within a budget, to be told beside a separation.
+pub(crate) fn beside(views: [&ScanView<'_>; 2], semantics: Semantics, budget: &Budget) -> Option<Distance> {
+    let options = DistanceOptions::default().with_semantics(semantics);
+    let plan = DistancePlan::new(&options, views[0].scan(), views[1].scan()).ok()?;
+    Some(distance_with(views[0], views[1], &plan, budget, &mut DistanceScratch::default()))
+}
+
+/// Reads a relative precision.
+fn parse_relative(text: &str) -> Result<f64, String> {
+    let relative = text.parse().ok().filter(|relative| (0.0..1.0).contains(relative));
+    relative.ok_or_else(|| "expected a number from 0 to less than 1".into())
 }

@@ -12,17 +12,19 @@ use nearmiss::{Scan, SurfaceGraph};
 
 use crate::console::Console;
 use crate::error::CliError;
-use crate::{input, output, report};
+use crate::kinds_picture::{colour, kinds_picture};
+use crate::{input, output, picture, report};
 
 /// Options of `export`. At least one output is asked for.
 #[derive(Debug, Clone, Args)]
-#[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "samples", "boxes", "radii", "edges", "close_pairs"]))]
+#[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "samples", "boxes", "radii", "edges", "close_pairs", "image"]))]
 #[command(group = clap::ArgGroup::new("levelled").multiple(true).args(["samples", "boxes"]))]
 pub struct ExportArgs {
     /// Prepared scan, or a raw input, prepared on the fly
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Points with normals in the order of the prepared file, and their index in its input as `source`
+    /// Points with normals in the order of the prepared file, their index in its input as `source`, and their kind as `kind`, a
+    /// number with a colour: 0 sheet, grey; 1 edge, blue; 2 noisy, yellow; 3 line, green; 4 stray, red; 5 sparse, pink
     #[arg(long, value_name = "P.ply")]
     pub points: Option<PathBuf>,
     /// Samples of the nodes at one depth (--level), of each its node, the node's covering radius and sampling radius
@@ -41,14 +43,21 @@ pub struct ExportArgs {
     /// Points that are heard at each point i: i,j,distance along the graph, nearest first
     #[arg(long, value_name = "C.csv")]
     pub close_pairs: Option<PathBuf>,
+    /// Picture, as PNG, of the points in the colours of their kinds, with their shares
+    #[arg(long, value_name = "OUT.png")]
+    pub image: Option<PathBuf>,
     /// Only nodes at this depth, the root's being 0, and leaves above it
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
 }
 
 pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
-    let outputs = [&args.points, &args.samples, &args.boxes, &args.radii, &args.edges, &args.close_pairs]
-        .map(Option::as_ref);
+    let outputs = [&args.points, &args.samples, &args.boxes, &args.radii, &args.edges, &args.close_pairs];
+    let outputs = [&outputs[..], &[&args.image]].concat();
+    let outputs: Vec<Option<&PathBuf>> = outputs.into_iter().map(Option::as_ref).collect();
+    if let Some(path) = &args.image {
+        picture::check_name(path)?;
+    }
     for (i, path) in outputs.iter().enumerate().filter_map(|(i, p)| p.map(|p| (i, p))) {
         output::check_apart(path, &[&args.file])?;
         if outputs[..i].contains(&Some(path)) {
@@ -86,6 +95,9 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     if let Some(path) = &args.radii {
         output::replace_plain(path, |out| radii(&scan, out))?;
     }
+    if let Some(path) = &args.image {
+        kinds_picture(&scan).save(path)?;
+    }
     Ok(())
 }
 
@@ -99,12 +111,19 @@ pub(crate) fn refused(path: &Path, error: WriteError) -> CliError {
 /// In the frame of the input: in single precision where that is what is stored, else in double.
 fn points(scan: &Scan, out: &mut impl Write) -> Result<(), WriteError> {
     let frame = scan.frame();
+    let kinds = || (0..scan.len()).map(|i| scan.kind(i));
+    let codes: Vec<u32> = kinds().map(|kind| u32::from(kind.code())).collect();
+    let colours: Vec<[u8; 3]> = kinds().map(colour).collect();
+    let columns = [Column::Uint("kind", &codes)];
+    let told = |ply: PlyPoints<'_>, out| {
+        let ply = ply.with_normals(scan.normals()).with_colours(&colours);
+        ply.with_source(scan.source()).with_columns(&columns).write(out)
+    };
     if *frame == Frame::default() {
-        let ply = PlyPoints::single(scan.positions());
-        return ply.with_normals(scan.normals()).with_source(scan.source()).write(out);
+        return told(PlyPoints::single(scan.positions()), out);
     }
     let positions: Vec<[f64; 3]> = scan.positions().iter().map(|&p| frame.to_world(p)).collect();
-    PlyPoints::double(&positions).with_normals(scan.normals()).with_source(scan.source()).write(out)
+    told(PlyPoints::double(&positions), out)
 }
 
 /// The nodes at a depth, and leaves above it; all of them if no depth is given.

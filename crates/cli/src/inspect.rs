@@ -51,7 +51,7 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), CliError> {
         return results.flush();
     }
     results.line(format_args!("format     version {}", report.format_version))?;
-    for line in report.scan.lines().into_iter().chain(health(&scan)) {
+    for line in report.scan.lines().into_iter().chain(health(&scan, &report.scan.health)) {
         results.line(line)?;
     }
     if args.verify {

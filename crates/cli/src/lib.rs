@@ -27,14 +27,18 @@ mod units;
 
 mod advice;
 mod digits;
+mod health;
+mod meaning;
 mod report;
 mod search;
 mod sentence;
 
 mod canvas;
 mod curve_picture;
+mod distance_picture;
 mod font;
 mod geodesic;
+mod kinds_picture;
 mod level;
 mod no_curve;
 mod picture;
@@ -60,7 +64,9 @@ pub use export::ExportArgs;
 pub use filters::{CropBox, FilterArgs, LeastNeighbours, Outliers};
 pub use geodesic::geodesic_picture;
 pub use inspect::InspectArgs;
+pub use kinds_picture::kinds_picture;
 pub use level::level_picture;
+pub use meaning::MeaningArgs;
 pub use memory::MemoryArgs;
 pub use picture::{Picture, contact_picture};
 pub use poses::PosesArgs;

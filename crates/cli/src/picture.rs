@@ -14,15 +14,15 @@ use crate::font;
 use crate::output;
 
 /// In fine pixels.
-const PANEL: usize = 780 * FINE;
-const GAP: usize = 12 * FINE;
-const LEGEND: usize = 44 * FINE;
+pub(crate) const PANEL: usize = 780 * FINE;
+pub(crate) const GAP: usize = 12 * FINE;
+pub(crate) const LEGEND: usize = 44 * FINE;
 
-const GROUND: Colour = [255, 255, 255];
-const PANEL_GROUND: Colour = [238, 240, 243];
-const INK: Colour = [30, 34, 40];
-const OF_A: Colour = [74, 144, 217];
-const OF_B: Colour = [240, 140, 46];
+pub(crate) const GROUND: Colour = [255, 255, 255];
+pub(crate) const PANEL_GROUND: Colour = [238, 240, 243];
+pub(crate) const INK: Colour = [30, 34, 40];
+pub(crate) const OF_A: Colour = [74, 144, 217];
+pub(crate) const OF_B: Colour = [240, 140, 46];
 
 /// Half the width of the close view, in local sampling radii.
 const CLOSE: f64 = 12.0;
@@ -132,7 +132,13 @@ pub(crate) fn paint(views: [&ScanView<'_>; 2], answer: &Answer, style: &Style) -
         mark(&mut canvas, &whole, close.point, 1.0);
         frame(&mut canvas, &whole, close);
     }
-    legend(&mut canvas, answer, &style.names);
+    let sure = |evidence| if evidence == Evidence::Certified { "CERTIFIED" } else { "ESTIMATED" };
+    let verdict = match answer.verdict {
+        Verdict::Intersecting { evidence, .. } => format!("CONTACT, {}", sure(evidence)),
+        Verdict::Separated { evidence, .. } => format!("NO CONTACT, {}", sure(evidence)),
+        Verdict::Undecided(_) => "UNDECIDED".to_owned(),
+    };
+    legend(&mut canvas, &verdict, &style.names);
     canvas.picture()
 }
 
@@ -146,12 +152,35 @@ pub(crate) fn splat(view: &ScanView<'_>, i: usize) -> Splat {
     }
 }
 
+/// Paints what stands for the `i`-th stored point in the obstacle: a disc, or a ball. Neither is larger than `largest`, in fine
+/// pixels, nor a ball too small to be seen.
+pub(crate) fn obstacle(
+    canvas: &mut Canvas,
+    camera: &Camera,
+    view: &ScanView<'_>,
+    i: usize,
+    colour: Colour,
+    largest: f64,
+) {
+    let largest = largest / camera.scale;
+    let ball = f64::from(view.slices().obstacle_ball(i)) * view.placed().scale();
+    if ball > 0.0 {
+        canvas.ball(camera, view.point(i).into(), ball.min(largest).max(SEEN / camera.scale), colour);
+    } else {
+        let splat = splat(view, i);
+        canvas.splat(camera, &Splat { radius: splat.radius.min(largest), ..splat }, colour);
+    }
+}
+
+/// No ball is smaller, in fine pixels.
+const SEEN: f64 = 2.0;
+
 /// Radii of points in fine pixels.
 const WHOLE_DOT: f64 = 2.5;
 const CLOSE_DOT: f64 = 9.0;
 
 /// A point in place of a disc, facing the viewer.
-fn dot(splat: &Splat, camera: &Camera, pixels: f64) -> Splat {
+pub(crate) fn dot(splat: &Splat, camera: &Camera, pixels: f64) -> Splat {
     Splat { normal: camera.axes[2], radius: pixels / camera.scale, ..*splat }
 }
 
@@ -239,19 +268,19 @@ impl Close {
     }
 }
 
-fn stored_index(view: &ScanView<'_>, id: PointId) -> usize {
+pub(crate) fn stored_index(view: &ScanView<'_>, id: PointId) -> usize {
     view.scan().source().iter().position(|&s| s == id.0).unwrap_or_default()
 }
 
 /// Some unit direction at right angles to `v`.
-fn across(v: Vector3<f64>) -> Vector3<f64> {
+pub(crate) fn across(v: Vector3<f64>) -> Vector3<f64> {
     let least = v.iamin();
     let axis = Vector3::from_fn(|k, _| if k == least { 1.0 } else { 0.0 });
     v.cross(&axis).normalize()
 }
 
 /// Some points of both scans.
-fn sample(views: [&ScanView<'_>; 2]) -> Vec<Vector3<f64>> {
+pub(crate) fn sample(views: [&ScanView<'_>; 2]) -> Vec<Vector3<f64>> {
     let points = |view: &ScanView<'_>| {
         let view = *view;
         let stride = view.scan().len().div_ceil(SAMPLE);
@@ -329,7 +358,7 @@ fn hidden(close: &Close, points: &[Vector3<f64>], toward: Vector3<f64>) -> f64 {
 }
 
 /// Directions spread evenly over the sphere, on a Fibonacci spiral.
-fn directions() -> impl Iterator<Item = Vector3<f64>> {
+pub(crate) fn directions() -> impl Iterator<Item = Vector3<f64>> {
     const COUNT: u32 = 128;
     (0..COUNT).map(|i| {
         let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(COUNT);
@@ -340,7 +369,7 @@ fn directions() -> impl Iterator<Item = Vector3<f64>> {
 }
 
 /// Lines are drawn wider in white first, to stand out from what is behind them.
-const HALO: f64 = 3.0;
+pub(crate) const HALO: f64 = 3.0;
 
 fn mark(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, size: f64) {
     let [x, y, _] = camera.project(point);
@@ -413,7 +442,7 @@ pub(crate) fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
 /// Longer names are cut short.
 pub(crate) const LONGEST_NAME: usize = 32;
 
-fn legend(canvas: &mut Canvas, answer: &Answer, names: &[String; 2]) {
+pub(crate) fn legend(canvas: &mut Canvas, told: &str, names: &[String; 2]) {
     let top = PANEL + 2 * GAP + 8 * FINE;
     let mut left = GAP + 4 * FINE;
     for (name, colour) in names.iter().zip([OF_A, OF_B]) {
@@ -422,11 +451,5 @@ fn legend(canvas: &mut Canvas, answer: &Answer, names: &[String; 2]) {
         canvas.text([left + 20 * FINE, top], 2 * FINE, INK, &name);
         left += (40 + 2 * font::ADVANCE * name.chars().count()) * FINE;
     }
-    let sure = |evidence| if evidence == Evidence::Certified { "CERTIFIED" } else { "ESTIMATED" };
-    let verdict = match answer.verdict {
-        Verdict::Intersecting { evidence, .. } => format!("CONTACT, {}", sure(evidence)),
-        Verdict::Separated { evidence, .. } => format!("NO CONTACT, {}", sure(evidence)),
-        Verdict::Undecided(_) => "UNDECIDED".to_owned(),
-    };
-    canvas.text([left + 10 * FINE, top], 2 * FINE, INK, &verdict);
+    canvas.text([left + 10 * FINE, top], 2 * FINE, INK, told);
 }

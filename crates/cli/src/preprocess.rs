@@ -35,6 +35,10 @@ pub struct PreprocessArgs {
     /// K: local radii reach to the K-th neighbour, further where the points look like lines; 3 to 32
     #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32))]
     pub radius_neighbours: u32,
+    /// L: how far the scan may be interpolated, in the units of the input. No gap wider than this is bridged, and no ball is
+    /// wider. By default twice the sampling radius, within which nine tenths of the points have six neighbours
+    #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach)]
+    pub reach: Option<f64>,
     /// Weight of a point by its distance
     #[arg(long, value_enum, default_value_t = WeightName::Gaussian)]
     pub weight: WeightName,
@@ -133,6 +137,11 @@ fn parse_bandwidth(text: &str) -> Result<Bandwidth, String> {
     }
 }
 
+fn parse_reach(text: &str) -> Result<f64, String> {
+    let reach = text.parse().ok().filter(|reach: &f64| *reach > 0.0 && reach.is_finite());
+    reach.ok_or_else(|| "expected a positive length, in the units of the input".into())
+}
+
 /// More threads than this help nobody, and may not start.
 const MOST_THREADS: usize = 1024;
 
@@ -225,7 +234,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
         results.line(format_args!(
             "seconds    read {read:.2}, hierarchy {hierarchy:.2}, graph {graph:.2}, write {write:.2}"
         ))?;
-        for line in health(&scan) {
+        for line in health(&scan, &report.scan.health) {
             results.line(line)?;
         }
     }
@@ -264,7 +273,9 @@ fn options(args: &PreprocessArgs) -> BuildOptions {
         WeightName::Gaussian => Kernel::Gaussian,
         WeightName::Wendland => Kernel::Wendland,
     };
-    BuildOptions::default()
+    let default = BuildOptions::default();
+    let default = args.reach.map_or(default, |reach| default.with_reach(reach));
+    default
         .with_surface(SurfaceOptions::default().with_kernel(kernel).with_bandwidth(args.bandwidth))
         .with_radius_neighbours(args.radius_neighbours)
         .with_leaf_size(args.leaf)

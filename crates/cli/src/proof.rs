@@ -18,7 +18,7 @@ struct Line {
     placed_b: [f64; 16],
     margin: f64,
     /// What is enclosed: `obstacle`, `surface`, or `points`.
-    of: &'static str,
+    semantics: &'static str,
     verdict: &'static str,
     evidence: Option<&'static str>,
     gap: Option<f64>,
@@ -72,10 +72,10 @@ pub(crate) fn write(
         placed_a: views[0].placed().to_row_major(),
         placed_b: views[1].placed().to_row_major(),
         margin: options.margin,
-        of: match of {
+        semantics: match of {
             Semantics::Obstacle => "obstacle",
             Semantics::Surface => "surface",
-            Semantics::Thickened(_) => "points",
+            _ => "points",
         },
         verdict,
         evidence: evidence.map(word),

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::digits::{bytes, count, percent, place, short};
 use crate::filters::Filtered;
+use crate::health::Health;
 
 /// What a prepared scan holds.
 #[derive(Debug, Serialize)]
@@ -19,6 +20,8 @@ pub(crate) struct ScanReport {
     /// That the discs, and what is about them, are for.
     kernel: Metric,
     sampling_radius: f64,
+    /// No gap wider than this is bridged, and no local radius exceeds it.
+    reach: f64,
     /// The median, as `horizon`.
     bandwidth: f64,
     horizon: f64,
@@ -31,6 +34,7 @@ pub(crate) struct ScanReport {
     bytes_per_node: f64,
     usable: f64,
     kinds: KindsReport,
+    pub(crate) health: Health,
     /// If there is one.
     graph: Option<GraphReport>,
 }
@@ -79,14 +83,22 @@ struct DroppedReport {
     by_filter: Filtered,
 }
 
-/// Shares of the points by what their neighbourhoods look like; together 1.
+/// Shares of the points of each kind; together 1.
 #[derive(Debug, Serialize)]
 struct KindsReport {
-    surface: f64,
-    border: f64,
+    sheet: f64,
+    edge: f64,
+    noisy: f64,
     line: f64,
-    isolated: f64,
-    ambiguous: f64,
+    stray: f64,
+    sparse: f64,
+}
+
+impl KindsReport {
+    fn new(scan: &Scan) -> Self {
+        let [sheet, edge, noisy, line, stray, sparse] = PointKind::ALL.map(|kind| scan.share(kind));
+        Self { sheet, edge, noisy, line, stray, sparse }
+    }
 }
 
 impl ScanReport {
@@ -108,6 +120,7 @@ impl ScanReport {
             bounds: [scan.bounds().min, scan.bounds().max],
             kernel: scan.metric(),
             sampling_radius: scan.sampling_radius(),
+            reach: scan.reach(),
             bandwidth: f64::from(scan.plan().bandwidth(median)) * scale,
             horizon: f64::from(scan.plan().horizon(median)) * scale,
             support_min: scan.plan().options().support_min,
@@ -117,13 +130,8 @@ impl ScanReport {
             bytes,
             bytes_per_node: scan.bytes_of_nodes() as f64 / nodes as f64,
             usable: scan.usable(),
-            kinds: KindsReport {
-                surface: scan.share(PointKind::Sheet),
-                border: scan.share(PointKind::Edge),
-                line: scan.share(PointKind::Line),
-                isolated: scan.share(PointKind::Stray),
-                ambiguous: scan.share(PointKind::Noisy),
-            },
+            kinds: KindsReport::new(scan),
+            health: Health::new(scan),
             graph: scan.graph().map(GraphReport::new),
         }
     }
@@ -230,6 +238,8 @@ pub(crate) struct AnswerReport {
     source_b: Option<u32>,
     gap: Option<f64>,
     distance_estimate: Option<f64>,
+    /// Nothing is promised of where the scanned things are within it; null for invalid poses.
+    band: f64,
     likelihood: Option<f64>,
     evaluations: u64,
     node_pairs: u64,
@@ -303,6 +313,7 @@ impl AnswerReport {
             source_b: None,
             gap: None,
             distance_estimate: answer.distance_estimate,
+            band: answer.band,
             likelihood: None,
             evaluations: answer.statistics.evaluations,
             node_pairs: answer.statistics.node_pairs,

@@ -9,7 +9,7 @@ use crate::error::CliError;
 /// Options of `collide` that say how to search.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct SearchArgs {
-    /// How leaves are compared
+    /// How leaves are compared. `sampling` and `interpolation` compare surfaces alone, as with --surface-only
     #[arg(long, value_enum, default_value_t = MethodName::Traversal)]
     pub method: MethodName,
     /// Leave the hierarchy out, with `--method sampling` or `interpolation`: points about, or of, all of a in the box of b

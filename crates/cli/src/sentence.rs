@@ -1,15 +1,25 @@
 //! Answers for people, with as many digits as the sampling carries.
 
-use nearmiss::{Aabb, Answer, CollideOptions, Evidence, PointKind, Reason, ScanView, Semantics, Verdict};
+use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss::{
+    Aabb, Answer, CollideOptions, Contact, Distance, Method, Metric, PointKind, Reason, ScanView, Semantics,
+    Verdict,
+};
 
 use crate::advice;
 use crate::digits::{percent, place, rough, rounded, rounded_down, short};
+use crate::picture::stored_index;
 use crate::report::word;
 
-/// The answer, to a question with these `options`, as a sentence.
-pub(crate) fn sentence(answer: &Answer, views: [&ScanView<'_>; 2], options: &CollideOptions) -> String {
-    let [ra, rb] = views.map(world_radius);
-    let unit = ra.min(rb) / 100.0;
+/// The answer to a question with these `options`, as a sentence. Without a `distance` a separation
+/// is told without one: the proven gap of a verdict is no clearance.
+pub(crate) fn sentence(
+    answer: &Answer,
+    views: [&ScanView<'_>; 2],
+    options: &CollideOptions,
+    distance: Option<&Distance>,
+) -> String {
+    let unit = unit(views);
     let thickened = match options.semantics {
         Semantics::Thickened(radius) => Some(radius),
         _ => None,
@@ -18,45 +28,80 @@ pub(crate) fn sentence(answer: &Answer, views: [&ScanView<'_>; 2], options: &Col
     match answer.verdict {
         Verdict::Intersecting { contact, evidence } => {
             let at = place(contact.point, unit);
-            if let Some(radius) = thickened {
-                let apart = 2.0 * contact.residual;
-                if let Some(margin) = margin {
-                    return format!(
-                        "Balls of radius {} come within {margin} of each other at {at}; the two points are {} apart.",
-                        short(radius),
-                        short(apart)
-                    );
+            let apart = rough(points_apart(&contact, views));
+            match (thickened, margin) {
+                (Some(radius), Some(margin)) => format!(
+                    "Balls of radius {} come within {margin} of each other at {at}; the two points are {apart} apart.",
+                    short(radius)
+                ),
+                (Some(radius), None) => {
+                    let verb = if radius > 0.0 { "overlap" } else { "meet" };
+                    format!(
+                        "Balls of radius {} {verb} at {at}; the two points are {apart} apart.",
+                        short(radius)
+                    )
                 }
-                let verb = if radius > 0.0 { "overlap" } else { "meet" };
-                return format!(
-                    "Balls of radius {} {verb} at {at}; the two points are {} apart.",
-                    short(radius),
-                    short(apart)
-                );
+                (None, Some(margin)) => {
+                    format!("They come within {margin} of each other at {at} ({}).", word(evidence))
+                }
+                (None, None) => format!(
+                    "They touch at {at} ({}); the measured points that show it are {apart} apart, and {}.",
+                    word(evidence),
+                    untold(answer.band)
+                ),
             }
-            if let Some(margin) = margin {
-                return format!("They come within {margin} of each other at {at} ({}).", word(evidence));
-            }
-            let within = match evidence {
-                Evidence::Certified => rough(contact.residual),
-                Evidence::Estimated => rounded(contact.residual.max(unit), unit),
-            };
-            format!("They touch at {at}, within {within} ({}).", word(evidence))
         }
-        Verdict::Separated { gap, evidence } if gap > 0.0 => {
-            format!("No contact; at least {} apart ({}).", rounded_down(gap, unit), word(evidence))
-        }
-        Verdict::Separated { evidence, .. } => {
+        Verdict::Separated { gap, evidence } => {
+            let found = if gap > 0.0 { "" } else { " found" };
             let within = margin.map_or(String::new(), |margin| format!(" within {margin}"));
-            format!("No contact found{within} ({}).", word(evidence))
+            let apart = distance.filter(|distance| distance.upper > 0.0).map(|distance| {
+                let distance = Distance { lower: distance.lower.max(gap).min(distance.upper), ..*distance };
+                let is_near = thickened.is_none() && distance.upper < distance.band;
+                let near = if is_near {
+                    format!(", less than the local spacing of {}", rough(distance.band))
+                } else {
+                    String::new()
+                };
+                format!("; {}{near}", bracket(&distance, unit))
+            });
+            format!("No contact{found}{within}{} ({}).", apart.unwrap_or_default(), word(evidence))
         }
-        Verdict::Undecided(reason) => {
-            format!("Cannot tell: {}.", doubt(reason, views, thickened.is_some()))
-        }
+        Verdict::Undecided(reason) => format!("Cannot tell: {}.", doubt(reason, views, options)),
     }
 }
 
-/// Two scans further from each other than they are large are rarely meant to be.
+/// The distance as a clause. The lower bound is rounded down, the upper one up.
+pub(crate) fn bracket(found: &Distance, unit: f64) -> String {
+    if found.lower.to_bits() == found.upper.to_bits() {
+        return format!("{} apart", short(found.upper));
+    }
+    let unit = unit.max(found.upper / 1000.0);
+    let upper = rounded(found.upper + 0.5 * unit, unit);
+    if found.lower > 0.0 {
+        format!("between {} and {upper} apart", rounded_down(found.lower, unit))
+    } else {
+        format!("at most {upper} apart")
+    }
+}
+
+/// What a band means for a contact.
+pub(crate) fn untold(band: f64) -> String {
+    format!("no gap below {} can be told from contact", rough(band))
+}
+
+/// Lengths are told to a hundredth of the lesser sampling radius.
+pub(crate) fn unit(views: [&ScanView<'_>; 2]) -> f64 {
+    let [ra, rb] = views.map(world_radius);
+    ra.min(rb) / 100.0
+}
+
+/// The distance between the two points that show a contact.
+fn points_apart(contact: &Contact, views: [&ScanView<'_>; 2]) -> f64 {
+    let at = |k: usize| Vector3::from(views[k].point(stored_index(views[k], contact.sources[k])));
+    (at(1) - at(0)).norm()
+}
+
+/// A hint where two scans are further from each other than they are large, which is rarely meant.
 pub(crate) fn hint(answer: &Answer, views: [&ScanView<'_>; 2]) -> Option<String> {
     if !answer.verdict.is_separated() {
         return None;
@@ -77,7 +122,13 @@ fn world_bounds(view: &ScanView<'_>) -> Aabb {
 }
 
 /// Why there is no verdict, and what would help.
-fn doubt(reason: Reason, views: [&ScanView<'_>; 2], thickened: bool) -> String {
+fn doubt(reason: Reason, views: [&ScanView<'_>; 2], options: &CollideOptions) -> String {
+    // Only surfaces are ever in doubt; balls stand for all other points of obstacles.
+    let first = match (options.method, options.metric) {
+        (_, Some(Metric::Geodesic)) => None,
+        (Method::Traversal, _) => Some("leave --surface-only out"),
+        _ => Some("--method traversal"),
+    };
     let worse = |share: fn(&ScanView<'_>) -> f64| {
         let [of_a, of_b] = views.map(share);
         if of_b > of_a { ("b", views[1], of_b) } else { ("a", views[0], of_a) }
@@ -95,7 +146,7 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], thickened: bool) -> String {
                 |v: &ScanView<'_>| v.scan().share(PointKind::Line) + v.scan().share(PointKind::Stray);
             let (name, view, share) = worse(sparse);
             let how = if lines(view) >= 0.5 * share { "sampled as lines" } else { "sampled too sparsely" };
-            let ways = advice::for_sparse(view, radius, thickened);
+            let ways = advice::for_sparse(view, radius, first);
             let near = if share < 0.2 {
                 "they come near each other only where points say too little, and "
             } else {
@@ -105,7 +156,7 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], thickened: bool) -> String {
         }
         Reason::Ambiguous => {
             let (name, _, share) = worse(|v| v.scan().share(PointKind::Noisy));
-            let ways = advice::for_ambiguous(views, radius, thickened);
+            let ways = advice::for_ambiguous(views, radius, first);
             format!(
                 "where they meet the points do not look like one sheet, as do {} of {name}; try {ways}",
                 percent(share)

@@ -26,6 +26,7 @@ mod sections;
 mod spacing;
 mod split;
 mod surfels;
+mod survey;
 mod topology;
 mod wide;
 
@@ -46,5 +47,6 @@ pub use samples::Samples;
 pub use sanity::Flaw;
 pub use sections::{HierarchyMeta, LoadError};
 pub use surfels::{NormalCone, PointKind, THICKNESS};
+pub use survey::Survey;
 pub use topology::{MOST_LEAF_POINTS, Node};
 pub use wide::{Child, LeafVisitor, WideStack, WideTree, descend_wide, whole};

@@ -372,12 +372,7 @@ pub(crate) fn fitted(at: &Evaluation, look: Look) -> Fit {
 
 /// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose support radii
 /// reach `p`.
-pub(crate) fn surfel_of(
-    fit: &Fit,
-    p: [f32; 3],
-    (radius, reach): (f32, f32),
-    near: &[PointBlock],
-) -> Surfel {
+pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], (radius, reach): (f32, f32), near: &[PointBlock]) -> Surfel {
     let gap = dispatch!(Level::new(), simd => simd.vectorize(
         #[inline(always)]
         || widest_gap(simd, p, fit.normal, near.iter()),

@@ -46,10 +46,12 @@ fn a_fit_by_straight_distances_changes_nothing() {
             assert!((0..3).all(|k| (n[k] - m[k]).abs() < 1e-4), "the normal of point {i}: {n:?}, {m:?}");
             assert!(near(again.discs()[i], scan.discs()[i]), "the disc of point {i}");
         }
-        let boxes = [&again, &scan].map(|scan| scan.enclosures().zip(scan.boxes()));
-        for (id, ((e, b), (f, c))) in boxes[0].clone().zip(boxes[1].clone()).enumerate() {
+        for id in 0..scan.nodes().len() {
+            let [(e, b), (f, c)] =
+                [&again, &scan].map(|scan| (scan.slices().enclosure(id), scan.boxes()[id]));
             for k in 0..3 {
-                let same = near(b.half[k], c.half[k]) && (e.half[k] - f.half[k]).abs() < 0.01 * f.half[k].max(0.1);
+                let same =
+                    near(b.half[k], c.half[k]) && (e.half[k] - f.half[k]).abs() < 0.01 * f.half[k].max(0.1);
                 assert!(same && near(b.centre[k], c.centre[k]), "node {id}: {b:?}, {c:?}");
             }
             let [new, old] = [&again, &scan].map(|scan| scan.slices().sampling_radius_of(id));

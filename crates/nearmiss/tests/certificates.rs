@@ -4,7 +4,7 @@
 use nearmiss::hierarchy::Node;
 use nearmiss::{
     Bandwidth, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence,
-    PointCloud, Pose, Proof, Scan, SurfaceOptions, Verdict, collide_proving, collide_with,
+    PointCloud, Pose, Proof, Scan, Semantics, SurfaceOptions, Verdict, collide_proving, collide_with,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -160,7 +160,8 @@ fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
         scan.write_to(&mut bytes).unwrap();
         let scan = Scan::from_bytes(bytes, Check::Full).unwrap();
         let asked = |semantics| {
-            let options = CollideOptions::default().with_semantics(semantics).with_evidence(Evidence::Certified);
+            let options =
+                CollideOptions::default().with_semantics(semantics).with_evidence(Evidence::Certified);
             let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
             let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.0, 20.0, 0.0])));
             collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict

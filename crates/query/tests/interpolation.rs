@@ -57,7 +57,8 @@ fn no_verdict_is_wrong_outside_the_band() {
                 for detail in [Detail::Verdict, Detail::Witness] {
                     let whole = options(Interpolation::default()).with_detail(detail);
                     let verdict = ask(&a, &b, &whole, &mut scratch).verdict;
-                    let by_discs = CollideOptions::default().with_semantics(Semantics::Surface).with_detail(detail);
+                    let by_discs =
+                        CollideOptions::default().with_semantics(Semantics::Surface).with_detail(detail);
                     let expected = ask(&a, &b, &by_discs, &mut scratch).verdict;
                     let is_open = pair.thin && verdict == Verdict::Undecided(Reason::Ambiguous);
                     assert!(is_open || verdict.is_intersecting() == pair.truth, "{}: {verdict:?}", case());

@@ -35,7 +35,10 @@ impl Placed {
 
     /// The point of this stored position where `matrix` puts it.
     pub(crate) fn point(position: [f32; 3], matrix: &Matrix) -> Self {
-        Self::new(&Enclosure { first: 0, count: 1, centre: position, half: [0.0; 3], axes: [[0.0; 3]; 3] }, matrix)
+        Self::new(
+            &Enclosure { first: 0, count: 1, centre: position, half: [0.0; 3], axes: [[0.0; 3]; 3] },
+            matrix,
+        )
     }
 
     /// About how far the box extends from its centre along `d`.

@@ -3,7 +3,7 @@
 use super::boxes::{Placed, distance, distance_of_balls};
 use super::cover::{Rectangle, uncovered};
 use super::placement::Placement;
-use super::proof::{Enclosure, Line, Matrix, Of, Poses, Verdict};
+use super::proof::{Enclosure, Line, Matrix, Poses, Semantics, Verdict};
 use super::subject::Subject;
 use super::witness;
 
@@ -75,9 +75,9 @@ impl Checker<'_> {
             mended: 0.0,
         };
         let checked = match kind {
-            Kind::Separated => {
-                self.placements(line, &mut finding).and_then(|placements| self.separated(line, &placements, &mut finding))
-            }
+            Kind::Separated => self
+                .placements(line, &mut finding)
+                .and_then(|placements| self.separated(line, &placements, &mut finding)),
             Kind::Intersecting => self
                 .placements(line, &mut finding)
                 .and_then(|placements| self.intersecting(line, &placements, &mut finding)),
@@ -119,7 +119,10 @@ impl Checker<'_> {
         for (name, nodes, subject) in
             [("a", &line.nodes_a, self.subjects[0]), ("b", &line.nodes_b, self.subjects[1])]
         {
-            nodes.iter().try_for_each(|node| subject.check_node(node, line.of)).map_err(|e| format!("{name}: {e}"))?;
+            nodes
+                .iter()
+                .try_for_each(|node| subject.check_node(node, line.semantics))
+                .map_err(|e| format!("{name}: {e}"))?;
         }
         let known = |[i, j]: [usize; 2]| i < line.nodes_a.len() && j < line.nodes_b.len();
         if let Some(pair) = line.pairs.iter().find(|pair| !known(**pair)) {
@@ -166,14 +169,15 @@ impl Checker<'_> {
         [a, b]: [&Placed; 2],
         wanted: f64,
     ) -> Option<f64> {
-        if line.of != Of::Obstacle {
+        if line.semantics != Semantics::Obstacle {
             return None;
         }
         let balls = |side: usize, node: &Enclosure, matrix: &Matrix| -> Option<Vec<(Placed, f64)>> {
             let subject = self.subjects[side];
             let scale = placements[side].scale * (1.0 + 1e-12);
             let range = node.first as usize..(node.first + node.count) as usize;
-            let ball = |k: usize| (Placed::point(subject.scan.positions()[k], matrix), subject.reach(k) * scale);
+            let ball =
+                |k: usize| (Placed::point(subject.scan.positions()[k], matrix), subject.reach(k) * scale);
             (node.count <= POINT_BY_POINT).then(|| range.map(ball).collect())
         };
         let (of_a, of_b) =
@@ -195,7 +199,7 @@ impl Checker<'_> {
     ) -> Result<(), String> {
         let witness = line.witness.ok_or("certified to intersect without a witness")?;
         let claimed = line.residual.filter(|r| *r >= 0.0).ok_or("a witness without a residual")?;
-        if line.of == Of::Obstacle {
+        if line.semantics == Semantics::Obstacle {
             return self.obstacles_meet(line, placements, witness, finding);
         }
         let on = |i: usize, name: &str| {

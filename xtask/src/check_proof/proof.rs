@@ -23,7 +23,7 @@ pub(crate) struct Line {
     pub(crate) placed_b: Matrix,
     pub(crate) margin: f64,
     #[serde(default)]
-    pub(crate) of: Of,
+    pub(crate) semantics: Semantics,
     pub(crate) verdict: Verdict,
     pub(crate) evidence: Option<Evidence>,
     pub(crate) gap: Option<f64>,
@@ -37,7 +37,7 @@ pub(crate) struct Line {
 /// What of the scans is enclosed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Of {
+pub(crate) enum Semantics {
     Obstacle,
     /// Also of older proofs, which do not say.
     #[default]

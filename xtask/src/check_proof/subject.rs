@@ -9,7 +9,7 @@ use nearmiss::hierarchy::Node;
 use nearmiss::{Bandwidth, BuildOptions, Check, Kernel, PointKind, Scan};
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 
-use super::proof::{Enclosure, Of};
+use super::proof::{Enclosure, Semantics};
 use crate::repository::Outcome;
 
 /// First bytes of a prepared scan.
@@ -66,8 +66,7 @@ impl Subject {
         if i < self.scan.slices().sheets {
             return 0.0;
         }
-        let is_alone =
-            matches!(self.scan.kind(i), PointKind::Line | PointKind::Stray | PointKind::Sparse);
+        let is_alone = matches!(self.scan.kind(i), PointKind::Line | PointKind::Stray | PointKind::Sparse);
         self.radius(i) * if is_alone { 0.5 } else { 0.325 }
     }
 
@@ -114,13 +113,17 @@ impl Subject {
 
     /// # Errors
     /// When no node has these points, or its enclosure differs in a bit.
-    pub(crate) fn check_node(&self, claimed: &Enclosure, of: Of) -> Result<(), String> {
+    pub(crate) fn check_node(&self, claimed: &Enclosure, semantics: Semantics) -> Result<(), String> {
         let Enclosure { first, count, .. } = *claimed;
         let Some(&id) = self.ids.get(&(first, count)) else {
             return Err(format!("no node has the points {first} to {first} + {count}"));
         };
         let slices = self.scan.slices();
-        let stored = if of == Of::Obstacle { slices.obstacle_enclosure(id) } else { slices.enclosure(id) };
+        let stored = if semantics == Semantics::Obstacle {
+            slices.obstacle_enclosure(id)
+        } else {
+            slices.enclosure(id)
+        };
         let bits = |[a, b, c]: [f32; 3]| [a.to_bits(), b.to_bits(), c.to_bits()];
         let same = bits(stored.centre) == bits(claimed.centre)
             && bits(stored.half) == bits(claimed.half)

@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::running::{Place, keys, name, numbers, shift, sorted};
 
 const FIELDS: &str = "verdict evidence reason witness normal_a normal_b residual source_a source_b gap \
-                      distance_estimate likelihood evaluations node_pairs leaf_pairs micros";
+                      distance_estimate band likelihood evaluations node_pairs leaf_pairs micros";
 
 fn balls() -> Place {
     let place = Place::new();
@@ -119,6 +119,56 @@ fn thickened_points_are_decided_exactly() {
     assert!((0.0..=0.11).contains(&miss["gap"].as_f64().unwrap()), "{miss}");
 }
 
+fn identity() -> String {
+    commas(0.0)
+}
+
+/// A shift along x as the numbers of a list.
+fn commas(x: f64) -> String {
+    shift(x, 0.0, 0.0).replace(' ', ",")
+}
+
+/// A sheet and, above it, a single point: part of the obstacle, but of no surface.
+#[test]
+fn a_stray_is_an_obstacle_and_no_surface() {
+    let place = Place::new();
+    let mut sheet = String::new();
+    for i in 0..40_u8 {
+        for j in 0..40_u8 {
+            sheet += &format!("{} {} 0\n", f64::from(i) * 0.1, f64::from(j) * 0.1);
+        }
+    }
+    place.write("sheet.xyz", format!("{sheet}2 2 3\n"));
+    place.write("plain.xyz", &sheet);
+    // The second sheet lies 0.02 below the stray.
+    let pose = shift(0.0, 0.0, 2.98);
+    let ask = |command: &str, options: &[&str]| {
+        let asked = [&[command, "sheet.xyz", "plain.xyz", "--pose-b", &pose, "--json"], options].concat();
+        place.ok(&asked).json().remove(0)
+    };
+    let hit = ask("collide", &[]);
+    assert_eq!((&hit["verdict"], &hit["evidence"]), (&"intersecting".into(), &"certified".into()), "{hit}");
+    assert!((0.1..=0.5).contains(&hit["band"].as_f64().unwrap()), "at most the reach: {hit}");
+    let miss = ask("collide", &["--surface-only"]);
+    assert_ne!(miss["verdict"], "intersecting", "{miss}");
+    let near = ask("distance", &[]);
+    assert_eq!(near["upper"], 0.0, "{near}");
+    let far = ask("distance", &["--surface-only"]);
+    assert!(far["upper"].as_f64().unwrap() > 0.1 && far["evidence"] == "estimated", "{far}");
+    let tried = ask("collide", &["--method", "sampling", "--seed", "1"]);
+    assert_ne!(tried["verdict"], "intersecting", "the paper's method knows surfaces alone: {tried}");
+    place.refused(
+        2,
+        &["collide", "sheet.xyz", "plain.xyz", "--surface-only", "--thickened", "1"],
+        &["cannot be used"],
+    );
+    place.refused(
+        2,
+        &["distance", "sheet.xyz", "plain.xyz", "--surface-only", "--thickened", "1"],
+        &["cannot be used"],
+    );
+}
+
 #[test]
 fn people_read_sentences() {
     let place = balls();
@@ -127,18 +177,34 @@ fn people_read_sentences() {
         done.results.lines().next().unwrap().to_owned()
     };
     let touch = say(&["--pose-b", &shift(1.2, 0.0, 0.0)]);
-    let residual = touch.split("within ").nth(1).and_then(|t| t.split(' ').next());
-    let residual: f64 = residual.unwrap().parse().unwrap();
-    assert!(touch.starts_with("They touch at (0.6") && residual < 1e-6, "not rounded to r/100: {touch}");
+    assert!(
+        touch.starts_with("They touch at (0.6") && touch.contains(") (certified); the measured"),
+        "{touch}"
+    );
+    let after = |words: &str| touch.split(words).nth(1).and_then(|t| t.split(' ').next()).unwrap();
+    let apart: f64 = after("that show it are ").parse().unwrap();
+    let band: f64 = after("no gap below ").parse().unwrap();
+    assert!(apart < 0.16 && (0.08..0.25).contains(&band), "a spacing of 0.08: {touch}");
     let balls = say(&["--pose-b", &shift(2.05, 0.0, 0.0), "--thickened", "0.1"]);
     assert!(balls.starts_with("Balls of radius 0.1 overlap at (1.0"), "{balls}");
     let apart = balls.split("the two points are ").nth(1).and_then(|t| t.strip_suffix(" apart."));
     assert!((0.05..=0.2).contains(&apart.unwrap().parse().unwrap()), "{balls}");
-    assert_eq!(
-        say(&["--pose-b", &shift(2.5, 0.0, 0.0), "--thickened", "0.1"]).split("; at").next(),
-        Some("No contact")
-    );
-    assert!(say(&["--pose-b", &shift(9.0, 0.0, 0.0)]).starts_with("No contact"));
+    let between = |told: &str| -> Vec<f64> {
+        let told =
+            told.strip_prefix("No contact; ").and_then(|t| t.strip_suffix(" apart (certified).")).unwrap();
+        told.trim_start_matches("between ").split(" and ").map(|x| x.parse().unwrap()).collect()
+    };
+    // The balls are exactly as far apart as their points, less both radii.
+    let exact = between(&say(&["--pose-b", &shift(2.5, 0.0, 0.0), "--thickened", "0.1"]));
+    assert!(exact.len() == 1 && (0.3..0.35).contains(&exact[0]), "{exact:?}");
+    for (x, true_distance) in [(9.0, 7.0), (2.5, 0.5)] {
+        let told = between(&say(&["--pose-b", &shift(x, 0.0, 0.0)]));
+        assert!(told.len() == 2 && told[0] <= true_distance + 0.02, "{told:?}");
+        assert!(told[0] >= 0.85 * true_distance - 0.16 && (told[1] - true_distance).abs() < 0.03, "{told:?}");
+    }
+    // Lines of a file say nothing of distances.
+    place.write("far.jsonl", format!("{{\"a\":[{0}],\"b\":[{1}]}}\n", identity(), commas(9.0)));
+    assert_eq!(say(&["--poses", "far.jsonl"]), "line 1: No contact (certified).");
     for (x, is_hinted) in [(9.0, true), (4.5, true), (3.5, false), (2.5, false)] {
         let done = place.ok(&["collide", "ball.nm", "ball.xyz", "--pose-b", &shift(x, 0.0, 0.0)]);
         assert_eq!(done.results.contains("hint: their bounds are"), is_hinted, "{x}: {}", done.results);
@@ -358,16 +424,16 @@ fn separations_are_certified_and_their_proof_is_written() {
         serde_json::from_str(&std::fs::read_to_string(place.path("proof.jsonl")).unwrap()).unwrap();
     let count = |list: &str| proof[list].as_array().unwrap().len();
     assert!(count("pairs") > 0 && count("nodes_a") > 0 && count("nodes_b") > 0, "{proof}");
-    assert_eq!(proof["gap"], certified["gap"]);
+    assert_eq!((&proof["gap"], &proof["semantics"]), (&certified["gap"], &"obstacle".into()));
     assert_eq!(proof["placed_a"].as_array().unwrap().len(), 16);
 
     let estimated = ask(&place, &["--pose-b", &apart, "--evidence", "estimated"]);
     assert_eq!((&estimated["evidence"], &estimated["gap"]), (&"estimated".into(), &0.0.into()));
     let told = place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &apart]).results;
-    assert!(told.contains("No contact; at least ") && told.contains("(certified)"), "{told}");
+    assert!(told.contains("No contact; between 0.8") && told.contains("(certified)"), "{told}");
     let told =
         place.ok(&["collide", "ball.nm", "ball.nm", "--pose-b", &apart, "--evidence", "estimated"]).results;
-    assert!(told.contains("No contact found (estimated)"), "{told}");
+    assert!(told.contains("No contact found; between 0.8") && told.contains("(estimated)"), "{told}");
 }
 
 #[test]

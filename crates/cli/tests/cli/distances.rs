@@ -11,7 +11,8 @@ fn two_spheres_are_as_far_apart_as_they_are() {
     let pose = shift(3.0, 0.0, 0.0);
     let asked = ["distance", "one.xyz", "one.xyz", "--pose-b", &pose, "--json"];
     let told = place.ok(&asked).json().remove(0);
-    let expected = "lower upper points evidence source_a source_b evaluations node_pairs leaf_pairs micros";
+    let expected =
+        "lower upper points band evidence source_a source_b evaluations node_pairs leaf_pairs micros";
     assert_eq!(keys(&told), sorted(expected));
     let [lower, upper] = ["lower", "upper"].map(|key| told[key].as_f64().unwrap());
     // Both surfaces lie a little inside their spheres.
@@ -21,12 +22,16 @@ fn two_spheres_are_as_far_apart_as_they_are() {
     assert!((points[0] - 1.0).abs() < 0.01 && (points[1] - 2.0).abs() < 0.01, "{told}");
 
     let people = place.ok(&asked[..5]).results;
-    assert!(people.starts_with("They are at least 0.") && people.contains(" and at most 1.0"), "{people}");
+    assert!(people.starts_with("They are between 0.9") && people.contains(" and 1.0"), "{people}");
+    assert!(people.contains(" apart (certified), give or take the local spacing of 0."), "{people}");
+    let band = told["band"].as_f64().unwrap();
+    assert!((0.05..0.15).contains(&band), "a spacing of 0.05: {told}");
     let thick = [&asked[..], &["--thickened", "0.25"]].concat();
     let told = place.ok(&thick).json().remove(0);
     assert_eq!(told["lower"], told["upper"], "of points exact");
     assert!((told["upper"].as_f64().unwrap() - 0.5).abs() < 0.02, "{told}");
-    assert!(place.ok(&thick[..5]).results.starts_with("They are at least"));
+    let people = [&asked[..5], &["--thickened", "0.25"]].concat();
+    assert!(place.ok(&people).results.starts_with("They are 0."), "exact");
 
     let short = place.ok(&[&asked[..], &["--work", "40"]].concat()).json().remove(0);
     assert_eq!(short["complete"], false, "{short}");
@@ -41,14 +46,54 @@ fn what_meets_is_at_distance_zero_and_lines_are_answered_in_order() {
     place.cloud("one.xyz", sphere(1.0), 0.05);
     let pose = shift(1.0, 0.0, 0.0);
     let asked = ["distance", "one.xyz", "one.xyz", "--pose-b", &pose];
-    assert!(place.ok(&asked).results.starts_with("They touch (certified)."));
+    assert!(place.ok(&asked).results.starts_with("They touch (certified); no gap below 0."));
     place.ok(&["poses", "one.xyz", "one.xyz", "--sweep", "--per-distance", "1", "-o", "poses.jsonl"]);
     let told = place.ok(&["distance", "one.xyz", "one.xyz", "--poses", "poses.jsonl", "--json"]).json();
     assert_eq!(told.len(), 13, "a line a pose");
     let upper: Vec<f64> = told.iter().map(|line| line["upper"].as_f64().unwrap()).collect();
     assert!(upper[7..8].iter().all(|&d| d <= 1e-9) && (upper[12] - 1.0).abs() < 0.02, "{upper:?}");
     let people = place.ok(&["distance", "one.xyz", "one.xyz", "--poses", "poses.jsonl"]).results;
-    assert!(people.lines().nth(12).unwrap().starts_with("line 13: They are at least"), "{people}");
+    assert!(people.lines().nth(12).unwrap().starts_with("line 13: They are between 0."), "{people}");
+}
+
+#[test]
+fn a_relative_precision_is_reached() {
+    let place = Place::new();
+    place.cloud("one.xyz", sphere(1.0), 0.05);
+    let lower = |relative: &[&str]| {
+        let pose = shift(12.0, 0.0, 0.0);
+        let asked = ["distance", "one.xyz", "one.xyz", "--pose-b", &pose, "--json"];
+        let told = place.ok(&[&asked[..], relative].concat()).json().remove(0);
+        let [lower, upper] = ["lower", "upper"].map(|key| told[key].as_f64().unwrap());
+        assert!((upper - 10.0).abs() < 0.02, "{told}");
+        lower / upper
+    };
+    let [rough, default, fine] = [&["--relative", "0.5"][..], &[], &["--relative", "0.02"]].map(lower);
+    assert!(rough >= 0.5 && default >= 0.9 && fine >= 0.98, "{rough}, {default}, {fine}");
+    assert!(rough <= default && default <= fine, "{rough}, {default}, {fine}");
+}
+
+#[test]
+fn a_picture_shows_the_segment() {
+    let place = Place::new();
+    place.cloud("one.xyz", sphere(1.0), 0.1);
+    let pose = shift(3.0, 0.0, 0.0);
+    place.ok(&["distance", "one.xyz", "one.xyz", "--pose-b", &pose, "--image", "d.png"]);
+    let (width, pixels) = place.picture("d.png");
+    let count = |is: fn(&[u8]) -> bool| pixels.chunks(3).filter(|p| is(p)).count();
+    let [blue, orange] =
+        [count(|p| p[2] > p[0].saturating_add(60)), count(|p| p[0] > p[2].saturating_add(60))];
+    assert!(blue > 10_000 && orange > 10_000, "{blue} blue and {orange} orange pixels");
+    // A dark line runs level through the middle of the close view, half a width of the view or more.
+    let longest = pixels
+        .chunks(3 * width)
+        .take(780)
+        .map(|row| row[3 * (width / 2)..].chunks(3).filter(|p| p.iter().all(|&c| c < 90)).count())
+        .max();
+    assert!(longest > Some(200), "{longest:?}");
+    let both = ["distance", "one.xyz", "one.xyz", "--image", "d.png", "--poses", "p.jsonl"];
+    place.refused(2, &both, &["cannot be used with"]);
+    place.refused(2, &["distance", "one.xyz", "one.xyz", "--image", "d.jpg"], &["pictures are PNG"]);
 }
 
 #[test]
@@ -59,6 +104,7 @@ fn distances_are_refused_with_a_reason() {
     for (options, word) in [
         (&["--thickened", "-1"][..], "zero or more"),
         (&["--budget", "5"], "units"),
+        (&["--relative", "1"], "from 0 to less than 1"),
         (&["--pose-b", "1 2 3"], "3 numbers"),
         (&["--thickened", "1", "--kernel", "geodesic"], "cannot be used with"),
     ] {

@@ -93,12 +93,15 @@ fn an_export_comes_back() {
         let cosine = (0..3).map(|k| p[k] * n[k] / 2.0).sum::<f64>();
         assert!(cosine.abs() > 0.97, "the normal of a sphere at {p:?}: {n:?}");
     }
-    // The source is the last of seven values of four bytes.
+    // Six values of four bytes, a colour of three, then the source and the kind.
     let ply = std::fs::read(place.path("p.ply")).unwrap();
-    let rows = &ply[ply.len() - 28 * given.len()..];
-    for (i, row) in rows.chunks(28).enumerate() {
-        let source = u32::from_le_bytes(*row.last_chunk().unwrap());
+    let header = String::from_utf8_lossy(&ply[..400]).into_owned();
+    assert!(header.contains("uchar red") && header.contains("property uint kind"), "{header}");
+    let rows = &ply[ply.len() - 35 * given.len()..];
+    for (i, row) in rows.chunks(35).enumerate() {
+        let [source, kind] = [27, 31].map(|at| u32::from_le_bytes(row[at..at + 4].try_into().unwrap()));
         assert_eq!(back.point(i), given.point(source as usize), "row {i}");
+        assert_eq!((kind, &row[24..27]), (0, &[158, 166, 178][..]), "a sphere is a sheet: row {i}");
     }
 
     let report = place.ok(&["inspect", "ball.nm", "--json"]).json().remove(0);
@@ -119,6 +122,36 @@ fn an_export_comes_back() {
     let share = in_sampling as f64 / rows.len() as f64;
     assert!((share - 0.9).abs() < 0.02, "the 0.9-quantile: {share}");
     place.refused(2, &["export", "ball.nm", "--points", "x", "--radii", "x"], &["two outputs"]);
+}
+
+/// A plate, and beside it points along a line: exported and painted in the colours of their kinds.
+#[test]
+fn kinds_are_exported_and_painted() {
+    let place = Place::new();
+    let mut cloud = String::new();
+    for i in 0..40_u8 {
+        for j in 0..40_u8 {
+            cloud += &format!("{} {} 0\n", f64::from(i) * 0.1, f64::from(j) * 0.1);
+        }
+    }
+    for i in 0..160_u8 {
+        cloud += &format!("{} 8 0\n", f64::from(i) * 0.025);
+    }
+    place.write("scan.xyz", cloud);
+    place.ok(&["export", "scan.xyz", "--image", "kinds.png", "--points", "p.ply"]);
+    let (width, pixels) = place.picture("kinds.png");
+    assert!(width > 1500, "{width}");
+    // Lines are green.
+    let green = pixels.chunks(3).filter(|p| p[1] > p[0].saturating_add(60) && p[1] > p[2].saturating_add(20));
+    let count = green.count();
+    assert!(count > 1000, "the line and its patch of the legend: {count} pixels");
+    let ply = std::fs::read(place.path("p.ply")).unwrap();
+    let rows = &ply[ply.len() - 35 * 1760..];
+    let kinds = rows.chunks(35).map(|row| u32::from_le_bytes(*row.last_chunk().unwrap()));
+    let lines = kinds.clone().filter(|&kind| kind == 3).count();
+    let sheets = kinds.filter(|&kind| kind == 0).count();
+    assert!((130..=160).contains(&lines) && (1400..=1600).contains(&sheets), "{lines} and {sheets}");
+    place.refused(2, &["export", "scan.xyz", "--image", "kinds.jpg"], &["pictures are PNG"]);
 }
 
 #[test]

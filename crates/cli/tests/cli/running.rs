@@ -39,6 +39,15 @@ impl Place {
         self.write(name, text(&form.sample(Sampling::clean(spacing)).points))
     }
 
+    /// Width in pixels and bytes, red green blue, of a picture.
+    pub(crate) fn picture(&self, name: &str) -> (usize, Vec<u8>) {
+        let file = std::fs::File::open(self.path(name)).unwrap();
+        let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut pixels).unwrap();
+        (usize::try_from(info.width).unwrap(), pixels)
+    }
+
     /// Runs the command in this folder.
     pub(crate) fn run(&self, args: &[&str]) -> Done {
         let output = Command::new(env!("CARGO_BIN_EXE_nearmiss"))

@@ -1,0 +1,199 @@
+//! Pictures of two scans, of their nearest places and the segment between these.
+
+use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss::{Distance, ScanView};
+
+use crate::canvas::{Area, Camera, Canvas, FINE};
+use crate::digits::{rough, short};
+use crate::picture::{
+    GAP, GROUND, HALO, INK, LARGEST, LEGEND, OF_A, OF_B, PANEL, PANEL_GROUND, Picture, Style, across,
+    directions, dot, legend, obstacle, sample, scale_bar, splat, whole_camera,
+};
+use crate::sentence::{bracket, unit};
+
+/// Half the width of the close view, in lengths of the segment and in bands; the greater counts.
+const OF_LENGTH: f64 = 0.8;
+const OF_BAND: f64 = 5.0;
+
+/// How much the close view is turned towards the first scan: by 15 degrees, which shortens the
+/// segment by 4 %.
+const TILT: f64 = 0.27;
+
+/// Radii of points in fine pixels, and of the ends of the segment.
+const WHOLE_DOT: f64 = 2.5;
+const CLOSE_DOT: f64 = 7.0;
+const END: f64 = 9.0;
+
+/// Both scans as they lie in the world; beside that a close view across the segment between the
+/// nearest places, what is before it taken away.
+pub(crate) fn paint_distance(views: [&ScanView<'_>; 2], found: &Distance, style: &Style) -> Picture {
+    let mut canvas = Canvas::new(2 * PANEL + 3 * GAP, PANEL + LEGEND + 2 * GAP, GROUND);
+    let segment = Segment::new(found);
+    let area = Area { left: GAP, top: GAP, width: PANEL, height: PANEL };
+    canvas.fill(area, PANEL_GROUND);
+    let whole = whole_camera(views, area, |points, toward| 4.0 * segment.hidden(points, *toward));
+    segment.paint(&mut canvas, &whole, views, style, |_| true, [LARGEST, WHOLE_DOT]);
+    let area = Area { left: 2 * GAP + PANEL, ..area };
+    canvas.fill(area, PANEL_GROUND);
+    let (close, cut) = segment.camera(&sample(views), area);
+    let is_behind = |p: Vector3<f64>| {
+        let offset = p - segment.middle();
+        cut.dot(&offset) <= 0.5 * segment.band && offset.norm() < 1.5 * segment.reach
+    };
+    segment.paint(&mut canvas, &close, views, style, is_behind, [f64::INFINITY, CLOSE_DOT]);
+    let told = if found.upper > 0.0 { bracket(found, unit(views)) } else { "they touch".to_owned() };
+    let told = if style.points { told } else { format!("{told}, BAND {}", rough(found.band)) };
+    legend(&mut canvas, &told, &style.names);
+    canvas.picture()
+}
+
+/// The segment between the nearest places.
+struct Segment {
+    ends: [Vector3<f64>; 2],
+    band: f64,
+    /// Half the width of the close view.
+    reach: f64,
+    label: String,
+}
+
+impl Segment {
+    fn new(found: &Distance) -> Self {
+        let ends = found.points.map(Vector3::from);
+        let length = (ends[1] - ends[0]).norm();
+        let band = if found.band.is_finite() { found.band } else { length };
+        let reach = (OF_LENGTH * length).max(OF_BAND * band).max(f64::MIN_POSITIVE);
+        Self { ends, band, reach, label: short(found.upper) }
+    }
+
+    fn middle(&self) -> Vector3<f64> {
+        0.5 * (self.ends[0] + self.ends[1])
+    }
+
+    /// How much is before the segment, seen from `toward`: about 0 to 1.
+    fn hidden(&self, points: &[Vector3<f64>], toward: Vector3<f64>) -> f64 {
+        let before = points.iter().filter(|p| {
+            let offset = *p - self.middle();
+            let depth = toward.dot(&offset);
+            depth > self.band && (offset - toward * depth).norm() < 0.5 * self.reach
+        });
+        #[expect(clippy::cast_precision_loss, reason = "a count")]
+        let count = before.count() as f64;
+        count / (count + 4.0)
+    }
+
+    /// Obliquely across the segment, which lies level, with as little before it as may be; and the
+    /// direction at right angles to it from which what is before it is cut away. A surface at right
+    /// angles to the segment is seen as one.
+    fn camera(&self, points: &[Vector3<f64>], area: Area) -> (Camera, Vector3<f64>) {
+        let along = self.ends[1] - self.ends[0];
+        let along = along.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let turned = |d: Vector3<f64>| (d - along * along.dot(&d)).try_normalize(0.1);
+        let cost = |toward: &Vector3<f64>| {
+            let below = (-toward.dot(&Vector3::new(0.0, 0.7, 0.7))).max(0.0);
+            self.hidden(points, *toward) + 0.3 * below
+        };
+        let toward = directions().filter_map(turned).min_by(|p, q| cost(p).total_cmp(&cost(q)));
+        let cut = toward.unwrap_or_else(|| across(along));
+        let toward = (cut + TILT * along).normalize();
+        let along = (along - toward * toward.dot(&along)).normalize();
+        let up = toward.cross(&along);
+        let (right, up) = if up.y + up.z < 0.0 { (-along, -up) } else { (along, up) };
+        #[expect(clippy::cast_precision_loss, reason = "pixels")]
+        let scale = 0.5 * area.width as f64 / self.reach;
+        (Camera { axes: [right, up, toward], centre: self.middle(), scale, area }, cut)
+    }
+
+    /// The points of both scans that are `shown`, and the segment over them with its length. No
+    /// disc is larger than the first of `sizes`, in fine pixels; where points are shown, each has
+    /// the second as its radius.
+    fn paint(
+        &self,
+        canvas: &mut Canvas,
+        camera: &Camera,
+        views: [&ScanView<'_>; 2],
+        style: &Style,
+        shown: impl Fn(Vector3<f64>) -> bool,
+        [largest, point]: [f64; 2],
+    ) {
+        for (view, colour) in views.into_iter().zip([OF_A, OF_B]) {
+            for i in (0..view.scan().len()).filter(|&i| shown(view.point(i).into())) {
+                if style.points {
+                    canvas.splat(camera, &dot(&splat(view, i), camera, point), colour);
+                } else {
+                    obstacle(canvas, camera, view, i, colour, largest);
+                }
+            }
+        }
+        scale_bar(canvas, camera);
+        let ends = self.ends.map(|p| camera.project(p)).map(|[x, y, _]| [x, y]);
+        for (width, colour) in [(5.0 + 2.0 * HALO, GROUND), (5.0, INK)] {
+            canvas.line(camera.area, ends, width, colour);
+        }
+        for (end, colour) in ends.into_iter().zip([OF_A, OF_B]) {
+            canvas.line(camera.area, [end; 2], 2.0 * END + 2.0 * HALO, INK);
+            canvas.line(camera.area, [end; 2], 2.0 * END, colour);
+        }
+        self.label(canvas, camera.area, ends);
+    }
+
+    /// The length beside the middle of the segment, on a ground of its own.
+    fn label(&self, canvas: &mut Canvas, area: Area, ends: [[f64; 2]; 2]) {
+        const SIZE: usize = 2 * FINE;
+        const PAD: usize = 4 * FINE;
+        const AWAY: f64 = 16.0 * FINE as f64;
+        let (width, height) = (Canvas::text_width(SIZE, &self.label) + 2 * PAD, 7 * SIZE + 2 * PAD);
+        let middle = [0, 1].map(|k| 0.5 * (ends[0][k] + ends[1][k]));
+        #[expect(
+            clippy::cast_precision_loss,
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "pixels within the area"
+        )]
+        let within = |c: f64, start: usize, length: usize, size: usize| {
+            c.clamp(start as f64, (start + length - size) as f64) as usize
+        };
+        #[expect(clippy::cast_precision_loss, reason = "pixels")]
+        let half = 0.5 * width as f64;
+        let left = within(middle[0] - half, area.left, area.width, width);
+        let top = within(middle[1] + AWAY, area.top, area.height, height);
+        canvas.fill(Area { left, top, width, height }, GROUND);
+        canvas.text([left + PAD, top + PAD], SIZE, INK, &self.label);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss::{BuildOptions, DistanceOptions, DistancePlan, PointCloud, Pose, Scan};
+
+    use super::*;
+
+    #[test]
+    fn the_segment_is_seen_in_both_panels() {
+        let points: Vec<[f64; 3]> =
+            (0..40_u32).flat_map(|i| (0..40).map(move |j| [i, j, 0].map(f64::from))).collect();
+        let scan =
+            Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap();
+        let above = Pose::from_row_major(
+            &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 9.0, 0.0, 0.0, 0.0, 1.0],
+            scan.bounds(),
+            0.1,
+        )
+        .unwrap();
+        let [a, b] = [scan.at(&Pose::IDENTITY), scan.at(&above)];
+        let plan = DistancePlan::new(&DistanceOptions::default(), &scan, &scan).unwrap();
+        let found = nearmiss::query::distance(&a, &b, &plan, &nearmiss::Budget::UNLIMITED);
+        assert!((found.upper - 9.0).abs() < 1e-6, "{found:?}");
+        let style = Style { names: ["A", "B"].map(Into::into), points: false };
+        let picture = paint_distance([&a, &b], &found, &style);
+        let is_ink = |p: &[u8]| p.iter().zip(INK).all(|(x, y)| x.abs_diff(y) < 8);
+        let width = picture.size().0;
+        for half in [0, width / 2] {
+            let rows = picture.pixels().chunks(3 * width);
+            let count: usize = rows
+                .take(PANEL / FINE)
+                .map(|r| r[3 * half..][..3 * (width / 2)].chunks(3).filter(|p| is_ink(p)).count())
+                .sum();
+            assert!(count > 300, "{count} pixels of ink");
+        }
+    }
+}

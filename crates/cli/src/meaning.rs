@@ -1,0 +1,32 @@
+//! What `collide` and `distance` compare: obstacles, surfaces, or balls about the points.
+
+use clap::Args;
+use nearmiss::{Metric, Scan, Semantics};
+
+use crate::collide::parse_radius;
+
+/// Options that say what of two scans is compared. By default their obstacles: surfaces where
+/// points sample a sheet, balls of half the local spacing about all other points, and every
+/// measured point.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct MeaningArgs {
+    /// Compare surfaces alone, as Klein & Zachmann define them; points that sample no sheet then
+    /// count for nothing. By default they count as balls of half the local spacing. The geodesic
+    /// kernel always compares surfaces alone
+    #[arg(long, conflicts_with = "thickened")]
+    pub surface_only: bool,
+    /// Compare balls of this radius about the points, in world units, and no surfaces: exact
+    #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
+    pub thickened: Option<f64>,
+}
+
+impl MeaningArgs {
+    /// The semantics for two scans like `a`.
+    pub(crate) fn semantics(self, a: &Scan) -> Semantics {
+        match self.thickened {
+            Some(radius) => Semantics::Thickened(radius),
+            None if self.surface_only || a.metric() == Metric::Geodesic => Semantics::Surface,
+            None => Semantics::Obstacle,
+        }
+    }
+}
