@@ -159,7 +159,7 @@ mod tests {
                 .contains("seem to touch at (1.000, 2.000, 3.000), within 0.0004 (estimated)")
         );
         assert_eq!(
-            said(apart(0.25, Certified), touch(Certified)),
+            said(apart(0.2504, Certified), touch(Certified)),
             "The surfaces do not cut; at least 0.250 apart (certified). But they touch at (1.000, 2.000, 3.000), where no \
              surface is sampled, within 0.0004 (certified)."
         );
@@ -167,18 +167,18 @@ mod tests {
             said(apart(0.0, Estimated), touch(Certified)).starts_with("No curve found. But they touch at (1")
         );
         assert_eq!(
-            said(apart(0.25, Certified), apart(0.125, Certified)),
+            said(apart(0.2504, Certified), apart(0.1254, Certified)),
             "They do not cut; at least 0.125 apart (certified)."
         );
         assert_eq!(said(apart(0.0, Certified), apart(0.0, Certified)), "They do not cut (certified).");
         assert_eq!(
-            said(unknown, apart(0.125, Certified)),
+            said(unknown, apart(0.1254, Certified)),
             "No curve found, nor any contact; at least 0.125 apart (certified)."
         );
         assert_eq!(said(unknown, apart(0.0, Estimated)), "No curve found, nor any contact (estimated).");
         let budget = Verdict::Undecided(Reason::Budget { likelihood: 0.5 });
         assert_eq!(
-            said(apart(0.25, Certified), budget),
+            said(apart(0.2504, Certified), budget),
             "No curve found. Whether they touch cannot be told: the budget ran out first; try a greater --budget or --work."
         );
     }
