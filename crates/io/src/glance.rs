@@ -30,7 +30,7 @@ pub struct Glance {
     pub points: u64,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Bounds of some hundreds of points throughout the file, if it holds nothing but points that are not compressed.
+    /// Bounds of some thousands of points throughout the file, if it holds nothing but points that are not compressed.
     pub bounds: Option<Aabb>,
 }
 
@@ -98,7 +98,7 @@ fn bounds(layout: &Layout, pieces: &mut Pieces<'_>) -> Option<Aabb> {
             let off = usize::try_from((at - start) % stride as u64).unwrap_or(0);
             let skipped = if off == 0 { 0 } else { stride - off };
             let records = piece.get(skipped..).unwrap_or_default().chunks_exact(stride);
-            for record in records.take(ROWS) {
+            for record in records {
                 layout.rows.record(record, &mut row);
                 found.push([row[0], row[1], row[2]]);
             }
@@ -106,8 +106,7 @@ fn bounds(layout: &Layout, pieces: &mut Pieces<'_>) -> Option<Aabb> {
         Encoding::Text { end, .. } => {
             let whole = Lines::going_on(piece, 0, end);
             // The first line may lack its start, and the last one its end.
-            let mut rows: Vec<_> =
-                whole.skip(1).filter(|line| layout.rows.is_row(line)).take(ROWS + 1).collect();
+            let mut rows: Vec<_> = whole.skip(1).filter(|line| layout.rows.is_row(line)).collect();
             rows.pop();
             for line in rows {
                 if layout.rows.line(line, &mut row).is_ok() {
@@ -119,9 +118,6 @@ fn bounds(layout: &Layout, pieces: &mut Pieces<'_>) -> Option<Aabb> {
     let finite: Vec<[f64; 3]> = found.into_iter().filter(|p| p.iter().all(|x| x.is_finite())).collect();
     (!finite.is_empty()).then(|| Aabb::of(finite.into_iter()))
 }
-
-/// Rows of a piece that are looked at.
-const ROWS: usize = 16;
 
 /// Pieces that are evenly spread over a part of a file.
 struct Pieces<'a> {

@@ -60,10 +60,11 @@ impl From<nearmiss_graph::LoadError> for LoadError {
 const KIND: [u8; 4] = *b"SCAN";
 
 /// Version of the layout of a scan's sections and metadata.
-const VERSION: u32 = 9;
+const VERSION: u32 = 8;
 
-/// Versions before this are refused by name. This one counts the points that filters left out.
-const OLDEST: u32 = 9;
+/// Versions before this are refused by name. This one has the reach, classes and obstacle enclosures of
+/// points, and counts the points that filters left out.
+const OLDEST: u32 = 8;
 
 /// What a scan's file holds beside arrays.
 #[derive(Debug, Serialize, Deserialize)]

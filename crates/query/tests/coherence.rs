@@ -97,6 +97,7 @@ fn hints_change_no_verdict() {
                         proven += 1;
                     }
                     if !of_points {
+                        if kind(&cold.verdict).1 != kind(&warm.verdict).1 { eprintln!("EVID {cloud:?} {n} {options:?} step {step} cold {cold:?} warm {warm:?}"); }
                         evident += usize::from(kind(&cold.verdict).1 != kind(&warm.verdict).1);
                     }
                     seen[usize::from(kind(&cold.verdict).0)] += 1;

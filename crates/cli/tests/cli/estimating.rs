@@ -22,7 +22,7 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
     refused(&["--memory", "22MB"], &all);
     refused(&["--memory", "24MB"], &["--no-close-pairs, or --memory"]);
     refused(&["--memory", "1MB"], &["reading ", "a part of the file, or --memory 2"]);
-    refused(&["--memory", "22MB", "--voxel", "0.01"], &["points need about", "--memory 2"]);
+    refused(&["--memory", "22MB", "--voxel", "0.01", "--quiet"], &["points need about", "--memory 2"]);
     place.refused(2, &["preprocess", "ball.xyz", "-o", "b.nm", "--memory", "big"], &["--memory", "500MB"]);
     for fitting in [
         &["--memory", "22MB", "--voxel", "0.5"][..],

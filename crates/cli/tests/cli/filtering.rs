@@ -91,15 +91,20 @@ fn filters_are_applied_in_their_order_and_sources_lead_to_the_input() {
 fn normals_and_the_graph_follow_the_points_that_stay() {
     let place = Place::new();
     let (points, ball) = ball_and_strays();
-    let rows: String = points.iter().map(|[x, y, z]| format!("{x} {y} {z} {} {} {}\n", -x, -y, -z)).collect();
-    place.write("all.csv", format!("x y z nx ny nz\n{rows}"));
-    let done = place.ok(&["preprocess", "all.csv", "-o", "ball.nm", "--json", "--crop", "-2,-2,-2,2,2,2"]);
-    assert_eq!(done.json()[0]["points"], ball);
-    assert_eq!(done.json()[0]["graph"]["components"], 1);
     place.write("at.txt", "0 0 1.01\n0.99 0 0\n");
-    let values = place.ok(&["eval", "ball.nm", "--points", "at.txt", "--json"]).json();
-    let f = [0, 1].map(|i| values[i]["f"].as_f64().unwrap());
-    assert!(f[0] < 0.0 && f[1] > 0.0, "normals of the input point inwards: {f:?}");
+    let values = [1.0, -1.0].map(|side| {
+        let row = |[x, y, z]: &[f64; 3]| format!("{x} {y} {z} {} {} {}\n", side * x, side * y, side * z);
+        let rows: String = points.iter().map(row).collect();
+        place.write("all.csv", format!("x y z nx ny nz\n{rows}"));
+        let done =
+            place.ok(&["preprocess", "all.csv", "-o", "ball.nm", "--json", "--crop", "-2,-2,-2,2,2,2"]);
+        assert_eq!(done.json()[0]["points"], ball);
+        assert_eq!(done.json()[0]["graph"]["components"], 1);
+        let values = place.ok(&["eval", "ball.nm", "--points", "at.txt", "--json"]).json();
+        [0, 1].map(|i| values[i]["f"].as_f64().unwrap())
+    });
+    let [out, inwards] = values;
+    assert_eq!(out, inwards.map(|f| -f), "sides follow the normals of the input");
 }
 
 #[test]
