@@ -23,8 +23,8 @@ const SPARED: usize = 8;
 /// The spacing is the distance to the neighbour of this rank.
 const RANK: usize = 6;
 
-/// A point is an outlier if so many of its nearest six are this many times denser, and its spacing
-/// exceeds the reach.
+/// A point is an outlier if so many of its nearest six lie on sheets and are this many times denser,
+/// and its spacing exceeds the reach.
 const OUTLIER: usize = 2;
 const DENSER: f64 = 4.0;
 
@@ -127,7 +127,9 @@ impl PointHierarchy {
             seen.count += 1;
             let is_outlier = i >= slices.sheets && spacing > f64::from(slices.reach) && {
                 let near = found.of(i % WIDTH).take(RANK).map(|near| near.id as usize);
-                let denser = near.filter(|&j| DENSER * f64::from(slices.radii[j]) < spacing);
+                // The radii of other points are limited by the reach.
+                let is_denser = |j: usize| j < slices.sheets && DENSER * f64::from(slices.radii[j]) < spacing;
+                let denser = near.filter(|&j| is_denser(j));
                 denser.count() >= OUTLIER
             };
             if is_outlier {
@@ -230,7 +232,7 @@ fn sample(points: Range<usize>, most: usize, seed: u64) -> Vec<usize> {
     (0..count).map(chosen).collect()
 }
 
-/// The finaliser of SplitMix64.
+/// The finaliser of `SplitMix64`.
 fn mixed(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

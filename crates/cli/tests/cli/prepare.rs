@@ -205,6 +205,7 @@ fn uneven_spacing_is_told_with_its_share_of_the_area() {
     assert!((0.001..0.006).contains(&number("share")), "64 of 22,564: {uneven}");
     assert!((0.35..0.65).contains(&number("area")), "half: {uneven}");
     assert!((14.0..26.0).contains(&number("times")), "20: {uneven}");
+    assert!(report["health"]["outliers"].as_f64().unwrap() < 0.001, "{report}");
     let advice = find(&told, "times sparser than the rest");
     let reach = advice.split("--reach ").nth(1).and_then(|t| t.split('`').next()).unwrap();
     assert!((0.4..1.2).contains(&reach.parse().unwrap()), "{advice}");
