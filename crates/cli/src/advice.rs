@@ -9,7 +9,7 @@ use crate::report::median;
 /// From these shares of the points on a scan gets advice.
 const MANY_ON_LINES: f64 = 0.1;
 const MANY_SPARSE: f64 = 0.05;
-const MANY_STRAYS: f64 = 0.001;
+const MANY_OUTLIERS: f64 = 0.001;
 const MANY_NOISY: f64 = 0.2;
 const MANY_AT_BORDERS: f64 = 0.02;
 
@@ -52,7 +52,7 @@ pub(crate) fn health(scan: &Scan, health: &Health) -> Vec<String> {
         of_spacing(scan, health),
         of_borders(scan, health),
         of_holes(health),
-        of_strays(scan, &ball),
+        of_outliers(scan, health),
         of_lines(scan),
         of_noise(scan),
     ];
@@ -119,16 +119,16 @@ fn of_holes(health: &Health) -> Option<String> {
     ))
 }
 
-/// Where points are alone.
-fn of_strays(scan: &Scan, ball: &str) -> Option<String> {
-    let share = scan.share(PointKind::Stray);
-    (share > MANY_STRAYS).then(|| {
+/// Where points lie alone beside much denser ones.
+fn of_outliers(scan: &Scan, health: &Health) -> Option<String> {
+    (health.outliers > MANY_OUTLIERS).then(|| {
         #[expect(clippy::cast_precision_loss, reason = "a count")]
-        let count = (share * scan.len() as f64).round();
+        let count = (health.outliers * scan.len() as f64).round();
         format!(
-            "{} of the points, {count}, are strays, each a ball of up to {ball}: `preprocess --remove-outliers 8,2` \
-             drops them",
-            part(share)
+            "{} of the points, about {count}, are strays far from much denser points, each a ball of up to {}: \
+             `preprocess --remove-outliers 8,2` drops them",
+            part(health.outliers),
+            rough(health.largest_ball)
         )
     })
 }

@@ -39,7 +39,7 @@ pub struct CollideArgs {
     #[arg(long, requires = "poses")]
     pub first: bool,
     /// Which distances define the surfaces, as scans are prepared for and raw inputs will be; by default as prepared, else straight
-    /// ones. By the geodesic kernel separations are estimated
+    /// ones. By the geodesic kernel surfaces alone are compared, and separations are estimated
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
     /// What is compared

@@ -11,7 +11,7 @@ const UNEVEN: f64 = 4.0;
 const MANY: f64 = 0.02;
 const LARGE: f64 = 0.1;
 
-/// Fewer border points than this do not show a hole.
+/// Fewer sampled points than this show neither a hole nor a sparse part.
 const FEW: usize = 4;
 
 /// Chooses the points that are looked at.
@@ -26,6 +26,8 @@ pub(crate) struct Health {
     pub(crate) largest_ball: f64,
     /// Share of the points at borders of sheets, estimated.
     pub(crate) border: f64,
+    /// Share of the points that lie alone beside much denser ones, estimated.
+    pub(crate) outliers: f64,
     /// Points much sparser than the others, if there are enough to matter.
     pub(crate) uneven: Option<Uneven>,
     /// Holes wider than the reach, if any were found.
@@ -74,6 +76,7 @@ impl Health {
             balls: 1.0 - scan.sheet_share(),
             largest_ball: f64::from(largest) * scale,
             border: survey.border,
+            outliers: survey.outliers,
             uneven: Uneven::of(&survey.spacings),
             holes,
             beyond_reach: quantile(&beyond, 0.9),
@@ -93,7 +96,7 @@ impl Uneven {
         let whole = spacings.iter().map(area).sum::<f64>().max(f64::MIN_POSITIVE);
         let (share, area) =
             (sparse.iter().map(|s| s.1).sum::<f64>(), sparse.iter().map(area).sum::<f64>() / whole);
-        let matters = median > 0.0 && (share >= MANY || area >= LARGE);
+        let matters = median > 0.0 && sparse.len() >= FEW && (share >= MANY || area >= LARGE);
         matters.then(|| Self { share, area, times: spacing / median, spacing, median })
     }
 }
@@ -136,7 +139,8 @@ mod tests {
     fn few_sparse_points_matter_where_they_cover_much() {
         let even: Vec<(f64, f64)> = (0..100).map(|i| (1.0 + f64::from(i) / 100.0, 0.01)).collect();
         assert!(Uneven::of(&even).is_none());
-        let plates = [(1.0, 0.9975), (20.0, 0.0025)];
+        let plates = [&[(1.0, 0.9975)][..], &[(20.0, 0.0005); 5]].concat();
+        assert!(Uneven::of(&plates[..4]).is_none(), "three points show nothing");
         let uneven = Uneven::of(&plates).unwrap();
         assert!((uneven.area - 0.5).abs() < 0.01 && (uneven.times - 20.0).abs() < 1e-9, "{uneven:?}");
     }

@@ -130,7 +130,7 @@ pub enum Command {
     /// Whether, where and how near two scans meet
     #[command(after_long_help = COLLIDE_EXAMPLES)]
     Collide(CollideArgs),
-    /// All curves in which two scans cut each other
+    /// All curves in which the surfaces of two scans cut each other
     #[command(after_long_help = "Example:\n  nearmiss curve a.nm b.nm --image curves.png -o curves.ply")]
     Curve(CurveArgs),
     /// How far two scans are apart: a proven bound from below, and two points that show one from above

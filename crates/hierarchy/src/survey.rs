@@ -10,7 +10,6 @@ use nearmiss_surface::{BlockTree, Nearest, PointBlock};
 
 use crate::build::PointHierarchy;
 use crate::neighbours::chunks;
-use crate::surfels::PointKind;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
@@ -23,6 +22,11 @@ const SPARED: usize = 8;
 
 /// The spacing is the distance to the neighbour of this rank.
 const RANK: usize = 6;
+
+/// A point is an outlier if so many of its nearest six lie on sheets and are this many times denser,
+/// and its spacing exceeds the reach.
+const OUTLIER: usize = 2;
+const DENSER: f64 = 4.0;
 
 /// Neighbours about a point that show a border. Of 24 random directions in a plane, one in ten
 /// thousand leaves a sector of 150° empty.
@@ -49,9 +53,11 @@ const LEVEL: f64 = 0.15;
 /// What a sample of a scan's points shows. Lengths are in the caller's units.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Survey {
-    /// Distance of each sampled point but strays to its sixth neighbour, ascending, and the share
+    /// Distance of each sampled point but outliers to its sixth neighbour, ascending, and the share
     /// of all points it stands for.
     pub spacings: Vec<(f64, f64)>,
+    /// Estimated share of the points that lie on no sheet and have much denser points as neighbours.
+    pub outliers: f64,
     /// Estimated share of the points that lie at a border of a sheet.
     pub border: f64,
     /// The share of all points that each sampled border point stands for.
@@ -65,6 +71,7 @@ pub struct Survey {
 #[derive(Default)]
 struct Seen {
     count: usize,
+    outliers: usize,
     spacings: Vec<f64>,
     border: usize,
     holes: Vec<f64>,
@@ -92,6 +99,7 @@ impl PointHierarchy {
             let seen: Vec<Seen> = seen.into_iter().flatten().collect();
             let count: usize = seen.iter().map(|seen| seen.count).sum();
             let weight = points.len() as f64 / self.len() as f64 / count.max(1) as f64;
+            survey.outliers += weight * seen.iter().map(|seen| seen.outliers as f64).sum::<f64>();
             let border: usize = seen.iter().map(|seen| seen.border).sum();
             if border > 0 {
                 (survey.border, survey.border_weight) = (weight * border as f64, weight);
@@ -117,7 +125,16 @@ impl PointHierarchy {
             let near = found.ranked(i % WIDTH, RANK.min(count) - 1);
             let spacing = near.map_or(0.0, |near| f64::from(near.distance_sq).sqrt());
             seen.count += 1;
-            if self.kind(i) != PointKind::Stray {
+            let is_outlier = i >= slices.sheets && spacing > f64::from(slices.reach) && {
+                let near = found.of(i % WIDTH).take(RANK).map(|near| near.id as usize);
+                // The radii of other points are limited by the reach.
+                let is_denser = |j: usize| j < slices.sheets && DENSER * f64::from(slices.radii[j]) < spacing;
+                let denser = near.filter(|&j| is_denser(j));
+                denser.count() >= OUTLIER
+            };
+            if is_outlier {
+                seen.outliers += 1;
+            } else {
                 seen.spacings.push(spacing * self.frame().scale);
             }
             if i < slices.sheets {
@@ -215,7 +232,7 @@ fn sample(points: Range<usize>, most: usize, seed: u64) -> Vec<usize> {
     (0..count).map(chosen).collect()
 }
 
-/// The finaliser of SplitMix64.
+/// The finaliser of `SplitMix64`.
 fn mixed(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -365,6 +365,7 @@ fn wrong_usage_ends_with_status_2() {
     place.refused(2, &["preprocess", "ball.xyz"], &["--output"]);
     place.refused(2, &["preprocess", "ball.xyz", "-o", "x.nm", "--leaf", "2"], &["4..=64"]);
     place.refused(2, &["preprocess", "ball.xyz", "-o", "x.nm", "--bandwidth", "0"], &["positive length"]);
+    place.refused(2, &["preprocess", "ball.xyz", "-o", "x.nm", "--reach", "0"], &["positive length"]);
     place.refused(2, &["preprocess", "ball.xyz", "-o", "./ball.xyz"], &["would replace the input"]);
     place.refused(2, &["export", "ball.nm"], &["--points"]);
     place.refused(2, &["poses", "ball.nm", "ball.nm", "-o", "p.jsonl"], &["--sweep"]);

@@ -46,13 +46,13 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
     assert!((all - 1.0).abs() < 1e-12, "{kinds}");
     assert!((number("reach") - 2.0 * radius).abs() < 1e-6, "the default: {report}");
     let health = &report["health"];
-    assert_eq!(keys(health), sorted("balls largest_ball border uneven holes beyond_reach"));
+    assert_eq!(keys(health), sorted("balls largest_ball border outliers uneven holes beyond_reach"));
     assert!(health["border"].as_f64().unwrap() < 0.005, "a closed surface: {health}");
     assert!(health["uneven"].is_null() && health["holes"].is_null(), "{health}");
 
     let mut seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
     let version = seen.as_object_mut().unwrap().remove("format_version").unwrap();
-    assert_eq!(version.as_u64(), Some(7));
+    assert_eq!(version.as_u64(), Some(8));
     let mut told = report.clone();
     told.as_object_mut().unwrap().remove("seconds");
     assert_eq!(seen, told, "inspect sees what preprocess told");
@@ -205,6 +205,7 @@ fn uneven_spacing_is_told_with_its_share_of_the_area() {
     assert!((0.001..0.006).contains(&number("share")), "64 of 22,564: {uneven}");
     assert!((0.35..0.65).contains(&number("area")), "half: {uneven}");
     assert!((14.0..26.0).contains(&number("times")), "20: {uneven}");
+    assert!(report["health"]["outliers"].as_f64().unwrap() < 0.001, "{report}");
     let advice = find(&told, "times sparser than the rest");
     let reach = advice.split("--reach ").nth(1).and_then(|t| t.split('`').next()).unwrap();
     assert!((0.4..1.2).contains(&reach.parse().unwrap()), "{advice}");
@@ -242,7 +243,7 @@ fn borders_holes_and_strays_are_told() {
     let closing: f64 = closing.split('`').next().unwrap().parse().unwrap();
     assert!((0.9..1.2).contains(&closing), "half the hole: {told:?}");
     assert!(!told.iter().any(|line| line.contains("times sparser")), "strays are no sheet: {told:?}");
-    assert!(find(&told, "are strays").contains("of the points, 5, are strays"), "{told:?}");
+    assert!(find(&told, "much denser points").contains("of the points, about 5, are strays"), "{told:?}");
     let kinds = &report["kinds"];
     let alone = kinds["stray"].as_f64().unwrap() + kinds["sparse"].as_f64().unwrap();
     assert!(alone >= 5.0 / 3205.0 - 1e-9, "{kinds}");
