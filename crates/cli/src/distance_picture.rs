@@ -32,7 +32,8 @@ pub(crate) fn paint_distance(views: [&ScanView<'_>; 2], found: &Distance, style:
     let area = Area { left: GAP, top: GAP, width: PANEL, height: PANEL };
     canvas.fill(area, PANEL_GROUND);
     let whole = whole_camera(views, area, |points, toward| 4.0 * segment.hidden(points, *toward));
-    segment.paint(&mut canvas, &whole, views, style, |_| true, [LARGEST, WHOLE_DOT]);
+    let look = Look { points: style.points, largest: LARGEST, dot: WHOLE_DOT };
+    segment.paint(&mut canvas, &whole, views, &look, |_| true);
     let area = Area { left: 2 * GAP + PANEL, ..area };
     canvas.fill(area, PANEL_GROUND);
     let (close, cut) = segment.camera(&sample(views), area);
@@ -40,11 +41,22 @@ pub(crate) fn paint_distance(views: [&ScanView<'_>; 2], found: &Distance, style:
         let offset = p - segment.middle();
         cut.dot(&offset) <= 0.5 * segment.band && offset.norm() < 1.5 * segment.reach
     };
-    segment.paint(&mut canvas, &close, views, style, is_behind, [f64::INFINITY, CLOSE_DOT]);
+    let look = Look { largest: f64::INFINITY, dot: CLOSE_DOT, ..look };
+    segment.paint(&mut canvas, &close, views, &look, is_behind);
     let told = if found.upper > 0.0 { bracket(found, unit(views)) } else { "they touch".to_owned() };
     let told = if style.points { told } else { format!("{told}, BAND {}", rough(found.band)) };
     legend(&mut canvas, &told, &style.names);
     canvas.picture()
+}
+
+/// How scans are shown in a view.
+struct Look {
+    /// Points instead of obstacles.
+    points: bool,
+    /// No disc or ball has a larger radius, in fine pixels.
+    largest: f64,
+    /// The radius of points, in fine pixels.
+    dot: f64,
 }
 
 /// The segment between the nearest places.
@@ -103,24 +115,21 @@ impl Segment {
         (Camera { axes: [right, up, toward], centre: self.middle(), scale, area }, cut)
     }
 
-    /// The points of both scans that are `shown`, and the segment over them with its length. No
-    /// disc is larger than the first of `sizes`, in fine pixels; where points are shown, each has
-    /// the second as its radius.
+    /// The points of both scans that are `shown`, and the segment over them with its length.
     fn paint(
         &self,
         canvas: &mut Canvas,
         camera: &Camera,
         views: [&ScanView<'_>; 2],
-        style: &Style,
+        look: &Look,
         shown: impl Fn(Vector3<f64>) -> bool,
-        [largest, point]: [f64; 2],
     ) {
         for (view, colour) in views.into_iter().zip([OF_A, OF_B]) {
             for i in (0..view.scan().len()).filter(|&i| shown(view.point(i).into())) {
-                if style.points {
-                    canvas.splat(camera, &dot(&splat(view, i), camera, point), colour);
+                if look.points {
+                    canvas.splat(camera, &dot(&splat(view, i), camera, look.dot), colour);
                 } else {
-                    obstacle(canvas, camera, view, i, colour, largest);
+                    obstacle(canvas, camera, view, i, colour, look.largest);
                 }
             }
         }
