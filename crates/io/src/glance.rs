@@ -116,7 +116,7 @@ fn bounds(layout: &Layout, pieces: &mut Pieces<'_>) -> Option<Aabb> {
         }
     });
     let finite: Vec<[f64; 3]> = found.into_iter().filter(|p| p.iter().all(|x| x.is_finite())).collect();
-    (!finite.is_empty()).then(|| Aabb::of(finite.into_iter()))
+    (!finite.is_empty()).then(|| Aabb::of(finite))
 }
 
 /// Pieces that are evenly spread over a part of a file.

@@ -40,6 +40,26 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
 }
 
 #[test]
+fn long_runs_are_announced() {
+    let place = Place::new();
+    // 600,000 points at zero, which are refused once they are read.
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 600000\nproperty float x\nproperty float y\n\
+                  property float z\nend_header\n";
+    let path = place.write("zeros.ply", header);
+    let file = std::fs::File::options().append(true).open(path).unwrap();
+    file.set_len(header.len() as u64 + 600_000 * 12).unwrap();
+    let command = ["preprocess", "zeros.ply", "-o", "z.nm", "--threads", "1", "--memory", "4GB"];
+    let done = place.run(&command);
+    let mut lines = done.errors.lines();
+    assert_eq!(lines.next(), Some("preparing 600,000 points takes about 16 s and 890 MB"), "{}", done.errors);
+    assert!(lines.next().is_some_and(|line| line.contains("1 distinct")), "{}", done.errors);
+    let quiet = place.run(&[&command[..], &["--quiet"]].concat());
+    assert_eq!(quiet.errors.lines().count(), 1, "{}", quiet.errors);
+    let quick = place.run(&[&command[..], &["--no-graph"]].concat());
+    assert_eq!(quick.errors.lines().count(), 1, "{}", quick.errors);
+}
+
+#[test]
 fn samples_that_do_not_fit_into_memory_are_refused_before_they_are_made() {
     let place = Place::new();
     place.write("plate.obj", "v 0 0 0\nv 100 0 0\nv 100 100 0\nv 0 100 0\nf 1 2 3 4\n");
