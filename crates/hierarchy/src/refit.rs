@@ -105,7 +105,8 @@ impl PointHierarchy {
     fn replace(&mut self, surfels: &[Surfel]) {
         let leaf_size = self.leaf_size as usize;
         let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
-        let discs: Vec<f32> = surfels.iter().map(|s| s.disc).collect();
+        let disc = |(s, &r): (&Surfel, &f32)| s.disc_within(ball(s.kind, r, self.sampling_radius));
+        let discs: Vec<f32> = surfels.iter().zip(&self.radii).map(disc).collect();
         let sheets = self.sheets as usize;
         let ball = |(i, (s, &r)): (usize, (&Surfel, &f32))| {
             ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, sheets, s.kind, r))

@@ -269,7 +269,8 @@ pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Sur
     for (surfels, bounds) in parts {
         for (surfel, (i, &radius)) in surfels.iter().zip(&mut radii) {
             let own = obstacle_ball(i, known.sheets, surfel.kind, radius);
-            all.push(surfel, ball(surfel.kind, radius, known.ordinary).max(own));
+            let ball = ball(surfel.kind, radius, known.ordinary);
+            all.push(&Surfel { disc: surfel.disc_within(ball), ..*surfel }, ball.max(own));
         }
         for [surface, obstacle] in bounds {
             all.leaves.push(surface);
@@ -353,6 +354,13 @@ impl Leaf<'_> {
                 [cells.close(), obstacle]
             },
         )
+    }
+}
+
+impl Surfel {
+    /// The radius of the disc; about a sparse point no more than that of its `ball`.
+    pub(crate) fn disc_within(&self, ball: f32) -> f32 {
+        if self.kind.is_sparse() { self.disc.min(ball) } else { self.disc }
     }
 }
 
