@@ -1,6 +1,8 @@
 //! Questions with answers: poses of one object against itself, and whether they meet.
 
 use nearmiss::{CollideOptions, Detail, Pose, Scan};
+use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
+use rand::RngExt;
 
 use crate::Failure;
 use crate::object::Object;
@@ -36,6 +38,44 @@ pub fn asked(
         Some(mesh) => Box::new(MeshTree::new(mesh)),
         None => Box::new(Ours::new(scan, &options)?),
     };
+    let judged = |pose| Asked { pose, meets: judge.ask(&Pose::IDENTITY, &pose).hit };
+    Ok(poses.into_iter().map(judged).collect())
+}
+
+/// `near` poses of a body about contact with a room, and as many as that at random within its bounds.
+///
+/// About contact a random point of the body, turned at random, lies up to ten of its room's local radii away from a random point
+/// of the room. Whether they meet is what the search to the end says.
+///
+/// # Errors
+/// When the scans cannot be searched.
+pub fn in_room(
+    [room, body]: [&Scan; 2],
+    scale: f64,
+    near: usize,
+    seed: u64,
+) -> Result<Vec<Asked>, Failure> {
+    let rng = &mut rng(seed);
+    let centre = body.bounds().centre();
+    let (frame_a, frame_b) = (room.frame(), body.frame());
+    let mut poses = Vec::with_capacity(2 * near);
+    for _ in 0..near {
+        let (i, j) = (rng.random_range(0..room.len()), rng.random_range(0..body.len()));
+        let turned = rotation(rng).with_scale(scale);
+        let radius = f64::from(room.radii()[i]) * frame_a.scale;
+        let away: f64 = rng.random_range(0.0..10.0);
+        let (to, way) = (frame_a.to_world(room.positions()[i]), unit_vector(rng));
+        let from = turned.apply(frame_b.to_world(body.positions()[j]));
+        poses.push(turned.with_translation([0, 1, 2].map(|k| to[k] + away * radius * way[k] - from[k])));
+        let bounds = room.bounds();
+        let to =
+            [0, 1, 2].map(|k| bounds.min[k] + (bounds.max[k] - bounds.min[k]) * rng.random_range(0.0..1.0));
+        let turned = rotation(rng).with_scale(scale);
+        let from = turned.apply(centre);
+        poses.push(turned.with_translation([0, 1, 2].map(|k| to[k] - from[k])));
+    }
+    let options = CollideOptions::default().with_detail(Detail::Verdict);
+    let mut judge = Ours::of([room, body], &options)?;
     let judged = |pose| Asked { pose, meets: judge.ask(&Pose::IDENTITY, &pose).hit };
     Ok(poses.into_iter().map(judged).collect())
 }

@@ -3,6 +3,8 @@
 //!
 //! `calibration OBJECT… [--near N] [--swept N] [--seed N]` and what `asked` reads (`--order` …)
 //!
+//! An object is asked about against itself. `SCAN+OBJECT` asks about an object in a scan, a twenty-fifth of its diagonal long.
+//!
 //! Ends with status 1 if a decile with a hundred answers or more is off by more than 0.15, or the Brier score of all
 //! answers is not below that of the best constant.
 #![expect(clippy::print_stdout, reason = "a program for people")]
@@ -19,6 +21,9 @@ use nearmiss_benches::{Failure, machine, questions};
 
 /// Node pairs and evaluations after which a search is ended.
 const BUDGETS: [u64; 8] = [1, 4, 8, 16, 32, 64, 128, 256];
+
+/// An object's longest side over the diagonal of the scan that it is in.
+const SHARE: f64 = 0.04;
 
 /// Fewer answers in a decile say little.
 const ENOUGH: usize = 100;
@@ -77,20 +82,33 @@ fn main() -> Result<ExitCode, Failure> {
         "| object | answers | meet | Brier | constant | worst decile |\n| --- | --: | --: | --: | --: | --: |"
     );
     for source in &objects {
-        let object = Object::read(source)?.scaled()?;
-        let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
+        let build = |object: &Object| Scan::build(&object.cloud, &BuildOptions::default());
+        let (name, scans, questions) = if let Some((room, body)) = source.split_once('+') {
+            let (room, body) = (Object::read(room)?, Object::read(body)?);
+            let scans = [build(&room)?, build(&body)?];
+            let half = room.cloud.bounds().half_extents();
+            let diagonal = half.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let longest = body.cloud.bounds().half_extents().into_iter().fold(0.0, f64::max);
+            let asked = questions::in_room([&scans[0], &scans[1]], SHARE * diagonal / longest, near, seed)?;
+            (room.name, scans, asked)
+        } else {
+            let object = Object::read(source)?.scaled()?;
+            let scan = build(&object)?;
+            let asked = questions::asked(&object, &scan, near, swept, seed)?;
+            (object.name, [scan.clone(), scan], asked)
+        };
         let mut answers = Answers::default();
-        for question in questions::asked(&object, &scan, near, swept, seed)? {
+        for question in questions {
             for work in BUDGETS {
                 let limits = Limits { work: Some(work), ..Limits::default() };
-                let answer =
-                    Ours::new(&scan, &options)?.with_limits(limits).answer(&Pose::IDENTITY, &question.pose);
+                let asked = Ours::of([&scans[0], &scans[1]], &options)?;
+                let answer = asked.with_limits(limits).answer(&Pose::IDENTITY, &question.pose);
                 if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
                     answers.0.push((likelihood, question.meets));
                 }
             }
         }
-        row(&object.name, &answers);
+        row(&name, &answers);
         all.0.extend(answers.0);
     }
     row("all", &all);

@@ -12,10 +12,10 @@ use crate::Failure;
 use crate::asked::{Limits, best_effort};
 use crate::rivals::{Method, Reply};
 
-/// A prepared scan against a copy of itself, with a scratch that is kept.
+/// Two prepared scans, often one and a copy of itself, with a scratch that is kept.
 #[derive(Debug, Clone)]
 pub struct Ours<'a> {
-    scan: &'a Scan,
+    scans: [&'a Scan; 2],
     plan: CollidePlan,
     limits: Limits,
     scratch: CollideScratch,
@@ -33,9 +33,17 @@ impl<'a> Ours<'a> {
     /// # Errors
     /// When there is no plan for that.
     pub fn new(scan: &'a Scan, options: &CollideOptions) -> Result<Self, Failure> {
-        let plan = CollidePlan::new(options, scan, scan)?;
+        Self::of([scan, scan], options)
+    }
+
+    /// Asks about two scans.
+    ///
+    /// # Errors
+    /// When there is no plan for that.
+    pub fn of(scans: [&'a Scan; 2], options: &CollideOptions) -> Result<Self, Failure> {
+        let plan = CollidePlan::new(options, scans[0], scans[1])?;
         let scratch = CollideScratch::default();
-        Ok(Self { scan, plan, limits: Limits::default(), scratch, level: None, evicting: Vec::new() })
+        Ok(Self { scans, plan, limits: Limits::default(), scratch, level: None, evicting: Vec::new() })
     }
 
     /// The same, each question within `limits`; hits are then best efforts.
@@ -58,7 +66,7 @@ impl<'a> Ours<'a> {
 
     /// The whole answer.
     pub fn answer(&mut self, a: &Pose, b: &Pose) -> Answer {
-        let (a, b) = (self.scan.at(a), self.scan.at(b));
+        let (a, b) = (self.scans[0].at(a), self.scans[1].at(b));
         collide_with(&a, &b, &self.plan, &self.limits.begin(), &mut self.scratch)
     }
 }
