@@ -49,12 +49,7 @@ pub fn asked(
 ///
 /// # Errors
 /// When the scans cannot be searched.
-pub fn in_room(
-    [room, body]: [&Scan; 2],
-    scale: f64,
-    near: usize,
-    seed: u64,
-) -> Result<Vec<Asked>, Failure> {
+pub fn in_room([room, body]: [&Scan; 2], scale: f64, near: usize, seed: u64) -> Result<Vec<Asked>, Failure> {
     let rng = &mut rng(seed);
     let centre = body.bounds().centre();
     let (frame_a, frame_b) = (room.frame(), body.frame());
