@@ -63,7 +63,7 @@ impl Health {
     pub(crate) fn new(scan: &Scan) -> Self {
         let survey = scan.survey(SEED);
         let (scale, slices) = (scan.frame().scale, scan.slices());
-        let largest = (slices.sheets..scan.len()).map(|i| slices.obstacle_ball(i)).fold(0.0, f32::max);
+        let largest = (0..scan.len()).map(|i| slices.obstacle_ball(i)).fold(0.0, f32::max);
         let beyond: Vec<(f64, f64)> =
             survey.spacings.iter().copied().filter(|&(spacing, _)| spacing > scan.reach()).collect();
         let widths = &survey.holes;

@@ -2,23 +2,23 @@
 
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
 use nearmiss_store::Array;
-use nearmiss_surface::{BlockTree, Metric, PointBlock, SurfacePlan};
+use nearmiss_surface::{Metric, PointBlock, SurfacePlan};
 
 use crate::boxes::{OrientedBox, dot};
-use crate::classes::{sheets_first, vote};
 use crate::covering::{Covering, Ground, coverings};
 use crate::enclosure::growths;
 use crate::extents::{Discs, boxes_of_discs};
 use crate::gather::Index;
 use crate::growth::Growth;
 use crate::levels::samples;
-use crate::neighbours::{self, NeighbourList, groups as groups_of, neighbours};
+use crate::neighbours::{NeighbourList, neighbours};
 use crate::options::{BuildError, BuildOptions};
+use crate::ordered::Ordered;
 use crate::outline::Outline;
 use crate::samples::lists;
-use crate::sampling::{Sampling, set_reaches};
-use crate::split::{Item, id32, split};
-use crate::surfels::{Known, NormalCone, PointKind, Surfels, THICKNESS, align, fits, surfels};
+use crate::sampling::Sampling;
+use crate::split::id32;
+use crate::surfels::{Known, NormalCone, PointKind, Surfels, THICKNESS, align, surfels};
 use crate::topology::Node;
 use crate::wide::WideTree;
 
@@ -34,7 +34,7 @@ pub struct PointHierarchy {
     pub(crate) step: f64,
     pub(crate) sampling_radius: f32,
     pub(crate) reach: f32,
-    pub(crate) sheets: u32,
+    pub(crate) dense: u32,
     pub(crate) leaf_size: u32,
     pub(crate) radius_neighbours: u32,
     pub(crate) samples_a_node: u32,
@@ -105,9 +105,9 @@ pub struct Slices<'a> {
     pub sampling_radius: f32,
     /// The scan's reach L.
     pub reach: f32,
-    /// Points before this sample sheets; those from here on stand in the obstacle as balls. A leaf has points of
-    /// one sort alone.
-    pub sheets: usize,
+    /// Points before this are on sheets or, noisy, among others; sparse points come from here on, and stand in the
+    /// obstacle as balls. A leaf has points of one sort alone.
+    pub dense: usize,
 }
 
 /// What an enclosure of a node holds beside its points and their discs.
@@ -164,7 +164,17 @@ impl Slices<'_> {
     #[inline]
     #[must_use]
     pub fn obstacle_ball(&self, i: usize) -> f32 {
-        obstacle_ball(i, self.sheets, PointKind::from_code(self.kinds[i]), self.radii[i])
+        obstacle_ball(i, self.dense, PointKind::from_code(self.kinds[i]), self.radii[i])
+    }
+
+    /// Returns `true` if a point stands in the obstacle by the sheet that it samples, and `false` if by a ball.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn is_on_sheet(&self, i: usize) -> bool {
+        is_on_sheet(i, self.dense, PointKind::from_code(self.kinds[i]))
     }
 
     /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its part of a
@@ -175,7 +185,7 @@ impl Slices<'_> {
     #[inline]
     #[must_use]
     pub fn obstacle_reach(&self, i: usize) -> f32 {
-        if i < self.sheets {
+        if self.is_on_sheet(i) {
             self.cell_radius(i).max(self.discs[i] * DISC_REACH)
         } else {
             self.obstacle_ball(i)
@@ -225,14 +235,20 @@ const BALL_OF_SPARSE: f32 = 0.5;
 
 /// See [`Slices::obstacle_ball`].
 #[inline]
-pub(crate) fn obstacle_ball(i: usize, sheets: usize, kind: PointKind, radius: f32) -> f32 {
-    if i < sheets {
+pub(crate) fn obstacle_ball(i: usize, dense: usize, kind: PointKind, radius: f32) -> f32 {
+    if is_on_sheet(i, dense, kind) {
         0.0
     } else if kind.is_sparse() {
         BALL_OF_SPARSE * radius
     } else {
         BALL_AMONG_OTHERS * radius
     }
+}
+
+/// See [`Slices::is_on_sheet`].
+#[inline]
+pub(crate) fn is_on_sheet(i: usize, dense: usize, kind: PointKind) -> bool {
+    i < dense && kind.is_sheet()
 }
 
 /// See [`Slices::ball`].
@@ -281,7 +297,7 @@ impl PointHierarchy {
             plan: &self.plan,
             sampling_radius: self.sampling_radius,
             reach: self.reach,
-            sheets: self.sheets as usize,
+            dense: self.dense as usize,
         }
     }
 
@@ -333,7 +349,8 @@ impl PointHierarchy {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     pub fn sheet_share(&self) -> f64 {
-        f64::from(self.sheets) / self.len() as f64
+        let slices = self.slices();
+        (0..self.len()).filter(|&i| slices.is_on_sheet(i)).count() as f64 / self.len() as f64
     }
 
     /// What defines the surface.
@@ -495,41 +512,18 @@ impl PointHierarchy {
 
 fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, BuildError> {
     let leaf_size = options.leaf_size as usize;
-    let mut items: Vec<Item> =
-        (0..).zip(cloud.positions()).map(|(index, &position)| Item { position, index }).collect();
-    let (mut nodes, mut boxes) = split(&mut items, leaf_size, 0);
-    let mut positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
-    let mut source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
-    drop(items);
-
-    let Sampling { spacings, mut radii, sampling_radius, reach, plan, mut blocks } =
-        Sampling::of(&positions, (&nodes, &mut boxes), options, 1.0 / cloud.frame().scale)?;
-    let mut groups = groups_of(&blocks);
-    let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
-    let mut fits = fits(&index, &positions, (&radii, &spacings));
-    drop(spacings);
-    vote(&BlockTree::new(&blocks, positions.len()), &positions, &radii, &mut fits);
-    let mut sheets = positions.len();
-    if let Some((mut items, count)) = sheets_first(&positions, &fits, leaf_size) {
-        sheets = count;
-        (nodes, boxes) = split(&mut items, leaf_size, sheets);
-        positions = items.iter().map(|item| item.position).collect();
-        source = reordered(&items, &source);
-        radii = reordered(&items, &radii);
-        fits = reordered(&items, &fits);
-        set_reaches(&nodes, &mut boxes, &radii);
-        blocks = neighbours::blocks(&plan, &positions, &radii);
-        groups = groups_of(&blocks);
-    }
+    let Ordered { nodes, boxes, positions, source, fits, dense, groups, sampling } =
+        Ordered::of(cloud, options)?;
+    let Sampling { radii, sampling_radius, reach, plan, blocks, .. } = sampling;
     let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);
-    let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, sheets };
+    let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, dense };
     let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves, obstacles } =
         surfels(&index, &known, &fits);
     drop(fits);
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
-    boxes = boxes_of_discs(&nodes, &boxes, &of_points);
+    let boxes = boxes_of_discs(&nodes, &boxes, &of_points);
     drop(balls);
     let obstacle_growths = growths(&nodes, &boxes, &obstacles);
     let growths = growths(&nodes, &boxes, &leaves);
@@ -556,7 +550,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         step: cloud.step(),
         sampling_radius,
         reach,
-        sheets: id32(sheets),
+        dense: id32(dense),
         leaf_size: options.leaf_size,
         radius_neighbours: options.radius_neighbours,
         samples_a_node: options.samples,
@@ -585,9 +579,4 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     };
     hierarchy.derive();
     Ok(hierarchy)
-}
-
-/// The values of points in the order of `items`, whose indices are their places before.
-fn reordered<T: Copy>(items: &[Item], values: &[T]) -> Vec<T> {
-    items.iter().map(|item| values[item.index as usize]).collect()
 }

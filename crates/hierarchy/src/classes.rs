@@ -1,9 +1,9 @@
 //! Which points sample a sheet, and which stand for themselves as balls (`docs/theory/obstacle.md`).
 //!
 //! The fit at a point gives its class. A vote of its neighbours then corrects single flips: a noisy point in the
-//! plane of the sheet about it belongs to that sheet, and a plane fitted to a few points of a blob is none. Points
-//! of sheets come first in the order of the points and have a subtree of their own, so that a stray never
-//! widens the bounds of a wall.
+//! plane of the sheet about it belongs to that sheet, and a plane fitted to a few points of a blob is none. Sparse
+//! points come last in the order of the points and have a subtree of their own, so that a stray never
+//! widens the bounds of a wall. Noisy points have others all around them: they stay among these.
 
 use fearless_simd::Level;
 use nearmiss_surface::{BlockTree, Nearest, PointBlock};
@@ -79,33 +79,34 @@ fn corrected(
     }
 }
 
-/// The points in their order again, those of sheets first, and how many these are: as many as fill leaves. Sheet
-/// points that are left over stand for themselves, those at edges before others. `None` if all points are on sheets.
-pub(crate) fn sheets_first(
+/// The points in their order again, the sparse ones last, and how many come before these: as many as fill leaves. Points
+/// that are left over stand for themselves among the sparse ones, noisy ones before those at edges and others. `None` if no point
+/// is sparse.
+pub(crate) fn dense_first(
     positions: &[[f32; 3]],
     fits: &[Fit],
     leaf_size: usize,
 ) -> Option<(Vec<Item>, usize)> {
     let item = |i: usize| Item { position: positions[i], index: id32(i) };
-    let (mut sheets, mut balls): (Vec<usize>, Vec<usize>) =
-        (0..fits.len()).partition(|&i| fits[i].kind.is_sheet());
-    if balls.is_empty() {
+    let (mut dense, mut sparse): (Vec<usize>, Vec<usize>) =
+        (0..fits.len()).partition(|&i| !fits[i].kind.is_sparse());
+    if sparse.is_empty() {
         return None;
     }
-    let mut over = sheets.len() % leaf_size;
-    for kind in [PointKind::Edge, PointKind::Sheet] {
-        sheets.reverse();
-        sheets.retain(|&i| {
+    let mut over = dense.len() % leaf_size;
+    for kind in [PointKind::Noisy, PointKind::Edge, PointKind::Sheet] {
+        dense.reverse();
+        dense.retain(|&i| {
             let leaves = over > 0 && fits[i].kind == kind;
             if leaves {
                 over -= 1;
-                balls.push(i);
+                sparse.push(i);
             }
             !leaves
         });
-        sheets.reverse();
+        dense.reverse();
     }
-    balls.sort_unstable();
-    let count = sheets.len();
-    Some((sheets.into_iter().chain(balls).map(item).collect(), count))
+    sparse.sort_unstable();
+    let count = dense.len();
+    Some((dense.into_iter().chain(sparse).map(item).collect(), count))
 }

@@ -133,6 +133,8 @@ pub struct Leaves {
     ids: Vec<u32>,
     /// Whether some point of a leaf is sparse.
     sparse: Vec<bool>,
+    /// Whether some point of a leaf stands in the obstacle as a ball.
+    balls: Vec<bool>,
     points: usize,
     leaf_size: usize,
     blocks_a_leaf: usize,
@@ -144,12 +146,13 @@ impl Leaves {
         let (slices, leaf_size) = (scan.slices(), scan.leaf_size as usize);
         let blocks_a_leaf = leaf_size.div_ceil(WIDTH);
         let numbered = (0_u32..).zip(slices.nodes).filter(|(_, node)| node.is_leaf());
-        let (ids, sparse): (Vec<u32>, Vec<bool>) = numbered
-            .map(|(id, node)| {
-                let is_sparse = |&code: &u8| PointKind::from_code(code).is_sparse();
-                (id, slices.kinds[node.points()].iter().any(is_sparse))
-            })
-            .unzip();
+        let (mut ids, mut sparse, mut balls) = (Vec::new(), Vec::new(), Vec::new());
+        for (id, node) in numbered {
+            let is_sparse = |&code: &u8| PointKind::from_code(code).is_sparse();
+            ids.push(id);
+            sparse.push(slices.kinds[node.points()].iter().any(is_sparse));
+            balls.push(node.points().any(|i| !slices.is_on_sheet(i)));
+        }
         let numbers: Vec<usize> = (0..ids.len() * blocks_a_leaf).collect();
         let blocks = map(&numbers, |&number| {
             let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
@@ -160,7 +163,7 @@ impl Leaves {
             }
             block
         });
-        Self { blocks, ids, sparse, points: scan.len(), leaf_size, blocks_a_leaf }
+        Self { blocks, ids, sparse, balls, points: scan.len(), leaf_size, blocks_a_leaf }
     }
 
     /// The leaf's id in the binary tree.
@@ -207,6 +210,13 @@ impl Leaves {
     #[must_use]
     pub fn is_sparse(&self, leaf: usize) -> bool {
         self.sparse[leaf]
+    }
+
+    /// Returns `true` if some of them stand in the obstacle as balls.
+    #[inline]
+    #[must_use]
+    pub fn has_balls(&self, leaf: usize) -> bool {
+        self.balls[leaf]
     }
 
     /// Its points in blocks, with the first point of each block and how many it has.

@@ -17,6 +17,7 @@ mod leaf_block;
 mod levels;
 mod neighbours;
 mod options;
+mod ordered;
 mod outline;
 mod refit;
 mod samples;

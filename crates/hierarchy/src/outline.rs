@@ -40,7 +40,7 @@ impl Outline {
         let mut hash = Xxh3::new();
         let frame = scan.frame();
         hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
-        let numbers = [scan.leaf_size(), scan.samples_a_node, scan.sheets];
+        let numbers = [scan.leaf_size(), scan.samples_a_node, scan.dense];
         hash.update(bytes_of(&numbers));
         hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
         hash.update(bytemuck::cast_slice(slices.positions));

@@ -107,9 +107,9 @@ impl PointHierarchy {
         let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
         let disc = |(s, &r): (&Surfel, &f32)| s.disc_within(ball(s.kind, r, self.sampling_radius));
         let discs: Vec<f32> = surfels.iter().zip(&self.radii).map(disc).collect();
-        let sheets = self.sheets as usize;
+        let dense = self.dense as usize;
         let ball = |(i, (s, &r)): (usize, (&Surfel, &f32))| {
-            ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, sheets, s.kind, r))
+            ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, dense, s.kind, r))
         };
         let balls: Vec<f32> = surfels.iter().zip(&self.radii).enumerate().map(ball).collect();
         let cones: Vec<NormalCone> = if self.is_oriented {

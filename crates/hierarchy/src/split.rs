@@ -35,13 +35,13 @@ const JUDGED_BY: usize = 512;
 
 /// Orders `items` into leaves and returns the nodes with their boxes about the points; the root parts the first
 /// `sheets`, which fill whole leaves, from the others. O(n log n).
-pub(crate) fn split(items: &mut [Item], leaf_size: usize, sheets: usize) -> (Vec<Node>, Vec<OrientedBox>) {
+pub(crate) fn split(items: &mut [Item], leaf_size: usize, dense: usize) -> (Vec<Node>, Vec<OrientedBox>) {
     let count = node_count(items.len(), leaf_size);
     let mut nodes = vec![Node::default(); count];
     let mut boxes = vec![OrientedBox::default(); count];
     let points = items.len();
     let place = Place { items, nodes: &mut nodes, boxes: &mut boxes, first: 0, id: 0 };
-    place.split(leaf_size, (0 < sheets && sheets < points).then_some(sheets));
+    place.split(leaf_size, (0 < dense && dense < points).then_some(dense));
     (nodes, boxes)
 }
 

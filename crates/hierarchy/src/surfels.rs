@@ -180,7 +180,7 @@ impl Surfels {
 }
 
 /// Reused from leaf to leaf.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct LeafScratch {
     locality: Locality,
     surroundings: Surroundings,
@@ -188,18 +188,6 @@ struct LeafScratch {
     near: Vec<u32>,
     halves: Vec<HalfBlock>,
     fits: Vec<Moments>,
-}
-
-impl Default for LeafScratch {
-    fn default() -> Self {
-        Self {
-            locality: Locality::default(),
-            surroundings: Surroundings::default(),
-            near: Vec::new(),
-            halves: Vec::new(),
-            fits: Vec::new(),
-        }
-    }
 }
 
 /// What is known of all points before their discs, in order.
@@ -211,8 +199,8 @@ pub(crate) struct Known<'a> {
     pub(crate) ordinary: f32,
     /// The scan's reach.
     pub(crate) reach: f32,
-    /// Points before this are on sheets.
-    pub(crate) sheets: usize,
+    /// Sparse points come from here on.
+    pub(crate) dense: usize,
 }
 
 /// The surface at every point, and the class that follows from it. O(n).
@@ -252,13 +240,13 @@ pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Sur
         let bounds = leaves
             .iter()
             .map(|(points, about)| {
-                let Known { positions, radii, reach, sheets, .. } = *known;
+                let Known { positions, radii, reach, dense, .. } = *known;
                 let leaf =
                     Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
-                let are_sheets = points.start < sheets;
+                let is_dense = points.start < dense;
                 let fits = &fits[points.clone()];
                 dispatch!(level, simd => {
-                    leaf.look_about(simd, index, (fits, reach, are_sheets), &mut scratch, &mut surfels)
+                    leaf.look_about(simd, index, (fits, reach, is_dense), &mut scratch, &mut surfels)
                 })
             })
             .collect::<Vec<_>>();
@@ -268,7 +256,7 @@ pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Sur
     let mut radii = known.radii.iter().enumerate();
     for (surfels, bounds) in parts {
         for (surfel, (i, &radius)) in surfels.iter().zip(&mut radii) {
-            let own = obstacle_ball(i, known.sheets, surfel.kind, radius);
+            let own = obstacle_ball(i, known.dense, surfel.kind, radius);
             let ball = ball(surfel.kind, radius, known.ordinary);
             all.push(&Surfel { disc: surfel.disc_within(ball), ..*surfel }, ball.max(own));
         }
@@ -322,7 +310,7 @@ impl Leaf<'_> {
         &self,
         simd: S,
         index: &Index<'_>,
-        (fits, reach, are_sheets): (&[Fit], f32, bool),
+        (fits, reach, is_dense): (&[Fit], f32, bool),
         scratch: &mut LeafScratch,
         surfels: &mut Vec<Surfel>,
     ) -> [LeafBounds; 2] {
@@ -335,13 +323,15 @@ impl Leaf<'_> {
                 surroundings.fill(index, self.positions[0], locality);
                 let bounds = LeafBounds::new(simd, self.positions, self.about, surroundings);
                 let (mut cells, mut obstacle) = (bounds.cells(), bounds.cells());
+                let mut has_cells = false;
                 for ((p, &radius), fit) in self.positions.iter().zip(self.radii).zip(fits) {
                     let near = index.heard(simd, &locality.groups, *p, 0.0, near);
                     let blocks = || near.iter().map(|&block| &index.blocks[block as usize]);
                     let gap = widest_gap(simd, *p, fit.normal, blocks());
                     let cell = surroundings.cell(simd, *p, fit.normal, radius, blocks());
                     cells.include(*p, fit.normal, &cell);
-                    if are_sheets {
+                    if is_dense && fit.kind.is_sheet() {
+                        has_cells = true;
                         obstacle.include(
                             *p,
                             fit.normal,
@@ -350,7 +340,7 @@ impl Leaf<'_> {
                     }
                     surfels.push(Surfel { cell, ..surfel(fit, radius, reach, gap) });
                 }
-                let obstacle = if are_sheets { obstacle.close() } else { bounds.empty() };
+                let obstacle = if has_cells { obstacle.close() } else { bounds.empty() };
                 [cells.close(), obstacle]
             },
         )

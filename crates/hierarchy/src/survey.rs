@@ -86,7 +86,7 @@ impl PointHierarchy {
         let slices = self.slices();
         let tree = BlockTree::new(slices.blocks, self.len());
         let mut survey = Survey::default();
-        let parts = [(0..slices.sheets, BLOCKS), (slices.sheets..self.len(), BLOCKS / 2)];
+        let parts = [(0..slices.dense, BLOCKS), (slices.dense..self.len(), BLOCKS / 2)];
         for (points, most) in parts {
             if points.is_empty() {
                 continue;
@@ -125,10 +125,10 @@ impl PointHierarchy {
             let near = found.ranked(i % WIDTH, RANK.min(count) - 1);
             let spacing = near.map_or(0.0, |near| f64::from(near.distance_sq).sqrt());
             seen.count += 1;
-            let is_outlier = i >= slices.sheets && spacing > f64::from(slices.reach) && {
+            let is_outlier = i >= slices.dense && spacing > f64::from(slices.reach) && {
                 let near = found.of(i % WIDTH).take(RANK).map(|near| near.id as usize);
                 // The radii of other points are limited by the reach.
-                let is_denser = |j: usize| j < slices.sheets && DENSER * f64::from(slices.radii[j]) < spacing;
+                let is_denser = |j: usize| j < slices.dense && DENSER * f64::from(slices.radii[j]) < spacing;
                 let denser = near.filter(|&j| is_denser(j));
                 denser.count() >= OUTLIER
             };
@@ -137,7 +137,7 @@ impl PointHierarchy {
             } else {
                 seen.spacings.push(spacing * self.frame().scale);
             }
-            if i < slices.sheets {
+            if slices.is_on_sheet(i) {
                 let ids = found.of(i % WIDTH).map(|near| near.id as usize);
                 if let Some(outward) = self.outward(i, ids) {
                     seen.border += 1;
@@ -196,14 +196,14 @@ impl PointHierarchy {
             // A sphere misses the cone if it does so in the plane through the axis and its centre.
             let beside = (d.norm_squared() - along * along).max(0.0).sqrt();
             let sine = (1.0 - CONE * CONE).sqrt();
-            if first >= slices.sheets || d.norm() - radius > best || beside * CONE - along * sine > radius {
+            if first >= slices.dense || d.norm() - radius > best || beside * CONE - along * sine > radius {
                 continue;
             }
             if !node.is_leaf() {
                 open.extend(node.children(id));
                 continue;
             }
-            for j in first..(first + node.count as usize).min(slices.sheets) {
+            for j in first..(first + node.count as usize).min(slices.dense) {
                 let d = self.place(j) - p;
                 let width = d.norm();
                 if width < best && width > 0.0 && outward.dot(&d) > CONE * width {

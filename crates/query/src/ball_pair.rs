@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{LeafBlock, Slices};
+use nearmiss_hierarchy::{LeafBlock, Part, Slices};
 use nearmiss_surface::project;
 
 use crate::posed::Posed;
@@ -25,22 +25,29 @@ struct Targets<'a> {
     positions: [[f32; WIDTH]; 3],
     /// The radii of balls; zero for discs.
     balls: [f32; WIDTH],
-    /// Whether they are discs.
-    are_discs: bool,
-    count: usize,
+    /// The lanes of discs, as bits.
+    discs: u32,
+    /// All lanes that count.
+    lanes: u32,
 }
 
 impl<'a> Targets<'a> {
     fn new(scan: &Slices<'_>, (block, first, count): (&'a LeafBlock, usize, usize)) -> Self {
-        let (mut positions, mut balls) = ([[0.0; WIDTH]; 3], [0.0; WIDTH]);
+        let (mut positions, mut balls, mut discs) = ([[0.0; WIDTH]; 3], [0.0; WIDTH], 0);
         for lane in 0..count {
             let p = scan.positions[first + lane];
             for k in 0..3 {
                 positions[k][lane] = p[k];
             }
             balls[lane] = scan.obstacle_ball(first + lane);
+            discs |= u32::from(scan.is_on_sheet(first + lane)) << lane;
         }
-        Self { block, positions, balls, are_discs: first < scan.sheets, count }
+        Self { block, positions, balls, discs, lanes: (1 << count) - 1 }
+    }
+
+    /// The discs alone.
+    fn discs(self) -> Self {
+        Self { lanes: self.discs, ..self }
     }
 
     /// The lanes of points no further from `x` than `radius`, beside their own discs and balls, as bits.
@@ -60,20 +67,21 @@ impl<'a> Targets<'a> {
             f32x16::load_array_ref(simd, pz) - x[2],
         ];
         let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let near: mask32x16<S> = if self.are_discs {
+        let reach = f32x16::load_array_ref(simd, &self.balls) + radius;
+        let of_balls: mask32x16<S> = d_sq.simd_le(reach * reach);
+        let mut near = of_balls.to_bitmask() & !u64::from(self.discs);
+        if self.discs != 0 {
             let zero = f32x16::splat(simd, 0.0);
             let [nx, ny, nz] = self.block.normals(simd);
             let height = d[0] * nx + d[1] * ny + d[2] * nz;
             let beside = (d_sq - height * height).max(zero).sqrt() - self.block.discs(simd);
             let beside = beside.max(zero);
-            (height * height + beside * beside).simd_le(radius * radius)
-        } else {
-            let reach = f32x16::load_array_ref(simd, &self.balls) + radius;
-            d_sq.simd_le(reach * reach)
-        };
+            let of_discs: mask32x16<S> = (height * height + beside * beside).simd_le(radius * radius);
+            near |= of_discs.to_bitmask() & u64::from(self.discs);
+        }
         #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-        let bits = near.to_bitmask() as u32;
-        bits & ((1 << self.count) - 1)
+        let bits = near as u32;
+        bits & self.lanes
     }
 
     /// The squared distance of a place from the box of the leaf.
@@ -93,7 +101,13 @@ impl Posed<'_> {
     /// Returns `true` if both points stand in their obstacles by sheets.
     #[inline]
     pub(crate) fn are_sheets(&self, [i, j]: [usize; 2]) -> bool {
-        i < self.a.sheets && j < self.b.sheets
+        self.a.is_on_sheet(i) && self.b.is_on_sheet(j)
+    }
+
+    /// Returns `true` if it is asked about obstacles, and either point stands there as a ball.
+    #[inline]
+    pub(crate) fn is_of_balls(&self, points: [usize; 2]) -> bool {
+        self.part == Part::Obstacle && !self.are_sheets(points)
     }
 
     /// The radii, in the world, of the balls of points `i` and `j`; zero where they are on sheets.
@@ -155,15 +169,14 @@ impl Surfaces<'_> {
     pub(crate) fn compare_balls(&mut self, [leaf_a, leaf_b]: [usize; 2]) -> ControlFlow<()> {
         let (a, b) = (self.pair.a, self.pair.b);
         let (of_a, of_b) = (&a.wide.leaves, &b.wide.leaves);
-        let a_has_balls = of_a.points(leaf_a).start >= a.sheets;
         let relative = self.pair.relative;
         // Two places as near as this in the world may come out so much further apart.
         let reach = self.reach + 2.0 * relative.slack();
         let level = self.instructions.0;
-        if a_has_balls {
+        if of_a.has_balls(leaf_a) {
             for block in of_b.blocks(leaf_b) {
                 let targets = Targets::new(b, block);
-                for i in of_a.points(leaf_a) {
+                for i in of_a.points(leaf_a).filter(|&i| !a.is_on_sheet(i)) {
                     let x = relative.point_back(a.positions[i]);
                     let radius = (a.obstacle_ball(i) + reach) * relative.scale_back();
                     if targets.distance_sq(x) <= radius * radius {
@@ -172,14 +185,17 @@ impl Surfaces<'_> {
                     }
                 }
             }
+        }
+        if !of_b.has_balls(leaf_b) {
             return ControlFlow::Continue(());
         }
         for block in of_a.blocks(leaf_a) {
-            let targets = Targets::new(a, block);
-            for j in of_b.points(leaf_b) {
+            // Its balls have been looked at.
+            let targets = Targets::new(a, block).discs();
+            for j in of_b.points(leaf_b).filter(|&j| !b.is_on_sheet(j)) {
                 let x = relative.point(b.positions[j]);
                 let radius = b.obstacle_ball(j) * relative.scale() + reach;
-                if targets.distance_sq(x) <= radius * radius {
+                if targets.lanes != 0 && targets.distance_sq(x) <= radius * radius {
                     let near = targets.within(level, x, radius);
                     self.balls_meet(near, |lane| [block.1 + lane, j])?;
                 }

@@ -41,10 +41,12 @@ impl Surfaces<'_> {
     pub(crate) fn compare_leaves(&mut self, [leaf_a, leaf_b]: [usize; 2], by_discs: bool) -> ControlFlow<()> {
         let (a, b) = (self.pair.a, self.pair.b);
         let (of_a, of_b) = (&a.wide.leaves, &b.wide.leaves);
-        if self.pair.part == Part::Obstacle {
-            let first = [of_a.points(leaf_a).start, of_b.points(leaf_b).start];
-            if !self.pair.are_sheets(first) {
-                return self.compare_balls([leaf_a, leaf_b]);
+        if self.pair.part == Part::Obstacle && (of_a.has_balls(leaf_a) || of_b.has_balls(leaf_b)) {
+            let tries = self.tries;
+            self.compare_balls([leaf_a, leaf_b])?;
+            let are_dense = of_a.points(leaf_a).start < a.dense && of_b.points(leaf_b).start < b.dense;
+            if self.tries > tries || !are_dense {
+                return ControlFlow::Continue(());
             }
         }
         let is_sparse = |leaves: &Leaves, leaf| self.pair.part == Part::Surface && leaves.is_sparse(leaf);
@@ -129,7 +131,7 @@ impl Surfaces<'_> {
             let j = first + crossings.trailing_zeros() as usize;
             crossings &= crossings - 1;
             let (distance, [ra, rb]) = self.pair.points(i, j);
-            if distance > FAR * ra.max(rb) {
+            if distance > FAR * ra.max(rb) || self.pair.is_of_balls([i, j]) {
                 continue;
             }
             match self.pair.doubt_about(i, j) {

@@ -59,7 +59,7 @@ impl Surfaces<'_> {
             self.pair.meter.go_on()?;
             let other = self.pair.disc_b(j);
             let distance = (Vector3::from(disc.centre) - Vector3::from(other.centre)).norm();
-            if distance > self.reach + disc.radius + other.radius {
+            if distance > self.reach + disc.radius + other.radius || self.pair.is_of_balls([i, j]) {
                 continue;
             }
             if distance <= self.reach + self.pair.relative.slack() {

@@ -83,12 +83,12 @@ impl<'a> ScanView<'a> {
     pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
         let x = self.placed.apply_inverse(x);
         let nearest = self.scan.nearest_point_near(i, x) as usize;
-        let Slices { positions, normals, radii, sheets, .. } = self.slices;
+        let Slices { positions, normals, radii, .. } = self.slices;
         let away = [0, 1, 2].map(|k| x[k] - f64::from(positions[nearest][k]));
         let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
         let distance_sq: f64 = away.iter().map(|d| d * d).sum();
         let most = f64::from(self.slices.cell_radius(nearest));
-        nearest < sheets && height.abs() <= f64::from(SLAB * radii[nearest]) && distance_sq <= most * most
+        self.slices.is_on_sheet(nearest) && height.abs() <= f64::from(SLAB * radii[nearest]) && distance_sq <= most * most
     }
 
     /// The `i`-th stored point in the world.

@@ -63,7 +63,7 @@ impl Subject {
 
     /// The radius of the ball that stands for point `i` in the obstacle; zero if it samples a sheet.
     pub(crate) fn ball(&self, i: usize) -> f64 {
-        if i < self.scan.slices().sheets {
+        if self.is_on_sheet(i) {
             return 0.0;
         }
         let is_alone = matches!(self.scan.kind(i), PointKind::Line | PointKind::Stray | PointKind::Sparse);
@@ -74,7 +74,7 @@ impl Subject {
     /// its cell, or of its disc with the thickness of a twentieth of its radius.
     pub(crate) fn reach(&self, i: usize) -> f64 {
         let slices = self.scan.slices();
-        if i < slices.sheets { self.cell(i).max(1.05 * f64::from(slices.discs[i])) } else { self.ball(i) }
+        if self.is_on_sheet(i) { self.cell(i).max(1.05 * f64::from(slices.discs[i])) } else { self.ball(i) }
     }
 
     /// Whether `x`, a place of the surface in the stored frame, belongs to the obstacle, up to rounding: it is in the cell
@@ -98,9 +98,13 @@ impl Subject {
         let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.positions[i][k]));
         let height: f64 = (0..3).map(|k| d[k] * f64::from(slices.normals[i][k])).sum();
         let distance = d.iter().map(|x| x * x).sum::<f64>().sqrt();
-        i < slices.sheets
+        self.is_on_sheet(i)
             && height.abs() <= rounded(SLAB * self.radius(i))
             && distance <= rounded(self.cell(i))
+    }
+
+    fn is_on_sheet(&self, i: usize) -> bool {
+        i < self.scan.slices().dense && matches!(self.scan.kind(i), PointKind::Sheet | PointKind::Edge)
     }
 
     fn radius(&self, i: usize) -> f64 {

@@ -62,14 +62,14 @@ impl PointHierarchy {
         if !(self.reach > 0.0 && self.reach <= FARTHEST) {
             return wrong("the reach");
         }
-        let fills_leaves = self.leaf_size > 0 && self.sheets % self.leaf_size == 0;
+        let fills_leaves = self.leaf_size > 0 && self.dense.is_multiple_of(self.leaf_size);
         let is_parted = || match &self.nodes[..] {
-            [_, left, ..] => left.count == self.sheets,
+            [_, left, ..] => left.count == self.dense,
             _ => false,
         };
-        let all = self.sheets as usize == self.len();
-        if !(all || self.sheets == 0 || fills_leaves && is_parted()) {
-            return wrong("the number of points on sheets");
+        let all = self.dense as usize == self.len();
+        if !(all || self.dense == 0 || fills_leaves && is_parted()) {
+            return wrong("the number of points that are not sparse");
         }
         if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
             return wrong("the number of neighbours for a radius");

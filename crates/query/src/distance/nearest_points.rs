@@ -4,7 +4,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Node, NodePair, Part, Slices};
+use nearmiss_hierarchy::{Leaves, Node, NodePair, Part, Slices};
 use nearmiss_surface::PointBlock;
 
 use crate::posed::Posed;
@@ -22,15 +22,17 @@ pub(crate) struct PointPair {
 impl PointPair {
     pub(crate) fn new(pair: &Posed<'_>, points: [usize; 2]) -> Self {
         let [p, q] = [0, 1].map(|k| Vector3::from(pair.views[k].point(points[k])));
-        let balls = if has_balls(pair, points) { pair.balls(points).iter().sum() } else { 0.0 };
+        let balls = if pair.is_of_balls(points) { pair.balls(points).iter().sum() } else { 0.0 };
         Self { distance: (p - q).norm() - balls, points }
     }
 }
 
-/// Whether a ball stands for either point.
+/// Returns `true` if balls stand for some points of either leaf.
 #[inline(always)]
-fn has_balls(pair: &Posed<'_>, points: [usize; 2]) -> bool {
-    pair.part == Part::Obstacle && !pair.are_sheets(points)
+fn has_balls(pair: &Posed<'_>, [a, b]: [&Node; 2]) -> bool {
+    let (of_a, of_b) = (&pair.a.wide.leaves, &pair.b.wide.leaves);
+    let has = |leaves: &Leaves, node: &Node| leaves.has_balls(leaves.leaf_of(node.points().start));
+    pair.part == Part::Obstacle && (has(of_a, a) || has(of_b, b))
 }
 
 /// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that is found.
@@ -47,7 +49,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
     let bounds = &pair.b.boxes[leaves.b.index()];
     let zero = f32x16::simd_from(simd, 0.0);
     let mut reach = reach_of(pair, best.distance);
-    let has_balls = has_balls(pair, [a.points().start, b.points().start]);
+    let has_balls = has_balls(pair, [a, b]);
     for block_a in blocks(a) {
         let [x, y, z] = &pair.a.blocks[block_a].position;
         let own = [

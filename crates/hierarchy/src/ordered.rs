@@ -1,0 +1,72 @@
+//! The points in the order of their final tree, whose root parts dense from sparse ones, and what is known of them then.
+
+use nearmiss_geometry::PointCloud;
+use nearmiss_surface::{BlockTree, PointBlock};
+
+use crate::boxes::OrientedBox;
+use crate::classes::{dense_first, vote};
+use crate::gather::Index;
+use crate::neighbours::{self, groups as groups_of};
+use crate::options::{BuildError, BuildOptions};
+use crate::sampling::{Sampling, set_reaches};
+use crate::split::{Item, split};
+use crate::surfels::{Fit, fits};
+use crate::topology::Node;
+
+/// Points in order, with their classes.
+pub(crate) struct Ordered {
+    pub(crate) nodes: Vec<Node>,
+    /// About the points alone.
+    pub(crate) boxes: Vec<OrientedBox>,
+    pub(crate) positions: Vec<[f32; 3]>,
+    /// Their numbers in the input.
+    pub(crate) source: Vec<u32>,
+    pub(crate) fits: Vec<Fit>,
+    /// Sparse points come from here on.
+    pub(crate) dense: usize,
+    /// Of its blocks.
+    pub(crate) groups: Vec<PointBlock>,
+    pub(crate) sampling: Sampling,
+}
+
+impl Ordered {
+    /// Those of a cloud. A tree of all points tells how densely they lie and what surface they sample; where some turn out to be
+    /// sparse, a second one parts these from the others.
+    pub(crate) fn of(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
+        let leaf_size = options.leaf_size as usize;
+        let mut items: Vec<Item> =
+            (0..).zip(cloud.positions()).map(|(index, &position)| Item { position, index }).collect();
+        let (mut nodes, mut boxes) = split(&mut items, leaf_size, 0);
+        let mut positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
+        let mut source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
+        drop(items);
+
+        let mut sampling =
+            Sampling::of(&positions, (&nodes, &mut boxes), options, 1.0 / cloud.frame().scale)?;
+        let mut groups = groups_of(&sampling.blocks);
+        let index = Index::without_lists((&nodes, &boxes), (&sampling.blocks, &groups), &sampling.plan);
+        let mut fits = fits(&index, &positions, (&sampling.radii, &sampling.spacings));
+        sampling.spacings = Vec::new();
+        let tree = BlockTree::new(&sampling.blocks, positions.len());
+        vote(&tree, &positions, &sampling.radii, &mut fits);
+        drop(tree);
+        let mut dense = positions.len();
+        if let Some((mut items, count)) = dense_first(&positions, &fits, leaf_size) {
+            dense = count;
+            (nodes, boxes) = split(&mut items, leaf_size, dense);
+            positions = items.iter().map(|item| item.position).collect();
+            source = reordered(&items, &source);
+            fits = reordered(&items, &fits);
+            sampling.radii = reordered(&items, &sampling.radii);
+            set_reaches(&nodes, &mut boxes, &sampling.radii);
+            sampling.blocks = neighbours::blocks(&sampling.plan, &positions, &sampling.radii);
+            groups = groups_of(&sampling.blocks);
+        }
+        Ok(Self { nodes, boxes, positions, source, fits, dense, groups, sampling })
+    }
+}
+
+/// The values of points in the order of `items`, whose indices are their places before.
+fn reordered<T: Copy>(items: &[Item], values: &[T]) -> Vec<T> {
+    items.iter().map(|item| values[item.index as usize]).collect()
+}
