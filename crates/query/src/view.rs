@@ -88,7 +88,9 @@ impl<'a> ScanView<'a> {
         let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
         let distance_sq: f64 = away.iter().map(|d| d * d).sum();
         let most = f64::from(self.slices.cell_radius(nearest));
-        self.slices.is_on_sheet(nearest) && height.abs() <= f64::from(SLAB * radii[nearest]) && distance_sq <= most * most
+        self.slices.is_on_sheet(nearest)
+            && height.abs() <= f64::from(SLAB * radii[nearest])
+            && distance_sq <= most * most
     }
 
     /// The `i`-th stored point in the world.
