@@ -8,7 +8,7 @@ use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
     Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveEnd, CurveOptions, CurvePlan,
-    CurveScratch, Curves, PlanError, ScanView, ViewScratch, collide_all, curves, curves_with,
+    CurveScratch, Curves, PlanError, ScanView, Semantics, ViewScratch, collide_all, curves, curves_with,
 };
 use nearmiss_surface::meet;
 use nearmiss_testdata::arbitrary;
@@ -318,7 +318,8 @@ fn nothing_that_newton_finds_from_any_crossing_is_missing() {
         let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.8 * size));
         let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
         let found = draw(&views[0], &views[1], CurveOptions::default());
-        let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
+        let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
+        let plan = CollidePlan::new(&surfaces, &scan, &scan).unwrap();
         let mut contacts = Contacts::default();
         collide_all(
             &views[0],
