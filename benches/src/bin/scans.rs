@@ -103,41 +103,8 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     let (a, b) = (Scan::build(&object.cloud, &build)?, Scan::build(&body.cloud, &BuildOptions::default())?);
     let truths = truths(&object.cloud, &body.cloud, scale, options)?;
 
-    let asked = CollideOptions::default().with_evidence(Evidence::Certified);
-    let plan = CollidePlan::new(&asked, &a, &b)?;
-    let (mut scratch, mut score, mut far) = (CollideScratch::default(), Score::default(), Sample::default());
-    for (i, truth) in truths.iter().enumerate() {
-        let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&truth.pose));
-        let (answer, time) =
-            timed(|| black_box(collide_with(&va, black_box(&vb), &plan, &Budget::UNLIMITED, &mut scratch)));
-        let is_far = truth.distance >= FAR * truth.spacing;
-        match answer.verdict {
-            Verdict::Separated { evidence, gap } => {
-                if gap > truth.distance {
-                    println!("pose {i}: a gap of {gap}, but points {} apart", truth.distance);
-                }
-                let is_certified = evidence == Evidence::Certified;
-                score.certified += usize::from(is_far && is_certified);
-                if options.listed && is_far && !is_certified {
-                    println!("pose {i}: {:.1} spacings apart, not certified", truth.distance / truth.spacing);
-                }
-            }
-            Verdict::Intersecting { .. } => {
-                score.contacts += 1;
-                let off = truth.distance / truth.spacing;
-                score.furthest_contact = score.furthest_contact.max(off);
-                if options.listed && off > 1.0 {
-                    println!("pose {i}: a contact {off:.2} spacings from the nearest points");
-                }
-            }
-            Verdict::Undecided(reason) => println!("pose {i}: {reason:?}"),
-        }
-        if is_far {
-            score.far += 1;
-            far.push(nanoseconds(time));
-        }
-    }
-
+    let mut score = Score::default();
+    let far = verdicts([&a, &b], &truths, options, &mut score)?;
     let plan = DistancePlan::new(&DistanceOptions::default(), &a, &b)?;
     let (mut scratch, mut distances) = (DistanceScratch::default(), Sample::default());
     for (i, truth) in truths.iter().enumerate() {
@@ -176,6 +143,50 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
         hinted,
     );
     Ok(())
+}
+
+/// Asks for a verdict in every pose; returns the times of those that are far from contact.
+fn verdicts(
+    [a, b]: [&Scan; 2],
+    truths: &[Truth],
+    options: &Options,
+    score: &mut Score,
+) -> Result<Sample, Failure> {
+    let asked = CollideOptions::default().with_evidence(Evidence::Certified);
+    let plan = CollidePlan::new(&asked, a, b)?;
+    let (mut scratch, mut far) = (CollideScratch::default(), Sample::default());
+    for (i, truth) in truths.iter().enumerate() {
+        let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&truth.pose));
+        let (answer, time) =
+            timed(|| black_box(collide_with(&va, black_box(&vb), &plan, &Budget::UNLIMITED, &mut scratch)));
+        let is_far = truth.distance >= FAR * truth.spacing;
+        match answer.verdict {
+            Verdict::Separated { evidence, gap } => {
+                if gap > truth.distance {
+                    println!("pose {i}: a gap of {gap}, but points {} apart", truth.distance);
+                }
+                let is_certified = evidence == Evidence::Certified;
+                score.certified += usize::from(is_far && is_certified);
+                if options.listed && is_far && !is_certified {
+                    println!("pose {i}: {:.1} spacings apart, not certified", truth.distance / truth.spacing);
+                }
+            }
+            Verdict::Intersecting { .. } => {
+                score.contacts += 1;
+                let off = truth.distance / truth.spacing;
+                score.furthest_contact = score.furthest_contact.max(off);
+                if options.listed && off > 1.0 {
+                    println!("pose {i}: a contact {off:.2} spacings from the nearest points");
+                }
+            }
+            Verdict::Undecided(reason) => println!("pose {i}: {reason:?}"),
+        }
+        if is_far {
+            score.far += 1;
+            far.push(nanoseconds(time));
+        }
+    }
+    Ok(far)
 }
 
 fn count_distance(found: &Distance, truth: &Truth, score: &mut Score) {
@@ -219,7 +230,7 @@ fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Resul
     for truth in truths.iter().filter(|truth| truth.distance >= FAR * truth.spacing).take(50) {
         let way = unit_vector(rng);
         let (mut hint, mut pose) = (PairHint::default(), truth.pose);
-        let from: [f64; 3] = pose.translation().into();
+        let from: [f64; 3] = pose.translation();
         let most = truth.distance - FAR * truth.spacing;
         for step in 0..options.steps {
             // To and fro, so that the object stays clear.

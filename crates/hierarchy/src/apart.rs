@@ -1,9 +1,9 @@
 //! Whether the coverings of two nodes are apart (Klein & Zachmann 2004, §5.1).
 
 use crate::boxes::{OrientedBox, Relative};
-use crate::build::Slices;
 use crate::covering::Centres;
 use crate::descend::NodePair;
+use crate::slices::Slices;
 
 /// What motion and arithmetic may do to the distance of two places, in units of [`Relative::slack`], each of which
 /// bounds a coordinate: √3 for either of two places in motion, as much again for the distance itself and for the radii.

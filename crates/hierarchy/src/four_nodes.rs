@@ -5,9 +5,9 @@ use fearless_simd::{Level, Simd, dispatch, f32x4, u32x4};
 use nearmiss_geometry::NodeId;
 
 use crate::boxes::{OrientedBox, Relative};
-use crate::build::{Part, Slices};
 use crate::growth::Growth;
 use crate::lanes::{Boxes, along_normals};
+use crate::slices::{Part, Slices};
 
 /// Boxes and enclosures of four nodes, a lane each.
 #[derive(Debug, Clone, Copy)]

@@ -2,9 +2,10 @@
 
 use nearmiss_surface::{Evaluation, Moments, PointBlock};
 
-use crate::build::{PointHierarchy, Slices};
+use crate::build::PointHierarchy;
 use crate::gather::GatherScratch;
 use crate::samples::{Samples, list_number};
+use crate::slices::Slices;
 
 impl<'a> Slices<'a> {
     /// The sample P' of a node: [`BuildOptions::samples`](crate::BuildOptions::samples) of its points, or all if it

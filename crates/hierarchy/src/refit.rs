@@ -8,12 +8,13 @@ use std::ops::Range;
 use nearmiss_surface::{BlockTree, Evaluation, Metric, PointBlock};
 
 use crate::boxes::dot;
-use crate::build::{PointHierarchy, ball, obstacle_ball};
+use crate::build::PointHierarchy;
 use crate::classes::vote;
 use crate::covering::{Ground, Solid, coverings};
 use crate::extents::{Discs, boxes_of_discs};
 use crate::levels::samples;
 use crate::neighbours::chunks;
+use crate::slices::{ball, obstacle_ball};
 use crate::spacing::Look;
 use crate::split::id32;
 use crate::surfels::{Fit, NormalCone, PointKind, Surfel, align, cone, fitted, surfel_of};

@@ -15,13 +15,13 @@ use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, PointBlock, Statu
 use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, dot, sub};
-use crate::build::{ball, cell_radius, obstacle_ball};
 use crate::classes::SLAB;
 use crate::covering::Solid;
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::Index;
 use crate::lanes::{along, product, seen_from};
 use crate::neighbours::{Locality, chunks};
+use crate::slices::{ball, cell_radius, obstacle_ball};
 use crate::spacing::{Look, Spacing};
 
 /// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a square

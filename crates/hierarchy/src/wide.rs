@@ -14,10 +14,11 @@ use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 
 use crate::boxes::{OrientedBox, Relative};
-use crate::build::{Part, PointHierarchy, Slices};
+use crate::build::PointHierarchy;
 use crate::descend::NodePair;
 use crate::lanes::{Boxes, along_normals};
 use crate::leaf_block::Leaves;
+use crate::slices::{Part, Slices};
 use crate::split::id32;
 
 /// Children of a node.

@@ -1,4 +1,5 @@
 //! What a sample of the points shows of spacing, borders and holes.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};

@@ -241,6 +241,6 @@ impl Surfaces<'_> {
         self.pair.meter.spent.evaluations += u64::from(foot.evaluations);
         let apart = (Vector3::from(foot.point) - Vector3::from(centre)).norm();
         let holds = foot.converged && apart <= ra + rb + self.margin && view.is_obstacle(k, foot.point);
-        holds.then(|| Contact { point: foot.point, residual: 0.5 * apart, ..*contact })
+        holds.then_some(Contact { point: foot.point, residual: 0.5 * apart, ..*contact })
     }
 }

@@ -360,25 +360,15 @@ fn surfaces(
             apart(options, 0.0, false)
         }
         _ => {
-            // Otherwise all there is will be proven.
             let noted = (!is_plain).then_some(&**excluded);
-            if is_plain {
-                certifier.proven.clear();
+            let proven = proven_apart(&mut certifier, noted, &mut frontiers.stack, proof);
+            if let Some((distance, near)) = proven {
+                band = near;
+                if let Some(known) = &mut known {
+                    known.proven(distance, certifier.proven, &certifier.pair);
+                }
             }
-            let whole = certifier.prove(noted, &mut frontiers.stack).is_continue();
-            let distance = if whole { certifier.tighten() } else { 0.0 };
-            if whole && let Some(nearest) = certifier.nearest() {
-                band = certifier.pair.band_of(nearest);
-            }
-            if let Some(proof) = proof.filter(|_| whole) {
-                certifier.hand_out(proof);
-            }
-            if let Some(known) = &mut known
-                && whole
-            {
-                known.proven(distance, certifier.proven, &certifier.pair);
-            }
-            apart(options, distance, whole)
+            apart(options, proven.map_or(0.0, |(distance, _)| distance), proven.is_some())
         }
     };
     if let Some(known) = known
@@ -394,6 +384,27 @@ fn surfaces(
     *longest_stretch = certifier.pair.meter.longest_stretch;
     let distance_estimate = Some(estimate).filter(|distance| distance.is_finite());
     Answer { verdict, band, distance_estimate, statistics: certifier.pair.meter.spent }
+}
+
+/// Proves all pairs that were `noted`, or all there is if nothing was. Returns the least gap and the band there, or `None` where the
+/// proof fails.
+fn proven_apart(
+    certifier: &mut Certifier<'_>,
+    noted: Option<&[Excluded]>,
+    stack: &mut Stack,
+    proof: Option<&mut Proof>,
+) -> Option<(f64, f64)> {
+    if noted.is_none() {
+        certifier.proven.clear();
+    }
+    if certifier.prove(noted, stack).is_break() {
+        return None;
+    }
+    let distance = certifier.tighten();
+    if let Some(proof) = proof {
+        certifier.hand_out(proof);
+    }
+    Some((distance, certifier.pair.band_of(certifier.nearest().unwrap_or(ROOTS))))
 }
 
 /// Looks for a contact: where there was one, then from what kept the scans apart, or from the roots.

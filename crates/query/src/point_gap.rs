@@ -55,7 +55,7 @@ impl Balls {
 
     /// The least distance of any ball from the box.
     #[inline(always)]
-    fn from_box<S: Simd>(&self, simd: S, bounds: &OrientedBox) -> f32 {
+    fn gap_to_box<S: Simd>(&self, simd: S, bounds: &OrientedBox) -> f32 {
         let d = self.seen_from(simd, bounds.centre);
         let mut beyond_sq = f32x16::splat(simd, 0.0);
         for k in 0..3 {
@@ -68,7 +68,7 @@ impl Balls {
 
     /// The least distance of any ball from the ball about `p`.
     #[inline(always)]
-    fn from_ball<S: Simd>(&self, simd: S, p: [f32; 3], radius: f32) -> f32 {
+    fn gap_to_ball<S: Simd>(&self, simd: S, p: [f32; 3], radius: f32) -> f32 {
         let [x, y, z] = self.seen_from(simd, p);
         let away = (x * x + y * y + z * z).sqrt();
         self.least(simd, away - f32x16::load_array_ref(simd, &self.reaches)) - radius
@@ -128,7 +128,7 @@ impl Posed<'_> {
             let back = self.relative.scale_back();
             for block in blocks(leaf) {
                 let balls = Balls::of(self.a, leaf, block).moved(back, |p| self.relative.point_back(p));
-                least = least.min(balls.from_box(simd, &bounds));
+                least = least.min(balls.gap_to_box(simd, &bounds));
             }
             return least * self.relative.scale();
         }
@@ -137,7 +137,7 @@ impl Posed<'_> {
         let scale = self.relative.scale();
         for block in blocks(leaf) {
             let balls = Balls::of(self.b, leaf, block).moved(scale, |p| self.relative.point(p));
-            least = least.min(balls.from_box(simd, &bounds));
+            least = least.min(balls.gap_to_box(simd, &bounds));
         }
         least
     }
@@ -163,7 +163,7 @@ impl Posed<'_> {
                 for lane in 0..WIDTH {
                     if of_a.lanes >> lane & 1 != 0 {
                         let p = [of_a.centres[0][lane], of_a.centres[1][lane], of_a.centres[2][lane]];
-                        least = least.min(of_b.from_ball(simd, p, of_a.reaches[lane]));
+                        least = least.min(of_b.gap_to_ball(simd, p, of_a.reaches[lane]));
                     }
                 }
             }

@@ -242,6 +242,8 @@ impl Checker<'_> {
         x: [f64; 3],
         finding: &mut Finding,
     ) -> Result<(), String> {
+        let claimed = line.residual.filter(|r| *r >= 0.0).ok_or("a witness without a residual")?;
+        let mut on_surfaces = Vec::new();
         let away = [0, 1].map(|i| {
             let (subject, placement) = (self.subjects[i], &placements[i]);
             if let Ok(seen) = witness::check(subject, placement, x)
@@ -249,6 +251,7 @@ impl Checker<'_> {
             {
                 finding.off = finding.off.max(seen.off);
                 finding.on_the_brink |= seen.on_the_brink;
+                on_surfaces.push(seen);
                 return 0.0;
             }
             let of_matter = witness::distance_of_balls(subject, placement, x);
@@ -256,7 +259,6 @@ impl Checker<'_> {
                 return of_matter;
             }
             finding.between = true;
-            let claimed = line.residual.unwrap_or(0.0);
             let near = witness::check_near(subject, placement, x, claimed.min(0.5 * line.margin));
             near.map_or(of_matter, |(_, of_surface)| of_surface.min(of_matter))
         });
@@ -269,6 +271,13 @@ impl Checker<'_> {
                 "the witness is {:.4e} and {:.4e} from the obstacles, together more than the margin",
                 away[0], away[1]
             ));
+        }
+        if let [a, b] = on_surfaces[..] {
+            // Of balls the residual is half the distance of the points.
+            let residual = a.residual.max(b.residual);
+            if (residual - claimed).abs() > RESIDUAL * a.bandwidth.max(b.bandwidth) {
+                return Err(format!("the residual is {residual:.2e}, not {claimed:.2e}"));
+            }
         }
         Ok(())
     }

@@ -158,7 +158,7 @@ fn witnesses_lie_on_both_surfaces() {
     let trial = trial();
     let line = trial.certified(Verdict::Intersecting).next().unwrap();
     let r = trial.subject.scan.sampling_radius();
-    for (by, fault) in [(1e-3 * r, "off the surface"), (50.0 * r, "")] {
+    for (by, fault) in [(1e-3 * r, "from the obstacles"), (50.0 * r, "")] {
         // Along the diagonal, in no plane of either surface.
         let mut moved = line.clone();
         moved.witness = line.witness.map(|x| x.map(|c| c + by));
@@ -188,7 +188,7 @@ fn witnesses_between_surfaces_are_within_the_margin() {
     assert!(trial.fault(&moved).contains("more than the margin"));
     let narrow = Line { margin: 0.1 * line.residual.unwrap(), ..(*line).clone() };
     assert!(trial.fault(&narrow).contains("more than the margin"));
-    assert!(trial.fault(&Line { margin: 0.0, ..(*line).clone() }).contains("off the surface"));
+    assert!(trial.fault(&Line { margin: 0.0, ..(*line).clone() }).contains("from the obstacles"));
 }
 
 #[test]

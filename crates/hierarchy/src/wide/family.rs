@@ -4,9 +4,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, u32x4};
 
 use super::{Child, WIDTH, WideTree};
-use crate::build::{Part, Slices};
 use crate::four_nodes::FourNodes;
 use crate::growth::Growth;
+use crate::slices::{Part, Slices};
 
 /// What the enclosures of up to four children reach further than their boxes, as [`Growth::pairs`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -5,9 +5,9 @@ use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
 
 use super::*;
-use crate::build::Part;
 use crate::four_nodes::FourNodes;
 use crate::options::BuildOptions;
+use crate::slices::Part;
 
 /// A blob, a sheet or a line of so many points.
 fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) -> PointHierarchy {

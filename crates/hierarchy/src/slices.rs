@@ -1,0 +1,208 @@
+//! `Slices`: the arrays of a scan for hot loops, and what of them stands for each point and node in the obstacle.
+
+use nearmiss_surface::{PointBlock, SurfacePlan};
+
+use crate::boxes::OrientedBox;
+#[cfg(doc)]
+use crate::build::PointHierarchy;
+use crate::covering::Covering;
+use crate::growth::Growth;
+use crate::outline::Outline;
+use crate::surfels::{PointKind, THICKNESS};
+use crate::topology::Node;
+use crate::wide::WideTree;
+
+/// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not at every
+/// access.
+#[derive(Debug, Clone, Copy)]
+pub struct Slices<'a> {
+    /// Positions in leaf order.
+    pub positions: &'a [[f32; 3]],
+    /// Unit normals; see [`PointHierarchy::normals`].
+    pub normals: &'a [[f32; 3]],
+    /// Local sampling radii.
+    pub radii: &'a [f32],
+    /// Radii of the tangent discs.
+    pub discs: &'a [f32],
+    /// What the points' neighbourhoods look like, as [`PointKind::code`].
+    pub kinds: &'a [u8],
+    /// The tree.
+    pub nodes: &'a [Node],
+    /// A box about the discs of each node's points, and about their balls.
+    pub boxes: &'a [OrientedBox],
+    /// The tree with four children a node.
+    pub wide: &'a WideTree,
+    /// What tells the scan from others, and where it is.
+    pub outline: &'a Outline,
+    /// What the boxes must grow by to contain each node's part of the surface.
+    pub growths: &'a [Growth],
+    /// What the boxes must grow by to contain each node's part of the obstacle.
+    pub obstacle_growths: &'a [Growth],
+    /// The points in blocks: see [`PointHierarchy::blocks`].
+    pub blocks: &'a [PointBlock],
+    /// The samples of the inner nodes in their order, [`samples_a_node`](Self::samples_a_node) of each; see
+    /// [`Slices::samples`].
+    pub sample_lists: &'a [u32],
+    /// How far the samples of each node reach.
+    pub coverings: &'a [Covering],
+    /// Points of a full leaf.
+    pub leaf_size: u32,
+    /// Samples of an inner node.
+    pub samples_a_node: u32,
+    /// What defines the surface.
+    pub plan: &'a SurfacePlan,
+    /// The scan's sampling radius.
+    pub sampling_radius: f32,
+    /// The scan's reach L.
+    pub reach: f32,
+    /// Points before this are on sheets or, noisy, among others; sparse points come from here on, and stand in the
+    /// obstacle as balls. A leaf has points of one sort alone.
+    pub dense: usize,
+}
+
+/// What an enclosure of a node holds beside its points and their discs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The node's part of the implicit surface.
+    Surface = 0,
+    /// The node's part of the obstacle.
+    Obstacle = 1,
+}
+
+impl Part {
+    pub(crate) const BOTH: [Self; 2] = [Self::Surface, Self::Obstacle];
+}
+
+impl Slices<'_> {
+    /// What the boxes of the nodes must grow by to contain this part of each.
+    #[inline]
+    #[must_use]
+    pub fn growths_of(&self, part: Part) -> &[Growth] {
+        match part {
+            Part::Surface => self.growths,
+            Part::Obstacle => self.obstacle_growths,
+        }
+    }
+
+    /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's box, and
+    /// contains it.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[inline]
+    #[must_use]
+    pub fn enclosure(&self, node: usize) -> OrientedBox {
+        self.growths[node].of(&self.boxes[node])
+    }
+
+    /// A box about the part of the obstacle of a node (`docs/theory/obstacle.md`); it has the axes of the node's
+    /// box, and contains it.
+    ///
+    /// # Panics
+    /// When there is no such node.
+    #[inline]
+    #[must_use]
+    pub fn obstacle_enclosure(&self, node: usize) -> OrientedBox {
+        self.obstacle_growths[node].of(&self.boxes[node])
+    }
+
+    /// The radius of the ball that stands for a point in the obstacle: half its local radius, a third where it has others
+    /// all around it, zero for points on sheets.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn obstacle_ball(&self, i: usize) -> f32 {
+        obstacle_ball(i, self.dense, PointKind::from_code(self.kinds[i]), self.radii[i])
+    }
+
+    /// Returns `true` if a point stands in the obstacle by the sheet that it samples, and `false` if by a ball.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn is_on_sheet(&self, i: usize) -> bool {
+        is_on_sheet(i, self.dense, PointKind::from_code(self.kinds[i]))
+    }
+
+    /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its part of a
+    /// sheet, the lesser of its local radius and half the reach.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn obstacle_reach(&self, i: usize) -> f32 {
+        if self.is_on_sheet(i) {
+            self.cell_radius(i).max(self.discs[i] * DISC_REACH)
+        } else {
+            self.obstacle_ball(i)
+        }
+    }
+
+    /// How far from a point on a sheet the surface belongs to the obstacle: the lesser of its local radius and half the
+    /// reach.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn cell_radius(&self, i: usize) -> f32 {
+        cell_radius(self.radii[i], self.reach)
+    }
+
+    /// About a [sparse](PointKind::is_sparse) point, the radius of the ball in which surface may be that no disc
+    /// stands for: the local radius, but no more than the scan's, within which nothing is promised of any point.
+    /// Zero for others.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn ball(&self, i: usize) -> f32 {
+        ball(PointKind::from_code(self.kinds[i]), self.radii[i], self.sampling_radius)
+    }
+}
+
+/// See [`Slices::cell_radius`].
+#[inline]
+pub(crate) fn cell_radius(radius: f32, reach: f32) -> f32 {
+    radius.min(0.5 * reach)
+}
+
+/// How far a disc with its thickness reaches, in its radius.
+const DISC_REACH: f32 = 1.0 + THICKNESS;
+
+/// The ball of a point that has others all around, in its local radius: half the radius of a disc of a sheet. The nearest
+/// neighbour is 0.36 local radii away on average, so such balls overlap.
+const BALL_AMONG_OTHERS: f32 = 0.325;
+
+/// The ball of any other point. Half the local radius is the most at which the centres of two balls that touch are no further apart
+/// than the greater of their local radii.
+const BALL_OF_SPARSE: f32 = 0.5;
+
+/// See [`Slices::obstacle_ball`].
+#[inline]
+pub(crate) fn obstacle_ball(i: usize, dense: usize, kind: PointKind, radius: f32) -> f32 {
+    if is_on_sheet(i, dense, kind) {
+        0.0
+    } else if kind.is_sparse() {
+        BALL_OF_SPARSE * radius
+    } else {
+        BALL_AMONG_OTHERS * radius
+    }
+}
+
+/// See [`Slices::is_on_sheet`].
+#[inline]
+pub(crate) fn is_on_sheet(i: usize, dense: usize, kind: PointKind) -> bool {
+    i < dense && kind.is_sheet()
+}
+
+/// See [`Slices::ball`].
+#[inline]
+pub(crate) fn ball(kind: PointKind, radius: f32, sampling_radius: f32) -> f32 {
+    if kind.is_sparse() { radius.min(sampling_radius) } else { 0.0 }
+}
