@@ -109,6 +109,28 @@ impl<'a> Certifier<'a> {
         ControlFlow::Continue(())
     }
 
+    /// Proves all of `excluded`, or all there is if nothing was noted, and hands the proof out. Returns the least gap, in
+    /// the world, and the band there; `None` where the proof fails.
+    pub(crate) fn prove_apart(
+        &mut self,
+        excluded: Option<&[Excluded]>,
+        stack: &mut Stack,
+        proof: Option<&mut Proof>,
+    ) -> Option<(f64, f64)> {
+        if excluded.is_none() {
+            self.proven.clear();
+        }
+        if self.prove(excluded, stack).is_break() {
+            return None;
+        }
+        let distance = self.tighten();
+        if let Some(proof) = proof {
+            self.hand_out(proof);
+        }
+        let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
+        Some((distance, self.pair.band_of(self.nearest().unwrap_or(roots))))
+    }
+
     /// Proves these pairs of leaves, which were compared without a hit; or breaks. Their boxes overlap, and so do their
     /// enclosures: only of obstacles may their points tell more.
     pub(crate) fn prove_leaves(&mut self, compared: &[NodePair]) -> ControlFlow<()> {

@@ -361,7 +361,7 @@ fn surfaces(
         }
         _ => {
             let noted = (!is_plain).then_some(&**excluded);
-            let proven = proven_apart(&mut certifier, noted, &mut frontiers.stack, proof);
+            let proven = certifier.prove_apart(noted, &mut frontiers.stack, proof);
             if let Some((distance, near)) = proven {
                 band = near;
                 if let Some(known) = &mut known {
@@ -384,27 +384,6 @@ fn surfaces(
     *longest_stretch = certifier.pair.meter.longest_stretch;
     let distance_estimate = Some(estimate).filter(|distance| distance.is_finite());
     Answer { verdict, band, distance_estimate, statistics: certifier.pair.meter.spent }
-}
-
-/// Proves all pairs that were `noted`, or all there is if nothing was. Returns the least gap and the band there, or `None` where the
-/// proof fails.
-fn proven_apart(
-    certifier: &mut Certifier<'_>,
-    noted: Option<&[Excluded]>,
-    stack: &mut Stack,
-    proof: Option<&mut Proof>,
-) -> Option<(f64, f64)> {
-    if noted.is_none() {
-        certifier.proven.clear();
-    }
-    if certifier.prove(noted, stack).is_break() {
-        return None;
-    }
-    let distance = certifier.tighten();
-    if let Some(proof) = proof {
-        certifier.hand_out(proof);
-    }
-    Some((distance, certifier.pair.band_of(certifier.nearest().unwrap_or(ROOTS))))
 }
 
 /// Looks for a contact: where there was one, then from what kept the scans apart, or from the roots.
