@@ -280,7 +280,7 @@ impl Apart<'_> {
             search.found_points(self.motion.bound_of(self.best.distance.max(0.0)), &self.motion);
             if self.of_obstacles() {
                 let upper = self.best.distance.max(0.0);
-                let enough = (upper * (1.0 - self.plan.options.relative)).max(upper - self.band());
+                let enough = (upper * (1.0 - self.plan.options.relative)).min(upper - self.band());
                 search.is_content_with(self.motion.bound_of(enough), &self.motion);
             }
         }
