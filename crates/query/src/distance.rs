@@ -35,7 +35,8 @@ pub struct DistanceOptions {
     /// What is to be apart. Default: obstacles.
     pub semantics: Semantics,
     /// Of obstacles, how far below the upper bound the lower one may be left, as a share of it: 0 to less than 1, default
-    /// 0.1. Where that is less than the local spacing, within which nothing is promised, the spacing counts.
+    /// 0.1. Where that is less than the local spacing, within which nothing is promised, the spacing counts, up to half of the
+    /// upper bound.
     pub relative: f64,
     /// By which distances surfaces are defined. None, the default: as both scans were prepared.
     pub metric: Option<Metric>,
@@ -280,7 +281,8 @@ impl Apart<'_> {
             search.found_points(self.motion.bound_of(self.best.distance.max(0.0)), &self.motion);
             if self.of_obstacles() {
                 let upper = self.best.distance.max(0.0);
-                let enough = (upper * (1.0 - self.plan.options.relative)).min(upper - self.band());
+                let relative = self.plan.options.relative;
+                let enough = (upper * (1.0 - relative)).min((upper - self.band()).max(0.5 * upper));
                 search.is_content_with(self.motion.bound_of(enough), &self.motion);
             }
         }
