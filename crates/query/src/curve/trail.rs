@@ -79,7 +79,7 @@ impl Trail {
 
     const FEWEST: usize = 256;
 
-    /// Share of its length by which a chord is extended to look for places: [`SAME_TURN`] times the tangent of [`MOST_TURN`]. Within
+    /// Share of its length by which a chord is extended to look for places: `SAME_TURN` times the tangent of `MOST_TURN`. Within
     /// `SAME_TURN` of its length aside, no place then lies between two chords that turn by `MOST_TURN`.
     const BEYOND: f64 = 0.07;
 
