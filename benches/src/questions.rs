@@ -44,8 +44,8 @@ pub fn asked(
 
 /// `near` poses of a body about contact with a room, and as many as that at random within its bounds.
 ///
-/// About contact a random point of the body, turned at random, lies up to ten of its room's local radii away from a random point
-/// of the room. Whether they meet is what the search to the end says.
+/// About contact a random point of the body, turned at random, lies up to ten of its room's local radii away
+/// from a random point of the room. Whether they meet is what the search to the end says.
 ///
 /// # Errors
 /// When the scans cannot be searched.

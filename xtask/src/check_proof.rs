@@ -1,12 +1,12 @@
 //! `cargo xtask check-proof`: whether what certified answers rest on holds, without the code that found them.
 //!
-//! * Apart: the pairs of nodes cover all pairs of points, and their enclosures are apart, in interval arithmetic; or,
-//!   of obstacles, the balls about their points in which the obstacle lies.
-//! * Intersecting: the witness is a zero of both functions, summed over all points in double precision; of obstacles a
-//!   zero in a cell, a place in a ball, or a measured point.
-//! * Of each scan: a million points of its surface lie in the enclosures of the nodes of their nearest points, and so
-//!   do those in cells, and the balls, in the enclosures of the obstacle. That is a trial, not a proof; the proofs are
-//!   docs/theory/certificates.md and docs/theory/obstacle.md.
+//! * Apart: the pairs of nodes cover all pairs of points, and their enclosures are apart, in interval
+//!   arithmetic; or, of obstacles, the balls about their points in which the obstacle lies.
+//! * Intersecting: the witness is a zero of both functions, summed over all points in double precision; of
+//!   obstacles a zero in a cell, a place in a ball, or a measured point.
+//! * Of each scan: a million points of its surface lie in the enclosures of the nodes of their nearest
+//!   points, and so do those in cells, and the balls, in the enclosures of the obstacle. That is a trial, not
+//!   a proof; the proofs are docs/theory/certificates.md and docs/theory/obstacle.md.
 
 mod boxes;
 mod claim;

@@ -1,10 +1,11 @@
-//! The clearance of an object that moves through a scan: bounds, the nearest points, and what each answer takes.
+//! The clearance of an object that moves through a scan: bounds, the nearest points, and what each answer
+//! takes.
 //!
 //! `clearance SCAN OBJECT --from X,Y,Z --to X,Y,Z [--size S] [--steps N] [--turn DEGREES] [--image OUT.svg]`
 //!
-//! The object's centre goes straight from one place to the other while it turns about a fixed axis. At each step the distance is
-//! asked with and the verdict with certified evidence, and hinted by the step before; the exact distance of the nearest points is
-//! the truth that no upper bound may exceed.
+//! The object's centre goes straight from one place to the other while it turns about a fixed axis. At each
+//! step the distance is asked with and the verdict with certified evidence, and hinted by the step before;
+//! the exact distance of the nearest points is the truth that no upper bound may exceed.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::fs;
@@ -70,7 +71,7 @@ fn place(text: Option<String>, name: &str) -> Result<[f64; 3], Failure> {
 /// Places on the path, with what was found there.
 type Curve = Vec<[f64; 2]>;
 
-/// What was found along a path.
+/// The bounds, times and verdicts along a path.
 #[derive(Default)]
 struct Found {
     lower: Curve,

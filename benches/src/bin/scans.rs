@@ -2,11 +2,11 @@
 //!
 //! `scans SCAN… [--object O] [--size S] [--poses N] [--seed N] [--reach L] [--listed]`
 //!
-//! The object, 1/25 of a scan's diagonal long unless told otherwise, is placed at random within the scan's bounds. Truth is
-//! the exact distance of the nearest two points. Everything is measured in *local spacings*: the greater of the distances
-//! from either of these two points to its sixth distinct neighbour in its own scan, times the pose's scale. Each
-//! pose is asked once for a verdict with certified evidence and once for the distance, in passes of their own.
-//! `--listed` names the poses that fall short.
+//! The object, 1/25 of a scan's diagonal long unless told otherwise, is placed at random within the scan's
+//! bounds. Truth is the exact distance of the nearest two points. Everything is measured in *local spacings*:
+//! the greater of the distances from either of these two points to its sixth distinct neighbour in its own
+//! scan, times the pose's scale. Each pose is asked once for a verdict with certified evidence and once for
+//! the distance, in passes of their own. `--listed` names the poses that fall short.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
@@ -69,7 +69,7 @@ fn main() -> Result<(), Failure> {
     scans.iter().try_for_each(|scan| measure(scan, &options))
 }
 
-/// What is so of a pose, by brute force.
+/// The truth about a pose, by brute force.
 struct Truth {
     pose: Pose,
     /// Of the nearest two points.
@@ -221,7 +221,8 @@ fn truths(
     Ok(truths.collect())
 }
 
-/// The mean time of a question with a hint, the object moving in steps of `--step` from those poses that are clear.
+/// The mean time of a question with a hint, the object moving in steps of `--step` from those poses that are
+/// clear.
 fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Result<f64, Failure> {
     let asked = CollideOptions::default().with_evidence(Evidence::Certified).with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&asked, a, b)?;

@@ -45,8 +45,8 @@ impl PointScan {
 }
 
 impl PointScan {
-    /// The nearest pair of one of these points and one of `body` at `pose`: their distance in double precision and
-    /// their indices.
+    /// The nearest pair of one of these points and one of `body` at `pose`: their distance in double
+    /// precision and their indices.
     #[must_use]
     pub fn nearest_pair(&self, body: &PointCloud, pose: &Pose) -> (f64, usize, usize) {
         let mut best = (f64::INFINITY, 0, 0);

@@ -187,8 +187,8 @@ fn has_local_bandwidth(bandwidth: Bandwidth) -> bool {
     matches!(bandwidth, Bandwidth::Local)
 }
 
-/// What helps where points of `view` that sample no sheet leave surfaces in doubt. `radius` is the
-/// greater sampling radius of both scans in the world; `first` comes first.
+/// Remedies where points of `view` that sample no sheet leave surfaces in doubt. `radius` is the greater
+/// sampling radius of both scans in the world; `first` comes first.
 pub(crate) fn for_sparse(view: &ScanView<'_>, radius: f64, first: Option<&str>) -> String {
     let scan = view.scan();
     let mut ways: Vec<String> = first.map(Into::into).into_iter().collect();
@@ -206,7 +206,7 @@ pub(crate) fn for_sparse(view: &ScanView<'_>, radius: f64, first: Option<&str>) 
     ways.join(", or ")
 }
 
-/// What helps where the points of `views` do not look like one sheet.
+/// Remedies where the points of `views` do not look like one sheet.
 pub(crate) fn for_ambiguous(views: [&ScanView<'_>; 2], radius: f64, first: Option<&str>) -> String {
     let is_local = views.iter().any(|v| has_local_bandwidth(v.scan().plan().options().bandwidth));
     let mut ways: Vec<String> = first.map(Into::into).into_iter().collect();

@@ -42,7 +42,7 @@ pub struct CollideArgs {
     /// ones. By the geodesic kernel surfaces alone are compared, and separations are estimated
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
-    /// What is compared
+    /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
     /// Count as meeting what comes nearer than this, in world units

@@ -82,7 +82,7 @@ struct CurveReport {
     complete: Option<bool>,
     evaluations: u64,
     micros: f64,
-    /// What `collide` answers of the surfaces, where no curve was found.
+    /// The answer of `collide` about the surfaces; only where no curve was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     surfaces: Option<AnswerReport>,
     /// The same of obstacles.

@@ -37,11 +37,11 @@ pub struct DistanceArgs {
     /// proven
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
-    /// What is compared
+    /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Obstacles only: how far below the upper bound the lower one may be left, as a share of it, 0 to less than 1. The
-    /// local spacing counts instead where it is greater
+    /// Obstacles only: how far below the upper bound the lower one may be left, as a share of it, 0 to less
+    /// than 1. The local spacing counts instead where it is greater
     #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative)]
     pub relative: f64,
     /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s. The bounds are then further apart

@@ -16,11 +16,11 @@ const LONG: f64 = 10.0;
 /// Memory of the process itself, whatever it does, in bytes.
 const BASE: f64 = 2e7;
 
-/// Bytes a point while a file is read, beside the file itself: its row in double precision, the rounded point and what finds
-/// duplicates. Counted from the arrays of `io` and `PointCloud::cleaned`.
+/// Bytes a point while a file is read, beside the file itself: its row in double precision, the rounded point
+/// and what finds duplicates. Counted from the arrays of `io` and `PointCloud::cleaned`.
 const READING: f64 = 72.0;
 
-/// What a step costs for each point.
+/// The cost of a step per point.
 #[derive(Debug, Clone, Copy)]
 struct Cost {
     /// Peak memory in bytes, input included.
@@ -29,7 +29,7 @@ struct Cost {
     micros: f64,
 }
 
-/// What `preprocess` makes, in the order of what it needs.
+/// The products of `preprocess`, the cheapest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Preparation {
     /// The hierarchy alone.
@@ -43,8 +43,8 @@ pub(crate) enum Preparation {
 }
 
 impl Preparation {
-    /// Measured, bytes a point: peak resident memory less [`BASE`], by getrusage, of release builds on x86-64 with AVX2. And microseconds
-    /// a point, user and system time.
+    /// Measured, bytes a point: peak resident memory less [`BASE`], by getrusage, of release builds on x86-64
+    /// with AVX2. And microseconds a point, user and system time.
     ///
     /// | points | hierarchy | graph | with close pairs |
     /// | --: | --: | --: | --: |
@@ -67,7 +67,7 @@ impl Preparation {
         BASE + self.cost().bytes * points
     }
 
-    /// What needs less, and the option that asks for it.
+    /// A cheaper product, and the option that asks for it.
     fn lighter(self) -> &'static [(Self, &'static str)] {
         match self {
             Self::ClosePairs => &[(Self::Graph, "--no-close-pairs"), (Self::Hierarchy, "--no-graph")],
@@ -95,7 +95,8 @@ impl Forecast<'_> {
         self.refuse(&what, need, &["a part of the file".to_owned()])
     }
 
-    /// Refuses points that do not fit into memory once they are prepared. `bounds` are those of the points, if known.
+    /// Refuses points that do not fit into memory once they are prepared. `bounds` are those of the points,
+    /// if known.
     pub(crate) fn check_preparing(&self, points: u64, bounds: Option<&Aabb>) -> Result<(), CliError> {
         let count = to_float(points);
         let need = self.preparation.bytes(count);
@@ -130,7 +131,8 @@ impl Forecast<'_> {
     }
 }
 
-/// Measured, bytes a sample: 24.2 at 3,453,074 and at 11,932,842 samples of an atrium. The file is written as it goes.
+/// Measured, bytes a sample: 24.2 at 3,453,074 and at 11,932,842 samples of an atrium. The file is written as
+/// it goes.
 const SAMPLE: Cost = Cost { bytes: 24.5, micros: 0.12 };
 
 /// Refuses to sample `mesh` where the samples would not fit into memory, and announces long runs.
@@ -163,8 +165,8 @@ pub(crate) fn check_sampling(
     Ok(())
 }
 
-/// About how many samples `nearmiss::mesh::sample` makes at a spacing: those of the triangles' areas, and what rounding up of rows
-/// and places adds.
+/// About how many samples `nearmiss::mesh::sample` makes at a spacing: those of the triangles' areas, and
+/// what rounding up of rows and places adds.
 fn samples(mesh: &TriangleMesh, spacing: f64, is_jittered: bool) -> f64 {
     // The steps between rows, and between the places in a row, as in `sample`.
     let step = 2.0 / 5.0_f64.sqrt() * spacing * if is_jittered { 0.8 } else { 1.0 };
@@ -180,8 +182,8 @@ fn samples(mesh: &TriangleMesh, spacing: f64, is_jittered: bool) -> f64 {
     mesh.triangles().iter().enumerate().map(of_triangle).sum()
 }
 
-/// An edge length of voxels of which about `points` are occupied, if the points lie on surfaces whose area is that of their bounding
-/// box.
+/// An edge length of voxels of which about `points` are occupied, if the points lie on surfaces whose area is
+/// that of their bounding box.
 fn voxel_for(bounds: &Aabb, points: f64) -> Option<f64> {
     let [x, y, z] = bounds.half_extents().map(|h| 2.0 * h);
     let area = 2.0 * (x * y + y * z + z * x);
@@ -211,7 +213,8 @@ impl Limit {
     }
 }
 
-/// Work of so many microseconds on some threads, 0 for all. Measured runs keep a second thread busy for five sixths of the time.
+/// Work of so many microseconds on some threads, 0 for all. Measured runs keep a second thread busy for five
+/// sixths of the time.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 fn seconds(micros: f64, threads: usize) -> f64 {
     let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);

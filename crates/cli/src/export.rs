@@ -23,8 +23,9 @@ pub struct ExportArgs {
     /// Prepared scan, or a raw input, prepared on the fly
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Points with normals in the order of the prepared file, their index in its input as `source`, and their kind as `kind`, a
-    /// number with a colour: 0 sheet, grey; 1 edge, blue; 2 noisy, yellow; 3 line, green; 4 stray, red; 5 sparse, pink
+    /// Points with normals in the order of the prepared file, their index in its input as `source`, and their
+    /// kind as `kind`, a number with a colour: 0 sheet, grey; 1 edge, blue; 2 noisy, yellow; 3 line, green; 4
+    /// stray, red; 5 sparse, pink
     #[arg(long, value_name = "P.ply")]
     pub points: Option<PathBuf>,
     /// Samples of the nodes at one depth (--level), of each its node, the node's covering radius and sampling radius

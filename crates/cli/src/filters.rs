@@ -16,15 +16,16 @@ use crate::input::pieces;
 /// Options that leave points out, in the order in which they are applied.
 #[derive(Debug, Clone, Default, Args)]
 pub struct FilterArgs {
-    /// Keep the points within a box, given by its lower and upper corner in the units of the input. Filters are applied in this
-    /// order: --crop, --voxel, --remove-outliers, --min-neighbours
+    /// Keep the points within a box, given by its lower and upper corner in the units of the input. Filters
+    /// are applied in this order: --crop, --voxel, --remove-outliers, --min-neighbours
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse_crop)]
     pub crop: Option<CropBox>,
-    /// Keep one point for each cube with edges of length S: the point nearest to the mean of the cube's points
+    /// Keep one point for each cube with edges of length S: the point nearest to the mean of the cube's
+    /// points
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
     pub voxel: Option<f64>,
-    /// Remove points whose mean distance to their K nearest neighbours exceeds the mean of that distance over all points by more
-    /// than SIGMA standard deviations; often 16,2
+    /// Remove points whose mean distance to their K nearest neighbours exceeds the mean of that distance over
+    /// all points by more than SIGMA standard deviations; often 16,2
     #[arg(long, value_name = "K,SIGMA", allow_hyphen_values = true, value_parser = parse_outliers)]
     pub remove_outliers: Option<Outliers>,
     /// Keep the points that have at least N others within the distance R

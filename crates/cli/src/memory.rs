@@ -8,8 +8,8 @@ use clap::Args;
 /// The option that sets a limit.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct MemoryArgs {
-    /// Refuse to start if more memory is expected to be needed, as in 500MB or 16GB; by default more than is available, where that is
-    /// known
+    /// Refuse to start if more memory is expected to be needed, as in 500MB or 16GB; by default more than is
+    /// available, where that is known
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub memory: Option<u64>,
 }
@@ -49,7 +49,8 @@ fn mem_available(text: &str) -> Option<u64> {
     kilobytes.checked_mul(1024)
 }
 
-/// The least that any control group of a process has left; `text` is `/proc/self/cgroup`, and groups lie below `root`.
+/// The least that any control group of a process has left; `text` is `/proc/self/cgroup`, and groups lie
+/// below `root`.
 fn groups_left(text: &str, root: &Path) -> Option<u64> {
     // A line is `number:controllers:path`; version 2 names no controllers.
     let places = text.lines().filter_map(|line| {
@@ -62,7 +63,8 @@ fn groups_left(text: &str, root: &Path) -> Option<u64> {
         };
         Some((folder, path.trim_start_matches('/').to_owned()))
     });
-    // Every group above counts too. In a container the path may be that of the host, so missing files are passed over.
+    // Every group above counts too. In a container the path may be that of the host, so missing files are
+    // passed over.
     let left = places.flat_map(|(folder, path)| {
         let groups: Vec<_> = Path::new(&path).ancestors().map(|group| folder.join(group)).collect();
         groups.into_iter().filter_map(|group| group_left(&group))

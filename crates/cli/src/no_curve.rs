@@ -43,7 +43,8 @@ impl NoCurve {
         [self.surfaces.0.statistics, self.obstacles.0.statistics]
     }
 
-    /// The verdict as `collide` writes it. A contact of the surfaces is a contact; otherwise that of the obstacles.
+    /// The verdict as `collide` writes it. A contact of the surfaces is a contact; otherwise that of the
+    /// obstacles.
     pub(crate) fn word(&self) -> &'static str {
         let (surfaces, obstacles) = (self.surfaces.0.verdict, self.obstacles.0.verdict);
         if surfaces.is_intersecting() || obstacles.is_intersecting() {

@@ -152,8 +152,8 @@ pub(crate) fn splat(view: &ScanView<'_>, i: usize) -> Splat {
     }
 }
 
-/// Paints what stands for the `i`-th stored point in the obstacle: a disc, or a ball. Neither is larger than `largest`, in fine
-/// pixels, nor a ball too small to be seen.
+/// Paints what stands for the `i`-th stored point in the obstacle: a disc, or a ball. Neither is larger than
+/// `largest`, in fine pixels, nor a ball too small to be seen.
 pub(crate) fn obstacle(
     canvas: &mut Canvas,
     camera: &Camera,

@@ -26,8 +26,8 @@ pub struct PairArgs {
     /// Pose of b
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_b: Option<String>,
-    /// Unit of the lengths of a. With --units-a or --units-b the world is in metres, and so is a scan without a unit: scans are scaled
-    /// to metres before their poses are applied
+    /// Unit of the lengths of a. With --units-a or --units-b the world is in metres, and so is a scan without
+    /// a unit: scans are scaled to metres before their poses are applied
     #[arg(long, value_enum, value_name = "U")]
     pub units_a: Option<UnitName>,
     /// Unit of the lengths of b

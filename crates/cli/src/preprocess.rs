@@ -35,8 +35,9 @@ pub struct PreprocessArgs {
     /// K: local radii reach to the K-th neighbour, further where the points look like lines; 3 to 32
     #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32))]
     pub radius_neighbours: u32,
-    /// L: how far the scan may be interpolated, in the units of the input. No gap wider than this is bridged, and no ball is
-    /// wider. By default twice the sampling radius, within which nine tenths of the points have six neighbours
+    /// L: how far the scan may be interpolated, in the units of the input. No gap wider than this is bridged,
+    /// and no ball is wider. By default twice the sampling radius, within which nine tenths of the points
+    /// have six neighbours
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach)]
     pub reach: Option<f64>,
     /// Weight of a point by its distance
@@ -253,8 +254,8 @@ fn forecast(args: &PreprocessArgs, console: Console) -> Forecast<'_> {
     Forecast { path: &args.input, limit, threads, console, preparation }
 }
 
-/// Refuses the input before it is read if it cannot fit, as far as its header and length tell. Returns `true` if a long run was
-/// announced.
+/// Refuses the input before it is read if it cannot fit, as far as its header and length tell. Returns `true`
+/// if a long run was announced.
 fn foresee(args: &PreprocessArgs, forecast: &Forecast<'_>) -> Result<bool, CliError> {
     input::check_raw(&args.input)?;
     let Some(seen) = nearmiss::io::glance(&args.input, args.format.0) else { return Ok(false) };

@@ -9,8 +9,9 @@ use crate::console::Console;
 use crate::digits::rough;
 use crate::posing::Matrix;
 
-/// Scans whose bounds differ more than this in their diagonals may be in different units. An object in a room is commonly 1 to 30
-/// times smaller than the room; the factors from inches, centimetres and millimetres to metres are 39, 100 and 1000.
+/// Scans whose bounds differ more than this in their diagonals may be in different units. An object in a room
+/// is commonly 1 to 30 times smaller than the room; the factors from inches, centimetres and millimetres to
+/// metres are 39, 100 and 1000.
 const SUSPICIOUS: f64 = 30.0;
 
 /// A unit of length, by name.
@@ -83,8 +84,8 @@ fn diagonal(bounds: &Aabb) -> f64 {
     2.0 * bounds.half_extents().iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The scan with the larger numbers is the one in the smaller unit. Whoever has named a unit is asked only where that makes sizes
-/// differ more.
+/// The scan with the larger numbers is the one in the smaller unit. Whoever has named a unit is asked only
+/// where that makes sizes differ more.
 fn question(sizes: [f64; 2], factors: Option<[f64; 2]>) -> Option<String> {
     let ratio = |[a, b]: [f64; 2]| (a / b).max(b / a);
     let (large, small) = if sizes[0] > sizes[1] { ("a", "b") } else { ("b", "a") };

@@ -6,8 +6,8 @@ use crate::error::{FilterError, enough};
 
 /// Returns the points within the box from `min` to `max`, border included, in the frame of the cloud's input.
 ///
-/// A corner may be infinite, which leaves the box open on that side. Positions are those of the cloud, so a point may
-/// have moved across the border by at most [`PointCloud::step`].
+/// A corner may be infinite, which leaves the box open on that side. Positions are those of the cloud, so a
+/// point may have moved across the border by at most [`PointCloud::step`].
 ///
 /// ```
 /// # use nearmiss_geometry::PointCloud;

@@ -1,4 +1,5 @@
-//! Least neighbours: the points that have enough others nearby. And the nearest neighbours that filters ask for.
+//! Least neighbours: the points that have enough others nearby. And the nearest neighbours that filters ask
+//! for.
 
 use std::num::NonZero;
 
@@ -22,8 +23,8 @@ use crate::parallel;
 /// ```
 ///
 /// # Errors
-/// When `n` is 0 or not below the number of points, when `radius` is not positive and finite, or when fewer than 8
-/// points stay.
+/// When `n` is 0 or not below the number of points, when `radius` is not positive and finite, or when fewer
+/// than 8 points stay.
 pub fn min_neighbours(cloud: &PointCloud, n: usize, radius: f64) -> Result<Vec<u32>, FilterError> {
     positive("radius", radius)?;
     // In the local frame, as all distances here.

@@ -8,11 +8,11 @@ use crate::neighbours::Neighbours;
 /// Rounding moves a mean distance by far less than this share of it.
 const ROUNDING: f64 = 1e-9;
 
-/// Returns the points whose mean distance to their `k` nearest neighbours is at most μ + `sigma` · s, where μ and s are
-/// the mean and the standard deviation of that distance over all points.
+/// Returns the points whose mean distance to their `k` nearest neighbours is at most μ + `sigma` · s, where μ
+/// and s are the mean and the standard deviation of that distance over all points.
 ///
-/// This is the statistical outlier filter of PCL and Open3D. As in PCL, and unlike in Open3D, a point is not counted
-/// among its own neighbours. s is the sample standard deviation, with n − 1 in the denominator.
+/// This is the statistical outlier filter of PCL and Open3D. As in PCL, and unlike in Open3D, a point is not
+/// counted among its own neighbours. s is the sample standard deviation, with n − 1 in the denominator.
 ///
 /// ```
 /// # use nearmiss_geometry::PointCloud;
@@ -24,8 +24,8 @@ const ROUNDING: f64 = 1e-9;
 /// ```
 ///
 /// # Errors
-/// When `k` is 0 or not below the number of points, when `sigma` is not positive and finite, or when fewer than 8
-/// points stay.
+/// When `k` is 0 or not below the number of points, when `sigma` is not positive and finite, or when fewer
+/// than 8 points stay.
 pub fn remove_outliers(cloud: &PointCloud, k: usize, sigma: f64) -> Result<Vec<u32>, FilterError> {
     positive("sigma", sigma)?;
     let distances = Neighbours::new(cloud, k)?.map(mean);

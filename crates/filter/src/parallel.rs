@@ -1,7 +1,7 @@
 //! The same work on one thread or on all of them.
 
-/// Returns `work` of each number below `count`, in order. `scratch` is made anew now and then, and must not change a
-/// result.
+/// Returns `work` of each number below `count`, in order. `scratch` is made anew now and then, and must not
+/// change a result.
 #[cfg(feature = "rayon")]
 pub(crate) fn map_with<S, T: Send>(
     count: usize,

@@ -8,11 +8,11 @@ use crate::parallel;
 /// A little less than 2⁶³, so that a quotient below it fits into 64 bits whatever its rounding.
 const MOST_CELLS: f64 = 9.2e18;
 
-/// Returns one point for each occupied cell of a grid of cubes with edges of length `size`: the point nearest to the
-/// mean of the cell's points, the first of those that are equally near.
+/// Returns one point for each occupied cell of a grid of cubes with edges of length `size`: the point nearest
+/// to the mean of the cell's points, the first of those that are equally near.
 ///
-/// The walls of the cells lie at multiples of `size` in the frame of the cloud's input, so equal places of different
-/// clouds fall into equal cells. A cell contains its lower walls.
+/// The walls of the cells lie at multiples of `size` in the frame of the cloud's input, so equal places of
+/// different clouds fall into equal cells. A cell contains its lower walls.
 ///
 /// Takes O(n log n) time and 32 bytes a point.
 ///
@@ -28,7 +28,8 @@ const MOST_CELLS: f64 = 9.2e18;
 /// ```
 ///
 /// # Errors
-/// When `size` is not positive and finite, when 64 bits cannot number the cells, or when fewer than 8 points stay.
+/// When `size` is not positive and finite, when 64 bits cannot number the cells, or when fewer than 8 points
+/// stay.
 pub fn voxel(cloud: &PointCloud, size: f64) -> Result<Vec<u32>, FilterError> {
     positive("voxel size", size)?;
     let bounds = cloud.bounds();
@@ -52,8 +53,8 @@ pub fn voxel(cloud: &PointCloud, size: f64) -> Result<Vec<u32>, FilterError> {
 
 /// The point of a cell that is nearest to the mean of its points.
 ///
-/// Compares |n p − Σ p| instead of |p − Σ p / n|, with p relative to the cell's first point: in double precision this
-/// is exact for all but the largest cells, so points that are equally near compare equal.
+/// Compares |n p − Σ p| instead of |p − Σ p / n|, with p relative to the cell's first point: in double
+/// precision this is exact for all but the largest cells, so points that are equally near compare equal.
 fn most_central(positions: &[[f32; 3]], cell: &[([i64; 3], u32)]) -> u32 {
     let first = cell[0].1;
     let [x, y, z] = positions[first as usize].map(f64::from);

@@ -188,7 +188,8 @@ fn filters_agree_with_their_twins_on_hard_clouds() {
     }
 }
 
-/// Scan lines and walls hold many points with one coordinate, of which some trees make endless or wrong leaves.
+/// Scan lines and walls hold many points with one coordinate, of which some trees make endless or wrong
+/// leaves.
 #[test]
 fn many_equal_coordinates_are_no_trap() {
     for axis in 0..3 {

@@ -184,7 +184,8 @@ impl PointCloud {
     /// ascending order.
     ///
     /// Normals and colours follow their points. The frame and [`PointCloud::step`] stay as they are,
-    /// [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads to indices of the input.
+    /// [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads to indices of
+    /// the input.
     ///
     /// ```
     /// # use nearmiss_geometry::PointCloud;

@@ -144,8 +144,8 @@ impl PointHierarchy {
         f64::from(self.sampling_radius) * self.frame.scale
     }
 
-    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and no local
-    /// radius exceeds it.
+    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and
+    /// no local radius exceeds it.
     #[must_use]
     pub fn reach(&self) -> f64 {
         f64::from(self.reach) * self.frame.scale

@@ -1,9 +1,9 @@
 //! Which points sample a sheet, and which stand for themselves as balls (`docs/theory/obstacle.md`).
 //!
-//! The fit at a point gives its class. A vote of its neighbours then corrects single flips: a noisy point in the
-//! plane of the sheet about it belongs to that sheet, and a plane fitted to a few points of a blob is none. Sparse
-//! points come last in the order of the points and have a subtree of their own, so that a stray never
-//! widens the bounds of a wall. Noisy points have others all around them: they stay among these.
+//! The fit at a point gives its class. A vote of its neighbours then corrects single flips: a noisy point in
+//! the plane of the sheet about it belongs to that sheet, and a plane fitted to a few points of a blob is
+//! none. Sparse points come last in the order of the points and have a subtree of their own, so that a stray
+//! never widens the bounds of a wall. Noisy points have others all around them: they stay among these.
 
 use fearless_simd::Level;
 use nearmiss_surface::{BlockTree, Nearest, PointBlock};
@@ -24,9 +24,10 @@ const MAJORITY: usize = VOTERS / 2;
 /// A sheet point with fewer sheet points among its neighbours is noisy: one may be a chance.
 const ALONE: usize = 2;
 
-/// Half the thickness of a sheet at a point, in its local radius: the surface nearest to the point, and a noisy point
-/// of the same sheet, lie no further from its tangent plane. A curvature of 0.6 over the local radius rises so
-/// far at its distance, and so do two standard deviations of a noise of a fifth of the spacing.
+/// Half the thickness of a sheet at a point, in its local radius: the surface nearest to the point, and a
+/// noisy point of the same sheet, lie no further from its tangent plane. A curvature of 0.6 over the local
+/// radius rises so far at its distance, and so do two standard deviations of a noise of a fifth of the
+/// spacing.
 pub const SLAB: f32 = 0.3;
 
 /// Corrects the classes of single points by those of their neighbours. O(n) where all points are on sheets.
@@ -79,9 +80,9 @@ fn corrected(
     }
 }
 
-/// The points in their order again, the sparse ones last, and how many come before these: as many as fill leaves. Points
-/// that are left over stand for themselves among the sparse ones, noisy ones before those at edges and others. `None` if no point
-/// is sparse.
+/// The points in their order again, the sparse ones last, and how many come before these: as many as fill
+/// leaves. Points that are left over stand for themselves among the sparse ones, noisy ones before those at
+/// edges and others. `None` if no point is sparse.
 pub(crate) fn dense_first(
     positions: &[[f32; 3]],
     fits: &[Fit],

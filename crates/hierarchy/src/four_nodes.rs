@@ -82,8 +82,8 @@ impl<S: Simd> FourNodes<S> {
 }
 
 impl Relative {
-    /// How far the enclosures of this part of either of two nodes of the first scan and either of two of the second are apart: as
-    /// [`Relative::gaps`] of [`Growth::of`] each, by any instructions.
+    /// How far the enclosures of this part of either of two nodes of the first scan and either of two of the
+    /// second are apart: as [`Relative::gaps`] of [`Growth::of`] each, by any instructions.
     ///
     /// # Panics
     /// When there are no such nodes.

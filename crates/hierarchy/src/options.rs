@@ -22,9 +22,10 @@ pub struct BuildOptions {
     /// Sample points of an inner node, 8 to 32, default 16. More make finer levels and tighter coverings, at four bytes
     /// each.
     pub samples: u32,
-    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and no local
-    /// radius exceeds it. `None`, the default: twice the sampling radius, so that nothing is interpolated further from
-    /// a measured point than nine tenths of the points have six neighbours. A tenth of outliers does not change it.
+    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and
+    /// no local radius exceeds it. `None`, the default: twice the sampling radius, so that nothing is
+    /// interpolated further from a measured point than nine tenths of the points have six neighbours. A tenth
+    /// of outliers does not change it.
     pub reach: Option<f64>,
     /// Threads to build on; 0, the default, takes what the process's pool has. Never changes the result.
     pub threads: usize,

@@ -1,4 +1,5 @@
-//! The points in the order of their final tree, whose root parts dense from sparse ones, and what is known of them then.
+//! The points in the order of their final tree, whose root parts dense from sparse ones, and what is known of
+//! them then.
 
 use nearmiss_geometry::PointCloud;
 use nearmiss_surface::{BlockTree, PointBlock};
@@ -30,8 +31,8 @@ pub(crate) struct Ordered {
 }
 
 impl Ordered {
-    /// Those of a cloud. A tree of all points tells how densely they lie and what surface they sample; where some turn out to be
-    /// sparse, a second one parts these from the others.
+    /// Those of a cloud. A tree of all points tells how densely they lie and what surface they sample; where
+    /// some turn out to be sparse, a second one parts these from the others.
     pub(crate) fn of(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
         let leaf_size = options.leaf_size as usize;
         let mut items: Vec<Item> =

@@ -10,8 +10,8 @@ use crate::topology::Node;
 /// Share of the points whose local radius is at most the scan's sampling radius.
 const SAMPLING_QUANTILE: f64 = 0.9;
 
-/// The default reach over the quantile of the radii that it has yet to limit: a gap whose middle is such a radius from
-/// either side is bridged, and no wider one.
+/// The default reach over the quantile of the radii that it has yet to limit: a gap whose middle is such a
+/// radius from either side is bridged, and no wider one.
 const REACH: f32 = 2.0;
 
 /// How densely points lie, and what follows from it.

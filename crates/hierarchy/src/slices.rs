@@ -1,4 +1,5 @@
-//! `Slices`: the arrays of a scan for hot loops, and what of them stands for each point and node in the obstacle.
+//! `Slices`: the arrays of a scan for hot loops, and what of them stands for each point and node in the
+//! obstacle.
 
 use nearmiss_surface::{PointBlock, SurfacePlan};
 
@@ -55,8 +56,8 @@ pub struct Slices<'a> {
     pub sampling_radius: f32,
     /// The scan's reach L.
     pub reach: f32,
-    /// Points before this are on sheets or, noisy, among others; sparse points come from here on, and stand in the
-    /// obstacle as balls. A leaf has points of one sort alone.
+    /// Points before this are on sheets or, noisy, among others; sparse points come from here on, and stand
+    /// in the obstacle as balls. A leaf has points of one sort alone.
     pub dense: usize,
 }
 
@@ -84,8 +85,8 @@ impl Slices<'_> {
         }
     }
 
-    /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's box, and
-    /// contains it.
+    /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's
+    /// box, and contains it.
     ///
     /// # Panics
     /// When there is no such node.
@@ -95,8 +96,8 @@ impl Slices<'_> {
         self.growths[node].of(&self.boxes[node])
     }
 
-    /// A box about the part of the obstacle of a node (`docs/theory/obstacle.md`); it has the axes of the node's
-    /// box, and contains it.
+    /// A box about the part of the obstacle of a node (`docs/theory/obstacle.md`); it has the axes of the
+    /// node's box, and contains it.
     ///
     /// # Panics
     /// When there is no such node.
@@ -106,8 +107,8 @@ impl Slices<'_> {
         self.obstacle_growths[node].of(&self.boxes[node])
     }
 
-    /// The radius of the ball that stands for a point in the obstacle: half its local radius, a third where it has others
-    /// all around it, zero for points on sheets.
+    /// The radius of the ball that stands for a point in the obstacle: half its local radius, a third where
+    /// it has others all around it, zero for points on sheets.
     ///
     /// # Panics
     /// When there is no such point.
@@ -117,7 +118,8 @@ impl Slices<'_> {
         obstacle_ball(i, self.dense, PointKind::from_code(self.kinds[i]), self.radii[i])
     }
 
-    /// Returns `true` if a point stands in the obstacle by the sheet that it samples, and `false` if by a ball.
+    /// Returns `true` if a point stands in the obstacle by the sheet that it samples, and `false` if by a
+    /// ball.
     ///
     /// # Panics
     /// When there is no such point.
@@ -127,8 +129,8 @@ impl Slices<'_> {
         is_on_sheet(i, self.dense, PointKind::from_code(self.kinds[i]))
     }
 
-    /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its part of a
-    /// sheet, the lesser of its local radius and half the reach.
+    /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its
+    /// part of a sheet, the lesser of its local radius and half the reach.
     ///
     /// # Panics
     /// When there is no such point.
@@ -142,8 +144,8 @@ impl Slices<'_> {
         }
     }
 
-    /// How far from a point on a sheet the surface belongs to the obstacle: the lesser of its local radius and half the
-    /// reach.
+    /// How far from a point on a sheet the surface belongs to the obstacle: the lesser of its local radius
+    /// and half the reach.
     ///
     /// # Panics
     /// When there is no such point.
@@ -153,9 +155,9 @@ impl Slices<'_> {
         cell_radius(self.radii[i], self.reach)
     }
 
-    /// About a [sparse](PointKind::is_sparse) point, the radius of the ball in which surface may be that no disc
-    /// stands for: the local radius, but no more than the scan's, within which nothing is promised of any point.
-    /// Zero for others.
+    /// About a [sparse](PointKind::is_sparse) point, the radius of the ball in which surface may be that no
+    /// disc stands for: the local radius, but no more than the scan's, within which nothing is promised of
+    /// any point. Zero for others.
     ///
     /// # Panics
     /// When there is no such point.
@@ -175,12 +177,12 @@ pub(crate) fn cell_radius(radius: f32, reach: f32) -> f32 {
 /// How far a disc with its thickness reaches, in its radius.
 const DISC_REACH: f32 = 1.0 + THICKNESS;
 
-/// The ball of a point that has others all around, in its local radius: half the radius of a disc of a sheet. The nearest
-/// neighbour is 0.36 local radii away on average, so such balls overlap.
+/// The ball of a point that has others all around, in its local radius: half the radius of a disc of a sheet.
+/// The nearest neighbour is 0.36 local radii away on average, so such balls overlap.
 const BALL_AMONG_OTHERS: f32 = 0.325;
 
-/// The ball of any other point. Half the local radius is the most at which the centres of two balls that touch are no further apart
-/// than the greater of their local radii.
+/// The ball of any other point. Half the local radius is the most at which the centres of two balls that
+/// touch are no further apart than the greater of their local radii.
 const BALL_OF_SPARSE: f32 = 0.5;
 
 /// See [`Slices::obstacle_ball`].

@@ -345,8 +345,8 @@ pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
     smoothed.concat()
 }
 
-/// Limits `radii`, the smoothed `spacings`, to `reach`. A ring whose next ring is further away than that is a line,
-/// with its K-th neighbour's distance; any other point with a greater spacing is [`Look::Sparse`].
+/// Limits `radii`, the smoothed `spacings`, to `reach`. A ring whose next ring is further away than that is a
+/// line, with its K-th neighbour's distance; any other point with a greater spacing is [`Look::Sparse`].
 ///
 /// The least of the spacings about a point and the reach is the least of the limited spacings about it, so
 /// this equals a limit before smoothing.

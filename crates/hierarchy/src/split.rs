@@ -33,8 +33,8 @@ const WORTH_A_TRY: f32 = 0.5;
 /// Splits need no more than this many points to tell which axis is better.
 const JUDGED_BY: usize = 512;
 
-/// Orders `items` into leaves and returns the nodes with their boxes about the points; the root parts the first
-/// `sheets`, which fill whole leaves, from the others. O(n log n).
+/// Orders `items` into leaves and returns the nodes with their boxes about the points; the root parts the
+/// first `sheets`, which fill whole leaves, from the others. O(n log n).
 pub(crate) fn split(items: &mut [Item], leaf_size: usize, dense: usize) -> (Vec<Node>, Vec<OrientedBox>) {
     let count = node_count(items.len(), leaf_size);
     let mut nodes = vec![Node::default(); count];

@@ -87,8 +87,8 @@ impl PointKind {
     /// The greatest code of a kind.
     pub(crate) const LAST: u8 = Self::Sparse.code();
 
-    /// Returns `true` if so little is known about the point that its disc is not to be trusted: some surface lies
-    /// within about a local radius.
+    /// Returns `true` if so little is known about the point that its disc is not to be trusted: some surface
+    /// lies within about a local radius.
     #[inline]
     #[must_use]
     pub const fn is_sparse(self) -> bool {
@@ -143,7 +143,8 @@ pub(crate) struct Surfels {
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) discs: Vec<f32>,
     pub(crate) kinds: Vec<u8>,
-    /// Those of [`Slices::ball`](crate::Slices::ball) and [`Slices::obstacle_ball`](crate::Slices::obstacle_ball): the greater.
+    /// Those of [`Slices::ball`](crate::Slices::ball) and
+    /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball): the greater.
     pub(crate) balls: Vec<f32>,
     /// About the disc and the ball of each point.
     pub(crate) flat: Vec<Solid>,
@@ -304,7 +305,8 @@ impl Leaf<'_> {
         );
     }
 
-    /// The discs of the points, narrowed at borders, and bounds of their part of the surface and of the obstacle.
+    /// The discs of the points, narrowed at borders, and bounds of their part of the surface and of the
+    /// obstacle.
     #[inline(always)]
     fn look_about<S: Simd>(
         &self,
@@ -368,8 +370,8 @@ pub(crate) fn fitted(at: &Evaluation, look: Look) -> Fit {
     Fit { normal, kind: kind(at, look) }
 }
 
-/// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose support radii
-/// reach `p`.
+/// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose
+/// support radii reach `p`.
 pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], (radius, reach): (f32, f32), near: &[PointBlock]) -> Surfel {
     let gap = dispatch!(Level::new(), simd => simd.vectorize(
         #[inline(always)]

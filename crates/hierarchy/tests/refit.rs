@@ -52,7 +52,8 @@ fn a_fit_by_straight_distances_changes_nothing() {
             assert!(!same || near(again.discs()[i], scan.discs()[i]), "the disc of point {i}");
             differ += usize::from(!same);
         }
-        // A vote is of the nearest, and takes the normal of the nearest of a sheet: of several equally near, of any.
+        // A vote is of the nearest, and takes the normal of the nearest of a sheet: of several equally near,
+        // of any.
         assert!(20 * differ <= scan.len(), "{differ} points");
         if differ > 0 {
             continue;
@@ -102,7 +103,8 @@ fn what_a_fit_says_is_kept() {
     let mut kept = 0;
     for i in 0..scan.len() {
         if scan.kind(i) != kinds[i % 4] {
-            // The vote of the neighbours: noisy points join a sheet, and sheet points without company are noisy.
+            // The vote of the neighbours: noisy points join a sheet, and sheet points without company are
+            // noisy.
             let voted = if i % 4 == 2 { PointKind::Sheet } else { PointKind::Noisy };
             assert!(i % 4 < 3 && scan.kind(i) == voted, "point {i}");
             continue;

@@ -9,7 +9,8 @@ fn built(points: &[[f64; 3]]) -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
-/// A plate of 100 by 100 points of spacing 1, without those strictly within a square of side `hole` in its middle.
+/// A plate of 100 by 100 points of spacing 1, without those strictly within a square of side `hole` in its
+/// middle.
 fn plate(hole: f64) -> Vec<[f64; 3]> {
     let mut points: Vec<[f64; 3]> =
         (0..100_u8).flat_map(|i| (0..100_u8).map(move |j| [f64::from(i), f64::from(j), 0.0])).collect();

@@ -30,14 +30,15 @@ pub struct Glance {
     pub points: u64,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Bounds of some thousands of points throughout the file, if it holds nothing but points that are not compressed.
+    /// Bounds of some thousands of points throughout the file, if it holds nothing but points that are not
+    /// compressed.
     pub bounds: Option<Aabb>,
 }
 
 /// Looks at the header and at some pieces of a file, a third of a mebibyte in all.
 ///
-/// Returns `None` if the file cannot be read or is of an unknown format. A header that promises more points than the
-/// file has space for is not believed.
+/// Returns `None` if the file cannot be read or is of an unknown format. A header that promises more points
+/// than the file has space for is not believed.
 #[must_use]
 pub fn glance(path: &Path, format: Option<Format>) -> Option<Glance> {
     check_file(path).ok()?;

@@ -52,7 +52,8 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     })
 }
 
-/// How many points a file of this length that begins like this has, as its header says, and at most as many as fit.
+/// How many points a file of this length that begins like this has, as its header says, and at most as many
+/// as fit.
 pub(crate) fn count(head: &[u8], length: u64) -> Option<u64> {
     let (header, lines) = header::parse(head).ok()?;
     let room = u128::from(length - lines.offset() as u64);

@@ -86,7 +86,8 @@ impl Rows for Vertices {
     }
 }
 
-/// How many vertices a file of this length that begins like this has, as its header says, and at most as many as fit.
+/// How many vertices a file of this length that begins like this has, as its header says, and at most as many
+/// as fit.
 pub(crate) fn count(head: &[u8], length: u64) -> Option<u64> {
     let (header, lines) = header::parse(head).ok()?;
     let vertex = header.vertices().ok()?;

@@ -1,4 +1,5 @@
-//! The obstacle of a scan: what is certified, how far the band goes, and how distances bracket, against brute force.
+//! The obstacle of a scan: what is certified, how far the band goes, and how distances bracket, against brute
+//! force.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::{
@@ -26,8 +27,8 @@ fn how_far(a: &ScanView<'_>, b: &ScanView<'_>) -> Distance {
     distance(a, b, &plan, &Budget::UNLIMITED)
 }
 
-/// The points of a scan in the world, each with the radius of its ball and the radius within which its part of the obstacle
-/// lies: from the definition in `docs/theory/obstacle.md` alone.
+/// The points of a scan in the world, each with the radius of its ball and the radius within which its part
+/// of the obstacle lies: from the definition in `docs/theory/obstacle.md` alone.
 fn matter(view: &ScanView<'_>) -> Vec<([f64; 3], f64, f64)> {
     let (slices, scale) = (view.slices(), view.placed().scale());
     let part = |i: usize| {
@@ -46,8 +47,8 @@ fn matter(view: &ScanView<'_>) -> Vec<([f64; 3], f64, f64)> {
     (0..view.scan().len()).map(part).collect()
 }
 
-/// Bounds of the distance of two obstacles by all pairs of points: by balls from above, and by what holds each part from below. And
-/// the distance of the nearest points.
+/// Bounds of the distance of two obstacles by all pairs of points: by balls from above, and by what holds
+/// each part from below. And the distance of the nearest points.
 fn brute_force(a: &ScanView<'_>, b: &ScanView<'_>) -> [f64; 3] {
     let (of_a, of_b) = (matter(a), matter(b));
     let mut bounds = [f64::INFINITY; 3];
@@ -188,7 +189,8 @@ fn the_band_of_uneven_plates_is_local_and_no_wider_than_the_reach() {
     }
 }
 
-/// A wall, a second one half a spacing behind it, one point in a hundred anywhere: strays are met, and widen nothing.
+/// A wall, a second one half a spacing behind it, one point in a hundred anywhere: strays are met, and widen
+/// nothing.
 #[test]
 fn strays_are_obstacles_and_widen_no_wall() {
     let spacing = 0.05;
@@ -212,7 +214,8 @@ fn strays_are_obstacles_and_widen_no_wall() {
     let (mut met, mut proven, mut asked) = (0, 0, 0);
     for stray in &strays {
         let views = [room.at(&Pose::IDENTITY), probe.at(&Pose::from_translation(*stray))];
-        // The middle of the probe is hollow: the ball about the stray reaches its shell, or the stray is within it.
+        // The middle of the probe is hollow: the ball about the stray reaches its shell, or the stray is
+        // within it.
         let Distance { lower, upper, .. } = how_far(&views[0], &views[1]);
         assert!(upper <= 0.05 && lower <= upper, "{stray:?}: {lower} to {upper}");
         met += usize::from(upper == 0.0);

@@ -1,7 +1,7 @@
 //! The balls that stand in an obstacle for points that sample no sheet, against balls and against discs.
 //!
-//! Where a leaf of balls is near another leaf, each of its points that reaches the other's box is held against
-//! sixteen points there at a time. Whether a ball meets a ball is a matter of arithmetic; whether it
+//! Where a leaf of balls is near another leaf, each of its points that reaches the other's box is held
+//! against sixteen points there at a time. Whether a ball meets a ball is a matter of arithmetic; whether it
 //! meets a sheet is one too where it holds a point of that sheet, and to first order where it meets a disc.
 
 use std::ops::ControlFlow;
@@ -116,10 +116,11 @@ impl Posed<'_> {
         [f64::from(self.a.obstacle_ball(i)) * sa, f64::from(self.b.obstacle_ball(j)) * sb]
     }
 
-    /// The contact of a ball, of point `i` or `j` or both, with what the other stands for, if these are no further
-    /// apart than `margin` in the world.
+    /// The contact of a ball, of point `i` or `j` or both, with what the other stands for, if these are no
+    /// further apart than `margin` in the world.
     ///
-    /// Certified where a ball meets a ball or holds a measured point, estimated where it meets a tangent disc.
+    /// Certified where a ball meets a ball or holds a measured point, estimated where it meets a tangent
+    /// disc.
     pub(crate) fn ball_contact(&self, [i, j]: [usize; 2], margin: f64) -> Option<(Contact, Evidence)> {
         let [p, q] = [self.views[0].point(i), self.views[1].point(j)].map(Vector3::from);
         let [ra, rb] = self.balls([i, j]);

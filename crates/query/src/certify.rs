@@ -109,8 +109,8 @@ impl<'a> Certifier<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Proves all of `excluded`, or all there is if nothing was noted, and hands the proof out. Returns the least gap, in
-    /// the world, and the band there; `None` where the proof fails.
+    /// Proves all of `excluded`, or all there is if nothing was noted, and hands the proof out. Returns the
+    /// least gap, in the world, and the band there; `None` where the proof fails.
     pub(crate) fn prove_apart(
         &mut self,
         excluded: Option<&[Excluded]>,
@@ -131,8 +131,8 @@ impl<'a> Certifier<'a> {
         Some((distance, self.pair.band_of(self.nearest().unwrap_or(roots))))
     }
 
-    /// Proves these pairs of leaves, which were compared without a hit; or breaks. Their boxes overlap, and so do their
-    /// enclosures: only of obstacles may their points tell more.
+    /// Proves these pairs of leaves, which were compared without a hit; or breaks. Their boxes overlap, and
+    /// so do their enclosures: only of obstacles may their points tell more.
     pub(crate) fn prove_leaves(&mut self, compared: &[NodePair]) -> ControlFlow<()> {
         for &pair in compared {
             let gap = match self.pair.part {

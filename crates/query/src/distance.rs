@@ -34,8 +34,8 @@ use search::{Frontier, Search};
 pub struct DistanceOptions {
     /// What is to be apart. Default: obstacles.
     pub semantics: Semantics,
-    /// Of obstacles, how far below the upper bound the lower one may be left, as a share of it: 0 to less than 1, default
-    /// 0.1. Far away, where that is more than the band, the band counts.
+    /// Of obstacles, how far below the upper bound the lower one may be left, as a share of it: 0 to less
+    /// than 1, default 0.1. Far away, where that is more than the band, the band counts.
     pub relative: f64,
     /// By which distances surfaces are defined. None, the default: as both scans were prepared.
     pub metric: Option<Metric>,
@@ -81,8 +81,8 @@ impl DistancePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// [`PlanError::Radius`] for one that is no length; [`PlanError::Relative`]; [`PlanError::Metric`] and [`PlanError::Metrics`] for scans whose surfaces
-    /// are not defined as it is asked, or not alike.
+    /// [`PlanError::Radius`] for one that is no length; [`PlanError::Relative`]; [`PlanError::Metric`]
+    /// and [`PlanError::Metrics`] for scans whose surfaces are not defined as it is asked, or not alike.
     pub fn new(options: &DistanceOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         if !(0.0..1.0).contains(&options.relative) {
             return Err(PlanError::Relative(options.relative));
@@ -109,10 +109,10 @@ impl DistancePlan {
 pub struct Distance {
     /// They are no nearer than this: proven.
     pub lower: f64,
-    /// The band at the nearest places: the greater of the local radii of the two points there, at most the greater reach,
-    /// in the world. Nothing is promised of where the scanned things themselves are within it.
+    /// The band at the nearest places: the greater of the local radii of the two points there, at most the
+    /// greater reach, in the world. Nothing is promised of where the scanned things themselves are within it.
     pub band: f64,
-    /// They are no further apart than this; see [`Self::evidence`]. Infinite for poses that are none.
+    /// They are no further apart than this; see [`Self::evidence`]. Infinite if a pose is invalid.
     pub upper: f64,
     /// A place of either scan: of the surfaces those that show [`Self::upper`], of points the samples.
     pub points: [[f64; 3]; 2],
@@ -188,8 +188,8 @@ pub fn distance_with(
     }
 }
 
-/// Beyond so many bands feet on the surfaces of obstacles are hardly nearer than the points: by a hundredth at most, where points are
-/// within 0.6 bands of them.
+/// Beyond so many bands feet on the surfaces of obstacles are hardly nearer than the points: by a hundredth
+/// at most, where points are within 0.6 bands of them.
 const FAR_FEET: f64 = 6.0;
 
 /// The search for a distance.
@@ -295,7 +295,8 @@ impl Apart<'_> {
         self.pair.band(self.best.points)
     }
 
-    /// The places of the balls about the nearest points, which lie at `centres`, that are nearest to each other.
+    /// The places of the balls about the nearest points, which lie at `centres`, that are nearest to each
+    /// other.
     fn places_of_balls(&self, centres: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         let [p, q] = centres.map(Vector3::from);
         let balls = self.pair.balls(self.best.points);

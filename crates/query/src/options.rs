@@ -12,14 +12,14 @@ use crate::verdict::Evidence;
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Semantics {
-    /// Their obstacles have a point in common (`docs/theory/obstacle.md`). The obstacle of a scan is its surface where
-    /// points sample a sheet, a ball about every other point, and every measured point itself; none of it is
-    /// further from a measured point than that point's local radius or half the scan's reach. Two-sided: a ball
-    /// wholly inside a hollow ball does not meet it.
+    /// Their obstacles have a point in common (`docs/theory/obstacle.md`). The obstacle of a scan is its
+    /// surface where points sample a sheet, a ball about every other point, and every measured point itself;
+    /// none of it is further from a measured point than that point's local radius or half the scan's reach.
+    /// Two-sided: a ball wholly inside a hollow ball does not meet it.
     #[default]
     Obstacle,
-    /// Their implicit surfaces have a point in common, as the papers define them: points that sample no sheet are no
-    /// obstacles. Two-sided likewise.
+    /// Their implicit surfaces have a point in common, as the papers define them: points that sample no sheet
+    /// are no obstacles. Two-sided likewise.
     Surface,
     /// Balls of this radius (world units, zero or more) about the points of both overlap or touch: exact.
     Thickened(f64),
@@ -161,12 +161,14 @@ pub struct CollideOptions {
     /// two to three times as much, and says a proven distance; where the proof fails, the separation is still answered
     /// as estimated. By the geodesic kernel it always is, for enclosures are proven of straight distances alone.
     pub evidence: Evidence,
-    /// By which distances surfaces are defined; balls about points know none. None, the default: as both scans were prepared.
+    /// By which distances surfaces are defined; balls about points know none. None, the default: as both
+    /// scans were prepared.
     pub metric: Option<Metric>,
     /// How two leaves are compared. Default: by tangent discs. Any other method compares surfaces alone.
     pub method: Method,
-    /// Which pairs of nodes are looked at first, of surfaces and obstacles. None, the default: what measuring found best
-    /// (benches/record), depth first, or by overlap where a budget of work or time may end the search.
+    /// Which pairs of nodes are looked at first, of surfaces and obstacles. None, the default: what measuring
+    /// found best (benches/record), depth first, or by overlap where a budget of work or time may end the
+    /// search.
     pub order: Option<Order>,
     /// Whether nodes whose boxes overlap are also parted by their sphere coverings (S0 §5.1), of surfaces and
     /// obstacles. Default: no, for that costs more than it saves (benches/record).

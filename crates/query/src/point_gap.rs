@@ -1,9 +1,9 @@
 //! Lower bounds of the distance of obstacles from the points of a leaf.
 //!
 //! No place of the obstacle is further from its nearest point than that point's reach
-//! ([`Slices::obstacle_reach`]). So the balls of these radii about the points of a leaf contain its part of the
-//! obstacle. Where a leaf straddles a gap, as one of a depth frame does at a silhouette, or holds strays, its
-//! box is mostly empty, and these balls tell far more.
+//! ([`Slices::obstacle_reach`]). So the balls of these radii about the points of a leaf contain its part of
+//! the obstacle. Where a leaf straddles a gap, as one of a depth frame does at a silhouette, or holds strays,
+//! its box is mostly empty, and these balls tell far more.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
@@ -16,8 +16,8 @@ use crate::posed::Posed;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// A leaf longer than so many of its greatest local radii is not a patch of a sheet. Half the length of a patch of 16 points
-/// is some two.
+/// A leaf longer than so many of its greatest local radii is not a patch of a sheet. Half the length of a
+/// patch of 16 points is some two.
 const LOOSE: f32 = 3.0;
 
 /// Points of a leaf in lanes, in one of the two stored frames, with how far the obstacle reaches from each.
@@ -99,8 +99,8 @@ impl Posed<'_> {
         scan.nodes[id.index()].is_leaf() && bounds.half[0] > LOOSE * bounds.reach
     }
 
-    /// A lower bound of the distance of the obstacles of two nodes by the points of a loose leaf, or of two leaves; `None` where
-    /// boxes tell as much.
+    /// A lower bound of the distance of the obstacles of two nodes by the points of a loose leaf, or of two
+    /// leaves; `None` where boxes tell as much.
     #[inline]
     pub(crate) fn gap_by_points(&self, pair: NodePair) -> Option<f32> {
         let [a, b] = [self.a.nodes[pair.a.index()].is_leaf(), self.b.nodes[pair.b.index()].is_leaf()];
@@ -118,7 +118,8 @@ impl Posed<'_> {
         )))
     }
 
-    /// By the points of the loose leaf, which is that of a or else that of b, and the enclosure of the other node.
+    /// By the points of the loose leaf, which is that of a or else that of b, and the enclosure of the other
+    /// node.
     #[inline(always)]
     fn gap_of_loose<S: Simd>(&self, simd: S, pair: NodePair, of_a: bool) -> f32 {
         let mut least = f32::INFINITY;

@@ -45,7 +45,8 @@ impl<'a> Posed<'a> {
         self.in_world([self.a.radii[i], self.b.radii[j]])
     }
 
-    /// The band where the nearest places are of two nodes, in the world: the greatest local radius of any point of theirs.
+    /// The band where the nearest places are of two nodes, in the world: the greatest local radius of any
+    /// point of theirs.
     pub(crate) fn band_of(&self, nodes: NodePair) -> f64 {
         self.in_world([self.a.boxes[nodes.a.index()].reach, self.b.boxes[nodes.b.index()].reach])
     }
@@ -78,7 +79,8 @@ impl<'a> Posed<'a> {
         self.relative.gaps_of_enclosures(self.level, self.part, [self.a, self.b], a, b)
     }
 
-    /// The gap between the parts of two nodes: that of their enclosures or, of obstacles, that of their points if it is more.
+    /// The gap between the parts of two nodes: that of their enclosures or, of obstacles, that of their
+    /// points if it is more.
     pub(crate) fn gap_of_parts(&self, pair: NodePair) -> f32 {
         self.better_gap(pair, self.gaps_of_enclosures([pair.a; 2], [pair.b; 2])[0])
     }
@@ -194,8 +196,8 @@ impl Balls {
     }
 }
 
-/// A lower bound of the distance of this part of two scans in the world: that of balls about them, which is less than 0 where
-/// these overlap.
+/// A lower bound of the distance of this part of two scans in the world: that of balls about them, which is
+/// less than 0 where these overlap.
 pub(crate) fn balls_apart([a, b]: [&ScanView<'_>; 2], part: Part) -> f64 {
     let about = |view: &ScanView<'_>| match part {
         Part::Obstacle => view.slices().outline.obstacle,

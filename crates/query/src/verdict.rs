@@ -103,9 +103,9 @@ pub struct Statistics {
 pub struct Answer {
     /// Whether they meet.
     pub verdict: Verdict,
-    /// The band, a length in the world: nothing is promised of where the scanned things themselves are within it. Where
-    /// scans meet, the greater local radius of the two points that show it; otherwise that of all points near the
-    /// narrowest gap that was proven, or of the scans. Never more than the greater
+    /// The band, a length in the world: nothing is promised of where the scanned things themselves are within
+    /// it. Where scans meet, the greater local radius of the two points that show it; otherwise that of all
+    /// points near the narrowest gap that was proven, or of the scans. Never more than the greater
     /// [reach](nearmiss_hierarchy::PointHierarchy::reach); infinite for invalid poses.
     pub band: f64,
     /// By [`Method::Sampling`](crate::Method), the least |f_A| + |f_B| of all test points on which both mean something, in

@@ -78,8 +78,9 @@ impl<'a> ScanView<'a> {
         self.is_proper
     }
 
-    /// Returns `true` if `x`, a place of the implicit surface in the world near the stored point `i`, belongs to the
-    /// obstacle: it lies in the cell of its nearest stored point, which samples a sheet (`docs/theory/obstacle.md`).
+    /// Returns `true` if `x`, a place of the implicit surface in the world near the stored point `i`, belongs
+    /// to the obstacle: it lies in the cell of its nearest stored point, which samples a sheet
+    /// (`docs/theory/obstacle.md`).
     pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
         let x = self.placed.apply_inverse(x);
         let nearest = self.scan.nearest_point_near(i, x) as usize;

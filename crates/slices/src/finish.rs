@@ -4,9 +4,10 @@
 //! the height that it still has to compare with. Here a voxel is an obstacle if its highest point lies more than ε σ above its lowest,
 //! whatever the order.
 //!
-//! A surface that crosses from a slice into the next is one surface: where the gap between the highest point of a voxel and the lowest of
-//! the one above is at most ε σ, both are obstacles if together they span more than ε σ; if not, they are one floor.
-//! Either voxel keeps its own highest level, so a floor that is looked up in the lower slice has the height of a point.
+//! A surface that crosses from a slice into the next is one surface: where the gap between the highest point
+//! of a voxel and the lowest of the one above is at most ε σ, both are obstacles if together they span more
+//! than ε σ; if not, they are one floor. Either voxel keeps its own highest level, so a floor that is looked
+//! up in the lower slice has the height of a point.
 
 use crate::Grid;
 use crate::build::Layer;

@@ -67,8 +67,8 @@ pub(crate) fn distance(a: &Placed, b: &Placed, wanted: f64) -> Option<f64> {
     proven.or_else(|| distance_along(a, b, between_nearest(a, b), wanted))
 }
 
-/// About how far two sets of balls are apart, if it is proven that they are disjoint and at least `wanted` apart: of each its
-/// centre, or a box of which every place is a centre, and the radius.
+/// About how far two sets of balls are apart, if it is proven that they are disjoint and at least `wanted`
+/// apart: of each its centre, or a box of which every place is a centre, and the radius.
 pub(crate) fn distance_of_balls(a: &[(Placed, f64)], b: &[(Placed, f64)], wanted: f64) -> Option<f64> {
     let mut least = f64::INFINITY;
     for (p, of_a) in a {

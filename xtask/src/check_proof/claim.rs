@@ -159,8 +159,8 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// About how far the obstacles of a pair of nodes are apart, if their points show that it is at least `wanted`: the balls
-    /// about the points of either, or of both, in which the obstacle lies.
+    /// About how far the obstacles of a pair of nodes are apart, if their points show that it is at least
+    /// `wanted`: the balls about the points of either, or of both, in which the obstacle lies.
     fn by_points(
         &self,
         line: &Line,
@@ -233,8 +233,8 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// The witness lies in both obstacles, or together no further from them than the margin: on the surface in a cell, in a ball,
-    /// or at a measured point.
+    /// The witness lies in both obstacles, or together no further from them than the margin: on the surface
+    /// in a cell, in a ball, or at a measured point.
     fn obstacles_meet(
         &self,
         line: &Line,

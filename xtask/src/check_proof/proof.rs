@@ -62,7 +62,8 @@ pub(crate) enum Evidence {
     Estimated,
 }
 
-/// A node: its points, and the box that is claimed to contain their part of the surface or obstacle, in the stored frame.
+/// A node: its points, and the box that is claimed to contain their part of the surface or obstacle, in the
+/// stored frame.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(crate) struct Enclosure {
     pub(crate) first: u32,

@@ -70,15 +70,15 @@ impl Subject {
         self.radius(i) * if is_alone { 0.5 } else { 0.325 }
     }
 
-    /// How far the obstacle lies at most from point `i` where that is its nearest point: the radius of its ball; or that of
-    /// its cell, or of its disc with the thickness of a twentieth of its radius.
+    /// How far the obstacle lies at most from point `i` where that is its nearest point: the radius of its
+    /// ball; or that of its cell, or of its disc with the thickness of a twentieth of its radius.
     pub(crate) fn reach(&self, i: usize) -> f64 {
         let slices = self.scan.slices();
         if self.is_on_sheet(i) { self.cell(i).max(1.05 * f64::from(slices.discs[i])) } else { self.ball(i) }
     }
 
-    /// Whether `x`, a place of the surface in the stored frame, belongs to the obstacle, up to rounding: it is in the cell
-    /// of its nearest point, which samples a sheet.
+    /// Whether `x`, a place of the surface in the stored frame, belongs to the obstacle, up to rounding: it
+    /// is in the cell of its nearest point, which samples a sheet.
     pub(crate) fn is_in_cell(&self, x: [f64; 3]) -> bool {
         let slices = self.scan.slices();
         let away = |p: &[f32; 3]| [0, 1, 2].map(|k| x[k] - f64::from(p[k]));
@@ -92,7 +92,8 @@ impl Subject {
             || slices.positions.iter().enumerate().any(|(i, p)| is_nearest(p) && self.is_in_cell_of(i, x))
     }
 
-    /// Whether `x` in the stored frame is in the cell of point `i`, up to rounding, if that is its nearest point.
+    /// Whether `x` in the stored frame is in the cell of point `i`, up to rounding, if that is its nearest
+    /// point.
     pub(crate) fn is_in_cell_of(&self, i: usize, x: [f64; 3]) -> bool {
         let slices = self.scan.slices();
         let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.positions[i][k]));

@@ -86,8 +86,8 @@ pub(crate) fn check_near(
     seen.ok_or_else(|| "no point of the surface was found near the witness".into())
 }
 
-/// How far `x` of the world is from the nearest ball that stands for a point in the obstacle; points on sheets have none,
-/// and are places of it themselves.
+/// How far `x` of the world is from the nearest ball that stands for a point in the obstacle; points on
+/// sheets have none, and are places of it themselves.
 pub(crate) fn distance_of_balls(subject: &Subject, placement: &Placement, x: [f64; 3]) -> f64 {
     let x = placement.stored(x);
     let away = |(i, p): (usize, &[f32; 3])| (distance(&p.map(f64::from), &x) - subject.ball(i)).max(0.0);

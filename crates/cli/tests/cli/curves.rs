@@ -97,7 +97,8 @@ fn ends_misses_and_budgets_are_said() {
     assert!(std::fs::read_to_string(place.path("none.ply")).unwrap().contains("element vertex 0\n"));
 }
 
-/// Scans that meet without a curve are not said to be apart, nor is a contact of points said to be one of surfaces.
+/// Scans that meet without a curve are not said to be apart, nor is a contact of points said to be one of
+/// surfaces.
 #[test]
 fn contacts_without_a_curve_are_said() {
     let place = Place::new();

@@ -38,7 +38,8 @@ impl WideTree {
 }
 
 impl Slices<'_> {
-    /// Boxes and enclosures of this part of [`WideTree::children`], in the same order; what there is in other lanes says nothing.
+    /// Boxes and enclosures of this part of [`WideTree::children`], in the same order; what there is in other
+    /// lanes says nothing.
     ///
     /// # Panics
     /// When there is no such node.

@@ -216,7 +216,8 @@ impl Follower<'_> {
         }
     }
 
-    /// Returns `true` if `passed` lies beyond `next` and a chord from `here` would be too long or turn too far to leave `next` out.
+    /// Returns `true` if `passed` lies beyond `next` and a chord from `here` would be too long or turn too
+    /// far to leave `next` out.
     fn needs_between(&self, here: &Place, next: &Place, passed: &Place) -> bool {
         let direct = passed.point - here.point;
         let is_beyond = (passed.point - next.point).dot(&(next.point - here.point)) > 0.0;

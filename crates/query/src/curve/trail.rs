@@ -79,8 +79,9 @@ impl Trail {
 
     const FEWEST: usize = 256;
 
-    /// Share of its length by which a chord is extended to look for places: `SAME_TURN` times the tangent of `MOST_TURN`. Within
-    /// `SAME_TURN` of its length aside, no place then lies between two chords that turn by `MOST_TURN`.
+    /// Share of its length by which a chord is extended to look for places: `SAME_TURN` times the tangent of
+    /// `MOST_TURN`. Within `SAME_TURN` of its length aside, no place then lies between two chords that turn
+    /// by `MOST_TURN`.
     const BEYOND: f64 = 0.07;
 
     pub(super) fn clear(&mut self, origin: Vector3<f64>, longest: f64) {
@@ -156,8 +157,9 @@ impl Trail {
 
     /// The nearest place that the chord from `here` to `next` passes within `aside`, in the same direction.
     ///
-    /// The chord is extended by [`Self::BEYOND`] of its length. Otherwise a place just beyond `next` would be missed where the
-    /// next chord turns away from it: that place is then neither before the end of this chord nor ahead of the next one.
+    /// The chord is extended by [`Self::BEYOND`] of its length. Otherwise a place just beyond `next` would be
+    /// missed where the next chord turns away from it: that place is then neither before the end of this
+    /// chord nor ahead of the next one.
     pub(super) fn passed(&self, here: &Place, next: &Place, aside: f64) -> Option<usize> {
         let chord = next.point - here.point;
         let length = chord.norm();

@@ -128,7 +128,8 @@ impl Motion {
         ((bound - self.distance) as f32).next_up().next_up()
     }
 
-    /// So much further away than the centres of the scans, or a little less, is what is no nearer than this `bound`.
+    /// So much further away than the centres of the scans, or a little less, is what is no nearer than this
+    /// `bound`.
     #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
     pub(crate) fn no_nearer(&self, bound: f64) -> f32 {
         ((bound - self.distance) as f32).next_down().next_down().max(self.least())

@@ -112,7 +112,8 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
     best
 }
 
-/// How far apart, in b's stored frame, points may come out that are no further apart than `distance`, beside their balls.
+/// How far apart, in b's stored frame, points may come out that are no further apart than `distance`, beside
+/// their balls.
 #[inline(always)]
 fn reach_of(pair: &Posed<'_>, distance: f64) -> f32 {
     let stored = pair.stored(distance.max(0.0)) + 3.0 * pair.relative.slack();

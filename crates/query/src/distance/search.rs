@@ -130,7 +130,8 @@ impl<'s> Search<'s> {
         self.points = motion.beyond(bound);
     }
 
-    /// Bounds from below beyond this `bound` are good enough: what is no nearer is not looked at for them any more.
+    /// Bounds from below beyond this `bound` are good enough: what is no nearer is not looked at for them any
+    /// more.
     pub(crate) fn is_content_with(&mut self, bound: f64, motion: &Motion) {
         if self.of_surfaces {
             self.surfaces = self.surfaces.min(motion.no_nearer(bound));
@@ -233,7 +234,8 @@ impl<'s> Search<'s> {
     }
 }
 
-/// The greater of a bound by enclosures and that by points, if nodes have one, both relative to the centres of the scans.
+/// The greater of a bound by enclosures and that by points, if nodes have one, both relative to the centres
+/// of the scans.
 #[inline]
 fn better(pair: &Posed<'_>, motion: &Motion, nodes: NodePair, by_enclosures: f32) -> f32 {
     match pair.part {

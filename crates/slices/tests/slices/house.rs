@@ -65,8 +65,8 @@ fn floors_are_floor_and_walls_are_obstacles() {
     }
 }
 
-/// A floor just below the border of two slices and points just above it are joined to one floor. Its height must be that of a point,
-/// not that of the border.
+/// A floor just below the border of two slices and points just above it are joined to one floor. Its height
+/// must be that of a point, not that of the border.
 #[test]
 fn floors_have_the_heights_of_points_where_slices_join() {
     let step = |i: u16| f64::from(i) * 0.02 + 0.01;
