@@ -148,6 +148,13 @@ impl WideTree {
         if self.nodes.is_empty() { Child::leaf(0) } else { Child(0) }
     }
 
+    /// The leaf with the `i`-th stored point.
+    #[inline]
+    #[must_use]
+    pub fn leaf_of(&self, i: usize) -> Child {
+        Child::leaf(id32(self.leaves.leaf_of(i)))
+    }
+
     /// The id of a node in the binary tree.
     ///
     /// # Panics
@@ -174,6 +181,13 @@ pub trait LeafVisitor {
 
     /// So many pairs of boxes were compared; may end the descent.
     fn compared(&mut self, pairs: u32) -> ControlFlow<()>;
+
+    /// Returns `true` if a leaf and an inner node, whose boxes are not apart, are known to hold nothing that
+    /// meets.
+    fn is_apart(&mut self, pair: [Child; 2]) -> bool {
+        let _ = pair;
+        false
+    }
 
     /// Two leaves, by their numbers, whose boxes are not apart.
     fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()>;
@@ -263,6 +277,10 @@ fn descend_by<S: Simd, V: LeafVisitor>(
                 stack.pairs.push(open);
                 return flow;
             }
+            stack.turn_to_best(&mut turns);
+            continue;
+        }
+        if pair[0].is_leaf() != pair[1].is_leaf() && visitor.is_apart(pair) {
             stack.turn_to_best(&mut turns);
             continue;
         }

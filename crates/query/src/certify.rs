@@ -1,22 +1,21 @@
-//! Certificates of separation: what boxes of discs parted is parted again by enclosures, which provably contain
-//! the surfaces.
+//! Certificates of separation: a set of node pairs that covers all pairs of points, the enclosures of each pair
+//! apart. Enclosures provably contain the surface, or the obstacle, of their nodes.
 //!
-//! A search that looks at pairs of boxes one by one notes those that its tight boxes exclude; together they cover all pairs
-//! of points. A pair whose enclosures are disjoint is proven; one whose enclosures overlap is replaced by its children. The
-//! certificate is whole when no pair of leaves overlaps, and given up at the first that does. The nearest
-//! pairs are taken first: they are the likeliest to fail. After a search that looks at sixteen pairs at a time and notes nothing the
-//! proof begins with the roots, and takes what overlaps most first, for the same reason.
+//! The proof begins with the roots. A pair whose enclosures are apart is proven; one whose enclosures overlap is
+//! replaced by its children, sixteen pairs at a time. The certificate is whole when no pair is left, and given up
+//! at the first two leaves that nothing parts.
 //!
-//! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with the least bound
-//! is split further, for about an eighth as long as all took before.
+//! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with the
+//! least bound is split further, for about an eighth as long as all took before.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
-use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Frontier, NodePair, Part, Split, Stack, Visitor, descend, resume};
+use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_hierarchy::{Child, NodePair, Part, Slices, Split, Visitor, whole};
 
+use crate::bounds::{FAN, LANES, Limits, Motion};
 use crate::posed::{Posed, balls_apart};
 
 /// Pairs of either of `a` with either of `b`, some of which were excluded.
@@ -44,39 +43,69 @@ pub struct Proof {
     pub pairs: Vec<(NodePair, f64)>,
 }
 
-/// A pair of nodes whose parts of the surfaces are this far apart, in a's stored frame. Ordered so that the least is
-/// greatest.
-#[derive(Debug, Clone, Copy)]
+/// A pair of nodes that are proven to be this far apart, in a's stored frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bound {
     pub(crate) gap: f32,
     pub(crate) pair: NodePair,
-    /// The pair, or one of its ancestors, whose enclosures show it.
-    shown_by: NodePair,
 }
 
-impl Ord for Bound {
+/// A pair of nodes in a proof. Ordered so that the pair with the least gap is greatest.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    gap: f32,
+    pair: [Child; 2],
+    /// The pair, or one of its ancestors, whose enclosures show the gap.
+    shown_by: [Child; 2],
+}
+
+impl Ord for Open {
     fn cmp(&self, other: &Self) -> Ordering {
-        let key = |bound: &Self| (bound.pair.a.0, bound.pair.b.0);
-        other.gap.total_cmp(&self.gap).then_with(|| key(other).cmp(&key(self)))
+        other.gap.total_cmp(&self.gap).then_with(|| other.pair.cmp(&self.pair))
     }
 }
 
-impl PartialOrd for Bound {
+impl PartialOrd for Open {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Bound {
+impl PartialEq for Open {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl Eq for Bound {}
+impl Eq for Open {}
 
-/// So many node pairs are compared for a better bound even where hardly any were needed before: a microsecond.
-const LEAST_SPLITS: u64 = 16;
+/// The pairs of nodes of a proof. Reused.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ProofScratch {
+    /// Those that are not yet proven apart.
+    open: Vec<Open>,
+    /// Those that are.
+    apart: Vec<Open>,
+    /// The same, the least gap first, while these are split further.
+    nearest: BinaryHeap<Open>,
+}
+
+/// The pair of all points.
+pub(crate) const ROOTS: NodePair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
+
+/// Returns `true` if a proof would fail at these two leaves, b's stored frame at `pose` in a's.
+pub(crate) fn are_doubtful(pair: &Posed<'_>, pose: &Pose, leaves: NodePair, reach: f32) -> bool {
+    if pair.gap_of_parts(leaves) > reach {
+        return false;
+    }
+    let motion = Motion::new(pair.level, pair.views, pose);
+    let child = |scan: &Slices<'_>, id: NodeId| scan.wide.leaf_of(scan.nodes[id.index()].first as usize);
+    let leaves = [child(pair.a, leaves.a), child(pair.b, leaves.b)];
+    let all = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
+    let gaps = motion.gaps(([pair.a, pair.b], pair.part), leaves, [true; 2], all);
+    let gap = motion.gap(gaps.enclosures[0], pair.relative.slack());
+    gap.is_nan() || gap <= reach
+}
 
 /// The search for a pair of leaves whose enclosures are not apart.
 pub(crate) struct Certifier<'a> {
@@ -95,108 +124,135 @@ impl<'a> Certifier<'a> {
         Self { pair, reach, proven, doubtful: None }
     }
 
-    /// Proves all of `excluded`, or all there is if nothing was noted; or breaks.
-    pub(crate) fn prove(&mut self, excluded: Option<&[Excluded]>, stack: &mut Stack) -> ControlFlow<()> {
-        let (a, b) = (self.pair.a.nodes, self.pair.b.nodes);
-        let Some(excluded) = excluded else { return descend(a, b, self, stack) };
-        stack.clear();
-        for group in excluded.iter().rev() {
-            let admitted = self.overlaps(group.a, group.b, group.gaps.map(|gap| gap.is_some()));
-            let pair = |i: usize| (admitted[i], NodePair { a: group.a[i >> 1], b: group.b[i & 1] });
-            stack.push([pair(0), pair(1), pair(2), pair(3)]);
-            resume(a, b, self, stack)?;
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// Proves all of `excluded`, or all there is if nothing was noted, and hands the proof out. Returns the
-    /// least gap, in the world, and the band there; `None` where the proof fails.
-    pub(crate) fn prove_apart(
+    /// Proves the two scans, b's stored frame at `pose` in a's, to be apart. Returns the least gap, in the world,
+    /// and the band there; `None` where the proof fails. The pairs are handed out with their gaps in the world
+    /// if a `proof` is wanted, and left in `proven` if a hint wants them.
+    pub(crate) fn prove(
         &mut self,
-        excluded: Option<&[Excluded]>,
-        stack: &mut Stack,
-        proof: Option<&mut Proof>,
+        pose: &Pose,
+        scratch: &mut ProofScratch,
+        (proof, is_hinted): (Option<&mut Proof>, bool),
     ) -> Option<(f64, f64)> {
-        if excluded.is_none() {
-            self.proven.clear();
+        let motion = Motion::new(self.pair.level, self.pair.views, pose);
+        scratch.open.clear();
+        scratch.apart.clear();
+        self.proven.clear();
+        let before = self.pair.meter.spent.node_pairs;
+        let pair = [self.pair.a.wide.root(), self.pair.b.wide.root()];
+        let gap = self.pair.gaps_of_enclosures([NodeId::ROOT; 2], [NodeId::ROOT; 2])[0];
+        self.file(Open { gap, pair, shown_by: pair }, scratch)?;
+        while let Some(next) = scratch.open.pop() {
+            self.split(&next, &motion, scratch)?;
         }
-        if self.prove(excluded, stack).is_break() {
-            return None;
-        }
-        let distance = self.tighten();
-        if let Some(proof) = proof {
-            self.hand_out(proof);
-        }
-        let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
-        Some((distance, self.pair.band_of(self.nearest().unwrap_or(roots))))
-    }
-
-    /// Proves these pairs of leaves, which were compared without a hit; or breaks. Their boxes overlap, and
-    /// so do their enclosures: only of obstacles may their points tell more.
-    pub(crate) fn prove_leaves(&mut self, compared: &[NodePair]) -> ControlFlow<()> {
-        for &pair in compared {
-            let gap = match self.pair.part {
-                Part::Obstacle => self.pair.gap_of_leaves(pair),
-                Part::Surface => f32::MIN,
-            };
-            if gap.is_nan() || gap <= self.reach {
-                self.doubtful = Some(pair);
-                return ControlFlow::Break(());
-            }
-            self.proven.push(Bound { gap, pair, shown_by: pair });
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// Splits the pair with the least bound again and again, until that is two leaves, or an eighth as many node pairs
-    /// more were compared as until now. The least bound of all then, in the world.
-    pub(crate) fn tighten(&mut self) -> f64 {
-        let most = self.pair.meter.spent.node_pairs + self.pair.meter.spent.node_pairs / 8 + LEAST_SPLITS;
-        let mut heap = BinaryHeap::from(std::mem::take(self.proven));
-        while let Some(&least) = heap.peek() {
-            let pair = least.pair;
-            let nodes = (&self.pair.a.nodes[pair.a.index()], &self.pair.b.nodes[pair.b.index()]);
-            let Some([a, b]) = pair.split(nodes.0, nodes.1, || self.pair.split(pair)) else { break };
-            if self.pair.meter.spent.node_pairs >= most || self.pair.meter.go_on().is_break() {
-                break;
-            }
-            let (gaps, mask) = (self.pair.gaps_of_enclosures(a, b), distinct(a, b));
-            self.pair.meter.spent.node_pairs += mask.iter().map(|&counts| u64::from(counts)).sum::<u64>();
-            heap.pop();
-            for i in (0..4).filter(|&i| mask[i]) {
-                let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
-                // Its part is in that of its parents: what is proven of these holds.
-                let own = gaps[i] > least.gap;
-                heap.push(Bound {
-                    gap: if own { gaps[i] } else { least.gap },
-                    pair,
-                    shown_by: if own { pair } else { least.shown_by },
-                });
-            }
-        }
-        let least = heap.peek().map_or(f64::INFINITY, |least| self.in_world(least.gap));
-        *self.proven = heap.into_vec();
-        // Along the axes of boxes little is seen of a distance between them.
+        let compared = self.pair.meter.spent.node_pairs - before;
+        let nearest = self.tighten(&motion, compared / 8, scratch)?;
+        let least = self.in_world(nearest.gap);
+        // Far away balls tell more than boxes.
         let balls = balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].placed().scale();
         #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
         let gap = (balls * (1.0 - 1e-6)) as f32;
-        if self.in_world(gap) <= least {
-            return least;
+        let distance = self.in_world(gap).max(least);
+        if distance > least {
+            scratch.apart.clear();
+            scratch.apart.push(Open { gap, pair, shown_by: pair });
         }
-        let roots = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
-        self.proven.clear();
-        self.proven.push(Bound { gap, pair: roots, shown_by: roots });
-        self.in_world(gap)
+        if is_hinted {
+            let bound = |own: &Open| Bound { gap: own.gap, pair: self.pair.nodes(own.pair) };
+            self.proven.extend(scratch.apart.iter().map(bound));
+        }
+        if let Some(proof) = proof {
+            let shown = |own: &Open| (self.pair.nodes(own.shown_by), self.in_world(own.gap));
+            proof.pairs.extend(scratch.apart.iter().map(shown));
+        }
+        Some((distance, self.pair.band_of(self.pair.nodes(nearest.pair))))
     }
 
-    /// The pair that was proven with the least gap. The last that [`Self::tighten`] left comes first.
-    pub(crate) fn nearest(&self) -> Option<NodePair> {
-        self.proven.first().map(|bound| bound.pair)
+    /// Replaces a pair by its children. `None` where two leaves are not apart, or the budget ends.
+    fn split(&mut self, next: &Open, motion: &Motion, scratch: &mut ProofScratch) -> Option<()> {
+        if self.pair.meter.go_on().is_break() {
+            return None;
+        }
+        let pair = &mut self.pair;
+        let (wide_a, wide_b) = (pair.a.wide, pair.b.wide);
+        let whole = whole([wide_a, wide_b], next.pair, pair.relative.scale());
+        let all = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
+        let gaps = motion.gaps(([pair.a, pair.b], pair.part), next.pair, whole, all);
+        let (a, count_a) = wide_a.children(next.pair[0], whole[0]);
+        let (b, count_b) = wide_b.children(next.pair[1], whole[1]);
+        pair.meter.spent.node_pairs += (count_a * count_b) as u64;
+        let slack = pair.relative.slack();
+        let mut lanes = LANES[count_a - 1][count_b - 1];
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let pair = [a[lane / FAN], b[lane % FAN]];
+            let gap = motion.gap(gaps.enclosures[lane], slack);
+            // The part of a child is in that of its parent: what is proven of the parent holds.
+            let own = gap > next.gap;
+            let (gap, shown_by) = if own { (gap, pair) } else { (next.gap, next.shown_by) };
+            self.file(Open { gap, pair, shown_by }, scratch)?;
+        }
+        Some(())
     }
 
-    /// What was proven, in the world.
-    pub(crate) fn hand_out(&self, proof: &mut Proof) {
-        proof.pairs.extend(self.proven.iter().map(|bound| (bound.shown_by, self.in_world(bound.gap))));
+    /// Puts a pair where it belongs. `None` where two leaves are not apart.
+    #[inline]
+    fn file(&mut self, mut own: Open, scratch: &mut ProofScratch) -> Option<()> {
+        if own.gap > self.reach {
+            scratch.apart.push(own);
+            return Some(());
+        }
+        let [a, b] = own.pair.map(Child::is_leaf);
+        if a || b {
+            let nodes = self.pair.nodes(own.pair);
+            let gap =
+                if a && b { self.pair.gap_of_parts(nodes) } else { self.pair.better_gap(nodes, own.gap) };
+            if gap > self.reach {
+                (own.gap, own.shown_by) = (gap, own.pair);
+                scratch.apart.push(own);
+                return Some(());
+            }
+            if a && b {
+                self.doubtful = Some(nodes);
+                return None;
+            }
+        }
+        scratch.open.push(own);
+        Some(())
+    }
+
+    /// Splits the pair with the least gap again and again, until that is two leaves or `most` node pairs more were
+    /// compared, but once at least. Returns the pair with the least gap then.
+    fn tighten(&mut self, motion: &Motion, most: u64, scratch: &mut ProofScratch) -> Option<Open> {
+        let most = self.pair.meter.spent.node_pairs + most.max(1);
+        let mut nearest = std::mem::take(&mut scratch.nearest);
+        nearest.clear();
+        nearest.extend(scratch.apart.drain(..));
+        while let Some(&least) = nearest.peek() {
+            let are_leaves = least.pair.iter().all(|node| node.is_leaf());
+            if are_leaves
+                || self.pair.meter.spent.node_pairs >= most
+                || self.split(&least, motion, scratch).is_none()
+            {
+                break;
+            }
+            nearest.pop();
+            nearest.extend(scratch.apart.drain(..));
+        }
+        let least = nearest.peek().copied();
+        scratch.apart.extend(nearest.drain());
+        scratch.nearest = nearest;
+        least
+    }
+
+    /// Returns `true` if `leaves`, whose boxes overlap, are apart by their points; only of obstacles these may
+    /// tell more than boxes.
+    pub(crate) fn are_apart(&mut self, leaves: NodePair) -> bool {
+        let apart = self.pair.part == Part::Obstacle && self.pair.gap_of_leaves(leaves) > self.reach;
+        if !apart {
+            self.doubtful = Some(leaves);
+        }
+        apart
     }
 
     /// What a gap in a's stored frame proves in the world.
@@ -219,7 +275,7 @@ impl<'a> Certifier<'a> {
             let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
             let gap = if gaps[i] > self.reach { gaps[i] } else { self.pair.better_gap(pair, gaps[i]) };
             if gap > self.reach {
-                self.proven.push(Bound { gap, pair, shown_by: pair });
+                self.proven.push(Bound { gap, pair });
             } else {
                 overlaps[i] = Some(-gaps[i]);
             }

@@ -7,11 +7,11 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use fearless_simd::Level;
-use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{Frontier, Heap, NodePair, Stack, Visitor, WideStack, descend, descend_wide};
 
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
-use crate::certify::{Bound, Certifier, Excluded, Proof};
+use crate::certify::{Bound, Certifier, Excluded, Proof, ProofScratch, ROOTS};
 use crate::hint::{Known, PairHint};
 use crate::interpolation::InterpolationScratch;
 use crate::leaf_pair::Instructions;
@@ -35,6 +35,7 @@ pub struct CollideScratch {
     members: Vec<u32>,
     interpolation: InterpolationScratch,
     proven: Vec<Bound>,
+    proof: ProofScratch,
     longest_stretch: Duration,
     manifold: ManifoldScratch,
 }
@@ -224,9 +225,6 @@ fn search(
     }
 }
 
-/// The pair of all points.
-const ROOTS: NodePair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
-
 /// The greatest local radius of any point of two scans, in the world.
 fn greatest_band(views: [&ScanView<'_>; 2]) -> f64 {
     views
@@ -282,7 +280,7 @@ fn decide(
     }
     match options.semantics {
         Semantics::Obstacle | Semantics::Surface => {
-            surfaces(pair, options, budget, scratch, (known, extras.proof, extras.all))
+            surfaces((pair, &pose), options, budget, scratch, (known, extras.proof, extras.all))
         }
         Semantics::Thickened(_) => balls(pair, plan, scratch, known, extras.all),
     }
@@ -303,7 +301,7 @@ fn still_meet(pair: &Posed<'_>, plan: &CollidePlan, [i, j]: [usize; 2]) -> Optio
 
 /// Pairs of tangent discs, then, if they are apart and a certificate is wanted, pairs of enclosures.
 fn surfaces(
-    pair: Posed<'_>,
+    (pair, pose): (Posed<'_>, &Pose),
     options: &CollideOptions,
     budget: &Budget,
     scratch: &mut CollideScratch,
@@ -318,6 +316,7 @@ fn surfaces(
         members,
         interpolation,
         proven,
+        proof: open,
         longest_stretch,
         ..
     } = scratch;
@@ -343,7 +342,7 @@ fn surfaces(
         *complete = !ended;
     }
     let parted = !ended && search.found.is_none();
-    let Surfaces { pair, found, doubt, estimate, excluded, compared, met, is_plain, .. } = search;
+    let Surfaces { pair, found, doubt, estimate, excluded, compared, met, .. } = search;
     let mut certifier = Certifier::new(pair, reach, proven);
     let mut band = met.map_or_else(|| certifier.pair.band_of(ROOTS), |met| certifier.pair.band(met));
     let verdict = match (found, doubt) {
@@ -355,13 +354,12 @@ fn surfaces(
         (None, Some(reason)) => Verdict::Undecided(reason),
         _ if !options.certifies() => apart(options, 0.0, false),
         _ if known.as_ref().is_some_and(|known| known.is_doubtful())
-            || certifier.prove_leaves(compared).is_break() =>
+            || compared.first().is_some_and(|&leaves| !certifier.are_apart(leaves)) =>
         {
             apart(options, 0.0, false)
         }
         _ => {
-            let noted = (!is_plain).then_some(&**excluded);
-            let proven = certifier.prove_apart(noted, &mut frontiers.stack, proof);
+            let proven = certifier.prove(pose, open, (proof, known.is_some()));
             if let Some((distance, near)) = proven {
                 band = near;
                 if let Some(known) = &mut known {

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{LeafBlock, LeafVisitor, Leaves, NodePair, Part};
+use nearmiss_hierarchy::{Child, LeafBlock, LeafVisitor, Leaves, NodePair, Part};
 
 use crate::disc_pair::FAR;
 use crate::leaf_pair::{Discs, LeafPair, Near};
@@ -21,6 +21,11 @@ impl LeafVisitor for Surfaces<'_> {
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.pair.meter.spent.node_pairs += u64::from(pairs);
         self.pair.meter.go_on()
+    }
+
+    #[inline]
+    fn is_apart(&mut self, pair: [Child; 2]) -> bool {
+        self.pair.gap_by_leaf(self.pair.nodes(pair)).is_some_and(|gap| gap > self.reach)
     }
 
     fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {

@@ -5,7 +5,6 @@
 //! the nearest points on, points of the surfaces themselves approach each other.
 
 mod approach;
-mod bounds;
 mod nearest_points;
 mod search;
 
@@ -17,6 +16,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointHierarchy;
 use nearmiss_surface::Metric;
 
+use crate::bounds::Motion;
 use crate::budget::{Budget, Meter};
 use crate::collide::{CollideScratch, collide_with};
 use crate::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
@@ -24,8 +24,7 @@ use crate::posed::{Posed, relative};
 use crate::verdict::{Evidence, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
 use approach::{Approach, Feet};
-use bounds::Motion;
-pub(crate) use nearest_points::{PointPair, blocks, lanes, nearest};
+pub(crate) use nearest_points::{PointPair, nearest};
 use search::{Frontier, Search};
 
 /// What is asked. Plain values; [`DistancePlan::new`] validates them.

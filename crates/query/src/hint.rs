@@ -12,7 +12,7 @@ use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{Ball, Frontier, Node, NodePair, Stack, descend, resume};
 use serde::{Deserialize, Serialize};
 
-use crate::certify::{Bound, Certifier, Excluded};
+use crate::certify::{Bound, Certifier, Excluded, are_doubtful};
 use crate::options::CollideOptions;
 use crate::posed::Posed;
 use crate::surface::Surfaces;
@@ -173,7 +173,9 @@ impl Known {
 
     /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail again.
     pub(crate) fn has_front(&self, pair: &Posed<'_>, reach: f32, certifies: bool) -> bool {
-        let fails = |&leaves: &NodePair| are_leaves(pair, leaves) && pair.gap_of_parts(leaves) <= reach;
+        let fails = |&leaves: &NodePair| {
+            are_leaves(pair, leaves) && self.pose.is_some_and(|pose| are_doubtful(pair, &pose, leaves, reach))
+        };
         self.is_slow(pair, SLOW)
             && self.is_there(pair)
             && !self.is_proof
@@ -197,7 +199,10 @@ impl Known {
         stack.clear();
         let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
         let (reach, slack) = (search.reach, search.pair.relative.slack());
-        let gap = |pair: NodePair| search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
+        let gap = |pair: NodePair| {
+            let gap = search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
+            search.pair.gap_by_leaf(pair).map_or(gap, |by_points| by_points.max(gap))
+        };
         if !self.advance(reach, slack, stack, gap) {
             // After a long way the roots are nearer than what was the front.
             self.forget(None);

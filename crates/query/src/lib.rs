@@ -3,6 +3,7 @@
 
 mod ball_pair;
 mod batch;
+mod bounds;
 mod budget;
 mod certify;
 mod collide;

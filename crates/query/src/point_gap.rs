@@ -8,10 +8,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Node, NodePair, OrientedBox, Slices};
+use nearmiss_hierarchy::{Node, NodePair, OrientedBox, Part, Slices};
 use nearmiss_surface::PointBlock;
 
-use crate::distance::{blocks, lanes};
 use crate::posed::Posed;
 
 const WIDTH: usize = PointBlock::WIDTH;
@@ -118,6 +117,13 @@ impl Posed<'_> {
         )))
     }
 
+    /// The same of a leaf and an inner node of obstacles; `None` for others.
+    #[inline]
+    pub(crate) fn gap_by_leaf(&self, pair: NodePair) -> Option<f32> {
+        let [a, b] = [self.a.nodes[pair.a.index()].is_leaf(), self.b.nodes[pair.b.index()].is_leaf()];
+        if a == b || self.part == Part::Surface { None } else { self.gap_by_points(pair) }
+    }
+
     /// By the points of the loose leaf, which is that of a or else that of b, and the enclosure of the other
     /// node.
     #[inline(always)]
@@ -171,4 +177,19 @@ impl Posed<'_> {
         }
         least
     }
+}
+
+/// The blocks in which a leaf's points lie.
+#[inline(always)]
+pub(crate) fn blocks(leaf: &Node) -> std::ops::RangeInclusive<usize> {
+    let points = leaf.points();
+    points.start / WIDTH..=(points.end - 1) / WIDTH
+}
+
+/// The lanes of a block that are the leaf's, as bits.
+#[inline(always)]
+pub(crate) fn lanes(leaf: &Node, block: usize) -> u32 {
+    let (points, first) = (leaf.points(), block * WIDTH);
+    let below = |i: usize| (1_u32 << i.saturating_sub(first).min(WIDTH)) - 1;
+    below(points.end) & !below(points.start)
 }

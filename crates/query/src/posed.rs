@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, Slices, Split};
+use nearmiss_hierarchy::{Ball, Child, NodePair, Part, Relative, SLACK, Slices, Split};
 
 use crate::budget::Meter;
 use crate::options::{CollidePlan, Semantics};
@@ -32,6 +32,12 @@ impl<'a> Posed<'a> {
     ) -> Self {
         let [a, b] = views.map(ScanView::slices);
         Self { views, a, b, relative, meter, part, level }
+    }
+
+    /// A pair of nodes of the wide trees as one of the binary trees.
+    #[inline]
+    pub(crate) fn nodes(&self, [a, b]: [Child; 2]) -> NodePair {
+        NodePair { a: self.a.wide.id(a), b: self.b.wide.id(b) }
     }
 
     /// The leaves with a point of either scan.

@@ -87,7 +87,7 @@ pub(crate) struct Workspace<'a> {
 }
 
 impl<'a> Surfaces<'a> {
-    /// `notes`: whether the pairs that were excluded or compared are wanted for more than a certificate.
+    /// `notes`: whether the pairs that were excluded or compared are wanted.
     pub(crate) fn new(
         pair: Posed<'a>,
         options: &CollideOptions,
@@ -114,7 +114,7 @@ impl<'a> Surfaces<'a> {
             resolution: budget.resolution.map_or(-1.0, |length| pair.stored(length)),
             pair,
             is_plain,
-            notes: !is_plain && (notes || options.certifies()),
+            notes,
             nearest: f32::INFINITY,
             excluded,
             compared,
@@ -232,13 +232,22 @@ impl Visitor for Surfaces<'_> {
     #[inline]
     fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
         let reach = self.reach;
-        let (gaps, urgencies) = if self.order == Order::DepthFirst {
+        let (mut gaps, urgencies) = if self.order == Order::DepthFirst {
             let gaps = self.pair.gaps(a, b, count);
             (gaps, gaps.map(|gap| -gap))
         } else {
             self.pair.gaps_and_overlaps(a, b, count, reach)
         };
         let mut admitted = [0, 1, 2, 3].map(|i| if gaps[i] > reach { None } else { Some(urgencies[i]) });
+        for i in 0..4 {
+            let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
+            if admitted[i].is_some()
+                && let Some(gap) = self.pair.gap_by_leaf(pair)
+                && gap > reach
+            {
+                (gaps[i], admitted[i]) = (gap, None);
+            }
+        }
         if self.looks_closer {
             self.look_closer(a, b, &mut admitted);
         }
@@ -276,7 +285,8 @@ impl Visitor for Surfaces<'_> {
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        if self.notes {
+        // One is enough to know that no proof would hold.
+        if self.notes || self.compared.is_empty() {
             self.compared.push(pair);
         }
         self.compare(pair)

@@ -7,6 +7,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Leaves, Node, NodePair, Part, Slices};
 use nearmiss_surface::PointBlock;
 
+use crate::point_gap::{blocks, lanes};
 use crate::posed::Posed;
 
 const WIDTH: usize = PointBlock::WIDTH;
@@ -142,21 +143,6 @@ fn least(values: &[f32; WIDTH], lanes: u32) -> usize {
         }
     }
     least
-}
-
-/// The blocks in which a leaf's points lie.
-#[inline(always)]
-pub(crate) fn blocks(leaf: &Node) -> std::ops::RangeInclusive<usize> {
-    let points = leaf.points();
-    points.start / WIDTH..=(points.end - 1) / WIDTH
-}
-
-/// The lanes of a block that are the leaf's, as bits.
-#[inline(always)]
-pub(crate) fn lanes(leaf: &Node, block: usize) -> u32 {
-    let (points, first) = (leaf.points(), block * WIDTH);
-    let below = |i: usize| (1_u32 << i.saturating_sub(first).min(WIDTH)) - 1;
-    below(points.end) & !below(points.start)
 }
 
 #[inline(always)]

@@ -6,7 +6,7 @@ use std::collections::BinaryHeap;
 
 use nearmiss_hierarchy::{Child, NodePair, Part, whole};
 
-use crate::distance::bounds::{FAN, Gaps, Limits, Motion};
+use crate::bounds::{FAN, Gaps, LANES, Limits, Motion};
 use crate::posed::Posed;
 
 /// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in them is at least.
@@ -71,22 +71,6 @@ impl PartialEq for Open {
 }
 
 impl Eq for Open {}
-
-/// The lanes of so many nodes of a, less one, with so many of b, less one.
-const LANES: [[u32; FAN]; FAN] = {
-    let mut lanes = [[0; FAN]; FAN];
-    let mut i = 0;
-    while i < FAN * FAN {
-        let mut row = 0;
-        while row <= i / FAN {
-            let all_b = (1 << (i % FAN + 1)) - 1;
-            lanes[i / FAN][i % FAN] |= all_b << (FAN * row);
-            row += 1;
-        }
-        i += 1;
-    }
-    lanes
-};
 
 /// So many steps split the nearest pair of all, which a heap finds. Then limits are near what they will be, and what was put off last
 /// comes next: some pairs more, but a heap takes longer than to look at those.
@@ -179,9 +163,8 @@ impl<'s> Search<'s> {
         let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
         let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
         let (of_enclosures, of_boxes) = (next.enclosures(), next.boxes());
-        let nodes = |[a, b]: [Child; 2]| NodePair { a: pair.a.wide.id(a), b: pair.b.wide.id(b) };
         if next.pair.iter().all(|node| node.is_leaf()) {
-            let leaves = nodes(next.pair);
+            let leaves = pair.nodes(next.pair);
             if of_enclosures < self.surfaces {
                 self.surfaces = self.surfaces.min(better(pair, motion, leaves, of_enclosures));
             }
@@ -206,7 +189,7 @@ impl<'s> Search<'s> {
                 (enclosures[lane].max(of_enclosures), boxes[lane].max(of_boxes));
             if children[0].is_leaf() != children[1].is_leaf() {
                 // The points of a loose leaf say more than its box, also of points.
-                of_enclosures = better(pair, motion, nodes(children), of_enclosures);
+                of_enclosures = better(pair, motion, pair.nodes(children), of_enclosures);
                 of_boxes = of_boxes.max(of_enclosures);
                 if of_boxes >= self.points && of_enclosures >= self.surfaces {
                     continue;

@@ -24,6 +24,22 @@ const ROUNDS: u32 = 1;
 /// So many nodes of either scan are compared at once.
 pub(crate) const FAN: usize = 4;
 
+/// The lanes of [`Gaps`] that the first `i + 1` nodes of a and the first `j + 1` of b take, as bits, at `[i][j]`.
+pub(crate) const LANES: [[u32; FAN]; FAN] = {
+    let mut lanes = [[0; FAN]; FAN];
+    let mut i = 0;
+    while i < FAN * FAN {
+        let mut row = 0;
+        while row <= i / FAN {
+            let all_b = (1 << (i % FAN + 1)) - 1;
+            lanes[i / FAN][i % FAN] |= all_b << (FAN * row);
+            row += 1;
+        }
+        i += 1;
+    }
+    lanes
+};
+
 /// How far four nodes of either scan are apart: by how much further, at least, than the centres of the scans, in a's stored frame. That
 /// of the i-th of a and the j-th of b stands at 4 i + j; [`Motion::least`] where they may overlap, or are no numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -126,6 +142,13 @@ impl Motion {
     #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
     pub(crate) fn beyond(&self, bound: f64) -> f32 {
         ((bound - self.distance) as f32).next_up().next_up()
+    }
+
+    /// The gap, in a's stored frame, of what is so much further away than the centres of the scans are: what
+    /// the world sees of it is at least this less `slack`.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn gap(&self, beyond: f32, slack: f32) -> f32 {
+        ((self.distance + f64::from(beyond) - self.slack + f64::from(slack)) as f32).next_down()
     }
 
     /// So much further away than the centres of the scans, or a little less, is what is no nearer than this
