@@ -151,6 +151,18 @@ impl Relative {
         ]
     }
 
+    /// Sixteen points of b's frame in a's.
+    #[inline(always)]
+    #[must_use]
+    pub fn points<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+        let [x, y, z] = *points;
+        let row = |k: usize| {
+            let [rx, ry, rz] = self.linear[k];
+            x * rx + y * ry + z * rz + self.translation[k]
+        };
+        [row(0), row(1), row(2)]
+    }
+
     /// A point of a's frame in b's.
     #[inline]
     #[must_use]

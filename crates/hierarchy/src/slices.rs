@@ -144,6 +144,28 @@ impl Slices<'_> {
         }
     }
 
+    /// [`Self::obstacle_reach`] of the points in a block, in lanes; 0 where there is no point.
+    ///
+    /// # Panics
+    /// When there is no such block.
+    #[inline(always)]
+    #[must_use]
+    pub fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
+        let first = block * PointBlock::WIDTH;
+        let end = (first + PointBlock::WIDTH).min(self.radii.len());
+        let mut reaches = [0.0; PointBlock::WIDTH];
+        let points = self.radii[first..end].iter().zip(&self.discs[first..end]);
+        for (reach, (radius, disc)) in reaches.iter_mut().zip(points) {
+            *reach = cell_radius(*radius, self.reach).max(disc * DISC_REACH);
+        }
+        for (i, reach) in (first..end).zip(&mut reaches) {
+            if !self.is_on_sheet(i) {
+                *reach = self.obstacle_ball(i);
+            }
+        }
+        reaches
+    }
+
     /// How far from a point on a sheet the surface belongs to the obstacle: the lesser of its local radius
     /// and half the reach.
     ///

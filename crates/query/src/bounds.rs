@@ -151,6 +151,12 @@ impl Motion {
         ((self.distance + f64::from(beyond) - self.slack + f64::from(slack)) as f32).next_down()
     }
 
+    /// So much further away than the centres of the scans is what has this [`Self::gap`], or a little more.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+    pub(crate) fn beyond_gap(&self, gap: f32, slack: f32) -> f32 {
+        ((f64::from(gap) + self.slack - f64::from(slack) - self.distance) as f32).next_up().next_up()
+    }
+
     /// So much further away than the centres of the scans, or a little less, is what is no nearer than this
     /// `bound`.
     #[expect(clippy::cast_possible_truncation, reason = "rounded down")]

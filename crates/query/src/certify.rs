@@ -84,10 +84,52 @@ impl Eq for Open {}
 pub(crate) struct ProofScratch {
     /// Those that are not yet proven apart.
     open: Vec<Open>,
-    /// Those that are.
-    apart: Vec<Open>,
+    /// Those that are apart with the least gaps.
+    near: Vec<Open>,
     /// The same, the least gap first, while these are split further.
     nearest: BinaryHeap<Open>,
+    /// The others that are apart, if all are wanted.
+    rest: Vec<Open>,
+}
+
+impl ProofScratch {
+    fn clear(&mut self) {
+        self.open.clear();
+        self.near.clear();
+        self.nearest.clear();
+        self.rest.clear();
+    }
+
+    /// All pairs that are apart.
+    fn apart(&self) -> impl Iterator<Item = &Open> {
+        self.near.iter().chain(&self.rest)
+    }
+}
+
+/// A proof under way.
+struct Run<'m> {
+    motion: &'m Motion,
+    /// Whether all pairs are wanted that are apart.
+    lists: bool,
+    /// The least gap so far.
+    least: f32,
+    /// A pair with no lesser gap than this is not split for a better bound: [`KEPT`] times the least gap.
+    enough: f32,
+    /// The same, beside the distance of the centres.
+    beyond: f32,
+    /// Whether there is such a pair.
+    is_cut: bool,
+}
+
+/// So many times the least gap of a proof is a good gap.
+const KEPT: f32 = 4.0;
+
+impl Run<'_> {
+    /// A pair is apart with this gap, the least so far. `slack` is that of the gap.
+    fn found(&mut self, gap: f32, slack: f32) {
+        (self.least, self.enough) = (gap, KEPT * gap);
+        self.beyond = self.motion.beyond_gap(self.enough, slack);
+    }
 }
 
 /// The pair of all points.
@@ -133,114 +175,134 @@ impl<'a> Certifier<'a> {
         scratch: &mut ProofScratch,
         (proof, is_hinted): (Option<&mut Proof>, bool),
     ) -> Option<(f64, f64)> {
-        let motion = Motion::new(self.pair.level, self.pair.views, pose);
-        scratch.open.clear();
-        scratch.apart.clear();
+        let motion = &Motion::new(self.pair.level, self.pair.views, pose);
+        let infinite = f32::INFINITY;
+        let lists = is_hinted || proof.is_some();
+        let mut run =
+            Run { motion, lists, least: infinite, enough: infinite, beyond: infinite, is_cut: false };
+        scratch.clear();
         self.proven.clear();
         let before = self.pair.meter.spent.node_pairs;
         let pair = [self.pair.a.wide.root(), self.pair.b.wide.root()];
         let gap = self.pair.gaps_of_enclosures([NodeId::ROOT; 2], [NodeId::ROOT; 2])[0];
-        self.file(Open { gap, pair, shown_by: pair }, scratch)?;
+        self.file(Open { gap, pair, shown_by: pair }, &mut run, scratch)?;
         while let Some(next) = scratch.open.pop() {
-            self.split(&next, &motion, scratch)?;
+            self.split(&next, &mut run, scratch)?;
         }
         let compared = self.pair.meter.spent.node_pairs - before;
-        let nearest = self.tighten(&motion, compared / 8, scratch)?;
-        let least = self.in_world(nearest.gap);
+        let nearest = self.tighten(compared / 8, &mut run, scratch)?;
+        let least = self.in_world(if run.is_cut { nearest.gap.min(run.enough) } else { nearest.gap });
         // Far away balls tell more than boxes.
         let balls = balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].placed().scale();
         #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
         let gap = (balls * (1.0 - 1e-6)) as f32;
         let distance = self.in_world(gap).max(least);
         if distance > least {
-            scratch.apart.clear();
-            scratch.apart.push(Open { gap, pair, shown_by: pair });
+            scratch.clear();
+            scratch.near.push(Open { gap, pair, shown_by: pair });
         }
         if is_hinted {
             let bound = |own: &Open| Bound { gap: own.gap, pair: self.pair.nodes(own.pair) };
-            self.proven.extend(scratch.apart.iter().map(bound));
+            self.proven.extend(scratch.apart().map(bound));
         }
         if let Some(proof) = proof {
             let shown = |own: &Open| (self.pair.nodes(own.shown_by), self.in_world(own.gap));
-            proof.pairs.extend(scratch.apart.iter().map(shown));
+            proof.pairs.extend(scratch.apart().map(shown));
         }
         Some((distance, self.pair.band_of(self.pair.nodes(nearest.pair))))
     }
 
     /// Replaces a pair by its children. `None` where two leaves are not apart, or the budget ends.
-    fn split(&mut self, next: &Open, motion: &Motion, scratch: &mut ProofScratch) -> Option<()> {
+    fn split(&mut self, next: &Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<()> {
         if self.pair.meter.go_on().is_break() {
             return None;
         }
         let pair = &mut self.pair;
         let (wide_a, wide_b) = (pair.a.wide, pair.b.wide);
         let whole = whole([wide_a, wide_b], next.pair, pair.relative.scale());
-        let all = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
-        let gaps = motion.gaps(([pair.a, pair.b], pair.part), next.pair, whole, all);
+        let enclosures = if run.lists { f32::INFINITY } else { run.beyond };
+        let limits = Limits { boxes: f32::NEG_INFINITY, enclosures };
+        let gaps = run.motion.gaps(([pair.a, pair.b], pair.part), next.pair, whole, limits);
         let (a, count_a) = wide_a.children(next.pair[0], whole[0]);
         let (b, count_b) = wide_b.children(next.pair[1], whole[1]);
         pair.meter.spent.node_pairs += (count_a * count_b) as u64;
         let slack = pair.relative.slack();
-        let mut lanes = LANES[count_a - 1][count_b - 1];
+        let all = LANES[count_a - 1][count_b - 1];
+        let mut lanes = all & gaps.near;
+        run.is_cut |= lanes != all;
+        // The nearest child comes next: if the proof fails at all, it is likeliest to fail there.
+        let (mut nearest, mut least) = (None, f32::INFINITY);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
             let pair = [a[lane / FAN], b[lane % FAN]];
-            let gap = motion.gap(gaps.enclosures[lane], slack);
+            let gap = run.motion.gap(gaps.enclosures[lane], slack);
             // The part of a child is in that of its parent: what is proven of the parent holds.
             let own = gap > next.gap;
             let (gap, shown_by) = if own { (gap, pair) } else { (next.gap, next.shown_by) };
-            self.file(Open { gap, pair, shown_by }, scratch)?;
+            let mut own = Open { gap, pair, shown_by };
+            if gaps.boxes[lane] < least {
+                least = gaps.boxes[lane];
+                match nearest.replace(own) {
+                    Some(known) => own = known,
+                    None => continue,
+                }
+            }
+            self.file(own, run, scratch)?;
         }
-        Some(())
+        nearest.map_or(Some(()), |nearest| self.file(nearest, run, scratch))
     }
 
     /// Puts a pair where it belongs. `None` where two leaves are not apart.
     #[inline]
-    fn file(&mut self, mut own: Open, scratch: &mut ProofScratch) -> Option<()> {
-        if own.gap > self.reach {
-            scratch.apart.push(own);
-            return Some(());
-        }
+    fn file(&mut self, mut own: Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<()> {
         let [a, b] = own.pair.map(Child::is_leaf);
-        if a || b {
+        if !(own.gap > self.reach) && (a || b) {
             let nodes = self.pair.nodes(own.pair);
             let gap =
                 if a && b { self.pair.gap_of_parts(nodes) } else { self.pair.better_gap(nodes, own.gap) };
             if gap > self.reach {
                 (own.gap, own.shown_by) = (gap, own.pair);
-                scratch.apart.push(own);
-                return Some(());
-            }
-            if a && b {
+            } else if a && b {
                 self.doubtful = Some(nodes);
                 return None;
             }
         }
-        scratch.open.push(own);
+        if !(own.gap > self.reach) {
+            scratch.open.push(own);
+        } else if own.gap < run.enough {
+            scratch.near.push(own);
+            if own.gap < run.least {
+                run.found(own.gap, self.pair.relative.slack());
+            }
+        } else {
+            run.is_cut = true;
+            if run.lists {
+                scratch.rest.push(own);
+            }
+        }
         Some(())
     }
 
     /// Splits the pair with the least gap again and again, until that is two leaves or `most` node pairs more were
     /// compared, but once at least. Returns the pair with the least gap then.
-    fn tighten(&mut self, motion: &Motion, most: u64, scratch: &mut ProofScratch) -> Option<Open> {
+    fn tighten(&mut self, most: u64, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<Open> {
         let most = self.pair.meter.spent.node_pairs + most.max(1);
         let mut nearest = std::mem::take(&mut scratch.nearest);
-        nearest.clear();
-        nearest.extend(scratch.apart.drain(..));
+        nearest.extend(scratch.near.drain(..));
         while let Some(&least) = nearest.peek() {
             let are_leaves = least.pair.iter().all(|node| node.is_leaf());
             if are_leaves
                 || self.pair.meter.spent.node_pairs >= most
-                || self.split(&least, motion, scratch).is_none()
+                || self.split(&least, run, scratch).is_none()
             {
                 break;
             }
             nearest.pop();
-            nearest.extend(scratch.apart.drain(..));
+            nearest.extend(scratch.near.drain(..));
         }
         let least = nearest.peek().copied();
-        scratch.apart.extend(nearest.drain());
+        scratch.near.extend(nearest.drain());
         scratch.nearest = nearest;
         least
     }

@@ -129,7 +129,7 @@ pub fn collide_proving(
 /// they met, or what kept them apart.
 ///
 /// Changes no verdict but those that a budget ends, whatever `hint` was used for before. Evidence may differ: a separation may be certified
-/// with a lesser gap than without, and of some ten thousand one is certified that otherwise is estimated, or the other way round. It is believed, so one read from a file must be one that was written. Searches with a
+/// with a lesser gap than without, and of some thousand one is certified that otherwise is estimated, or the other way round. It is believed, so one read from a file must be one that was written. Searches with a
 /// resolution and those by any other method than [`Method::Traversal`] do without. What it remembers is worth most for small motions: a step of a tenth of a sampling
 /// radius, as a simulation makes, takes a fraction of a query.
 pub fn collide_hinted(

@@ -36,7 +36,7 @@ const LONGEST: f64 = (1_u64 << 40) as f64;
 /// What is remembered between queries about the same two scans; for [`collide_hinted`](crate::collide_hinted). Owned by
 /// the caller, one for each pair of scans.
 ///
-/// A proof that goes on rests on smaller nodes than a fresh one, and on where they were before: of some ten thousand
+/// A proof that goes on rests on smaller nodes than a fresh one, and on where they were before: of some thousand
 /// separations one is certified that otherwise is estimated, or the other way round.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]

@@ -8,7 +8,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Node, NodePair, OrientedBox, Part, Slices};
+use nearmiss_hierarchy::{Node, NodePair, OrientedBox, Part, Relative, Slices};
 use nearmiss_surface::PointBlock;
 
 use crate::posed::Posed;
@@ -21,70 +21,73 @@ const LOOSE: f32 = 3.0;
 
 /// Points of a leaf in lanes, in one of the two stored frames, with how far the obstacle reaches from each.
 #[derive(Clone, Copy)]
-struct Balls {
-    centres: [[f32; WIDTH]; 3],
-    reaches: [f32; WIDTH],
+struct Balls<S: Simd> {
+    centres: [f32x16<S>; 3],
+    reaches: f32x16<S>,
+    /// The lanes that are the leaf's, as bits.
     lanes: u32,
 }
 
-impl Balls {
-    fn of(scan: &Slices<'_>, leaf: &Node, block: usize) -> Self {
+impl<S: Simd> Balls<S> {
+    #[inline(always)]
+    fn of(simd: S, scan: &Slices<'_>, leaf: &Node, block: usize) -> Self {
         let lanes = lanes(leaf, block);
-        let mut reaches = [0.0; WIDTH];
-        for (lane, reach) in reaches.iter_mut().enumerate() {
-            if lanes >> lane & 1 != 0 {
-                *reach = scan.obstacle_reach(block * WIDTH + lane);
-            }
-        }
-        Self { centres: scan.blocks[block].position, reaches, lanes }
+        let [x, y, z] = &scan.blocks[block].position;
+        let load = |lanes: &[f32; WIDTH]| f32x16::load_array_ref(simd, lanes);
+        Self { centres: [load(x), load(y), load(z)], reaches: load(&scan.obstacle_reaches(block)), lanes }
     }
 
-    /// The same moved by a motion of this scale.
-    fn moved(&self, scale: f32, to: impl Fn([f32; 3]) -> [f32; 3]) -> Self {
-        let mut moved = *self;
-        for lane in 0..WIDTH {
-            let p = to([self.centres[0][lane], self.centres[1][lane], self.centres[2][lane]]);
-            for k in 0..3 {
-                moved.centres[k][lane] = p[k];
-            }
-            moved.reaches[lane] *= scale;
-        }
-        moved
+    /// Those of a in b's frame.
+    #[inline(always)]
+    fn moved_back(self, relative: &Relative) -> Self {
+        let centres = relative.points_back(&self.centres);
+        Self { centres, reaches: self.reaches * relative.scale_back(), ..self }
+    }
+
+    /// Those of b in a's frame.
+    #[inline(always)]
+    fn moved(self, relative: &Relative) -> Self {
+        let centres = relative.points(&self.centres);
+        Self { centres, reaches: self.reaches * relative.scale(), ..self }
     }
 
     /// The least distance of any ball from the box.
     #[inline(always)]
-    fn gap_to_box<S: Simd>(&self, simd: S, bounds: &OrientedBox) -> f32 {
-        let d = self.seen_from(simd, bounds.centre);
+    fn gap_to_box(&self, simd: S, bounds: &OrientedBox) -> f32 {
+        let d = self.seen_from(bounds.centre);
         let mut beyond_sq = f32x16::splat(simd, 0.0);
         for k in 0..3 {
             let [x, y, z] = bounds.axes[k];
             let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(0.0);
             beyond_sq += beyond * beyond;
         }
-        self.least(simd, beyond_sq.sqrt() - f32x16::load_array_ref(simd, &self.reaches))
+        self.least(simd, beyond_sq.sqrt() - self.reaches)
     }
 
-    /// The least distance of any ball from the ball about `p`.
+    /// The least distance of any ball from any of `others`, in the same frame.
     #[inline(always)]
-    fn gap_to_ball<S: Simd>(&self, simd: S, p: [f32; 3], radius: f32) -> f32 {
-        let [x, y, z] = self.seen_from(simd, p);
-        let away = (x * x + y * y + z * z).sqrt();
-        self.least(simd, away - f32x16::load_array_ref(simd, &self.reaches)) - radius
+    fn gap_to_balls(&self, simd: S, others: &Self) -> f32 {
+        let [x, y, z] = [0, 1, 2].map(|k| others.centres[k].to_array());
+        let reaches = others.reaches.to_array();
+        let mut nearest = f32x16::splat(simd, f32::INFINITY);
+        let mut left = others.lanes;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            let d = self.seen_from([x[lane], y[lane], z[lane]]);
+            let away = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            nearest = nearest.min(away - reaches[lane]);
+        }
+        self.least(simd, nearest - self.reaches)
     }
 
     #[inline(always)]
-    fn seen_from<S: Simd>(&self, simd: S, p: [f32; 3]) -> [f32x16<S>; 3] {
-        let [x, y, z] = &self.centres;
-        [
-            f32x16::load_array_ref(simd, x) - p[0],
-            f32x16::load_array_ref(simd, y) - p[1],
-            f32x16::load_array_ref(simd, z) - p[2],
-        ]
+    fn seen_from(&self, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
+        [self.centres[0] - x, self.centres[1] - y, self.centres[2] - z]
     }
 
     #[inline(always)]
-    fn least<S: Simd>(&self, simd: S, of: f32x16<S>) -> f32 {
+    fn least(&self, simd: S, of: f32x16<S>) -> f32 {
         let there = mask32x16::from_bitmask(simd, u64::from(self.lanes));
         there.select(of, f32x16::splat(simd, f32::INFINITY)).reduce_min()
     }
@@ -132,18 +135,16 @@ impl Posed<'_> {
         if of_a {
             let leaf = &self.a.nodes[pair.a.index()];
             let bounds = self.b.obstacle_enclosure(pair.b.index());
-            let back = self.relative.scale_back();
             for block in blocks(leaf) {
-                let balls = Balls::of(self.a, leaf, block).moved(back, |p| self.relative.point_back(p));
+                let balls = Balls::of(simd, self.a, leaf, block).moved_back(&self.relative);
                 least = least.min(balls.gap_to_box(simd, &bounds));
             }
             return least * self.relative.scale();
         }
         let leaf = &self.b.nodes[pair.b.index()];
         let bounds = self.a.obstacle_enclosure(pair.a.index());
-        let scale = self.relative.scale();
         for block in blocks(leaf) {
-            let balls = Balls::of(self.b, leaf, block).moved(scale, |p| self.relative.point(p));
+            let balls = Balls::of(simd, self.b, leaf, block).moved(&self.relative);
             least = least.min(balls.gap_to_box(simd, &bounds));
         }
         least
@@ -161,18 +162,12 @@ impl Posed<'_> {
     #[inline(always)]
     fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair) -> f32 {
         let (leaf_a, leaf_b) = (&self.a.nodes[pair.a.index()], &self.b.nodes[pair.b.index()]);
-        let scale = self.relative.scale();
         let mut least = f32::INFINITY;
         for block_b in blocks(leaf_b) {
-            let of_b = Balls::of(self.b, leaf_b, block_b).moved(scale, |p| self.relative.point(p));
+            let of_b = Balls::of(simd, self.b, leaf_b, block_b).moved(&self.relative);
             for block_a in blocks(leaf_a) {
-                let of_a = Balls::of(self.a, leaf_a, block_a);
-                for lane in 0..WIDTH {
-                    if of_a.lanes >> lane & 1 != 0 {
-                        let p = [of_a.centres[0][lane], of_a.centres[1][lane], of_a.centres[2][lane]];
-                        least = least.min(of_b.gap_to_ball(simd, p, of_a.reaches[lane]));
-                    }
-                }
+                let of_a = Balls::of(simd, self.a, leaf_a, block_a);
+                least = least.min(of_a.gap_to_balls(simd, &of_b));
             }
         }
         least

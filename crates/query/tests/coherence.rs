@@ -117,8 +117,8 @@ fn hints_change_no_verdict() {
     assert!(seen[0] > 1000 && seen[1] > 3000, "{seen:?}");
     assert!(skipped > 1000, "{skipped} answers came without any search");
     assert!(proven > 1000, "{proven} separations were certified");
-    // What children of two nodes show of obstacles may be less than what the nodes do.
-    assert!(evident[0] == 0 && evident[1] * 2000 < proven, "the evidence of {evident:?} of {proven} differs");
+    // What the children of two nodes show may be less than what the nodes do.
+    assert!(evident.iter().sum::<usize>() * 500 < proven, "the evidence of {evident:?} of {proven} differs");
 }
 
 /// The least distance of any two points.
