@@ -257,18 +257,20 @@ impl<'a> Certifier<'a> {
     #[inline]
     fn file(&mut self, mut own: Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<()> {
         let [a, b] = own.pair.map(Child::is_leaf);
-        if !(own.gap > self.reach) && (a || b) {
+        let mut is_apart = own.gap > self.reach;
+        if !is_apart && (a || b) {
             let nodes = self.pair.nodes(own.pair);
             let gap =
                 if a && b { self.pair.gap_of_parts(nodes) } else { self.pair.better_gap(nodes, own.gap) };
-            if gap > self.reach {
+            is_apart = gap > self.reach;
+            if is_apart {
                 (own.gap, own.shown_by) = (gap, own.pair);
             } else if a && b {
                 self.doubtful = Some(nodes);
                 return None;
             }
         }
-        if !(own.gap > self.reach) {
+        if !is_apart {
             scratch.open.push(own);
         } else if own.gap < run.enough {
             scratch.near.push(own);
