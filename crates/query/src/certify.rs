@@ -287,12 +287,15 @@ impl<'a> Certifier<'a> {
     }
 
     /// Splits the pair with the least gap again and again, until that is two leaves or `most` node pairs more were
-    /// compared, but once at least. Returns the pair with the least gap then.
+    /// compared, but once at least. Returns the pair with the least gap then, or the last that was split if only
+    /// pairs with good gaps are left.
     fn tighten(&mut self, most: u64, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<Open> {
         let most = self.pair.meter.spent.node_pairs + most.max(1);
         let mut nearest = std::mem::take(&mut scratch.nearest);
         nearest.extend(scratch.near.drain(..));
+        let mut last = None;
         while let Some(&least) = nearest.peek() {
+            last = Some(least);
             let are_leaves = least.pair.iter().all(|node| node.is_leaf());
             if are_leaves
                 || self.pair.meter.spent.node_pairs >= most
@@ -303,7 +306,8 @@ impl<'a> Certifier<'a> {
             nearest.pop();
             nearest.extend(scratch.near.drain(..));
         }
-        let least = nearest.peek().copied();
+        let good = last.map(|last| Open { gap: run.enough, ..last });
+        let least = nearest.peek().copied().or(good);
         scratch.near.extend(nearest.drain());
         scratch.nearest = nearest;
         least
