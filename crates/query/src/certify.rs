@@ -13,7 +13,7 @@ use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Child, NodePair, Part, Slices, Split, Visitor, whole};
+use nearmiss_hierarchy::{Child, NodePair, Slices, Split, Visitor, whole};
 
 use crate::bounds::{FAN, LANES, Limits, Motion};
 use crate::posed::{Posed, balls_apart};
@@ -55,8 +55,6 @@ pub(crate) struct Bound {
 struct Open {
     gap: f32,
     pair: [Child; 2],
-    /// The pair, or one of its ancestors, whose enclosures show the gap.
-    shown_by: [Child; 2],
 }
 
 impl Ord for Open {
@@ -137,16 +135,17 @@ pub(crate) const ROOTS: NodePair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT }
 
 /// Returns `true` if a proof would fail at these two leaves, b's stored frame at `pose` in a's.
 pub(crate) fn are_doubtful(pair: &Posed<'_>, pose: &Pose, leaves: NodePair, reach: f32) -> bool {
-    if pair.gap_of_parts(leaves) > reach {
-        return false;
-    }
-    let motion = Motion::new(pair.level, pair.views, pose);
+    pair.gap_of_parts(leaves) <= reach
+        && !are_parted(pair, &Motion::new(pair.level, pair.views, pose), leaves, reach)
+}
+
+/// Returns `true` if the enclosures of two leaves are further apart than `reach`.
+fn are_parted(pair: &Posed<'_>, motion: &Motion, leaves: NodePair, reach: f32) -> bool {
     let child = |scan: &Slices<'_>, id: NodeId| scan.wide.leaf_of(scan.nodes[id.index()].first as usize);
     let leaves = [child(pair.a, leaves.a), child(pair.b, leaves.b)];
     let all = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
     let gaps = motion.gaps(([pair.a, pair.b], pair.part), leaves, [true; 2], all);
-    let gap = motion.gap(gaps.enclosures[0], pair.relative.slack());
-    gap.is_nan() || gap <= reach
+    motion.gap(gaps.enclosures[0], pair.relative.slack()) > reach
 }
 
 /// The search for a pair of leaves whose enclosures are not apart.
@@ -167,15 +166,26 @@ impl<'a> Certifier<'a> {
     }
 
     /// Proves the two scans, b's stored frame at `pose` in a's, to be apart. Returns the least gap, in the world,
-    /// and the band there; `None` where the proof fails. The pairs are handed out with their gaps in the world
-    /// if a `proof` is wanted, and left in `proven` if a hint wants them.
+    /// and the band there; `None` where the proof fails. It is likeliest to fail at leaves that were `compared`
+    /// because their boxes overlap, so these come first. The pairs are handed out with their gaps in the world if a
+    /// `proof` is wanted, and left in `proven` if a hint wants them.
     pub(crate) fn prove(
         &mut self,
         pose: &Pose,
+        compared: &[NodePair],
         scratch: &mut ProofScratch,
         (proof, is_hinted): (Option<&mut Proof>, bool),
     ) -> Option<(f64, f64)> {
         let motion = &Motion::new(self.pair.level, self.pair.views, pose);
+        let (pair, reach) = (&self.pair, self.reach);
+        let fails = |&leaves: &NodePair| {
+            !pair.are_leaves(leaves)
+                || (pair.gap_of_parts(leaves) <= reach && !are_parted(pair, motion, leaves, reach))
+        };
+        if let Some(&leaves) = compared.iter().find(|leaves| fails(leaves)) {
+            self.doubtful = Some(leaves);
+            return None;
+        }
         let infinite = f32::INFINITY;
         let lists = is_hinted || proof.is_some();
         let mut run =
@@ -185,7 +195,7 @@ impl<'a> Certifier<'a> {
         let before = self.pair.meter.spent.node_pairs;
         let pair = [self.pair.a.wide.root(), self.pair.b.wide.root()];
         let gap = self.pair.gaps_of_enclosures([NodeId::ROOT; 2], [NodeId::ROOT; 2])[0];
-        self.file(Open { gap, pair, shown_by: pair }, &mut run, scratch)?;
+        self.file(Open { gap, pair }, &mut run, scratch)?;
         while let Some(next) = scratch.open.pop() {
             self.split(&next, &mut run, scratch)?;
         }
@@ -199,21 +209,22 @@ impl<'a> Certifier<'a> {
         let distance = self.in_world(gap).max(least);
         if distance > least {
             scratch.clear();
-            scratch.near.push(Open { gap, pair, shown_by: pair });
+            scratch.near.push(Open { gap, pair });
         }
         if is_hinted {
             let bound = |own: &Open| Bound { gap: own.gap, pair: self.pair.nodes(own.pair) };
             self.proven.extend(scratch.apart().map(bound));
         }
         if let Some(proof) = proof {
-            let shown = |own: &Open| (self.pair.nodes(own.shown_by), self.in_world(own.gap));
+            let shown = |own: &Open| (self.pair.nodes(own.pair), self.in_world(own.gap));
             proof.pairs.extend(scratch.apart().map(shown));
         }
         Some((distance, self.pair.band_of(self.pair.nodes(nearest.pair))))
     }
 
-    /// Replaces a pair by its children. `None` where two leaves are not apart, or the budget ends.
-    fn split(&mut self, next: &Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<()> {
+    /// Replaces a pair by its children. A pair that is apart stays if some of its children show less than it does:
+    /// then the answer is `false`. `None` where two leaves are not apart, or the budget ends.
+    fn split(&mut self, next: &Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<bool> {
         if self.pair.meter.go_on().is_break() {
             return None;
         }
@@ -229,6 +240,11 @@ impl<'a> Certifier<'a> {
         let slack = pair.relative.slack();
         let all = LANES[count_a - 1][count_b - 1];
         let mut lanes = all & gaps.near;
+        let shows_less =
+            |lane: usize| lanes >> lane & 1 != 0 && run.motion.gap(gaps.enclosures[lane], slack) <= next.gap;
+        if next.gap > self.reach && (0..FAN * FAN).any(shows_less) {
+            return Some(false);
+        }
         run.is_cut |= lanes != all;
         // The nearest child comes next: if the proof fails at all, it is likeliest to fail there.
         let (mut nearest, mut least) = (None, f32::INFINITY);
@@ -237,10 +253,7 @@ impl<'a> Certifier<'a> {
             lanes &= lanes - 1;
             let pair = [a[lane / FAN], b[lane % FAN]];
             let gap = run.motion.gap(gaps.enclosures[lane], slack);
-            // The part of a child is in that of its parent: what is proven of the parent holds.
-            let own = gap > next.gap;
-            let (gap, shown_by) = if own { (gap, pair) } else { (next.gap, next.shown_by) };
-            let mut own = Open { gap, pair, shown_by };
+            let mut own = Open { gap, pair };
             if gaps.boxes[lane] < least {
                 least = gaps.boxes[lane];
                 match nearest.replace(own) {
@@ -250,7 +263,10 @@ impl<'a> Certifier<'a> {
             }
             self.file(own, run, scratch)?;
         }
-        nearest.map_or(Some(()), |nearest| self.file(nearest, run, scratch))
+        if let Some(nearest) = nearest {
+            self.file(nearest, run, scratch)?;
+        }
+        Some(true)
     }
 
     /// Puts a pair where it belongs. `None` where two leaves are not apart.
@@ -264,7 +280,7 @@ impl<'a> Certifier<'a> {
                 if a && b { self.pair.gap_of_parts(nodes) } else { self.pair.better_gap(nodes, own.gap) };
             is_apart = gap > self.reach;
             if is_apart {
-                (own.gap, own.shown_by) = (gap, own.pair);
+                own.gap = gap;
             } else if a && b {
                 self.doubtful = Some(nodes);
                 return None;
@@ -299,7 +315,7 @@ impl<'a> Certifier<'a> {
             let are_leaves = least.pair.iter().all(|node| node.is_leaf());
             if are_leaves
                 || self.pair.meter.spent.node_pairs >= most
-                || self.split(&least, run, scratch).is_none()
+                || self.split(&least, run, scratch) != Some(true)
             {
                 break;
             }
@@ -311,16 +327,6 @@ impl<'a> Certifier<'a> {
         scratch.near.extend(nearest.drain());
         scratch.nearest = nearest;
         least
-    }
-
-    /// Returns `true` if `leaves`, whose boxes overlap, are apart by their points; only of obstacles these may
-    /// tell more than boxes.
-    pub(crate) fn are_apart(&mut self, leaves: NodePair) -> bool {
-        let apart = self.pair.part == Part::Obstacle && self.pair.gap_of_leaves(leaves) > self.reach;
-        if !apart {
-            self.doubtful = Some(leaves);
-        }
-        apart
     }
 
     /// What a gap in a's stored frame proves in the world.

@@ -353,13 +353,9 @@ fn surfaces(
         }
         (None, Some(reason)) => Verdict::Undecided(reason),
         _ if !options.certifies() => apart(options, 0.0, false),
-        _ if known.as_ref().is_some_and(|known| known.is_doubtful())
-            || compared.first().is_some_and(|&leaves| !certifier.are_apart(leaves)) =>
-        {
-            apart(options, 0.0, false)
-        }
+        _ if known.as_ref().is_some_and(|known| known.is_doubtful()) => apart(options, 0.0, false),
         _ => {
-            let proven = certifier.prove(pose, open, (proof, known.is_some()));
+            let proven = certifier.prove(pose, compared, open, (proof, known.is_some()));
             if let Some((distance, near)) = proven {
                 band = near;
                 if let Some(known) = &mut known {

@@ -32,10 +32,8 @@ impl LeafVisitor for Surfaces<'_> {
         let (a, b) = (&self.pair.a.wide.leaves, &self.pair.b.wide.leaves);
         let [of_a, of_b] = leaves;
         self.pair.meter.leaf_pair(a.points(of_a).len(), b.points(of_b).len());
-        let pair = || NodePair { a: NodeId(a.id(of_a)), b: NodeId(b.id(of_b)) };
-        if self.compared.is_empty() {
-            // One is enough to know that no proof would hold.
-            self.compared.push(pair());
+        if self.notes_leaves {
+            self.compared.push(NodePair { a: NodeId(a.id(of_a)), b: NodeId(b.id(of_b)) });
         }
         self.compare_leaves(leaves, true)
     }

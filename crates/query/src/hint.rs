@@ -7,9 +7,9 @@
 
 use std::ops::ControlFlow;
 
+use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Ball, Frontier, Node, NodePair, Stack, descend, resume};
+use nearmiss_hierarchy::{Ball, Frontier, NodePair, Stack, descend, resume};
 use serde::{Deserialize, Serialize};
 
 use crate::certify::{Bound, Certifier, Excluded, are_doubtful};
@@ -174,7 +174,7 @@ impl Known {
     /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail again.
     pub(crate) fn has_front(&self, pair: &Posed<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
-            are_leaves(pair, leaves) && self.pose.is_some_and(|pose| are_doubtful(pair, &pose, leaves, reach))
+            pair.are_leaves(leaves) && self.pose.is_some_and(|pose| are_doubtful(pair, &pose, leaves, reach))
         };
         self.is_slow(pair, SLOW)
             && self.is_there(pair)
@@ -334,10 +334,4 @@ impl Known {
         let distance = distance / pair.views[0].placed().scale() * (1.0 - 1e-9);
         self.clear = (self.travel + (distance - f64::from(pair.relative.slack()))).next_down();
     }
-}
-
-/// Whether these are leaves.
-fn are_leaves(pair: &Posed<'_>, leaves: NodePair) -> bool {
-    let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
-    is_leaf(pair.a.nodes, leaves.a) && is_leaf(pair.b.nodes, leaves.b)
 }

@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Ball, Child, NodePair, Part, Relative, SLACK, Slices, Split};
+use nearmiss_hierarchy::{Ball, Child, Node, NodePair, Part, Relative, SLACK, Slices, Split};
 
 use crate::budget::Meter;
 use crate::options::{CollidePlan, Semantics};
@@ -38,6 +38,12 @@ impl<'a> Posed<'a> {
     #[inline]
     pub(crate) fn nodes(&self, [a, b]: [Child; 2]) -> NodePair {
         NodePair { a: self.a.wide.id(a), b: self.b.wide.id(b) }
+    }
+
+    /// Returns `true` if these are leaves, and not other nodes or none at all.
+    pub(crate) fn are_leaves(&self, pair: NodePair) -> bool {
+        let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
+        is_leaf(self.a.nodes, pair.a) && is_leaf(self.b.nodes, pair.b)
     }
 
     /// The leaves with a point of either scan.

@@ -47,8 +47,10 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) resolution: f32,
     /// Whether pairs of boxes tell all that is wanted of those that are apart: they need not be looked at one by one.
     pub(crate) is_plain: bool,
-    /// Whether excluded and compared pairs are noted.
+    /// Whether excluded pairs are noted.
     notes: bool,
+    /// Whether compared pairs are noted.
+    pub(crate) notes_leaves: bool,
     /// The least gap of any pair excluded.
     nearest: f32,
     /// The pairs that were excluded.
@@ -115,6 +117,7 @@ impl<'a> Surfaces<'a> {
             pair,
             is_plain,
             notes,
+            notes_leaves: notes || options.certifies(),
             nearest: f32::INFINITY,
             excluded,
             compared,
@@ -285,8 +288,7 @@ impl Visitor for Surfaces<'_> {
     }
 
     fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        // One is enough to know that no proof would hold.
-        if self.notes || self.compared.is_empty() {
+        if self.notes_leaves {
             self.compared.push(pair);
         }
         self.compare(pair)

@@ -11,7 +11,7 @@ use nearmiss::{BuildOptions, Scan};
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
 use super::claim::{Checker, Kind};
-use super::proof::{self, Line, Poses, Verdict};
+use super::proof::{self, Line, Poses, Semantics, Verdict};
 use super::subject::Subject;
 use super::surface;
 
@@ -141,6 +141,27 @@ fn gaps_and_margins_are_not_taken_on_trust() {
     let checker = Checker { poses: None, ..trial.checker() };
     assert!(checker.check(&crossed).faults[0].contains("apart"), "moved into each other");
     assert!(trial.fault(&crossed).contains("away from the pose"), "and moved at all");
+}
+
+/// Near contact the points of leaves part what their enclosures do not. That is a proof of obstacles alone.
+#[test]
+fn points_part_obstacles_only() {
+    let shifts: Vec<f64> = (0..24_u8).map(|i| 0.15 + 0.001 * f64::from(i)).collect();
+    let trial = Trial::new("0", &shifts);
+    let mut by_points = 0;
+    for line in trial.certified(Verdict::Separated) {
+        let finding = trial.checker().check(line);
+        assert_eq!(finding.faults, Vec::<String>::new(), "line {}", line.query);
+        if finding.by_points == 0 {
+            continue;
+        }
+        by_points += 1;
+        let of_surfaces = Line { semantics: Semantics::Surface, ..line.clone() };
+        assert!(!trial.fault(&of_surfaces).is_empty(), "line {}", line.query);
+        let further = Line { gap: line.gap.map(|gap| gap + 0.01), ..line.clone() };
+        assert!(trial.fault(&further).contains("are not"), "line {}", line.query);
+    }
+    assert!(by_points > 0, "no pair was parted by points");
 }
 
 #[test]
