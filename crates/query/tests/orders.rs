@@ -315,3 +315,54 @@ fn no_resolution_misses_what_meets() {
     }
     assert!(met > 300 && erred > 20, "{met} meet, {erred} seem to");
 }
+
+/// The likelihood after one unit of work: of two boxes alone.
+fn first_guess(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose) -> f64 {
+    let budget = Budget::UNLIMITED.with_work(1);
+    let answer = ask(a, b, pose, &CollideOptions::default().with_detail(Detail::Verdict), &budget);
+    let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict else { panic!("{answer:?}") };
+    likelihood
+}
+
+/// Squares of 2 × 2 at these heights, in points a tenth apart.
+fn shelves(heights: &[f64]) -> Vec<[f64; 3]> {
+    let along = |i: i32| 0.1 * f64::from(i);
+    let square = |z: f64| {
+        (-10..=10).flat_map(move |i| (-10..=10).map(move |j| [along(i), along(j), z])).collect::<Vec<_>>()
+    };
+    heights.iter().flat_map(|&z| square(z)).collect()
+}
+
+#[test]
+fn a_likelihood_counts_what_boxes_hold() {
+    let hall = prepared(&shelves(&[-1.0, 1.0]));
+    let shop = prepared(&shelves(&[-1.0, -0.6, -0.2, 0.2, 0.6, 1.0]));
+    let ball = sphere(300);
+    let size = ball.bounds().half_extents()[0];
+    let mut likelihoods = [0.0; 2];
+    for z in [-0.8, -0.4, 0.0, 0.4, 0.8] {
+        let pose = Pose::from_translation([0.1, 0.1, z]).with_scale(0.15 / size);
+        for (sum, scan) in likelihoods.iter_mut().zip([&hall, &shop]) {
+            *sum += first_guess(scan, &ball, &pose) / 5.0;
+        }
+    }
+    let [empty, full] = likelihoods;
+    assert!(empty + 0.05 < full && full < 0.9, "{empty} in a hall, {full} in a shop");
+}
+
+#[test]
+fn a_likelihood_knows_neither_units_nor_sides() {
+    let (a, b) = (prepared(&shelves(&[-0.5, 0.5])), sphere(300));
+    let points: Vec<[f64; 3]> = shelves(&[-0.5, 0.5]).iter().map(|p| p.map(|x| 1024.0 * x)).collect();
+    let large = prepared(&points);
+    let mut rng = arbitrary::rng(5);
+    for _ in 0..20 {
+        let at = arbitrary::point_in(&mut rng, 0.4);
+        let pose = arbitrary::rotation(&mut rng).with_scale(0.3).with_translation(at);
+        let own = first_guess(&a, &b, &pose);
+        let swapped = first_guess(&b, &a, &pose.inverse());
+        let pose = pose.with_scale(0.3 * 1024.0).with_translation(at.map(|x| 1024.0 * x));
+        let scaled = first_guess(&large, &b, &pose);
+        assert!((own - swapped).abs() < 1e-3 && (own - scaled).abs() < 1e-3, "{own} {swapped} {scaled}");
+    }
+}
