@@ -111,15 +111,15 @@ struct Run<'m> {
     lists: bool,
     /// The least gap so far.
     least: f32,
-    /// A pair with no lesser gap than this is not split for a better bound: [`KEPT`] times the least gap.
+    /// [`KEPT`] times the least gap. A pair whose gap is at least this is not split for a better bound.
     enough: f32,
-    /// The same, beside the distance of the centres.
+    /// The same as [`Motion::gaps`] tells gaps: less the distance of the scans' centres.
     beyond: f32,
-    /// Whether there is such a pair.
+    /// Whether the gap of some pair is known to be at least `enough`, and not kept.
     is_cut: bool,
 }
 
-/// So many times the least gap of a proof is a good gap.
+/// A gap this many times the least one of a proof is good enough.
 const KEPT: f32 = 4.0;
 
 impl Run<'_> {
