@@ -31,8 +31,8 @@ pub(crate) struct Ordered {
 }
 
 impl Ordered {
-    /// Those of a cloud. A tree of all points tells how densely they lie and what surface they sample; where
-    /// some turn out to be sparse, a second one parts these from the others.
+    /// Orders the points of a cloud. A first tree of all points tells their spacing and the surface that they
+    /// sample. If some are sparse, a second tree parts these from the others.
     pub(crate) fn of(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
         let leaf_size = options.leaf_size as usize;
         let mut items: Vec<Item> =

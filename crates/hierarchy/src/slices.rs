@@ -138,7 +138,7 @@ impl Slices<'_> {
     #[must_use]
     pub fn obstacle_reach(&self, i: usize) -> f32 {
         if self.is_on_sheet(i) {
-            self.cell_radius(i).max(self.discs[i] * DISC_REACH)
+            sheet_reach(self.radii[i], self.discs[i], self.reach)
         } else {
             self.obstacle_ball(i)
         }
@@ -156,7 +156,7 @@ impl Slices<'_> {
         let mut reaches = [0.0; PointBlock::WIDTH];
         let points = self.radii[first..end].iter().zip(&self.discs[first..end]);
         for (reach, (radius, disc)) in reaches.iter_mut().zip(points) {
-            *reach = cell_radius(*radius, self.reach).max(disc * DISC_REACH);
+            *reach = sheet_reach(*radius, *disc, self.reach);
         }
         for (i, reach) in (first..end).zip(&mut reaches) {
             if !self.is_on_sheet(i) {
@@ -188,6 +188,12 @@ impl Slices<'_> {
     pub fn ball(&self, i: usize) -> f32 {
         ball(PointKind::from_code(self.kinds[i]), self.radii[i], self.sampling_radius)
     }
+}
+
+/// See [`Slices::obstacle_reach`]: that of a point on a sheet.
+#[inline]
+fn sheet_reach(radius: f32, disc: f32, reach: f32) -> f32 {
+    cell_radius(radius, reach).max(disc * DISC_REACH)
 }
 
 /// See [`Slices::cell_radius`].

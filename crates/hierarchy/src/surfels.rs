@@ -143,8 +143,8 @@ pub(crate) struct Surfels {
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) discs: Vec<f32>,
     pub(crate) kinds: Vec<u8>,
-    /// Those of [`Slices::ball`](crate::Slices::ball) and
-    /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball): the greater.
+    /// The radius of each point's ball: the greater of [`Slices::ball`](crate::Slices::ball) and
+    /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball).
     pub(crate) balls: Vec<f32>,
     /// About the disc and the ball of each point.
     pub(crate) flat: Vec<Solid>,

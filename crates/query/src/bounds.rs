@@ -24,7 +24,8 @@ const ROUNDS: u32 = 1;
 /// So many nodes of either scan are compared at once.
 pub(crate) const FAN: usize = 4;
 
-/// The lanes of [`Gaps`] that the first `i + 1` nodes of a and the first `j + 1` of b take, as bits, at `[i][j]`.
+/// The lanes of [`Gaps`] that the first `i + 1` nodes of a and the first `j + 1` of b take, as bits, at
+/// `[i][j]`.
 pub(crate) const LANES: [[u32; FAN]; FAN] = {
     let mut lanes = [[0; FAN]; FAN];
     let mut i = 0;

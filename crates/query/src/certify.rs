@@ -1,12 +1,12 @@
-//! Certificates of separation: a set of node pairs that covers all pairs of points, the enclosures of each pair
-//! apart. Enclosures provably contain the surface, or the obstacle, of their nodes.
+//! Certificates of separation: a set of node pairs that covers all pairs of points, the enclosures of each
+//! pair apart. Enclosures provably contain the surface, or the obstacle, of their nodes.
 //!
-//! The proof begins with the roots. A pair whose enclosures are apart is proven; one whose enclosures overlap is
-//! replaced by its children, sixteen pairs at a time. The certificate is whole when no pair is left, and given up
-//! at the first two leaves that nothing parts.
+//! The proof begins with the roots. A pair whose enclosures are apart is proven; one whose enclosures overlap
+//! is replaced by its children, sixteen pairs at a time. The certificate is whole when no pair is left, and
+//! given up at the first two leaves that nothing parts.
 //!
-//! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with the
-//! least bound is split further, for about an eighth as long as all took before.
+//! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with
+//! the least bound is split further, for about an eighth as long as all took before.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -109,9 +109,7 @@ struct Run<'m> {
     motion: &'m Motion,
     /// Whether all pairs are wanted that are apart.
     lists: bool,
-    /// The least gap so far.
-    least: f32,
-    /// [`KEPT`] times the least gap. A pair whose gap is at least this is not split for a better bound.
+    /// [`KEPT`] times the least gap so far. A pair with at least this gap is not split for a better bound.
     enough: f32,
     /// The same as [`Motion::gaps`] tells gaps: less the distance of the scans' centres.
     beyond: f32,
@@ -125,7 +123,7 @@ const KEPT: f32 = 4.0;
 impl Run<'_> {
     /// A pair is apart with this gap, the least so far. `slack` is that of the gap.
     fn found(&mut self, gap: f32, slack: f32) {
-        (self.least, self.enough) = (gap, KEPT * gap);
+        self.enough = KEPT * gap;
         self.beyond = self.motion.beyond_gap(self.enough, slack);
     }
 }
@@ -133,19 +131,18 @@ impl Run<'_> {
 /// The pair of all points.
 pub(crate) const ROOTS: NodePair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
 
-/// Returns `true` if a proof would fail at these two leaves, b's stored frame at `pose` in a's.
-pub(crate) fn are_doubtful(pair: &Posed<'_>, pose: &Pose, leaves: NodePair, reach: f32) -> bool {
-    pair.gap_of_parts(leaves) <= reach
-        && !are_parted(pair, &Motion::new(pair.level, pair.views, pose), leaves, reach)
-}
-
-/// Returns `true` if the enclosures of two leaves are further apart than `reach`.
-fn are_parted(pair: &Posed<'_>, motion: &Motion, leaves: NodePair, reach: f32) -> bool {
+/// Returns `true` if a proof would fail at two leaves: neither their enclosures nor their points are further
+/// apart than `reach`.
+pub(crate) fn are_doubtful(pair: &Posed<'_>, motion: &Motion, leaves: NodePair, reach: f32) -> bool {
+    if pair.gap_of_parts(leaves) > reach {
+        return false;
+    }
     let child = |scan: &Slices<'_>, id: NodeId| scan.wide.leaf_of(scan.nodes[id.index()].first as usize);
     let leaves = [child(pair.a, leaves.a), child(pair.b, leaves.b)];
     let all = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
     let gaps = motion.gaps(([pair.a, pair.b], pair.part), leaves, [true; 2], all);
-    motion.gap(gaps.enclosures[0], pair.relative.slack()) > reach
+    let gap = motion.gap(gaps.enclosures[0], pair.relative.slack());
+    gap.is_nan() || gap <= reach
 }
 
 /// The search for a pair of leaves whose enclosures are not apart.
@@ -165,10 +162,10 @@ impl<'a> Certifier<'a> {
         Self { pair, reach, proven, doubtful: None }
     }
 
-    /// Proves the two scans, b's stored frame at `pose` in a's, to be apart. Returns the least gap, in the world,
-    /// and the band there; `None` where the proof fails. It is likeliest to fail at leaves that were `compared`
-    /// because their boxes overlap, so these come first. The pairs are handed out with their gaps in the world if a
-    /// `proof` is wanted, and left in `proven` if a hint wants them.
+    /// Proves the two scans, b's stored frame at `pose` in a's, to be apart. Returns the least gap, in the
+    /// world, and the band there; `None` where the proof fails. It is likeliest to fail at leaves that were
+    /// `compared` because their boxes overlap, so these come first. The pairs are handed out with their gaps
+    /// in the world if a `proof` is wanted, and left in `proven` if a hint wants them.
     pub(crate) fn prove(
         &mut self,
         pose: &Pose,
@@ -178,18 +175,15 @@ impl<'a> Certifier<'a> {
     ) -> Option<(f64, f64)> {
         let motion = &Motion::new(self.pair.level, self.pair.views, pose);
         let (pair, reach) = (&self.pair, self.reach);
-        let fails = |&leaves: &NodePair| {
-            !pair.are_leaves(leaves)
-                || (pair.gap_of_parts(leaves) <= reach && !are_parted(pair, motion, leaves, reach))
-        };
+        let fails =
+            |&leaves: &NodePair| !pair.are_leaves(leaves) || are_doubtful(pair, motion, leaves, reach);
         if let Some(&leaves) = compared.iter().find(|leaves| fails(leaves)) {
             self.doubtful = Some(leaves);
             return None;
         }
         let infinite = f32::INFINITY;
         let lists = is_hinted || proof.is_some();
-        let mut run =
-            Run { motion, lists, least: infinite, enough: infinite, beyond: infinite, is_cut: false };
+        let mut run = Run { motion, lists, enough: infinite, beyond: infinite, is_cut: false };
         scratch.clear();
         self.proven.clear();
         let before = self.pair.meter.spent.node_pairs;
@@ -222,8 +216,8 @@ impl<'a> Certifier<'a> {
         Some((distance, self.pair.band_of(self.pair.nodes(nearest.pair))))
     }
 
-    /// Replaces a pair by its children. A pair that is apart stays if some of its children show less than it does:
-    /// then the answer is `false`. `None` where two leaves are not apart, or the budget ends.
+    /// Replaces a pair by its children. A pair that is apart stays if some of its children show less than it
+    /// does: then the answer is `false`. `None` where two leaves are not apart, or the budget ends.
     fn split(&mut self, next: &Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<bool> {
         if self.pair.meter.go_on().is_break() {
             return None;
@@ -290,7 +284,7 @@ impl<'a> Certifier<'a> {
             scratch.open.push(own);
         } else if own.gap < run.enough {
             scratch.near.push(own);
-            if own.gap < run.least {
+            if KEPT * own.gap < run.enough {
                 run.found(own.gap, self.pair.relative.slack());
             }
         } else {
@@ -302,9 +296,9 @@ impl<'a> Certifier<'a> {
         Some(())
     }
 
-    /// Splits the pair with the least gap again and again, until that is two leaves or `most` node pairs more were
-    /// compared, but once at least. Returns the pair with the least gap then, or the last that was split if only
-    /// pairs with good gaps are left.
+    /// Splits the pair with the least gap again and again, until that is two leaves or `most` node pairs more
+    /// were compared, but once at least. Returns the pair with the least gap then, or the last that was split
+    /// if only pairs with good gaps are left.
     fn tighten(&mut self, most: u64, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<Open> {
         let most = self.pair.meter.spent.node_pairs + most.max(1);
         let mut nearest = std::mem::take(&mut scratch.nearest);

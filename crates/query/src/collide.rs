@@ -128,10 +128,12 @@ pub fn collide_proving(
 /// As [`collide_with`], for two scans that were asked about before in poses not far from these: `hint` remembers where
 /// they met, or what kept them apart.
 ///
-/// Changes no verdict but those that a budget ends, whatever `hint` was used for before. Evidence may differ: a separation may be certified
-/// with a lesser gap than without, and of some thousand one is certified that otherwise is estimated, or the other way round. It is believed, so one read from a file must be one that was written. Searches with a
-/// resolution and those by any other method than [`Method::Traversal`] do without. What it remembers is worth most for small motions: a step of a tenth of a sampling
-/// radius, as a simulation makes, takes a fraction of a query.
+/// Changes no verdict but those that a budget ends, whatever `hint` was used for before. Evidence may differ:
+/// a certified gap may be less than without a hint, and about one separation in a thousand is certified with a
+/// hint and estimated without, or the reverse. A hint is not checked: read back only one that was written
+/// here. Searches with a resolution and those by any other method than [`Method::Traversal`] do
+/// without. What it remembers is worth most for small motions: a step of a tenth of a sampling radius, as a
+/// simulation makes, takes a fraction of a query.
 pub fn collide_hinted(
     a: &ScanView<'_>,
     b: &ScanView<'_>,

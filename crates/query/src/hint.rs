@@ -12,6 +12,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Ball, Frontier, NodePair, Stack, descend, resume};
 use serde::{Deserialize, Serialize};
 
+use crate::bounds::Motion;
 use crate::certify::{Bound, Certifier, Excluded, are_doubtful};
 use crate::options::CollideOptions;
 use crate::posed::Posed;
@@ -36,8 +37,8 @@ const LONGEST: f64 = (1_u64 << 40) as f64;
 /// What is remembered between queries about the same two scans; for [`collide_hinted`](crate::collide_hinted). Owned by
 /// the caller, one for each pair of scans.
 ///
-/// A proof that goes on rests on smaller nodes than a fresh one, and on where they were before: of some thousand
-/// separations one is certified that otherwise is estimated, or the other way round.
+/// A continued proof rests on smaller nodes than a fresh one, and on their earlier positions. So about one
+/// separation in a thousand is certified with a hint and estimated without, or the reverse.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct PairHint {
@@ -174,7 +175,8 @@ impl Known {
     /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail again.
     pub(crate) fn has_front(&self, pair: &Posed<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
-            pair.are_leaves(leaves) && self.pose.is_some_and(|pose| are_doubtful(pair, &pose, leaves, reach))
+            let motion = self.pose.map(|pose| Motion::new(pair.level, pair.views, &pose));
+            pair.are_leaves(leaves) && motion.is_some_and(|motion| are_doubtful(pair, &motion, leaves, reach))
         };
         self.is_slow(pair, SLOW)
             && self.is_there(pair)

@@ -3,9 +3,9 @@
 //! Three things about the pairs of nodes that are still open tell whether they hide a contact:
 //!
 //! - how much two boxes overlap, as a share s: 1 where they share a centre, 0 where they just touch;
-//! - how much surface the greater box holds. A thing of width w anywhere in a volume with the surface density ρ
-//!   meets ρ w sheets on average, so m = Σ s ρ w is about how many sheets are met. Boxes of a room are mostly
-//!   empty, those of an object are not;
+//! - how much surface the greater box holds. A thing of width w anywhere in a volume with the surface density
+//!   ρ meets ρ w sheets on average, so m = Σ s ρ w is about how many sheets are met. Boxes of a room are
+//!   mostly empty, those of an object are not;
 //! - how many times as long one box is as the other. Where their sizes differ much, s says little.
 //!
 //! The likelihood is a logistic function of s, ln m and the logarithm of that ratio. Its coefficients were
@@ -27,7 +27,7 @@ const AREA_A_POINT: f64 = 0.5;
 /// The range of m, beyond which more of it says nothing.
 const SHEETS: [f64; 2] = [1e-6, 1e3];
 
-/// What one pair of nodes says.
+/// The evidence of a contact that one pair of nodes gives.
 struct Hint {
     /// How much the boxes overlap.
     share: f64,

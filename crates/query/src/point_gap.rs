@@ -37,14 +37,14 @@ impl<S: Simd> Balls<S> {
         Self { centres: [load(x), load(y), load(z)], reaches: load(&scan.obstacle_reaches(block)), lanes }
     }
 
-    /// Those of a in b's frame.
+    /// The balls of a, moved into b's frame.
     #[inline(always)]
     fn moved_back(self, relative: &Relative) -> Self {
         let centres = relative.points_back(&self.centres);
         Self { centres, reaches: self.reaches * relative.scale_back(), ..self }
     }
 
-    /// Those of b in a's frame.
+    /// The balls of b, moved into a's frame.
     #[inline(always)]
     fn moved(self, relative: &Relative) -> Self {
         let centres = relative.points(&self.centres);

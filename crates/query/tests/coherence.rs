@@ -117,7 +117,7 @@ fn hints_change_no_verdict() {
     assert!(seen[0] > 1000 && seen[1] > 3000, "{seen:?}");
     assert!(skipped > 1000, "{skipped} answers came without any search");
     assert!(proven > 1000, "{proven} separations were certified");
-    // What the children of two nodes show may be less than what the nodes do.
+    // The enclosures of two nodes may be apart although those of two of their children are not shown to be.
     assert!(evident.iter().sum::<usize>() * 500 < proven, "the evidence of {evident:?} of {proven} differs");
 }
 
