@@ -1,4 +1,4 @@
-//! The boxes of four nodes side by side, with what their enclosures reach further.
+//! The box of a node, or the boxes of several side by side, with what their enclosures reach further.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, u32x4};
@@ -9,19 +9,52 @@ use crate::growth::Growth;
 use crate::lanes::{Boxes, along_normals};
 use crate::slices::{Part, Slices};
 
-/// Boxes and enclosures of four nodes, a lane each.
-#[derive(Debug, Clone, Copy)]
-pub struct FourNodes<S: Simd> {
+/// Box and enclosure of a node, with `f32` for `V`; of several nodes, a lane each, with a vector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeBounds<V> {
     /// The middles of the boxes.
-    pub centre: [f32x4<S>; 3],
+    pub centre: [V; 3],
     /// Half their edge lengths.
-    pub half: [f32x4<S>; 3],
+    pub half: [V; 3],
     /// Unit directions of the edges.
-    pub axes: [[f32x4<S>; 3]; 3],
+    pub axes: [[V; 3]; 3],
     /// By how much the enclosures reach further against the axes; infinite where nothing bounds them.
-    pub low: [f32x4<S>; 3],
+    pub low: [V; 3],
     /// The same along the axes.
-    pub high: [f32x4<S>; 3],
+    pub high: [V; 3],
+}
+
+/// Boxes and enclosures of four nodes.
+pub type FourNodes<S> = NodeBounds<f32x4<S>>;
+
+impl<V: Copy> NodeBounds<V> {
+    /// The same bounds with each number replaced.
+    #[inline(always)]
+    #[must_use]
+    pub fn map<W>(&self, replaced: impl Fn(V) -> W) -> NodeBounds<W> {
+        let [u, v, w] = self.axes;
+        NodeBounds {
+            centre: each(self.centre, &replaced),
+            half: each(self.half, &replaced),
+            axes: [each(u, &replaced), each(v, &replaced), each(w, &replaced)],
+            low: each(self.low, &replaced),
+            high: each(self.high, &replaced),
+        }
+    }
+}
+
+#[inline(always)]
+fn each<V, W>([x, y, z]: [V; 3], replaced: &impl Fn(V) -> W) -> [W; 3] {
+    [replaced(x), replaced(y), replaced(z)]
+}
+
+impl NodeBounds<f32> {
+    /// This box, and what it must grow by.
+    #[inline(always)]
+    pub(crate) fn of(bounds: &OrientedBox, growth: &Growth) -> Self {
+        let (low, high) = growth.lengths();
+        Self { centre: bounds.centre, half: bounds.half, axes: bounds.axes, low, high }
+    }
 }
 
 impl<S: Simd> FourNodes<S> {

@@ -51,15 +51,21 @@ impl Growth {
     #[must_use]
     pub fn of(&self, bounds: &OrientedBox) -> OrientedBox {
         let mut grown = *bounds;
+        let (low, high) = self.lengths();
         for k in 0..3 {
-            let (low, high) = (length(self.low[k]), length(self.high[k]));
-            let shift = 0.5 * (high - low);
+            let shift = 0.5 * (high[k] - low[k]);
             for i in 0..3 {
                 grown.centre[i] += shift * bounds.axes[k][i];
             }
-            grown.half[k] += 0.5 * (high + low);
+            grown.half[k] += 0.5 * (high[k] + low[k]);
         }
         grown
+    }
+
+    /// By how much the enclosure reaches further against the axes, and along them.
+    #[inline]
+    pub(crate) fn lengths(&self) -> ([f32; 3], [f32; 3]) {
+        (self.low.map(length), self.high.map(length))
     }
 
     /// Against the first axis and the second, against the third and along the first, along the second and the third: of each pair

@@ -38,7 +38,7 @@ pub use build::PointHierarchy;
 pub use classes::SLAB;
 pub use covering::Covering;
 pub use descend::{Frontier, Heap, NodePair, Split, Stack, Visitor, descend, resume};
-pub use four_nodes::FourNodes;
+pub use four_nodes::{FourNodes, NodeBounds};
 pub use gather::GatherScratch;
 pub use growth::Growth;
 pub use leaf_block::{LeafBlock, Leaves};

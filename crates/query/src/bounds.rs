@@ -1,4 +1,4 @@
-//! Lower bounds of how far oriented boxes in relative motion are apart, four of either scan at a time.
+//! Lower bounds of how far oriented boxes in relative motion are apart, sixteen pairs at a time.
 //!
 //! Along the face normals alone boxes may come out two thirds nearer than they are: enough to tell whether they touch, too little to tell
 //! how far off they are. So a box's centre is projected onto the other box and back (Cheney & Goldstein, "Proximity maps for
@@ -10,23 +10,74 @@
 //! much a pair of boxes is nearer or further than |o|: along a unit vector u, u·o = |o| (1 − |u − o/|o||² / 2), of which the
 //! second part is small where |o| is great. Rounding is then a share of the scans' sizes, not of their distance.
 
+use std::ops::{Add, Mul};
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
-use nearmiss_hierarchy::{Child, FourNodes, Part, SLACK, Slices};
+use nearmiss_hierarchy::{Child, FourNodes, NodeBounds, Part, SLACK, Slices, WideTree, whole};
 
 use crate::view::ScanView;
 
 /// Projections back and forth: after one of them the descent visits 0.5 % more pairs than with exact distances.
 const ROUNDS: u32 = 1;
 
-/// So many nodes of either scan are compared at once.
-pub(crate) const FAN: usize = 4;
+/// So many pairs of nodes are compared at once.
+pub(crate) const LANES: usize = 16;
 
-/// The lanes of [`Gaps`] that the first `i + 1` nodes of a and the first `j + 1` of b take, as bits, at
+/// So many children of either node make these pairs.
+const FAN: usize = 4;
+
+/// The pairs of nodes that take the place of a pair, up to sixteen, each in a lane of its own: four children of
+/// either node, or one node and the grandchildren of the other.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pairs {
+    of_a: [Child; LANES],
+    of_b: [Child; LANES],
+    /// A lane's node of a is that with the lane's number shifted by this.
+    shift: u32,
+    /// A lane's node of b is that with these bits of the lane's number.
+    mask: usize,
+    /// The lanes that hold a pair, as bits.
+    pub(crate) lanes: u32,
+}
+
+impl Pairs {
+    /// Those that take the place of `pair`, the nodes that are [`whole`] by themselves.
+    #[inline]
+    fn of([tree_a, tree_b]: [&WideTree; 2], [a, b]: [Child; 2], whole: [bool; 2]) -> Self {
+        let (alone_a, alone_b) = ([a; LANES], [b; LANES]);
+        match whole {
+            [true, true] => Self { of_a: alone_a, of_b: alone_b, shift: 0, mask: 0, lanes: 1 },
+            [true, false] => {
+                let (of_b, lanes) = tree_b.grandchildren(b);
+                Self { of_a: alone_a, of_b, shift: 0, mask: LANES - 1, lanes }
+            }
+            [false, true] => {
+                let (of_a, lanes) = tree_a.grandchildren(a);
+                Self { of_a, of_b: alone_b, shift: 0, mask: 0, lanes }
+            }
+            [false, false] => {
+                let ([a, b], mut of_a, mut of_b) =
+                    ([tree_a.children(a), tree_b.children(b)], alone_a, alone_b);
+                of_a[..FAN].copy_from_slice(&a.0);
+                of_b[..FAN].copy_from_slice(&b.0);
+                Self { of_a, of_b, shift: 2, mask: FAN - 1, lanes: FAN_LANES[a.1 - 1][b.1 - 1] }
+            }
+        }
+    }
+
+    /// The pair in this lane.
+    #[inline]
+    pub(crate) fn pair(&self, lane: usize) -> [Child; 2] {
+        [self.of_a[lane % LANES >> self.shift], self.of_b[lane & self.mask]]
+    }
+}
+
+/// The lanes of [`Pairs`] that the first `i + 1` children of a and the first `j + 1` of b take, as bits, at
 /// `[i][j]`.
-pub(crate) const LANES: [[u32; FAN]; FAN] = {
+const FAN_LANES: [[u32; FAN]; FAN] = {
     let mut lanes = [[0; FAN]; FAN];
     let mut i = 0;
     while i < FAN * FAN {
@@ -41,13 +92,13 @@ pub(crate) const LANES: [[u32; FAN]; FAN] = {
     lanes
 };
 
-/// How far four nodes of either scan are apart: by how much further, at least, than the centres of the scans, in a's stored frame. That
-/// of the i-th of a and the j-th of b stands at 4 i + j; [`Motion::least`] where they may overlap, or are no numbers.
+/// How far the nodes of [`Pairs`] are apart: by how much further, at least, than the centres of the scans, in
+/// a's stored frame; [`Motion::least`] where they may overlap, or are no numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gaps {
-    pub(crate) boxes: [f32; FAN * FAN],
-    pub(crate) enclosures: [f32; FAN * FAN],
-    /// Those that are nearer than either limit, as bits.
+    pub(crate) boxes: [f32; LANES],
+    pub(crate) enclosures: [f32; LANES],
+    /// The lanes of pairs that are nearer than either limit, as bits.
     pub(crate) near: u32,
 }
 
@@ -171,72 +222,124 @@ impl Motion {
         (-self.distance as f32).next_down().next_down()
     }
 
-    /// What takes the place of a node of `of_a`, up to four, and what of one of `of_b`, each [`whole`](nearmiss_hierarchy::whole) or
-    /// by its children.
+    /// The pairs that take the place of a pair of nodes, and their gaps.
     #[inline]
-    pub(crate) fn gaps(
+    pub(crate) fn split(
         &self,
         ([of_a, of_b], part): ([&Slices<'_>; 2], Part),
         [a, b]: [Child; 2],
-        whole: [bool; 2],
         limits: Limits,
-    ) -> Gaps {
-        dispatch!(self.level, simd => simd.vectorize(
+    ) -> (Pairs, Gaps) {
+        let whole = whole([of_a.wide, of_b.wide], [a, b], self.scale);
+        let pairs = Pairs::of([of_a.wide, of_b.wide], [a, b], whole);
+        let mut gaps = dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
             || {
-                let (a, b) = (of_a.family(simd, part, a, whole[0]), of_b.family(simd, part, b, whole[1]));
-                self.gaps_by(simd, &a, &b, limits)
+                let (bounds_a, bounds_b) = match whole {
+                    [true, true] => {
+                        (alone(simd, &of_a.bounds_of(part, a)), alone(simd, &self.moved(&of_b.bounds_of(part, b))))
+                    }
+                    [true, false] => {
+                        let below = of_b.bounds_of_grandchildren(simd, part, b);
+                        (alone(simd, &of_a.bounds_of(part, a)), self.moved(&below))
+                    }
+                    [false, true] => {
+                        let below = of_a.bounds_of_grandchildren(simd, part, a);
+                        (below, alone(simd, &self.moved(&of_b.bounds_of(part, b))))
+                    }
+                    [false, false] => {
+                        let a = of_a.bounds_of_children(simd, part, a);
+                        let b = of_b.bounds_of_children(simd, part, b);
+                        (each(&a), all(&self.moved(&b)))
+                    }
+                };
+                self.gaps(simd, &bounds_a, &bounds_b, limits)
             },
-        ))
+        ));
+        gaps.near &= pairs.lanes;
+        (pairs, gaps)
+    }
+
+    /// Bounds of b in a's stored frame, their centres less o.
+    #[inline(always)]
+    fn moved<V: Copy + Add<Output = V> + Mul<f32, Output = V> + Add<f32, Output = V>>(
+        &self,
+        bounds: &NodeBounds<V>,
+    ) -> NodeBounds<V> {
+        let [x, y, z] = self.scaled(self.turned(&bounds.centre));
+        NodeBounds {
+            centre: [x + self.shift[0], y + self.shift[1], z + self.shift[2]],
+            half: self.scaled(bounds.half),
+            axes: [
+                self.turned(&bounds.axes[0]),
+                self.turned(&bounds.axes[1]),
+                self.turned(&bounds.axes[2]),
+            ],
+            low: self.scaled(bounds.low),
+            high: self.scaled(bounds.high),
+        }
     }
 
     #[inline(always)]
-    fn gaps_by<S: Simd>(&self, simd: S, a: &FourNodes<S>, b: &FourNodes<S>, limits: Limits) -> Gaps {
-        let [x, y, z] = self.turned(&b.centre);
-        let scale = self.scale;
-        let centre_b =
-            all(&[x * scale + self.shift[0], y * scale + self.shift[1], z * scale + self.shift[2]]);
-        let half_b = all(&[b.half[0] * scale, b.half[1] * scale, b.half[2] * scale]);
-        let axes_b =
-            [all(&self.turned(&b.axes[0])), all(&self.turned(&b.axes[1])), all(&self.turned(&b.axes[2]))];
-        let (centre_a, half_a) = (each(&a.centre), each(&a.half));
-        let axes_a = [each(&a.axes[0]), each(&a.axes[1]), each(&a.axes[2])];
+    fn scaled<V: Mul<f32, Output = V>>(&self, [x, y, z]: [V; 3]) -> [V; 3] {
+        [x * self.scale, y * self.scale, z * self.scale]
+    }
+
+    #[inline(always)]
+    fn turned<V: Copy + Add<Output = V> + Mul<f32, Output = V>>(&self, v: &[V; 3]) -> [V; 3] {
+        let [x, y, z] = self.rotation;
+        [
+            v[0] * x[0] + v[1] * x[1] + v[2] * x[2],
+            v[0] * y[0] + v[1] * y[1] + v[2] * y[2],
+            v[0] * z[0] + v[1] * z[1] + v[2] * z[2],
+        ]
+    }
+
+    /// The gaps of nodes of a and of [moved](Self::moved) nodes of b, lane by lane.
+    #[inline(always)]
+    fn gaps<S: Simd>(
+        &self,
+        simd: S,
+        a: &NodeBounds<f32x16<S>>,
+        b: &NodeBounds<f32x16<S>>,
+        limits: Limits,
+    ) -> Gaps {
         let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
         let (mut between, mut off) = ([zero; 3], [zero; 3]);
         for k in 0..3 {
-            between[k] = centre_b[k] - centre_a[k];
+            between[k] = b.centre[k] - a.centre[k];
             off[k] = between[k] + self.offset[k];
         }
         // All that feet need in terms of the axes: their cosines, and how far apart the centres are along them.
         let mut cosines = [[zero; 3]; 3];
         let (mut along_a, mut along_b) = ([zero; 3], [zero; 3]);
         for i in 0..3 {
-            along_a[i] = product(&axes_a[i], &off);
-            along_b[i] = product(&axes_b[i], &off);
+            along_a[i] = product(&a.axes[i], &off);
+            along_b[i] = product(&b.axes[i], &off);
             for j in 0..3 {
-                cosines[i][j] = product(&axes_a[i], &axes_b[j]);
+                cosines[i][j] = product(&a.axes[i], &b.axes[j]);
             }
         }
         // From the centre of b on.
         let mut seen = along_a;
-        let mut foot_a = within(&seen, &half_a);
+        let mut foot_a = within(&seen, &a.half);
         for _ in 0..ROUNDS {
             let mut place = along_b;
             for j in 0..3 {
                 place[j] = cosines[0][j] * foot_a[0] + cosines[1][j] * foot_a[1] + cosines[2][j] * foot_a[2]
                     - place[j];
             }
-            let foot_b = within(&place, &half_b);
+            let foot_b = within(&place, &b.half);
             for i in 0..3 {
                 seen[i] = along_a[i] + product(&cosines[i], &foot_b);
             }
-            foot_a = within(&seen, &half_a);
+            foot_a = within(&seen, &a.half);
         }
         let mut line = [zero; 3];
         for i in 0..3 {
             let apart = seen[i] - foot_a[i];
             for k in 0..3 {
-                line[k] += axes_a[i][k] * apart;
+                line[k] += a.axes[i][k] * apart;
             }
         }
         let per_length = one / product(&line, &line).sqrt();
@@ -249,13 +352,13 @@ impl Motion {
         // Any line bounds: that of the boxes is nearly that of the enclosures.
         let mut growth = zero;
         for k in 0..3 {
-            let (along_a, along_b) = (product(&axes_a[k], &line), product(&axes_b[k], &line));
-            boxes -= half_a[k] * along_a.abs();
-            boxes -= half_b[k] * along_b.abs();
+            let (along_a, along_b) = (product(&a.axes[k], &line), product(&b.axes[k], &line));
+            boxes -= a.half[k] * along_a.abs();
+            boxes -= b.half[k] * along_b.abs();
             // Towards each other: along the line for a, against it for b.
-            let towards_b = simd.select_f32x16(along_a.simd_gt(0.0), each_one(a.high[k]), each_one(a.low[k]));
-            let towards_a = simd.select_f32x16(along_b.simd_gt(0.0), all_one(b.low[k]), all_one(b.high[k]));
-            growth += towards_b * along_a.abs() + towards_a * along_b.abs() * scale;
+            let towards_b = simd.select_f32x16(along_a.simd_gt(0.0), a.high[k], a.low[k]);
+            let towards_a = simd.select_f32x16(along_b.simd_gt(0.0), b.low[k], b.high[k]);
+            growth += towards_b * along_a.abs() + towards_a * along_b.abs();
         }
         let (least, enclosures) = (f32x16::splat(simd, self.least()), boxes - growth);
         let boxes = simd.select_f32x16(boxes.simd_gt(least), boxes, least);
@@ -265,40 +368,37 @@ impl Motion {
         let near = near.to_bitmask() as u32;
         Gaps { boxes: boxes.to_array(), enclosures: enclosures.to_array(), near }
     }
-
-    #[inline(always)]
-    fn turned<S: Simd>(&self, v: &[f32x4<S>; 3]) -> [f32x4<S>; 3] {
-        let [x, y, z] = self.rotation;
-        [
-            v[0] * x[0] + v[1] * x[1] + v[2] * x[2],
-            v[0] * y[0] + v[1] * y[1] + v[2] * y[2],
-            v[0] * z[0] + v[1] * z[1] + v[2] * z[2],
-        ]
-    }
 }
 
 /// The first of four in four lanes, then the second, and so on.
 #[inline(always)]
-fn each<S: Simd>([x, y, z]: &[f32x4<S>; 3]) -> [f32x16<S>; 3] {
-    [each_one(*x), each_one(*y), each_one(*z)]
-}
-
-#[inline(always)]
-fn each_one<S: Simd>(four: f32x4<S>) -> f32x16<S> {
-    let row = f32x16::block_splat(four);
-    let row = row.zip_low(row);
-    row.zip_low(row)
+fn each<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
+    four.map(
+        #[inline(always)]
+        |four| {
+            let row = f32x16::block_splat(four);
+            let row = row.zip_low(row);
+            row.zip_low(row)
+        },
+    )
 }
 
 /// The four one after the other, four times.
 #[inline(always)]
-fn all<S: Simd>([x, y, z]: &[f32x4<S>; 3]) -> [f32x16<S>; 3] {
-    [all_one(*x), all_one(*y), all_one(*z)]
+fn all<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
+    four.map(
+        #[inline(always)]
+        |four| f32x16::block_splat(four),
+    )
 }
 
+/// The one in all lanes.
 #[inline(always)]
-fn all_one<S: Simd>(four: f32x4<S>) -> f32x16<S> {
-    f32x16::block_splat(four)
+fn alone<S: Simd>(simd: S, one: &NodeBounds<f32>) -> NodeBounds<f32x16<S>> {
+    one.map(
+        #[inline(always)]
+        |one| f32x16::splat(simd, one),
+    )
 }
 
 #[inline(always)]
@@ -401,14 +501,15 @@ mod tests {
                 let motion = motion(level, &pose);
                 let gaps = dispatch!(level, simd => {
                     let a = FourNodes::new(simd, a.each_ref(), more_a.each_ref());
-                    motion.gaps_by(simd, &a, &FourNodes::new(simd, b.each_ref(), more_b.each_ref()), limits)
+                    let b = FourNodes::new(simd, b.each_ref(), more_b.each_ref());
+                    motion.gaps(simd, &each(&a), &all(&motion.moved(&b)), limits)
                 });
                 (gaps, motion)
             });
             let found: Vec<_> = found.collect();
             let (gaps, motion) = &found[0];
             assert!(found.iter().all(|other| other.0 == *gaps), "every level: {found:?}");
-            for lane in 0..FAN * FAN {
+            for lane in 0..LANES {
                 let (boxes, enclosures) = (gaps.boxes[lane], gaps.enclosures[lane]);
                 let is_near = boxes < limits.boxes || enclosures < limits.enclosures;
                 assert_eq!(gaps.near >> lane & 1 == 1, is_near, "round {round}, lane {lane}");

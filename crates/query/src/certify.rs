@@ -13,9 +13,9 @@ use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Child, NodePair, Slices, Split, Visitor, whole};
+use nearmiss_hierarchy::{Child, NodePair, Slices, Split, Visitor};
 
-use crate::bounds::{FAN, LANES, Limits, Motion};
+use crate::bounds::{LANES, Limits, Motion};
 use crate::posed::{Posed, balls_apart};
 
 /// Pairs of either of `a` with either of `b`, some of which were excluded.
@@ -140,7 +140,7 @@ pub(crate) fn are_doubtful(pair: &Posed<'_>, motion: &Motion, leaves: NodePair, 
     let child = |scan: &Slices<'_>, id: NodeId| scan.wide.leaf_of(scan.nodes[id.index()].first as usize);
     let leaves = [child(pair.a, leaves.a), child(pair.b, leaves.b)];
     let all = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
-    let gaps = motion.gaps(([pair.a, pair.b], pair.part), leaves, [true; 2], all);
+    let (_, gaps) = motion.split(([pair.a, pair.b], pair.part), leaves, all);
     let gap = motion.gap(gaps.enclosures[0], pair.relative.slack());
     gap.is_nan() || gap <= reach
 }
@@ -223,29 +223,24 @@ impl<'a> Certifier<'a> {
             return None;
         }
         let pair = &mut self.pair;
-        let (wide_a, wide_b) = (pair.a.wide, pair.b.wide);
-        let whole = whole([wide_a, wide_b], next.pair, pair.relative.scale());
         let enclosures = if run.lists { f32::INFINITY } else { run.beyond };
         let limits = Limits { boxes: f32::NEG_INFINITY, enclosures };
-        let gaps = run.motion.gaps(([pair.a, pair.b], pair.part), next.pair, whole, limits);
-        let (a, count_a) = wide_a.children(next.pair[0], whole[0]);
-        let (b, count_b) = wide_b.children(next.pair[1], whole[1]);
-        pair.meter.spent.node_pairs += (count_a * count_b) as u64;
+        let (pairs, gaps) = run.motion.split(([pair.a, pair.b], pair.part), next.pair, limits);
+        pair.meter.spent.node_pairs += u64::from(pairs.lanes.count_ones());
         let slack = pair.relative.slack();
-        let all = LANES[count_a - 1][count_b - 1];
-        let mut lanes = all & gaps.near;
+        let mut lanes = gaps.near;
         let shows_less =
             |lane: usize| lanes >> lane & 1 != 0 && run.motion.gap(gaps.enclosures[lane], slack) <= next.gap;
-        if next.gap > self.reach && (0..FAN * FAN).any(shows_less) {
+        if next.gap > self.reach && (0..LANES).any(shows_less) {
             return Some(false);
         }
-        run.is_cut |= lanes != all;
+        run.is_cut |= lanes != pairs.lanes;
         // The nearest child comes next: if the proof fails at all, it is likeliest to fail there.
         let (mut nearest, mut least) = (None, f32::INFINITY);
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            let pair = [a[lane / FAN], b[lane % FAN]];
+            let pair = pairs.pair(lane);
             let gap = run.motion.gap(gaps.enclosures[lane], slack);
             let mut own = Open { gap, pair };
             if gaps.boxes[lane] < least {

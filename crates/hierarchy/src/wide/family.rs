@@ -1,10 +1,10 @@
-//! Boxes and enclosures of the children of a node, in lanes.
+//! Boxes and enclosures of the children and grandchildren of a node, in lanes.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, u32x4};
+use fearless_simd::{Simd, f32x4, f32x16, u32x4};
 
-use super::{Child, WIDTH, WideTree};
-use crate::four_nodes::FourNodes;
+use super::{Child, LANES, Siblings, WIDTH, WideTree};
+use crate::four_nodes::{FourNodes, NodeBounds};
 use crate::growth::Growth;
 use crate::slices::{Part, Slices};
 
@@ -22,36 +22,110 @@ impl Growths {
 }
 
 impl WideTree {
-    /// What takes the place of a node: its children, the first few of four; or itself alone if it is to stay `whole`, as leaves do.
+    /// The children of an inner node: the first few of four.
     ///
     /// # Panics
-    /// When there is no such node.
+    /// When there is no such node, or it is a leaf.
     #[inline]
     #[must_use]
-    pub fn children(&self, node: Child, whole: bool) -> ([Child; WIDTH], usize) {
-        if whole || node.is_leaf() {
-            return ([node; WIDTH], 1);
-        }
+    pub fn children(&self, node: Child) -> ([Child; WIDTH], usize) {
         let siblings = &self.nodes[node.index()];
         (siblings.children, siblings.lanes().count_ones() as usize)
+    }
+
+    /// The children of the children of an inner node, and those of its children that are leaves, in lanes; and
+    /// the lanes that are taken, as bits.
+    ///
+    /// # Panics
+    /// When there is no such node, or it is a leaf.
+    #[inline]
+    #[must_use]
+    pub fn grandchildren(&self, node: Child) -> ([Child; LANES], u32) {
+        let (mut below, mut taken) = ([Child::NONE; LANES], 0);
+        for (group, (siblings, lanes)) in self.groups(node).into_iter().enumerate() {
+            below[WIDTH * group..][..WIDTH].copy_from_slice(&self.nodes[siblings].children);
+            taken |= lanes << (WIDTH * group);
+        }
+        (below, taken)
+    }
+
+    /// For each child of an inner node the siblings that hold what takes its place among the grandchildren,
+    /// and their lanes: its own children, or itself.
+    #[inline(always)]
+    fn groups(&self, node: Child) -> [(usize, u32); WIDTH] {
+        let own = node.index();
+        let Siblings { children, .. } = &self.nodes[own];
+        let mut groups = [(own, 0); WIDTH];
+        for (lane, (group, child)) in groups.iter_mut().zip(children).enumerate() {
+            if *child == Child::NONE {
+                break;
+            }
+            *group = if child.is_leaf() {
+                (own, 1 << lane)
+            } else {
+                (child.index(), self.nodes[child.index()].lanes())
+            };
+        }
+        groups
     }
 }
 
 impl Slices<'_> {
-    /// Boxes and enclosures of this part of [`WideTree::children`], in the same order; what there is in other
-    /// lanes says nothing.
+    /// Box and enclosure of this part of a node.
     ///
     /// # Panics
     /// When there is no such node.
     #[inline(always)]
     #[must_use]
-    pub fn family<S: Simd>(&self, simd: S, part: Part, node: Child, whole: bool) -> FourNodes<S> {
-        if whole || node.is_leaf() {
-            let id = self.wide.id(node).index();
-            return FourNodes::new(simd, [&self.boxes[id]; WIDTH], [&self.growths_of(part)[id]; WIDTH]);
+    pub fn bounds_of(&self, part: Part, node: Child) -> NodeBounds<f32> {
+        let id = self.wide.id(node).index();
+        NodeBounds::of(&self.boxes[id], &self.growths_of(part)[id])
+    }
+
+    /// Those of [`WideTree::children`], in the same order; what there is in other lanes says nothing.
+    ///
+    /// # Panics
+    /// When there is no such node, or it is a leaf.
+    #[inline(always)]
+    #[must_use]
+    pub fn bounds_of_children<S: Simd>(&self, simd: S, part: Part, node: Child) -> FourNodes<S> {
+        self.siblings(simd, part, node.index())
+    }
+
+    /// Those of [`WideTree::grandchildren`], in the same order; what there is in other lanes says nothing.
+    ///
+    /// # Panics
+    /// When there is no such node, or it is a leaf.
+    #[inline(always)]
+    #[must_use]
+    pub fn bounds_of_grandchildren<S: Simd>(
+        &self,
+        simd: S,
+        part: Part,
+        node: Child,
+    ) -> NodeBounds<f32x16<S>> {
+        let [a, b, c, d] = self.wide.groups(node);
+        let a = self.siblings(simd, part, a.0);
+        let b = self.siblings(simd, part, b.0);
+        let c = self.siblings(simd, part, c.0);
+        let d = self.siblings(simd, part, d.0);
+        NodeBounds {
+            centre: combined([a.centre, b.centre, c.centre, d.centre]),
+            half: combined([a.half, b.half, c.half, d.half]),
+            axes: [
+                combined([a.axes[0], b.axes[0], c.axes[0], d.axes[0]]),
+                combined([a.axes[1], b.axes[1], c.axes[1], d.axes[1]]),
+                combined([a.axes[2], b.axes[2], c.axes[2], d.axes[2]]),
+            ],
+            low: combined([a.low, b.low, c.low, d.low]),
+            high: combined([a.high, b.high, c.high, d.high]),
         }
-        let siblings = &self.wide.nodes[node.index()];
-        let Growths(growths) = &self.wide.growths[part as usize][node.index()];
+    }
+
+    #[inline(always)]
+    fn siblings<S: Simd>(&self, simd: S, part: Part, node: usize) -> FourNodes<S> {
+        let siblings = &self.wide.nodes[node];
+        let Growths(growths) = &self.wide.growths[part as usize][node];
         let rows = |[x, y, z]: &[[f32; WIDTH]; 3]| -> [f32x4<S>; 3] {
             [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
         };
@@ -66,4 +140,14 @@ impl Slices<'_> {
         let (centre, half) = (rows(&siblings.centre), rows(&siblings.half));
         FourNodes { centre, half, axes: [rows(u), rows(v), rows(w)], low, high }
     }
+}
+
+/// The lanes of four after each other.
+#[inline(always)]
+fn combined<S: Simd>([a, b, c, d]: [[f32x4<S>; 3]; WIDTH]) -> [f32x16<S>; 3] {
+    [
+        a[0].combine(b[0]).combine(c[0].combine(d[0])),
+        a[1].combine(b[1]).combine(c[1].combine(d[1])),
+        a[2].combine(b[2]).combine(c[2].combine(d[2])),
+    ]
 }

@@ -4,9 +4,9 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use nearmiss_hierarchy::{Child, NodePair, Part, whole};
+use nearmiss_hierarchy::{Child, NodePair, Part};
 
-use crate::bounds::{FAN, Gaps, LANES, Limits, Motion};
+use crate::bounds::{Limits, Motion};
 use crate::posed::Posed;
 
 /// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in them is at least.
@@ -170,23 +170,19 @@ impl<'s> Search<'s> {
             }
             return (of_boxes < self.points).then_some(leaves);
         }
-        let whole = whole([pair.a.wide, pair.b.wide], next.pair, pair.relative.scale());
         let limits = Limits { boxes: self.points, enclosures: self.surfaces };
-        let Gaps { boxes, enclosures, near } =
-            motion.gaps(([pair.a, pair.b], pair.part), next.pair, whole, limits);
-        let (a, count_a) = pair.a.wide.children(next.pair[0], whole[0]);
-        let (b, count_b) = pair.b.wide.children(next.pair[1], whole[1]);
-        let enclosures = if self.of_surfaces { enclosures } else { boxes };
-        pair.meter.spent.node_pairs += (count_a * count_b) as u64;
-        let mut near = near & LANES[count_a - 1][count_b - 1];
+        let (pairs, gaps) = motion.split(([pair.a, pair.b], pair.part), next.pair, limits);
+        let enclosures = if self.of_surfaces { gaps.enclosures } else { gaps.boxes };
+        pair.meter.spent.node_pairs += u64::from(pairs.lanes.count_ones());
+        let mut near = gaps.near;
         let mut nearest: Option<Open> = None;
         while near != 0 {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
             // What is in its parents is no nearer than they are.
-            let children = [a[lane / FAN], b[lane % FAN]];
+            let children = pairs.pair(lane);
             let (mut of_enclosures, mut of_boxes) =
-                (enclosures[lane].max(of_enclosures), boxes[lane].max(of_boxes));
+                (enclosures[lane].max(of_enclosures), gaps.boxes[lane].max(of_boxes));
             if children[0].is_leaf() != children[1].is_leaf() {
                 // The points of a loose leaf say more than its box, also of points.
                 of_enclosures = better(pair, motion, pair.nodes(children), of_enclosures);
