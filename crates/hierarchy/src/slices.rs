@@ -1,6 +1,8 @@
 //! `Slices`: the arrays of a scan for hot loops, and what of them stands for each point and node in the
 //! obstacle.
 
+use std::ops::Range;
+
 use nearmiss_surface::{PointBlock, SurfacePlan};
 
 use crate::boxes::OrientedBox;
@@ -144,26 +146,49 @@ impl Slices<'_> {
         }
     }
 
-    /// [`Self::obstacle_reach`] of the points in a block, in lanes; 0 where there is no point.
+    /// [`Self::obstacle_ball`] of the points in a block, in lanes; 0 where there is no point.
+    ///
+    /// # Panics
+    /// When there is no such block.
+    #[inline(always)]
+    #[must_use]
+    pub fn obstacle_balls(&self, block: usize) -> [f32; PointBlock::WIDTH] {
+        let points = self.points_of(block);
+        let mut balls = [0.0; PointBlock::WIDTH];
+        if points.end <= self.dense {
+            let known = self.kinds[points.clone()].iter().zip(&self.radii[points]);
+            for (ball, (kind, radius)) in balls.iter_mut().zip(known) {
+                *ball = DENSE_SHARES[usize::from(*kind)] * radius;
+            }
+        } else {
+            for (ball, i) in balls.iter_mut().zip(points) {
+                *ball = self.obstacle_ball(i);
+            }
+        }
+        balls
+    }
+
+    /// No less than [`Self::obstacle_reach`] of the points in a block, in lanes; 0 where there is no point.
     ///
     /// # Panics
     /// When there is no such block.
     #[inline(always)]
     #[must_use]
     pub fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
-        let first = block * PointBlock::WIDTH;
-        let end = (first + PointBlock::WIDTH).min(self.radii.len());
-        let mut reaches = [0.0; PointBlock::WIDTH];
-        let points = self.radii[first..end].iter().zip(&self.discs[first..end]);
-        for (reach, (radius, disc)) in reaches.iter_mut().zip(points) {
-            *reach = sheet_reach(*radius, *disc, self.reach);
-        }
-        for (i, reach) in (first..end).zip(&mut reaches) {
-            if !self.is_on_sheet(i) {
-                *reach = self.obstacle_ball(i);
-            }
+        let points = self.points_of(block);
+        let mut reaches = self.obstacle_balls(block);
+        let known = self.radii[points.clone()].iter().zip(&self.discs[points]);
+        for (reach, (radius, disc)) in reaches.iter_mut().zip(known) {
+            let of_sheet = sheet_reach(*radius, *disc, self.reach);
+            *reach = if *reach > 0.0 { *reach } else { of_sheet };
         }
         reaches
+    }
+
+    #[inline(always)]
+    fn points_of(&self, block: usize) -> Range<usize> {
+        let first = block * PointBlock::WIDTH;
+        first..(first + PointBlock::WIDTH).min(self.radii.len())
     }
 
     /// How far from a point on a sheet the surface belongs to the obstacle: the lesser of its local radius
@@ -216,14 +241,26 @@ const BALL_OF_SPARSE: f32 = 0.5;
 /// See [`Slices::obstacle_ball`].
 #[inline]
 pub(crate) fn obstacle_ball(i: usize, dense: usize, kind: PointKind, radius: f32) -> f32 {
-    if is_on_sheet(i, dense, kind) {
-        0.0
-    } else if kind.is_sparse() {
-        BALL_OF_SPARSE * radius
-    } else {
-        BALL_AMONG_OTHERS * radius
-    }
+    if is_on_sheet(i, dense, kind) { 0.0 } else { ball_share(kind) * radius }
 }
+
+/// The ball of a point that is on no sheet, in its local radius.
+const fn ball_share(kind: PointKind) -> f32 {
+    if kind.is_sparse() { BALL_OF_SPARSE } else { BALL_AMONG_OTHERS }
+}
+
+/// The ball of a point before [`Slices::dense`] by the code of its kind, in its local radius.
+const DENSE_SHARES: [f32; 256] = {
+    let mut shares = [0.0; 256];
+    let mut code = 0;
+    while code <= u8::MAX as usize {
+        #[expect(clippy::cast_possible_truncation, reason = "below 256")]
+        let kind = PointKind::from_code(code as u8);
+        shares[code] = if kind.is_sheet() { 0.0 } else { ball_share(kind) };
+        code += 1;
+    }
+    shares
+};
 
 /// See [`Slices::is_on_sheet`].
 #[inline]

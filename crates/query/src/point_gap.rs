@@ -116,7 +116,7 @@ impl Posed<'_> {
         let level = self.level;
         Some(dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.gap_of_loose(simd, pair, loose_a),
+            || self.gap_of_points(simd, pair, loose_a),
         )))
     }
 
@@ -127,10 +127,18 @@ impl Posed<'_> {
         if a == b || self.part == Part::Surface { None } else { self.gap_by_points(pair) }
     }
 
-    /// By the points of the loose leaf, which is that of a or else that of b, and the enclosure of the other
-    /// node.
+    /// The same of two leaves, by the points of either and the enclosure of the other.
+    pub(crate) fn gap_of_leaf_boxes(&self, pair: NodePair) -> f32 {
+        let level = self.level;
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.gap_of_points(simd, pair, true).max(self.gap_of_points(simd, pair, false)),
+        ))
+    }
+
+    /// By the points of a leaf, which is that of a or else that of b, and the enclosure of the other node.
     #[inline(always)]
-    fn gap_of_loose<S: Simd>(&self, simd: S, pair: NodePair, of_a: bool) -> f32 {
+    fn gap_of_points<S: Simd>(&self, simd: S, pair: NodePair, of_a: bool) -> f32 {
         let mut least = f32::INFINITY;
         if of_a {
             let leaf = &self.a.nodes[pair.a.index()];

@@ -4,7 +4,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Leaves, Node, NodePair, Part, Slices};
+use nearmiss_hierarchy::{Leaves, Node, NodePair, Part};
 use nearmiss_surface::PointBlock;
 
 use crate::point_gap::{blocks, lanes};
@@ -68,7 +68,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
             let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(zero);
             off_sq += beyond * beyond;
         }
-        let balls_a = if has_balls { balls(pair.a, a, block_a) } else { [0.0; WIDTH] };
+        let balls_a = if has_balls { pair.a.obstacle_balls(block_a) } else { [0.0; WIDTH] };
         let balls_a = f32x16::load_array_ref(simd, &balls_a) * pair.relative.scale_back();
         let mut left = lanes(a, block_a);
         loop {
@@ -88,7 +88,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
                     f32x16::load_array_ref(simd, z) - places[2][lane],
                 ];
                 let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                let balls_b = if has_balls { balls(pair.b, b, block_b) } else { [0.0; WIDTH] };
+                let balls_b = if has_balls { pair.b.obstacle_balls(block_b) } else { [0.0; WIDTH] };
                 let both = f32x16::load_array_ref(simd, &balls_b) + balls_a.to_array()[lane];
                 let mut left_b = lanes(b, block_b);
                 loop {
@@ -119,18 +119,6 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
 fn reach_of(pair: &Posed<'_>, distance: f64) -> f32 {
     let stored = pair.stored(distance.max(0.0)) + 3.0 * pair.relative.slack();
     stored * pair.relative.scale_back() * (1.0 + 2e-6)
-}
-
-/// The radii of the balls about the points of a leaf in this block, in its scan's stored frame.
-fn balls(scan: &Slices<'_>, leaf: &Node, block: usize) -> [f32; WIDTH] {
-    let mut balls = [0.0; WIDTH];
-    let lanes = lanes(leaf, block);
-    for (lane, ball) in balls.iter_mut().enumerate() {
-        if lanes >> lane & 1 != 0 {
-            *ball = scan.obstacle_ball(block * WIDTH + lane);
-        }
-    }
-    balls
 }
 
 /// The lane of the least of those in `lanes`, of which there are some; the first of equals.

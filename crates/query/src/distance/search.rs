@@ -166,7 +166,8 @@ impl<'s> Search<'s> {
         if next.pair.iter().all(|node| node.is_leaf()) {
             let leaves = pair.nodes(next.pair);
             if of_enclosures < self.surfaces {
-                self.surfaces = self.surfaces.min(better(pair, motion, leaves, of_enclosures));
+                let bound = bound_of_leaves(pair, motion, leaves, of_enclosures, self.surfaces);
+                self.surfaces = self.surfaces.min(bound);
             }
             return (of_boxes < self.points).then_some(leaves);
         }
@@ -185,7 +186,11 @@ impl<'s> Search<'s> {
                 (enclosures[lane].max(of_enclosures), gaps.boxes[lane].max(of_boxes));
             if children[0].is_leaf() != children[1].is_leaf() {
                 // The points of a loose leaf say more than its box, also of points.
-                of_enclosures = better(pair, motion, pair.nodes(children), of_enclosures);
+                if pair.part == Part::Obstacle
+                    && let Some(gap) = pair.gap_by_points(pair.nodes(children))
+                {
+                    of_enclosures = of_enclosures.max(motion.no_nearer(f64::from(gap)));
+                }
                 of_boxes = of_boxes.max(of_enclosures);
                 if of_boxes >= self.points && of_enclosures >= self.surfaces {
                     continue;
@@ -213,14 +218,23 @@ impl<'s> Search<'s> {
     }
 }
 
-/// The greater of a bound by enclosures and that by points, if nodes have one, both relative to the centres
-/// of the scans.
+/// The greater of a bound of two leaves by enclosures and that by points, if they have one, both relative to
+/// the centres of the scans. A lesser bound will do that is no less than `enough`.
 #[inline]
-fn better(pair: &Posed<'_>, motion: &Motion, nodes: NodePair, by_enclosures: f32) -> f32 {
-    match pair.part {
-        Part::Obstacle => pair
-            .gap_by_points(nodes)
-            .map_or(by_enclosures, |gap| by_enclosures.max(motion.no_nearer(f64::from(gap)))),
-        Part::Surface => by_enclosures,
+fn bound_of_leaves(
+    pair: &Posed<'_>,
+    motion: &Motion,
+    leaves: NodePair,
+    by_enclosures: f32,
+    enough: f32,
+) -> f32 {
+    if pair.part == Part::Surface {
+        return by_enclosures;
     }
+    // The points of either and a box about the other are far quicker compared than all points of both.
+    let by_boxes = motion.no_nearer(f64::from(pair.gap_of_leaf_boxes(leaves)));
+    if by_boxes >= enough {
+        return by_boxes;
+    }
+    by_enclosures.max(motion.no_nearer(f64::from(pair.gap_of_leaves(leaves))))
 }
