@@ -270,11 +270,7 @@ impl Motion {
         NodeBounds {
             centre: [x + self.shift[0], y + self.shift[1], z + self.shift[2]],
             half: self.scaled(bounds.half),
-            axes: [
-                self.turned(&bounds.axes[0]),
-                self.turned(&bounds.axes[1]),
-                self.turned(&bounds.axes[2]),
-            ],
+            axes: [self.turned(&bounds.axes[0]), self.turned(&bounds.axes[1]), self.turned(&bounds.axes[2])],
             low: self.scaled(bounds.low),
             high: self.scaled(bounds.high),
         }

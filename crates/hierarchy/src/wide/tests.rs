@@ -5,7 +5,6 @@ use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
 
 use super::*;
-use crate::four_nodes::FourNodes;
 use crate::options::BuildOptions;
 use crate::slices::Part;
 
@@ -308,36 +307,50 @@ fn after_nothing_comes_what_overlaps_most_of_all_that_is_left() {
 }
 
 #[test]
-fn children_side_by_side_have_the_boxes_and_enclosures_of_the_binary_tree() {
+fn children_and_grandchildren_in_lanes_have_the_bounds_of_their_nodes() {
     let rng = &mut rng(6);
     for (count, leaf_size) in [(9, 16), (33, 16), (48, 16), (700, 5), (900, 40)] {
         let scan = scan(rng, count, [1.0, 1.0, 0.1], leaf_size);
         let slices = scan.slices();
         let mut open = vec![scan.wide.root()];
         while let Some(node) = open.pop() {
-            for whole in [false, true] {
-                let (children, known) = scan.wide.children(node, whole);
-                assert_eq!(known == 1, whole || node.is_leaf(), "an inner node has two children or more");
-                let ids =
-                    children.map(|child| if child == Child::NONE { 0 } else { scan.wide.id(child).index() });
-                for level in levels() {
-                    dispatch!(level, simd => {
-                        let own = slices.family(simd, Part::Surface, node, whole);
-                        let boxes = ids.map(|id| &slices.boxes[id]);
-                        let expected = FourNodes::new(simd, boxes, ids.map(|id| &slices.growths[id]));
-                        for lane in 0..known {
-                            let of = |four: &FourNodes<_>| {
-                                let [u, v, w] = four.axes;
-                                [four.centre, four.half, u, v, w, four.low, four.high].map(|row| row.map(|x| x[lane]))
-                            };
-                            assert_eq!(of(&own), of(&expected), "{node:?}, {whole}, lane {lane}, {level:?}");
-                        }
-                    });
-                }
-                if !whole && !node.is_leaf() {
-                    open.extend(&children[..known]);
-                }
+            let alone = slices.bounds_of(Part::Surface, node);
+            let id = scan.wide.id(node).index();
+            assert_eq!((alone.centre, alone.axes), (slices.boxes[id].centre, slices.boxes[id].axes));
+            if node.is_leaf() {
+                continue;
             }
+            let (children, known) = scan.wide.children(node);
+            let (below, lanes) = scan.wide.grandchildren(node);
+            let expected = |lane: usize| slices.bounds_of(Part::Surface, children[lane]);
+            for level in levels() {
+                dispatch!(level, simd => {
+                    let own = slices.bounds_of_children(simd, Part::Surface, node);
+                    for lane in 0..known {
+                        assert_eq!(own.map(|row| row[lane]), expected(lane), "{node:?}, {lane}, {level:?}");
+                    }
+                    let own = slices.bounds_of_grandchildren(simd, Part::Surface, node);
+                    for lane in (0..LANES).filter(|lane| lanes >> lane & 1 != 0) {
+                        let expected = slices.bounds_of(Part::Surface, below[lane]);
+                        assert_eq!(own.map(|row| row[lane]), expected, "{node:?}, {lane}, {level:?}");
+                    }
+                });
+            }
+            // In the place of each child stand its own children, or a leaf itself.
+            let found: Vec<Child> =
+                (0..LANES).filter(|lane| lanes >> lane & 1 != 0).map(|lane| below[lane]).collect();
+            let expected: Vec<Child> = children[..known]
+                .iter()
+                .flat_map(|&child| {
+                    if child.is_leaf() {
+                        return vec![child];
+                    }
+                    let (below, known) = scan.wide.children(child);
+                    below[..known].to_vec()
+                })
+                .collect();
+            assert_eq!(found, expected);
+            open.extend(&children[..known]);
         }
     }
 }
