@@ -414,7 +414,8 @@ fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>;
 
 #[cfg(test)]
 mod tests {
-    use nearmiss_hierarchy::{Growth, OrientedBox};
+    use nearmiss_geometry::PointCloud;
+    use nearmiss_hierarchy::{BuildOptions, Growth, OrientedBox, PointHierarchy};
     use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
     use nearmiss_testdata::instructions::levels;
     use rand::RngExt;
@@ -525,5 +526,62 @@ mod tests {
         let [boxes, enclosures] = far.map(|(count, share)| (count, share / count));
         assert!(boxes.0 > 5000.0 && boxes.1 > 0.97, "{boxes:?}");
         assert!(enclosures.0 > 5000.0 && enclosures.1 > 0.9, "{enclosures:?}");
+    }
+
+    /// A scan of so many points in a slab of this size.
+    fn scan(rng: &mut impl rand::Rng, count: usize, size: f64) -> PointHierarchy {
+        let points: Vec<_> =
+            (0..count).map(|_| point_in(rng, size)).map(|[x, y, z]| [x, y, 0.1 * z]).collect();
+        PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
+            .unwrap()
+    }
+
+    #[test]
+    fn pairs_that_take_the_place_of_a_pair_hold_its_points_once_and_have_the_gaps_of_each_by_itself() {
+        let rng = &mut rng(82);
+        let mut kinds = [0; 3];
+        for (count, size) in [([900, 700], 1.0), ([1500, 40], 1.0), ([60, 1100], 0.3), ([17, 900], 4.0)] {
+            let scans = [scan(rng, count[0], 1.0), scan(rng, count[1], size)];
+            let pose = rotation(rng).with_scale(0.7).with_translation(point_in(rng, 3.0));
+            let [a, b] = [scans[0].slices(), scans[1].slices()];
+            let points = |[of_a, of_b]: [Child; 2]| {
+                let [a, b] = [(&a, of_a), (&b, of_b)].map(|(scan, node)| {
+                    let node = &scan.nodes[scan.wide.id(node).index()];
+                    (node.points().start, node.points().end)
+                });
+                (a, b)
+            };
+            let product = |((a, b), (c, d)): ((usize, usize), (usize, usize))| (b - a) * (d - c);
+            for level in levels() {
+                let motion = motion(level, &pose);
+                let infinite = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
+                let mut open = vec![[a.wide.root(), b.wide.root()]];
+                while let Some(pair) = open.pop() {
+                    let (pairs, gaps) = motion.split(([&a, &b], Part::Obstacle), pair, infinite);
+                    assert_eq!(gaps.near, pairs.lanes);
+                    let lanes = (0..LANES).filter(|lane| pairs.lanes >> lane & 1 != 0);
+                    let below: Vec<_> = lanes.map(|lane| (lane, pairs.pair(lane))).collect();
+                    let sum: usize = below.iter().map(|below| product(points(below.1))).sum();
+                    assert_eq!(sum, product(points(pair)), "{pair:?}");
+                    for (lane, below) in below {
+                        let own = dispatch!(level, simd => {
+                            let a = alone(simd, &a.bounds_of(Part::Obstacle, below[0]));
+                            let b = motion.moved(&b.bounds_of(Part::Obstacle, below[1]));
+                            motion.gaps(simd, &a, &alone(simd, &b), infinite)
+                        });
+                        assert_eq!(own.boxes[0], gaps.boxes[lane], "{below:?}, {level:?}");
+                        assert_eq!(own.enclosures[0], gaps.enclosures[lane], "{below:?}, {level:?}");
+                        if below != pair && rng.random_bool(0.05) {
+                            open.push(below);
+                        }
+                    }
+                    kinds[match pairs.mask {
+                        0 => 0,
+                        mask => usize::from(mask == FAN - 1) + 1,
+                    }] += 1;
+                }
+            }
+        }
+        assert!(kinds.iter().all(|&count| count > 3), "{kinds:?}");
     }
 }
