@@ -64,16 +64,16 @@ impl<'a> Index<'a> {
     }
 }
 
-impl Index<'_> {
+impl<'a> Index<'a> {
     /// f at `x`.
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
         let place = centre.rounded();
         let GatherScratch { level, block, found, heard, halves } = scratch;
-        let mut list = self.list(*block, place);
+        let mut list = self.list(*block, place, 0.0);
         if list.is_none() {
             *block = self.nearest_block(place);
-            list = self.list(*block, place);
+            list = self.list(*block, place, 0.0);
         }
         let list = list.unwrap_or_else(|| {
             self.collect(place, 0.0, found);
@@ -85,13 +85,15 @@ impl Index<'_> {
         ))
     }
 
-    /// The groups that may be heard at `x`, if the list of this block is complete there.
+    /// The groups of which a point may be heard within `distance` of `x`, if the list of this block is complete
+    /// there.
     #[inline]
-    fn list(&self, block: usize, x: [f32; 3]) -> Option<&[u32]> {
+    pub(crate) fn list(&self, block: usize, x: [f32; 3], distance: f32) -> Option<&'a [u32]> {
         let list = self.lists.get(block)?;
         let d = sub(x, self.middle(block)?);
         let first = list.first as usize;
-        let complete = list.within > 0.0 && dot(d, d) <= list.within * list.within;
+        let within = list.within - distance;
+        let complete = within > 0.0 && dot(d, d) <= within * within;
         if complete { self.listed.get(first..first + list.count as usize) } else { None }
     }
 
@@ -225,12 +227,13 @@ impl PointHierarchy {
     pub fn evaluate_onward(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let index = self.index();
         let place = Centre::new(x).rounded();
-        if index.list(scratch.block, place).is_none() {
+        if index.list(scratch.block, place, 0.0).is_none() {
             let next = index.next_block(scratch.block, place);
-            scratch.block = next.filter(|&next| index.list(next, place).is_some()).unwrap_or_else(|| {
-                let start = (scratch.block * PointBlock::WIDTH).min(self.len() - 1);
-                self.nearest_point_near(start, x) as usize / PointBlock::WIDTH
-            });
+            scratch.block =
+                next.filter(|&next| index.list(next, place, 0.0).is_some()).unwrap_or_else(|| {
+                    let start = (scratch.block * PointBlock::WIDTH).min(self.len() - 1);
+                    self.nearest_point_near(start, x) as usize / PointBlock::WIDTH
+                });
         }
         index.evaluate(x, scratch)
     }
@@ -277,7 +280,7 @@ impl PointHierarchy {
     /// When there is no such point.
     #[must_use]
     pub fn nearest_point_near(&self, i: usize, x: [f64; 3]) -> u32 {
-        self.nearest_point_within(i, x, f64::INFINITY).0
+        self.nearest_listed(i, x).unwrap_or_else(|| self.nearest_point_within(i, x, f64::INFINITY).0)
     }
 
     /// f at `x`, in the stored frame; allocates a scratch of its own.

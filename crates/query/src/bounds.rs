@@ -13,7 +13,7 @@
 use std::ops::{Add, Mul};
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
 use nearmiss_hierarchy::{Child, FourNodes, NodeBounds, Part, SLACK, Slices, WideTree, whole};

@@ -1,47 +1,80 @@
-//! The point nearest to a place: four boxes at a time, the nearest of them first.
+//! The point nearest to a place: from a neighbour list, or four boxes at a time, the nearest of them first.
 
+use std::ops::Range;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x4, mask32x16};
 use nearmiss_surface::{Centre, PointBlock};
 
-use super::{Child, Siblings, WIDTH};
+use super::{Siblings, WIDTH};
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::gather::TREE_STACK;
+use crate::lanes::{lanes_of, product, seen_from};
+use crate::neighbours::GROWN;
 use crate::split::id32;
 
 impl Siblings {
     /// The squared distances of a place from the four boxes.
-    #[inline]
-    fn distances_sq(&self, [x, y, z]: [f32; 3]) -> [f32; WIDTH] {
-        let mut sums = [0.0; WIDTH];
-        for k in 0..3 {
-            for lane in 0..WIDTH {
-                let [ax, ay, az] = [self.axes[k][0][lane], self.axes[k][1][lane], self.axes[k][2][lane]];
-                let [cx, cy, cz] = [self.centre[0][lane], self.centre[1][lane], self.centre[2][lane]];
-                let along = ax * (x - cx) + ay * (y - cy) + az * (z - cz);
-                let beyond = (along.abs() - self.half[k][lane]).max(0.0);
-                sums[lane] += beyond * beyond;
-            }
+    #[inline(always)]
+    fn distances_sq<S: Simd>(&self, simd: S, [x, y, z]: [f32; 3]) -> f32x4<S> {
+        let load = f32x4::load_array_ref;
+        let [cx, cy, cz] = &self.centre;
+        let d = [-(load(simd, cx) - x), -(load(simd, cy) - y), -(load(simd, cz) - z)];
+        let mut sum = f32x4::splat(simd, 0.0);
+        for ([ax, ay, az], half) in self.axes.iter().zip(&self.half) {
+            let along = product([load(simd, ax), load(simd, ay), load(simd, az)], d);
+            let beyond = (along.abs() - load(simd, half)).max(0.0);
+            sum += beyond * beyond;
         }
-        sums
+        sum
     }
-}
-
-/// The squared distances of a place from the points of a block.
-#[inline]
-fn squares(block: &PointBlock, [x, y, z]: [f32; 3]) -> [f32; PointBlock::WIDTH] {
-    let mut squares = [0.0; PointBlock::WIDTH];
-    let [px, py, pz] = &block.position;
-    for (lane, square) in squares.iter_mut().enumerate() {
-        let d = [px[lane] - x, py[lane] - y, pz[lane] - z];
-        *square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    }
-    squares
 }
 
 /// The number in single precision, or a little more.
 #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
 fn single_above(x: f64) -> f32 {
     (x as f32).next_up()
+}
+
+/// The nearest point so far to a place.
+struct Nearest {
+    place: [f64; 3],
+    /// The place in single precision.
+    rounded: [f32; 3],
+    /// Its squared distance, and its number.
+    best: (f64, usize),
+    /// What is nearer has no greater distance in single precision.
+    within: f32,
+    /// The square of that.
+    most: f32,
+    /// What single precision may lose of a distance.
+    lost: f64,
+}
+
+impl Nearest {
+    /// Of no point yet. No coordinate of the scan is greater than `far`.
+    fn new(place: [f64; 3], far: f64) -> Self {
+        let rounded = Centre::new(place).rounded();
+        let far = rounded.iter().fold(far, |far, c| far.max(f64::from(c.abs())));
+        let infinite = f32::INFINITY;
+        Self { place, rounded, best: (f64::INFINITY, 0), within: infinite, most: infinite, lost: 4e-6 * far }
+    }
+
+    #[inline]
+    fn offer(&mut self, i: usize, p: [f32; 3]) {
+        let distance_sq = (0..3).map(|k| (f64::from(p[k]) - self.place[k]).powi(2)).sum::<f64>();
+        if (distance_sq, i) < self.best {
+            self.best = (distance_sq, i);
+            self.within = single_above(distance_sq.sqrt() + self.lost);
+            self.most = (self.within * self.within).next_up();
+        }
+    }
+
+    /// No less than this is the squared distance that came out as `sq` in single precision.
+    fn least(&self, sq: f32) -> f64 {
+        (f64::from(sq.sqrt()) - self.lost).max(0.0).powi(2)
+    }
 }
 
 impl PointHierarchy {
@@ -52,56 +85,46 @@ impl PointHierarchy {
     /// When there is no such point.
     #[must_use]
     pub fn nearest_point_within(&self, i: usize, x: [f64; 3], reach: f64) -> (u32, u32) {
+        dispatch!(Level::new(), simd => simd.vectorize(
+            #[inline(always)]
+            || self.nearest_by(simd, i, x, reach),
+        ))
+    }
+
+    #[inline(always)]
+    fn nearest_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3], reach: f64) -> (u32, u32) {
         /// The square of how many times as far a point may be beyond reach.
         const ROUGHLY: f64 = 1.25 * 1.25;
         let reach_sq = reach * reach;
-        let place = Centre::new(x).rounded();
-        let distance_sq = |p: [f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
-        let (wide, positions): (_, &[[f32; 3]]) = (&self.wide, &self.positions);
-        // Boxes hold the points; how far off they are is told in single precision.
-        let lost = place.iter().fold(self.bounds_radius(), |far, c| far.max(f64::from(c.abs()))) * 4e-6;
-        let bound = |sq: f32| (f64::from(sq.sqrt()) - lost).max(0.0).powi(2);
-        let mut best = (distance_sq(positions[i]), i);
-        // Which points of a leaf may be nearer is told in single precision, sixteen at a time.
-        let look = |leaf: usize, best: &mut (f64, usize)| {
-            let points = wide.leaves.points(leaf);
-            for block in points.start / PointBlock::WIDTH..=(points.end - 1) / PointBlock::WIDTH {
-                let most = single_above((best.0.sqrt() + lost).powi(2));
-                let squares = squares(&self.blocks[block], place);
-                let first = block * PointBlock::WIDTH;
-                for (i, &square) in (first..).zip(&squares) {
-                    if square <= most && points.contains(&i) {
-                        let own = (distance_sq(positions[i]), i);
-                        *best = if own < *best { own } else { *best };
-                    }
-                }
-            }
-        };
+        let wide = &self.wide;
+        let mut nearest = self.nearest_of_leaf(simd, i, x);
         let own_leaf = wide.leaves.leaf_of(i);
-        look(own_leaf, &mut best);
         let mut stack = [(0.0, wide.root()); STACK];
         let (mut top, mut looked_at) = (1, 1);
         while top > 0 {
             top -= 1;
             let (least, child) = stack[top];
             // A point within reach is never passed over: one that is further away lets all nodes be looked at that come so near.
-            if least > best.0 || (least > reach_sq && ROUGHLY * least > best.0) {
+            let is_rough = |least: f64| least > reach_sq && ROUGHLY * least > nearest.best.0;
+            if least > nearest.most || (reach < f64::INFINITY && is_rough(nearest.least(least))) {
                 continue;
             }
             looked_at += 1;
             if child.is_leaf() {
                 if child.index() != own_leaf {
-                    look(child.index(), &mut best);
+                    self.offer_leaf(simd, child.index(), &mut nearest);
                 }
                 continue;
             }
             let siblings = &wide.nodes[child.index()];
-            let (bottom, distances) = (top, siblings.distances_sq(place));
-            for (&child, sq) in siblings.children.iter().zip(distances).filter(|(c, _)| **c != Child::NONE) {
-                let own = bound(sq);
-                if own > best.0 {
-                    continue;
-                }
+            let (bottom, distances) = (top, siblings.distances_sq(simd, nearest.rounded));
+            let near: mask32x4<S> = distances.simd_le(nearest.most);
+            let (mut left, distances) =
+                (near.to_bitmask() & u64::from(siblings.lanes()), distances.to_array());
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let (own, child) = (distances[lane % WIDTH], siblings.children[lane % WIDTH]);
                 // The nearest on top.
                 let mut at = top;
                 while at > bottom && stack[at - 1].0 < own {
@@ -112,7 +135,72 @@ impl PointHierarchy {
                 top += 1;
             }
         }
-        (id32(best.1), looked_at)
+        (id32(nearest.best.1), looked_at)
+    }
+
+    /// The point nearest to `x`, from the neighbour list of the stored point `i`; `None` where that may lack it.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    pub(crate) fn nearest_listed(&self, i: usize, x: [f64; 3]) -> Option<u32> {
+        dispatch!(Level::new(), simd => simd.vectorize(
+            #[inline(always)]
+            || self.nearest_listed_by(simd, i, x),
+        ))
+    }
+
+    /// A list that is complete at a place names the group of every point there, and `groups` hold the balls about
+    /// blocks that contain their points.
+    #[inline(always)]
+    fn nearest_listed_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Option<u32> {
+        let mut nearest = self.nearest_of_leaf(simd, i, x);
+        let listed = self.index().list(i / PointBlock::WIDTH, nearest.rounded, nearest.within)?;
+        let points = 0..self.positions.len();
+        for &group in listed {
+            let balls = self.groups.get(group as usize)?;
+            let d = seen_from(simd, balls, nearest.rounded);
+            let reach = f32x16::load_array_ref(simd, &balls.horizon) + nearest.within;
+            let near: mask32x16<S> = product(d, d).simd_le(reach * reach * GROWN);
+            let first = group as usize * PointBlock::WIDTH;
+            let mut left = near.to_bitmask() & lanes_of(first, &(first..self.blocks.len()));
+            while left != 0 {
+                let block = first + left.trailing_zeros() as usize;
+                left &= left - 1;
+                self.offer_block(simd, block, &points, &mut nearest);
+            }
+        }
+        Some(id32(nearest.best.1))
+    }
+
+    /// The nearest point to `x` in the leaf of the stored point `i`.
+    #[inline(always)]
+    fn nearest_of_leaf<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Nearest {
+        let mut nearest = Nearest::new(x, self.bounds_radius());
+        nearest.offer(i, self.positions[i]);
+        self.offer_leaf(simd, self.wide.leaves.leaf_of(i), &mut nearest);
+        nearest
+    }
+
+    /// Offers the points of a leaf.
+    #[inline(always)]
+    fn offer_leaf<S: Simd>(&self, simd: S, leaf: usize, nearest: &mut Nearest) {
+        let points = self.wide.leaves.points(leaf);
+        for block in points.start / PointBlock::WIDTH..=(points.end - 1) / PointBlock::WIDTH {
+            self.offer_block(simd, block, &points, nearest);
+        }
+    }
+
+    /// Offers those of `points` that stand in a block. Which may be nearer is told in single precision, all at once.
+    #[inline(always)]
+    fn offer_block<S: Simd>(&self, simd: S, block: usize, points: &Range<usize>, nearest: &mut Nearest) {
+        let d = seen_from(simd, &self.blocks[block], nearest.rounded);
+        let near: mask32x16<S> = product(d, d).simd_le(nearest.most);
+        let mut left = near.to_bitmask() & lanes_of(block, points);
+        while left != 0 {
+            let i = block * PointBlock::WIDTH + left.trailing_zeros() as usize;
+            left &= left - 1;
+            nearest.offer(i, self.positions[i]);
+        }
     }
 
     /// No stored coordinate is greater.
