@@ -18,11 +18,16 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// Neighbours that vote.
 const VOTERS: usize = 8;
 
-/// So many of them make a noisy point one of their sheet: half.
+/// So many of them, of about one normal, make a noisy point one of their sheet: half.
 const MAJORITY: usize = VOTERS / 2;
 
-/// A sheet point with fewer sheet points among its neighbours is noisy: one may be a chance.
+/// A sheet point with fewer sheet points of about its normal among its neighbours is noisy: one may be a
+/// chance.
 const ALONE: usize = 2;
+
+/// The cosine of the angle between the normals of neighbours on a sheet is no less. On a sphere of the
+/// greatest curvature that a slab holds they differ by 40° at most.
+const AGREEING: f32 = 0.5;
 
 /// Half the thickness of a sheet at a point, in its local radius: the surface nearest to the point, and a
 /// noisy point of the same sheet, lie no further from its tangent plane. A curvature of 0.6 over the local
@@ -56,6 +61,11 @@ pub(crate) fn vote(tree: &BlockTree<'_>, positions: &[[f32; 3]], radii: &[f32], 
     }
 }
 
+/// Returns `true` if neighbours with these normals may be on one sheet.
+fn agree(n: [f32; 3], m: [f32; 3]) -> bool {
+    dot(n, m).abs() >= AGREEING
+}
+
 /// The fit of point `i` by the vote of its neighbours, if that is another.
 fn corrected(
     i: usize,
@@ -71,10 +81,12 @@ fn corrected(
             let mut for_sheet = sheets.filter(|&j| height(j) <= SLAB * radii[i].min(radii[j]));
             // The nearest comes first.
             let normal = fits[for_sheet.next()?].normal;
-            (for_sheet.count() + 1 >= MAJORITY).then_some(Fit { normal, kind: PointKind::Sheet })
+            let agreeing = 1 + for_sheet.filter(|&j| agree(normal, fits[j].normal)).count();
+            (agreeing >= MAJORITY).then_some(Fit { normal, kind: PointKind::Sheet })
         }
         PointKind::Sheet | PointKind::Edge => {
-            (sheets.count() < ALONE).then_some(Fit { kind: PointKind::Noisy, ..fits[i] })
+            let agreeing = sheets.filter(|&j| agree(fits[i].normal, fits[j].normal)).count();
+            (agreeing < ALONE).then_some(Fit { kind: PointKind::Noisy, ..fits[i] })
         }
         _ => None,
     }
