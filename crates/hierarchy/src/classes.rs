@@ -123,3 +123,38 @@ pub(crate) fn dense_first(
     let count = dense.len();
     Some((dense.into_iter().chain(sparse).map(item).collect(), count))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_noisy_point_at_a_corner_is_of_neither_sheet_and_one_on_a_floor_is_of_the_floor() {
+        let (up, aside) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        let fit = |normal, kind| Fit { normal, kind };
+        let floor = (1..=6).map(|i: u8| [0.1 * f32::from(i), 0.05, 0.0]);
+        let wall = (1..=2).map(|i: u8| [0.0, 0.05, -0.1 * f32::from(i)]);
+        let positions: Vec<_> = [[0.0; 3]].into_iter().chain(floor).chain(wall).collect();
+        let radii = vec![1.0; positions.len()];
+        let kinds = |sheets: usize| {
+            let mut fits = vec![fit([0.7, 0.0, 0.7], PointKind::Noisy)];
+            for i in 1..=6 {
+                fits.push(fit(up, if i <= sheets { PointKind::Sheet } else { PointKind::Noisy }));
+            }
+            fits.extend([fit(aside, PointKind::Sheet); 2]);
+            fits
+        };
+        let corrected = |fits: &[Fit]| corrected(0, 1..9, &positions, &radii, fits);
+        assert!(
+            corrected(&kinds(2)).is_none(),
+            "two of the floor and two of the wall are not four of one sheet"
+        );
+        let found = corrected(&kinds(4)).unwrap();
+        assert_eq!((found.kind, found.normal), (PointKind::Sheet, up));
+        let mut alone = kinds(0);
+        alone[0] = fit(up, PointKind::Sheet);
+        assert_eq!(corrected(&alone).unwrap().kind, PointKind::Noisy, "no neighbour has its normal");
+        alone[1..=2].fill(fit(up, PointKind::Sheet));
+        assert!(corrected(&alone).is_none());
+    }
+}
