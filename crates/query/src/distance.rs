@@ -34,7 +34,7 @@ pub struct DistanceOptions {
     /// What is to be apart. Default: obstacles.
     pub semantics: Semantics,
     /// Of obstacles, how far below the upper bound the lower one may be left, as a share of it: 0 to less
-    /// than 1, default 0.1. Far away, where that is more than the band, the band counts.
+    /// than 1, default 0.1.
     pub relative: f64,
     /// By which distances surfaces are defined. None, the default: as both scans were prepared.
     pub metric: Option<Metric>,
@@ -279,7 +279,7 @@ impl Apart<'_> {
             search.found_points(self.motion.bound_of(self.best.distance.max(0.0)), &self.motion);
             if self.of_obstacles() {
                 let upper = self.best.distance.max(0.0);
-                let enough = (upper * (1.0 - self.plan.options.relative)).max(upper - self.band());
+                let enough = upper * (1.0 - self.plan.options.relative);
                 search.is_content_with(self.motion.bound_of(enough), &self.motion);
             }
         }
