@@ -64,7 +64,8 @@ pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>,
     }
 }
 
-/// The lanes of a block in which those of some points stand that are its, as bits: point i in lane i % 16 of block i / 16.
+/// The lanes of a block that hold any of `points`, as bits: point i stands in lane i % 16 of block i / 16. None of the
+/// points may end before the block starts.
 #[inline(always)]
 pub(crate) fn lanes_of(block: usize, points: &Range<usize>) -> u64 {
     let first = block * WIDTH;

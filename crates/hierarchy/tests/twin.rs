@@ -286,7 +286,8 @@ fn threads_and_order_of_work_do_not_matter() {
 #[test]
 fn the_nearest_point_is_found_from_anywhere() {
     for kind in CloudKind::ALL {
-        let points = arbitrary::cloud(kind, 400, 6);
+        // Many groups of blocks, so that lists name more than the first.
+        let points = arbitrary::cloud(kind, 6_000, 6);
         let scan =
             PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
                 .unwrap();
@@ -294,15 +295,17 @@ fn the_nearest_point_is_found_from_anywhere() {
         let far = scan.positions().iter().flatten().fold(0.0_f64, |far, &c| far.max(f64::from(c.abs())));
         for k in 0..100 {
             let i = k * 7919 % scan.len();
-            let off = arbitrary::point_in(&mut rng, far * [0.0, 0.01, 3.0][k % 3]);
+            let off = arbitrary::point_in(&mut rng, far * [0.0, 0.01, 0.03, 3.0][k % 4]);
             let x = [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + off[k]);
             let away = |p: &[f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
             // The first of those as near.
             let nearest =
                 (0..).zip(scan.positions()).min_by(|a, b| away(a.1).total_cmp(&away(b.1))).unwrap().0;
             assert_eq!(scan.nearest_point(x), nearest, "{kind:?}, {x:?}");
-            let from = k * 31 % scan.len();
-            assert_eq!(scan.nearest_point_near(from, x), nearest, "{kind:?}, {x:?} from {from}");
+            // From any point, and from one near by, whose list is complete there.
+            for from in [k * 31 % scan.len(), i] {
+                assert_eq!(scan.nearest_point_near(from, x), nearest, "{kind:?}, {x:?} from {from}");
+            }
         }
     }
 }

@@ -162,7 +162,7 @@ impl PointHierarchy {
             let reach = f32x16::load_array_ref(simd, &balls.horizon) + nearest.within;
             let near: mask32x16<S> = product(d, d).simd_le(reach * reach * GROWN);
             let first = group as usize * PointBlock::WIDTH;
-            let mut left = near.to_bitmask() & lanes_of(first, &(first..self.blocks.len()));
+            let mut left = near.to_bitmask() & lanes_of(group as usize, &(0..self.blocks.len()));
             while left != 0 {
                 let block = first + left.trailing_zeros() as usize;
                 left &= left - 1;
