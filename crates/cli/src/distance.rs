@@ -40,8 +40,8 @@ pub struct DistanceArgs {
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Obstacles only: how far below the upper bound the lower one may be left, as a share of it, 0 to less
-    /// than 1. The local spacing counts instead where it is greater
+    /// Obstacles only: the search stops when the lower bound is this share of the upper one below it, 0 to less
+    /// than 1. Within about the local spacing of contact the bounds may stay further apart
     #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative)]
     pub relative: f64,
     /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s. The bounds are then further apart
