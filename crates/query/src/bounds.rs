@@ -71,7 +71,7 @@ impl Pairs {
     /// The pair in this lane.
     #[inline]
     pub(crate) fn pair(&self, lane: usize) -> [Child; 2] {
-        [self.of_a[lane % LANES >> self.shift], self.of_b[lane & self.mask]]
+        [self.of_a[(lane % LANES) >> self.shift], self.of_b[lane & self.mask]]
     }
 }
 

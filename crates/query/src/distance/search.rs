@@ -118,7 +118,7 @@ impl<'s> Search<'s> {
     /// more.
     pub(crate) fn is_content_with(&mut self, bound: f64, motion: &Motion) {
         if self.of_surfaces {
-            self.surfaces = self.surfaces.min(motion.no_nearer(bound));
+            self.surfaces = self.surfaces.min(motion.beyond(bound));
         }
     }
 
