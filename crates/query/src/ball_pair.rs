@@ -12,6 +12,8 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{LeafBlock, Part, Slices};
 use nearmiss_surface::project;
 
+use crate::leaf_pair::{bits, near_box};
+use crate::point_gap::{blocks, lanes};
 use crate::posed::Posed;
 use crate::surface::Surfaces;
 use crate::verdict::{Contact, Evidence};
@@ -83,18 +85,14 @@ impl<'a> Targets<'a> {
         let bits = near as u32;
         bits & self.lanes
     }
+}
 
-    /// The squared distance of a place from the box of the leaf.
-    fn distance_sq(&self, x: [f32; 3]) -> f32 {
-        let LeafBlock { centre, half, axes, .. } = self.block;
-        let d = [x[0] - centre[0], x[1] - centre[1], x[2] - centre[2]];
-        (0..3)
-            .map(|k| {
-                let along = d[0] * axes[k][0] + d[1] * axes[k][1] + d[2] * axes[k][2];
-                (along.abs() - half[k]).max(0.0).powi(2)
-            })
-            .sum()
-    }
+/// The points of a block, and the radii of their balls: 0 of those on sheets.
+#[inline(always)]
+fn balls<S: Simd>(simd: S, scan: &Slices<'_>, block: usize) -> ([f32x16<S>; 3], f32x16<S>) {
+    let [x, y, z] = &scan.blocks[block].position;
+    let load = |lanes: &[f32; WIDTH]| f32x16::load_array_ref(simd, lanes);
+    ([load(x), load(y), load(z)], load(&scan.obstacle_balls(block)))
 }
 
 impl Posed<'_> {
@@ -114,6 +112,37 @@ impl Posed<'_> {
     pub(crate) fn balls(&self, [i, j]: [usize; 2]) -> [f64; 2] {
         let [sa, sb] = self.views.map(|view| view.placed().scale());
         [f64::from(self.a.obstacle_ball(i)) * sa, f64::from(self.b.obstacle_ball(j)) * sb]
+    }
+
+    /// The lanes of a block of a whose balls come within `reach`, in a's frame, of the box of a leaf of b, as
+    /// bits.
+    #[inline]
+    fn balls_of_a(&self, level: Level, block: usize, leaf: &LeafBlock, reach: f32) -> u32 {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let (centres, balls) = balls(simd, self.a, block);
+                let centres = self.relative.points_back(&centres);
+                let zero = f32x16::splat(simd, 0.0);
+                let radii = (balls + reach) * self.relative.scale_back();
+                near_box(simd, leaf, &centres, radii) & bits(balls.simd_gt(zero))
+            },
+        ))
+    }
+
+    /// The same of a block of b and a leaf of a; `reach` in a's frame.
+    #[inline]
+    fn balls_of_b(&self, level: Level, block: usize, leaf: &LeafBlock, reach: f32) -> u32 {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let (centres, balls) = balls(simd, self.b, block);
+                let centres = self.relative.points(&centres);
+                let zero = f32x16::splat(simd, 0.0);
+                let radii = balls * self.relative.scale() + reach;
+                near_box(simd, leaf, &centres, radii) & bits(balls.simd_gt(zero))
+            },
+        ))
     }
 
     /// The contact of a ball, of point `i` or `j` or both, with what the other stands for, if these are no
@@ -175,14 +204,19 @@ impl Surfaces<'_> {
         let reach = self.reach + 2.0 * relative.slack();
         let level = self.instructions.0;
         if of_a.has_balls(leaf_a) {
-            for block in of_b.blocks(leaf_b) {
-                let targets = Targets::new(b, block);
-                for i in of_a.points(leaf_a).filter(|&i| !a.is_on_sheet(i)) {
-                    let x = relative.point_back(a.positions[i]);
-                    let radius = (a.obstacle_ball(i) + reach) * relative.scale_back();
-                    if targets.distance_sq(x) <= radius * radius {
-                        let near = targets.within(level, x, radius);
-                        self.balls_meet(near, |lane| [i, block.1 + lane])?;
+            for target in of_b.blocks(leaf_b) {
+                let mut targets = None;
+                for block in blocks(&of_a.points(leaf_a)) {
+                    let mut near = self.pair.balls_of_a(level, block, target.0, reach)
+                        & lanes(&of_a.points(leaf_a), block);
+                    while near != 0 {
+                        let i = block * WIDTH + near.trailing_zeros() as usize;
+                        near &= near - 1;
+                        let x = relative.point_back(a.positions[i]);
+                        let radius = (a.obstacle_ball(i) + reach) * relative.scale_back();
+                        let met =
+                            targets.get_or_insert_with(|| Targets::new(b, target)).within(level, x, radius);
+                        self.balls_meet(met, |lane| [i, target.1 + lane])?;
                     }
                 }
             }
@@ -190,15 +224,20 @@ impl Surfaces<'_> {
         if !of_b.has_balls(leaf_b) {
             return ControlFlow::Continue(());
         }
-        for block in of_a.blocks(leaf_a) {
-            // Its balls have been looked at.
-            let targets = Targets::new(a, block).discs();
-            for j in of_b.points(leaf_b).filter(|&j| !b.is_on_sheet(j)) {
-                let x = relative.point(b.positions[j]);
-                let radius = b.obstacle_ball(j) * relative.scale() + reach;
-                if targets.lanes != 0 && targets.distance_sq(x) <= radius * radius {
-                    let near = targets.within(level, x, radius);
-                    self.balls_meet(near, |lane| [block.1 + lane, j])?;
+        for target in of_a.blocks(leaf_a) {
+            let mut targets = None;
+            for block in blocks(&of_b.points(leaf_b)) {
+                let mut near =
+                    self.pair.balls_of_b(level, block, target.0, reach) & lanes(&of_b.points(leaf_b), block);
+                while near != 0 {
+                    let j = block * WIDTH + near.trailing_zeros() as usize;
+                    near &= near - 1;
+                    let x = relative.point(b.positions[j]);
+                    let radius = b.obstacle_ball(j) * relative.scale() + reach;
+                    // Balls of a have been held against those of b.
+                    let discs = targets.get_or_insert_with(|| Targets::new(a, target).discs());
+                    let met = discs.within(level, x, radius);
+                    self.balls_meet(met, |lane| [target.1 + lane, j])?;
                 }
             }
         }

@@ -137,22 +137,32 @@ impl LeafPair<'_> {
     /// The points of a, which are `centres` in b's frame, that reach b's box.
     #[inline(always)]
     fn near_box<S: Simd>(&self, simd: S, centres: &[f32x16<S>; 3]) -> u32 {
-        let LeafBlock { centre, half, axes, .. } = self.b.block;
-        let d = [centres[0] - centre[0], centres[1] - centre[1], centres[2] - centre[2]];
-        let mut beyond_sq = f32x16::simd_from(simd, 0.0);
-        for k in 0..3 {
-            let [ax, ay, az] = axes[k];
-            let along = (d[0] * ax + d[1] * ay + d[2] * az).abs();
-            let beyond = (along - half[k]).max(0.0);
-            beyond_sq += beyond * beyond;
-        }
         let mut own = self.a.block.discs(simd);
         if let Some(balls) = &self.balls {
             own = own.max(f32x16::load_array_ref(simd, balls));
         }
-        let reach = (own + self.reach) * self.relative.scale_back();
-        bits(beyond_sq.simd_le(reach * reach))
+        near_box(simd, self.b.block, centres, (own + self.reach) * self.relative.scale_back())
     }
+}
+
+/// The lanes of balls, in a leaf's frame, that come to its box, as bits.
+#[inline(always)]
+pub(crate) fn near_box<S: Simd>(
+    simd: S,
+    leaf: &LeafBlock,
+    centres: &[f32x16<S>; 3],
+    radii: f32x16<S>,
+) -> u32 {
+    let LeafBlock { centre, half, axes, .. } = leaf;
+    let d = [centres[0] - centre[0], centres[1] - centre[1], centres[2] - centre[2]];
+    let mut beyond_sq = f32x16::splat(simd, 0.0);
+    for k in 0..3 {
+        let [ax, ay, az] = axes[k];
+        let along = (d[0] * ax + d[1] * ay + d[2] * az).abs();
+        let beyond = (along - half[k]).max(0.0);
+        beyond_sq += beyond * beyond;
+    }
+    bits(beyond_sq.simd_le(radii * radii))
 }
 
 /// The test of [`crossing`](crate::crossing()) in lanes: a disc of a against those of b, whose centres are `d` away.
@@ -183,9 +193,10 @@ fn product<S: Simd>(a: &[f32x16<S>; 3], b: &[f32x16<S>; 3]) -> f32x16<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// The lanes of a mask as bits.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
+pub(crate) fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 

@@ -5,6 +5,8 @@
 //! the obstacle. Where a leaf straddles a gap, as one of a depth frame does at a silhouette, or holds strays,
 //! its box is mostly empty, and these balls tell far more.
 
+use std::ops::{Range, RangeInclusive};
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
@@ -31,7 +33,7 @@ struct Balls<S: Simd> {
 impl<S: Simd> Balls<S> {
     #[inline(always)]
     fn of(simd: S, scan: &Slices<'_>, leaf: &Node, block: usize) -> Self {
-        let lanes = lanes(leaf, block);
+        let lanes = lanes(&leaf.points(), block);
         let [x, y, z] = &scan.blocks[block].position;
         let load = |lanes: &[f32; WIDTH]| f32x16::load_array_ref(simd, lanes);
         Self { centres: [load(x), load(y), load(z)], reaches: load(&scan.obstacle_reaches(block)), lanes }
@@ -143,7 +145,7 @@ impl Posed<'_> {
         if of_a {
             let leaf = &self.a.nodes[pair.a.index()];
             let bounds = self.b.obstacle_enclosure(pair.b.index());
-            for block in blocks(leaf) {
+            for block in blocks(&leaf.points()) {
                 let balls = Balls::of(simd, self.a, leaf, block).moved_back(&self.relative);
                 least = least.min(balls.gap_to_box(simd, &bounds));
             }
@@ -151,7 +153,7 @@ impl Posed<'_> {
         }
         let leaf = &self.b.nodes[pair.b.index()];
         let bounds = self.a.obstacle_enclosure(pair.a.index());
-        for block in blocks(leaf) {
+        for block in blocks(&leaf.points()) {
             let balls = Balls::of(simd, self.b, leaf, block).moved(&self.relative);
             least = least.min(balls.gap_to_box(simd, &bounds));
         }
@@ -171,9 +173,9 @@ impl Posed<'_> {
     fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair) -> f32 {
         let (leaf_a, leaf_b) = (&self.a.nodes[pair.a.index()], &self.b.nodes[pair.b.index()]);
         let mut least = f32::INFINITY;
-        for block_b in blocks(leaf_b) {
+        for block_b in blocks(&leaf_b.points()) {
             let of_b = Balls::of(simd, self.b, leaf_b, block_b).moved(&self.relative);
-            for block_a in blocks(leaf_a) {
+            for block_a in blocks(&leaf_a.points()) {
                 let of_a = Balls::of(simd, self.a, leaf_a, block_a);
                 least = least.min(of_a.gap_to_balls(simd, &of_b));
             }
@@ -182,17 +184,16 @@ impl Posed<'_> {
     }
 }
 
-/// The blocks in which a leaf's points lie.
+/// The blocks in which the points of a leaf lie.
 #[inline(always)]
-pub(crate) fn blocks(leaf: &Node) -> std::ops::RangeInclusive<usize> {
-    let points = leaf.points();
+pub(crate) fn blocks(points: &Range<usize>) -> RangeInclusive<usize> {
     points.start / WIDTH..=(points.end - 1) / WIDTH
 }
 
-/// The lanes of a block that are the leaf's, as bits.
+/// The lanes of a block that hold any of these points, as bits.
 #[inline(always)]
-pub(crate) fn lanes(leaf: &Node, block: usize) -> u32 {
-    let (points, first) = (leaf.points(), block * WIDTH);
+pub(crate) fn lanes(points: &Range<usize>, block: usize) -> u32 {
+    let first = block * WIDTH;
     let below = |i: usize| (1_u32 << i.saturating_sub(first).min(WIDTH)) - 1;
     below(points.end) & !below(points.start)
 }

@@ -51,7 +51,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
     let zero = f32x16::simd_from(simd, 0.0);
     let mut reach = reach_of(pair, best.distance);
     let has_balls = has_balls(pair, [a, b]);
-    for block_a in blocks(a) {
+    for block_a in blocks(&a.points()) {
         let [x, y, z] = &pair.a.blocks[block_a].position;
         let own = [
             f32x16::load_array_ref(simd, x),
@@ -70,7 +70,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
         }
         let balls_a = if has_balls { pair.a.obstacle_balls(block_a) } else { [0.0; WIDTH] };
         let balls_a = f32x16::load_array_ref(simd, &balls_a) * pair.relative.scale_back();
-        let mut left = lanes(a, block_a);
+        let mut left = lanes(&a.points(), block_a);
         loop {
             let most = balls_a + reach;
             let near: mask32x16<S> = off_sq.simd_le(most * most);
@@ -80,7 +80,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
             }
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            for block_b in blocks(b) {
+            for block_b in blocks(&b.points()) {
                 let [x, y, z] = &pair.b.blocks[block_b].position;
                 let d = [
                     f32x16::load_array_ref(simd, x) - places[0][lane],
@@ -90,7 +90,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
                 let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let balls_b = if has_balls { pair.b.obstacle_balls(block_b) } else { [0.0; WIDTH] };
                 let both = f32x16::load_array_ref(simd, &balls_b) + balls_a.to_array()[lane];
-                let mut left_b = lanes(b, block_b);
+                let mut left_b = lanes(&b.points(), block_b);
                 loop {
                     let most = both + reach;
                     let near: mask32x16<S> = d_sq.simd_le(most * most);
