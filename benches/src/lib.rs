@@ -6,6 +6,7 @@ pub mod asked;
 pub mod clock;
 pub mod counting;
 pub mod figures;
+pub mod guard;
 pub mod hulls;
 pub mod klein2004;
 pub mod machine;

@@ -9,10 +9,23 @@ use crate::tidy;
 type Check = fn() -> Outcome;
 
 /// In order of how soon they tell something.
-const CHECKS: [(&str, Check); 8] = [
+const CHECKS: [(&str, Check); 9] = [
     ("tidy", tidy::run),
     ("format", || run_cargo(&["fmt", "--all", "--check"])),
     ("tests", || run_cargo(&["test", "--workspace", "--quiet"])),
+    ("verify", || {
+        run_cargo(&[
+            "run",
+            "--release",
+            "--quiet",
+            "-p",
+            "nearmiss-benches",
+            "--bin",
+            "verify",
+            "--",
+            "--quick",
+        ])
+    }),
     ("lints", || run_cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])),
     ("docs", docs),
     ("features", features),

@@ -4,7 +4,7 @@
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
 //! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, those of their paper of 2005, and tables and plots of dos Anjos et al. 2012,
 //!   measured.
-//! * `test [tidy|format|lints|docs|features|packages|tests|determinism …]` — every check, or those named.
+//! * `test [tidy|format|lints|docs|features|packages|tests|verify|determinism …]` — every check, or those named.
 //! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
@@ -31,7 +31,7 @@ usage: cargo xtask COMMAND
 
 of the repository
   demo           prepare a real scan, sweep two copies past each other; a table and a picture
-  test [CHECK…]  every check, or: tidy, format, tests, lints, docs, features, packages, determinism
+  test [CHECK…]  every check, or: tidy, format, tests, verify, lints, docs, features, packages, determinism
   tidy, ci       the first of them; all of them
   geodesic [SCAN] [--from POINT] [-o FILE.png]
                  a picture of its graph, coloured by the distance from a point along it

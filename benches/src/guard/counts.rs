@@ -1,0 +1,236 @@
+//! Instructions that queries take, counted by valgrind: no clock, so a slow day changes nothing.
+//!
+//! Valgrind runs the code for AVX2, whatever else the processor has. On a processor without AVX2 counts differ.
+
+use std::path::Path;
+use std::process::Command;
+
+use nearmiss::{
+    Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Detail, DistanceOptions,
+    DistancePlan, DistanceScratch, Evidence, PairHint, PointCloud, Pose, Scan, collide_hinted, collide_with,
+    distance_with,
+};
+use nearmiss_testdata::arbitrary::{rng, unit_vector};
+use nearmiss_testdata::scanner::{self, Frame};
+
+use super::cases::{Case, in_room};
+use crate::object::Object;
+use crate::{Failure, poses};
+
+/// What is counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scenario {
+    /// Estimated verdicts of the sweep.
+    Sweep,
+    /// Estimated verdicts near contact.
+    Near,
+    /// Certified verdicts of the sweep, with witnesses.
+    Certified,
+    /// Certified verdicts of an object in a simulated scan of a hall.
+    Hall,
+    /// Distances over the sweep.
+    Distance,
+    /// Distances in the hall.
+    HallDistance,
+    /// Hinted verdicts of small steps near contact.
+    Hinted,
+    /// Views of scans.
+    View,
+    /// Opening a prepared scan, its structure checked.
+    Open,
+    /// Reading a file and preparing a scan on one thread, the whole process.
+    Build,
+}
+
+impl Scenario {
+    /// All of them, with their names.
+    pub const ALL: [(Self, &'static str); 10] = [
+        (Self::Sweep, "sweep"),
+        (Self::Near, "near"),
+        (Self::Certified, "certified"),
+        (Self::Hall, "hall"),
+        (Self::Distance, "distance"),
+        (Self::HallDistance, "hall-distance"),
+        (Self::Hinted, "hinted"),
+        (Self::View, "view"),
+        (Self::Open, "open"),
+        (Self::Build, "build"),
+    ];
+
+    /// The scenario of this name.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn named(name: &str) -> Result<Self, Failure> {
+        let known = Self::ALL.iter().find(|(_, known)| *known == name);
+        known.map(|(scenario, _)| *scenario).ok_or_else(|| format!("no scenario {name:?}").into())
+    }
+
+    /// Prepares the scenario, then works through it once, which valgrind counts.
+    ///
+    /// # Errors
+    /// When it cannot be prepared.
+    pub fn run(self) -> Result<(), Failure> {
+        let quick = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(Evidence::Estimated);
+        let certified = CollideOptions::default().with_evidence(Evidence::Certified);
+        match self {
+            Self::Sweep => verdicts(&sweep()?, &quick),
+            Self::Near => verdicts(&near()?, &quick),
+            Self::Certified => verdicts(&sweep()?, &certified),
+            Self::Hall => verdicts(&hall()?, &certified),
+            Self::Distance => distances(&sweep()?),
+            Self::HallDistance => distances(&hall()?),
+            Self::Hinted => hinted(&near()?, &quick),
+            Self::View => {
+                let Case { scans, questions, .. } = sweep()?;
+                counted(&mut || {
+                    for question in &questions {
+                        std::hint::black_box(scans[0].at(&question.poses[1]));
+                    }
+                });
+                Ok(())
+            }
+            Self::Open => {
+                let folder = tempfile::tempdir()?;
+                let path = folder.path().join("dragon.nm");
+                dragon()?.save(&path)?;
+                let mut opened = None;
+                counted(&mut || opened = Some(Scan::open(&path, Check::Structure)));
+                Ok(opened.transpose().map(|_| ())?)
+            }
+            Self::Build => dragon().map(|_| ()),
+        }
+    }
+
+    /// Which function's instructions are counted; all of the process where that works on threads of its own.
+    fn toggle(self) -> &'static [&'static str] {
+        if self == Self::Build { &[] } else { &["--toggle-collect=*counts::counted*"] }
+    }
+}
+
+/// Whether valgrind is installed.
+#[must_use]
+pub fn has_valgrind() -> bool {
+    Command::new("valgrind").arg("--version").output().is_ok_and(|output| output.status.success())
+}
+
+/// The count of a scenario by valgrind. `program` runs the scenario when given `arguments`.
+///
+/// # Errors
+/// When valgrind is not there, or the scenario fails.
+pub fn count(scenario: Scenario, program: &Path, arguments: &[&str]) -> Result<u64, Failure> {
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .args(scenario.toggle())
+        .arg(program)
+        .args(arguments)
+        .output()
+        .map_err(|cause| format!("valgrind: {cause}; install it, package valgrind"))?;
+    let told = String::from_utf8_lossy(&output.stderr);
+    let collected = told.lines().find_map(|line| line.split("Collected :").nth(1));
+    match collected.map(str::trim).and_then(|number| number.parse().ok()) {
+        Some(count) if output.status.success() && count > 0 => Ok(count),
+        _ => Err(format!("expected a count, valgrind said:\n{told}").into()),
+    }
+}
+
+/// All that valgrind counts.
+#[inline(never)]
+fn counted(work: &mut dyn FnMut()) {
+    work();
+}
+
+fn build(cloud: &PointCloud) -> Result<Scan, Failure> {
+    Ok(Scan::build(cloud, &BuildOptions::default().with_threads(1))?)
+}
+
+fn dragon() -> Result<Scan, Failure> {
+    build(&Object::read("dragon-23k")?.scaled()?.cloud)
+}
+
+fn sweep() -> Result<Case, Failure> {
+    let at = poses::sweep(8, 1, 0).into_iter().flatten().map(|pose| [Pose::IDENTITY, pose]);
+    Ok(Case::with_itself("sweep", dragon()?, at))
+}
+
+fn near() -> Result<Case, Failure> {
+    let object = Object::read("dragon-23k")?.scaled()?;
+    let at = poses::near(&object, 100, 1)?.into_iter().map(|near| [Pose::IDENTITY, near.pose]);
+    Ok(Case::with_itself("near", build(&object.cloud)?, at))
+}
+
+fn hall() -> Result<Case, Failure> {
+    let frame = Frame { beams: 32, steps: 900, noise: 0.01, seed: 1 };
+    let hall = PointCloud::from_positions(&scanner::frame(&frame))?;
+    in_room("hall", &hall, &Object::read("dragon-5k")?.cloud, 3)
+}
+
+/// Of a case whose questions are all about its first and its last scan.
+fn verdicts(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
+    let [a, b] = [&case.scans[0], &case.scans[case.scans.len() - 1]];
+    let (plan, mut scratch) = (CollidePlan::new(options, a, b)?, CollideScratch::default());
+    counted(&mut || {
+        for question in &case.questions {
+            let [at_a, at_b] = &question.poses;
+            std::hint::black_box(collide_with(
+                &a.at(at_a),
+                &b.at(at_b),
+                &plan,
+                &Budget::UNLIMITED,
+                &mut scratch,
+            ));
+        }
+    });
+    Ok(())
+}
+
+fn distances(case: &Case) -> Result<(), Failure> {
+    let [a, b] = [&case.scans[0], &case.scans[case.scans.len() - 1]];
+    let plan = DistancePlan::new(&DistanceOptions::default(), a, b)?;
+    let mut scratch = DistanceScratch::default();
+    counted(&mut || {
+        for question in &case.questions {
+            let [at_a, at_b] = &question.poses;
+            std::hint::black_box(distance_with(
+                &a.at(at_a),
+                &b.at(at_b),
+                &plan,
+                &Budget::UNLIMITED,
+                &mut scratch,
+            ));
+        }
+    });
+    Ok(())
+}
+
+fn hinted(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
+    const STEPS: u32 = 10;
+    let scan = &case.scans[0];
+    let (plan, mut scratch) = (CollidePlan::new(options, scan, scan)?, CollideScratch::default());
+    let (still, step) = (scan.at(&Pose::IDENTITY), 0.1 * f64::from(scan.slices().sampling_radius));
+    let rng = &mut rng(1);
+    let walks: Vec<(Pose, [f64; 3])> = case
+        .questions
+        .iter()
+        .map(|question| (question.poses[1], unit_vector(rng).map(|x| x * step)))
+        .collect();
+    counted(&mut || {
+        for (start, step) in &walks {
+            let mut hint = PairHint::default();
+            for i in 0..STEPS {
+                let [x, y, z] = start.translation();
+                let shift = step.map(|d| d * f64::from(i));
+                let at = start.with_translation([x + shift[0], y + shift[1], z + shift[2]]);
+                std::hint::black_box(collide_hinted(
+                    &still,
+                    &scan.at(&at),
+                    &plan,
+                    &Budget::UNLIMITED,
+                    &mut hint,
+                    &mut scratch,
+                ));
+            }
+        }
+    });
+    Ok(())
+}
