@@ -1,6 +1,4 @@
 //! Answers are those on record.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::fs;
 use std::path::Path;
 
