@@ -18,8 +18,8 @@ pub const ORDERS: [(&str, Order); 4] = [
     ("sides-by-gap", Order::SidesByGap),
 ];
 
-/// Reads `--witness`, `--certified`, `--method traversal|sampling|interpolation`, `--test-points N`, `--tolerance R`,
-/// `--surfels A`, `--surfel-radius R`, `--flat`, `--order NAME` and `--coverings`.
+/// Reads `--witness`, `--certified`, `--method traversal|sampling|interpolation`, `--test-points N`,
+/// `--tolerance R`, `--surfels A`, `--surfel-radius R`, `--flat`, `--order NAME` and `--coverings`.
 ///
 /// # Errors
 /// When a value cannot be read, or names nothing.

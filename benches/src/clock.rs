@@ -23,8 +23,8 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     (result, start.elapsed())
 }
 
-/// Processor time that this process has spent, on all its threads, to a hundredth of a second; where the system does not tell,
-/// the time that has passed. Unlike a clock it leaves out what other programs take.
+/// Processor time that this process has spent, on all its threads, to a hundredth of a second; where the
+/// system does not tell, the time that has passed. Unlike a clock it leaves out what other programs take.
 #[must_use]
 pub fn processor_time() -> Duration {
     static START: OnceLock<Instant> = OnceLock::new();

@@ -79,7 +79,8 @@ unsafe impl GlobalAlloc for Counting {
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // While it moves both blocks may be live; the system may also grow in place, which is not counted twice.
+        // While it moves both blocks may be live; the system may also grow in place, which is not counted
+        // twice.
         self.grow(size);
         self.shrink(layout.size());
         // SAFETY: as in `dealloc`; `size` is the caller's, who keeps the contract of `realloc`.

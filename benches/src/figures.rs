@@ -24,7 +24,8 @@ pub struct FigureOptions {
 }
 
 impl FigureOptions {
-    /// Takes them out of what `program` was given; `poses` by default, the former number if quick. Makes the folder.
+    /// Takes them out of what `program` was given; `poses` by default, the former number if quick. Makes the
+    /// folder.
     ///
     /// # Errors
     /// When one cannot be read, there is no folder to write to, or it cannot be made.

@@ -1,12 +1,14 @@
-//! The volumes of Klein & Zachmann 2004, §4.2, measured: H, the union of the convex hulls of each leaf's points with those
-//! of its border, and K, the union of a node's balls; and the radius as the paper grows it, without a certificate.
+//! The volumes of Klein & Zachmann 2004, §4.2, measured: H, the union of the convex hulls of each leaf's
+//! points with those of its border, and K, the union of a node's balls; and the radius as the paper grows it,
+//! without a certificate.
 
 use nearmiss::hierarchy::{OrientedBox, Slices};
 use nearmiss::{PointHierarchy, geometry::nalgebra::Vector3};
 
 use crate::sample::count;
 
-/// Directions in which hulls are bounded, the axes first: from outside, by a few hundredths of their volume too large.
+/// Directions in which hulls are bounded, the axes first: from outside, by a few hundredths of their volume
+/// too large.
 const DIRECTIONS: usize = 64;
 
 /// Test points in a row that must be inside before the radius is left as it is.
@@ -81,7 +83,8 @@ impl Hulls {
         hulls.iter().any(|hull| self.directions.iter().zip(&hull.extent).all(|(d, extent)| inside(d, extent)))
     }
 
-    /// Shares of a common box of a node that `draws` random places find filled; `share` draws numbers from 0 to 1.
+    /// Shares of a common box of a node that `draws` random places find filled; `share` draws numbers from 0
+    /// to 1.
     pub fn volumes(
         &self,
         slices: &Slices<'_>,
@@ -120,8 +123,9 @@ impl Hulls {
         Volumes { balls, hulls, enclosures }
     }
 
-    /// The radius of a node's balls as the paper finds it: test points in H, weighted means of the points of random
-    /// leaves with their borders, make it grow; after a miss the next are drawn near it. `share` draws numbers from 0 to 1.
+    /// The radius of a node's balls as the paper finds it: test points in H, weighted means of the points of
+    /// random leaves with their borders, make it grow; after a miss the next are drawn near it. `share` draws
+    /// numbers from 0 to 1.
     pub fn grown_radius(&self, slices: &Slices<'_>, node: usize, share: &mut impl FnMut() -> f64) -> f64 {
         let (centres, hulls) = (centres(slices, node), self.under(slices, node));
         let (mut radius_sq, mut inside, mut near) = (0.0_f64, 0, 0);

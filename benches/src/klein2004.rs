@@ -1,8 +1,8 @@
 //! The table and the plots of Klein & Zachmann 2004, §6: what is measured, and on what.
 //!
-//! Their objects are not to be had in their sizes; others stand in for them, and where there is no folder of objects, the
-//! dragon that comes with the tests. Their two artificial models are made here: a lattice of crossing bars of 197,000 points,
-//! which is no manifold, and spheres that do not touch.
+//! Their objects are not to be had in their sizes; others stand in for them, and where there is no folder of
+//! objects, the dragon that comes with the tests. Their two artificial models are made here: a lattice of
+//! crossing bars of 197,000 points, which is no manifold, and spheres that do not touch.
 
 pub mod course;
 pub mod hierarchy;

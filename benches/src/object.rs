@@ -76,8 +76,8 @@ impl Object {
     }
 }
 
-/// `count` points on a sphere with bumps, evenly spread over the directions along a Fibonacci spiral: a closed
-/// surface of uneven curvature, smooth where a scan is.
+/// `count` points on a sphere with bumps, evenly spread over the directions along a Fibonacci spiral: a
+/// closed surface of uneven curvature, smooth where a scan is.
 #[must_use]
 pub fn bumpy_sphere(count: u32) -> Vec<[f64; 3]> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());

@@ -49,8 +49,8 @@ pub struct NearPose {
     pub offset: f64,
 }
 
-/// `count` poses of a scaled object shifted by up to 10 r from where it first touches its resting copy when it
-/// comes from outside; every other one is apart.
+/// `count` poses of a scaled object shifted by up to 10 r from where it first touches its resting copy when
+/// it comes from outside; every other one is apart.
 ///
 /// First touch is that of the meshes where there is one, else where points first come within r/2. It is
 /// searched in steps of r/4, so a graze shorter than that may be stepped over.

@@ -75,8 +75,8 @@ pub fn in_room([room, body]: [&Scan; 2], scale: f64, near: usize, seed: u64) -> 
     Ok(poses.into_iter().map(judged).collect())
 }
 
-/// The interval in which the share of which `wrong` of `all` is a sample lies, to 95 % (Wilson, "Probable inference, the
-/// law of succession, and statistical inference", JASA 22, 1927).
+/// The interval in which the share of which `wrong` of `all` is a sample lies, to 95 % (Wilson, "Probable
+/// inference, the law of succession, and statistical inference", JASA 22, 1927).
 #[must_use]
 pub fn interval(wrong: usize, all: usize) -> [f64; 2] {
     const Z: f64 = 1.959_964;

@@ -53,8 +53,8 @@ pub fn rival(name: &str, object: &Object) -> Result<Option<Box<dyn Method>>, Fai
     }
 }
 
-/// Calls `measure` with ours, asking for a verdict and for a witness, and with the rivals parry and kiddo as far
-/// as they take the object.
+/// Calls `measure` with ours, asking for a verdict and for a witness, and with the rivals parry and kiddo as
+/// far as they take the object.
 ///
 /// # Errors
 /// When the object cannot be prepared.

@@ -19,8 +19,9 @@ const QUANTILE: f64 = 0.9;
 /// Along no direction that scans prefer.
 const AXIS: [f64; 3] = [0.36, 0.48, 0.8];
 
-/// Within this many r no method that sees only points can be right. A little less than one, for depths in truth
-/// sets are steps of a ladder, one of which is r itself: rounding of r must not decide who is judged, so they are.
+/// Within this many r no method that sees only points can be right. A little less than one, for depths in
+/// truth sets are steps of a ladder, one of which is r itself: rounding of r must not decide who is judged,
+/// so they are.
 const BAND: f64 = 0.999;
 
 /// Deeper than this many r no separation may be certified, inside the band or not.
@@ -32,8 +33,8 @@ const CLEAR: f64 = 6.0;
 /// See [`CLEAR`].
 const CERTIFIED_SHARE: f64 = 0.95;
 
-/// r: the 0.9-quantile over all points of the distance to the 6th distinct neighbour, computed from the points
-/// alone.
+/// r: the 0.9-quantile over all points of the distance to the 6th distinct neighbour, computed from the
+/// points alone.
 ///
 /// # Errors
 /// When the tree refuses the points.

@@ -1,9 +1,9 @@
 //! The sweep: all methods on the same poses in the same run, each pose asked once.
 //!
-//! Two copies of an object, the longest side of its box 2, their centres 0 to 3 apart in thirteen steps, turned
-//! and shifted at random: Zachmann, "Minimal Hierarchical Collision Detection", VRST 2002. Repeating a few poses
-//! would flatter by a quarter to a half, so a pass asks each once, and every pass draws new ones. Before each
-//! distance a method is warmed up with poses of a pass that is never timed.
+//! Two copies of an object, the longest side of its box 2, their centres 0 to 3 apart in thirteen steps,
+//! turned and shifted at random: Zachmann, "Minimal Hierarchical Collision Detection", VRST 2002. Repeating a
+//! few poses would flatter by a quarter to a half, so a pass asks each once, and every pass draws new ones.
+//! Before each distance a method is warmed up with poses of a pass that is never timed.
 
 use std::hint::black_box;
 

@@ -1,5 +1,5 @@
-//! Preparing a scan, on one thread and on all; beside it kiddo's kd-tree of the points and parry's hierarchy of
-//! the mesh, which do less: neither has normals, radii or discs, and the mesh had to be made first.
+//! Preparing a scan, on one thread and on all; beside it kiddo's kd-tree of the points and parry's hierarchy
+//! of the mesh, which do less: neither has normals, radii or discs, and the mesh had to be made first.
 
 use std::time::Duration;
 

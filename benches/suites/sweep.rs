@@ -7,8 +7,8 @@ use nearmiss::Pose;
 use nearmiss_benches::object::{Object, from_folder};
 use nearmiss_benches::{poses, rivals::bench};
 
-/// Poses of each distance, drawn beforehand. Together more than any sample of the slower methods asks, so that
-/// none is asked twice within a sample; the fastest come round after 26,000.
+/// Poses of each distance, drawn beforehand. Together more than any sample of the slower methods asks, so
+/// that none is asked twice within a sample; the fastest come round after 26,000.
 const PER_DISTANCE: usize = 2000;
 
 /// Distances in turn.

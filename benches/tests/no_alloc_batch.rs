@@ -1,5 +1,5 @@
-//! Once their scratch is warm, batches and broad phases ask for no memory; what rayon takes to spread work over threads
-//! does not grow with the questions.
+//! Once their scratch is warm, batches and broad phases ask for no memory; what rayon takes to spread work
+//! over threads does not grow with the questions.
 //!
 //! One test alone: the counter is of the whole process.
 

@@ -1,5 +1,5 @@
-//! Bytes opened as a prepared scan, their checksums made to fit first, and asked everything. The first byte says how
-//! much is checked, and whether the header is to state the length that the file has.
+//! Bytes opened as a prepared scan, their checksums made to fit first, and asked everything. The first byte
+//! says how much is checked, and whether the header is to state the length that the file has.
 #![no_main]
 
 #[path = "../../crates/nearmiss/tests/hostile/exercise.rs"]

@@ -152,7 +152,8 @@ pub fn unit_vector<R: Rng>(rng: &mut R) -> [f64; 3] {
     [flat * c, flat * s, z]
 }
 
-/// A normally distributed number, mean 0, variance 1 (Marsaglia's polar method; its second number is dropped).
+/// A normally distributed number, mean 0, variance 1 (Marsaglia's polar method; its second number is
+/// dropped).
 pub fn gaussian<R: Rng>(rng: &mut R) -> f64 {
     loop {
         let (u, v): (f64, f64) = (rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));

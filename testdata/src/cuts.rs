@@ -36,8 +36,9 @@ pub struct TrueCurve {
 }
 
 impl Cut {
-    /// How far, times h², the curve of two surfaces goes aside at its point `x` when each of them goes h²H/2 to the hollow side of its
-    /// mean curvature H: the least d whose shares along the two normals are these is no longer than their sum over the sine of the angle.
+    /// How far, times h², the curve of two surfaces goes aside at its point `x` when each of them goes h²H/2
+    /// to the hollow side of its mean curvature H: the least d whose shares along the two normals are these
+    /// is no longer than their sum over the sine of the angle.
     #[must_use]
     pub fn aside(&self, x: [f64; 3]) -> f64 {
         let (na, ha) = bent(&self.a.parts[0], x);
@@ -148,8 +149,8 @@ pub fn torus_and_level(major: f64, minor: f64, z: f64) -> Cut {
     with_plane("a torus and a plane across its axis", torus(major, minor), side, pose, circles.into())
 }
 
-/// A torus and the plane y = `y` along its axis, a section of Perseus: two loops, a figure of eight for `y` = `major` − `minor`, or one
-/// loop.
+/// A torus and the plane y = `y` along its axis, a section of Perseus: two loops, a figure of eight for `y` =
+/// `major` − `minor`, or one loop.
 #[must_use]
 pub fn torus_and_upright(major: f64, minor: f64, y: f64) -> Cut {
     let side = 2.4 * (major + minor);
@@ -202,8 +203,8 @@ struct Crossing {
 }
 
 impl Crossing {
-    /// The loop on b where it passes the surface of a between `outside` and `inside`: angles along the tube of b, for each one about it, where
-    /// the loop goes `across` the tube; otherwise the other way round.
+    /// The loop on b where it passes the surface of a between `outside` and `inside`: angles along the tube
+    /// of b, for each one about it, where the loop goes `across` the tube; otherwise the other way round.
     fn curve(&self, outside: f64, inside: f64, across: bool) -> TrueCurve {
         let [major, minor] = self.b;
         let [major_a, minor_a] = self.a;
@@ -224,8 +225,8 @@ impl Crossing {
     }
 }
 
-/// Pairs of tori whose tubes cross: upright to each other and at a slant, each through the tube of the other twice, in four loops;
-/// once, in two; and one that is a ring too narrow about the other's tube, in two.
+/// Pairs of tori whose tubes cross: upright to each other and at a slant, each through the tube of the other
+/// twice, in four loops; once, in two; and one that is a ring too narrow about the other's tube, in two.
 #[must_use]
 pub fn crossing_tori() -> Vec<Cut> {
     let upright =
@@ -334,7 +335,8 @@ mod tests {
                 }
             };
             let trace: f64 = (0..3).map(|k| (d(on(k, 1.0)) + d(on(k, -1.0)) - 2.0 * d(x)) / (e * e)).sum();
-            // The surface parallel to the form through x has the same normals; its own radius is larger by d(x).
+            // The surface parallel to the form through x has the same normals; its own radius is larger by
+            // d(x).
             let parallel = match part {
                 Primitive::Torus { major, minor } => Primitive::Torus { major, minor: minor + d(x) },
                 Primitive::Sphere { centre, radius } => Primitive::Sphere { centre, radius: radius + d(x) },

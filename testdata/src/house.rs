@@ -1,6 +1,8 @@
-//! A house to walk through: two storeys, a staircase, ramps from 10° to 60°, round columns, doors, a low ceiling. Metres, z up.
+//! A house to walk through: two storeys, a staircase, ramps from 10° to 60°, round columns, doors, a low
+//! ceiling. Metres, z up.
 //!
-//! The lower floor is at z = 0, x 0 to 16, y 0 to 12; the upper one at z = 3, x 6.5 to 16, y 6 to 12, with open edges.
+//! The lower floor is at z = 0, x 0 to 16, y 0 to 12; the upper one at z = 3, x 6.5 to 16, y 6 to 12, with
+//! open edges.
 
 use nearmiss_geometry::TriangleMesh;
 use rand::RngExt;
@@ -128,8 +130,8 @@ pub fn house() -> Vec<Quad> {
     quads
 }
 
-/// Points on surfaces, one for each `spacing`² in a jittered lattice, with Gaussian noise of this standard deviation along the
-/// normal.
+/// Points on surfaces, one for each `spacing`² in a jittered lattice, with Gaussian noise of this standard
+/// deviation along the normal.
 #[must_use]
 pub fn scanned(quads: &[Quad], spacing: f64, noise: f64, seed: u64) -> Vec<[f64; 3]> {
     let rng = &mut rng(seed);

@@ -1,5 +1,5 @@
-//! Symmetric 3×3 matrices, ordinary and adversarial, and how well eigenpairs fit them. Entries are in the order
-//! xx xy xz yy yz zz.
+//! Symmetric 3×3 matrices, ordinary and adversarial, and how well eigenpairs fit them. Entries are in the
+//! order xx xy xz yy yz zz.
 
 use rand::{Rng, RngExt};
 
@@ -160,10 +160,11 @@ fn neighbourhood<R: Rng>(rng: &mut R) -> [f64; 6] {
     [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
 }
 
-/// The largest component of B n − λ n over the largest entry of B, NaN if anything is; 0 where B is 0 and λ too.
+/// The largest component of B n − λ n over the largest entry of B, NaN if anything is; 0 where B is 0 and λ
+/// too.
 ///
-/// What the last bit of a subnormal λ explains is not counted. Where the eigenvalue is beyond the range of `f64`
-/// its end is as near as can be: that fits if B n points along n and is as long or longer.
+/// What the last bit of a subnormal λ explains is not counted. Where the eigenvalue is beyond the range of
+/// `f64` its end is as near as can be: that fits if B n points along n and is as long or longer.
 #[must_use]
 pub fn residual(matrix: [f64; 6], value: f64, vector: [f64; 3]) -> f64 {
     /// The least positive number.

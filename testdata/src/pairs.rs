@@ -1,9 +1,9 @@
 //! Posed pairs with the true answer, from geometry alone.
 //!
-//! `gap` is the exact distance of the two exact surfaces when they are apart. When they intersect it is minus a
-//! depth d ≥ 0 such that *no* shift shorter than d, in any direction, parts them: a stronger statement than one
-//! about 26 directions. For every family d is the least shift that parts them, or a lower bound of it; `why`
-//! says which. Surfaces are two-sided: a ball within a hollow ball is apart from it.
+//! `gap` is the exact distance of the two exact surfaces when they are apart. When they intersect it is minus
+//! a depth d ≥ 0 such that *no* shift shorter than d, in any direction, parts them: a stronger statement than
+//! one about 26 directions. For every family d is the least shift that parts them, or a lower bound of it;
+//! `why` says which. Surfaces are two-sided: a ball within a hollow ball is apart from it.
 //!
 //! Poses are rigid, in double precision. The truth is about the exact surfaces; sampled points may be noisy,
 //! and no method that sees only points is right below r, so pairs with |gap| ≤ r are counted apart.
@@ -135,7 +135,8 @@ impl AnalyticSet {
 
 /// A set of pairs of all families; the same for the same arguments.
 ///
-/// With the default options 5,500 pairs of 76 shapes with 330,000 points together, 2 seconds in a release build.
+/// With the default options 5,500 pairs of 76 shapes with 330,000 points together, 2 seconds in a release
+/// build.
 #[must_use]
 pub fn analytic_set(seed: u64, options: &SetOptions) -> AnalyticSet {
     let mut set = AnalyticSet { shapes: Vec::new(), radii: Vec::new(), pairs: Vec::new() };

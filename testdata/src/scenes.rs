@@ -15,7 +15,8 @@ pub struct Scene {
     pub climb: f64,
 }
 
-/// A scan of two storeys: up the two flights of its staircase, over the landing, to the upper floor, and down again.
+/// A scan of two storeys: up the two flights of its staircase, over the landing, to the upper floor, and down
+/// again.
 pub const TWO_STOREYS: Scene = Scene {
     file: "buildings/two-storey-scan-zup-753k.ply",
     up: "z",

@@ -2,7 +2,8 @@
 //!
 //! A [`Form`] is a union of primitive surfaces: two-sided, without inside. A [`Shape`] is a form with points
 //! sampled from it. Points of a noise-free shape lie on the form up to rounding; where the form ends (the rim
-//! of a bowl, the edge of a patch) points lie on the end itself, so that the samples end where the truth does.
+//! of a bowl, the edge of a patch) points lie on the end itself, so that the samples end where the truth
+//! does.
 //!
 //! Random numbers are the same on every platform; sines and logarithms may differ in their last bit.
 

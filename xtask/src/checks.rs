@@ -83,7 +83,8 @@ fn features() -> Outcome {
     Ok(())
 }
 
-/// The same file from one thread and two, from a debug and a release build: that which the tests run, and this program.
+/// The same file from one thread and two, from a debug and a release build: that which the tests run, and
+/// this program.
 fn determinism() -> Outcome {
     if cfg!(debug_assertions) {
         return Err("run it by `cargo xtask`, which is a release build".into());

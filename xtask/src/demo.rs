@@ -120,8 +120,8 @@ fn least_distance(
     Ok(2.0 * apart)
 }
 
-/// The distance at which the points, not the surfaces, first come within r of each other: by bisection from afar on
-/// the exact question for thickened points.
+/// The distance at which the points, not the surfaces, first come within r of each other: by bisection from
+/// afar on the exact question for thickened points.
 fn first_touch(scan: &Scan) -> Outcome<f64> {
     let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
     let plan = CollidePlan::new(&balls, scan, scan)?;

@@ -1,7 +1,7 @@
 //! `cargo xtask field`: the picture of Klein & Zachmann 2004, Fig. 6, and what it says in numbers.
 //!
-//! f over a slice of a noisy scan with the covariance about x and about a(x), and a table of how often its normal
-//! changes sides near the surface.
+//! f over a slice of a noisy scan with the covariance about x and about a(x), and a table of how often its
+//! normal changes sides near the surface.
 
 mod flips;
 mod paint;

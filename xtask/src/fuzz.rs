@@ -1,7 +1,7 @@
 //! `cargo xtask fuzz [TARGET] [SECONDS]`: builds the fuzz targets with coverage, makes seeds, runs them.
 //!
-//! What cargo-fuzz does, without a nightly toolchain: the instrumentation is LLVM's, and the flags that ask for it are
-//! passed through.
+//! What cargo-fuzz does, without a nightly toolchain: the instrumentation is LLVM's, and the flags that ask
+//! for it are passed through.
 
 use std::fs;
 use std::process::Command;

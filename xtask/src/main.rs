@@ -2,9 +2,10 @@
 //!
 //! * `demo` — the main job on a real scan, with a table and a picture.
 //! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
-//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, those of their paper of 2005, and tables and plots of dos Anjos et al. 2012,
-//!   measured.
-//! * `test [tidy|format|lints|docs|features|packages|tests|verify|determinism …]` — every check, or those named.
+//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, those of their paper of 2005, and tables and
+//!   plots of dos Anjos et al. 2012, measured.
+//! * `test [tidy|format|lints|docs|features|packages|tests|verify|determinism …]` — every check, or those
+//!   named.
 //! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
 //! * `check-proof` — whether what `collide --prove` wrote holds.

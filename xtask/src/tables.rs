@@ -1,4 +1,5 @@
-//! `cargo xtask tables`: the tables and plots of Klein & Zachmann 2004 and 2005 and of dos Anjos et al. 2012, measured.
+//! `cargo xtask tables`: the tables and plots of Klein & Zachmann 2004 and 2005 and of dos Anjos et al. 2012,
+//! measured.
 
 use crate::repository::{Outcome, root, run_cargo};
 
@@ -8,7 +9,8 @@ const OBJECTS: &str = "../shared/data";
 /// Papers that can be asked for alone.
 const YEARS: [(&str, &str); 2] = [("--2005", "klein2005"), ("--2012", "anjos2012")];
 
-/// Measures, with these words after the program's name; with the folder of objects, if it is there and none is named.
+/// Measures, with these words after the program's name; with the folder of objects, if it is there and none
+/// is named.
 pub(crate) fn run(words: &[&str]) -> Outcome {
     let folder = root().join(OBJECTS);
     let found = folder.is_dir() && !words.contains(&"--data") && std::env::var_os("NEARMISS_DATA").is_none();

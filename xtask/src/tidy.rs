@@ -9,6 +9,9 @@ use crate::repository::{Outcome, ask_cargo, members, root};
 /// A file longer than this is more than one noun or one step.
 const MOST_LINES: usize = 500;
 
+/// A comment reaches no further than this column.
+const COMMENT_WIDTH: usize = 110;
+
 /// Names that say nothing about what is inside.
 const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 
@@ -102,6 +105,11 @@ fn source_faults(path: &Path, text: &str, references: &str) -> Vec<String> {
     if path.file_name().is_some_and(|name| VAGUE.iter().any(|vague| name == *vague)) {
         faults.push(format!("{shown}: name it after what is inside"));
     }
+    for (number, line) in text.lines().enumerate() {
+        if line.trim_start().starts_with("//") && line.chars().count() > COMMENT_WIDTH {
+            faults.push(format!("{shown}:{}: a comment reaches beyond column {COMMENT_WIDTH}", number + 1));
+        }
+    }
     // Written in two parts, so that this line is not a fault itself.
     if code.contains(concat!(".partial", "_cmp(")) {
         faults.push(format!("{shown}: use total_cmp; a partial order panics or lies on NaN"));
@@ -186,6 +194,9 @@ mod tests {
         assert_eq!(source_faults(&root().join("a/utils.rs"), &long, "").len(), 2);
         let order = concat!("a.partial", "_cmp(&b)");
         assert_eq!(source_faults(&root().join("a/b.rs"), order, "").len(), 1);
-        assert!(source_faults(&root().join("a/b.rs"), "fn main() {}", "").is_empty());
+        let wide = format!("    // {}", "x".repeat(104));
+        assert_eq!(source_faults(&root().join("a/b.rs"), &wide, "").len(), 1);
+        let fits = format!("    // {}\nfn main() {{}}", "x".repeat(103));
+        assert!(source_faults(&root().join("a/b.rs"), &fits, "").is_empty());
     }
 }

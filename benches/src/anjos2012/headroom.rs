@@ -19,10 +19,12 @@ const STEP: f64 = 0.04;
 const ASIDE: f64 = 0.5;
 const ASIDE_STEP: f64 = 0.05;
 
-/// What lies no higher than this above the highest point of a step belongs to the step: points are rounded to a centimetre.
+/// What lies no higher than this above the highest point of a step belongs to the step: points are rounded to
+/// a centimetre.
 const SAME: f64 = 0.02;
 
-/// The greatest height of boxes of some widths that get up, by the points and by maps of several sizes of pixels.
+/// The greatest height of boxes of some widths that get up, by the points and by maps of several sizes of
+/// pixels.
 ///
 /// # Errors
 /// When no map can be made.
@@ -117,7 +119,8 @@ fn near(cloud: &PointCloud, up: &Route) -> Vec<[f64; 3]> {
     (0..cloud.len()).map(|i| cloud.point(i)).filter(is_near).collect()
 }
 
-/// Height of the highest thing under a square that can be stepped on from `feet`, and the room between that and what is above.
+/// Height of the highest thing under a square that can be stepped on from `feet`, and the room between that
+/// and what is above.
 fn above(points: &[[f64; 3]], [x, y]: [f64; 2], width: f64, feet: f64) -> Option<[f64; 2]> {
     let climb = AvatarOptions::default().climb;
     let under = || {

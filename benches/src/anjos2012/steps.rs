@@ -70,7 +70,8 @@ fn peaks(values: &[f64]) -> Vec<[f64; 2]> {
     groups.map(|(i, group)| [count(TOGETHER * i), group.iter().copied().fold(0.0, f64::max)]).collect()
 }
 
-/// Walks with the paper's avatar of six slices, of which 10 or 16 are kept, and with slices of three pixels; writes both figures and a table.
+/// Walks with the paper's avatar of six slices, of which 10 or 16 are kept, and with slices of three pixels;
+/// writes both figures and a table.
 ///
 /// # Errors
 /// When a map or a figure cannot be written, or the walk ends early.

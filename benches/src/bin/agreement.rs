@@ -2,9 +2,9 @@
 //!
 //! `agreement OBJECT… [--poses N] [--seed N]`
 //!
-//! A pose counts as outside the band when the mesh's answer stays the same under shifts by 1.05 r in each of 26
-//! directions: then neither a contact nor a gap is shallower than that. Objects are scaled as in the sweep. Ends
-//! with status 1 if a verdict outside the band is wrong or missing.
+//! A pose counts as outside the band when the mesh's answer stays the same under shifts by 1.05 r in each of
+//! 26 directions: then neither a contact nor a gap is shallower than that. Objects are scaled as in the
+//! sweep. Ends with status 1 if a verdict outside the band is wrong or missing.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::process::ExitCode;

@@ -2,8 +2,8 @@
 //!
 //! `analytic [--repeats N] [--seed N] [--list]` and what `asked` reads: `--witness`, `--method`, `--order` …
 //!
-//! Ends with status 1 if a verdict outside the band is wrong or missing, `Ambiguous` on thin pairs apart, which
-//! may be one in twenty of them.
+//! Ends with status 1 if a verdict outside the band is wrong or missing, `Ambiguous` on thin pairs apart,
+//! which may be one in twenty of them.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::collections::BTreeMap;

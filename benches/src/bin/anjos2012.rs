@@ -1,5 +1,6 @@
-//! Tables 1 to 3 and Figs 5 and 6 of dos Anjos, Pereira & Oliveira 2012 (S4) for comparable scenes, with the paper's figures beside,
-//! what §4 says of round columns, and how high a box fits up a real staircase: `anjos2012.md` and SVGs in a folder.
+//! Tables 1 to 3 and Figs 5 and 6 of dos Anjos, Pereira & Oliveira 2012 (S4) for comparable scenes, with the
+//! paper's figures beside, what §4 says of round columns, and how high a box fits up a real staircase:
+//! `anjos2012.md` and SVGs in a folder.
 //!
 //! `anjos2012 -o FOLDER [--data FOLDER] [--seed N] [--quick]`
 //!
@@ -32,7 +33,8 @@ const LOADED: usize = 6;
 /// Times are the least of so many.
 const PASSES: usize = 5;
 
-/// A scene, what of the paper it stands for, and what the paper has for that: points given and sampled, seconds, MB.
+/// A scene, what of the paper it stands for, and what the paper has for that: points given and sampled,
+/// seconds, MB.
 struct Scene {
     name: &'static str,
     file: &'static str,

@@ -2,8 +2,8 @@
 //!
 //! `budgets OBJECT… [--near N] [--seed N]`
 //!
-//! The answer is the best effort, what is likelier where the budget ended the search; it is held against the meshes, or,
-//! where an object has none, against the search to the end. Poses are within 10 r of first touch.
+//! The answer is the best effort, what is likelier where the budget ended the search; it is held against the
+//! meshes, or, where an object has none, against the search to the end. Poses are within 10 r of first touch.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::time::Duration;

@@ -1,13 +1,13 @@
-//! Whether likelihoods are: how often scans meet where a budget ended the search, by decile of the likelihood that was
-//! answered.
+//! Whether likelihoods are: how often scans meet where a budget ended the search, by decile of the likelihood
+//! that was answered.
 //!
 //! `calibration OBJECT… [--near N] [--swept N] [--seed N]` and what `asked` reads (`--order` …)
 //!
 //! An object is asked about against itself. `SCAN+OBJECT` asks about an object in a scan, a twenty-fifth of
 //! its diagonal long.
 //!
-//! Ends with status 1 if a decile with a hundred answers or more is off by more than 0.15, or the Brier score of all
-//! answers is not below that of the best constant.
+//! Ends with status 1 if a decile with a hundred answers or more is off by more than 0.15, or the Brier score
+//! of all answers is not below that of the best constant.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::process::ExitCode;

@@ -2,9 +2,10 @@
 //!
 //! `certificates [--poses N] [--seed N]`
 //!
-//! A ball is put at random beside a shape of each family. Its exact surface meets the shape's when the distance of
-//! its centre from the shape is at most its radius; less than that is the depth. Ends with status 1 if a
-//! separation deeper than 0.3 r is certified, or a certified gap is larger than the exact one by more than 0.3 r.
+//! A ball is put at random beside a shape of each family. Its exact surface meets the shape's when the
+//! distance of its centre from the shape is at most its radius; less than that is the depth. Ends with status
+//! 1 if a separation deeper than 0.3 r is certified, or a certified gap is larger than the exact one by more
+//! than 0.3 r.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::process::ExitCode;

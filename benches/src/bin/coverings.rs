@@ -2,11 +2,11 @@
 //!
 //! `coverings OBJECT… [--samples N] [--points N] [--nodes N] [--draws N] [--poses N] [--seed N]`
 //!
-//! Of each level of each object, over some of its nodes: the covering radius beside the one that the paper's growth alone
-//! ends with; the volume of the balls over that of the hulls and of the enclosures; the sampling radius as it is stored,
-//! as it is on projected surface points, and by eq. 10. Then a million (`--points`) surface points against the
-//! coverings of their leaves and all nodes above; and how many pairs of nodes, whose boxes overlap, coverings exclude.
-//! Ends with status 1 if a surface point is outside.
+//! Of each level of each object, over some of its nodes: the covering radius beside the one that the paper's
+//! growth alone ends with; the volume of the balls over that of the hulls and of the enclosures; the sampling
+//! radius as it is stored, as it is on projected surface points, and by eq. 10. Then a million (`--points`)
+//! surface points against the coverings of their leaves and all nodes above; and how many pairs of nodes,
+//! whose boxes overlap, coverings exclude. Ends with status 1 if a surface point is outside.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
@@ -77,8 +77,8 @@ fn bytes(scan: &Scan) {
     );
 }
 
-/// Projects random places near the scan; how many of those that are surface are in no ball of some node that has their
-/// nearest point, and for each node how far the furthest is from its samples.
+/// Projects random places near the scan; how many of those that are surface are in no ball of some node that
+/// has their nearest point, and for each node how far the furthest is from its samples.
 fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Failure> {
     let slices = scan.slices();
     let tree: ImmutableKdTree<f64, 3> = {

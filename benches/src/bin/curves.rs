@@ -1,8 +1,9 @@
-//! What the curves of pairs of objects cost, by spacing; beside it, finding the contacts that they start from, and the rival that follows
-//! no curve: Newton's method from every contact, which gives points in no order.
+//! What the curves of pairs of objects cost, by spacing; beside it, finding the contacts that they start
+//! from, and the rival that follows no curve: Newton's method from every contact, which gives points in no
+//! order.
 //!
-//! `curves OBJECT OBJECT … [--shift X] [--passes N]`: pairs of objects, each scaled to a longest side of 2, the second of a pair
-//! turned a little and shifted by X along x.
+//! `curves OBJECT OBJECT … [--shift X] [--passes N]`: pairs of objects, each scaled to a longest side of 2,
+//! the second of a pair turned a little and shifted by X along x.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use nearmiss::query::ViewScratch;

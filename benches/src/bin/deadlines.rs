@@ -1,8 +1,10 @@
-//! How late queries with a deadline come back, beside a loop that does nothing but look at the clock until then.
+//! How late queries with a deadline come back, beside a loop that does nothing but look at the clock until
+//! then.
 //!
 //! `deadlines [OBJECT] [--queries N] [--seed N]`
 //!
-//! The spin and the queries take turns, so that both have the same machine. Only queries that a deadline ended count.
+//! The spin and the queries take turns, so that both have the same machine. Only queries that a deadline
+//! ended count.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::time::{Duration, Instant};

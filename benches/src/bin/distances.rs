@@ -1,5 +1,5 @@
-//! How far two copies of an object are apart, over the poses of the sweep: what that costs, and what it tells. Beside it the rival: the
-//! nearest point of one copy for each point of the other, by kiddo.
+//! How far two copies of an object are apart, over the poses of the sweep: what that costs, and what it
+//! tells. Beside it the rival: the nearest point of one copy for each point of the other, by kiddo.
 //!
 //! `distances OBJECT… [--per-distance N] [--passes N] [--rival-poses N] [--from I] [--seed N] [--threads N]`
 //!

@@ -1,7 +1,8 @@
 //! Solvers of the symmetric 3×3 eigenproblem: time, and errors over families of matrices, as one table.
 //!
-//! `eigen [OBJECT] [--repeats N] [--count N]`. Real neighbourhoods are those of `OBJECT`, `dragon-5k` unless told
-//! otherwise. Every repeat asks each solver once, in turn, so that what else the machine does meets all of them.
+//! `eigen [OBJECT] [--repeats N] [--count N]`. Real neighbourhoods are those of `OBJECT`, `dragon-5k` unless
+//! told otherwise. Every repeat asks each solver once, in turn, so that what else the machine does meets all
+//! of them.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;

@@ -1,5 +1,5 @@
-//! What one evaluation of f costs: at a leaf, and anywhere, by instruction set; beside it kiddo's search for as many
-//! nearest points as are added up.
+//! What one evaluation of f costs: at a leaf, and anywhere, by instruction set; beside it kiddo's search for
+//! as many nearest points as are added up.
 //!
 //! `evaluation [OBJECT]… [--runs N]`; the objects are the shipped dragon's unless told otherwise.
 #![expect(clippy::print_stdout, reason = "a program for people")]
@@ -45,8 +45,8 @@ fn places(scan: &Scan) -> Vec<Place> {
         .collect()
 }
 
-/// Mean ns a place: of each stretch of places the least of `runs` times, which no other work on the machine makes
-/// longer.
+/// Mean ns a place: of each stretch of places the least of `runs` times, which no other work on the machine
+/// makes longer.
 fn time(places: &[Place], runs: usize, mut ask: impl FnMut(&Place) -> f64) -> f64 {
     let stretches: Vec<&[Place]> = places.chunks(STRETCH).collect();
     let mut least = vec![f64::INFINITY; stretches.len()];

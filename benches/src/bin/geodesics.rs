@@ -1,8 +1,8 @@
-//! What follows from proximity graphs: oriented normals, close pairs, coarser levels, the geodesic kernel. Speed, size
-//! and accuracy.
+//! What follows from proximity graphs: oriented normals, close pairs, coarser levels, the geodesic kernel.
+//! Speed, size and accuracy.
 //!
-//! `geodesics [OBJECT]… [--runs N] [--pairs N] [--plates]`; the objects are the shipped dragon's unless told otherwise;
-//! `--plates` shows what both kernels make of two sheets instead.
+//! `geodesics [OBJECT]… [--runs N] [--pairs N] [--plates]`; the objects are the shipped dragon's unless told
+//! otherwise; `--plates` shows what both kernels make of two sheets instead.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
@@ -78,7 +78,8 @@ fn orientation(object: &Object, scan: &Scan, graph: &PointGraph, runs: usize) {
     }
 }
 
-/// Counts normals that point into the mesh, and those that lean to the other side than its faces about the vertex do in sum.
+/// Counts normals that point into the mesh, and those that lean to the other side than its faces about the
+/// vertex do in sum.
 fn against(mesh: &TriangleMesh, scan: &Scan, normals: &[[f32; 3]], confidence: &[u8]) {
     let mut at_vertices = vec![[0.0; 3]; mesh.vertices().len()];
     for (normal, &source) in normals.iter().zip(scan.source()) {

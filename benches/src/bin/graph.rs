@@ -1,7 +1,7 @@
 //! What proximity graphs cost, and what they look like.
 //!
-//! `graph [OBJECT] [--runs N]`; the object is `bumpy:1000000` unless told otherwise. With `--updates` instead what it costs to
-//! insert, remove and move one point among 10³ to 10⁶.
+//! `graph [OBJECT] [--runs N]`; the object is `bumpy:1000000` unless told otherwise. With `--updates` instead
+//! what it costs to insert, remove and move one point among 10³ to 10⁶.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;

@@ -3,7 +3,8 @@
 //! `klein2004 -o FOLDER [--data FOLDER] [--poses N] [--seed N] [--target MICROSECONDS] [--only NUMBER]
 //! [--quick]`
 //!
-//! Without the folder of objects, the dragon that comes with the tests stands in for them; the artificial models are made.
+//! Without the folder of objects, the dragon that comes with the tests stands in for them; the artificial
+//! models are made.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 use std::fmt::Write;
@@ -224,7 +225,8 @@ fn verdict() -> CollideOptions {
     CollideOptions::default().with_detail(Detail::Verdict)
 }
 
-/// Random test points at leaves (§5.3), pairs in the order of sample points on either side (§5.2), coverings (§5.1).
+/// Random test points at leaves (§5.3), pairs in the order of sample points on either side (§5.2), coverings
+/// (§5.1).
 fn as_in_the_paper() -> CollideOptions {
     verdict().with_method(Method::Sampling(Sampling::default())).with_order(Order::Sides).with_coverings(true)
 }

@@ -2,8 +2,8 @@
 //!
 //! `klein2005 -o FOLDER [--data FOLDER] [--poses N] [--seed N] [--points N] [--only NUMBER] [--quick]`
 //!
-//! Without the folder of objects, the dragon that comes with the tests stands in for them. `--points` is the largest cloud of
-//! Fig. 9.
+//! Without the folder of objects, the dragon that comes with the tests stands in for them. `--points` is the
+//! largest cloud of Fig. 9.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 use std::fmt::Write;

@@ -1,10 +1,11 @@
-//! Spheres, capsules and boxes against the points of a scan: nanoseconds a query, ours and rivals' on the same shapes, each asked once in a
-//! pass.
+//! Spheres, capsules and boxes against the points of a scan: nanoseconds a query, ours and rivals' on the
+//! same shapes, each asked once in a pass.
 //!
 //! `shapes OBJECT… [--count N] [--passes N] [--radius R] [--seed N]`
 //!
-//! Three sets of shapes of radius R times r: about places drawn in the bounding box, at most 3 r from a point of the surface, and at most 10 r. The rivals: a
-//! plain grid with cells of the sphere's radius, made for it, and kiddo, asked for the nearest point within the radius.
+//! Three sets of shapes of radius R times r: about places drawn in the bounding box, at most 3 r from a point
+//! of the surface, and at most 10 r. The rivals: a plain grid with cells of the sphere's radius, made for it,
+//! and kiddo, asked for the nearest point within the radius.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;

@@ -1,5 +1,5 @@
-//! Slice maps: points a second of building, boxes against a map, avatars stepping, slices loaded; beside them parry's voxels and a
-//! kd-tree on the same points.
+//! Slice maps: points a second of building, boxes against a map, avatars stepping, slices loaded; beside them
+//! parry's voxels and a kd-tree on the same points.
 //!
 //! `slices [SCAN]… [--points N] [--pixel T] [--queries N] [--avatars N] [--passes N] [--seed N]`
 //!
@@ -176,8 +176,9 @@ fn floors(cloud: &PointCloud, map: &SliceMap) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Pixels of floor, and those of them that are obstacles. Of floor are pixels with tops in at least twelve of the 24 around them, in their own slice,
-/// half of which are within a pixel's side of theirs, and with nothing above the nine around for a metre.
+/// Pixels of floor, and those of them that are obstacles. Of floor are pixels with tops in at least twelve of
+/// the 24 around them, in their own slice, half of which are within a pixel's side of theirs, and with
+/// nothing above the nine around for a metre.
 fn false_obstacles(map: &SliceMap) -> Result<[usize; 2], Failure> {
     let grid = map.grid();
     let [width, depth, slices] = grid.counts;
@@ -251,7 +252,8 @@ fn boxes(cloud: &PointCloud, map: &SliceMap, asked: &Asked) -> Result<(), Failur
     });
     drop(voxels);
 
-    // Heights by three: the box becomes a cube, and its points those within half a side by the greatest coordinate.
+    // Heights by three: the box becomes a cube, and its points those within half a side by the greatest
+    // coordinate.
     let squeezed = |p: [f64; 3]| {
         let Vector { x, y, z } = vector([0, 1, 2].map(|k| p[k] * BODY[0] / BODY[k]));
         [x, y, z]

@@ -1,11 +1,12 @@
 //! Scores verdicts against exact answers.
 //!
-//! `truth CLOUD POSES.jsonl [--rival parry|trimesh] [--threads N]` and what `asked` reads: `--witness`, `--certified`,
-//! `--method`, `--order`, `--coverings`, `--work`, `--micros`, `--resolution` … Under a budget the best effort is scored.
+//! `truth CLOUD POSES.jsonl [--rival parry|trimesh] [--threads N]` and what `asked` reads: `--witness`,
+//! `--certified`, `--method`, `--order`, `--coverings`, `--work`, `--micros`, `--resolution` … Under a budget
+//! the best effort is scored.
 //!
 //! Ends with status 1 if a verdict outside the band |gap| ≤ r is wrong or missing, or a deep separation is
-//! certified; with `--certified`, which asks for certificates, also if fewer than 95 % of separations from 6 r on are certified. A rival is
-//! judged by every pose, for a mesh knows what points do not.
+//! certified; with `--certified`, which asks for certificates, also if fewer than 95 % of separations from 6
+//! r on are certified. A rival is judged by every pose, for a mesh knows what points do not.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::path::Path;

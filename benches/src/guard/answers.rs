@@ -200,8 +200,8 @@ pub fn read(text: &str) -> Result<Vec<Row>, Failure> {
         .collect()
 }
 
-/// What is worse in `new` than in `old`, a line each: verdicts that differ, evidence that was lost, bounds that
-/// contradict the old ones, and bounds that are looser on average.
+/// What is worse in `new` than in `old`, a line each: verdicts that differ, evidence that was lost, bounds
+/// that contradict the old ones, and bounds that are looser on average.
 #[must_use]
 pub fn faults(new: &[Row], old: &[Row]) -> Vec<String> {
     let mut faults = Vec::new();

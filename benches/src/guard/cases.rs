@@ -52,8 +52,8 @@ impl Case {
     }
 }
 
-/// The cases about shipped and generated scans: objects with themselves, with either kernel, a dragon before a
-/// simulated scanner, and shapes with known answers.
+/// The cases about shipped and generated scans: objects with themselves, with either kernel, a dragon before
+/// a simulated scanner, and shapes with known answers.
 ///
 /// # Errors
 /// When a scan cannot be prepared.

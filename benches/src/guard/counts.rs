@@ -1,6 +1,7 @@
 //! Instructions that queries take, counted by valgrind: no clock, so a slow day changes nothing.
 //!
-//! Valgrind runs the code for AVX2, whatever else the processor has. On a processor without AVX2 counts differ.
+//! Valgrind runs the code for AVX2, whatever else the processor has. On a processor without AVX2 counts
+//! differ.
 
 use std::path::Path;
 use std::process::Command;

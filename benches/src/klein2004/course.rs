@@ -16,7 +16,8 @@ const AVERAGED: std::ops::RangeInclusive<f64> = 0.6..=2.0;
 /// Poses to warm up with before a distance.
 const WARM_UP: usize = 20;
 
-/// How answers compare with the exact test at one distance, of poses at which the boxes of the roots intersect.
+/// How answers compare with the exact test at one distance, of poses at which the boxes of the roots
+/// intersect.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Difference {
     /// Such poses.
@@ -70,8 +71,8 @@ impl Questions {
     }
 }
 
-/// Whether the boxes of the roots overlap, the second copy of the scan being at `pose`. Objects scaled for the sweep are
-/// stored in their own frame.
+/// Whether the boxes of the roots overlap, the second copy of the scan being at `pose`. Objects scaled for
+/// the sweep are stored in their own frame.
 fn roots_meet(scan: &Scan, pose: &Pose) -> bool {
     let root = &scan.boxes()[0];
     let relative = Relative::new(pose, f64::from(root.radius()));
@@ -105,8 +106,8 @@ impl Difference {
 }
 
 impl Course {
-    /// Asks all questions `passes` times, distance by distance; the time of a question is the least it took, which leaves out
-    /// what other programs took. Answers that count are the first.
+    /// Asks all questions `passes` times, distance by distance; the time of a question is the least it took,
+    /// which leaves out what other programs took. Answers that count are the first.
     ///
     /// Thousands of other questions come between those that are the same.
     pub fn run(questions: &Questions, passes: usize, mut ask: impl FnMut(&Pose) -> Answer) -> Self {

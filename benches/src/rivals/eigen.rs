@@ -24,8 +24,8 @@ pub trait Contender {
     /// Solves them all.
     fn solve(&mut self);
 
-    /// What came of them, `None` where the solver gave up; without vectors for all but the least eigenvalue where
-    /// it gives no others.
+    /// What came of them, `None` where the solver gave up; without vectors for all but the least eigenvalue
+    /// where it gives no others.
     fn answers(&self) -> Vec<Option<Answer>>;
 }
 

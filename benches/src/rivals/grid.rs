@@ -1,4 +1,5 @@
-//! A plain grid of points: what one writes for spheres of one radius. Cells have that radius, so 27 are looked at.
+//! A plain grid of points: what one writes for spheres of one radius. Cells have that radius, so 27 are
+//! looked at.
 
 /// Points by cell, and where each cell's begin.
 #[derive(Debug, Clone)]

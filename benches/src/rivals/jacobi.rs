@@ -1,5 +1,6 @@
-//! Eigenpairs of a symmetric 3×3 matrix by cyclic Jacobi rotations (Golub & Van Loan, "Matrix Computations", 4th
-//! ed. 2013, §8.5): converges for every symmetric matrix, and its eigenvectors are orthogonal to rounding.
+//! Eigenpairs of a symmetric 3×3 matrix by cyclic Jacobi rotations (Golub & Van Loan, "Matrix Computations",
+//! 4th ed. 2013, §8.5): converges for every symmetric matrix, and its eigenvectors are orthogonal to
+//! rounding.
 
 use nearmiss::surface::Eigen3;
 

@@ -1,5 +1,5 @@
-//! A scan of all points through kiddo's kd-tree: two copies meet if a point of one lies within r of a point of
-//! the other. What a user without a mesh writes in ten lines.
+//! A scan of all points through kiddo's kd-tree: two copies meet if a point of one lies within r of a point
+//! of the other. What a user without a mesh writes in ten lines.
 //!
 //! Points outside the grown bounding box of the other copy are passed over, and the first point that is near
 //! enough ends the scan.

@@ -35,11 +35,13 @@ pub struct CollideArgs {
     /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b", "image"])]
     pub poses: Option<PathBuf>,
-    /// Stop after the first hit of --poses: the last line is the hit, if there is one, and all before it are none
+    /// Stop after the first hit of --poses: the last line is the hit, if there is one, and all before it are
+    /// none
     #[arg(long, requires = "poses")]
     pub first: bool,
-    /// Which distances define the surfaces, as scans are prepared for and raw inputs will be; by default as prepared, else straight
-    /// ones. By the geodesic kernel surfaces alone are compared, and separations are estimated
+    /// Which distances define the surfaces, as scans are prepared for and raw inputs will be; by default as
+    /// prepared, else straight ones. By the geodesic kernel surfaces alone are compared, and separations are
+    /// estimated
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans
@@ -48,24 +50,27 @@ pub struct CollideArgs {
     /// Count as meeting what comes nearer than this, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub margin: f64,
-    /// How sure a separation should be: certified is tried for, and proven distances told, for half as much time
-    /// again, near contact two to three times as much; by default certified, where the kernel is geodesic estimated, as nothing
-    /// is proven of that
+    /// How sure a separation should be: certified is tried for, and proven distances told, for half as much
+    /// time again, near contact two to three times as much; by default certified, where the kernel is
+    /// geodesic estimated, as nothing is proven of that
     #[arg(long, value_enum)]
     pub evidence: Option<EvidenceName>,
     /// Write what certified answers rest on, a line of JSON a query, for an independent check
     #[arg(long, value_name = "FILE", conflicts_with = "thickened")]
     pub prove: Option<PathBuf>,
-    /// Time for each query from its start, whatever other threads do, often 50us to 1ms: a number with ns, us, ms or s
+    /// Time for each query from its start, whatever other threads do, often 50us to 1ms: a number with ns,
+    /// us, ms or s
     #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
-    /// Work units for each query, evaluations of f and node pairs, often 500 to 10000; reproducible, unlike time
+    /// Work units for each query, evaluations of f and node pairs, often 500 to 10000; reproducible, unlike
+    /// time
     #[arg(long, value_name = "N")]
     pub work: Option<u64>,
     /// How much to find out about a contact
     #[arg(long, value_enum, default_value_t = DetailName::Witness)]
     pub detail: DetailName,
-    /// All contacts, one for each pair of leaves that meets or, without hierarchy, each bracket: to first order, beside the answer
+    /// All contacts, one for each pair of leaves that meets or, without hierarchy, each bracket: to first
+    /// order, beside the answer
     #[arg(long, conflicts_with = "prove")]
     pub all: bool,
     /// How to search
@@ -92,7 +97,8 @@ pub enum DetailName {
     Verdict,
     /// A point on both surfaces, verified where that can be had
     Witness,
-    /// A contact, and several places of it, well spread, each with the way out and the gap along it, for a solver
+    /// A contact, and several places of it, well spread, each with the way out and the gap along it, for a
+    /// solver
     Manifold,
 }
 

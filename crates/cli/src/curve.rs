@@ -32,8 +32,8 @@ pub struct CurveArgs {
     /// Which distances define the surfaces; by default as prepared, else straight ones
     #[arg(long, value_enum)]
     pub kernel: Option<KernelName>,
-    /// Wanted distance of points along a curve, in world units; nearer where it turns. By default twice the lesser sampling
-    /// radius
+    /// Wanted distance of points along a curve, in world units; nearer where it turns. By default twice the
+    /// lesser sampling radius
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
     pub spacing: Option<f64>,
     /// How far points may be off either surface, in world units. By default a thousandth of that radius
@@ -48,7 +48,8 @@ pub struct CurveArgs {
     /// Threads to prepare raw inputs, 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
-    /// Where to write the curves, as PLY: points, each with the number of its curve, and the edges that join them
+    /// Where to write the curves, as PLY: points, each with the number of its curve, and the edges that join
+    /// them
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
     /// Picture, as PNG, of both scans and their curves

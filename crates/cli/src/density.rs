@@ -1,7 +1,8 @@
 //! `density`: how many points `--method interpolation --flat` has to draw for a wanted error rate.
 //!
-//! Measured as in S1 §5.1: the scan against a copy of itself over the sweep of `poses`, once for each density; an error is a hit of the traversal that is not found, or the other way round. Derived from Lemma 1: that each
-//! surfel gets a point, by inclusion and exclusion.
+//! Measured as in S1 §5.1: the scan against a copy of itself over the sweep of `poses`, once for each
+//! density; an error is a hit of the traversal that is not found, or the other way round. Derived from Lemma
+//! 1: that each surfel gets a point, by inclusion and exclusion.
 
 use std::path::PathBuf;
 
@@ -38,7 +39,8 @@ pub struct DensityArgs {
     /// Measure brackets alone, as Klein & Zachmann 2005 do: without the approaches that find what they miss
     #[arg(long, conflicts_with = "store")]
     pub brackets_alone: bool,
-    /// Keep what was measured in the file, if it suffices: `collide --method interpolation --flat` draws as many points from it by default
+    /// Keep what was measured in the file, if it suffices: `collide --method interpolation --flat` draws as
+    /// many points from it by default
     #[arg(long)]
     pub store: bool,
     /// Seed of all that is random
@@ -180,7 +182,8 @@ impl Tests<'_> {
             coarse = fine.surfels;
             fine = error(2 * fine.surfels)?;
         }
-        // Errors do not fall evenly; what is found is one of the densities that suffice, and the last tried below does not.
+        // Errors do not fall evenly; what is found is one of the densities that suffice, and the last tried
+        // below does not.
         while fine.error <= args.error && fine.surfels - coarse > 1 + fine.surfels / 16 {
             let middle = error(coarse + (fine.surfels - coarse) / 2)?;
             if middle.error <= args.error {

@@ -33,21 +33,23 @@ pub struct DistanceArgs {
     /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b"])]
     pub poses: Option<PathBuf>,
-    /// Which distances define the surfaces; by default as prepared, else straight ones. By the geodesic kernel no lower bound is
-    /// proven
+    /// Which distances define the surfaces; by default as prepared, else straight ones. By the geodesic
+    /// kernel no lower bound is proven
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Obstacles only: the search stops when the lower bound is this share of the upper one below it, 0 to less
-    /// than 1. Within about the local spacing of contact the bounds may stay further apart
+    /// Obstacles only: the search stops when the lower bound is this share of the upper one below it, 0 to
+    /// less than 1. Within about the local spacing of contact the bounds may stay further apart
     #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative)]
     pub relative: f64,
-    /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s. The bounds are then further apart
+    /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s. The bounds are then further
+    /// apart
     #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
     pub budget: Option<Duration>,
-    /// Work units for each query, evaluations of f and node pairs, often 1000 to 20000; reproducible, unlike time
+    /// Work units for each query, evaluations of f and node pairs, often 1000 to 20000; reproducible, unlike
+    /// time
     #[arg(long, value_name = "N")]
     pub work: Option<u64>,
     /// Threads to prepare raw inputs, 0 for all cores

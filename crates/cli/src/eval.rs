@@ -21,8 +21,8 @@ pub struct EvalArgs {
     /// Where to evaluate: a point a line, x y z, in the frame of the scan's input
     #[arg(long, value_name = "FILE")]
     pub points: PathBuf,
-    /// How far points are from where f is asked for: straight, or along the surface by the graph; by default as the scan was
-    /// prepared
+    /// How far points are from where f is asked for: straight, or along the surface by the graph; by default
+    /// as the scan was prepared
     #[arg(long, value_enum)]
     pub kernel: Option<KernelName>,
     /// One object of JSON a line instead of sentences

@@ -28,7 +28,8 @@ pub struct ExportArgs {
     /// stray, red; 5 sparse, pink
     #[arg(long, value_name = "P.ply")]
     pub points: Option<PathBuf>,
-    /// Samples of the nodes at one depth (--level), of each its node, the node's covering radius and sampling radius
+    /// Samples of the nodes at one depth (--level), of each its node, the node's covering radius and sampling
+    /// radius
     #[arg(long, value_name = "S.ply", requires = "level")]
     pub samples: Option<PathBuf>,
     /// Boxes of the hierarchy's nodes, as lines
@@ -37,8 +38,8 @@ pub struct ExportArgs {
     /// Sampling radius and bandwidth of each point: i,r,h
     #[arg(long, value_name = "R.csv")]
     pub radii: Option<PathBuf>,
-    /// Edges of the graph: i,j,length,virtual with i < j, indices into the exported points; virtual is 1 for those too long for
-    /// the surface
+    /// Edges of the graph: i,j,length,virtual with i < j, indices into the exported points; virtual is 1 for
+    /// those too long for the surface
     #[arg(long, value_name = "E.csv")]
     pub edges: Option<PathBuf>,
     /// Points that are heard at each point i: i,j,distance along the graph, nearest first

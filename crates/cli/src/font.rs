@@ -9,8 +9,8 @@ pub(crate) const HEIGHT: usize = 7;
 /// Rows of a glyph from the top, the leftmost pixel in the highest of five bits.
 type Glyph = [u8; HEIGHT];
 
-/// Whether the pixel in column `x` and row `y` of a letter is set. Small letters look like capitals; what has no
-/// glyph is blank.
+/// Whether the pixel in column `x` and row `y` of a letter is set. Small letters look like capitals; what has
+/// no glyph is blank.
 pub(crate) fn is_set(letter: char, x: usize, y: usize) -> bool {
     x < 5 && y < HEIGHT && glyph(letter.to_ascii_uppercase())[y] >> (4 - x) & 1 == 1
 }

@@ -33,8 +33,9 @@ const CLOSE: f64 = 14.0;
 /// The discs behind the edges of the close view.
 const PALE: f64 = 0.45;
 
-/// `scan` coloured by the distance of its points from point `from` along its graph, in rings, with the shortest path to
-/// the furthest; and its edges about that point, virtual ones red. `None` without a graph, or such a point.
+/// `scan` coloured by the distance of its points from point `from` along its graph, in rings, with the
+/// shortest path to the furthest; and its edges about that point, virtual ones red. `None` without a graph,
+/// or such a point.
 #[must_use]
 pub fn geodesic_picture(scan: &Scan, from: usize) -> Option<Picture> {
     let graph = scan.graph().filter(|_| from < scan.len())?;

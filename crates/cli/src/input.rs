@@ -14,7 +14,8 @@ use crate::error::CliError;
 /// First bytes of a prepared scan, also of one whose line ends were translated on the way.
 const MAGIC: &[u8] = b"\x8Enmiss";
 
-/// A mesh whose faces cover more than this share of its surface with longer edges than [`LONG`] is warned about.
+/// A mesh whose faces cover more than this share of its surface with longer edges than [`LONG`] is warned
+/// about.
 const LONG_SHARE: f64 = 0.05;
 
 /// In sampling radii.
@@ -76,7 +77,8 @@ fn open_for(kernel: Option<Metric>, path: &Path, threads: usize, console: Consol
     }
 }
 
-/// Opens two scans for this kernel, or for one and the same: that of the first that is prepared. The same file twice is one scan.
+/// Opens two scans for this kernel, or for one and the same: that of the first that is prepared. The same
+/// file twice is one scan.
 pub(crate) fn open_both(
     kernel: Option<Metric>,
     [a, b]: [&Path; 2],

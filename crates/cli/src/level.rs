@@ -30,8 +30,8 @@ const OPACITY: f64 = 0.55;
 const DOT: f64 = 9.0;
 const MANY: usize = 1000;
 
-/// `scan` once for each of `depths`, the root's being 0, under the balls that cover the nodes there, and leaves above it:
-/// each node has a colour, its samples are the dots, all its balls have its covering radius.
+/// `scan` once for each of `depths`, the root's being 0, under the balls that cover the nodes there, and
+/// leaves above it: each node has a colour, its samples are the dots, all its balls have its covering radius.
 #[must_use]
 pub fn level_picture(scan: &Scan, depths: &[u32]) -> Picture {
     let width = depths.len() * (PANEL + GAP) + GAP;

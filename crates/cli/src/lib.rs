@@ -141,7 +141,8 @@ pub enum Command {
     /// Which spheres, capsules and boxes touch the points of a scan, and which point is nearest
     #[command(after_long_help = TOUCH_EXAMPLE)]
     Touch(TouchArgs),
-    /// How many points to draw for an error rate, with `collide --method interpolation --flat`: measured, and derived
+    /// How many points to draw for an error rate, with `collide --method interpolation --flat`: measured, and
+    /// derived
     #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
     Density(DensityArgs),
     /// Make poses to ask `collide` about: a sweep, or poses about first contact
@@ -182,7 +183,8 @@ impl Command {
     }
 }
 
-/// Runs a command line, the program's own name first, as in [`std::env::args_os`]: help and errors call it so.
+/// Runs a command line, the program's own name first, as in [`std::env::args_os`]: help and errors call it
+/// so.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let mut args = args.into_iter();
     let program = args.next().unwrap_or_default();
@@ -200,7 +202,8 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli.command.run(),
         Err(mut refused) => {
             suggest_output(&mut refused);
-            // Help and version go to standard output, errors to standard error; a closed pipe is nobody's concern.
+            // Help and version go to standard output, errors to standard error; a closed pipe is nobody's
+            // concern.
             let _ = refused.print();
             ExitCode::from(u8::try_from(refused.exit_code()).unwrap_or(2))
         }

@@ -53,7 +53,8 @@ pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
     matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Replaces the file at `path` by what `write` writes, or leaves everything as it was; hands on what `write` tells.
+/// Replaces the file at `path` by what `write` writes, or leaves everything as it was; hands on what `write`
+/// tells.
 pub(crate) fn replace<T>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<T, CliError>,

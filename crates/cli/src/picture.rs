@@ -87,8 +87,8 @@ impl Picture {
     }
 }
 
-/// Both scans as they lie in the world; where they meet, beside that, a close view along the line in which the
-/// surfaces cut each other, the near half taken away, with the witness and both normals.
+/// Both scans as they lie in the world; where they meet, beside that, a close view along the line in which
+/// the surfaces cut each other, the near half taken away, with the witness and both normals.
 #[must_use]
 pub fn contact_picture(a: &ScanView<'_>, b: &ScanView<'_>, answer: &Answer) -> Picture {
     paint([a, b], answer, &Style { names: ["A", "B"].map(Into::into), points: false })
@@ -289,8 +289,8 @@ pub(crate) fn sample(views: [&ScanView<'_>; 2]) -> Vec<Vector3<f64>> {
     views.into_iter().flat_map(points).collect()
 }
 
-/// A view of everything: what matters unhidden, as `hides` says of points and a direction towards the viewer, else the scans beside
-/// each other; the longest extent lies across.
+/// A view of everything: what matters unhidden, as `hides` says of points and a direction towards the viewer,
+/// else the scans beside each other; the longest extent lies across.
 pub(crate) fn whole_camera(
     views: [&ScanView<'_>; 2],
     area: Area,

@@ -1,7 +1,7 @@
 //! `poses`: a sweep over distances, or poses about first contact.
 //!
-//! Both scans are scaled so that the longest side of their bounding box is 2, and centred. a stays, b is turned at
-//! random and lies at a distance d from a in a random direction.
+//! Both scans are scaled so that the longest side of their bounding box is 2, and centred. a stays, b is
+//! turned at random and lies at a distance d from a in a random direction.
 
 use std::f64::consts::TAU;
 use std::io::Write;
@@ -30,11 +30,12 @@ pub struct PosesArgs {
     pub a: PathBuf,
     /// The scan that is turned and moved
     pub b: PathBuf,
-    /// Distances d of the centres from 0 to 3 in steps of 0.25, both scans being scaled to a longest side of 2, with random rotations and directions at each
+    /// Distances d of the centres from 0 to 3 in steps of 0.25, both scans being scaled to a longest side of
+    /// 2, with random rotations and directions at each
     #[arg(long)]
     pub sweep: bool,
-    /// Shifts by up to 10 r from first touch, half of them apart. They touch at a least point distance of r/2; r is
-    /// the greater sampling radius. Found by bisection on that distance
+    /// Shifts by up to 10 r from first touch, half of them apart. They touch at a least point distance of
+    /// r/2; r is the greater sampling radius. Found by bisection on that distance
     #[arg(long)]
     pub near: bool,
     /// Number of poses at each distance (--sweep) or in all (--near), at least 1
@@ -117,7 +118,8 @@ fn distance(i: u64, per_distance: u32) -> f64 {
     (i / u64::from(per_distance)) as f64 * STEP
 }
 
-/// Scale and shift that make the longest side of the bounds 2, and centre them; none for bounds without extent.
+/// Scale and shift that make the longest side of the bounds 2, and centre them; none for bounds without
+/// extent.
 pub(crate) fn normalised(scan: &Scan) -> Option<Pose> {
     let bounds = scan.bounds();
     let scale = 1.0 / bounds.half_extents().into_iter().fold(0.0, f64::max);
@@ -139,7 +141,8 @@ fn rng(seed: u64, i: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(key ^ i.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
-/// A uniform rotation (Shoemake, "Uniform random rotations", Graphics Gems III, 1992) and a uniform direction.
+/// A uniform rotation (Shoemake, "Uniform random rotations", Graphics Gems III, 1992) and a uniform
+/// direction.
 fn placement(rng: &mut Xoshiro256PlusPlus) -> (Pose, [f64; 3]) {
     let share: f64 = rng.random();
     let [s, t, phi] = [0; 3].map(|_| rng.random::<f64>() * TAU);

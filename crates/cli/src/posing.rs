@@ -117,7 +117,8 @@ fn parse(text: &str) -> Result<Matrix, String> {
     if count == 16 { Ok(matrix) } else { Err(format!("{count} numbers where 16 belong")) }
 }
 
-/// The pose nearest to `matrix`, unless that moves the scan's bounds by more than a tenth of its sampling radius.
+/// The pose nearest to `matrix`, unless that moves the scan's bounds by more than a tenth of its sampling
+/// radius.
 pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseRefused> {
     let row = |i: usize| [matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]];
     let [x, y, z] = [row(0), row(1), row(2)];
@@ -175,7 +176,8 @@ struct PoseLine {
     b: Vec<f64>,
 }
 
-/// A file with a query's two poses on each line. Lines are read in order; what they say can be read by many threads.
+/// A file with a query's two poses on each line. Lines are read in order; what they say can be read by many
+/// threads.
 #[derive(Debug)]
 pub(crate) struct PoseFile {
     lines: TextLines,

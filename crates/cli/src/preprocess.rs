@@ -21,7 +21,8 @@ use crate::report::ScanReport;
 /// Options of `preprocess`.
 #[derive(Debug, Clone, Args)]
 pub struct PreprocessArgs {
-    /// Point cloud (PLY, PCD, XYZ or CSV text) or mesh (OBJ, PLY with faces), of which the vertices are the points
+    /// Point cloud (PLY, PCD, XYZ or CSV text) or mesh (OBJ, PLY with faces), of which the vertices are the
+    /// points
     pub input: PathBuf,
     /// Prepared scan to write, usually named `.nm`; replaced in one step if it is there
     #[arg(short, long, value_name = "OUT.nm")]
@@ -49,7 +50,8 @@ pub struct PreprocessArgs {
     /// Points in a leaf of the hierarchy, 4 to 64
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(4..=64))]
     pub leaf: u32,
-    /// R: two points are neighbours if the spheres about them that reach their R-th nearest points meet; 1 to 32
+    /// R: two points are neighbours if the spheres about them that reach their R-th nearest points meet; 1 to
+    /// 32
     #[arg(long, value_name = "R", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=32))]
     pub neighbours: u32,
     /// No graph: normals keep either sign, and nothing is known of distances along the surface
@@ -61,8 +63,9 @@ pub struct PreprocessArgs {
     /// Whether shortest paths are stored, a byte a pair, or rebuilt when wanted
     #[arg(long, value_enum, default_value_t = PathsName::Rebuilt)]
     pub paths: PathsName,
-    /// Which distances define the surface: straight ones, or those along the graph, which keep sheets apart that are close to each
-    /// other; the latter takes some tenths longer, and nothing but witnesses is certified of it
+    /// Which distances define the surface: straight ones, or those along the graph, which keep sheets apart
+    /// that are close to each other; the latter takes some tenths longer, and nothing but witnesses is
+    /// certified of it
     #[arg(long, value_enum, default_value_t = KernelName::Euclidean)]
     pub kernel: KernelName,
     /// Where the scanner stood, in the frame of the input: normals are turned towards it

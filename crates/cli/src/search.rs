@@ -12,7 +12,8 @@ pub struct SearchArgs {
     /// How leaves are compared. `sampling` and `interpolation` compare surfaces alone, as with --surface-only
     #[arg(long, value_enum, default_value_t = MethodName::Traversal)]
     pub method: MethodName,
-    /// Leave the hierarchy out, with `--method sampling` or `interpolation`: points about, or of, all of a in the box of b
+    /// Leave the hierarchy out, with `--method sampling` or `interpolation`: points about, or of, all of a in
+    /// the box of b
     #[arg(long)]
     pub flat: bool,
     /// Test points for each pair of leaves, with `--method sampling`
@@ -21,8 +22,9 @@ pub struct SearchArgs {
     /// What |f_A| + |f_B| of a test point must be less than, in sampling radii, with `--method sampling`
     #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance)]
     pub tolerance: f64,
-    /// Into how many surfels the surface of a is thought to be cut where b may be, with `--method interpolation --flat`: a number, or
-    /// `adapted` to the sampling density, 8 sampling radii wide; by default what `density` stored with a, or 30
+    /// Into how many surfels the surface of a is thought to be cut where b may be, with `--method
+    /// interpolation --flat`: a number, or `adapted` to the sampling density, 8 sampling radii wide; by
+    /// default what `density` stored with a, or 30
     #[arg(long, value_name = "A", value_parser = parse_surfels)]
     pub surfels: Option<Surfels>,
     /// The probability that each surfel gets a point, with `--method interpolation --flat`
@@ -55,7 +57,8 @@ pub enum MethodName {
     Traversal,
     /// By random test points (Klein & Zachmann 2004, section 5.3): slower, and not exhaustive
     Sampling,
-    /// By searches along paths of the proximity graph of a (Klein & Zachmann 2005): without hierarchy not exhaustive
+    /// By searches along paths of the proximity graph of a (Klein & Zachmann 2005): without hierarchy not
+    /// exhaustive
     Interpolation,
 }
 

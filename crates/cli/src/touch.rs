@@ -18,8 +18,9 @@ use crate::preprocess::parse_threads;
 pub struct TouchArgs {
     /// The scan: prepared, or a raw input, prepared on the fly
     pub scan: PathBuf,
-    /// A shape a line, in world units: `{"sphere":{"centre":[x,y,z],"radius":r}}`, `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}` or
-    /// `{"box":{"pose":[16 numbers],"half":[x,y,z]}}`; an answer a line, in order
+    /// A shape a line, in world units: `{"sphere":{"centre":[x,y,z],"radius":r}}`,
+    /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}` or `{"box":{"pose":[16 numbers],"half":[x,y,z]}}`;
+    /// an answer a line, in order
     #[arg(long, value_name = "FILE.jsonl")]
     pub shapes: PathBuf,
     /// Pose of the scan, object to world: 16 numbers, row-major, in one argument, or a file that holds them
@@ -147,7 +148,8 @@ impl ShapeFile {
         Ok(line)
     }
 
-    /// The shape on a line of this number and text; the pose of a box may be off a rotation by a tenth of `r`.
+    /// The shape on a line of this number and text; the pose of a box may be off a rotation by a tenth of
+    /// `r`.
     fn shape(&self, number: u64, text: &str, r: f64) -> Result<Shape, CliError> {
         let line: ShapeLine = serde_json::from_str(text).map_err(|e| {
             let message = e.to_string();

@@ -17,7 +17,8 @@ impl Default for Frame {
     }
 }
 
-/// Beyond 2^±30 squares of single-precision lengths would leave their range together with what is computed from them.
+/// Beyond 2^±30 squares of single-precision lengths would leave their range together with what is computed
+/// from them.
 const MAX_EXPONENT: i32 = 30;
 
 impl Frame {

@@ -232,7 +232,8 @@ impl Pose {
 /// The orthogonal factor of the polar decomposition, by Newton's iteration R ← (R + R⁻ᵀ)/2, which converges
 /// quadratically for any regular matrix. `None` when an iterate cannot be inverted.
 fn nearest_rotation(m: Matrix3<f64>) -> Option<Matrix3<f64>> {
-    /// From a condition number of 1e6 the iteration halves the gap to 1 some twenty times before it converges.
+    /// From a condition number of 1e6 the iteration halves the gap to 1 some twenty times before it
+    /// converges.
     const STEPS: usize = 40;
     let mut r = m;
     for _ in 0..STEPS {

@@ -29,7 +29,8 @@ impl Lists {
 }
 
 impl Adjacency {
-    /// The graph of `count` points with these edges, in any order, each once and never from a point to itself.
+    /// The graph of `count` points with these edges, in any order, each once and never from a point to
+    /// itself.
     ///
     /// # Panics
     /// When an edge leads to a point that is not there, or there are 2³¹ edges.
@@ -49,7 +50,8 @@ impl Adjacency {
         Self { starts: starts.into(), neighbours: neighbours.into() }
     }
 
-    /// The graph whose lists of neighbours these are, one part after the other; each edge stands in both lists.
+    /// The graph whose lists of neighbours these are, one part after the other; each edge stands in both
+    /// lists.
     pub(crate) fn from_lists(parts: Vec<Lists>) -> Result<Self, GraphError> {
         let ends = parts.iter().map(|part| part.neighbours.len()).sum();
         if u32::try_from(ends).is_err() {

@@ -1,18 +1,19 @@
 //! Points at the border of a surface: their neighbours lie to one side.
 //!
-//! The mean of what is two edges away or less, each place counted as often as walks lead there, lies off the point, along the
-//! surface, by a share of those places' standard deviation. Inside a surface that share is sampling noise, at a
-//! straight border it is about a half (docs/theory/graph.md). The part of it along the normal, the least principal direction of these places,
-//! is curvature's and not counted. "Approximating Bounded, Non-orientable Surfaces from Points" (Adamson & Alexa 2004) tell
-//! borders by the weighted mean too, for places off the points.
+//! The mean of what is two edges away or less, each place counted as often as walks lead there, lies off the
+//! point, along the surface, by a share of those places' standard deviation. Inside a surface that share is
+//! sampling noise, at a straight border it is about a half (docs/theory/graph.md). The part of it along the
+//! normal, the least principal direction of these places, is curvature's and not counted. "Approximating
+//! Bounded, Non-orientable Surfaces from Points" (Adamson & Alexa 2004) tell borders by the weighted mean
+//! too, for places off the points.
 
 use nearmiss_surface::symmetric_eigen;
 
 use crate::adjacency::Adjacency;
 use crate::parallel::{map, ranges};
 
-/// From which share on a point is at the border. The outermost of points half a spacing and more apart show 0.41 to 0.77 at a
-/// straight border, those of closed shapes at most 0.33.
+/// From which share on a point is at the border. The outermost of points half a spacing and more apart show
+/// 0.41 to 0.77 at a straight border, those of closed shapes at most 0.33.
 const SHARE: f64 = 0.4;
 
 /// Fewer neighbours surround nothing.

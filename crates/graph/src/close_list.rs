@@ -1,9 +1,9 @@
 //! Lists of close pairs as they are stored: four bytes a pair.
 //!
-//! Points stand in the order of the hierarchy's leaves, so most that are heard at a point have indices near its own: two
-//! bytes hold the difference. Two more hold the distance, rounded to 14 bits (13 of them stored) of which eight binades
-//! from one that the list chooses can be told: a relative error of 2⁻¹⁴ = 6.1e-5 at most. The few pairs that do not
-//! fit stand whole beside.
+//! Points stand in the order of the hierarchy's leaves, so most that are heard at a point have indices near
+//! its own: two bytes hold the difference. Two more hold the distance, rounded to 14 bits (13 of them stored)
+//! of which eight binades from one that the list chooses can be told: a relative error of 2⁻¹⁴ = 6.1e-5 at
+//! most. The few pairs that do not fit stand whole beside.
 
 use std::ops::Range;
 use std::slice::Iter;
@@ -81,8 +81,8 @@ pub(crate) fn floor(list: &[Close]) -> u8 {
     u8::try_from(best.1).unwrap_or(u8::MAX)
 }
 
-/// What is stored of `close` in the list of point `own`: the difference of indices and the code of the distance; where these
-/// do not fit, that it stands beside.
+/// What is stored of `close` in the list of point `own`: the difference of indices and the code of the
+/// distance; where these do not fit, that it stands beside.
 #[inline]
 pub(crate) fn pack(own: u32, floor: u8, close: Close) -> (i16, u16) {
     // Modulo 2³², as they are added again.

@@ -1,13 +1,15 @@
-//! The close-pairs shortest-paths map: for every point the points that are heard there, and how far they are along
-//! the graph.
+//! The close-pairs shortest-paths map: for every point the points that are heard there, and how far they are
+//! along the graph.
 //!
-//! Klein & Zachmann 2005 (§3.2): shortest paths from each point, only as far as its influence reaches. How far that
-//! is differs from point to point here, so a search goes out from the one that is heard, to its own horizon, and what it
-//! finds is entered with those that hear it. O(N) in time and space where each point hears a bounded number.
+//! Klein & Zachmann 2005 (§3.2): shortest paths from each point, only as far as its influence reaches. How
+//! far that is differs from point to point here, so a search goes out from the one that is heard, to its own
+//! horizon, and what it finds is entered with those that hear it. O(N) in time and space where each point
+//! hears a bounded number.
 //!
-//! Paths need not be stored: every point on the way from i to j hears j too, and says how far it still is. Distances are
-//! rounded, though, so neither do they grow along each edge, nor is the neighbour over which the way looks shortest always on a
-//! shortest one. Where the way that they show may be longer than promised, a search looks at all that might be shorter.
+//! Paths need not be stored: every point on the way from i to j hears j too, and says how far it still is.
+//! Distances are rounded, though, so neither do they grow along each edge, nor is the neighbour over which
+//! the way looks shortest always on a shortest one. Where the way that they show may be longer than promised,
+//! a search looks at all that might be shorter.
 
 use nearmiss_store::Array;
 use serde::{Deserialize, Serialize};
@@ -36,7 +38,8 @@ const ROUNDING: f32 = 1.0 / 16384.0;
 /// A way that is no longer than the rounded distance by more is longer than the shortest by 1e-4 at most.
 const SURE: f32 = 1e-4 - ROUNDING;
 
-/// And a shortest one seems no longer by more, from any of its points: once for the whole, once for what is left, once for sums.
+/// And a shortest one seems no longer by more, from any of its points: once for the whole, once for what is
+/// left, once for sums.
 const DOUBT: f32 = 3.0 * ROUNDING;
 
 /// What is kept of paths.
@@ -56,7 +59,8 @@ pub struct ClosePairs {
     pub(crate) starts: Array<u32>,
     /// The exponent of the least distance that fits the list of each point.
     pub(crate) floors: Array<u8>,
-    /// All lists, each by exact distance, then index: by how much the index is more than that of the list's point.
+    /// All lists, each by exact distance, then index: by how much the index is more than that of the list's
+    /// point.
     pub(crate) offsets: Array<i16>,
     /// Beside each offset the distance.
     pub(crate) codes: Array<u16>,
@@ -73,8 +77,8 @@ fn rank(close: &Close) -> u64 {
 }
 
 impl ClosePairs {
-    /// The pairs of points (i, j) with a way from j to i no longer than the horizon of j, on all cores; the result does
-    /// not depend on how many there are.
+    /// The pairs of points (i, j) with a way from j to i no longer than the horizon of j, on all cores; the
+    /// result does not depend on how many there are.
     ///
     /// # Panics
     /// When there is not a horizon for each point, or there are 2³² pairs.
@@ -165,8 +169,8 @@ impl ClosePairs {
         lists + 4 * self.pair_count() + size_of_val(&*self.beside) + self.onward.len()
     }
 
-    /// The points heard at `i`, itself first, by distance; of equal ones those that were nearer before rounding, then
-    /// those of lesser index first.
+    /// The points heard at `i`, itself first, by distance; of equal ones those that were nearer before
+    /// rounding, then those of lesser index first.
     ///
     /// # Panics
     /// When there is no such point.
@@ -184,14 +188,14 @@ impl ClosePairs {
         Some(self.view().find(i, j)?.1)
     }
 
-    /// The length of a path from `i` to `j`, if `j` is heard at `i`, longer than the shortest by 1e-4 of it at most; `path`
-    /// holds its points afterwards, both included, or none. Given the graph with the lengths that the map was built from. No
-    /// allocation once warm.
+    /// The length of a path from `i` to `j`, if `j` is heard at `i`, longer than the shortest by 1e-4 of it
+    /// at most; `path` holds its points afterwards, both included, or none. Given the graph with the lengths
+    /// that the map was built from. No allocation once warm.
     ///
-    /// Klein & Zachmann 2005 (Algorithm 2) go to the neighbour nearest to the target, keeping a queue of all that are nearer
-    /// than those they leave; what they find need not be shortest. We go where the edge and the distance left are
-    /// shortest together. Should the sum of the edges be too long then, which is one time in twenty or fewer, a search finds a
-    /// shortest path.
+    /// Klein & Zachmann 2005 (Algorithm 2) go to the neighbour nearest to the target, keeping a queue of all
+    /// that are nearer than those they leave; what they find need not be shortest. We go where the edge and
+    /// the distance left are shortest together. Should the sum of the edges be too long then, which is one
+    /// time in twenty or fewer, a search finds a shortest path.
     ///
     /// # Panics
     /// When there is no point `i`.
@@ -241,8 +245,8 @@ impl ClosePairs {
         Some(length)
     }
 
-    /// Goes from neighbour to neighbour where the whole way looks shortest, each nearer to `j` than the one before, if that
-    /// is possible and short enough for the distance that is stored.
+    /// Goes from neighbour to neighbour where the whole way looks shortest, each nearer to `j` than the one
+    /// before, if that is possible and short enough for the distance that is stored.
     fn walked_path(
         &self,
         network: Network<'_>,
@@ -281,8 +285,8 @@ impl ClosePairs {
     }
 }
 
-/// Where paths go on, beside each pair of lists of exact distances: there is a neighbour that the search reached before,
-/// whose distance plus the edge is that of the pair, to the last bit; of several the first.
+/// Where paths go on, beside each pair of lists of exact distances: there is a neighbour that the search
+/// reached before, whose distance plus the edge is that of the pair, to the last bit; of several the first.
 fn ranks_onward(network: Network<'_>, starts: &[u32], pairs: &[Close]) -> Vec<u8> {
     let count = network.len();
     let list_of = |i: usize| &pairs[starts[i] as usize..starts[i + 1] as usize];
@@ -357,9 +361,9 @@ fn pack_lists(starts: &[u32], pairs: &[Close]) -> ClosePairs {
 }
 
 /// Searches that reach the same points at the same distances as
-/// [`GeodesicScratch::within`](crate::GeodesicScratch::within), in any order. A shortest distance is the least over all
-/// ways, in whichever order they are tried; so nothing has to be kept sorted but roughly, and a point whose way is
-/// improved after it was left is left once more.
+/// [`GeodesicScratch::within`](crate::GeodesicScratch::within), in any order. A shortest distance is the
+/// least over all ways, in whichever order they are tried; so nothing has to be kept sorted but roughly, and
+/// a point whose way is improved after it was left is left once more.
 struct Spread {
     /// The least distance known; infinite between searches.
     least: Vec<f32>,

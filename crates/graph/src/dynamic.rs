@@ -1,12 +1,14 @@
 //! The r-SIG of points that come, go and move, one at a time.
 //!
-//! A point's sphere of influence changes when its r-th nearest does: when a point comes nearer than that or one as near
-//! goes. So those are asked for whose spheres contain the place; their radii are found anew, then their edges and the new
-//! point's. After every update the graph is what a build of all points would give, bit for bit.
+//! A point's sphere of influence changes when its r-th nearest does: when a point comes nearer than that or
+//! one as near goes. So those are asked for whose spheres contain the place; their radii are found anew, then
+//! their edges and the new point's. After every update the graph is what a build of all points would give,
+//! bit for bit.
 //!
-//! S1 §6 states O(log³ N) a step. Here an update touches a number of points that does not grow with N where density is bounded
-//! (each point is among the r nearest of O(r) others, and of as many is it a neighbour), and each costs a
-//! search in an R*-tree ("The R*-tree: an efficient and robust access method for points and rectangles", Beckmann et al. 1990).
+//! S1 §6 states O(log³ N) a step. Here an update touches a number of points that does not grow with N where
+//! density is bounded (each point is among the r nearest of O(r) others, and of as many is it a neighbour),
+//! and each costs a search in an R*-tree ("The R*-tree: an efficient and robust access method for points and
+//! rectangles", Beckmann et al. 1990).
 
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -26,7 +28,8 @@ pub struct Touched {
     pub points: usize,
 }
 
-/// The r-SIG of a changing set of points, without pruning. A point keeps its id until it is removed; ids are not used again.
+/// The r-SIG of a changing set of points, without pruning. A point keeps its id until it is removed; ids are
+/// not used again.
 #[derive(Debug, Clone)]
 pub struct DynamicGraph {
     neighbours: usize,
@@ -149,7 +152,8 @@ impl DynamicGraph {
         tally(spheres, touched)
     }
 
-    /// Takes a point out with its edges. Returns those that had it among their r nearest, and all whose lists changed.
+    /// Takes a point out with its edges. Returns those that had it among their r nearest, and all whose lists
+    /// changed.
     fn take(&mut self, id: u32) -> Option<(Vec<u32>, Vec<u32>)> {
         let position = self.positions.get_mut(id as usize)?.take()?;
         let list = std::mem::take(&mut self.lists[id as usize]);
@@ -164,8 +168,8 @@ impl DynamicGraph {
         Some((orphans, list))
     }
 
-    /// Finds radii, then edges of some points anew; adds all whose lists changed to `touched`. Returns how many the
-    /// former are.
+    /// Finds radii, then edges of some points anew; adds all whose lists changed to `touched`. Returns how
+    /// many the former are.
     fn refresh(&mut self, ids: &[u32], touched: &mut Vec<u32>) -> usize {
         for &i in ids {
             let Some(position) = self.position(i) else { continue };

@@ -1,8 +1,9 @@
 //! Shortest paths from a point along the edges of a graph (Dijkstra 1959).
 //!
-//! Lengths add up in single precision, from the source outwards, each sum rounded to nearest and greater than the one
-//! before: after m edges the relative error is at most (m + 3) 6e-8. Of ways that come out equally long the one
-//! stands whose last point but one was reached first, of points equally far the one with the lesser index.
+//! Lengths add up in single precision, from the source outwards, each sum rounded to nearest and greater than
+//! the one before: after m edges the relative error is at most (m + 3) 6e-8. Of ways that come out equally
+//! long the one stands whose last point but one was reached first, of points equally far the one with the
+//! lesser index.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -29,7 +30,8 @@ struct Known {
 
 const UNKNOWN: Known = Known { distance: f32::INFINITY, before: 0 };
 
-/// Memory for searches, used again by the next. Twelve bytes a point of the largest graph, and what a search reaches.
+/// Memory for searches, used again by the next. Twelve bytes a point of the largest graph, and what a search
+/// reaches.
 #[derive(Debug, Clone, Default)]
 pub struct GeodesicScratch {
     known: Vec<Known>,
@@ -67,8 +69,8 @@ impl GeodesicScratch {
         self.found(b)
     }
 
-    /// As [`Self::distance`]; `path` holds the points of a shortest path from `a` to `b` afterwards, both included, or
-    /// none.
+    /// As [`Self::distance`]; `path` holds the points of a shortest path from `a` to `b` afterwards, both
+    /// included, or none.
     ///
     /// # Panics
     /// When there is no such point.
@@ -86,8 +88,8 @@ impl GeodesicScratch {
         self.reached.len()
     }
 
-    /// Goes out from `sources`, which begin at the distances beside them, through points that are `open` to a way of
-    /// some length there, as far as `reach` or until a point is reached that is the `goal`.
+    /// Goes out from `sources`, which begin at the distances beside them, through points that are `open` to a
+    /// way of some length there, as far as `reach` or until a point is reached that is the `goal`.
     pub(crate) fn search(
         &mut self,
         network: Network<'_>,

@@ -13,8 +13,8 @@ use crate::prune::split;
 
 /// Who is whose neighbour on the surface: the r-SIG of S1 §3.2 without its long edges.
 ///
-/// Long edges are kept as *virtual* (S1 §4.5): a search may follow them, the surface does not. Points go by their
-/// place in the order that the graph was built from; lengths are in the units of those positions.
+/// Long edges are kept as *virtual* (S1 §4.5): a search may follow them, the surface does not. Points go by
+/// their place in the order that the graph was built from; lengths are in the units of those positions.
 #[derive(Debug, Clone)]
 pub struct PointGraph {
     pub(crate) options: GraphOptions,
@@ -43,11 +43,11 @@ pub struct GraphCounts {
 }
 
 impl PointGraph {
-    /// The graph over distinct `positions`, in an order in which near ones are mostly near, as a hierarchy's is; in others
-    /// it is the same and takes longer.
+    /// The graph over distinct `positions`, in an order in which near ones are mostly near, as a hierarchy's
+    /// is; in others it is the same and takes longer.
     ///
-    /// O(n log n) in such orders, as the number of edges is O(r n); on all cores with the feature `rayon`, and the same
-    /// on any number of them.
+    /// O(n log n) in such orders, as the number of edges is O(r n); on all cores with the feature `rayon`,
+    /// and the same on any number of them.
     ///
     /// # Errors
     /// When an option is out of range, a coordinate not finite or beyond ±1e18, or there are too many edges.

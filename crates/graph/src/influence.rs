@@ -1,10 +1,11 @@
 //! The sphere-of-influence graph to the r-th neighbour (S1 §3.2).
 //!
-//! `d_i` is the distance of point i from its r-th nearest other point, or from the furthest where there are fewer; i and j
-//! are joined iff `‖p_i − p_j‖ ≤ d_i + d_j`. What is compared is √ in double precision of squared distances in single,
-//! `(x−x')² + (y−y')² + (z−z')²` rounded at each operation in this order. That is one predicate for all who ask it,
-//! symmetric, and it joins every point with its r nearest whatever the rounding. Equal distances on a grid stay equal
-//! where the differences are: at such a tie the points are joined. Distances below 1e-19 are none.
+//! `d_i` is the distance of point i from its r-th nearest other point, or from the furthest where there are
+//! fewer; i and j are joined iff `‖p_i − p_j‖ ≤ d_i + d_j`. What is compared is √ in double precision of
+//! squared distances in single, `(x−x')² + (y−y')² + (z−z')²` rounded at each operation in this order. That
+//! is one predicate for all who ask it, symmetric, and it joins every point with its r nearest whatever the
+//! rounding. Equal distances on a grid stay equal where the differences are: at such a tie the points are
+//! joined. Distances below 1e-19 are none.
 
 use nearmiss_surface::{BlockTree, Heard, Level, Nearest, PointBlock};
 
@@ -27,7 +28,8 @@ pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
     f64::from(distance_sq(a, b)).sqrt()
 }
 
-/// How far a point of this `d_i²` is heard: further than `d_i`, by more than rounding, so that no neighbour is missed.
+/// How far a point of this `d_i²` is heard: further than `d_i`, by more than rounding, so that no neighbour
+/// is missed.
 #[inline]
 pub(crate) fn horizon(radius_sq: f32) -> f32 {
     radius_sq.sqrt() * (1.0 + 1e-6) + 1e-19

@@ -1,15 +1,16 @@
 //! The geodesic kernel: f with distances along the graph instead of straight ones.
 //!
-//! Klein & Zachmann 2005, eq. 5, and off the cloud as in their "Proximity graphs for defining surfaces over point
-//! clouds" (2004): x is replaced by its foot on the edge that is nearest to it, of those at its nearest point p1, and
-//! distances from the foot are interpolated between those from the two ends. So they do not jump where another point
-//! becomes the nearest, and x stays as near as the foot however high it is above the cloud; its domain ends that
-//! (`nearmiss_surface::Status`).
+//! Klein & Zachmann 2005, eq. 5, and off the cloud as in their "Proximity graphs for defining surfaces over
+//! point clouds" (2004): x is replaced by its foot on the edge that is nearest to it, of those at its nearest
+//! point p1, and distances from the foot are interpolated between those from the two ends. So they do not
+//! jump where another point becomes the nearest, and x stays as near as the foot however high it is above the
+//! cloud; its domain ends that (`nearmiss_surface::Status`).
 //!
-//! Two things we do otherwise. The ways from the foot to both ends are not added before interpolating: with them the
-//! foot half way between two points would be a whole edge from either, and from everything else by half an edge too
-//! far. And where only one of the ends is heard by a point, the other end takes its distance from there along the edge,
-//! instead of none: or points would fall silent as soon as x left p1, those too that weigh a tenth.
+//! Two things we do otherwise. The ways from the foot to both ends are not added before interpolating: with
+//! them the foot half way between two points would be a whole edge from either, and from everything else by
+//! half an edge too far. And where only one of the ends is heard by a point, the other end takes its distance
+//! from there along the edge, instead of none: or points would fall silent as soon as x left p1, those too
+//! that weigh a tenth.
 
 use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, PointBlock, SurfacePlan};
 
@@ -78,7 +79,8 @@ impl KernelScratch {
 }
 
 impl<'a> GeodesicKernel<'a> {
-    /// Given positions, local sampling radii, a graph over them, and the map of close pairs with the horizons of `plan`.
+    /// Given positions, local sampling radii, a graph over them, and the map of close pairs with the horizons
+    /// of `plan`.
     ///
     /// # Panics
     /// When these are not of equally many points.
@@ -99,7 +101,8 @@ impl<'a> GeodesicKernel<'a> {
         &self.neighbours[self.starts[i as usize] as usize..self.starts[i as usize + 1] as usize]
     }
 
-    /// The place on the edges at `nearest` that is nearest to `x`; of several edges the one to the least index.
+    /// The place on the edges at `nearest` that is nearest to `x`; of several edges the one to the least
+    /// index.
     ///
     /// # Panics
     /// When there is no such point.
@@ -124,8 +127,8 @@ impl<'a> GeodesicKernel<'a> {
         best.1
     }
 
-    /// The points that are heard at `foot` and how far they are from there along the graph: in the order of the list
-    /// of its first end, then the others in that of its second.
+    /// The points that are heard at `foot` and how far they are from there along the graph: in the order of
+    /// the list of its first end, then the others in that of its second.
     ///
     /// # Panics
     /// When its ends are no points.
@@ -212,8 +215,8 @@ impl<'a> GeodesicKernel<'a> {
         Moments::measured(*level, self.plan, x, &*blocks).evaluate(self.plan, x)
     }
 
-    /// The local sampling radius that the graph alone suggests at `foot`: the longest edges at its ends, interpolated.
-    /// It stands for r in [`SurfacePlan::bandwidth`], the bandwidth of Klein & Zachmann 2004.
+    /// The local sampling radius that the graph alone suggests at `foot`: the longest edges at its ends,
+    /// interpolated. It stands for r in [`SurfacePlan::bandwidth`], the bandwidth of Klein & Zachmann 2004.
     ///
     /// # Panics
     /// When its ends are no points.

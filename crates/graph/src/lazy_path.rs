@@ -1,14 +1,15 @@
 //! A path between two points of which only those are known that someone looks at.
 //!
-//! A search along a path looks at few of its points, and the path of two far points has many: O(√n) of a surface of n.
-//! So that it is not rebuilt whole (S1, Algorithm 2), it is put together from edges of [levels](Levels) as coarse as may
-//! be, and only the edge about the place that is looked at is taken apart, level by level, into the edges of the finer
-//! one that it stands for. O(log n) a look, whatever the length.
+//! A search along a path looks at few of its points, and the path of two far points has many: O(√n) of a
+//! surface of n. So that it is not rebuilt whole (S1, Algorithm 2), it is put together from edges of
+//! [levels](Levels) as coarse as may be, and only the edge about the place that is looked at is taken apart,
+//! level by level, into the edges of the finer one that it stands for. O(log n) a look, whatever the length.
 
 use crate::length::distance;
 use crate::{GeodesicScratch, Levels, Network};
 
-/// A path goes straight on on the first level where the ends are no more than so many local sampling radii of the next apart.
+/// A path goes straight on on the first level where the ends are no more than so many local sampling radii of
+/// the next apart.
 const SHORT: f32 = 1.5;
 
 /// A point of a path, and the edge by which it goes on.
@@ -32,7 +33,8 @@ pub struct PathPoint {
     pub along: f64,
 }
 
-/// A path between two points of a graph, known as far as it was looked at; its memory is used again for the next.
+/// A path between two points of a graph, known as far as it was looked at; its memory is used again for the
+/// next.
 ///
 /// It is a path of the graph, on average half as long again as the shortest.
 #[derive(Debug, Clone, Default)]
@@ -65,11 +67,13 @@ fn edge(network: Network<'_>, [u, v]: [u32; 2]) -> Option<f64> {
 }
 
 impl LazyPath {
-    /// Makes this a path from `a` to `b` in `points`, the graph that `levels` are over, with the points at its ends and no
-    /// more than some of the points between. False, with no path, where no way leads from one to the other.
+    /// Makes this a path from `a` to `b` in `points`, the graph that `levels` are over, with the points at
+    /// its ends and no more than some of the points between. False, with no path, where no way leads from one
+    /// to the other.
     ///
-    /// From either end it leads inwards, from cell to coarser cell, and straight on where the cells are a few times smaller than the
-    /// ends are apart. O(log n) but where the coarsest level has to be searched; no allocation once warm.
+    /// From either end it leads inwards, from cell to coarser cell, and straight on where the cells are a few
+    /// times smaller than the ends are apart. O(log n) but where the coarsest level has to be searched; no
+    /// allocation once warm.
     ///
     /// # Panics
     /// When there is no such point, or not a position for each.
@@ -139,7 +143,8 @@ impl LazyPath {
         true
     }
 
-    /// Goes on from cell to cell of one level, each time to the one whose centre is nearest to that of the last, if it gets there.
+    /// Goes on from cell to cell of one level, each time to the one whose centre is nearest to that of the
+    /// last, if it gets there.
     fn walk(
         &mut self,
         (levels, positions): (&Levels, &[[f32; 3]]),
@@ -184,8 +189,8 @@ impl LazyPath {
         found
     }
 
-    /// Makes this a shortest path from `a` to `b` in `network`, found whole, through points that are `open`: for ways
-    /// that levels do not know, as over virtual edges.
+    /// Makes this a shortest path from `a` to `b` in `network`, found whole, through points that are `open`:
+    /// for ways that levels do not know, as over virtual edges.
     ///
     /// # Panics
     /// When there is no such point.
@@ -245,10 +250,10 @@ impl LazyPath {
         PathPoint { point: self.stops[k].point, along: self.stops[k].along }
     }
 
-    /// Takes apart what is about the place `along` the path, between the known points of numbers `left` and `right`, until
-    /// an edge between points is there: the number of the end of it nearer to that place, as far as it is
-    /// neither of those two. Their numbers afterwards are `left`, which does not change, and `right` more by what the path grew.
-    /// None if one edge joins them.
+    /// Takes apart what is about the place `along` the path, between the known points of numbers `left` and
+    /// `right`, until an edge between points is there: the number of the end of it nearer to that place, as
+    /// far as it is neither of those two. Their numbers afterwards are `left`, which does not change, and
+    /// `right` more by what the path grew. None if one edge joins them.
     ///
     /// O(log n), however long the path is.
     ///
@@ -274,8 +279,8 @@ impl LazyPath {
         }
     }
 
-    /// As [`Self::look`], about the first place where `guess`, a function of points, changes its sign between those two; nothing
-    /// where it has the same sign at both.
+    /// As [`Self::look`], about the first place where `guess`, a function of points, changes its sign between
+    /// those two; nothing where it has the same sign at both.
     ///
     /// # Panics
     /// When there are not so many points.
@@ -316,7 +321,8 @@ impl LazyPath {
         self.ids.clear();
         self.ids.push(cells.centres[ends[0] as usize]);
         let crossed = cells.cross(ends, &mut self.ids);
-        // Within a cell ways are as long as the distances from its centre; the one edge between the two takes the rest.
+        // Within a cell ways are as long as the distances from its centre; the one edge between the two takes
+        // the rest.
         let (ids, to_centre): (&[u32], &[f32]) = (&self.ids, &cells.to_centre);
         let parts = ids.windows(2).enumerate().map(|(i, two)| {
             let to_centre = sound(to_centre[two[0] as usize]);

@@ -58,11 +58,11 @@ impl<'a> Network<'a> {
     }
 }
 
-/// The Euclidean length of every edge, for [`Network::new`]: of differences in single precision the root of the sum of
-/// squares, each step rounded, within 2e-7 of the true one.
+/// The Euclidean length of every edge, for [`Network::new`]: of differences in single precision the root of
+/// the sum of squares, each step rounded, within 2e-7 of the true one.
 ///
-/// On one core: graphs make these when first wanted, and where a thread of a pool waits for others of it meanwhile, it may come to want
-/// them again.
+/// On one core: graphs make these when first wanted, and where a thread of a pool waits for others of it
+/// meanwhile, it may come to want them again.
 ///
 /// # Panics
 /// When the graph has a point that has no position.
@@ -82,8 +82,8 @@ pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// What is `along` plus an edge: more than `along`, however short the edge is. So the points of a shortest path are
-/// at ever greater distances, and it can be told from these alone.
+/// What is `along` plus an edge: more than `along`, however short the edge is. So the points of a shortest
+/// path are at ever greater distances, and it can be told from these alone.
 #[inline]
 pub(crate) fn step(along: f32, edge: f32) -> f32 {
     (along + edge).max(along.next_up())

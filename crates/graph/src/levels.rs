@@ -1,11 +1,11 @@
 //! Coarser graphs over nested subsets of the points, for distances and paths of any length.
 //!
-//! A level keeps points, centres, no two of which are nearer than a distance along the graph that doubles from level to
-//! level, and of which every other point is within that of one. Each point belongs to the cell of the nearest centre (a
-//! Voronoi diagram along the graph); two cells that an edge joins are joined by an edge as long as the shortest way
-//! through one such edge, which is remembered, so that a path between centres is a path of points. A shortest path is
-//! searched among the few cells of the coarsest level, then, level by level, only in the cells near the path found on
-//! the level before.
+//! A level keeps points, centres, no two of which are nearer than a distance along the graph that doubles
+//! from level to level, and of which every other point is within that of one. Each point belongs to the cell
+//! of the nearest centre (a Voronoi diagram along the graph); two cells that an edge joins are joined by an
+//! edge as long as the shortest way through one such edge, which is remembered, so that a path between
+//! centres is a path of points. A shortest path is searched among the few cells of the coarsest level, then,
+//! level by level, only in the cells near the path found on the level before.
 
 use nearmiss_store::Array;
 
@@ -113,8 +113,9 @@ impl LevelScratch {
         }
     }
 
-    /// Searches from `a` and from `b` where it is open, and has those cells opened next by which ways lead from the one
-    /// to the other that are not `detour` longer than the shortest, as a share: which of them is, finer levels tell.
+    /// Searches from `a` and from `b` where it is open, and has those cells opened next by which ways lead
+    /// from the one to the other that are not `detour` longer than the shortest, as a share: which of them
+    /// is, finer levels tell.
     fn survey(
         &mut self,
         network: Network<'_>,
@@ -217,8 +218,8 @@ impl Cells {
         &self.to_centre
     }
 
-    /// The local sampling radii of the points at the centres, doubled with each level: times the surface's horizon what
-    /// a [`ClosePairs`](crate::ClosePairs) of this level reaches.
+    /// The local sampling radii of the points at the centres, doubled with each level: times the surface's
+    /// horizon what a [`ClosePairs`](crate::ClosePairs) of this level reaches.
     #[must_use]
     pub fn radii(&self) -> &[f32] {
         &self.radii
@@ -231,7 +232,8 @@ impl Cells {
         4 * (3 * self.owner.len() + 2 * self.centres.len() + starts.len() + 4 * neighbours.len())
     }
 
-    /// The points of the finer level on the way along a path of cells, from the centre of its first to that of its last.
+    /// The points of the finer level on the way along a path of cells, from the centre of its first to that
+    /// of its last.
     ///
     /// # Panics
     /// When `cells` is no path of touching cells.
@@ -243,8 +245,8 @@ impl Cells {
         }
     }
 
-    /// Appends the points from the centre of a cell, which is there already, to that of one that touches it; tells the place of
-    /// the first point of that in `path`.
+    /// Appends the points from the centre of a cell, which is there already, to that of one that touches it;
+    /// tells the place of the first point of that in `path`.
     ///
     /// # Panics
     /// When the cells do not touch.
@@ -306,8 +308,8 @@ impl Touch {
     }
 }
 
-/// All pairs of cells that an edge joins, the lesser first, ascending, each with the shortest way; of equally long ones
-/// the first.
+/// All pairs of cells that an edge joins, the lesser first, ascending, each with the shortest way; of equally
+/// long ones the first.
 fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize) -> Vec<Touch> {
     let mut starts = vec![0_u32; cells + 1];
     for cell in owner {
@@ -350,8 +352,8 @@ fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize
 }
 
 impl Levels {
-    /// The levels over a graph whose points have these local sampling radii, such as the distances of their sixth
-    /// neighbours, until one has few cells. O(n log n) time, O(n) space.
+    /// The levels over a graph whose points have these local sampling radii, such as the distances of their
+    /// sixth neighbours, until one has few cells. O(n log n) time, O(n) space.
     ///
     /// # Panics
     /// When there is not a radius for each point.
@@ -389,9 +391,9 @@ impl Levels {
         self.cells.iter().map(Cells::byte_len).sum()
     }
 
-    /// The length of a path from `a` to `b` in the graph that the levels are over, or nothing where no way leads there.
-    /// No path is shorter in the cells that were searched; how much shorter one elsewhere can be is measured
-    /// (`benches`).
+    /// The length of a path from `a` to `b` in the graph that the levels are over, or nothing where no way
+    /// leads there. No path is shorter in the cells that were searched; how much shorter one elsewhere can be
+    /// is measured (`benches`).
     ///
     /// # Panics
     /// When there is no such point.

@@ -20,8 +20,9 @@ const FARTHEST: f32 = 1e18;
 pub enum Prune {
     /// All edges stay.
     Never,
-    /// Edges are virtual that at one of their ends are longer than Q3 + k · (Q3 − Q1) and than 1.5 times the median, by the lengths of the
-    /// edges there, if these are five or more. k is given, at least 0; larger keeps more.
+    /// Edges are virtual that at one of their ends are longer than Q3 + k · (Q3 − Q1) and than 1.5 times the
+    /// median, by the lengths of the edges there, if these are five or more. k is given, at least 0; larger
+    /// keeps more.
     Quartiles(f64),
 }
 
@@ -29,8 +30,9 @@ pub enum Prune {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct GraphOptions {
-    /// r: a point's sphere of influence reaches to its r-th nearest neighbour (S1 §3.2). 1 to 32, default 4. Larger bridges wider
-    /// gaps between samples, joins more that is not joined on the surface, and costs in proportion.
+    /// r: a point's sphere of influence reaches to its r-th nearest neighbour (S1 §3.2). 1 to 32, default 4.
+    /// Larger bridges wider gaps between samples, joins more that is not joined on the surface, and costs in
+    /// proportion.
     pub neighbours: u32,
     /// What becomes of long edges. Default: [`Prune::Quartiles`] with k = 1.
     pub prune: Prune,

@@ -1,16 +1,17 @@
 //! Which side is out: one sign for each normal, so that neighbours agree.
 //!
-//! As in Hoppe et al. 1992, a spanning tree of the edges along which normals agree best carries the sign from point to
-//! point. We differ twice.
+//! As in Hoppe et al. 1992, a spanning tree of the edges along which normals agree best carries the sign from
+//! point to point. We differ twice.
 //!
-//! They hold normals to agree that are parallel, which fails at sharp edges and through thin plates. Ours mirror each
-//! other in the plane half way between the points, as two normals of one circle do, of a sphere, a plane, of both sides
-//! of a ridge, a groove or a plate: with e the direction of the edge, n' is held against n − 2 (n·e) e.
+//! They hold normals to agree that are parallel, which fails at sharp edges and through thin plates. Ours
+//! mirror each other in the plane half way between the points, as two normals of one circle do, of a sphere,
+//! a plane, of both sides of a ridge, a groove or a plate: with e the direction of the edge, n' is held
+//! against n − 2 (n·e) e.
 //!
-//! And their tree lets one edge decide between two sides of a doubtful place. Only along smooth sheets do we grow it
-//! edge by edge (Kruskal's algorithm); the patches that this leaves are joined by what all edges between two of them
-//! say together, each patch to the one that it is surest of, until no edge is left. `benches` (`geodesics`) counts what
-//! comes out wrong.
+//! And their tree lets one edge decide between two sides of a doubtful place. Only along smooth sheets do we
+//! grow it edge by edge (Kruskal's algorithm); the patches that this leaves are joined by what all edges
+//! between two of them say together, each patch to the one that it is surest of, until no edge is left.
+//! `benches` (`geodesics`) counts what comes out wrong.
 
 mod agreement;
 mod outwards;
@@ -22,8 +23,8 @@ use agreement::{Weights, agreement, strongest_first};
 use outwards::outwards;
 use patches::{Signed, Tree, Votes};
 
-/// Normals that agree like this lie on one smooth sheet. If a ring of such edges still turns a normal round, the sheet
-/// has one side only.
+/// Normals that agree like this lie on one smooth sheet. If a ring of such edges still turns a normal round,
+/// the sheet has one side only.
 const SMOOTH: f32 = 0.95;
 
 /// Which side is out, where something says so.
@@ -65,24 +66,25 @@ pub struct OrientedPart {
 /// How well normals could be oriented.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Orientation {
-    /// For each point 255 where its sign is certain, 0 where it might as well be the other: the lesser of the agreement
-    /// of its edges, those against it taken off, and of the doubt in the least certain step by which its sign came from
-    /// the greater part.
+    /// For each point 255 where its sign is certain, 0 where it might as well be the other: the lesser of the
+    /// agreement of its edges, those against it taken off, and of the doubt in the least certain step by
+    /// which its sign came from the greater part.
     pub confidence: Vec<u8>,
     /// The connected parts, by their first points.
     pub parts: Vec<OrientedPart>,
 }
 
-/// Turns `normals` so that neighbours in `graph` agree, and outwards where that can be told: by what `sides` says,
-/// where the greater part of a component follows it, else so that the component encloses a positive volume about its
-/// centre, each point standing for the square of its local sampling radius. What the signs are beforehand does not
-/// matter but where all of that says nothing.
+/// Turns `normals` so that neighbours in `graph` agree, and outwards where that can be told: by what `sides`
+/// says, where the greater part of a component follows it, else so that the component encloses a positive
+/// volume about its centre, each point standing for the square of its local sampling radius. What the signs
+/// are beforehand does not matter but where all of that says nothing.
 ///
-/// O(e log e) in the number of edges, of which only those in doubt are sorted, in part on all cores; the result does
-/// not depend on how many there are.
+/// O(e log e) in the number of edges, of which only those in doubt are sorted, in part on all cores; the
+/// result does not depend on how many there are.
 ///
 /// # Panics
-/// When there is not a position, a normal and a radius for each point, and a normal of its own if `sides` has these.
+/// When there is not a position, a normal and a radius for each point, and a normal of its own if `sides` has
+/// these.
 pub fn orient(
     graph: &Adjacency,
     positions: &[[f32; 3]],

@@ -23,7 +23,8 @@ pub(crate) fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -
     ranges(count, |range| range.map(&f).collect::<Vec<R>>()).into_iter().flatten().collect()
 }
 
-/// As [`ranges`], `length` items each but the last, with scratch that a thread makes once for several of them.
+/// As [`ranges`], `length` items each but the last, with scratch that a thread makes once for several of
+/// them.
 pub(crate) fn ranges_with<S, R: Send>(
     count: usize,
     length: usize,

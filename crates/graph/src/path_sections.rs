@@ -56,10 +56,10 @@ impl ClosePairs {
         Ok(())
     }
 
-    /// The map in `file` of points with these horizons, its arrays in place. With either `check` every list is there,
-    /// so that no use of it fails. With [`Check::Full`] each is also one that a build writes: of points that are there,
-    /// by distance, itself first, and none further than it is heard; and what stands beside has its place, and would fit none
-    /// in the list.
+    /// The map in `file` of points with these horizons, its arrays in place. With either `check` every list
+    /// is there, so that no use of it fails. With [`Check::Full`] each is also one that a build writes: of
+    /// points that are there, by distance, itself first, and none further than it is heard; and what stands
+    /// beside has its place, and would fit none in the list.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
@@ -148,9 +148,9 @@ impl Levels {
         Ok(())
     }
 
-    /// The levels over `points` points in `file`, their arrays in place. With either `check` everything that is named
-    /// is there, every way inwards ends at the centre of its cell, and edges cross between the cells they join, so that
-    /// no search fails. With [`Check::Full`] distances also are such as a build writes.
+    /// The levels over `points` points in `file`, their arrays in place. With either `check` everything that
+    /// is named is there, every way inwards ends at the centre of its cell, and edges cross between the cells
+    /// they join, so that no search fails. With [`Check::Full`] distances also are such as a build writes.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

@@ -1,7 +1,8 @@
 //! Which edges are long: outliers among the lengths about their ends.
 //!
-//! S1 §3.2 prunes "long" edges by an outlier test of the reader's choice. This is Tukey's fence with
-//! a tighter k and two guards (docs/theory/graph.md): lengths on a grid have no spread, and of fewer than five nothing is an outlier.
+//! S1 §3.2 prunes "long" edges by an outlier test of the reader's choice. This is Tukey's fence with a
+//! tighter k and two guards (docs/theory/graph.md): lengths on a grid have no spread, and of fewer than five
+//! nothing is an outlier.
 
 use crate::adjacency::{Adjacency, Lists};
 use crate::influence::distance;
@@ -11,10 +12,12 @@ use crate::parallel::ranges;
 /// Fewer edges have no outliers.
 const LEAST_EDGES: usize = 5;
 
-/// An edge up to so many times the median is not long: the diagonals of a square grid are 1.41 times its edges.
+/// An edge up to so many times the median is not long: the diagonals of a square grid are 1.41 times its
+/// edges.
 const ORDINARY: f64 = 1.5;
 
-/// Splits `graph` into the edges that stay and those that are long at one of their ends, which become virtual.
+/// Splits `graph` into the edges that stay and those that are long at one of their ends, which become
+/// virtual.
 pub(crate) fn split(
     positions: &[[f32; 3]],
     graph: &Adjacency,

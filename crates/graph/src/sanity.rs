@@ -1,5 +1,5 @@
-//! What must hold of a stored graph: what its users need to stay within its arrays whenever one is loaded, what their
-//! answers need when the whole file is checked.
+//! What must hold of a stored graph: what its users need to stay within its arrays whenever one is loaded,
+//! what their answers need when the whole file is checked.
 
 use thiserror::Error;
 
@@ -41,7 +41,8 @@ const VIRTUAL: &str = "the virtual edges of point";
 const COMPONENT: &str = "the component of point";
 
 impl Adjacency {
-    /// Checks that lists are there for `points` points, each ascending, of other points that are there. One pass.
+    /// Checks that lists are there for `points` points, each ascending, of other points that are there. One
+    /// pass.
     pub(crate) fn check_structure(&self, points: usize, what: &'static str) -> Result<(), Flaw> {
         let wrong = |index| Err(Flaw::Value { what, index });
         let found = self.starts.len();

@@ -66,9 +66,10 @@ impl PointGraph {
         Ok(())
     }
 
-    /// The graph over `points` points in `file`, its arrays in place. With either `check` the structure is looked
-    /// through: lengths agree, and every point and edge named is there, so that no use of the graph can fail. With
-    /// [`Check::Full`] each edge also stands with both of its ends, and numbers are such as a build writes.
+    /// The graph over `points` points in `file`, its arrays in place. With either `check` the structure is
+    /// looked through: lengths agree, and every point and edge named is there, so that no use of the graph
+    /// can fail. With [`Check::Full`] each edge also stands with both of its ends, and numbers are such as a
+    /// build writes.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

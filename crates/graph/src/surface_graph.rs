@@ -15,7 +15,8 @@ use crate::{
     Levels, LoadError, Network, Paths, PointGraph, edge_lengths,
 };
 
-/// Ways over virtual edges stay where the sum of the distances from both ends is at most so many times their distance.
+/// Ways over virtual edges stay where the sum of the distances from both ends is at most so many times their
+/// distance.
 const NARROW: f32 = 1.5;
 
 const CONFIDENCE: [u8; 4] = *b"CNFD";
@@ -87,11 +88,13 @@ impl StoredPart {
 }
 
 impl SurfaceGraph {
-    /// The graph of `samples`, whose `normals`, of any sign, are turned so that they agree along it, and outwards as far as
-    /// that can be told (see [`orient`]). O(n log n), on all cores with the feature `rayon`; the same on any number of them.
+    /// The graph of `samples`, whose `normals`, of any sign, are turned so that they agree along it, and
+    /// outwards as far as that can be told (see [`orient`]). O(n log n), on all cores with the feature
+    /// `rayon`; the same on any number of them.
     ///
     /// # Errors
-    /// When an option is out of range, a coordinate is no number that can be squared, or there is too much to number.
+    /// When an option is out of range, a coordinate is no number that can be squared, or there is too much to
+    /// number.
     ///
     /// # Panics
     /// When there is not a radius and a normal for each point, and one of its own if `sides` has these.
@@ -154,15 +157,15 @@ impl SurfaceGraph {
         self.close_pairs.first()
     }
 
-    /// The map of close pairs of the cells of a level, from 0 for the finest of [`Self::levels`], whose reach grows with the cells; `None`
-    /// where there is no such level, or no map.
+    /// The map of close pairs of the cells of a level, from 0 for the finest of [`Self::levels`], whose reach
+    /// grows with the cells; `None` where there is no such level, or no map.
     #[must_use]
     pub fn close_cells(&self, level: usize) -> Option<&ClosePairs> {
         self.close_pairs.get(level.checked_add(1)?)
     }
 
-    /// Coarser graphs over ever fewer of the points. With a map of close pairs they are there; without they are made when first wanted,
-    /// some second for a million points.
+    /// Coarser graphs over ever fewer of the points. With a map of close pairs they are there; without they
+    /// are made when first wanted, some second for a million points.
     ///
     /// # Panics
     /// When there is not a position and a radius for each point.
@@ -178,7 +181,8 @@ impl SurfaceGraph {
         Network::new(self.points.edges(), lengths)
     }
 
-    /// The edges with the virtual ones, which bridge small holes (S1 §4.5), and their lengths; made when first wanted.
+    /// The edges with the virtual ones, which bridge small holes (S1 §4.5), and their lengths; made when
+    /// first wanted.
     #[must_use]
     pub fn bridged_network(&self, positions: &[[f32; 3]]) -> Network<'_> {
         let (graph, lengths) = self.bridged.get_or_init(|| {
@@ -189,8 +193,9 @@ impl SurfaceGraph {
         Network::new(graph, lengths)
     }
 
-    /// For each point the areas of all before it, in units of π, and last that of all, for drawing points by area: one
-    /// stands for the square of its local sampling radius. Made when first wanted, eight bytes a point.
+    /// For each point the areas of all before it, in units of π, and last that of all, for drawing points by
+    /// area: one stands for the square of its local sampling radius. Made when first wanted, eight bytes a
+    /// point.
     #[must_use]
     pub fn areas(&self, radii: &[f32]) -> &[f64] {
         self.areas.get_or_init(|| {
@@ -206,15 +211,17 @@ impl SurfaceGraph {
         })
     }
 
-    /// Makes what searches along the graph make when they first want it: lengths, [areas](Self::areas), [bridges](Self::bridged_network) and
-    /// [levels](Self::levels). O(e log e) for e edges. For those who want the first search to be as fast as the next.
+    /// Makes what searches along the graph make when they first want it: lengths, [areas](Self::areas),
+    /// [bridges](Self::bridged_network) and [levels](Self::levels). O(e log e) for e edges. For those who
+    /// want the first search to be as fast as the next.
     pub fn make_ready(&self, samples: Samples<'_>) {
         let _ = self.levels(samples.positions, samples.radii);
         let _ = self.bridged_network(samples.positions);
         let _ = self.areas(samples.radii);
     }
 
-    /// Makes `path` one from `a` to `b` along the surface, as [`LazyPath::lead`] does. False, with no path, where none leads there.
+    /// Makes `path` one from `a` to `b` along the surface, as [`LazyPath::lead`] does. False, with no path,
+    /// where none leads there.
     ///
     /// # Panics
     /// When there is no such point, or not a position and a radius for each.
@@ -222,9 +229,9 @@ impl SurfaceGraph {
         path.lead(self.levels(positions, radii), self.network(positions), positions, ends)
     }
 
-    /// Makes `path` a shortest one from `a` to `b` over virtual edges too, as far as it stays near both: the sum of the distances
-    /// from them no more than half as much again as their own. For points that are near each other, with a hole between
-    /// (S1 §4.5). Takes time by the number of points there.
+    /// Makes `path` a shortest one from `a` to `b` over virtual edges too, as far as it stays near both: the
+    /// sum of the distances from them no more than half as much again as their own. For points that are near
+    /// each other, with a hole between (S1 §4.5). Takes time by the number of points there.
     ///
     /// # Panics
     /// When there is no such point, or not a position for each.
@@ -285,9 +292,9 @@ impl SurfaceGraph {
         }
     }
 
-    /// The graph of `samples` in `file`, its arrays in place. With either `check` no use of it fails. With [`Check::Full`]
-    /// arrays also agree with each other, lists are in order and lengths are lengths; whether a distance is the shortest there is, or a
-    /// confidence deserved, only a build could tell.
+    /// The graph of `samples` in `file`, its arrays in place. With either `check` no use of it fails. With
+    /// [`Check::Full`] arrays also agree with each other, lists are in order and lengths are lengths; whether
+    /// a distance is the shortest there is, or a confidence deserved, only a build could tell.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

@@ -259,7 +259,8 @@ fn stored_and_rebuilt_paths_are_shortest() {
     }
 }
 
-/// Layers of points, each joined to all of the next by edges that differ by less than distances are rounded by.
+/// Layers of points, each joined to all of the next by edges that differ by less than distances are rounded
+/// by.
 #[test]
 fn paths_are_short_where_rounding_hides_which_way_is() {
     const WIDTH: u32 = 6;

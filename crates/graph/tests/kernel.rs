@@ -212,7 +212,8 @@ fn foot_between(sheet: &Sheet, [a, b]: [u32; 2], share: f64) -> nearmiss_graph::
 fn sheets_that_no_edge_joins_stay_apart() {
     each_kernel(|kernel| {
         let h = Sheet::new(Cloud::of_form(patch(2.0, 2.0), 0.1, 0.0, 1), kernel).h();
-        // No sphere of influence is larger than what the sixth neighbour's is about: 2.2 h joins none of these.
+        // No sphere of influence is larger than what the sixth neighbour's is about: 2.2 h joins none of
+        // these.
         for gap in [2.2, 3.0] {
             let pair = Sheet::new(Cloud::of_form(plates(2.0, 2.0, gap * h), 0.1, 0.0, 1), kernel);
             let rng = &mut arbitrary::rng(3);

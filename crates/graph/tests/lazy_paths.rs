@@ -56,7 +56,8 @@ fn a_path_is_one_of_the_graph_and_a_look_finds_its_points() {
                 sum += whole[whole.len() - 1].along / f64::from(shortest);
                 longest = longest.max(whole[whole.len() - 1].along / f64::from(shortest));
             }
-            // Looks at random places find the nearer end of the edge there, and the path between stays as it is.
+            // Looks at random places find the nearer end of the edge there, and the path between stays as it
+            // is.
             for _ in 0..8 {
                 let along = random.random_range(-0.1..=1.1) * whole[whole.len() - 1].along;
                 let right = lazy.len() - 1;

@@ -102,7 +102,8 @@ fn a_level_keeps_about_a_quarter() {
     assert!(finer <= 256);
 }
 
-/// Mean and greatest of how much longer paths are than the shortest ones, and how much of the graph was looked at.
+/// Mean and greatest of how much longer paths are than the shortest ones, and how much of the graph was
+/// looked at.
 fn excess(form: Form, spacing: f64) -> [f64; 3] {
     let cloud = Cloud::of_form(form, spacing, 0.1, 3);
     let network = Network::new(&cloud.graph, &cloud.lengths);

@@ -40,7 +40,8 @@ fn closed_shapes_have_no_border() {
     }
 }
 
-/// Checks that points less than `near` inside a border are found, as far as `share` of them, and none further than `far`.
+/// Checks that points less than `near` inside a border are found, as far as `share` of them, and none further
+/// than `far`.
 fn check_border(graph: &PointGraph, depths: &[f64], (near, share, far): (f64, f64, f64), what: &str) {
     let (mut outermost, mut found) = (0_u32, 0_u32);
     for (i, &depth) in depths.iter().enumerate() {

@@ -90,8 +90,8 @@ fn the_dragon_points_outwards() {
     }
 }
 
-/// Of an edge from p to q whether normals there mirror each other as they are, how well, and how well along the surface: the
-/// formulas alone, in the steps of 1/1023 that are told apart.
+/// Of an edge from p to q whether normals there mirror each other as they are, how well, and how well along
+/// the surface: the formulas alone, in the steps of 1/1023 that are told apart.
 fn mirrored([p, m, q, n]: [[f32; 3]; 4]) -> (bool, f32, f32) {
     let e = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
     let cosine = dot(m, n) - 2.0 * dot(m, e) * dot(n, e) / dot(e, e);

@@ -49,8 +49,8 @@ fn what_is_stored_comes_back() {
     assert!(matches!(ClosePairs::load(&file, 1, &horizons, Check::Structure), Err(LoadError::Open(_))));
 }
 
-/// Points on a line, half of which come much later: on either side of the seam pairs of almost the same distances stand in the
-/// list and beside it.
+/// Points on a line, half of which come much later: on either side of the seam pairs of almost the same
+/// distances stand in the list and beside it.
 #[test]
 fn lists_of_near_and_far_points_stay_in_order() {
     const COUNT: usize = 70_000;

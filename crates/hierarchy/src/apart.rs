@@ -5,8 +5,9 @@ use crate::covering::Centres;
 use crate::descend::NodePair;
 use crate::slices::Slices;
 
-/// What motion and arithmetic may do to the distance of two places, in units of [`Relative::slack`], each of which
-/// bounds a coordinate: √3 for either of two places in motion, as much again for the distance itself and for the radii.
+/// What motion and arithmetic may do to the distance of two places, in units of [`Relative::slack`], each of
+/// which bounds a coordinate: √3 for either of two places in motion, as much again for the distance itself
+/// and for the radii.
 const ROUNDINGS: f32 = 8.0;
 
 /// What of two nodes is to be apart.
@@ -18,13 +19,13 @@ pub enum Extent {
     Surface,
 }
 
-/// Whether what two nodes have is further apart than `reach`, as far as their coverings show: `motion` takes the frame
-/// of `b` into that of `a`, in which `reach` is given.
+/// Whether what two nodes have is further apart than `reach`, as far as their coverings show: `motion` takes
+/// the frame of `b` into that of `a`, in which `reach` is given.
 ///
-/// As in the paper, balls that are further than that from the volume of the other node are dropped first: its box for
-/// discs, its [enclosure](Slices::enclosure) for the surface. Rounding is included: what is excluded has nothing within
-/// `reach` of each other. Compares each ball of one that is left with sixteen of the other at a time; does not
-/// allocate.
+/// As in the paper, balls that are further than that from the volume of the other node are dropped first: its
+/// box for discs, its [enclosure](Slices::enclosure) for the surface. Rounding is included: what is excluded
+/// has nothing within `reach` of each other. Compares each ball of one that is left with sixteen of the other
+/// at a time; does not allocate.
 ///
 /// # Panics
 /// When there are no such nodes.

@@ -1,7 +1,7 @@
 //! Oriented boxes, and whether two of them in relative motion overlap.
 //!
-//! The separating-axis test of Gottschalk, Lin & Manocha ("`OBBTree`", SIGGRAPH 1996) with the six face normals
-//! only: the nine edge axes exclude few further pairs of thin patches and cost more than they save
+//! The separating-axis test of Gottschalk, Lin & Manocha ("`OBBTree`", SIGGRAPH 1996) with the six face
+//! normals only: the nine edge axes exclude few further pairs of thin patches and cost more than they save
 //! (benches/record).
 
 use bytemuck::{Pod, Zeroable};
@@ -25,14 +25,14 @@ pub struct OrientedBox {
     pub reach: f32,
 }
 
-/// What rounding can do to an interval of a box, relative to the greatest coordinate along its axes. In units of
-/// 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 7 for axes that are orthonormal to rounding
-/// only, √3 between coordinates and lengths; together below 30.
+/// What rounding can do to an interval of a box, relative to the greatest coordinate along its axes. In units
+/// of 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 7 for axes that are orthonormal to
+/// rounding only, √3 between coordinates and lengths; together below 30.
 pub(crate) const ROUNDING: f32 = 2e-6;
 
-/// The same for a gap between boxes in motion, relative to the sum of all lengths involved: 12 for the centre of
-/// the box that is moved, 4 for the distance of the centres along an axis, 18 for the half lengths, each less than
-/// 8 off in its cosine; together below 40.
+/// The same for a gap between boxes in motion, relative to the sum of all lengths involved: 12 for the centre
+/// of the box that is moved, 4 for the distance of the centres along an axis, 18 for the half lengths, each
+/// less than 8 off in its cosine; together below 40.
 pub const SLACK: f32 = 4e-6;
 
 impl OrientedBox {
@@ -73,8 +73,8 @@ impl OrientedBox {
     }
 }
 
-/// The motion of one scan's stored frame into another's, in single precision for the hot path, with a bound on
-/// what rounding costs there.
+/// The motion of one scan's stored frame into another's, in single precision for the hot path, with a bound
+/// on what rounding costs there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relative {
     /// Rows of scale · rotation.
@@ -213,9 +213,9 @@ impl Relative {
         gap
     }
 
-    /// The gaps, and for each pair how much of each other the boxes overlap, with `margin` about them: 1 less the distance of
-    /// their centres along a face normal as a share of how far the two and `margin` reach along that, the least of the six. 1
-    /// where they share a centre, 0 where they are just so far apart.
+    /// The gaps, and for each pair how much of each other the boxes overlap, with `margin` about them: 1 less
+    /// the distance of their centres along a face normal as a share of how far the two and `margin` reach
+    /// along that, the least of the six. 1 where they share a centre, 0 where they are just so far apart.
     #[inline]
     #[must_use]
     pub fn gaps_and_overlaps(
@@ -232,7 +232,8 @@ impl Relative {
         (gap, lanes(|i| 1.0 - share[i]))
     }
 
-    /// Tells of four pairs of boxes, along each of the six face normals, the distance of their centres and how far both reach.
+    /// Tells of four pairs of boxes, along each of the six face normals, the distance of their centres and
+    /// how far both reach.
     #[inline]
     fn along_normals(&self, a: [&OrientedBox; 2], b: [&OrientedBox; 2], mut tell: impl FnMut(Quad, Quad)) {
         let a = Quads::new([a[0], a[0], a[1], a[1]]);

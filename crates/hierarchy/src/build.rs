@@ -202,9 +202,9 @@ impl PointHierarchy {
         self.is_oriented
     }
 
-    /// Turns normals round that `oriented`, which differs from them in signs alone, has the other way. So neighbours are on
-    /// the same side afterwards, as a graph over the points can tell it; f takes its sign from them ([`Self::evaluate_oriented_with`]),
-    /// and no box, nor any verdict, depends on it.
+    /// Turns normals round that `oriented`, which differs from them in signs alone, has the other way. So
+    /// neighbours are on the same side afterwards, as a graph over the points can tell it; f takes its sign
+    /// from them ([`Self::evaluate_oriented_with`]), and no box, nor any verdict, depends on it.
     ///
     /// # Panics
     /// When there is not one for each point.
@@ -218,7 +218,8 @@ impl PointHierarchy {
         self.is_oriented = true;
     }
 
-    /// Makes anew what is not stored, after discs or boxes have changed. Signs of normals, which say nothing to leaves, do not matter.
+    /// Makes anew what is not stored, after discs or boxes have changed. Signs of normals, which say nothing
+    /// to leaves, do not matter.
     pub(crate) fn derive(&mut self) {
         self.wide = WideTree::of(self);
         self.outline = Outline::of(self);
@@ -296,8 +297,8 @@ impl PointHierarchy {
         (0..self.nodes.len()).map(move |id| slices.enclosure(id))
     }
 
-    /// Bytes of all that is stored for nodes: tree, boxes, enclosures, cones, samples and coverings (S0 §6.1); what points keep,
-    /// and their neighbour lists, is not counted.
+    /// Bytes of all that is stored for nodes: tree, boxes, enclosures, cones, samples and coverings (S0
+    /// §6.1); what points keep, and their neighbour lists, is not counted.
     #[must_use]
     pub fn bytes_of_nodes(&self) -> usize {
         size_of_val::<[_]>(&self.nodes)

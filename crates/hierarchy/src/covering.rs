@@ -1,10 +1,11 @@
 //! Sphere coverings: the radius at which balls about a node's samples contain its part of the surface.
 //!
-//! Klein & Zachmann 2004, §4.2.2, let the radius grow with random test points and stop when enough of them are
-//! inside; what no test point found stays outside. Here it is the least at which one ball each contains the solids of
-//! the node's points: the cells in which the surface nearest to them provably is, with their discs and balls
-//! (docs/theory/coverings.md). As in the paper the radius grows with what it finds outside, the furthest parts first, so
-//! that most of what is under a node is never looked at: a box about it is inside.
+//! Klein & Zachmann 2004, §4.2.2, let the radius grow with random test points and stop when enough of them
+//! are inside; what no test point found stays outside. Here it is the least at which one ball each contains
+//! the solids of the node's points: the cells in which the surface nearest to them provably is, with their
+//! discs and balls (docs/theory/coverings.md). As in the paper the radius grows with what it finds outside,
+//! the furthest parts first, so that most of what is under a node is never looked at: a box about it is
+//! inside.
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
@@ -23,15 +24,15 @@ use crate::topology::{MOST_LEAF_POINTS, Node};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Covering {
-    /// The covering radius: balls of this radius about the samples contain the node's part of the surface, its points,
-    /// their discs and balls. Infinite where nothing is proven.
+    /// The covering radius: balls of this radius about the samples contain the node's part of the surface,
+    /// its points, their discs and balls. Infinite where nothing is proven.
     pub radius: f32,
-    /// r(P') of Klein & Zachmann 2004, Definition 4, measured on what shows of the surface to first order: each tangent
-    /// disc under the node, with its thickness, and the ball of each sparse point lie in a ball of this radius. At most
-    /// [`radius`](Self::radius).
+    /// r(P') of Klein & Zachmann 2004, Definition 4, measured on what shows of the surface to first order:
+    /// each tangent disc under the node, with its thickness, and the ball of each sparse point lie in a ball
+    /// of this radius. At most [`radius`](Self::radius).
     pub sampling: f32,
-    /// r(P): the root of the mean square of the local radii of all points under the node, for then the areas that
-    /// eq. 10 equates are the sums of the points' own.
+    /// r(P): the root of the mean square of the local radii of all points under the node, for then the areas
+    /// that eq. 10 equates are the sums of the points' own.
     pub spacing: f32,
 }
 
@@ -113,7 +114,8 @@ impl Centres {
         fold_min(&least)
     }
 
-    /// The square of the least radius at which one ball alone contains the box; infinite if anything is no number.
+    /// The square of the least radius at which one ball alone contains the box; infinite if anything is no
+    /// number.
     #[inline(always)]
     fn far_sq(&self, bounds: &OrientedBox) -> f32 {
         let OrientedBox { centre: c, half, axes, .. } = bounds;
@@ -252,8 +254,8 @@ pub(crate) fn coverings<'a>(
 
 // Inlined into a caller that has it compiled for an instruction set.
 impl Ground<'_> {
-    /// A radius at which balls about `centres` contain the surface whose nearest points are under `node`, and their discs
-    /// and balls.
+    /// A radius at which balls about `centres` contain the surface whose nearest points are under `node`, and
+    /// their discs and balls.
     #[inline(always)]
     fn covering_radius(&self, node: usize, centres: &Centres) -> f32 {
         let about = |id: usize| self.growths[id].of(&self.boxes[id]);
@@ -266,8 +268,9 @@ impl Ground<'_> {
         self.greatest(node, centres, |id| self.boxes[id], self.discs)
     }
 
-    /// The least radius at which under `node` each box `about` a node, or else each of the `solids` of points, lies in one of the
-    /// balls about `centres`. Of two children the further comes first, so that little is left to look at.
+    /// The least radius at which under `node` each box `about` a node, or else each of the `solids` of
+    /// points, lies in one of the balls about `centres`. Of two children the further comes first, so that
+    /// little is left to look at.
     #[inline(always)]
     fn greatest(
         &self,

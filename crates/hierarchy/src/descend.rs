@@ -19,8 +19,8 @@ pub struct NodePair {
 }
 
 impl NodePair {
-    /// What takes the place of either node when this pair is split, as `which` wants it if there is a choice; a node that
-    /// is not split stands there twice. None for two leaves.
+    /// What takes the place of either node when this pair is split, as `which` wants it if there is a choice;
+    /// a node that is not split stands there twice. None for two leaves.
     #[inline]
     pub fn split(self, a: &Node, b: &Node, which: impl FnOnce() -> Split) -> Option<[[NodeId; 2]; 2]> {
         self.split_unless(a, b, [a.is_leaf(), b.is_leaf()], which)
@@ -134,8 +134,8 @@ impl Frontier for Stack {
     }
 }
 
-/// The most urgent of all pairs first: for searches that a budget may end. Pairs equally urgent come in the order of
-/// their nodes, so the order never depends on anything else.
+/// The most urgent of all pairs first: for searches that a budget may end. Pairs equally urgent come in the
+/// order of their nodes, so the order never depends on anything else.
 #[derive(Debug, Clone, Default)]
 pub struct Heap {
     pairs: BinaryHeap<Urgent>,

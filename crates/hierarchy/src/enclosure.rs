@@ -1,19 +1,20 @@
 //! Enclosures: boxes that provably contain the surface.
 //!
-//! A surface point x belongs to the leaf of its nearest cloud point p. With J the points whose horizon reaches x,
-//! three facts bound where it can be (docs/theory/certificates.md has the argument step by step):
+//! A surface point x belongs to the leaf of its nearest cloud point p. With J the points whose horizon
+//! reaches x, three facts bound where it can be (docs/theory/certificates.md has the argument step by step):
 //!
-//! 1. a(x) is in the hull of J and ‖x − a(x)‖ ≤ 0.56 h(x), so x is in the hull of J grown by 0.56 of J's greatest h;
-//! 2. x is in the inner half of the horizon of one of J, and p is not further from x than that: x is within half
-//!    the greatest horizon of those that reach p;
+//! 1. a(x) is in the hull of J and ‖x − a(x)‖ ≤ 0.56 h(x), so x is in the hull of J grown by 0.56 of J's
+//!    greatest h;
+//! 2. x is in the inner half of the horizon of one of J, and p is not further from x than that: x is within
+//!    half the greatest horizon of those that reach p;
 //! 3. x is on p's side of the plane half-way between p and any other point.
 //!
 //! None of them uses f(x) = 0: every x of status ok is enclosed.
 //!
-//! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a cylinder about its
-//! normal, and the leaf's part is in the box about these as well; whichever is less counts. The enclosure of an
-//! inner node is the least box along its own axes about those of its leaves. The paper's claim that x is in the hull
-//! of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
+//! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a cylinder about
+//! its normal, and the leaf's part is in the box about these as well; whichever is less counts. The enclosure
+//! of an inner node is the least box along its own axes about those of its leaves. The paper's claim that x
+//! is in the hull of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
 
 use std::ops::Range;
 
@@ -56,8 +57,8 @@ const NEXT_RAYS: [[f32; SECTORS]; 2] = {
     next
 };
 
-/// Neighbours further than this many local radii bound a cell only beside holes; what is missed there makes it
-/// wider, never wrong.
+/// Neighbours further than this many local radii bound a cell only beside holes; what is missed there makes
+/// it wider, never wrong.
 const NEIGHBOURS: f32 = 1.75;
 
 /// What single precision may cost here, relatively: some hundred roundings in differences of nearby numbers.
@@ -135,8 +136,8 @@ impl Surroundings {
     }
 }
 
-/// Fact 3: how far from its axis a surface point in the cell of `p` can be. Of the points in the blocks `near`
-/// those `within` some distance of it are looked at; the last axis is the normal.
+/// Fact 3: how far from its axis a surface point in the cell of `p` can be. Of the points in the blocks
+/// `near` those `within` some distance of it are looked at; the last axis is the normal.
 #[inline(always)]
 fn across<'a, S: Simd>(
     simd: S,
@@ -155,7 +156,8 @@ fn across<'a, S: Simd>(
         if !counts.any_true() {
             continue;
         }
-        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal of a neighbour q, and any height z.
+        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal of a neighbour q, and any height
+        // z.
         let height = along(d, axes[2]);
         let bound = d_sq * 0.5 + (-(height * cell.low)).max(-(height * cell.high)).max(0.0);
         let (x, y) = ((along(d, axes[0]) / bound).to_array(), (along(d, axes[1]) / bound).to_array());
@@ -317,7 +319,8 @@ impl Cells {
     }
 }
 
-/// What the boxes about the discs of all nodes must grow by to be enclosures, given the bounds of the leaves in order.
+/// What the boxes about the discs of all nodes must grow by to be enclosures, given the bounds of the leaves
+/// in order.
 pub(crate) fn growths(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<Growth> {
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
     let leaf_boxes = nodes.iter().zip(boxes).filter(|(node, _)| node.is_leaf());

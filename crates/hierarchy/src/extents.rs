@@ -34,8 +34,8 @@ pub(crate) struct Discs<'a> {
     pub(crate) balls: &'a [f32],
 }
 
-/// For each node the least box along the axes of that `about` it that contains the discs of its points with their thickness, and
-/// their balls. O(n log n).
+/// For each node the least box along the axes of that `about` it that contains the discs of its points with
+/// their thickness, and their balls. O(n log n).
 pub(crate) fn boxes_of_discs(nodes: &[Node], about: &[OrientedBox], discs: &Discs<'_>) -> Vec<OrientedBox> {
     let blocks = discs.blocks();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();

@@ -1,5 +1,5 @@
-//! The points that f(x) needs: those whose horizon reaches x, from the neighbour list of a leaf near x, or by a
-//! descent where no list holds.
+//! The points that f(x) needs: those whose horizon reaches x, from the neighbour list of a leaf near x, or by
+//! a descent where no list holds.
 
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, PointBlock, SurfacePlan};
@@ -85,8 +85,8 @@ impl<'a> Index<'a> {
         ))
     }
 
-    /// The groups of which a point may be heard within `distance` of `x`, if the list of this block is complete
-    /// there.
+    /// The groups of which a point may be heard within `distance` of `x`, if the list of this block is
+    /// complete there.
     #[inline]
     pub(crate) fn list(&self, block: usize, x: [f32; 3], distance: f32) -> Option<&'a [u32]> {
         let list = self.lists.get(block)?;
@@ -165,8 +165,8 @@ impl<'a> Index<'a> {
         }
     }
 
-    /// The blocks of these groups, which ascend, that may be heard within `distance` of `x`: written to the front of
-    /// `heard`, of which they are returned.
+    /// The blocks of these groups, which ascend, that may be heard within `distance` of `x`: written to the
+    /// front of `heard`, of which they are returned.
     #[inline(always)]
     pub(crate) fn heard<'b, S: Simd>(
         &self,
@@ -214,16 +214,16 @@ impl PointHierarchy {
         self.index().evaluate(x, scratch)
     }
 
-    /// As [`Self::evaluate_with`], faster where `x` is within a local radius or so of the stored point `i`: the
-    /// list of that point is looked at first.
+    /// As [`Self::evaluate_with`], faster where `x` is within a local radius or so of the stored point `i`:
+    /// the list of that point is looked at first.
     pub fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         scratch.block = i / PointBlock::WIDTH;
         self.index().evaluate(x, scratch)
     }
 
-    /// As [`Self::evaluate_with`], faster for places along the surface, each near that which was asked about last with this scratch:
-    /// where the list used there ends, that of the nearest block it names is taken, and where that ends too, that of the nearest point,
-    /// which holds all that is heard on the surface.
+    /// As [`Self::evaluate_with`], faster for places along the surface, each near that which was asked about
+    /// last with this scratch: where the list used there ends, that of the nearest block it names is taken,
+    /// and where that ends too, that of the nearest point, which holds all that is heard on the surface.
     pub fn evaluate_onward(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let index = self.index();
         let place = Centre::new(x).rounded();
@@ -238,9 +238,9 @@ impl PointHierarchy {
         index.evaluate(x, scratch)
     }
 
-    /// As [`Self::evaluate_with`], with n, and so the sign of f, on the side of Σ wᵢ nᵢ, the stored normals of the points
-    /// that reach x: positive below the surface. Where these disagree, as between two sheets, the place is ambiguous;
-    /// unless they [are oriented](Self::is_oriented) all is as there.
+    /// As [`Self::evaluate_with`], with n, and so the sign of f, on the side of Σ wᵢ nᵢ, the stored normals
+    /// of the points that reach x: positive below the surface. Where these disagree, as between two sheets,
+    /// the place is ambiguous; unless they [are oriented](Self::is_oriented) all is as there.
     pub fn evaluate_oriented_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let at = self.evaluate_with(x, scratch);
         if !self.is_oriented || at.support == 0 {

@@ -1,7 +1,7 @@
 //! How much larger an enclosure is than the box of its node: both have the same axes, so six lengths say it.
 //!
-//! Kept short, for a certificate looks at many enclosures whose boxes it has looked at before: single precision
-//! without the lower half of its digits, rounded up.
+//! Kept short, for a certificate looks at many enclosures whose boxes it has looked at before: single
+//! precision without the lower half of its digits, rounded up.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -68,8 +68,8 @@ impl Growth {
         (self.low.map(length), self.high.map(length))
     }
 
-    /// Against the first axis and the second, against the third and along the first, along the second and the third: of each pair
-    /// the first in the lower half.
+    /// Against the first axis and the second, against the third and along the first, along the second and the
+    /// third: of each pair the first in the lower half.
     #[inline]
     pub(crate) fn pairs(&self) -> [u32; 3] {
         let ([a, b, c], [d, e, f]) = (self.low, self.high);

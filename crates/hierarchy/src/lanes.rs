@@ -24,7 +24,8 @@ pub(crate) fn seen_from<S: Simd>(simd: S, block: &PointBlock, p: [f32; 3]) -> Ve
     [x - p[0], y - p[1], z - p[2]]
 }
 
-/// How far each goes along `axis`: the sum of products in the order of [`dot`](crate::boxes::dot), bit for bit the same.
+/// How far each goes along `axis`: the sum of products in the order of [`dot`](crate::boxes::dot), bit for
+/// bit the same.
 #[inline(always)]
 pub(crate) fn along<S: Simd>([x, y, z]: Vectors<S>, axis: [f32; 3]) -> f32x16<S> {
     x * axis[0] + y * axis[1] + z * axis[2]
@@ -44,8 +45,8 @@ pub(crate) struct Boxes<V> {
     pub(crate) axes: [[V; 3]; 3],
 }
 
-/// Tells of boxes of a and b in each lane, along each of the six face normals, the distance of their centres and how far both
-/// reach: in the order of operations of [`Relative::gaps`](crate::Relative::gaps).
+/// Tells of boxes of a and b in each lane, along each of the six face normals, the distance of their centres
+/// and how far both reach: in the order of operations of [`Relative::gaps`](crate::Relative::gaps).
 #[inline(always)]
 pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>, mut tell: impl FnMut(V, V)) {
     let d = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];
@@ -64,8 +65,8 @@ pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>,
     }
 }
 
-/// The lanes of a block that hold any of `points`, as bits: point i stands in lane i % 16 of block i / 16. None of the
-/// points may end before the block starts.
+/// The lanes of a block that hold any of `points`, as bits: point i stands in lane i % 16 of block i / 16.
+/// None of the points may end before the block starts.
 #[inline(always)]
 pub(crate) fn lanes_of(block: usize, points: &Range<usize>) -> u64 {
     let first = block * WIDTH;

@@ -1,5 +1,5 @@
-//! What two leaves are compared by, in one place: a query comes to a leaf that no other has lately come to, and waits for each part
-//! of memory that it needs.
+//! What two leaves are compared by, in one place: a query comes to a leaf that no other has lately come to,
+//! and waits for each part of memory that it needs.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i16x16};
@@ -17,8 +17,9 @@ const STEPS: f32 = 32767.0;
 
 /// Up to sixteen points of a leaf as tangent discs, and the leaf's box.
 ///
-/// Of places and radii sixteen bits are kept, in steps of a 2⁻¹⁵th of the leaf, and of directions as many: off by less than a thousandth
-/// of a local radius and of a degree, where discs say no more than that surfaces cross to first order; in half the memory.
+/// Of places and radii sixteen bits are kept, in steps of a 2⁻¹⁵th of the leaf, and of directions as many:
+/// off by less than a thousandth of a local radius and of a degree, where discs say no more than that
+/// surfaces cross to first order; in half the memory.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(32))]
 pub struct LeafBlock {

@@ -1,4 +1,5 @@
-//! The samples of nodes as the scan seen from further away: which they are, how far they reach, and f' over them.
+//! The samples of nodes as the scan seen from further away: which they are, how far they reach, and f' over
+//! them.
 
 use nearmiss_surface::{Evaluation, Moments, PointBlock};
 
@@ -8,8 +9,8 @@ use crate::samples::{Samples, list_number};
 use crate::slices::Slices;
 
 impl<'a> Slices<'a> {
-    /// The sample P' of a node: [`BuildOptions::samples`](crate::BuildOptions::samples) of its points, or all if it
-    /// is a leaf or has no more.
+    /// The sample P' of a node: [`BuildOptions::samples`](crate::BuildOptions::samples) of its points, or all
+    /// if it is a leaf or has no more.
     ///
     /// # Panics
     /// When there is no such node.
@@ -19,8 +20,8 @@ impl<'a> Slices<'a> {
         samples(self.sample_lists, (node, &self.nodes[node]), (self.leaf_size, self.samples_a_node))
     }
 
-    /// The covering radius: balls of this radius about the samples of a node contain its part of the surface, its points and discs,
-    /// proven so. Infinite where nothing is proven.
+    /// The covering radius: balls of this radius about the samples of a node contain its part of the surface,
+    /// its points and discs, proven so. Infinite where nothing is proven.
     ///
     /// # Panics
     /// When there is no such node.
@@ -30,8 +31,8 @@ impl<'a> Slices<'a> {
         self.coverings[node].radius
     }
 
-    /// r(P') of Definition 4 (Klein & Zachmann 2004), measured: balls of this radius about the samples of a node cover
-    /// its surface.
+    /// r(P') of Definition 4 (Klein & Zachmann 2004), measured: balls of this radius about the samples of a
+    /// node cover its surface.
     ///
     /// # Panics
     /// When there is no such node.
@@ -41,8 +42,8 @@ impl<'a> Slices<'a> {
         self.coverings[node].sampling
     }
 
-    /// How far the samples of a node are heard: m·r(P'), with r(P') by eq. 10 of Klein & Zachmann 2004, that is the
-    /// horizon of points with the node's spacing times √(|P|/|P'|).
+    /// How far the samples of a node are heard: m·r(P'), with r(P') by eq. 10 of Klein & Zachmann 2004, that
+    /// is the horizon of points with the node's spacing times √(|P|/|P'|).
     ///
     /// # Panics
     /// When there is no such node.

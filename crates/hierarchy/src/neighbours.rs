@@ -1,10 +1,10 @@
 //! Neighbour lists: what is heard near each block of points, so that f there needs no descent.
 //!
-//! The lists of molecular dynamics (Verlet 1967), kept for blocks of points instead of particles. About every block
-//! there is a ball outside of which none of its points is heard; the balls of [`PointBlock::WIDTH`] blocks, a group,
-//! stand side by side like points with horizons. The list of a block names groups. It is complete for every place
-//! within some distance of the middle of the block's ball, far enough for every surface point whose nearest stored
-//! point is the block's (`docs/theory/certificates.md`, fact 2).
+//! The lists of molecular dynamics (Verlet 1967), kept for blocks of points instead of particles. About every
+//! block there is a ball outside of which none of its points is heard; the balls of [`PointBlock::WIDTH`]
+//! blocks, a group, stand side by side like points with horizons. The list of a block names groups. It is
+//! complete for every place within some distance of the middle of the block's ball, far enough for every
+//! surface point whose nearest stored point is the block's (`docs/theory/certificates.md`, fact 2).
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
@@ -20,8 +20,9 @@ use crate::spacing::map;
 /// Points of a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
 
-/// No list is longer; a block that hears more has none, and f near it is found by descent. Blocks on surfaces hear
-/// some seven; where the scan is sparse beside dense, or a bandwidth large, lists would be of everything.
+/// No list is longer; a block that hears more has none, and f near it is found by descent. Blocks on surfaces
+/// hear some seven; where the scan is sparse beside dense, or a bandwidth large, lists would be of
+/// everything.
 pub(crate) const MOST_LISTED: usize = 64;
 
 /// Steps towards the least ball about a block (Bădoiu & Clarkson 2003).
@@ -151,8 +152,8 @@ pub(crate) struct Locality {
 }
 
 impl Locality {
-    /// Collects all that is heard where surface points can be whose nearest point is one of `points`, about their
-    /// `middle`; `guess` is what the greatest local radius heard there may be.
+    /// Collects all that is heard where surface points can be whose nearest point is one of `points`, about
+    /// their `middle`; `guess` is what the greatest local radius heard there may be.
     #[inline(always)]
     pub(crate) fn collect<S: Simd>(
         &mut self,
@@ -240,15 +241,15 @@ impl PointHierarchy {
         &self.blocks
     }
 
-    /// The balls outside of which no point of a block is heard, like points with horizons: that of block `i` stands in
-    /// lane `i` % 16 of group `i` / 16.
+    /// The balls outside of which no point of a block is heard, like points with horizons: that of block `i`
+    /// stands in lane `i` % 16 of group `i` / 16.
     #[must_use]
     pub fn groups(&self) -> &[PointBlock] {
         &self.groups
     }
 
-    /// The groups of which a point may be heard within some distance of the middle of the ball of `block`, ascending,
-    /// with that distance; `None` where they are too many, or there is no such block.
+    /// The groups of which a point may be heard within some distance of the middle of the ball of `block`,
+    /// ascending, with that distance; `None` where they are too many, or there is no such block.
     #[must_use]
     pub fn neighbours(&self, block: usize) -> Option<(f32, &[u32])> {
         let list = self.lists.get(block).filter(|list| list.within > 0.0)?;

@@ -19,8 +19,8 @@ pub struct BuildOptions {
     pub radius_neighbours: u32,
     /// Points in a leaf, 4 to 64, default 16. Larger leaves make fewer nodes and dearer leaf tests.
     pub leaf_size: u32,
-    /// Sample points of an inner node, 8 to 32, default 16. More make finer levels and tighter coverings, at four bytes
-    /// each.
+    /// Sample points of an inner node, 8 to 32, default 16. More make finer levels and tighter coverings, at
+    /// four bytes each.
     pub samples: u32,
     /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and
     /// no local radius exceeds it. `None`, the default: twice the sampling radius, so that nothing is

@@ -21,7 +21,8 @@ impl Ball {
     }
 }
 
-/// What tells a scan from others, and where it is. Made whenever a scan is made or loaded, in O(n); not stored.
+/// What tells a scan from others, and where it is. Made whenever a scan is made or loaded, in O(n); not
+/// stored.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outline {
     /// A hash of all points, their frame and their discs, and of what the tree is made by.

@@ -1,7 +1,7 @@
 //! A scan's discs for another metric: what follows from f at the points is made anew.
 //!
-//! Boxes are about the new discs, and so are coverings. What was proven of the surface by straight distances is not proven again:
-//! enclosures and covering radii hold the discs, and nothing is to be certified by them.
+//! Boxes are about the new discs, and so are coverings. What was proven of the surface by straight distances
+//! is not proven again: enclosures and covering radii hold the discs, and nothing is to be certified by them.
 
 use std::ops::Range;
 
@@ -20,16 +20,17 @@ use crate::split::id32;
 use crate::surfels::{Fit, NormalCone, PointKind, Surfel, align, cone, fitted, surfel_of};
 
 impl PointHierarchy {
-    /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about them. Only of the
-    /// Euclidean metric enclosures and covering radii are proven to contain the surface.
+    /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about
+    /// them. Only of the Euclidean metric enclosures and covering radii are proven to contain the surface.
     #[must_use]
     pub fn metric(&self) -> Metric {
         self.metric
     }
 
-    /// Fits the surface at every point by another `metric`: `fit` gives f at a stored point, and adds the points that are heard
-    /// there to a list that is empty. Normals stay on their sides where they [are oriented](Self::is_oriented), and what is
-    /// [sparse](PointKind::is_sparse) stays so. On all cores with the feature `rayon`; the result does not depend on them.
+    /// Fits the surface at every point by another `metric`: `fit` gives f at a stored point, and adds the
+    /// points that are heard there to a list that is empty. Normals stay on their sides where they [are
+    /// oriented](Self::is_oriented), and what is [sparse](PointKind::is_sparse) stays so. On all cores with
+    /// the feature `rayon`; the result does not depend on them.
     ///
     /// # Panics
     /// When a point is heard that is none.

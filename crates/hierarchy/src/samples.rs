@@ -1,10 +1,10 @@
 //! The sample P' of a node: some of its points, spread over it (Klein & Zachmann 2004, §4.2.1).
 //!
-//! As there, a quasi-random number chooses a leaf under the node, random weights a mean of its points, and the
-//! nearest of them is drawn. We differ in three ways, none of which a covering rests on: the mean is that of three
-//! random points of the leaf, for means of all gather in its middle; the nearest point is looked for in that leaf
-//! alone; and of several draws the one furthest from the samples so far is kept (Mitchell 1991), which makes the
-//! distances between them of the same order, as the paper wants them.
+//! As there, a quasi-random number chooses a leaf under the node, random weights a mean of its points, and
+//! the nearest of them is drawn. We differ in three ways, none of which a covering rests on: the mean is that
+//! of three random points of the leaf, for means of all gather in its middle; the nearest point is looked for
+//! in that leaf alone; and of several draws the one furthest from the samples so far is kept (Mitchell 1991),
+//! which makes the distances between them of the same order, as the paper wants them.
 
 use crate::boxes::{dot, sub};
 use crate::covering::Centres;
@@ -21,7 +21,8 @@ pub(crate) const MOST_SAMPLES: usize = 32;
 /// The list of an inner node; the first of its entries are used.
 pub(crate) type List = [u32; MOST_SAMPLES];
 
-/// Draws for each sample: two make the covering radii of large nodes 7 % smaller than one (docs/decisions/0009).
+/// Draws for each sample: two make the covering radii of large nodes 7 % smaller than one
+/// (docs/decisions/0009).
 const DRAWS: usize = 2;
 
 /// 2⁶⁴ over the golden ratio: its multiples are spread evenly over all of 2⁶⁴, however many there are.
@@ -66,13 +67,15 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Which list is that of the inner node `id`: leaves are full, so their number before it follows from its first point.
+/// Which list is that of the inner node `id`: leaves are full, so their number before it follows from its
+/// first point.
 #[inline]
 pub(crate) fn list_number(id: usize, node: &Node, leaf_size: u32) -> usize {
     id - (node.first / leaf_size) as usize
 }
 
-/// `count` distinct points of the inner node `id`, ascending; all of them, and then the last again, if there are no more.
+/// `count` distinct points of the inner node `id`, ascending; all of them, and then the last again, if there
+/// are no more.
 pub(crate) fn draw(
     positions: &[[f32; 3]],
     (id, node): (u32, &Node),

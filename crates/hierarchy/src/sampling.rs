@@ -27,7 +27,8 @@ pub(crate) struct Sampling {
 }
 
 impl Sampling {
-    /// That of points under `nodes`, in whose boxes the reaches are set; `unit` of the points' are one of the caller's.
+    /// That of points under `nodes`, in whose boxes the reaches are set; `unit` of the points' are one of the
+    /// caller's.
     pub(crate) fn of(
         positions: &[[f32; 3]],
         (nodes, boxes): (&[Node], &mut [OrientedBox]),

@@ -1,5 +1,5 @@
-//! What must hold of a hierarchy. What queries rely on for safety and for a bounded cost is checked whenever one is
-//! loaded, what their answers rely on too when the whole file is compared with its checksums
+//! What must hold of a hierarchy. What queries rely on for safety and for a bounded cost is checked whenever
+//! one is loaded, what their answers rely on too when the whole file is compared with its checksums
 //! ([`Check`](nearmiss_store::Check)), and all of it by [`PointHierarchy::sanity_check`].
 
 #[cfg(test)]
@@ -100,8 +100,8 @@ pub(crate) fn check_topology(nodes: &[Node], points: usize, leaf_size: u32) -> R
 }
 
 impl PointHierarchy {
-    /// What queries need to stay within their arrays: lengths, tree, metadata, numbers of boxes in their ranges, and
-    /// neighbour lists that are there. One pass over the nodes; the points are not read.
+    /// What queries need to stay within their arrays: lengths, tree, metadata, numbers of boxes in their
+    /// ranges, and neighbour lists that are there. One pass over the nodes; the points are not read.
     pub(crate) fn check_structure(&self) -> Result<(), Flaw> {
         self.check_lengths()?;
         check_topology(&self.nodes, self.len(), self.leaf_size)?;
@@ -113,8 +113,9 @@ impl PointHierarchy {
         lists::check_ranges(&self.lists, self.listed.len())
     }
 
-    /// What their answers need besides, given the structure: each box lies within its parent's, and every number of
-    /// every point is one that a build writes, and lies within what its leaf says. One pass over the whole.
+    /// What their answers need besides, given the structure: each box lies within its parent's, and every
+    /// number of every point is one that a build writes, and lies within what its leaf says. One pass over
+    /// the whole.
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
         nodes::check(&self.nodes, &self.boxes)?;
         points::check(self)?;
@@ -123,8 +124,9 @@ impl PointHierarchy {
         self.check_summary()
     }
 
-    /// Checks every invariant: what a load checks, that each box of each node holds the discs of all points under it,
-    /// that neighbour lists are complete, and that no point of the input is stored twice. O(n log n); for tests.
+    /// Checks every invariant: what a load checks, that each box of each node holds the discs of all points
+    /// under it, that neighbour lists are complete, and that no point of the input is stored twice. O(n log
+    /// n); for tests.
     ///
     /// # Errors
     /// Names the first that does not hold.

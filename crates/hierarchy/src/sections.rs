@@ -108,9 +108,10 @@ impl PointHierarchy {
         Ok(())
     }
 
-    /// The hierarchy in `file`, its arrays in place. With either `check` the structure is looked through: lengths
-    /// agree, every node's children and points are there, numbers of boxes and lists lie in their ranges. With [`Check::Full`]
-    /// each box also lies within its parent's, and the numbers of every point are looked at.
+    /// The hierarchy in `file`, its arrays in place. With either `check` the structure is looked through:
+    /// lengths agree, every node's children and points are there, numbers of boxes and lists lie in their
+    /// ranges. With [`Check::Full`] each box also lies within its parent's, and the numbers of every point
+    /// are looked at.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

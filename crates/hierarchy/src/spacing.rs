@@ -1,9 +1,9 @@
 //! Local sampling radii.
 //!
 //! A point's spacing is the distance to its K-th nearest neighbour, with K growing up to 256 while those
-//! neighbours look like a line, as the returns of one LiDAR ring do. It is then made smooth,
-//! `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region; lines without
-//! another beside them and bends in rings, whose distances say nothing of a surface, are no such j.
+//! neighbours look like a line, as the returns of one LiDAR ring do. It is then made smooth, `r_i := min_j
+//! (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region; lines without another
+//! beside them and bends in rings, whose distances say nothing of a surface, are no such j.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -18,9 +18,9 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// How many neighbours are looked at where the first look like a line; doubled while they all do.
 const LINE_NEIGHBOURS: usize = 32;
 
-/// Points along a ring may be so many times nearer than the next ring is, twice over: 256 neighbours reach a ring
-/// a hundred spacings away, as sixteen beams 2° apart, 0.2° along, leave it on a floor met at a slope of one in
-/// ten. What is alone for longer is a wire, or stands for itself.
+/// Points along a ring may be so many times nearer than the next ring is, twice over: 256 neighbours reach a
+/// ring a hundred spacings away, as sixteen beams 2° apart, 0.2° along, leave it on a floor met at a slope of
+/// one in ten. What is alone for longer is a wire, or stands for itself.
 const MOST_NEIGHBOURS: usize = 256;
 
 /// λ2 < 0.05 λ3 is what a line of points with noise looks like.
@@ -136,8 +136,8 @@ impl<'a> Search<'a> {
         (self.block, self.count) = (block, 0);
     }
 
-    /// The points of the block that surely see an area, as bits: those of which [`Self::spacing`] says so at once. All are looked at
-    /// together.
+    /// The points of the block that surely see an area, as bits: those of which [`Self::spacing`] says so at
+    /// once. All are looked at together.
     fn plain(&mut self, neighbours: usize) -> u64 {
         self.tree.nearest(self.level, self.block, neighbours, &mut self.found);
         self.count = neighbours;
@@ -198,8 +198,8 @@ impl<'a> Search<'a> {
         (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
     }
 
-    /// Makes `near` hold point `i` of the block and the nearest `count` others. Those of the whole block are found at
-    /// once.
+    /// Makes `near` hold point `i` of the block and the nearest `count` others. Those of the whole block are
+    /// found at once.
     fn look(&mut self, i: usize, count: usize) {
         if count > self.count {
             self.tree.nearest(self.level, self.block, count, &mut self.found);
@@ -284,8 +284,8 @@ impl Sums {
         [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
     }
 
-    /// Whether any of the points `near` lies more across the main direction than along it, seen from the first: an
-    /// arc grows wide too, but the next ring alone has points beside it.
+    /// Whether any of the points `near` lies more across the main direction than along it, seen from the
+    /// first: an arc grows wide too, but the next ring alone has points beside it.
     fn lies_across(&self, points: &[[f32; 3]], near: &[(f64, usize)]) -> bool {
         let main = symmetric_eigen(self.covariance()).vectors[2];
         let origin = points[near[0].1];

@@ -24,12 +24,12 @@ use crate::neighbours::{Locality, chunks};
 use crate::slices::{ball, cell_radius, obstacle_ball};
 use crate::spacing::{Look, Spacing};
 
-/// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a square
-/// lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
+/// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a
+/// square lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
 const DISC: f32 = 0.65;
 
-/// Disc radius over local sampling radius at a border. Local radii grow there, to some 1.3 times those inside,
-/// and two discs must not bridge a sampling radius.
+/// Disc radius over local sampling radius at a border. Local radii grow there, to some 1.3 times those
+/// inside, and two discs must not bridge a sampling radius.
 const DISC_AT_BORDER: f32 = 0.35;
 
 /// Sectors into which the tangent plane is divided, equal on a diamond: of 11 to 18 degrees.
@@ -388,8 +388,8 @@ fn disc(gap: u32) -> f32 {
     DISC - (DISC - DISC_AT_BORDER) * border
 }
 
-/// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at `p`; such points are
-/// in the blocks `near`.
+/// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at
+/// `p`; such points are in the blocks `near`.
 #[inline(always)]
 fn widest_gap<'a, S: Simd>(
     simd: S,

@@ -1,8 +1,10 @@
-//! The tree with four children a node, whose boxes stand side by side: sixteen pairs of boxes are compared in one pass.
+//! The tree with four children a node, whose boxes stand side by side: sixteen pairs of boxes are compared in
+//! one pass.
 //!
-//! Every other level of the binary tree is left out. What a boolean query costs is pairs of boxes, and with sixteen in the
-//! lanes of a register a pair costs a sixth of what it costs four at a time; the boxes of a level that is left out would have
-//! parted few (docs/decisions). Made from the binary tree whenever that is made or loaded, in O(nodes): nothing of it is stored.
+//! Every other level of the binary tree is left out. What a boolean query costs is pairs of boxes, and with
+//! sixteen in the lanes of a register a pair costs a sixth of what it costs four at a time; the boxes of a
+//! level that is left out would have parted few (docs/decisions). Made from the binary tree whenever that is
+//! made or loaded, in O(nodes): nothing of it is stored.
 
 mod family;
 mod nearest;
@@ -32,7 +34,8 @@ const TURNS: u32 = 64;
 
 type Lanes = [f32; WIDTH];
 
-/// A node of a [`WideTree`]: a leaf by its number in the order of the points, or an inner node by its place there.
+/// A node of a [`WideTree`]: a leaf by its number in the order of the points, or an inner node by its place
+/// there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Child(u32);
 
@@ -107,7 +110,8 @@ pub struct WideTree {
 }
 
 impl WideTree {
-    /// Every other level of the tree of these nodes, level by level: what all queries look at stands together.
+    /// Every other level of the tree of these nodes, level by level: what all queries look at stands
+    /// together.
     pub(crate) fn of(scan: &PointHierarchy) -> Self {
         let slices = scan.slices();
         let Slices { nodes, boxes, leaf_size, .. } = slices;
@@ -236,12 +240,14 @@ impl WideStack {
     }
 }
 
-/// Visits the pairs of leaves of `a` and `b` whose boxes are no further apart than `reach`, in a's frame, until `visitor` ends it.
+/// Visits the pairs of leaves of `a` and `b` whose boxes are no further apart than `reach`, in a's frame,
+/// until `visitor` ends it.
 ///
-/// Of siblings the pair that overlaps most comes first, and so on down to the leaves. Where nothing is found there and the visitor wants
-/// any, the next is the pair that overlaps most of all that are left: the neighbours of leaves that do not meet seldom do (plunging, as
-/// branch and bound calls it; docs/decisions). After so many turns, the others are looked at depth first: what meets would have
-/// been found, and looking for the best would take longer than looking at all.
+/// Of siblings the pair that overlaps most comes first, and so on down to the leaves. Where nothing is found
+/// there and the visitor wants any, the next is the pair that overlaps most of all that are left: the
+/// neighbours of leaves that do not meet seldom do (plunging, as branch and bound calls it; docs/decisions).
+/// After so many turns, the others are looked at depth first: what meets would have been found, and looking
+/// for the best would take longer than looking at all.
 pub fn descend_wide<V: LeafVisitor>(
     (a, b): (&Slices<'_>, &Slices<'_>),
     relative: &Relative,
@@ -325,8 +331,8 @@ fn descend_by<S: Simd, V: LeafVisitor>(
     ControlFlow::Continue(())
 }
 
-/// Which nodes of a pair that are not both leaves stay whole: leaves, and those that are less than half as long as the other, of which
-/// lengths are `scale` times as long.
+/// Which nodes of a pair that are not both leaves stay whole: leaves, and those that are less than half as
+/// long as the other, of which lengths are `scale` times as long.
 ///
 /// # Panics
 /// When there are no such nodes.

@@ -61,8 +61,8 @@ fn samples_are_distinct_points_of_their_node() {
     assert!(lists > 1000, "{lists} lists");
 }
 
-/// Whatever is ok, zero of f or not, is in the coverings of all nodes of its nearest point; and so are the discs, with room for
-/// no more than a box about them asks for.
+/// Whatever is ok, zero of f or not, is in the coverings of all nodes of its nearest point; and so are the
+/// discs, with room for no more than a box about them asks for.
 #[test]
 fn coverings_contain_what_is_ok_and_are_no_larger_than_boxes_ask_for() {
     let (mut places, mut nodes, mut share) = (0, 0, 0.0);
@@ -124,8 +124,8 @@ fn surface_points_are_in_the_coverings_of_every_node_of_their_nearest_point() {
     assert!(found > 5000, "{found} surface points");
 }
 
-/// Definition 4 as it is measured: each disc is in one ball, and the radius is no larger than discs with their thickness, and
-/// balls, ask for.
+/// Definition 4 as it is measured: each disc is in one ball, and the radius is no larger than discs with
+/// their thickness, and balls, ask for.
 #[test]
 fn sampling_radii_equal_the_twin() {
     let (mut nodes, mut exact) = (0, 0);

@@ -1,5 +1,5 @@
-//! Enclosures against the surface itself: zeros of f found by projection, and places of status ok, driven outwards as
-//! long as they stay ok, each in the enclosure of every node that holds its nearest point.
+//! Enclosures against the surface itself: zeros of f found by projection, and places of status ok, driven
+//! outwards as long as they stay ok, each in the enclosure of every node that holds its nearest point.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::PointCloud;
@@ -31,8 +31,8 @@ fn check_enclosed(scan: &PointHierarchy, enclosures: &[OrientedBox], x: [f64; 3]
     }
 }
 
-/// Starts at `count` places near points of `scan` where the status is ok, and takes steps that lead further out of the
-/// leaf's enclosure and keep it ok. How many starts there were.
+/// Starts at `count` places near points of `scan` where the status is ok, and takes steps that lead further
+/// out of the leaf's enclosure and keep it ok. How many starts there were.
 fn driven_outwards(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
     let mut scratch = GatherScratch::default();
     let mut random = arbitrary::rng(seed);

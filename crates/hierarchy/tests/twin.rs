@@ -64,7 +64,8 @@ fn radii_equal_the_twin() {
             let is_line = scan.kind(i) == PointKind::Line && found < expected;
             differ += u32::from((found / expected - 1.0).abs() > 1e-5 && !is_line);
         }
-        // Which of several equally near neighbours counts is open; it matters where they are judged as a line.
+        // Which of several equally near neighbours counts is open; it matters where they are judged as a
+        // line.
         let most = if matches!(kind, CloudKind::Lattice | CloudKind::Rings) { 20 } else { 0 };
         assert!(differ <= most, "{kind:?}: {differ} of {} radii differ", expected.len());
     }

@@ -59,8 +59,8 @@ impl fmt::Display for Format {
 /// Endings of names of text files that hold points and nothing else.
 const TEXT_ENDINGS: [&str; 9] = ["xyz", "csv", "txt", "asc", "pts", "xyzn", "xyzrgb", "3d", "neu"];
 
-/// The format of a file of this length from its start, 64 KiB unless it is shorter; refuses those that are known but cannot be
-/// read.
+/// The format of a file of this length from its start, 64 KiB unless it is shorter; refuses those that are
+/// known but cannot be read.
 pub(crate) fn recognise(bytes: &[u8], length: u64, name: &Path) -> Result<Format, ReadError> {
     let unsupported = |format| ReadError::Unsupported { path: name.into(), format };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or_default();

@@ -17,11 +17,12 @@ use header::{Encoding, Field, Header, Part};
 /// Memory that reading takes for each point, beside its bytes: in double precision, then rounded and sorted.
 const BYTES_A_POINT: u128 = 64;
 
-/// Compressed data may take this much memory whatever their length: two million points, all of them at one place.
+/// Compressed data may take this much memory whatever their length: two million points, all of them at one
+/// place.
 const FREE: u128 = 128 << 20;
 
-/// Beyond it, so much for each compressed byte. Scans take some 10 bytes of memory a byte; frames most of whose pixels
-/// saw nothing up to 100. Made to harm, a byte gives 2000.
+/// Beyond it, so much for each compressed byte. Scans take some 10 bytes of memory a byte; frames most of
+/// whose pixels saw nothing up to 100. Made to harm, a byte gives 2000.
 const BYTES_A_BYTE: u128 = 128;
 
 /// The content of a PCD file.

@@ -1,6 +1,7 @@
 //! Files of points larger than memory: row by row, a block at a time.
 //!
-//! What the whole-file readers know of a row is used here too; what they say of a broken file is said here in the same words.
+//! What the whole-file readers know of a row is used here too; what they say of a broken file is said here in
+//! the same words.
 
 use std::fmt;
 use std::fs::File;
@@ -82,10 +83,12 @@ impl Encoding {
     }
 }
 
-/// Opens a file for going over its points, of which some `block` bytes are read at a time; meshes are read whole.
+/// Opens a file for going over its points, of which some `block` bytes are read at a time; meshes are read
+/// whole.
 ///
-/// PLY of vertices alone, PCD that is not compressed, and text are never in memory as a whole, only a block (more if a row is longer)
-/// and its points, which take up to eight times as much. Others are read as by [`read`](crate::read()).
+/// PLY of vertices alone, PCD that is not compressed, and text are never in memory as a whole, only a block
+/// (more if a row is longer) and its points, which take up to eight times as much. Others are read as by
+/// [`read`](crate::read()).
 ///
 /// # Errors
 /// As [`read`](crate::read()), as far as the header tells. That there are too few points for a cloud is none.
@@ -136,7 +139,8 @@ impl PointPieces {
     /// Goes over all points from the first on, and hands out some at a time. Can be done again.
     ///
     /// # Errors
-    /// When the file cannot be read, or a row is broken: which, and where. What came before it has been handed out.
+    /// When the file cannot be read, or a row is broken: which, and where. What came before it has been
+    /// handed out.
     pub fn each(&self, mut take: impl FnMut(&[[f64; 3]])) -> Result<(), ReadError> {
         match &self.source {
             Source::Whole(points) => take(points),

@@ -1,4 +1,5 @@
-//! PLY, after Greg Turk, "The PLY Polygon File Format" (Stanford, 1994): ascii and binary in both byte orders.
+//! PLY, after Greg Turk, "The PLY Polygon File Format" (Stanford, 1994): ascii and binary in both byte
+//! orders.
 //!
 //! Points come from the element `vertex`, triangles from `face` (polygons, as fans) and `tristrips`; whatever
 //! else the header declares is stepped over. Bytes after the last element of a binary file are ignored as by
@@ -31,7 +32,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     }
 }
 
-/// How to go over the vertices of a file that begins like this, if there is nothing else in it and it is not broken.
+/// How to go over the vertices of a file that begins like this, if there is nothing else in it and it is not
+/// broken.
 pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     let (header, lines) = header::parse(head).ok()?;
     let mut elements = header.elements.into_iter().filter(|e| !e.properties.is_empty() && e.count > 0);

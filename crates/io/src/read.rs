@@ -13,8 +13,8 @@ use crate::{obj, pcd, ply, xyz};
 /// Reads the points of a file, and its triangles where it has faces.
 ///
 /// Without a `format` the content decides, then the name. The whole file is held in memory while it is read,
-/// and what is allocated besides is bounded by the file's length, never by a count in its header: some tens of bytes
-/// for each of its own, 128 for compressed ones beyond a first 128 MiB.
+/// and what is allocated besides is bounded by the file's length, never by a count in its header: some tens
+/// of bytes for each of its own, 128 for compressed ones beyond a first 128 MiB.
 ///
 /// # Errors
 /// Says which file, what is wrong and where; never panics, whatever the file holds.

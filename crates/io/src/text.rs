@@ -28,7 +28,8 @@ impl<'a> Lines<'a> {
         Self { bytes, offset: 0, number: 0, end }
     }
 
-    /// The lines of a further piece of a text, of which the last line before has this number, and every line ends with this byte.
+    /// The lines of a further piece of a text, of which the last line before has this number, and every line
+    /// ends with this byte.
     pub(crate) fn going_on(bytes: &'a [u8], number: u64, end: u8) -> Self {
         Self { bytes, offset: 0, number, end }
     }

@@ -24,7 +24,8 @@ pub enum WriteError {
         /// How many points there are.
         points: usize,
     },
-    /// An edge or a triangle that names a point which is not there, or which PLY's 31-bit indices cannot name.
+    /// An edge or a triangle that names a point which is not there, or which PLY's 31-bit indices cannot
+    /// name.
     #[error("{element} {index} names point {point}, but there are {points} points")]
     NoSuchPoint {
         /// `edge` or `face`.
@@ -160,8 +161,8 @@ impl<'a> PlyPoints<'a> {
     /// Writes header and content; `out` need not be buffered.
     ///
     /// # Errors
-    /// When the output fails; and, before anything is written, when there is not one normal, colour, source or
-    /// further number for each point, or when an edge or triangle names a point that is not there.
+    /// When the output fails; and, before anything is written, when there is not one normal, colour, source
+    /// or further number for each point, or when an edge or triangle names a point that is not there.
     pub fn write(&self, out: &mut impl Write) -> Result<(), WriteError> {
         self.check()?;
         let mut out = BufWriter::with_capacity(1 << 16, out);

@@ -3,8 +3,8 @@
 /// A triangle has three corners, and each of the six walls of a box adds at most one.
 const MOST_CORNERS: usize = 9;
 
-/// By this share of the way to the middle of its piece a corner is drawn inwards, so that it lies inside its box and not on a
-/// wall.
+/// By this share of the way to the middle of its piece a corner is drawn inwards, so that it lies inside its
+/// box and not on a wall.
 const INWARDS: f64 = 1.0 / 1_048_576.0;
 
 /// A convex polygon in the lattice's own coordinates, in which boxes have side 1.
@@ -58,7 +58,8 @@ impl Piece {
         parts
     }
 
-    /// What lies from the first wall across `axis` to the last, cut at every wall; hands out what lies between two.
+    /// What lies from the first wall across `axis` to the last, cut at every wall; hands out what lies
+    /// between two.
     fn cut(mut self, axis: usize, boxes: u32, mut each: impl FnMut(Self)) {
         let boxes = f64::from(boxes);
         let [low, high] = self.extent(axis);
@@ -95,13 +96,15 @@ pub struct Lattice {
 /// In sides of boxes; coordinates further out may overflow on the way to where they are cut.
 const FARTHEST: f64 = 1e150;
 
-/// Cuts a triangle along the walls of a lattice and hands out the corners of the pieces, each drawn a millionth of the way to the middle
-/// of its piece. Tells whether the whole triangle lies in the lattice: what does not is left out, and all of a triangle with a corner that
-/// is not finite, or further out than 1e150 boxes.
+/// Cuts a triangle along the walls of a lattice and hands out the corners of the pieces, each drawn a
+/// millionth of the way to the middle of its piece. Tells whether the whole triangle lies in the lattice:
+/// what does not is left out, and all of a triangle with a corner that is not finite, or further out than
+/// 1e150 boxes.
 ///
-/// So every box that holds more of the surface than rounding gets a sample, and its least and greatest coordinates are those of the surface in
-/// it, to a millionth. Boxes are half open: what lies in a wall belongs to the box above. Costs some ten nanoseconds
-/// a sample, and a step a box along each axis, however far the triangle reaches.
+/// So every box that holds more of the surface than rounding gets a sample, and its least and greatest
+/// coordinates are those of the surface in it, to a millionth. Boxes are half open: what lies in a wall
+/// belongs to the box above. Costs some ten nanoseconds a sample, and a step a box along each axis, however
+/// far the triangle reaches.
 pub fn lattice_samples(triangle: [[f64; 3]; 3], lattice: &Lattice, mut each: impl FnMut([f64; 3])) -> bool {
     let Lattice { origin, sides, counts } = *lattice;
     let corners = triangle.map(|corner| [0, 1, 2].map(|k| (corner[k] - origin[k]) / sides[k]));

@@ -31,8 +31,9 @@ pub enum Samples {
 pub struct SampleOptions {
     /// How many.
     pub samples: Samples,
-    /// What is random depends on it. Without, samples at a spacing lie in rows; with one, each is moved at random, which takes
-    /// a little over half as many again. A count is random always, of seed 0 if none is given.
+    /// What is random depends on it. Without, samples at a spacing lie in rows; with one, each is moved at
+    /// random, which takes a little over half as many again. A count is random always, of seed 0 if none is
+    /// given.
     pub seed: Option<u64>,
 }
 
@@ -79,8 +80,9 @@ pub enum SampleError {
 
 /// Points on the triangles of a mesh.
 ///
-/// At a spacing, each triangle is sampled by itself, in rows along its longest side; what two triangles share is sampled twice. So many
-/// in all are drawn triangle by triangle, each getting as many as its area is worth, give or take one.
+/// At a spacing, each triangle is sampled by itself, in rows along its longest side; what two triangles share
+/// is sampled twice. So many in all are drawn triangle by triangle, each getting as many as its area is
+/// worth, give or take one.
 ///
 /// # Errors
 /// When the options make no sense, or the mesh is not finite.

@@ -58,8 +58,8 @@ impl Triangle {
 
     /// Places in rows along the base, both at most `step` apart, corners and sides included.
     ///
-    /// No place of the triangle is further than √5/2 steps from one: below it is a row, at most a step away, that reaches at least as
-    /// far to both sides, as the angles at the longest side are no wider than right.
+    /// No place of the triangle is further than √5/2 steps from one: below it is a row, at most a step away,
+    /// that reaches at least as far to both sides, as the angles at the longest side are no wider than right.
     pub(crate) fn rows(&self, step: f64, mut each: impl FnMut([f64; 3])) {
         let rows = (self.height / step).ceil();
         for i in whole(rows) {

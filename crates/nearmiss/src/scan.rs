@@ -110,13 +110,15 @@ impl Scan {
         Ok(Self { hierarchy: Arc::new(PointHierarchy::build(cloud, options)?), graph: None, density: None })
     }
 
-    /// The same scan, which is of `cloud`, with a graph over its points, by which normals are turned to one side: that of the
-    /// cloud's own normals where it has some, towards `scanner`, a place in the frame of the cloud, where that is
-    /// known, or outwards. Takes some three times as long as [`Scan::build`], without the map of close pairs half as long.
+    /// The same scan, which is of `cloud`, with a graph over its points, by which normals are turned to one
+    /// side: that of the cloud's own normals where it has some, towards `scanner`, a place in the frame of
+    /// the cloud, where that is known, or outwards. Takes some three times as long as [`Scan::build`],
+    /// without the map of close pairs half as long.
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, GraphOptions, PointCloud, Scan};
-    /// # let points: Vec<[f64; 3]> = (0..400_u32).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
+    /// # let points: Vec<[f64; 3]> =
+    /// #     (0..400_u32).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
     /// let cloud = PointCloud::from_positions(&points)?;
     /// let above = [10.0, 10.0, 5.0];
     /// let scan = Scan::build(&cloud, &BuildOptions::default())?;
@@ -127,8 +129,9 @@ impl Scan {
     /// ```
     ///
     /// # Errors
-    /// Names the option that is out of range. [`GraphError::NoClosePairs`] where the scan [is for the geodesic
-    /// kernel](Self::with_geodesic_kernel), for which it is then fitted again, and the map is not wanted.
+    /// Names the option that is out of range. [`GraphError::NoClosePairs`] where the scan [is for the
+    /// geodesic kernel](Self::with_geodesic_kernel), for which it is then fitted again, and the map is not
+    /// wanted.
     pub fn with_graph(
         self,
         cloud: &PointCloud,
@@ -153,13 +156,15 @@ impl Scan {
         }
     }
 
-    /// The same scan for the geodesic kernel: its normals, discs and boxes are those of f with distances along its graph, which
-    /// keeps sheets apart that straight distances merge, and so are the answers of queries (Klein & Zachmann 2005, §3). Nothing
-    /// is certified of it but witnesses. What it is for is kept in the file.
+    /// The same scan for the geodesic kernel: its normals, discs and boxes are those of f with distances
+    /// along its graph, which keeps sheets apart that straight distances merge, and so are the answers of
+    /// queries (Klein & Zachmann 2005, §3). Nothing is certified of it but witnesses. What it is for is kept
+    /// in the file.
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, GraphOptions, PointCloud, Metric, Scan};
-    /// # let points: Vec<[f64; 3]> = (0..400_u32).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
+    /// # let points: Vec<[f64; 3]> =
+    /// #     (0..400_u32).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
     /// let cloud = PointCloud::from_positions(&points)?;
     /// let scan = Scan::build(&cloud, &BuildOptions::default())?;
     /// let scan = scan.with_graph(&cloud, &GraphOptions::default(), None)?.with_geodesic_kernel()?;
@@ -191,8 +196,8 @@ impl Scan {
         self.graph.as_deref()
     }
 
-    /// f with distances along the graph (Klein & Zachmann 2005, eq. 5) in the frame of the stored positions; `None` without a graph or its map of
-    /// close pairs.
+    /// f with distances along the graph (Klein & Zachmann 2005, eq. 5) in the frame of the stored positions;
+    /// `None` without a graph or its map of close pairs.
     #[must_use]
     pub fn geodesic_kernel(&self) -> Option<GeodesicKernel<'_>> {
         self.graph.as_ref()?.kernel(samples(&self.hierarchy))
@@ -207,8 +212,9 @@ impl Scan {
         self.writer(&meta)?.save(path)
     }
 
-    /// Makes what searches along the graph make when they first want it, if there is a graph: some tenths of a second for a million
-    /// points with a map of close pairs, some second and a half without. So the first [`Interpolation`](crate::Interpolation) takes no longer than the next, and keeps its deadline.
+    /// Makes what searches along the graph make when they first want it, if there is a graph: some tenths of
+    /// a second for a million points with a map of close pairs, some second and a half without. So the first
+    /// [`Interpolation`](crate::Interpolation) takes no longer than the next, and keeps its deadline.
     pub fn make_ready(&self) {
         if let Some(graph) = &self.graph {
             graph.make_ready(samples(&self.hierarchy));
@@ -257,14 +263,16 @@ impl Scan {
     /// Opens a saved scan by mapping it: nothing is copied, and with [`Check::Structure`] little is read.
     ///
     /// [`Check::Structure`] looks through the nodes and their boxes, for files one has written oneself.
-    /// [`Check::Full`], for all others, compares checksums too, and looks at every number of every point: what it
-    /// lets pass could have been written by [`Scan::save`]. Either way a query ends, and never leaves its arrays.
+    /// [`Check::Full`], for all others, compares checksums too, and looks at every number of every point:
+    /// what it lets pass could have been written by [`Scan::save`]. Either way a query ends, and never leaves
+    /// its arrays.
     ///
-    /// The file must not be changed in place while it is open (see `nearmiss_store::File::open`); replacing it
-    /// by [`Scan::save`] is fine.
+    /// The file must not be changed in place while it is open (see `nearmiss_store::File::open`); replacing
+    /// it by [`Scan::save`] is fine.
     ///
     /// # Errors
-    /// When the file cannot be opened, is no prepared scan, of another version, damaged, or contradicts itself.
+    /// When the file cannot be opened, is no prepared scan, of another version, damaged, or contradicts
+    /// itself.
     pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Self, LoadError> {
         Self::load(&File::open(path, check)?, check)
     }
@@ -298,8 +306,8 @@ impl Scan {
         Ok(Self { hierarchy: Arc::new(hierarchy), graph: graph.map(Arc::new), density: meta.density })
     }
 
-    /// The scan in a pose, which leads from the frame of its input to the world; f is by the kernel that the scan [is
-    /// for](PointHierarchy::metric).
+    /// The scan in a pose, which leads from the frame of its input to the world; f is by the kernel that the
+    /// scan [is for](PointHierarchy::metric).
     #[must_use]
     pub fn at(&self, pose: &Pose) -> ScanView<'_> {
         let view = ScanView::new(&self.hierarchy, pose);

@@ -81,8 +81,8 @@ fn a_proof_covers_all_pairs_of_points() {
     assert!(proven > 20 && most > 20, "{proven} proofs of up to {most} pairs");
 }
 
-/// A bowl of few points, a lot of nothing, and a small patch inside the bowl whose discs miss the bowl's, though the
-/// leaves are compared: other pairs being proven apart says nothing of these.
+/// A bowl of few points, a lot of nothing, and a small patch inside the bowl whose discs miss the bowl's,
+/// though the leaves are compared: other pairs being proven apart says nothing of these.
 #[test]
 fn leaves_that_were_compared_are_not_certified() {
     let lattice = |step: f64, height: &dyn Fn(f64, f64) -> f64| -> Vec<[f64; 3]> {
@@ -110,8 +110,8 @@ fn leaves_that_were_compared_are_not_certified() {
     }
 }
 
-/// Two grids along the axes that meet at a rim, where a neighbour of a rim point lies exactly across: a zero of either
-/// sign once made its cell vanish.
+/// Two grids along the axes that meet at a rim, where a neighbour of a rim point lies exactly across: a zero
+/// of either sign once made its cell vanish.
 #[test]
 fn grids_along_the_axes_are_enclosed_to_their_rims() {
     let grid: Vec<[f64; 3]> =

@@ -1,4 +1,5 @@
-//! Scans for the geodesic kernel: what they keep apart, where they agree with straight distances, and what is kept of them.
+//! Scans for the geodesic kernel: what they keep apart, where they agree with straight distances, and what is
+//! kept of them.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::graph::SurfaceGraphMeta;
@@ -84,7 +85,8 @@ fn leaning(scan: &Scan) -> Vec<f32> {
 #[test]
 fn discs_of_close_plates_lie_on_them() {
     let h = bandwidth();
-    // In h: the distance; ambiguous points, and the median angle, at most by the geodesic and at least by the straight kernel.
+    // In h: the distance; ambiguous points, and the median angle, at most by the geodesic and at least by the
+    // straight kernel.
     for (s, ambiguous, angle) in
         [(1.5, [0.25, 0.8], [2.0, 2.5]), (1.8, [0.05, 0.15], [0.1, 1.2]), (2.0, [0.02, 0.015], [0.1, 0.7])]
     {

@@ -1,5 +1,5 @@
-//! The same scene elsewhere, turned, larger or smaller, is the same scene; so it is with its scans exchanged, their
-//! points in another order, given twice, or more of them.
+//! The same scene elsewhere, turned, larger or smaller, is the same scene; so it is with its scans exchanged,
+//! their points in another order, given twice, or more of them.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss::{
@@ -215,7 +215,8 @@ fn a_finer_mesh_answers_as_the_coarser_did() {
     assert!(hits > 50 && apart > 100, "{hits} hits, {apart} apart");
 }
 
-/// A graph turns normals, and no verdict looks at their signs: the same bits but for the sides of a contact's normals.
+/// A graph turns normals, and no verdict looks at their signs: the same bits but for the sides of a contact's
+/// normals.
 #[test]
 fn a_graph_changes_no_verdict() {
     let mut rng = arbitrary::rng(12);

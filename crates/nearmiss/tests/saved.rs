@@ -96,8 +96,8 @@ fn a_graph_is_kept_as_it_was_asked_for() {
     assert!(sizes.is_sorted_by(|a, b| a < b), "{sizes:?}");
 }
 
-/// Whatever sign normals had: those of a closed surface point outwards, those of an open one to the scanner, or as the
-/// cloud's own; and f has their sign.
+/// Whatever sign normals had: those of a closed surface point outwards, those of an open one to the scanner,
+/// or as the cloud's own; and f has their sign.
 #[test]
 fn normals_are_turned_outwards_to_the_scanner_or_as_given() {
     let ball = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 2000, 5)).unwrap();

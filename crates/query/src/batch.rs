@@ -1,8 +1,8 @@
 //! Many questions at once, on the threads of the current rayon pool.
 //!
-//! Workers take the questions in order, some at a time, so that the first ones are answered first. What a question
-//! is answered depends on nothing but the question: a batch says what single queries say, bit for bit, on any number
-//! of threads. Only a deadline, which no clock repeats, can change that.
+//! Workers take the questions in order, some at a time, so that the first ones are answered first. What a
+//! question is answered depends on nothing but the question: a batch says what single queries say, bit for
+//! bit, on any number of threads. Only a deadline, which no clock repeats, can change that.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,8 +18,8 @@ use crate::options::CollidePlan;
 use crate::verdict::{Answer, Reason, Statistics, Verdict};
 use crate::view::ScanView;
 
-/// Questions that a worker takes at once: few enough that those cut short by a deadline, a look at the clock each,
-/// take some microseconds together, and enough to hide the lock.
+/// Questions that a worker takes at once: few enough that those cut short by a deadline, a look at the clock
+/// each, take some microseconds together, and enough to hide the lock.
 const MOST_AT_ONCE: usize = 16;
 
 /// Of a small batch each worker has so many turns, so that a hard question holds up few others.
@@ -66,11 +66,11 @@ pub fn collide_many(
 /// Whether the two scans of each question meet, as `plan` means it: the answers of
 /// [`collide_with`], in order.
 ///
-/// With [`Until::First`] they end with the first hit. A budget of work holds for each question. A deadline holds for
-/// all: questions not begun by then are undecided, with a likelihood of a half and no work spent.
+/// With [`Until::First`] they end with the first hit. A budget of work holds for each question. A deadline
+/// holds for all: questions not begun by then are undecided, with a likelihood of a half and no work spent.
 ///
-/// Runs on the current rayon pool (`pool.install(|| …)` chooses one), or on the calling thread without the feature
-/// `rayon`. Does not allocate once `scratch` is warm.
+/// Runs on the current rayon pool (`pool.install(|| …)` chooses one), or on the calling thread without the
+/// feature `rayon`. Does not allocate once `scratch` is warm.
 pub fn collide_many_with<'s>(
     questions: &[[ScanView<'_>; 2]],
     plan: &CollidePlan,
@@ -107,9 +107,12 @@ pub fn collide_poses(
 ///
 /// use nearmiss_geometry::{PointCloud, Pose};
 /// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-/// use nearmiss_query::{BatchScratch, Budget, CollideOptions, CollidePlan, Deadline, Until, collide_poses_with};
+/// use nearmiss_query::{
+///     BatchScratch, Budget, CollideOptions, CollidePlan, Deadline, Until, collide_poses_with,
+/// };
 ///
-/// let points: Vec<[f32; 3]> = (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
 /// let square = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
 /// let plan = CollidePlan::new(&CollideOptions::default(), &square, &square)?;
 ///
@@ -121,7 +124,8 @@ pub fn collide_poses(
 /// let mut scratch = BatchScratch::default();
 /// let answers = collide_poses_with([&square, &square], &path, &plan, &budget, Until::First, &mut scratch);
 /// assert_eq!(answers.len(), 7, "with step 6");
-/// assert!(answers[6].verdict.is_intersecting() && answers[..6].iter().all(|answer| answer.verdict.is_separated()));
+/// assert!(answers[6].verdict.is_intersecting());
+/// assert!(answers[..6].iter().all(|answer| answer.verdict.is_separated()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn collide_poses_with<'s>(
@@ -164,12 +168,12 @@ pub(crate) fn ask_all(
     &scratch.answers
 }
 
-/// Answers question i into `answers[i]`, whatever a question and an answer are: `ask` is given i and a scratch, and
-/// breaks with the answer after which none is wanted. Returns how many are told: all up to the first that breaks, in
-/// the order of the questions; what stands after them means nothing.
+/// Answers question i into `answers[i]`, whatever a question and an answer are: `ask` is given i and a
+/// scratch, and breaks with the answer after which none is wanted. Returns how many are told: all up to the
+/// first that breaks, in the order of the questions; what stands after them means nothing.
 ///
-/// The workhorse of [`collide_many`], for those who measure, prove or parse on the way. Questions not begun by
-/// `deadline` keep what stood there. Threads and memory as for [`collide_many_with`].
+/// The workhorse of [`collide_many`], for those who measure, prove or parse on the way. Questions not begun
+/// by `deadline` keep what stood there. Threads and memory as for [`collide_many_with`].
 pub fn answer_each<T: Send>(
     answers: &mut [T],
     deadline: Option<Deadline>,

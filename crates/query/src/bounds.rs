@@ -1,14 +1,16 @@
 //! Lower bounds of how far oriented boxes in relative motion are apart, sixteen pairs at a time.
 //!
-//! Along the face normals alone boxes may come out two thirds nearer than they are: enough to tell whether they touch, too little to tell
-//! how far off they are. So a box's centre is projected onto the other box and back (Cheney & Goldstein, "Proximity maps for
-//! convex sets", Proc. AMS 10, 1959), and both are measured along the line between the two feet. Any line gives a lower bound; that
-//! between the nearest places gives the distance.
+//! Along the face normals alone boxes may come out two thirds nearer than they are: enough to tell whether
+//! they touch, too little to tell how far off they are. So a box's centre is projected onto the other box and
+//! back (Cheney & Goldstein, "Proximity maps for convex sets", Proc. AMS 10, 1959), and both are measured
+//! along the line between the two feet. Any line gives a lower bound; that between the nearest places gives
+//! the distance.
 //!
-//! Single precision cannot tell the near parts of scans from their far ones where these are a million times as far from each other as
-//! they are large. So the vector o between the centres of the two scans stays in double precision, and what is computed here is by how
-//! much a pair of boxes is nearer or further than |o|: along a unit vector u, u·o = |o| (1 − |u − o/|o||² / 2), of which the
-//! second part is small where |o| is great. Rounding is then a share of the scans' sizes, not of their distance.
+//! Single precision cannot tell the near parts of scans from their far ones where these are a million times
+//! as far from each other as they are large. So the vector o between the centres of the two scans stays in
+//! double precision, and what is computed here is by how much a pair of boxes is nearer or further than |o|:
+//! along a unit vector u, u·o = |o| (1 − |u − o/|o||² / 2), of which the second part is small where |o| is
+//! great. Rounding is then a share of the scans' sizes, not of their distance.
 
 use std::ops::{Add, Mul};
 
@@ -20,7 +22,8 @@ use nearmiss_hierarchy::{Child, FourNodes, NodeBounds, Part, SLACK, Slices, Wide
 
 use crate::view::ScanView;
 
-/// Projections back and forth: after one of them the descent visits 0.5 % more pairs than with exact distances.
+/// Projections back and forth: after one of them the descent visits 0.5 % more pairs than with exact
+/// distances.
 const ROUNDS: u32 = 1;
 
 /// So many pairs of nodes are compared at once.
@@ -29,8 +32,8 @@ pub(crate) const LANES: usize = 16;
 /// So many children of either node make these pairs.
 const FAN: usize = 4;
 
-/// The pairs of nodes that take the place of a pair, up to sixteen, each in a lane of its own: four children of
-/// either node, or one node and the grandchildren of the other.
+/// The pairs of nodes that take the place of a pair, up to sixteen, each in a lane of its own: four children
+/// of either node, or one node and the grandchildren of the other.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pairs {
     of_a: [Child; LANES],
@@ -147,7 +150,8 @@ impl Motion {
         let extent =
             ca.norm() + f64::from(root_a.radius()) + pose.scale() * (cb.norm() + f64::from(root_b.radius()));
         let to_world = a.placed().scale();
-        // Places are told in the world, where both scans may be far from the origin, and rotations are such to rounding only.
+        // Places are told in the world, where both scans may be far from the origin, and rotations are such
+        // to rounding only.
         let far: f64 = [a, b].map(|view| Vector3::from(view.placed().translation()).norm()).iter().sum();
         let skew = [a, b].map(|view| {
             let rotation = view.placed().rotation();
@@ -179,12 +183,14 @@ impl Motion {
         ((bound - self.slack) * self.to_world * (1.0 - 4.0 * DOUBLE_ROUNDING)).max(0.0)
     }
 
-    /// A bound in a's stored frame such that nothing is nearer than `distance` in the world to which a greater one belongs.
+    /// A bound in a's stored frame such that nothing is nearer than `distance` in the world to which a
+    /// greater one belongs.
     pub(crate) fn bound_of(&self, distance: f64) -> f64 {
         distance / self.to_world * (1.0 + 4.0 * DOUBLE_ROUNDING) + self.slack
     }
 
-    /// The bound, in a's stored frame, of what is so much further away than the centres of the scans are. Not negative.
+    /// The bound, in a's stored frame, of what is so much further away than the centres of the scans are. Not
+    /// negative.
     pub(crate) fn bound(&self, beyond: f32) -> f64 {
         let own = self.distance + f64::from(beyond);
         if own > 0.0 { own } else { 0.0 }
@@ -306,7 +312,8 @@ impl Motion {
             between[k] = b.centre[k] - a.centre[k];
             off[k] = between[k] + self.offset[k];
         }
-        // All that feet need in terms of the axes: their cosines, and how far apart the centres are along them.
+        // All that feet need in terms of the axes: their cosines, and how far apart the centres are along
+        // them.
         let mut cosines = [[zero; 3]; 3];
         let (mut along_a, mut along_b) = ([zero; 3], [zero; 3]);
         for i in 0..3 {

@@ -6,8 +6,8 @@ use std::time::{Duration, Instant};
 use crate::verdict::Statistics;
 use crate::view::ScanView;
 
-/// Between two looks at the clock, which cost some 22 ns each, lies work of about this many node pairs, which cost
-/// about 15 ns each.
+/// Between two looks at the clock, which cost some 22 ns each, lies work of about this many node pairs, which
+/// cost about 15 ns each.
 const PAIRS_A_LOOK: u64 = 64;
 
 /// An evaluation costs as much as so many node pairs.
@@ -16,9 +16,10 @@ const PAIRS_AN_EVALUATION: u64 = 64;
 /// So many pairs of points cost as much as a node pair.
 pub(crate) const POINTS_A_PAIR: u64 = 4;
 
-/// A query without a budget of work is ended after so many leaf pairs for each leaf of either scan. Boxes that
-/// lie could otherwise make it compare each leaf with each. Solid noise of 400,000 points in the middle of other such
-/// noise takes 19, surfaces on each other 5; 100,000 points are ended within a second or so (docs/decisions).
+/// A query without a budget of work is ended after so many leaf pairs for each leaf of either scan. Boxes
+/// that lie could otherwise make it compare each leaf with each. Solid noise of 400,000 points in the middle
+/// of other such noise takes 19, surfaces on each other 5; 100,000 points are ended within a second or so
+/// (docs/decisions).
 const LEAF_PAIRS_A_LEAF: u64 = 128;
 
 /// Node pairs that lead to a leaf pair: two to eight where boxes overlap much.
@@ -50,21 +51,25 @@ pub(crate) fn now() -> Instant {
     Instant::now()
 }
 
-/// How much a query may cost; whatever ends first ends it. The default has no limit but one, and reads no clock.
+/// How much a query may cost; whatever ends first ends it. The default has no limit but one, and reads no
+/// clock.
 ///
-/// That one keeps a damaged file, whose boxes all overlap, from holding a query up for hours: without `work`, a query
-/// ends undecided after some 128 leaf pairs for each leaf of the two scans, seven times what the worst honest scans
-/// were found to need. Only [`Semantics::Thickened`](crate::Semantics) with a radius of many spacings can come so far,
-/// where large parallel sheets are just not near enough; `with_work(u64::MAX)` lifts the limit.
+/// That one keeps a damaged file, whose boxes all overlap, from holding a query up for hours: without `work`,
+/// a query ends undecided after some 128 leaf pairs for each leaf of the two scans, seven times what the
+/// worst honest scans were found to need. Only [`Semantics::Thickened`](crate::Semantics) with a radius of
+/// many spacings can come so far, where large parallel sheets are just not near enough; `with_work(u64::MAX)`
+/// lifts the limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Budget {
-    /// Work units: evaluations of an implicit function and node pairs. Reproducible. None: what no sound scans need.
+    /// Work units: evaluations of an implicit function and node pairs. Reproducible. None: what no sound
+    /// scans need.
     pub work: Option<u64>,
     /// When to stop. Not reproducible.
     pub deadline: Option<Deadline>,
-    /// How fine to look, a length in the world: nodes whose samples are no further from their surface than this
-    /// answer for all that is below them (S0 §1). Reproducible; the evidence is then estimated. None: to the last point.
+    /// How fine to look, a length in the world: nodes whose samples are no further from their surface than
+    /// this answer for all that is below them (S0 §1). Reproducible; the evidence is then estimated. None: to
+    /// the last point.
     pub resolution: Option<f64>,
 }
 
@@ -132,8 +137,8 @@ impl Meter {
 
     /// One that goes on after `spent`, with evaluations along curves in steps of so many sampling radii.
     pub(crate) fn resumed(budget: &Budget, views: [&ScanView<'_>; 2], step: f64, spent: Statistics) -> Self {
-        /// For each of the pairs of leaves that sound scans may have at most, of which few are on a curve: a tenth of what it
-        /// takes to follow one through.
+        /// For each of the pairs of leaves that sound scans may have at most, of which few are on a curve: a
+        /// tenth of what it takes to follow one through.
         const EVALUATIONS: f64 = 10.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 2¹⁶")]
         let evaluations = (EVALUATIONS / step).clamp(1.0, 65536.0) as u64;

@@ -35,8 +35,8 @@ impl Excluded {
     }
 }
 
-/// A proof that two scans are apart: pairs of nodes with disjoint enclosures, which together cover the pair of the
-/// roots.
+/// A proof that two scans are apart: pairs of nodes with disjoint enclosures, which together cover the pair
+/// of the roots.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Proof {
     /// The pairs, with a lower bound of the distance of their enclosures in world units.

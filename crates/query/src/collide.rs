@@ -1,7 +1,8 @@
 //! The query: do two scans meet?
 //!
 //! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
-//! children of both, or of the much larger one; the deepest overlap first, after nothing that of all that is left.
+//! children of both, or of the much larger one; the deepest overlap first, after nothing that of all that is
+//! left.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -72,15 +73,16 @@ impl CollideScratch {
         Self { instructions: Instructions(level), ..Self::default() }
     }
 
-    /// The longest time that the last query with a deadline did not look at the clock; zero without a deadline. What a
-    /// query may be late by, beside what the machine takes away.
+    /// The longest time that the last query with a deadline did not look at the clock; zero without a
+    /// deadline. What a query may be late by, beside what the machine takes away.
     #[must_use]
     pub fn longest_stretch(&self) -> Duration {
         self.longest_stretch
     }
 
-    /// Where the scans of the last query with [`Detail::Manifold`] meet: the deepest place first, then ever again the one furthest from
-    /// those before it, up to eight. Empty after any other answer than that they meet.
+    /// Where the scans of the last query with [`Detail::Manifold`] meet: the deepest place first, then ever
+    /// again the one furthest from those before it, up to eight. Empty after any other answer than that they
+    /// meet.
     #[must_use]
     pub fn manifold(&self) -> &[ManifoldPoint] {
         &self.manifold.points
@@ -107,8 +109,8 @@ pub fn collide_with(
     search(a, b, plan, budget, scratch, Extras::default())
 }
 
-/// As [`collide_with`], and leaves in `proof` what a certified separation of surfaces rests on; nothing after any
-/// other answer.
+/// As [`collide_with`], and leaves in `proof` what a certified separation of surfaces rests on; nothing after
+/// any other answer.
 pub fn collide_proving(
     a: &ScanView<'_>,
     b: &ScanView<'_>,
@@ -125,15 +127,15 @@ pub fn collide_proving(
     answer
 }
 
-/// As [`collide_with`], for two scans that were asked about before in poses not far from these: `hint` remembers where
-/// they met, or what kept them apart.
+/// As [`collide_with`], for two scans that were asked about before in poses not far from these: `hint`
+/// remembers where they met, or what kept them apart.
 ///
 /// Changes no verdict but those that a budget ends, whatever `hint` was used for before. Evidence may differ:
-/// a certified gap may be less than without a hint, and about one separation in a thousand is certified with a
-/// hint and estimated without, or the reverse. A hint is not checked: read back only one that was written
-/// here. Searches with a resolution and those by any other method than [`Method::Traversal`] do
-/// without. What it remembers is worth most for small motions: a step of a tenth of a sampling radius, as a
-/// simulation makes, takes a fraction of a query.
+/// a certified gap may be less than without a hint, and about one separation in a thousand is certified with
+/// a hint and estimated without, or the reverse. A hint is not checked: read back only one that was written
+/// here. Searches with a resolution and those by any other method than [`Method::Traversal`] do without. What
+/// it remembers is worth most for small motions: a step of a tenth of a sampling radius, as a simulation
+/// makes, takes a fraction of a query.
 pub fn collide_hinted(
     a: &ScanView<'_>,
     b: &ScanView<'_>,
@@ -160,9 +162,10 @@ impl Contacts {
     }
 }
 
-/// As [`collide_with`], but looks on after the first contact and leaves all of them in `contacts`: one for each pair of leaves of which
-/// two discs cross (two points are near enough, a test point saw the crossing, as `plan` means it), to first order. The
-/// answer's is the first that is certified, of the first few, or else the first; [`collide_with`], which looks for any, may tell of another of them.
+/// As [`collide_with`], but looks on after the first contact and leaves all of them in `contacts`: one for
+/// each pair of leaves of which two discs cross (two points are near enough, a test point saw the crossing,
+/// as `plan` means it), to first order. The answer's is the first that is certified, of the first few, or
+/// else the first; [`collide_with`], which looks for any, may tell of another of them.
 ///
 /// Costs a descent to all leaves that meet; does not allocate once `scratch` and `contacts` are warm.
 pub fn collide_all(
@@ -261,8 +264,8 @@ fn decide(
     extras: Extras<'_>,
 ) -> Answer {
     let options = plan.options();
-    // What was seen at some resolution says nothing of the rest, and which leaves are tested by points, which see more
-    // than crossings, depends on the way to them.
+    // What was seen at some resolution says nothing of the rest, and which leaves are tested by points, which
+    // see more than crossings, depends on the way to them.
     let is_exact = budget.resolution.is_none() && options.method == Method::Traversal;
     let hint = extras.hint.filter(|_| is_exact);
     let mut known = hint.map(|hint| hint.recall(&pair, options));

@@ -13,7 +13,8 @@ use crate::verdict::Reason;
 impl LeafVisitor for Surfaces<'_> {
     #[inline]
     fn wants_any(&self) -> bool {
-        // Within a margin boxes that overlap most are beside each other rather than near, and fewer witnesses verify there.
+        // Within a margin boxes that overlap most are beside each other rather than near, and fewer witnesses
+        // verify there.
         self.all.is_none() && self.margin == 0.0
     }
 

@@ -1,9 +1,10 @@
 //! Whether two tangent discs cross: the first-order test of a pair of points.
 //!
 //! The planes of two discs meet in a line, which either disc covers by a chord or not at all; the discs cross
-//! where the chords overlap. With `d = p_a − p_b`, `c = n_a·n_b`, `g = 1 − c²`, `u = d·n_a` and `v = d·n_b`, half
-//! chords are `√(ρ_a² − v²/g)` and `√(ρ_b² − u²/g)`, and their midpoints lie `√(d² − (u² + v² − 2cuv)/g)` apart
-//! along the line. Multiplied by g nothing is divided by, and no sign of a normal matters (docs/theory/discs.md).
+//! where the chords overlap. With `d = p_a − p_b`, `c = n_a·n_b`, `g = 1 − c²`, `u = d·n_a` and `v = d·n_b`,
+//! half chords are `√(ρ_a² − v²/g)` and `√(ρ_b² − u²/g)`, and their midpoints lie `√(d² − (u² + v² −
+//! 2cuv)/g)` apart along the line. Multiplied by g nothing is divided by, and no sign of a normal matters
+//! (docs/theory/discs.md).
 
 use nearmiss_hierarchy::THICKNESS;
 

@@ -1,10 +1,10 @@
 //! All of `{x | f_A(x) = f_B(x) = 0}`: the curves in which two surfaces cut each other, as polylines.
 //!
-//! [`collide_all`] says where discs of either scan cross. From the first of these places that no curve has passed, Newton's
-//! method leads onto both surfaces, and from there the curve is followed both ways (`follow`): ahead along `n_A × n_B`, back
-//! onto both surfaces by Newton's method, in steps that get shorter where the curve turns. Crossings that it passed start
-//! no other (`trail`). Places where the surfaces cross steeply come first: where they graze, first order says little
-//! (docs/theory/curves.md).
+//! [`collide_all`] says where discs of either scan cross. From the first of these places that no curve has
+//! passed, Newton's method leads onto both surfaces, and from there the curve is followed both ways
+//! (`follow`): ahead along `n_A × n_B`, back onto both surfaces by Newton's method, in steps that get shorter
+//! where the curve turns. Crossings that it passed start no other (`trail`). Places where the surfaces cross
+//! steeply come first: where they graze, first order says little (docs/theory/curves.md).
 
 mod follow;
 mod trail;
@@ -30,10 +30,12 @@ const STEEP: f64 = 0.3;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct CurveOptions {
-    /// The wanted distance of points that follow each other; they are nearer where a chord would
-    /// leave its curve by more than a fortieth of that, or of two sampling radii. None: twice the lesser of the scans' sampling radii.
+    /// The wanted distance of points that follow each other; they are nearer where a chord would leave its
+    /// curve by more than a fortieth of that, or of two sampling radii. None: twice the lesser of the scans'
+    /// sampling radii.
     pub spacing: Option<f64>,
-    /// The greatest |f| of either surface at a point. None: a thousandth of that radius; never less than a hundredth of that.
+    /// The greatest |f| of either surface at a point. None: a thousandth of that radius; never less than a
+    /// hundredth of that.
     pub tolerance: Option<f64>,
 }
 
@@ -62,8 +64,8 @@ impl CurvePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// [`PlanError::CurveLength`] for a spacing or tolerance that is not positive; [`PlanError::Metrics`] for scans that are
-    /// prepared for different kernels.
+    /// [`PlanError::CurveLength`] for a spacing or tolerance that is not positive; [`PlanError::Metrics`] for
+    /// scans that are prepared for different kernels.
     pub fn new(options: &CurveOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         let given = [options.spacing, options.tolerance].into_iter().flatten();
         if let Some(length) = given.into_iter().find(|&l| !(l > 0.0 && l.is_finite())) {
@@ -93,8 +95,8 @@ pub enum CurveEnd {
     BorderOfA,
     /// The surface of b ends there.
     BorderOfB,
-    /// The surfaces touch: their normals are parallel to within half a degree, or come to be so faster than the curve can be followed.
-    /// Other curves may end there too.
+    /// The surfaces touch: their normals are parallel to within half a degree, or come to be so faster than
+    /// the curve can be followed. Other curves may end there too.
     Tangent,
     /// A surface does not look like one sheet there, or turns too sharply.
     Lost,
@@ -168,7 +170,8 @@ pub struct CurveScratch {
     trail: Trail,
 }
 
-/// The curves in which the surfaces of `a` and `b` cut each other. Allocates a scratch of its own; see [`curves_with`].
+/// The curves in which the surfaces of `a` and `b` cut each other. Allocates a scratch of its own; see
+/// [`curves_with`].
 #[must_use]
 pub fn curves(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CurvePlan, budget: &Budget) -> Curves {
     let mut found = Curves::default();
@@ -176,18 +179,19 @@ pub fn curves(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CurvePlan, budget: &Bud
     found
 }
 
-/// Leaves in `found` the curves in which the surfaces of `a` and `b`, each by the kernel of its view, cut each other, as far as
-/// `budget` lasts.
+/// Leaves in `found` the curves in which the surfaces of `a` and `b`, each by the kernel of its view, cut
+/// each other, as far as `budget` lasts.
 ///
-/// At each point both |f| are within the tolerance, and a chord deviates from its curve by at most a fortieth of the wanted spacing, or
-/// of two sampling radii if that is less: 0.05 radii by default, where curves are as smooth as arcs; on a rough scan one chord in a hundred by
-/// 0.06 to 0.16. Of the true surfaces' curve it is as far as the bias of
-/// both surfaces, h²H/2 each, over the sine of their angle. No curve is missed of which a leaf of
-/// either scan saw discs cross; one that is shorter than a leaf and nearer to another than a sampling radius may be taken for that.
-/// Swapped scans give the same curves with other points on them. Scans of the geodesic metric need views with their kernel.
+/// At each point both |f| are within the tolerance, and a chord deviates from its curve by at most a fortieth
+/// of the wanted spacing, or of two sampling radii if that is less: 0.05 radii by default, where curves are
+/// as smooth as arcs; on a rough scan one chord in a hundred by 0.06 to 0.16. Of the true surfaces' curve it
+/// is as far as the bias of both surfaces, h²H/2 each, over the sine of their angle. No curve is missed of
+/// which a leaf of either scan saw discs cross; one that is shorter than a leaf and nearer to another than a
+/// sampling radius may be taken for that. Swapped scans give the same curves with other points on them. Scans
+/// of the geodesic metric need views with their kernel.
 ///
-/// Costs, beside [`collide_all`], three pairs of evaluations for each sampling radius of length; does not allocate once
-/// `found` and `scratch` are warm.
+/// Costs, beside [`collide_all`], three pairs of evaluations for each sampling radius of length; does not
+/// allocate once `found` and `scratch` are warm.
 pub fn curves_with(
     a: &ScanView<'_>,
     b: &ScanView<'_>,

@@ -8,13 +8,13 @@ use crate::leaf_pair::{Discs, LeafPair};
 use crate::posed::Posed;
 use crate::verdict::{Contact, Reason};
 
-/// As near each other as discs are wide, in the lesser local radius, points say enough by themselves, however their
-/// discs lie.
+/// As near each other as discs are wide, in the lesser local radius, points say enough by themselves, however
+/// their discs lie.
 const NEAR: f32 = 0.65;
 
-/// Where surfaces cross, samples of either are within some 0.6 local radii of the place, and nearer than this to each
-/// other, in the greater radius. Discs reach up to 1.3; those that stand upright, as noise on thin plates makes them,
-/// would bridge a gap of that width.
+/// Where surfaces cross, samples of either are within some 0.6 local radii of the place, and nearer than this
+/// to each other, in the greater radius. Discs reach up to 1.3; those that stand upright, as noise on thin
+/// plates makes them, would bridge a gap of that width.
 pub(crate) const FAR: f32 = 0.9;
 
 impl Posed<'_> {
@@ -91,8 +91,8 @@ impl Posed<'_> {
         }
     }
 
-    /// Whether the discs of points `i` and `j` cross, as when leaves are compared, so that it says something. Of a sparse leaf it
-    /// takes more to say.
+    /// Whether the discs of points `i` and `j` cross, as when leaves are compared, so that it says something.
+    /// Of a sparse leaf it takes more to say.
     pub(crate) fn crosses(&self, [i, j]: [usize; 2]) -> bool {
         let (a, b) = (&self.a.wide.leaves, &self.b.wide.leaves);
         let is_sparse = || a.is_sparse(a.leaf_of(i)) || b.is_sparse(b.leaf_of(j));

@@ -1,8 +1,9 @@
 //! How far two scans are apart.
 //!
-//! Branch and bound over both trees, the nearest pair of nodes first: by the boxes about the points for the two nearest points, by the
-//! enclosures, which provably contain the surfaces, for a bound from below. It is worth what it found whenever a budget ends it. From
-//! the nearest points on, points of the surfaces themselves approach each other.
+//! Branch and bound over both trees, the nearest pair of nodes first: by the boxes about the points for the
+//! two nearest points, by the enclosures, which provably contain the surfaces, for a bound from below. It is
+//! worth what it found whenever a budget ends it. From the nearest points on, points of the surfaces
+//! themselves approach each other.
 
 mod approach;
 mod nearest_points;
@@ -117,12 +118,13 @@ pub struct Distance {
     pub points: [[f64; 3]; 2],
     /// A sample of either scan near these.
     pub sources: [PointId; 2],
-    /// Of [`Self::upper`]. Certified: the places were verified to lie on the surfaces; where it is zero they are one. Estimated: the surfaces cross to first
-    /// order, or no surface was found, or looked for, below the samples; then half a local radius of either is added to their distance.
-    /// Of points always certified.
+    /// Of [`Self::upper`]. Certified: the places were verified to lie on the surfaces; where it is zero they
+    /// are one. Estimated: the surfaces cross to first order, or no surface was found, or looked for, below
+    /// the samples; then half a local radius of either is added to their distance. Of points always
+    /// certified.
     pub evidence: Evidence,
-    /// Whether the budget lasted: of points both bounds are then the distance, of surfaces no further work would
-    /// bring them nearer to each other.
+    /// Whether the budget lasted: of points both bounds are then the distance, of surfaces no further work
+    /// would bring them nearer to each other.
     pub complete: bool,
     /// What that cost.
     pub statistics: Statistics,
@@ -142,17 +144,20 @@ pub fn distance(a: &ScanView<'_>, b: &ScanView<'_>, plan: &DistancePlan, budget:
     distance_with(a, b, plan, budget, &mut DistanceScratch::default())
 }
 
-/// How far `a` and `b` are apart, as `plan` means it, within `budget`: lower ≤ distance ≤ upper whenever that ends the search.
+/// How far `a` and `b` are apart, as `plan` means it, within `budget`: lower ≤ distance ≤ upper whenever that
+/// ends the search.
 ///
-/// Of [`Semantics::Thickened`] the distance is that of the nearest two points less both radii, as brute force in double precision has
-/// it, and both bounds are that once the search is complete. Of surfaces `lower` is what enclosures prove
-/// (docs/theory/certificates.md), as certified gaps of [`collide_with`] are: some sampling radii less than the distance, and nothing
-/// for scans of the geodesic metric. `upper` is the distance of two points on the surfaces, near the two nearest
-/// samples; a step further along either surface leads no nearer. Surfaces that meet, as [`collide_with`] says it, are at distance 0.
+/// Of [`Semantics::Thickened`] the distance is that of the nearest two points less both radii, as brute force
+/// in double precision has it, and both bounds are that once the search is complete. Of surfaces `lower` is
+/// what enclosures prove (docs/theory/certificates.md), as certified gaps of [`collide_with`] are: some
+/// sampling radii less than the distance, and nothing for scans of the geodesic metric. `upper` is the
+/// distance of two points on the surfaces, near the two nearest samples; a step further along either surface
+/// leads no nearer. Surfaces that meet, as [`collide_with`] says it, are at distance 0.
 ///
-/// A budget's resolution is not looked at. Does not allocate once `scratch` is warm. Costs one or two tenths of a millisecond for
-/// scans of 100,000 points that are apart (benches/record), ten microseconds for surfaces that meet; balls about the points
-/// of scans that lie in each other cost as much as all leaves that are so near.
+/// A budget's resolution is not looked at. Does not allocate once `scratch` is warm. Costs one or two tenths
+/// of a millisecond for scans of 100,000 points that are apart (benches/record), ten microseconds for
+/// surfaces that meet; balls about the points of scans that lie in each other cost as much as all leaves that
+/// are so near.
 pub fn distance_with(
     a: &ScanView<'_>,
     b: &ScanView<'_>,

@@ -1,9 +1,10 @@
 //! Temporal coherence: what the last query about two scans found helps the next one, a small motion later.
 //!
-//! Where they met they probably still meet, so the two points whose discs crossed are tried alone, then their leaves. Where they were
-//! apart and move slowly, the pairs of nodes that parted them are a front across the tree of pairs; a pair whose gap was g stays apart until b has travelled
-//! so far. So only pairs whose time has come are compared again, and split where they do not part the scans any more; and as
-//! long as none has come, nothing at all. Travel is the length of b's way in a's frame, at the point that moves most.
+//! Where they met they probably still meet, so the two points whose discs crossed are tried alone, then their
+//! leaves. Where they were apart and move slowly, the pairs of nodes that parted them are a front across the
+//! tree of pairs; a pair whose gap was g stays apart until b has travelled so far. So only pairs whose time
+//! has come are compared again, and split where they do not part the scans any more; and as long as none has
+//! come, nothing at all. Travel is the length of b's way in a's frame, at the point that moves most.
 
 use std::ops::ControlFlow;
 
@@ -18,14 +19,15 @@ use crate::options::CollideOptions;
 use crate::posed::Posed;
 use crate::surface::Surfaces;
 
-/// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they need be.
+/// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they
+/// need be.
 const GROWN: usize = 3;
 
 /// Where more than one in so many pairs of the front has expired, a search from the roots is cheaper.
 const MOST_EXPIRED: usize = 4;
 
-/// Steps of up to so many sampling radii find enough of a front as it was: after longer ones a search from the roots, sixteen pairs
-/// at a time, is faster (benches/record).
+/// Steps of up to so many sampling radii find enough of a front as it was: after longer ones a search from
+/// the roots, sixteen pairs at a time, is faster (benches/record).
 const SLOW: f64 = 0.2;
 
 /// The same of a front of enclosures.
@@ -34,8 +36,8 @@ const SLOW_PROVEN: f64 = 1.0;
 /// A travel of more slacks than this is begun anew: gaps beside it would lose their digits.
 const LONGEST: f64 = (1_u64 << 40) as f64;
 
-/// What is remembered between queries about the same two scans; for [`collide_hinted`](crate::collide_hinted). Owned by
-/// the caller, one for each pair of scans.
+/// What is remembered between queries about the same two scans; for
+/// [`collide_hinted`](crate::collide_hinted). Owned by the caller, one for each pair of scans.
 ///
 /// A continued proof rests on smaller nodes than a fresh one, and on their earlier positions. So about one
 /// separation in a thousand is certified with a hint and estimated without, or the reverse.
@@ -172,7 +174,8 @@ impl Known {
         (left > f64::from(pair.stored(reach))).then(|| left * pair.views[0].placed().scale() * (1.0 - 1e-9))
     }
 
-    /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail again.
+    /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail
+    /// again.
     pub(crate) fn has_front(&self, pair: &Posed<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
             let motion = self.pose.map(|pose| Motion::new(pair.level, pair.views, &pose));
@@ -213,8 +216,8 @@ impl Known {
         resume(nodes_a, nodes_b, search, stack)
     }
 
-    /// Goes on from the front of a proof, if there is one: how far the scans are apart at least, if it can be made
-    /// whole again.
+    /// Goes on from the front of a proof, if there is one: how far the scans are apart at least, if it can be
+    /// made whole again.
     pub(crate) fn prove_again(&mut self, certifier: &mut Certifier<'_>, stack: &mut Stack) -> Option<f64> {
         let pair = &certifier.pair;
         if !self.is_proof || !self.is_slow(pair, SLOW_PROVEN) || !self.is_there(pair) {
@@ -237,8 +240,8 @@ impl Known {
         self.distance(&certifier.pair, 0.0)
     }
 
-    /// Looks at the pairs of the front whose time has come: those that are still apart wait again, the others leave it
-    /// for the stack. False if they are too many.
+    /// Looks at the pairs of the front whose time has come: those that are still apart wait again, the others
+    /// leave it for the stack. False if they are too many.
     fn advance(
         &mut self,
         reach: f32,
@@ -287,8 +290,8 @@ impl Known {
         self.doubtful = None;
     }
 
-    /// Nothing meets: adds what a search has excluded and compared to the front, or begins a new one. A proof that is
-    /// wanted has failed, at the leaves `doubtful` if that is known.
+    /// Nothing meets: adds what a search has excluded and compared to the front, or begins a new one. A proof
+    /// that is wanted has failed, at the leaves `doubtful` if that is known.
     pub(crate) fn parted(
         &mut self,
         (excluded, compared): (&[Excluded], &[NodePair]),

@@ -13,12 +13,13 @@ use serde::{Deserialize, Serialize};
 
 pub(crate) use side::Side;
 
-/// The search for intersections along paths of a's graph (S1 §4): points of a are drawn at random, those on different sides of
-/// b are joined by a path, and on it the place is looked for where the side changes. Where b's sides are not known, and
-/// where no drawn points lie on either side though some are near, points are drawn towards each other instead.
+/// The search for intersections along paths of a's graph (S1 §4): points of a are drawn at random, those on
+/// different sides of b are joined by a path, and on it the place is looked for where the side changes. Where
+/// b's sides are not known, and where no drawn points lie on either side though some are near, points are
+/// drawn towards each other instead.
 ///
-/// What a graph makes for such searches it makes when the first wants it, whatever that's deadline, unless it was [made
-/// ready](nearmiss_graph::SurfaceGraph::make_ready).
+/// What a graph makes for such searches it makes when the first wants it, whatever that's deadline, unless it
+/// was [made ready](nearmiss_graph::SurfaceGraph::make_ready).
 ///
 /// Wants the graph of a, and for brackets that of b, which says which side is out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -33,14 +34,15 @@ pub struct Interpolation {
     pub brackets: Brackets,
     /// How a place on both surfaces is found from there, if [`Detail::Witness`](crate::Detail) asks for one.
     pub refinement: Refinement,
-    /// Where brackets led nowhere: so many of the drawn points nearest to b are drawn towards it, from nearest point to
-    /// nearest point, and the discs there compared. Finds small contacts between drawn points, which no bracket
-    /// holds, and those where sides are not known; S1 does without. Default: 64.
+    /// Where brackets led nowhere: so many of the drawn points nearest to b are drawn towards it, from
+    /// nearest point to nearest point, and the discs there compared. Finds small contacts between drawn
+    /// points, which no bracket holds, and those where sides are not known; S1 does without. Default: 64.
     pub approaches: u32,
     /// What the random numbers come from.
     pub seed: u64,
-    /// Without hierarchy: points drawn from all of a that lie in the box of b. With it, pairs of leaves are compared: each
-    /// edge of a's graph there, whether its ends are on different sides of b, and where none crosses, all discs.
+    /// Without hierarchy: points drawn from all of a that lie in the box of b. With it, pairs of leaves are
+    /// compared: each edge of a's graph there, whether its ends are on different sides of b, and where none
+    /// crosses, all discs.
     pub flat: bool,
 }
 
@@ -49,8 +51,8 @@ pub struct Interpolation {
 pub enum Surfels {
     /// So many, however many points there are: 1 to 65,536. Default: 30, for some 200 points (S1 §4.1).
     Count(u32),
-    /// So many sampling radii wide (S3: adapted to the sampling density): 1 to 1024. The number of points drawn grows with
-    /// that of the cloud's.
+    /// So many sampling radii wide (S3: adapted to the sampling density): 1 to 1024. The number of points
+    /// drawn grows with that of the cloud's.
     Radius(f64),
 }
 
@@ -60,8 +62,8 @@ pub enum Brackets {
     /// From the drawn points: the nearest on the other side, within two surfel radii (S3).
     #[default]
     Drawn,
-    /// From the map of close pairs: some points about two surfel radii away along the surface (S1 §4.3), as far as it reaches;
-    /// beyond, from the drawn points.
+    /// From the map of close pairs: some points about two surfel radii away along the surface (S1 §4.3), as
+    /// far as it reaches; beyond, from the drawn points.
     Annulus,
 }
 
@@ -71,8 +73,8 @@ pub enum Refinement {
     /// By Newton's method on both surfaces.
     #[default]
     Newton,
-    /// By random points in a sphere, until one is as near to both surfaces as this, in sampling radii (S1 §4.6): above 0.01,
-    /// at most 1.
+    /// By random points in a sphere, until one is as near to both surfaces as this, in sampling radii (S1
+    /// §4.6): above 0.01, at most 1.
     Sphere(f64),
     /// By the points of a regular grid in that sphere (S3).
     Grid(f64),
@@ -150,8 +152,9 @@ impl Interpolation {
     }
 }
 
-/// The probability that each of `surfels` surfels of one size gets one of `points` points that are drawn evenly and independently:
-/// Σₖ (−1)ᵏ C(a, k) (1 − k/a)ⁿ, by inclusion and exclusion, to 1e-7. S1's Lemma 1 has its limit for many surfels.
+/// The probability that each of `surfels` surfels of one size gets one of `points` points that are drawn
+/// evenly and independently: Σₖ (−1)ᵏ C(a, k) (1 − k/a)ⁿ, by inclusion and exclusion, to 1e-7. S1's Lemma 1
+/// has its limit for many surfels.
 #[must_use]
 pub fn occupancy(surfels: u32, points: u32) -> f64 {
     /// With so many surfels expected to stay empty all are occupied once in 10⁸ times.
@@ -173,7 +176,8 @@ pub fn occupancy(surfels: u32, points: u32) -> f64 {
     sum.clamp(0.0, 1.0)
 }
 
-/// The fewest points to draw so that with a probability of at most `error` some of `surfels` surfels gets none.
+/// The fewest points to draw so that with a probability of at most `error` some of `surfels` surfels gets
+/// none.
 ///
 /// O(log n) times what [`occupancy`] takes. 2³² − 1 if that does not suffice.
 #[must_use]
@@ -195,8 +199,8 @@ pub fn points_for(surfels: u32, error: f64) -> u32 {
     enough
 }
 
-/// n = a ln a + c a points, of which each of a surfels gets one with probability `exp(−exp(−c))` (S1, Lemma 1); for ten
-/// surfels and more the true probability is greater.
+/// n = a ln a + c a points, of which each of a surfels gets one with probability `exp(−exp(−c))` (S1, Lemma
+/// 1); for ten surfels and more the true probability is greater.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
 fn points_to_draw(surfels: f64, probability: f64) -> u32 {
     let c = -(-probability.ln()).ln();

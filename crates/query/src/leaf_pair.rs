@@ -1,8 +1,10 @@
-//! Which tangent discs of two leaves cross: sixteen of one against sixteen of the other, in the frame of the other.
+//! Which tangent discs of two leaves cross: sixteen of one against sixteen of the other, in the frame of the
+//! other.
 //!
-//! Most discs of a leaf are out of reach of the other's box, and most of the others of all but a few there. So the points of a
-//! are moved into b's frame, all at once, and held against the box; each that is left is held against all of b's, whose
-//! positions stand side by side already; and normals are looked at where points are near.
+//! Most discs of a leaf are out of reach of the other's box, and most of the others of all but a few there.
+//! So the points of a are moved into b's frame, all at once, and held against the box; each that is left is
+//! held against all of b's, whose positions stand side by side already; and normals are looked at where
+//! points are near.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
@@ -71,8 +73,8 @@ pub(crate) struct Near {
 }
 
 impl LeafPair<'_> {
-    /// The first of some `lanes`, as bits, that crosses something, or, if `each`, that reaches the box at all; the same by any
-    /// instructions.
+    /// The first of some `lanes`, as bits, that crosses something, or, if `each`, that reaches the box at
+    /// all; the same by any instructions.
     #[inline]
     pub(crate) fn next(&self, by: Instructions, lanes: u32, each: bool) -> Option<Near> {
         dispatch!(by.0, simd => simd.vectorize(
@@ -165,7 +167,8 @@ pub(crate) fn near_box<S: Simd>(
     bits(beyond_sq.simd_le(radii * radii))
 }
 
-/// The test of [`crossing`](crate::crossing()) in lanes: a disc of a against those of b, whose centres are `d` away.
+/// The test of [`crossing`](crate::crossing()) in lanes: a disc of a against those of b, whose centres are
+/// `d` away.
 #[inline(always)]
 fn cross<S: Simd>(
     simd: S,

@@ -76,7 +76,8 @@ impl Hint {
     }
 }
 
-/// The chance that the pairs still open, or all if none was looked at, hide a contact or what is within `reach`.
+/// The chance that the pairs still open, or all if none was looked at, hide a contact or what is within
+/// `reach`.
 pub(crate) fn likelihood(pair: &Posed<'_>, reach: f32, open: impl Iterator<Item = NodePair>) -> f64 {
     let mut open = open.take(LOOKED_AT).peekable();
     let roots = open.peek().is_none().then_some(NodePair { a: NodeId::ROOT, b: NodeId::ROOT });

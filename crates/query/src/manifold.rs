@@ -1,9 +1,9 @@
 //! A contact for a solver: a few places, well spread, each with the way out and how far that is.
 //!
-//! The points of either scan that are near the other know how deep they are in: their height over the tangent plane of the
-//! nearest point there. Of these the deepest is taken, then ever again the one furthest from all that are taken, as
-//! Gonzalez ("Clustering to minimize the maximum intercluster distance", Theoretical Computer Science 38, 1985) spreads centres: whoever
-//! stops early has the most of the support.
+//! The points of either scan that are near the other know how deep they are in: their height over the tangent
+//! plane of the nearest point there. Of these the deepest is taken, then ever again the one furthest from all
+//! that are taken, as Gonzalez ("Clustering to minimize the maximum intercluster distance", Theoretical
+//! Computer Science 38, 1985) spreads centres: whoever stops early has the most of the support.
 
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
@@ -36,8 +36,8 @@ pub struct ManifoldPoint {
     pub point: [f64; 3],
     /// The unit direction in which a leaves b.
     pub normal: [f64; 3],
-    /// How far apart they are along it: less than zero where one is in the other. No deeper than the greater sampling radius, for
-    /// what is further behind a surface is not seen from its points.
+    /// How far apart they are along it: less than zero where one is in the other. No deeper than the greater
+    /// sampling radius, for what is further behind a surface is not seen from its points.
     pub gap: f64,
     /// The points of a and b that are nearest there, as the caller numbered them.
     pub sources: [PointId; 2],
@@ -106,7 +106,8 @@ pub(crate) fn gather(
     }
 }
 
-/// Takes the deepest of `candidates`, then ever again the one furthest from all that were taken, while that is at least `spacing` away.
+/// Takes the deepest of `candidates`, then ever again the one furthest from all that were taken, while that
+/// is at least `spacing` away.
 fn spread(candidates: &mut [(ManifoldPoint, f64)], spacing: f64, taken: &mut Vec<ManifoldPoint>) {
     let deepest = |a: &ManifoldPoint, b: &ManifoldPoint| a.gap.total_cmp(&b.gap);
     while taken.len() < MOST {
@@ -213,9 +214,9 @@ impl Solid {
         (self.centres[0] - self.centres[1]).try_normalize(0.0).unwrap_or_else(Vector3::z)
     }
 
-    /// The normal of a point of one scan, that of a if `of_b` is the other's, in the direction in which a leaves b: out of that scan
-    /// if its normals tell, else into the other if that one's do. Else the lesser scan is on the side of its middle, as a cup is on
-    /// the table and the table in the room.
+    /// The normal of a point of one scan, that of a if `of_b` is the other's, in the direction in which a
+    /// leaves b: out of that scan if its normals tell, else into the other if that one's do. Else the lesser
+    /// scan is on the side of its middle, as a cup is on the table and the table in the room.
     fn way_out(&self, pair: &Posed<'_>, of_b: bool, points: [usize; 2]) -> Vector3<f64> {
         let normal = |side: usize| {
             let stored = pair.views[side].slices().normals[points[side]].map(f64::from);

@@ -1,8 +1,9 @@
 //! Surfaces nearer than a margin count as meeting.
 //!
-//! Two points nearer than it always do: that is a fact, whatever their discs say. Otherwise their tangent discs
-//! decide, whose distance alternating projection finds (both are convex: Cheney & Goldstein, "Proximity maps for
-//! convex sets", Proc. AMS 10, 1959). For a witness a point of either implicit surface walks towards the other.
+//! Two points nearer than it always do: that is a fact, whatever their discs say. Otherwise their tangent
+//! discs decide, whose distance alternating projection finds (both are convex: Cheney & Goldstein, "Proximity
+//! maps for convex sets", Proc. AMS 10, 1959). For a witness a point of either implicit surface walks towards
+//! the other.
 
 use std::ops::{ControlFlow, Range};
 
@@ -105,8 +106,8 @@ impl Surfaces<'_> {
         }
     }
 
-    /// A verified point of either surface, nearer to each other than the margin: both walk towards each other along
-    /// their surfaces, at most a local radius at a time.
+    /// A verified point of either surface, nearer to each other than the margin: both walk towards each other
+    /// along their surfaces, at most a local radius at a time.
     fn approach(
         &mut self,
         [p, q]: [Vector3<f64>; 2],

@@ -61,22 +61,22 @@ pub enum Method {
     /// Whether tangent discs of their points cross.
     #[default]
     Traversal,
-    /// How near both surfaces come to random test points: S0 §5.3, for comparison. Slower, and misses what lies
-    /// between the test points.
+    /// How near both surfaces come to random test points: S0 §5.3, for comparison. Slower, and misses what
+    /// lies between the test points.
     Sampling(Sampling),
-    /// By searches along the graph of a: S1 §4. Slower than [`Self::Traversal`]; without hierarchy it does without volumes, and may
-    /// miss small contacts.
+    /// By searches along the graph of a: S1 §4. Slower than [`Self::Traversal`]; without hierarchy it does
+    /// without volumes, and may miss small contacts.
     Interpolation(Interpolation),
 }
 
-/// The random test of two leaves (S0 §5.3, eq. 8): test points in the sphere covering of a's leaf, in which an
-/// intersection is seen when |f_A| + |f_B| is less than a tolerance in any.
+/// The random test of two leaves (S0 §5.3, eq. 8): test points in the sphere covering of a's leaf, in which
+/// an intersection is seen when |f_A| + |f_B| is less than a tolerance in any.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[non_exhaustive]
 pub struct Sampling {
-    /// Test points for each pair of leaves, or, [flat](Sampling::flat), for each leaf's worth of points; 1 to 65,536,
-    /// default 128.
+    /// Test points for each pair of leaves, or, [flat](Sampling::flat), for each leaf's worth of points; 1 to
+    /// 65,536, default 128.
     pub test_points: u32,
     /// `d_ε` in sampling radii (of the scan with the greater one): above 0, at most 4; default 0.4.
     pub tolerance: f64,
@@ -137,8 +137,8 @@ pub enum Order {
     DepthFirst,
     /// Of all pairs the one whose boxes overlap most of each other: best under budgets.
     Overlap,
-    /// The pair with most sample points of a's node on either side of f′ of b's, further from it than its covering
-    /// radius (S0 §5.2).
+    /// The pair with most sample points of a's node on either side of f′ of b's, further from it than its
+    /// covering radius (S0 §5.2).
     Sides,
     /// The same, each sample point weighing with the eigenvalue gap of f′ where it is (S0 §7).
     SidesByGap,
@@ -153,13 +153,15 @@ pub struct CollideOptions {
     pub semantics: Semantics,
     /// How much to say of a contact. Default: a witness.
     pub detail: Detail,
-    /// What nearer than this, in world units, counts as meeting; zero or more. Default: 0, nothing but contact.
+    /// What nearer than this, in world units, counts as meeting; zero or more. Default: 0, nothing but
+    /// contact.
     ///
     /// Never too small: two points nearer than it are never separated.
     pub margin: f64,
-    /// How sure a separation of surfaces should be. Default: estimated. Certified costs half as much again, near contact
-    /// two to three times as much, and says a proven distance; where the proof fails, the separation is still answered
-    /// as estimated. By the geodesic kernel it always is, for enclosures are proven of straight distances alone.
+    /// How sure a separation of surfaces should be. Default: estimated. Certified costs half as much again,
+    /// near contact two to three times as much, and says a proven distance; where the proof fails, the
+    /// separation is still answered as estimated. By the geodesic kernel it always is, for enclosures are
+    /// proven of straight distances alone.
     pub evidence: Evidence,
     /// By which distances surfaces are defined; balls about points know none. None, the default: as both
     /// scans were prepared.
@@ -362,8 +364,8 @@ impl CollidePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// Names the option that is out of range, or the [metric](PointHierarchy::metric) that does not fit. Balls about points, which
-    /// know no kernel, fit any.
+    /// Names the option that is out of range, or the [metric](PointHierarchy::metric) that does not fit.
+    /// Balls about points, which know no kernel, fit any.
     pub fn new(options: &CollideOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         let is_length = |l: f64| l >= 0.0 && l.is_finite();
         match options.semantics {

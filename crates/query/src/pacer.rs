@@ -1,7 +1,8 @@
 //! The same time for every query: S0 §5.4.
 //!
-//! A query that takes longer than it may has fewer test points and a greater tolerance next time; one that has time left
-//! has more and a lesser one, if it came to test any. A time budget cuts off what is too long all the same.
+//! A query that takes longer than it may has fewer test points and a greater tolerance next time; one that
+//! has time left has more and a lesser one, if it came to test any. A time budget cuts off what is too long
+//! all the same.
 
 use std::time::Duration;
 
@@ -25,8 +26,8 @@ const TOLERANCES: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 /// A query that took more than this share of its time had enough to do.
 const ENOUGH: f64 = 0.9;
 
-/// How many test points leaves get, so that successive queries take the same time. Owned by the caller, stepped in the order
-/// of the queries: one for each pair of scans, or one for all.
+/// How many test points leaves get, so that successive queries take the same time. Owned by the caller,
+/// stepped in the order of the queries: one for each pair of scans, or one for all.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pacer {
     target: Duration,
@@ -46,7 +47,8 @@ impl Pacer {
         Self { sampling, ..self }
     }
 
-    /// What the next query tests leaves with: 8 to 65,536 test points, a tolerance of 0.1 to 1, whatever was wanted.
+    /// What the next query tests leaves with: 8 to 65,536 test points, a tolerance of 0.1 to 1, whatever was
+    /// wanted.
     #[must_use]
     pub fn sampling(&self) -> Sampling {
         // `clamp` would let through what is no number.
@@ -84,8 +86,8 @@ impl Pacer {
     }
 }
 
-/// As [`collide_with`] with a deadline in `pacer`'s time; the test points of
-/// [`Method::Sampling`] are the pacer's, which learns from the query. By other methods there is nothing to adapt.
+/// As [`collide_with`] with a deadline in `pacer`'s time; the test points of [`Method::Sampling`] are the
+/// pacer's, which learns from the query. By other methods there is nothing to adapt.
 pub fn collide_paced(
     a: &ScanView<'_>,
     b: &ScanView<'_>,

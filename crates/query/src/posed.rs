@@ -142,8 +142,8 @@ const FAR_APART: f64 = 100.0;
 /// Scans whose stored frames differ in scale by more than this are not compared in single precision.
 const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 
-/// The motion of b's stored frame into a's, in double and in single precision. An error is the distance of balls about the two scans if that is more
-/// than any contact reaches, or `None` for poses that are none.
+/// The motion of b's stored frame into a's, in double and in single precision. An error is the distance of
+/// balls about the two scans if that is more than any contact reaches, or `None` for poses that are none.
 pub(crate) fn relative(
     a: &ScanView<'_>,
     b: &ScanView<'_>,

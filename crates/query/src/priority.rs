@@ -1,8 +1,9 @@
 //! What a pair of nodes whose boxes overlap says on a closer look: S0 §5.1 and §5.2.
 //!
-//! Their sphere coverings may part them. Otherwise the sample points of a's node that lie on either side of f′_B, the function
-//! that the sample points of b's node define, tell how likely the surfaces cross; only those count that are further from it
-//! than the covering radius of b's node, for nearer ones say little of f_B.
+//! Their sphere coverings may part them. Otherwise the sample points of a's node that lie on either side of
+//! f′_B, the function that the sample points of b's node define, tell how likely the surfaces cross; only
+//! those count that are further from it than the covering radius of b's node, for nearer ones say little of
+//! f_B.
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
@@ -13,8 +14,8 @@ use crate::options::Order;
 use crate::surface::Surfaces;
 
 impl Surfaces<'_> {
-    /// Takes those pairs back that coverings part, and adds to the urgencies of the others what their sample points say. At
-    /// most one before, an urgency then decides between pairs of as many sample points.
+    /// Takes those pairs back that coverings part, and adds to the urgencies of the others what their sample
+    /// points say. At most one before, an urgency then decides between pairs of as many sample points.
     #[cold]
     pub(crate) fn look_closer(&mut self, a: [NodeId; 2], b: [NodeId; 2], admitted: &mut [Option<f32>; 4]) {
         for (i, admitted) in admitted.iter_mut().enumerate() {

@@ -1,7 +1,8 @@
 //! A resolution of the search: nodes that are fine enough answer by their samples (S0 §1).
 //!
-//! A node's sample points stand for all below it: the balls about them that cover its tangent discs (S0 Definition 4). Where
-//! no two balls overlap no discs cross; where two do, the surfaces come within the sum of four radii of each other.
+//! A node's sample points stand for all below it: the balls about them that cover its tangent discs (S0
+//! Definition 4). Where no two balls overlap no discs cross; where two do, the surfaces come within the sum
+//! of four radii of each other.
 
 use std::ops::ControlFlow;
 

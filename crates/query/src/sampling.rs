@@ -1,8 +1,9 @@
 //! The random test of two surfaces: S0 §5.3.
 //!
-//! Test points are drawn in the sphere covering of a's leaf; the least |f_A| + |f_B| of those on which both functions
-//! mean something estimates the distance of the surfaces (eq. 8). Unlike S0 we draw again what falls outside the volume of b's
-//! leaf, where nothing can be found, and a witness is looked for from the test point that saw the intersection.
+//! Test points are drawn in the sphere covering of a's leaf; the least |f_A| + |f_B| of those on which both
+//! functions mean something estimates the distance of the surfaces (eq. 8). Unlike S0 we draw again what
+//! falls outside the volume of b's leaf, where nothing can be found, and a witness is looked for from the
+//! test point that saw the intersection.
 
 use std::ops::{ControlFlow, Range};
 
@@ -150,8 +151,8 @@ impl Surfaces<'_> {
         self.pair.meter.go_on()
     }
 
-    /// One test point, in a's stored frame, probably not far from the points `about` of either scan; `points` of either
-    /// are those near which a contact may be.
+    /// One test point, in a's stored frame, probably not far from the points `about` of either scan; `points`
+    /// of either are those near which a contact may be.
     fn test(
         &mut self,
         x: [f32; 3],
@@ -195,8 +196,8 @@ impl Surfaces<'_> {
     }
 }
 
-/// The point nearest to `x`, if it is so near that there is a surface: between two sheets f vanishes too (docs/theory).
-/// None as well when time is up.
+/// The point nearest to `x`, if it is so near that there is a surface: between two sheets f vanishes too
+/// (docs/theory). None as well when time is up.
 fn near(view: &ScanView<'_>, x: [f64; 3], points: Range<usize>, meter: &mut Meter) -> Option<usize> {
     let placed = view.placed();
     let local = placed.apply_inverse(x);

@@ -1,8 +1,9 @@
 //! Spheres, capsules and boxes against the points of a scan.
 //!
-//! A shape touches a scan if a point of it is in the shape: what a robot of spheres asks of a depth frame. Points are held in blocks of
-//! sixteen, with bounds about blocks, about sixteen of these, and so on (`surface::BlockTree`); the blocks are those of the scan. A grid
-//! tells which blocks are near small spheres (`surface::Cells`).
+//! A shape touches a scan if a point of it is in the shape: what a robot of spheres asks of a depth frame.
+//! Points are held in blocks of sixteen, with bounds about blocks, about sixteen of these, and so on
+//! (`surface::BlockTree`); the blocks are those of the scan. A grid tells which blocks are near small spheres
+//! (`surface::Cells`).
 
 use fearless_simd::Level;
 use nearmiss_geometry::{PointId, Pose};
@@ -11,7 +12,8 @@ use nearmiss_surface::{BlockTree, Cells, Skeleton};
 
 use crate::view::ScanView;
 
-/// A shape in the world. Radii and half edge lengths are zero or more; nothing touches one that is less, or no number.
+/// A shape in the world. Radii and half edge lengths are zero or more; nothing touches one that is less, or
+/// no number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Shape {
@@ -49,7 +51,8 @@ pub struct NearestPoint {
     pub gap: f64,
 }
 
-/// The points of a scan, ready for shapes. Made once for a scan, in O(n): some milliseconds and two megabytes for 100,000 points.
+/// The points of a scan, ready for shapes. Made once for a scan, in O(n): some milliseconds and two megabytes
+/// for 100,000 points.
 #[derive(Debug, Clone)]
 pub struct ShapeIndex<'a> {
     scan: &'a PointHierarchy,
@@ -83,11 +86,11 @@ pub struct PlacedIndex<'a> {
 }
 
 impl PlacedIndex<'_> {
-    /// Whether a point of the scan is in `shape`, its boundary included: exactly what double precision says of each point in the stored
-    /// frame of the scan ([`Skeleton::distance_sq`]).
+    /// Whether a point of the scan is in `shape`, its boundary included: exactly what double precision says
+    /// of each point in the stored frame of the scan ([`Skeleton::distance_sq`]).
     ///
-    /// A small sphere looks at some five blocks of points, named by the cell of its centre; others descend through some ten registers'
-    /// worth of boxes near the surface (benches/record). Does not allocate.
+    /// A small sphere looks at some five blocks of points, named by the cell of its centre; others descend
+    /// through some ten registers' worth of boxes near the surface (benches/record). Does not allocate.
     #[inline]
     #[must_use]
     pub fn touches(&self, shape: &Shape) -> bool {
@@ -115,8 +118,9 @@ impl PlacedIndex<'_> {
             }
     }
 
-    /// The point nearest to `shape`, if it is no further than `reach` from it, in the world; of equally near ones the first in the order of
-    /// the scan. Exact as [`Self::touches`]. Within a sphere or capsule the nearest point is that nearest to its centre or segment.
+    /// The point nearest to `shape`, if it is no further than `reach` from it, in the world; of equally near
+    /// ones the first in the order of the scan. Exact as [`Self::touches`]. Within a sphere or capsule the
+    /// nearest point is that nearest to its centre or segment.
     #[must_use]
     pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
         let (skeleton, radius) = self.stored(shape);
@@ -133,7 +137,8 @@ impl PlacedIndex<'_> {
         })
     }
 
-    /// Which of many shapes [touch](Self::touches) the scan, in order, on the threads of the current rayon pool; the same on any number.
+    /// Which of many shapes [touch](Self::touches) the scan, in order, on the threads of the current rayon
+    /// pool; the same on any number.
     ///
     /// # Panics
     /// When there are not as many answers as shapes.
@@ -167,7 +172,8 @@ impl PlacedIndex<'_> {
         }
     }
 
-    /// A shape in the stored frame of the scan: what it is about, and how thick; less than nothing for a box that has a negative edge.
+    /// A shape in the stored frame of the scan: what it is about, and how thick; less than nothing for a box
+    /// that has a negative edge.
     #[inline]
     fn stored(&self, shape: &Shape) -> (Skeleton, f64) {
         let placed = self.view.placed();

@@ -1,10 +1,11 @@
 //! `Semantics::Surface`: the tangent discs of one scan against those of the other.
 //!
 //! Boxes hold the discs of their points, so a pair of disjoint boxes hides no crossing, and the descent finds
-//! a crossing exactly if there is one. Discs of points on lines and of lone ones are not to be trusted: where only
-//! they cross, or the other scan comes within a local radius of such a point, the answer stays open. Where two discs cross, Newton's method looks for a point on both
-//! implicit surfaces; it adds a witness and certainty, and does not overrule: the weighted fit rounds off tips
-//! and ends early at borders, where discs of points still tell (docs/decisions).
+//! a crossing exactly if there is one. Discs of points on lines and of lone ones are not to be trusted: where
+//! only they cross, or the other scan comes within a local radius of such a point, the answer stays open.
+//! Where two discs cross, Newton's method looks for a point on both implicit surfaces; it adds a witness and
+//! certainty, and does not overrule: the weighted fit rounds off tips and ends early at borders, where discs
+//! of points still tell (docs/decisions).
 
 use std::ops::{ControlFlow, Range};
 
@@ -26,7 +27,8 @@ use crate::view::{ScanView, ViewScratch};
 /// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
 const TRIES: u32 = 4;
 
-/// A verified point further than this from the crossing, in the greater of the two local radii, is some other place.
+/// A verified point further than this from the crossing, in the greater of the two local radii, is some other
+/// place.
 const NEARBY: f64 = 4.0;
 
 /// The search for a crossing.
@@ -45,7 +47,8 @@ pub(crate) struct Surfaces<'a> {
     looks_closer: bool,
     /// Nodes whose samples are no further from their surface than this, in a's stored frame, are not split.
     pub(crate) resolution: f32,
-    /// Whether pairs of boxes tell all that is wanted of those that are apart: they need not be looked at one by one.
+    /// Whether pairs of boxes tell all that is wanted of those that are apart: they need not be looked at one
+    /// by one.
     pub(crate) is_plain: bool,
     /// Whether excluded pairs are noted.
     notes: bool,
@@ -134,8 +137,8 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Whether a disc of some points of b comes into the `ball` about the centre of `disc` of a, or that disc into
-    /// one of their balls. A point with a ball has no disc here.
+    /// Whether a disc of some points of b comes into the `ball` about the centre of `disc` of a, or that disc
+    /// into one of their balls. A point with a ball has no disc here.
     pub(crate) fn comes_near_sparse(&self, disc: &Disc, ball: f32, mut points: Range<usize>) -> bool {
         let point =
             |disc: &Disc, ball: f32| Disc { radius: if ball > 0.0 { 0.0 } else { disc.radius }, ..*disc };

@@ -15,8 +15,8 @@ pub enum Verdict {
     },
     /// They do not.
     Separated {
-        /// If certified, a proven lower bound of the distance in world units of their surfaces, or of their balls;
-        /// else 0.
+        /// If certified, a proven lower bound of the distance in world units of their surfaces, or of their
+        /// balls; else 0.
         gap: f64,
         /// How sure that is.
         evidence: Evidence,
@@ -53,20 +53,22 @@ pub enum Evidence {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Reason {
-    /// The budget was spent first; without one, so much that a file must be damaged ([`Budget`](crate::Budget)).
+    /// The budget was spent first; without one, so much that a file must be damaged
+    /// ([`Budget`](crate::Budget)).
     Budget {
-        /// An estimate of the probability that they meet, 0 to 1, from how deeply the volumes still open overlap.
+        /// An estimate of the probability that they meet, 0 to 1, from how deeply the volumes still open
+        /// overlap.
         likelihood: f64,
     },
     /// They come near each other only where a scan's points lie on lines or too sparsely.
     Undersampled,
     /// They come near each other only where a scan's points do not look like one sheet.
     Ambiguous,
-    /// [`Method::Interpolation`](crate::Method) searches along the graph of the one scan, which has none, or was given
-    /// [without](crate::ScanView::with_graph).
+    /// [`Method::Interpolation`](crate::Method) searches along the graph of the one scan, which has none, or
+    /// was given [without](crate::ScanView::with_graph).
     NoGraph,
-    /// A pose is not finite, no rotation, has no positive scale, leads further than squares of double precision reach,
-    /// or makes one scan's frame more than 2⁶⁰ times as large as the other's.
+    /// A pose is not finite, no rotation, has no positive scale, leads further than squares of double
+    /// precision reach, or makes one scan's frame more than 2⁶⁰ times as large as the other's.
     Pose,
 }
 
@@ -108,9 +110,10 @@ pub struct Answer {
     /// points near the narrowest gap that was proven, or of the scans. Never more than the greater
     /// [reach](nearmiss_hierarchy::PointHierarchy::reach); infinite for invalid poses.
     pub band: f64,
-    /// By [`Method::Sampling`](crate::Method), the least |f_A| + |f_B| of all test points on which both mean something, in
-    /// world units (S0 eq. 8): an estimate, from above, of the distance of the surfaces. By a flat
-    /// [`Method::Interpolation`](crate::Method) the least distance of any point drawn of a from b. None otherwise, and where there was no such point.
+    /// By [`Method::Sampling`](crate::Method), the least |f_A| + |f_B| of all test points on which both mean
+    /// something, in world units (S0 eq. 8): an estimate, from above, of the distance of the surfaces. By a
+    /// flat [`Method::Interpolation`](crate::Method) the least distance of any point drawn of a from b. None
+    /// otherwise, and where there was no such point.
     pub distance_estimate: Option<f64>,
     /// What that cost.
     pub statistics: Statistics,

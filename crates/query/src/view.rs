@@ -108,8 +108,8 @@ impl<'a> ScanView<'a> {
         self.kernel.is_some() == (self.scan.metric() == Metric::Geodesic)
     }
 
-    /// The implicit function at `x`, all in the world, by the [kernel](Self::with_kernel) of the view; the sign of f and of the normal as
-    /// in the stored frame, from oriented normals if the scan has them.
+    /// The implicit function at `x`, all in the world, by the [kernel](Self::with_kernel) of the view; the
+    /// sign of f and of the normal as in the stored frame, from oriented normals if the scan has them.
     pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
         match &self.kernel {
             None => self.in_world(
@@ -119,8 +119,9 @@ impl<'a> ScanView<'a> {
         }
     }
 
-    /// The same with distances along the graph of this scan, that of `kernel`; outside further than the greatest horizon from all points.
-    /// The sign is that of the nearest point's normal (Klein & Zachmann 2005, §3.2).
+    /// The same with distances along the graph of this scan, that of `kernel`; outside further than the
+    /// greatest horizon from all points. The sign is that of the nearest point's normal (Klein & Zachmann
+    /// 2005, §3.2).
     pub fn evaluate_by(
         &self,
         kernel: &GeodesicKernel<'_>,
@@ -148,7 +149,8 @@ impl<'a> ScanView<'a> {
         self.in_world(at)
     }
 
-    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`, on the side of whose normal n is.
+    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`, on the side of whose normal
+    /// n is.
     pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
         match &self.kernel {
             None => {
@@ -159,8 +161,9 @@ impl<'a> ScanView<'a> {
         }
     }
 
-    /// f at `x` but for its sign, as [`Self::evaluate_with`]; faster where the last place that was asked about with this scratch is near. `nearest`
-    /// is the point nearest to that, or any, and then that nearest to `x` if the kernel needs it.
+    /// f at `x` but for its sign, as [`Self::evaluate_with`]; faster where the last place that was asked
+    /// about with this scratch is near. `nearest` is the point nearest to that, or any, and then that nearest
+    /// to `x` if the kernel needs it.
     pub(crate) fn evaluate_onward(
         &self,
         x: [f64; 3],
@@ -192,7 +195,8 @@ impl<'a> ScanView<'a> {
     }
 }
 
-/// Whether a pose is one: products of many may lead nowhere, or turn by what is no rotation to more than rounding.
+/// Whether a pose is one: products of many may lead nowhere, or turn by what is no rotation to more than
+/// rounding.
 fn is_proper(pose: &Pose) -> bool {
     let rotation = pose.rotation();
     let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];

@@ -1,8 +1,8 @@
 //! Many scans in one world, and which of them may meet.
 //!
-//! An R*-tree (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree: an efficient and robust access method for points
-//! and rectangles", SIGMOD 1990; the crate `rstar`) over boxes of the world leaves out the pairs that are further apart
-//! than a plan reaches; batches answer the others.
+//! An R*-tree (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree: an efficient and robust access method for
+//! points and rectangles", SIGMOD 1990; the crate `rstar`) over boxes of the world leaves out the pairs that
+//! are further apart than a plan reaches; batches answer the others.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
@@ -35,15 +35,16 @@ pub enum Bodies<'a> {
 
 /// Placed scans, each a *body* with an id.
 ///
-/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc<PointHierarchy>` or a reference. One scan may be placed
-/// many times.
+/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc<PointHierarchy>` or a reference. One scan may
+/// be placed many times.
 ///
 /// ```
 /// use nearmiss_geometry::{PointCloud, Pose};
 /// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 /// use nearmiss_query::{Bodies, Budget, CollideOptions, CollidePlan, Until, World};
 ///
-/// let points: Vec<[f32; 3]> = (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
 /// let square = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
 /// let plan = CollidePlan::new(&CollideOptions::default(), &square, &square)?;
 ///
@@ -54,15 +55,18 @@ pub enum Bodies<'a> {
 /// let hinge = world.insert(&square, &upright.with_translation([0.4, 0.4, -0.4]));
 ///
 /// // The door and its hinge belong together.
-/// let told = world.collide_many(Bodies::All, |pair| pair != [door, hinge], &plan, &Budget::UNLIMITED, Until::All);
-/// let touching: Vec<_> = told.iter().filter(|(_, answer)| answer.verdict.is_intersecting()).map(|(pair, _)| *pair).collect();
+/// let asked = |pair| pair != [door, hinge];
+/// let told = world.collide_many(Bodies::All, asked, &plan, &Budget::UNLIMITED, Until::All);
+/// let touching = told.iter().filter(|(_, answer)| answer.verdict.is_intersecting());
+/// let touching: Vec<_> = touching.map(|(pair, _)| *pair).collect();
 /// assert_eq!(touching, [[floor, door], [floor, hinge]]);
 ///
 /// // Of a body that moved, only its own pairs are asked for.
 /// world.move_to(door, &upright.with_translation([0.3, 0.5, 0.1]));
 /// let pairs = world.near_pairs(Bodies::These(&[door]), &plan);
 /// let answers = world.collide_pairs(&pairs, &plan, &Budget::UNLIMITED, Until::All);
-/// assert!(pairs.iter().zip(&answers).all(|(pair, answer)| pair[0] != floor || answer.verdict.is_separated()));
+/// let mut told = pairs.iter().zip(&answers);
+/// assert!(told.all(|(pair, answer)| pair[0] != floor || answer.verdict.is_separated()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -187,14 +191,15 @@ impl<S: Deref<Target = PointHierarchy>> World<S> {
         self.bodies.get(&id).map(Body::view)
     }
 
-    /// The box of the world about a body that the broad phase goes by; none of one that it takes for boundless.
+    /// The box of the world about a body that the broad phase goes by; none of one that it takes for
+    /// boundless.
     #[must_use]
     pub fn bounds(&self, id: BodyId) -> Option<Aabb> {
         self.bodies.get(&id).and_then(|body| body.bounds)
     }
 
-    /// The broad phase: pairs whose boxes come as near each other as `plan` reaches, lesser id first, in order.
-    /// Allocates; see [`World::near_pairs_with`].
+    /// The broad phase: pairs whose boxes come as near each other as `plan` reaches, lesser id first, in
+    /// order. Allocates; see [`World::near_pairs_with`].
     #[must_use]
     pub fn near_pairs(&self, bodies: Bodies<'_>, plan: &CollidePlan) -> Vec<[BodyId; 2]> {
         let mut pairs = Vec::new();
@@ -202,8 +207,8 @@ impl<S: Deref<Target = PointHierarchy>> World<S> {
         pairs
     }
 
-    /// As [`World::near_pairs`], into `pairs`. About half a microsecond a body where each is near twelve others, on this
-    /// thread alone.
+    /// As [`World::near_pairs`], into `pairs`. About half a microsecond a body where each is near twelve
+    /// others, on this thread alone.
     ///
     /// Of pairs left out a single query would say that they are apart. A body in a pose that is none
     /// ([`Reason::Pose`]), or at the ends of the range of double precision, is near all others.
@@ -291,8 +296,8 @@ fn are_near(a: &Envelope, b: &Envelope, reach: f64) -> bool {
 }
 
 impl<S: Deref<Target = PointHierarchy> + Sync> World<S> {
-    /// Which bodies meet: the answers to all near pairs that `asked` lets pass, by ids, the lesser first. Two bodies
-    /// that are not told of are apart, or were not asked for.
+    /// Which bodies meet: the answers to all near pairs that `asked` lets pass, by ids, the lesser first. Two
+    /// bodies that are not told of are apart, or were not asked for.
     ///
     /// As [`World::near_pairs`] and then [`World::collide_pairs`].
     pub fn collide_many(
@@ -309,7 +314,8 @@ impl<S: Deref<Target = PointHierarchy> + Sync> World<S> {
         pairs.into_iter().zip(answers).collect()
     }
 
-    /// Whether the bodies of each pair meet. Allocates a scratch of its own; see [`World::collide_pairs_with`].
+    /// Whether the bodies of each pair meet. Allocates a scratch of its own; see
+    /// [`World::collide_pairs_with`].
     #[must_use]
     pub fn collide_pairs(
         &self,
@@ -354,12 +360,12 @@ const DOUBLE_ROUNDING: f64 = 4e-15;
 /// Further out, volumes of boxes leave the range of double precision.
 const FARTHEST: f64 = 1e100;
 
-/// Scans whose stored frames are larger or smaller by more than this are bounded by nothing: then the others differ by
-/// no more than single queries allow, 2⁶⁰.
+/// Scans whose stored frames are larger or smaller by more than this are bounded by nothing: then the others
+/// differ by no more than single queries allow, 2⁶⁰.
 const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
 
-/// A box of the world about all that a query looks at of a scan; half of the rounding that it allows for included.
-/// None of a scan in a pose that is none, or that is extreme.
+/// A box of the world about all that a query looks at of a scan; half of the rounding that it allows for
+/// included. None of a scan in a pose that is none, or that is extreme.
 fn bounds(view: &ScanView<'_>) -> Option<Aabb> {
     let root = view.slices().enclosure(0);
     let placed = view.placed();
@@ -369,8 +375,9 @@ fn bounds(view: &ScanView<'_>) -> Option<Aabb> {
         let half = f64::from(root.half[j]) * scale;
         placed.rotate(root.axes[j].map(f64::from)).map(|x| (x * half).abs())
     });
-    // A query in single precision allows for SLACK times the coordinates of either scan about the other's origin:
-    // for two whose boxes touch, at most twice the distances of both centres from their origins, and four radii of each.
+    // A query in single precision allows for SLACK times the coordinates of either scan about the other's
+    // origin: for two whose boxes touch, at most twice the distances of both centres from their origins, and
+    // four radii of each.
     let own = Vector3::from(root.centre.map(f64::from)).norm();
     let single = f64::from(SLACK) * (2.0 * own + 4.0 * f64::from(root.radius())) * scale;
     let far = Vector3::from(placed.translation()).norm() + Vector3::from(centre).norm();

@@ -17,8 +17,8 @@ use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use nearmiss_testdata::shapes::{Form, Order, Sampling, patch, sphere};
 use rand::RngExt;
 
-/// How far beyond a border, or before it, a curve may end, in sampling radii: f's domain ends where the mean of the points is 0.56 h
-/// away, and how they lie moves that.
+/// How far beyond a border, or before it, a curve may end, in sampling radii: f's domain ends where the mean
+/// of the points is 0.56 h away, and how they lie moves that.
 const AT_BORDERS: f64 = 0.75;
 
 #[test]

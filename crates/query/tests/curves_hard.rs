@@ -1,5 +1,5 @@
-//! Curves of tori through each other, whole; and of surfaces that graze or nearly coincide, where what is asserted is that the search ends,
-//! makes nothing up and says where it could not go on.
+//! Curves of tori through each other, whole; and of surfaces that graze or nearly coincide, where what is
+//! asserted is that the search ends, makes nothing up and says where it could not go on.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod cut;
@@ -70,7 +70,8 @@ fn a_ball_that_grazes_leaves_a_loop_or_a_point_or_nothing() {
             let off = (to_segment(x, centre, centre) - rho).abs() / r;
             assert!(off < 0.2, "{off} r from the circle");
         }
-        // Smaller than a step, or less than the tolerance deep: a loop or points, none far from where the surfaces touch.
+        // Smaller than a step, or less than the tolerance deep: a loop or points, none far from where the
+        // surfaces touch.
         for depth in [0.2, 0.1, 0.05, 0.02, 0.01, 2e-3, 0.0, -2e-3] {
             let (found, centre, rho) = drawn(depth * r);
             assert!(ends_touch(&found), "{depth} r deep: {:?}", found.curves);
@@ -141,7 +142,8 @@ fn chords_keep_to_what_shorter_ones_show() {
         }
     }
     off.sort_by(f64::total_cmp);
-    // A fortieth of two sampling radii, and what a surface that is rougher than an arc adds: most where it turns within a step.
+    // A fortieth of two sampling radii, and what a surface that is rougher than an arc adds: most where it
+    // turns within a step.
     let [most, nearly_all] = [off[off.len() - 1], off[off.len() * 99 / 100]];
     assert!(off.len() > 500, "{} chords", off.len());
     assert!(nearly_all < 0.065 && most < 0.2, "{nearly_all} r off, {most} at most");

@@ -162,8 +162,8 @@ fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
     points.retain(|p| p[0].abs() > 1.5);
     let slit = scan(&points);
     assert_eq!(slit.graph.counts().components, 2, "no edge leads across");
-    // Where a point stands out, a blade upright along the slit cuts it off: no other of this half is beyond, and it is seldom drawn.
-    // Roofs above and below, which meet nothing, have the other half searched too.
+    // Where a point stands out, a blade upright along the slit cuts it off: no other of this half is beyond,
+    // and it is seldom drawn. Roofs above and below, which meet nothing, have the other half searched too.
     let outermost = |p: &&[f64; 3]| {
         let is_beyond = |q: &[f64; 3]| q[0] < 0.0 && q[0] > p[0] && (q[1] - p[1]).abs() < 4.5;
         p[0] < 0.0 && p[1].abs() < 25.0 && !points.iter().any(is_beyond)

@@ -49,7 +49,8 @@ impl<'a> Twin<'a> {
         (0..self.view.scan().len()).min_by(|i, j| away(i).total_cmp(&away(j))).unwrap()
     }
 
-    /// The distance of `x` from the surface, positive on the side that the normal of the nearest point is on (S1 §3.2), if f means something.
+    /// The distance of `x` from the surface, positive on the side that the normal of the nearest point is on
+    /// (S1 §3.2), if f means something.
     fn side(&self, x: Vector3<f64>) -> Option<f64> {
         let placed = self.view.placed();
         let at = self.surface.evaluate(placed.apply_inverse(x.into()))?;

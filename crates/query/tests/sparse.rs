@@ -27,7 +27,8 @@ fn scene(seed: u64) -> Vec<[f64; 3]> {
     points
 }
 
-/// Places where a point with a ball comes near: the least of distance over reach, of balls and of the points' discs.
+/// Places where a point with a ball comes near: the least of distance over reach, of balls and of the points'
+/// discs.
 fn nearest_ball(a: &ScanView<'_>, b: &ScanView<'_>) -> f64 {
     let all = |view: &ScanView<'_>| -> Vec<(oracle::Disc, f64)> {
         let (scan, scale) = (view.scan(), view.placed().scale());

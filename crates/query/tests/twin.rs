@@ -32,8 +32,8 @@ const SHAPES: [CloudKind; 8] = [
     CloudKind::Huge,
 ];
 
-/// The greatest slack of any two trusted discs in the world, in shares of their radii, and whether any doubtful
-/// ones cross.
+/// The greatest slack of any two trusted discs in the world, in shares of their radii, and whether any
+/// doubtful ones cross.
 fn best_crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> (f64, bool) {
     let discs = |view: &ScanView<'_>| -> Vec<(oracle::Disc, bool, f64)> {
         let scan = view.scan();

@@ -45,7 +45,8 @@ fn options() -> [CollideOptions; 4] {
 /// The bodies that a world ought to hold, in the order of their ids.
 type Placed = Vec<(BodyId, usize, Pose)>;
 
-/// A proper pose: b about a place in a cube, whatever the scan's own origin, a third of them far from the world's.
+/// A proper pose: b about a place in a cube, whatever the scan's own origin, a third of them far from the
+/// world's.
 fn proper_pose(scan: usize, seed: u64) -> Pose {
     let rng = &mut arbitrary::rng(seed);
     let scale = [1.0, 0.3, 4.0, 1e3][usize::try_from(seed % 4).unwrap()];

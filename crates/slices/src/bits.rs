@@ -2,11 +2,12 @@
 
 use std::ops::RangeInclusive;
 
-/// Side of a tile in pixels, a power of two from eight on, so that the pixels of a byte are in one. An avatar's base meets three by
-/// three; the bits of all tiles of a map fit a cache.
+/// Side of a tile in pixels, a power of two from eight on, so that the pixels of a byte are in one. An
+/// avatar's base meets three by three; the bits of all tiles of a map fit a cache.
 const TILE: u32 = 8;
 
-/// Bits of a rectangle of pixels, each row from a word of its own, so that a run of pixels is tested 64 at a time.
+/// Bits of a rectangle of pixels, each row from a word of its own, so that a run of pixels is tested 64 at a
+/// time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Bits {
     words: Vec<u64>,

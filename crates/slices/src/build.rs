@@ -1,7 +1,7 @@
 //! Points into voxels: of each the lowest and the highest level, which no order of the points changes.
 //!
-//! A block of points at a time is sorted by the part of the map that they lie in; then every part is filled by one thread. So nothing
-//! is shared between threads, and what is written lies close together.
+//! A block of points at a time is sorted by the part of the map that they lie in; then every part is filled
+//! by one thread. So nothing is shared between threads, and what is written lies close together.
 
 use std::ops::Range;
 
@@ -26,8 +26,8 @@ pub(crate) const PART: usize = 1 << 16;
 /// Samples of a mesh that are kept before they are poured into the map.
 const BATCH: usize = BLOCK * BLOCKS;
 
-/// What a voxel has seen: 255 less the lowest level in the high byte, the highest level plus one in the low byte; 0 if
-/// nothing. So either byte only ever grows, and memory that is zero is a map without points.
+/// What a voxel has seen: 255 less the lowest level in the high byte, the highest level plus one in the low
+/// byte; 0 if nothing. So either byte only ever grows, and memory that is zero is a map without points.
 pub(crate) type Cell = u16;
 
 /// What the voxels of a slice have seen.
@@ -72,7 +72,8 @@ impl Layer {
         self.filled[i / 64] >> (i % 64) & 1 == 1
     }
 
-    /// Lowest and highest level of a cell; none if it has seen nothing, for which its bit is enough: the bits of a layer fit a cache.
+    /// Lowest and highest level of a cell; none if it has seen nothing, for which its bit is enough: the bits
+    /// of a layer fit a cache.
     #[inline]
     pub(crate) fn span(&self, i: usize) -> Option<[i32; 2]> {
         let seen = || self.cells[i];
@@ -105,8 +106,8 @@ impl Part<'_> {
 
 /// Takes points in any number of pieces and makes a map of them.
 ///
-/// Takes 2 bytes a voxel until it is done, touched only where points are, and some 20 MB to sort in. The map depends on the points
-/// alone, not on their order, their pieces or the number of threads.
+/// Takes 2 bytes a voxel until it is done, touched only where points are, and some 20 MB to sort in. The map
+/// depends on the points alone, not on their order, their pieces or the number of threads.
 #[derive(Debug)]
 pub struct SliceBuilder {
     plan: SlicePlan,
@@ -127,8 +128,8 @@ impl SliceBuilder {
         Ok(Self { plan: *plan, layers, points: 0, left_out: 0 })
     }
 
-    /// Adds points given in the caller's coordinates. Those outside the bounds of the plan, and those with a coordinate that is
-    /// not a number, are left out and counted.
+    /// Adds points given in the caller's coordinates. Those outside the bounds of the plan, and those with a
+    /// coordinate that is not a number, are left out and counted.
     ///
     /// Some ten nanoseconds a point and thread.
     pub fn add(&mut self, points: &[[f64; 3]]) {
@@ -142,11 +143,11 @@ impl SliceBuilder {
         self.left_out += self.pour(cloud.positions(), |p| up.to_map(frame.to_world(*p)));
     }
 
-    /// Adds a mesh by samples of its own making: every voxel that its surface passes gets the lowest and the highest point of the
-    /// surface in it, up to rounding. Tells how many samples that took.
+    /// Adds a mesh by samples of its own making: every voxel that its surface passes gets the lowest and the
+    /// highest point of the surface in it, up to rounding. Tells how many samples that took.
     ///
-    /// Of a triangle that reaches beyond the bounds of the plan the part inside is added; of one with a corner that is not finite,
-    /// nothing. Each such triangle counts as one left out.
+    /// Of a triangle that reaches beyond the bounds of the plan the part inside is added; of one with a
+    /// corner that is not finite, nothing. Each such triangle counts as one left out.
     pub fn add_mesh(&mut self, mesh: &TriangleMesh) -> u64 {
         let Grid { up, origin, pixel, slice_height, counts } = *self.plan.grid();
         let lattice = Lattice { origin, sides: [pixel, pixel, slice_height], counts };
@@ -192,7 +193,8 @@ impl SliceBuilder {
         points.len() as u64 - added
     }
 
-    /// How many points are in, samples of meshes among them; and how many points, or triangles at least a part of which, were left out.
+    /// How many points are in, samples of meshes among them; and how many points, or triangles at least a
+    /// part of which, were left out.
     #[must_use]
     pub fn counts(&self) -> [u64; 2] {
         [self.points, self.left_out]

@@ -1,7 +1,8 @@
 //! So many slices in memory, loaded as an avatar needs them.
 //!
-//! S4, §3.1: new slices are loaded until there are n; from then on each takes the place of the one furthest from the avatar. Beside that
-//! a thread of its own loads what comes next in the direction of movement (the paper's figures are without one).
+//! S4, §3.1: new slices are loaded until there are n; from then on each takes the place of the one furthest
+//! from the avatar. Beside that a thread of its own loads what comes next in the direction of movement (the
+//! paper's figures are without one).
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -19,7 +20,8 @@ use crate::store::{SliceFolder, StoreError};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CacheOptions {
-    /// n: how many slices are kept in memory. Raised to what is needed at once. Default: 16, as in S4's Fig. 6.
+    /// n: how many slices are kept in memory. Raised to what is needed at once. Default: 16, as in S4's Fig.
+    /// 6.
     pub slices: u32,
     /// Whether a thread loads ahead. Default: yes.
     pub prefetch: bool,
@@ -58,8 +60,8 @@ pub struct CacheCounts {
 
 /// Some slices of a folder in memory, and a thread that loads others.
 ///
-/// Which slices are kept follows from what was wanted, in order, never from how fast the disk is: a slice has its place from
-/// when it is asked for.
+/// Which slices are kept follows from what was wanted, in order, never from how fast the disk is: a slice has
+/// its place from when it is asked for.
 #[derive(Debug)]
 pub struct SliceCache {
     folder: SliceFolder,
@@ -76,8 +78,8 @@ pub struct SliceCache {
 }
 
 impl SliceCache {
-    /// A cache without slices. `span` is how many are needed at once ([`Avatar::slices`](crate::Avatar::slices)): fewer are never
-    /// kept.
+    /// A cache without slices. `span` is how many are needed at once
+    /// ([`Avatar::slices`](crate::Avatar::slices)): fewer are never kept.
     #[must_use]
     pub fn new(folder: &SliceFolder, options: &CacheOptions, span: u32) -> Self {
         // No more than there are.
@@ -114,8 +116,8 @@ impl SliceCache {
         &self.map
     }
 
-    /// Sees to it that these slices are loaded, for feet at this height of the map's coordinates, and asks for those that come
-    /// next.
+    /// Sees to it that these slices are loaded, for feet at this height of the map's coordinates, and asks
+    /// for those that come next.
     ///
     /// # Errors
     /// Names the file of a slice that cannot be loaded.
@@ -144,7 +146,8 @@ impl SliceCache {
 
     /// Loads a slice that has a place, if it is not there yet. Tells whether that took any waiting.
     ///
-    /// A thread that has begun to load it may have to wait for a processor longer than loading takes, so nobody waits for it.
+    /// A thread that has begun to load it may have to wait for a processor longer than loading takes, so
+    /// nobody waits for it.
     fn complete(&mut self, slice: u32) -> Result<bool, StoreError> {
         if self.map.slice(slice).is_ok() {
             return Ok(false);
@@ -160,8 +163,8 @@ impl SliceCache {
         Ok(true)
     }
 
-    /// Takes in what the thread has loaded, unless it is there already or its place has gone to another. What cannot be loaded is told when
-    /// it is wanted.
+    /// Takes in what the thread has loaded, unless it is there already or its place has gone to another. What
+    /// cannot be loaded is told when it is wanted.
     fn receive(&mut self, (slice, image): (u32, Result<Slice, StoreError>)) {
         if let Ok(image) = image
             && self.kept.contains(&slice)
@@ -186,8 +189,8 @@ impl SliceCache {
         self.map.put(slice, Some(known.unwrap_or_else(|| Arc::new(image))));
     }
 
-    /// Takes the place of the slice furthest from the middle of those wanted, if all places are taken, but of none in `spared`. Tells
-    /// whether there is room.
+    /// Takes the place of the slice furthest from the middle of those wanted, if all places are taken, but of
+    /// none in `spared`. Tells whether there is room.
     fn make_room(&mut self, wanted: &RangeInclusive<u32>, spared: &RangeInclusive<u32>) -> bool {
         if self.kept.len() < self.capacity {
             return true;
@@ -204,7 +207,8 @@ impl SliceCache {
         furthest.is_some()
     }
 
-    /// Asks for slices beyond those wanted, on the side the avatar moves to: half of those that there is room for, as it may turn round.
+    /// Asks for slices beyond those wanted, on the side the avatar moves to: half of those that there is room
+    /// for, as it may turn round.
     fn ask_ahead(&mut self, slices: &RangeInclusive<u32>, feet: f64) {
         let before = *self.feet.get_or_insert(feet);
         // Unevenness of a floor is no movement.

@@ -1,8 +1,9 @@
 //! A slice in few bytes: what is in memory, but for words of 64 pixels in which nothing is, compressed.
 //!
-//! Four bytes, the number of words in which something is; then, as one LZ4 block, a bit a pixel (row by row, each from a byte of its own);
-//! of every such word 64 tops, then 32 bytes of bottoms, then 8 of obstacles, each all words together; beyond the end of a row zeros. So
-//! nothing is put together pixel by pixel, and what repeats from row to row LZ4 finds.
+//! Four bytes, the number of words in which something is; then, as one LZ4 block, a bit a pixel (row by row,
+//! each from a byte of its own); of every such word 64 tops, then 32 bytes of bottoms, then 8 of obstacles,
+//! each all words together; beyond the end of a row zeros. So nothing is put together pixel by pixel, and
+//! what repeats from row to row LZ4 finds.
 
 use crate::slice::{Canvas, Slice, Word};
 

@@ -1,8 +1,8 @@
 //! From what voxels have seen to slices: which are obstacles, how high the floors are, how noisy the points.
 //!
-//! S4, Fig. 2, marks a point that lies more than ε from the one seen last, so the order of points decides, and it overwrites
-//! the height that it still has to compare with. Here a voxel is an obstacle if its highest point lies more than ε σ above its lowest,
-//! whatever the order.
+//! S4, Fig. 2, marks a point that lies more than ε from the one seen last, so the order of points decides,
+//! and it overwrites the height that it still has to compare with. Here a voxel is an obstacle if its highest
+//! point lies more than ε σ above its lowest, whatever the order.
 //!
 //! A surface that crosses from a slice into the next is one surface: where the gap between the highest point
 //! of a voxel and the lowest of the one above is at most ε σ, both are obstacles if together they span more
@@ -15,30 +15,31 @@ use crate::grid::LEVELS;
 use crate::parallel::map_each;
 use crate::slice::{Canvas, Content, Slice};
 
-/// Of the spans of level voxels this share is no greater than the noise: enough that few floors become obstacles, and
-/// not so much that what stands on them decides.
+/// Of the spans of level voxels this share is no greater than the noise: enough that few floors become
+/// obstacles, and not so much that what stands on them decides.
 const QUANTILE: f64 = 0.95;
 
 /// Fewer level voxels than this say nothing about noise.
 const LEAST: u64 = 100;
 
-/// Runs of layers whose spans are counted apart: enough for any number of threads, few where layers are many and thin.
+/// Runs of layers whose spans are counted apart: enough for any number of threads, few where layers are many
+/// and thin.
 const RUNS: usize = 256;
 
 /// Layers that are finished together; their cells are then let go of.
 const WAVE: usize = 16;
 
-/// The greatest number of levels that a floor may span, for ε. Rounding of a tangent must not decide, hence the small
-/// addition.
+/// The greatest number of levels that a floor may span, for ε. Rounding of a tangent must not decide, hence
+/// the small addition.
 pub(crate) fn most_levels(share: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
     let most = (share * f64::from(LEVELS) + 1e-6).floor().min(f64::from(2 * LEVELS)) as i32;
     most
 }
 
-/// How far points of a level floor spread upwards in a pixel: the 0.95-quantile of the spans of voxels with surface to
-/// all four sides, opposite neighbours of which differ by at most half a pixel's side in height. The span of a voxel itself plays
-/// no part in the choice. 0 where there are too few.
+/// How far points of a level floor spread upwards in a pixel: the 0.95-quantile of the spans of voxels with
+/// surface to all four sides, opposite neighbours of which differ by at most half a pixel's side in height.
+/// The span of a voxel itself plays no part in the choice. 0 where there are too few.
 ///
 /// Voxels with something right below or above are left out: they may hold half a floor.
 pub(crate) fn noise(grid: &Grid, layers: &[Layer]) -> f64 {

@@ -14,8 +14,8 @@ const FARTHEST: f64 = 9_007_199_254_740_992.0;
 
 /// The lattice of a map: pixels of side t, slices of height σ, counted from a corner.
 ///
-/// A place p of the map's coordinates ([`Up::to_map`]) lies in column ⌊(p₀ − o₀)/t⌋, row ⌊(p₁ − o₁)/t⌋ and slice
-/// s = ⌊(p₂ − o₂)/σ⌋, at level ⌊255·((p₂ − o₂)/σ − s)⌋, in double precision.
+/// A place p of the map's coordinates ([`Up::to_map`]) lies in column ⌊(p₀ − o₀)/t⌋, row ⌊(p₁ − o₁)/t⌋ and
+/// slice s = ⌊(p₂ − o₂)/σ⌋, at level ⌊255·((p₂ − o₂)/σ − s)⌋, in double precision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// Which way is up.
@@ -85,7 +85,8 @@ impl Grid {
         Some(Voxel { slice: slice as usize, pixel, level: level.min(254) })
     }
 
-    /// Which columns (`axis` 0), rows (1) or slices (2) the closed interval meets, as far as they are on the map.
+    /// Which columns (`axis` 0), rows (1) or slices (2) the closed interval meets, as far as they are on the
+    /// map.
     #[must_use]
     pub fn range(&self, axis: usize, [low, high]: [f64; 2]) -> Option<RangeInclusive<u32>> {
         let [from, to] = [low, high].map(|x| ((x - self.origin[axis]) / self.size(axis)).floor());
@@ -117,8 +118,8 @@ impl Grid {
         self.origin[2] + (f64::from(slice) + share) * self.slice_height
     }
 
-    /// The greatest level, counted through all slices, whose height is at most `height`; negative below the map. Far from it, that of a
-    /// nearer height, so that levels can be added.
+    /// The greatest level, counted through all slices, whose height is at most `height`; negative below the
+    /// map. Far from it, that of a nearer height, so that levels can be added.
     #[must_use]
     pub(crate) fn level_at(&self, height: f64) -> i64 {
         let level = (height - self.origin[2]) / self.slice_height * f64::from(LEVELS) - 0.5;

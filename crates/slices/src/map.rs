@@ -33,8 +33,8 @@ pub struct About {
     pub rule: Obstacle,
     /// ε: a voxel whose points span more than ε σ is an obstacle.
     pub share: f64,
-    /// How far points of a level floor spread upwards within a pixel, as far as ε allows for it: as given, or estimated, which is 0 where
-    /// nothing could be told; and 0 where the rule is ε itself.
+    /// How far points of a level floor spread upwards within a pixel, as far as ε allows for it: as given, or
+    /// estimated, which is 0 where nothing could be told; and 0 where the rule is ε itself.
     pub noise: f64,
     /// How many points are in it.
     pub points: u64,

@@ -1,4 +1,5 @@
-//! A map against a map: objects of the scene as slices of their own (S4, §5), turned about the axis that points up.
+//! A map against a map: objects of the scene as slices of their own (S4, §5), turned about the axis that
+//! points up.
 
 use nearmiss_geometry::Pose;
 use thiserror::Error;
@@ -62,9 +63,10 @@ impl Upright {
 impl SliceMap {
     /// What an object's own map meets of this one, posed object → building.
     ///
-    /// Each of the object's pixels that holds something is a box, turned with the object: as broad and deep as a pixel of it and as high
-    /// as a slice. It meets every pixel of the building that it overlaps or touches. `pixels` counts those of the object
-    /// that meet something. The floor is taken under the middles of the object's columns, below its lowest slice that holds something.
+    /// Each of the object's pixels that holds something is a box, turned with the object: as broad and deep
+    /// as a pixel of it and as high as a slice. It meets every pixel of the building that it overlaps or
+    /// touches. `pixels` counts those of the object that meet something. The floor is taken under the middles
+    /// of the object's columns, below its lowest slice that holds something.
     ///
     /// # Errors
     /// When the pose tilts the object, or a slice that is needed is not loaded.

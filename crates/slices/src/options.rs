@@ -14,11 +14,13 @@ const MOST: f64 = 2_147_483_648.0;
 /// However noisy points are, what spans more than this share of a slice is an obstacle.
 pub(crate) const MOST_SHARE: f64 = 0.9;
 
-/// Bytes that allocators take beside what a slice is given, in eight pieces: sixteen each, and as much lost to rounding.
+/// Bytes that allocators take beside what a slice is given, in eight pieces: sixteen each, and as much lost
+/// to rounding.
 const ALLOCATIONS: usize = 8 * 32;
 
-/// Most bytes that a slice of so many pixels takes while a map is built: what its voxels have seen, the image made of that, its
-/// places in lists of slices, where each block of points begins in each of its parts, and what the system adds.
+/// Most bytes that a slice of so many pixels takes while a map is built: what its voxels have seen, the image
+/// made of that, its places in lists of slices, where each block of points begins in each of its parts, and
+/// what the system adds.
 fn bytes([width, height]: [u32; 2]) -> usize {
     let area = width as usize * height as usize;
     let lists = 2 * size_of::<Slice>() + 4 * size_of::<usize>();
@@ -38,20 +40,23 @@ pub enum Pixel {
 /// When a voxel is an obstacle: if the points in it span more than ε σ upwards.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Obstacle {
-    /// ε itself. The paper has 0.07, which with σ = 3 t calls everything an obstacle that is steeper than 11.9°.
+    /// ε itself. The paper has 0.07, which with σ = 3 t calls everything an obstacle that is steeper than
+    /// 11.9°.
     Share(f64),
     /// ε = (t·tan θ + noise)/σ, so that what climbs along an axis at θ is still floor.
     Slope {
         /// θ, above 0 and below 90 degrees.
         degrees: f64,
-        /// How far points of a level floor spread upwards within a pixel, in the units of the points; estimated from the
-        /// points if not given. What is estimated makes ε no more than 0.9, however noisy the points: else walls would
-        /// become floors ([`About::is_noise_capped`](crate::About::is_noise_capped) tells).
+        /// How far points of a level floor spread upwards within a pixel, in the units of the points;
+        /// estimated from the points if not given. What is estimated makes ε no more than 0.9, however noisy
+        /// the points: else walls would become floors
+        /// ([`About::is_noise_capped`](crate::About::is_noise_capped) tells).
         noise: Option<f64>,
     },
 }
 
-/// How a map is made. Plain numbers, checked by [`SlicePlan::new`], and without points by [`SliceOptions::check`].
+/// How a map is made. Plain numbers, checked by [`SlicePlan::new`], and without points by
+/// [`SliceOptions::check`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SliceOptions {
@@ -186,11 +191,12 @@ pub struct SlicePlan {
 }
 
 impl SlicePlan {
-    /// Checks the options against the bounds of the points, in the caller's coordinates. Nothing is allocated.
+    /// Checks the options against the bounds of the points, in the caller's coordinates. Nothing is
+    /// allocated.
     ///
     /// # Errors
-    /// Names the option that makes no sense, or what of the bounds does not serve; says how many bytes are needed where more
-    /// are than allowed.
+    /// Names the option that makes no sense, or what of the bounds does not serve; says how many bytes are
+    /// needed where more are than allowed.
     pub fn new(options: &SliceOptions, bounds: &Aabb) -> Result<Self, SliceError> {
         options.check()?;
         let up = options.up;

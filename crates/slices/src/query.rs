@@ -1,7 +1,7 @@
 //! A box against the slices: does it touch anything, is that an obstacle, how high is the floor below?
 //!
-//! S4, §3.1: the pixels under the box in every slice between its bottom and its top; O(pixels · slices). Where the paper counts
-//! size/t pixels about the centre, these are all that the closed box meets.
+//! S4, §3.1: the pixels under the box in every slice between its bottom and its top; O(pixels · slices).
+//! Where the paper counts size/t pixels about the centre, these are all that the closed box meets.
 
 use std::ops::RangeInclusive;
 
@@ -43,8 +43,8 @@ pub struct Occupancy {
 }
 
 impl Grid {
-    /// The voxels that a closed box of the caller's coordinates meets; none if it is empty, has a bound that is not a number, or lies
-    /// outside.
+    /// The voxels that a closed box of the caller's coordinates meets; none if it is empty, has a bound that
+    /// is not a number, or lies outside.
     #[must_use]
     pub fn block_of(&self, bounds: &Aabb) -> Option<Block> {
         let [min, max] = self.turned(bounds)?;
@@ -63,9 +63,11 @@ impl Grid {
 }
 
 impl SliceMap {
-    /// Whether a box, in the caller's coordinates, meets a pixel that holds something. An empty box meets none.
+    /// Whether a box, in the caller's coordinates, meets a pixel that holds something. An empty box meets
+    /// none.
     ///
-    /// Equal slices in a row are looked at once (S4, §5). Some hundred nanoseconds for an avatar of 15 × 15 × 15 pixels.
+    /// Equal slices in a row are looked at once (S4, §5). Some hundred nanoseconds for an avatar of 15 × 15 ×
+    /// 15 pixels.
     ///
     /// # Errors
     /// When a slice that is needed is not loaded.
@@ -82,8 +84,8 @@ impl SliceMap {
 
     /// What is in a box of the caller's coordinates, and how high the floor is below it.
     ///
-    /// The floor of a pixel under the base is the highest thing in its column in the slice of the base or lower, unless that is an
-    /// obstacle.
+    /// The floor of a pixel under the base is the highest thing in its column in the slice of the base or
+    /// lower, unless that is an obstacle.
     ///
     /// # Errors
     /// When a slice that is needed is not loaded; the floor may need any slice below the box.
@@ -120,8 +122,8 @@ impl SliceMap {
         fill_each(boxes, answers, CHUNK, |bounds| self.query(bounds, floor));
     }
 
-    /// Adds, for each column, the height in the map's coordinates of the highest thing in the slice of `base` or lower, unless it is an
-    /// obstacle.
+    /// Adds, for each column, the height in the map's coordinates of the highest thing in the slice of `base`
+    /// or lower, unless it is an obstacle.
     pub(crate) fn floors_below(
         &self,
         columns: &RangeInclusive<u32>,

@@ -2,7 +2,8 @@
 
 /// Where an avatar may go instead of a place where there is no room; places across in the map's coordinates.
 pub trait Response: Sync {
-    /// Places to try in turn, coming from `from` and wanting to `wanted`; if none serves, the avatar stays at `from`.
+    /// Places to try in turn, coming from `from` and wanting to `wanted`; if none serves, the avatar stays at
+    /// `from`.
     fn elsewhere(&self, from: [f64; 2], wanted: [f64; 2]) -> [Option<[f64; 2]>; 2];
 }
 

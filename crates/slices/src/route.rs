@@ -16,7 +16,8 @@ pub trait Building {
     /// Where pixels and slices lie.
     fn grid(&self) -> &Grid;
 
-    /// The map with these slices loaded, for an avatar whose feet are at this height of the map's coordinates.
+    /// The map with these slices loaded, for an avatar whose feet are at this height of the map's
+    /// coordinates.
     ///
     /// # Errors
     /// When one of them cannot be loaded.
@@ -108,7 +109,8 @@ impl Route {
         grid.up.across([u, v])
     }
 
-    /// Walks along the route, straight from point to point, until it ends; hands out the building and every step.
+    /// Walks along the route, straight from point to point, until it ends; hands out the building and every
+    /// step.
     ///
     /// # Errors
     /// As [`Route::stand`] and [`Route::follow`].
@@ -123,11 +125,12 @@ impl Route {
         self.follow(building, walker, response, each)
     }
 
-    /// Puts an avatar at the start, as [`Walker::new`] does; a fall from above the map begins where there may be something.
+    /// Puts an avatar at the start, as [`Walker::new`] does; a fall from above the map begins where there may
+    /// be something.
     ///
     /// # Errors
-    /// When a place is not finite or far off the map, there is no room at the start, steps or climb are so short that there would be more
-    /// than 2^32 of them, or a slice cannot be loaded.
+    /// When a place is not finite or far off the map, there is no room at the start, steps or climb are so
+    /// short that there would be more than 2^32 of them, or a slice cannot be loaded.
     pub fn stand<B: Building>(&self, building: &mut B, avatar: &Avatar) -> Result<Walker, B::Error> {
         self.check()?;
         let grid = building.grid();
@@ -141,8 +144,8 @@ impl Route {
         Ok(Walker::new(*avatar, map, start)?)
     }
 
-    /// Walks on from the start ([`Route::stand`]), straight from point to point, until it ends; without points, down to what is below.
-    /// Hands out the building and every step.
+    /// Walks on from the start ([`Route::stand`]), straight from point to point, until it ends; without
+    /// points, down to what is below. Hands out the building and every step.
     ///
     /// Every step but a fall comes nearer to the next point, so it ends.
     ///

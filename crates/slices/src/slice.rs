@@ -115,7 +115,8 @@ impl Canvas {
 }
 
 impl Slice {
-    /// Of what is there alone: most of a slice is empty. Words side by side with something in them are taken together.
+    /// Of what is there alone: most of a slice is empty. Words side by side with something in them are taken
+    /// together.
     fn hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(cast_slice(&[self.width, self.height]));
@@ -208,8 +209,9 @@ impl Slice {
         Some(Content { top, bottom: half * Content::STEP, is_obstacle })
     }
 
-    /// The image as the paper encodes it, red green blue a pixel, the last row first: red is the height in the slice, green is full
-    /// where something is, blue is full for obstacles and a tenth for floor; black is empty (S4, Fig. 2).
+    /// The image as the paper encodes it, red green blue a pixel, the last row first: red is the height in
+    /// the slice, green is full where something is, blue is full for obstacles and a tenth for floor; black
+    /// is empty (S4, Fig. 2).
     #[must_use]
     pub fn rgb(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(3 * self.tops.len());

@@ -103,7 +103,8 @@ pub enum StoreError {
     Walk(#[from] WalkError),
 }
 
-/// What is wrong with a file of a map. Containers only know of scans, which are prepared again: `unfit` are remedies that do not serve.
+/// What is wrong with a file of a map. Containers only know of scans, which are prepared again: `unfit` are
+/// remedies that do not serve.
 fn of_map(cause: &OpenError, unfit: &[&str]) -> String {
     let what = match &cause.fault {
         Fault::NotAContainer { .. } => "is no file of a slice map".to_owned(),
@@ -213,7 +214,8 @@ impl SliceFolder {
         image.filter(|image| image.checksum() == checksum).ok_or(StoreError::Image { slice, path })
     }
 
-    /// The whole map in memory, and what could not be loaded of it, lowest first, a file once: those slices are missing, the others serve.
+    /// The whole map in memory, and what could not be loaded of it, lowest first, a file once: those slices
+    /// are missing, the others serve.
     #[must_use]
     pub fn load_all(&self) -> (SliceMap, Vec<StoreError>) {
         let mut firsts: Vec<(u64, u32)> = self.firsts().into_iter().collect();

@@ -1,8 +1,8 @@
 //! Writing a map into a folder, over another or a new one.
 //!
-//! A map that is written over another never changes a file that the other's index names: slices come first, then the index replaces the
-//! old one in one step, then files that it does not name go. So two that write at once would remove each other's slices: whoever writes
-//! holds a lock on a file in the folder.
+//! A map that is written over another never changes a file that the other's index names: slices come first,
+//! then the index replaces the old one in one step, then files that it does not name go. So two that write at
+//! once would remove each other's slices: whoever writes holds a lock on a file in the folder.
 
 use std::collections::BTreeMap;
 use std::fs::{self, TryLockError};
@@ -28,7 +28,8 @@ const TEMPORARY: (&str, usize) = (".tmp-", 12);
 
 /// A folder that a map will be written into, held so that nobody else writes there.
 ///
-/// Folders that were made for it go again if nothing is written. Where the file system knows no locks, nobody is kept out.
+/// Folders that were made for it go again if nothing is written. Where the file system knows no locks, nobody
+/// is kept out.
 #[derive(Debug)]
 pub struct SliceTarget {
     folder: PathBuf,
@@ -38,10 +39,12 @@ pub struct SliceTarget {
 }
 
 impl SliceTarget {
-    /// Makes the folder, or checks that it is empty or holds a map, or what is left of one; and takes the lock.
+    /// Makes the folder, or checks that it is empty or holds a map, or what is left of one; and takes the
+    /// lock.
     ///
     /// # Errors
-    /// When the folder cannot be made or written to, holds other files and no map, or somebody else is writing there.
+    /// When the folder cannot be made or written to, holds other files and no map, or somebody else is
+    /// writing there.
     pub fn new(folder: &Path) -> Result<Self, StoreError> {
         let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let made = Made(missing.map(Path::to_owned).collect());
@@ -53,7 +56,8 @@ impl SliceTarget {
     /// Writes the map, which replaces the one that is there. Tells the bytes of all files.
     ///
     /// # Errors
-    /// When something cannot be written, or slices are missing; then nothing new is left, and a map that was there before is whole.
+    /// When something cannot be written, or slices are missing; then nothing new is left, and a map that was
+    /// there before is whole.
     pub fn save(self, map: &SliceMap) -> Result<u64, StoreError> {
         let images = (0..).zip(map.slices()).map(|(slice, image)| match image {
             Some(image) => Ok(&**image),
@@ -127,7 +131,8 @@ impl Drop for SliceTarget {
 }
 
 impl SliceMap {
-    /// Writes the map into a folder, which is made, is empty, or holds another map, which it replaces. Tells the bytes of all files.
+    /// Writes the map into a folder, which is made, is empty, or holds another map, which it replaces. Tells
+    /// the bytes of all files.
     ///
     /// # Errors
     /// As [`SliceTarget::new`] and [`SliceTarget::save`].
@@ -164,7 +169,8 @@ fn failed(folder: &Path, verb: &'static str) -> impl Fn(io::Error) -> StoreError
     move |cause| StoreError::Folder { path: folder.to_owned(), verb, cause }
 }
 
-/// Whether a map may be written into a folder. A damaged index is one all the same; without an index there may be what killed writers left.
+/// Whether a map may be written into a folder. A damaged index is one all the same; without an index there
+/// may be what killed writers left.
 fn check(folder: &Path) -> Result<(), StoreError> {
     let foreign = || StoreError::Foreign { path: folder.to_owned() };
     let index = File::read(folder.join(INDEX_NAME), Check::Structure);

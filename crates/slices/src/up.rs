@@ -8,7 +8,8 @@ use thiserror::Error;
 
 /// The direction that slices are stacked along.
 ///
-/// A map works in coordinates of its own: two across, then the one up, turned from the caller's without mirroring.
+/// A map works in coordinates of its own: two across, then the one up, turned from the caller's without
+/// mirroring.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Up {
     /// x grows upwards.
@@ -35,7 +36,8 @@ pub struct UnknownAxis {
 }
 
 impl Up {
-    /// The caller's axes that become the map's first, second and third, and whether the third is turned round.
+    /// The caller's axes that become the map's first, second and third, and whether the third is turned
+    /// round.
     const fn order(self) -> ([usize; 3], bool) {
         match self {
             Self::X => ([1, 2, 0], false),

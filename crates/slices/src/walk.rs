@@ -1,9 +1,9 @@
 //! An avatar in a building: steps of fixed length, up and down what it can climb, and falling.
 //!
-//! S4, §3.1: pixels that hold something stop the avatar, except those it can climb; where it collides it goes back to where it
-//! was, so it always stands on a valid place; its height is that of the floor under its base. Here, what is no higher than it can
-//! climb carries it, floor or not, but climbing counts from the last floor: so a slope that is too steep is no way up, however
-//! short the steps.
+//! S4, §3.1: pixels that hold something stop the avatar, except those it can climb; where it collides it goes
+//! back to where it was, so it always stands on a valid place; its height is that of the floor under its
+//! base. Here, what is no higher than it can climb carries it, floor or not, but climbing counts from the
+//! last floor: so a slope that is too steep is no way up, however short the steps.
 
 use std::ops::RangeInclusive;
 
@@ -29,13 +29,13 @@ const CHUNK: usize = 64;
 pub struct AvatarOptions {
     /// Of the box, along the two axes across in the caller's order. Default: 0.4 each.
     pub base: [f64; 2],
-    /// Of the box. Default: 1.6: on stairs a box stands on the highest step under it, a quarter of a metre higher than whoever it
-    /// stands for.
+    /// Of the box. Default: 1.6: on stairs a box stands on the highest step under it, a quarter of a metre
+    /// higher than whoever it stands for.
     pub height: f64,
     /// How far it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
     pub climb: f64,
-    /// How far it moves in a step, at most the lesser side of its base: then bases at both ends meet, and it steps over nothing.
-    /// Default: 0.05.
+    /// How far it moves in a step, at most the lesser side of its base: then bases at both ends meet, and it
+    /// steps over nothing. Default: 0.05.
     pub step: f64,
 }
 
@@ -226,8 +226,8 @@ struct Look {
 }
 
 impl Walker {
-    /// Puts an avatar's feet at a place of the caller's coordinates: on what is there, at most as far below or above as it climbs; else it
-    /// begins to fall.
+    /// Puts an avatar's feet at a place of the caller's coordinates: on what is there, at most as far below
+    /// or above as it climbs; else it begins to fall.
     ///
     /// # Errors
     /// When the place is not finite, or there is no room; or a slice is not loaded.
@@ -273,8 +273,8 @@ impl Walker {
         self.falling
     }
 
-    /// Whether it got on so little since it was `before`, though it does not fall and is not there, that it is as good as stuck: along
-    /// a wall, ever shorter steps of which only the part along it counts.
+    /// Whether it got on so little since it was `before`, though it does not fall and is not there, that it
+    /// is as good as stuck: along a wall, ever shorter steps of which only the part along it counts.
     pub(crate) fn creeps(&self, before: &Self) -> bool {
         let way = [0, 1, 2].map(|k| self.place[k] - before.place[k]);
         let gained = way.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -294,10 +294,11 @@ impl Walker {
         grid.range(2, [self.place[2] - climb, self.footing + climb + height])
     }
 
-    /// One step towards a place, given as the two coordinates across in the caller's order; or, while it falls, one step down.
+    /// One step towards a place, given as the two coordinates across in the caller's order; or, while it
+    /// falls, one step down.
     ///
-    /// If something is in the way, `response` says where else it may go; if that does not serve either, it stays. So it does if the place is
-    /// not finite.
+    /// If something is in the way, `response` says where else it may go; if that does not serve either, it
+    /// stays. So it does if the place is not finite.
     ///
     /// # Errors
     /// When a slice that is needed is not loaded; then it is where it was.
@@ -440,7 +441,8 @@ impl Walker {
     }
 }
 
-/// Whether anything in these pixels tops a level and begins at another or lower: a ceiling above the head does not.
+/// Whether anything in these pixels tops a level and begins at another or lower: a ceiling above the head
+/// does not.
 fn reaches(slice: &Slice, [columns, rows]: [&RangeInclusive<u32>; 2], [over, level]: [i64; 2]) -> bool {
     rows.clone().any(|row| {
         let mut contents = columns.clone().filter_map(|column| slice.pixel(column, row));
@@ -480,8 +482,8 @@ fn to_u32(i: usize) -> u32 {
     u32::try_from(i).unwrap_or(u32::MAX)
 }
 
-/// A step of every walker towards its own target, on all cores with the feature `rayon`; the same on any number of
-/// threads.
+/// A step of every walker towards its own target, on all cores with the feature `rayon`; the same on any
+/// number of threads.
 ///
 /// # Panics
 /// When there are not as many targets and steps as walkers.

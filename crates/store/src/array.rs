@@ -10,11 +10,11 @@ use crate::bytes::Bytes;
 
 /// A read-only run of plain-old-data elements, backed by a `Vec` or by the bytes of a container.
 ///
-/// Derefs to `[T]`. A clone costs a reference count, never a copy. To replace values in one clone, [`Array::to_mut`]
-/// copies first where the elements are shared.
+/// Derefs to `[T]`. A clone costs a reference count, never a copy. To replace values in one clone,
+/// [`Array::to_mut`] copies first where the elements are shared.
 ///
-/// Each deref of an array that lies in a file checks bounds and alignment again, some nanoseconds: take the slice
-/// once, outside the loop.
+/// Each deref of an array that lies in a file checks bounds and alignment again, some nanoseconds: take the
+/// slice once, outside the loop.
 pub struct Array<T> {
     backing: Backing<T>,
 }
@@ -56,8 +56,8 @@ impl<T: Pod> Array<T> {
         }
     }
 
-    /// The elements for writing. Copied first if they lie in a file or another clone shares them; other clones and
-    /// the file keep their values.
+    /// The elements for writing. Copied first if they lie in a file or another clone shares them; other
+    /// clones and the file keep their values.
     pub fn to_mut(&mut self) -> &mut [T] {
         if self.is_in_place() {
             self.backing = Backing::Owned(Arc::new(self.to_vec()));

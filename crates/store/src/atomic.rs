@@ -1,10 +1,10 @@
 //! Replacing a file in one step, and clearing away what killed writers left.
 //!
-//! Every writer holds an exclusive lock on its temporary file from just after its creation until it has its final
-//! name; the system lets go of the lock when the process ends, however it ends. So a file with our pattern that can be
-//! locked has no living writer. Between creating and locking lies a moment in which another process might take a new
-//! file for litter: hence a writer, once it has the lock, looks whether the name is still there, and otherwise begins
-//! anew.
+//! Every writer holds an exclusive lock on its temporary file from just after its creation until it has its
+//! final name; the system lets go of the lock when the process ends, however it ends. So a file with our
+//! pattern that can be locked has no living writer. Between creating and locking lies a moment in which
+//! another process might take a new file for litter: hence a writer, once it has the lock, looks whether the
+//! name is still there, and otherwise begins anew.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, TryLockError};
@@ -93,7 +93,8 @@ fn create_locked(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     }
     for _ in 0..ATTEMPTS {
         let file = builder.tempfile_in(folder)?;
-        // An error other than "held by someone" means that there are no locks here, and nobody clears litter then.
+        // An error other than "held by someone" means that there are no locks here, and nobody clears litter
+        // then.
         let ours = !matches!(file.as_file().try_lock(), Err(TryLockError::WouldBlock));
         if ours && file.path().try_exists()? {
             return Ok(file);
@@ -102,7 +103,8 @@ fn create_locked(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     Err(io::ErrorKind::ResourceBusy.into())
 }
 
-/// Removes what killed writers of this very target left. Never fails: litter does no harm but to the eye and the disk.
+/// Removes what killed writers of this very target left. Never fails: litter does no harm but to the eye and
+/// the disk.
 fn clear_litter(folder: &Path, name: &OsStr) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     let prefix = prefix(name);
@@ -130,8 +132,8 @@ fn remove_if_abandoned(path: &Path) {
     }
 }
 
-/// Makes the new name itself survive a loss of power. The replacement has happened, and some file systems cannot sync
-/// a folder, so a failure is not reported.
+/// Makes the new name itself survive a loss of power. The replacement has happened, and some file systems
+/// cannot sync a folder, so a failure is not reported.
 fn sync_folder(folder: &Path) {
     if cfg!(unix)
         && let Ok(folder) = fs::File::open(folder)

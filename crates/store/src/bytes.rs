@@ -7,9 +7,11 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
-/// Bytes of a whole container, shared by the [`File`](crate::File) and every [`Array`](crate::Array) made from it.
+/// Bytes of a whole container, shared by the [`File`](crate::File) and every [`Array`](crate::Array) made
+/// from it.
 ///
-/// Made from a `Vec<u8>`, an `Arc<[u8]>` or a `&'static [u8]` without copying them. A clone costs a reference count.
+/// Made from a `Vec<u8>`, an `Arc<[u8]>` or a `&'static [u8]` without copying them. A clone costs a reference
+/// count.
 #[derive(Clone)]
 pub struct Bytes(Backing);
 

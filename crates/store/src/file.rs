@@ -23,8 +23,9 @@ pub enum Check {
     /// Everything: structure, the checksum of every section, zeros in the padding. Reads the whole file once.
     #[default]
     Full,
-    /// Header and table with their checksums; bounds, alignment, order and element sizes of the sections. Their
-    /// contents are neither read nor compared: for files one has written oneself. Some microseconds, whatever the size.
+    /// Header and table with their checksums; bounds, alignment, order and element sizes of the sections.
+    /// Their contents are neither read nor compared: for files one has written oneself. Some microseconds,
+    /// whatever the size.
     Structure,
 }
 
@@ -40,13 +41,13 @@ pub struct File {
 }
 
 impl File {
-    /// Opens the file at `path` by mapping it, or by reading it where there is no map: without the feature `mmap`,
-    /// and on file systems that refuse.
+    /// Opens the file at `path` by mapping it, or by reading it where there is no map: without the feature
+    /// `mmap`, and on file systems that refuse.
     ///
-    /// **While a map is in use the file must not be changed in place or shortened.** Touching a page that is no longer
-    /// there ends the process (`SIGBUS`), and changed bytes show through arrays that were checked. Replacing the file
-    /// by [`Writer::save`](crate::Writer::save), or by any rename, is harmless on Unix; Windows refuses it while
-    /// mapped. Where others may write to the file, use [`File::read`].
+    /// **While a map is in use the file must not be changed in place or shortened.** Touching a page that is
+    /// no longer there ends the process (`SIGBUS`), and changed bytes show through arrays that were checked.
+    /// Replacing the file by [`Writer::save`](crate::Writer::save), or by any rename, is harmless on Unix;
+    /// Windows refuses it while mapped. Where others may write to the file, use [`File::read`].
     ///
     /// Costs some microseconds with [`Check::Structure`], one pass over the file with [`Check::Full`].
     ///
@@ -58,23 +59,26 @@ impl File {
         })
     }
 
-    /// Reads the file at `path` into memory aligned to 64 bytes: what happens to the file later does not matter.
+    /// Reads the file at `path` into memory aligned to 64 bytes: what happens to the file later does not
+    /// matter.
     ///
     /// Costs the file's length in memory. A file whose header is wrong is refused before that is allocated.
     ///
     /// # Errors
-    /// [`OpenError`] if it is not a file, cannot be read, does not fit in memory, or fails the checks asked for.
+    /// [`OpenError`] if it is not a file, cannot be read, does not fit in memory, or fails the checks asked
+    /// for.
     pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Self, OpenError> {
         Self::from_path(path.as_ref(), check, |file, length| Bytes::read(file, length).map_err(Fault::from))
     }
 
     /// Takes a container that is in memory, say an asset from an archive, without copying it.
     ///
-    /// The bytes may have any alignment. Allocators align to 16 bytes or so, enough for elements made of numbers, which
-    /// are then used in place; an array whose elements need more is copied by [`File::array`].
+    /// The bytes may have any alignment. Allocators align to 16 bytes or so, enough for elements made of
+    /// numbers, which are then used in place; an array whose elements need more is copied by [`File::array`].
     ///
     /// # Errors
-    /// [`OpenError`] without a path if the bytes fail the checks asked for; [`OpenError::with_path`] can name them.
+    /// [`OpenError`] without a path if the bytes fail the checks asked for; [`OpenError::with_path`] can name
+    /// them.
     pub fn from_bytes(bytes: impl Into<Bytes>, check: Check) -> Result<Self, OpenError> {
         Self::assemble(bytes.into(), None, check).map_err(|fault| OpenError { path: None, fault })
     }
@@ -112,8 +116,8 @@ impl File {
         Ok(Self { bytes, header, table: Arc::new(table), path })
     }
 
-    /// Compares every section with its checksum and requires zeros in the padding: what [`Check::Full`] does beyond
-    /// [`Check::Structure`]. Reads the whole file once.
+    /// Compares every section with its checksum and requires zeros in the padding: what [`Check::Full`] does
+    /// beyond [`Check::Structure`]. Reads the whole file once.
     ///
     /// # Errors
     /// [`Fault::Checksum`] names the first section that differs, [`Fault::Padding`] the first byte.
@@ -135,11 +139,11 @@ impl File {
         Ok(())
     }
 
-    /// The elements of a section, in place: no copy, unless the container was given with an alignment that does not
-    /// suit `T` (never for files that were opened or read).
+    /// The elements of a section, in place: no copy, unless the container was given with an alignment that
+    /// does not suit `T` (never for files that were opened or read).
     ///
-    /// Only the size of an element is stored; that the section holds `T`s follows from kind and version. `T` has a size
-    /// and an alignment of at most 64 bytes, or it does not compile.
+    /// Only the size of an element is stored; that the section holds `T`s follows from kind and version. `T`
+    /// has a size and an alignment of at most 64 bytes, or it does not compile.
     ///
     /// # Errors
     /// [`Fault::MissingSection`], or [`Fault::WrongElementSize`] if the elements have another size than `T`.

@@ -12,10 +12,12 @@ use crate::sniff::Looks;
 
 /// Layout number that this crate writes and reads: the meaning of the header, the table and the padding.
 ///
-/// What the sections mean is the caller's; it has its own kind and version, see [`File::expect`](crate::File::expect).
+/// What the sections mean is the caller's; it has its own kind and version, see
+/// [`File::expect`](crate::File::expect).
 pub const LAYOUT: u32 = 1;
 
-/// Not ASCII in the first byte, so no text file begins like this; `\r\n` shows a transfer that changed line ends.
+/// Not ASCII in the first byte, so no text file begins like this; `\r\n` shows a transfer that changed line
+/// ends.
 pub(crate) const MAGIC: [u8; 8] = *b"\x8Enmiss\r\n";
 
 /// Sections begin at multiples of this many bytes: one cache line, and enough for every SIMD load.

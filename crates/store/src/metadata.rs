@@ -1,18 +1,19 @@
 //! The metadata section: one small serde value. The only module that names the encoder.
 //!
-//! The format is bincode 2's standard one: little-endian, integers in variable length. Two limits bound what a
-//! hostile file can cost: the section's length, and what decoding may claim in memory.
+//! The format is bincode 2's standard one: little-endian, integers in variable length. Two limits bound what
+//! a hostile file can cost: the section's length, and what decoding may claim in memory.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Fault, WriteError};
 
-/// Longest metadata section in bytes: 64 KiB. It is for numbers and names; whatever grows with the data is a section.
+/// Longest metadata section in bytes: 64 KiB. It is for numbers and names; whatever grows with the data is a
+/// section.
 pub const METADATA_LIMIT: usize = 64 * 1024;
 
-/// The decoder counts bytes of values, not of their encoding; the widest integer has 16 bytes and may take one
-/// encoded. With this factor no value that fits [`METADATA_LIMIT`] is refused.
+/// The decoder counts bytes of values, not of their encoding; the widest integer has 16 bytes and may take
+/// one encoded. With this factor no value that fits [`METADATA_LIMIT`] is refused.
 const CLAIM_LIMIT: usize = 16 * METADATA_LIMIT;
 
 pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, WriteError> {

@@ -1,8 +1,8 @@
 //! The section table: what lies where, and the checks that let every later read be a plain slice.
 //!
-//! The layout is canonical: sections stand in table order, each at the first multiple of 64 behind the one before,
-//! and the file ends with the padding of the last. So no byte of a file is without an owner, two sections never
-//! overlap, and one pass over the table proves both.
+//! The layout is canonical: sections stand in table order, each at the first multiple of 64 behind the one
+//! before, and the file ends with the padding of the last. So no byte of a file is without an owner, two
+//! sections never overlap, and one pass over the table proves both.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -193,7 +193,8 @@ fn check_padding(bytes: &[u8], offset: u64) -> Result<(), Fault> {
 
 /// A range of a file that is in memory.
 ///
-/// The bounds were checked against the number of bytes held, which is a `usize`, so the conversion loses nothing.
+/// The bounds were checked against the number of bytes held, which is a `usize`, so the conversion loses
+/// nothing.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "both ends are at most the length of a slice, checked at open"
@@ -205,8 +206,8 @@ fn span(start: u64, end: u64) -> Range<usize> {
 
 /// Bytes of one `T` as the table states them.
 ///
-/// Refused when compiled: types without a size, and types that ask for more than the 64 bytes of alignment that
-/// sections have.
+/// Refused when compiled: types without a size, and types that ask for more than the 64 bytes of alignment
+/// that sections have.
 #[expect(clippy::cast_possible_truncation, reason = "asserted in the line above, when compiled")]
 pub(crate) const fn element_size<T>() -> u32 {
     const {

@@ -18,8 +18,9 @@ use crate::section::{Entry, Section, SectionId, element_size};
 
 /// Collects the sections of a container, then writes it.
 ///
-/// The bytes are a function of what was added, in which order, and nothing else: no time, no name, no machine.
-/// Sections are borrowed until then and never copied; writing reads them twice, once for the checksums.
+/// The bytes are a function of what was added, in which order, and nothing else: no time, no name, no
+/// machine. Sections are borrowed until then and never copied; writing reads them twice, once for the
+/// checksums.
 #[derive(Debug)]
 pub struct Writer<'a> {
     kind: [u8; 4],
@@ -44,7 +45,8 @@ impl<'a> Writer<'a> {
 
     /// Adds a section. Sections lie in the file in the order in which they are added.
     ///
-    /// `T` has a size and an alignment of at most 64 bytes, or it does not compile. An empty slice is a section too.
+    /// `T` has a size and an alignment of at most 64 bytes, or it does not compile. An empty slice is a
+    /// section too.
     ///
     /// # Errors
     /// [`WriteError::DuplicateSection`] if `(tag, part)` was used, [`WriteError::ReservedTag`] for `META`.
@@ -64,14 +66,15 @@ impl<'a> Writer<'a> {
         Ok(self)
     }
 
-    /// Sets the metadata: one serde value of at most [`METADATA_LIMIT`](crate::METADATA_LIMIT) bytes encoded. It comes
-    /// first in the file, whenever it is set, so that it shares a page with the table.
+    /// Sets the metadata: one serde value of at most [`METADATA_LIMIT`](crate::METADATA_LIMIT) bytes encoded.
+    /// It comes first in the file, whenever it is set, so that it shares a page with the table.
     ///
-    /// Field names are not stored, so what serde can only read back by name (`flatten`, `untagged`, `skip_serializing_if`) is out.
+    /// Field names are not stored, so what serde can only read back by name (`flatten`, `untagged`,
+    /// `skip_serializing_if`) is out.
     ///
     /// # Errors
-    /// [`WriteError::DuplicateSection`] if it was set before, [`WriteError::Metadata`] if the value cannot be encoded,
-    /// [`WriteError::MetadataTooLarge`].
+    /// [`WriteError::DuplicateSection`] if it was set before, [`WriteError::Metadata`] if the value cannot be
+    /// encoded, [`WriteError::MetadataTooLarge`].
     pub fn metadata(&mut self, value: &impl Serialize) -> Result<&mut Self, WriteError> {
         let bytes = Cow::Owned(metadata::encode(value)?);
         self.claim(SectionId::META)?;
@@ -99,17 +102,19 @@ impl<'a> Writer<'a> {
         Ok(header.length)
     }
 
-    /// Writes the container to `path`, replacing a file that is there in one step, and returns its length in bytes.
+    /// Writes the container to `path`, replacing a file that is there in one step, and returns its length in
+    /// bytes.
     ///
-    /// It is written to `NAME.tmp-` and twelve random letters and digits in the same folder, synced, and renamed; on
-    /// Unix the folder is synced too, as far as its file system can. Whatever goes wrong, a file that was there before
-    /// is whole, and so is the new one once it bears the name. A link is followed and stays a link; a folder or device
-    /// is refused; permissions of a replaced file are kept, ownership is not. Programs that have the old file mapped
-    /// keep the old bytes (Windows refuses to replace it instead).
+    /// It is written to `NAME.tmp-` and twelve random letters and digits in the same folder, synced, and
+    /// renamed; on Unix the folder is synced too, as far as its file system can. Whatever goes wrong, a file
+    /// that was there before is whole, and so is the new one once it bears the name. A link is followed and
+    /// stays a link; a folder or device is refused; permissions of a replaced file are kept, ownership is
+    /// not. Programs that have the old file mapped keep the old bytes (Windows refuses to replace it
+    /// instead).
     ///
-    /// A writer that fails removes its temporary file; one that was killed cannot. The next save of the same name
-    /// removes what such writers left: files with just that pattern on which no living process holds the lock that
-    /// every writer takes. Where the file system knows no locks, none is removed.
+    /// A writer that fails removes its temporary file; one that was killed cannot. The next save of the same
+    /// name removes what such writers left: files with just that pattern on which no living process holds the
+    /// lock that every writer takes. Where the file system knows no locks, none is removed.
     ///
     /// # Errors
     /// [`WriteError::NotAFile`], or [`WriteError::Io`] with the step that failed.

@@ -1,12 +1,13 @@
 //! A tree of boxes over blocks of points: who is near the points of a block, all sixteen at once.
 //!
-//! Sixteen boxes stand side by side, level over level, until one group of them is left; the order of the points is
-//! the tree. It serves an order in which near points are mostly near, as that of a hierarchy's leaves; in any other
-//! it is as right and slow.
+//! Sixteen boxes stand side by side, level over level, until one group of them is left; the order of the
+//! points is the tree. It serves an order in which near points are mostly near, as that of a hierarchy's
+//! leaves; in any other it is as right and slow.
 //!
-//! Distances are what single precision makes of `(x−x')² + (y−y')² + (z−z')²`, each operation rounded, in this order,
-//! underflow included. Rounding keeps order, so the distance of a box, computed alike from its nearest corner, face
-//! or edge, exceeds no distance to a point in it, and what is found depends on nothing but the points.
+//! Distances are what single precision makes of `(x−x')² + (y−y')² + (z−z')²`, each operation rounded, in
+//! this order, underflow included. Rounding keeps order, so the distance of a box, computed alike from its
+//! nearest corner, face or edge, exceeds no distance to a point in it, and what is found depends on nothing
+//! but the points.
 
 mod cells;
 mod cones;
@@ -127,8 +128,8 @@ pub struct BlockTree<'a> {
     blocks: &'a [PointBlock],
     /// How many points there are.
     points: usize,
-    /// The box of block `i` stands in lane `i` % 16 of group `i` / 16 of the first level, that of such a group likewise
-    /// in the next. The last has one group.
+    /// The box of block `i` stands in lane `i` % 16 of group `i` / 16 of the first level, that of such a
+    /// group likewise in the next. The last has one group.
     levels: Vec<Vec<Boxes>>,
 }
 

@@ -2,10 +2,10 @@
 //!
 //! A is the matrix less a third of its trace, in units in which tr A² = 2; its characteristic polynomial is
 //! y³ − y = det A. Of the roots only that of largest magnitude is computed: it is 1 or more away from both
-//! others, so that it and its eigenvector are as exact as the matrix, however close the others are. Across that
-//! eigenvector a 2×2 problem is left, which one rotation solves. This is the order of Eberly, "A Robust
-//! Eigensolver for 3 × 3 Symmetric Matrices", 2014; we differ in that the other two eigenvalues are those of the
-//! 2×2 problem, not roots of the cubic, and in having a polynomial in place of arc cosine and cosine.
+//! others, so that it and its eigenvector are as exact as the matrix, however close the others are. Across
+//! that eigenvector a 2×2 problem is left, which one rotation solves. This is the order of Eberly, "A Robust
+//! Eigensolver for 3 × 3 Symmetric Matrices", 2014; we differ in that the other two eigenvalues are those of
+//! the 2×2 problem, not roots of the cubic, and in having a polynomial in place of arc cosine and cosine.
 //! docs/theory/eigen.md has the argument for the error.
 //!
 //! There is no branch and no call: the same lines solve one matrix and, lane by lane, eight of them
@@ -24,11 +24,11 @@ pub struct Eigen3 {
 
 /// The eigenpairs of the symmetric matrix with rows [xx xy xz], [xy yy yz], [xz yz zz].
 ///
-/// ‖Bn − λn‖ is some units in the last place of the largest entry, and vectors are orthonormal to rounding, for
-/// every finite matrix: any magnitudes, eigenvalues that coincide or nearly do. A multiple of the identity gives
-/// some frame. Where an eigenvalue is beyond the range of `f64` it is its end. A matrix that is not finite gives
-/// NaN throughout. The same bits on every machine; what the caller does not use is not computed, as this is
-/// inlined.
+/// ‖Bn − λn‖ is some units in the last place of the largest entry, and vectors are orthonormal to rounding,
+/// for every finite matrix: any magnitudes, eigenvalues that coincide or nearly do. A multiple of the
+/// identity gives some frame. Where an eigenvalue is beyond the range of `f64` it is its end. A matrix that
+/// is not finite gives NaN throughout. The same bits on every machine; what the caller does not use is not
+/// computed, as this is inlined.
 #[must_use]
 #[inline]
 pub fn symmetric_eigen(matrix: [f64; 6]) -> Eigen3 {
@@ -37,12 +37,12 @@ pub fn symmetric_eigen(matrix: [f64; 6]) -> Eigen3 {
 }
 
 /// Below this sum of squares, of a matrix whose largest entry is about 1, all directions are eigenvectors:
-/// eigenvalues are 10⁻⁴ units in the last place apart. (Entries that are subnormal are scaled to 2⁻⁵² at least,
-/// and differ by as much.)
+/// eigenvalues are 10⁻⁴ units in the last place apart. (Entries that are subnormal are scaled to 2⁻⁵² at
+/// least, and differ by as much.)
 const ISOTROPIC: f64 = 1e-40;
 
-/// Eigenvalues and eigenvectors as [`symmetric_eigen`], of one matrix or of several side by side. It is compiled
-/// for the instruction set of whoever calls it.
+/// Eigenvalues and eigenvectors as [`symmetric_eigen`], of one matrix or of several side by side. It is
+/// compiled for the instruction set of whoever calls it.
 #[inline(always)]
 pub(crate) fn solve<L: Lane>(matrix: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     let (down, up) = largest(matrix).powers_of_two();
@@ -54,8 +54,8 @@ pub(crate) fn solve<L: Lane>(matrix: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     (values, vectors)
 }
 
-/// Three times the eigenvalues, and the eigenvectors, of a matrix in units in which its largest entry is about 1, or
-/// much less where all directions may be eigenvectors.
+/// Three times the eigenvalues, and the eigenvectors, of a matrix in units in which its largest entry is
+/// about 1, or much less where all directions may be eigenvectors.
 #[inline(always)]
 pub(crate) fn solve_scaled<L: Lane>([xx, xy, xz, yy, yz, zz]: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     // Three times the matrix less a third of its trace. Differences first: their errors are relative to how
@@ -105,10 +105,11 @@ pub(crate) fn determinant<L: Lane>([xx, xy, xz, yy, yz, zz]: [L; 6]) -> L {
     xx * (yy * zz - yz * yz) + (xy * (xz * yz - xy * zz) + xz * (xy * yz - yy * xz))
 }
 
-/// The greatest root of y³ − y = d for d from 0 to 2/√27, which is 2/√3 · cos(acos(√27/2 · d)/3), to rounding.
+/// The greatest root of y³ − y = d for d from 0 to 2/√27, which is 2/√3 · cos(acos(√27/2 · d)/3), to
+/// rounding.
 ///
-/// The polynomial of degree 17 that equals it at Chebyshev's nodes (error 1e-16): in t = √27 d − 1, which goes
-/// from −1 to 1, the root is analytic save for t ≤ −3, so every degree takes off a factor of 3 + √8.
+/// The polynomial of degree 17 that equals it at Chebyshev's nodes (error 1e-16): in t = √27 d − 1, which
+/// goes from −1 to 1, the root is analytic save for t ≤ −3, so every degree takes off a factor of 3 + √8.
 #[inline(always)]
 pub(crate) fn greatest_root<L: Lane>(d: L) -> L {
     const ROOT_27: f64 = 5.196_152_422_706_632;
@@ -148,8 +149,9 @@ fn cubic<L: Lane>(c: &[f64], t: L, t2: L) -> L {
     (t * c[1] + c[0]) + (t * c[3] + c[2]) * t2
 }
 
-/// Right-handed unit eigenvectors of `a`, whose trace is 0 and half the sum of whose squares is 1: across that
-/// of the eigenvalue `single`, of the lower and the higher of the other two; then that itself. And those two.
+/// Right-handed unit eigenvectors of `a`, whose trace is 0 and half the sum of whose squares is 1: across
+/// that of the eigenvalue `single`, of the lower and the higher of the other two; then that itself. And those
+/// two.
 ///
 /// The adjugate of A − lI is a multiple of v vᵀ, no less than 1 in norm: its column of the greatest diagonal
 /// entry. Square roots and divisions are put off, so that they run side by side.

@@ -1,10 +1,10 @@
-//! The least eigenpair as Klein & Zachmann 2004, §5.6, find it: the roots of the cubic characteristic polynomial,
-//! then a Cholesky decomposition of B − λI with full pivoting.
+//! The least eigenpair as Klein & Zachmann 2004, §5.6, find it: the roots of the cubic characteristic
+//! polynomial, then a Cholesky decomposition of B − λI with full pivoting.
 //!
-//! Kept for comparison. The coefficients of the polynomial are of the size of B, so where eigenvalues lie close
-//! together their roots are known to a part in 10⁸ of ‖B‖ (10⁵ where all three do), and so is the vector:
-//! docs/theory/eigen.md has the figures. [`symmetric_eigen`](crate::symmetric_eigen) is faster and has none of
-//! this.
+//! Kept for comparison. The coefficients of the polynomial are of the size of B, so where eigenvalues lie
+//! close together their roots are known to a part in 10⁸ of ‖B‖ (10⁵ where all three do), and so is the
+//! vector: docs/theory/eigen.md has the figures. [`symmetric_eigen`](crate::symmetric_eigen) is faster and
+//! has none of this.
 
 use crate::eigen::{determinant, greatest_root, largest};
 use crate::lane::Lane;
@@ -21,10 +21,11 @@ pub struct LeastEigen {
 /// The least eigenpair of the symmetric matrix with rows [xx xy xz], [xy yy yz], [xz yz zz], by the cubic and
 /// pivoted Cholesky.
 ///
-/// Accurate to rounding where the least eigenvalue is well apart, as on a sheet; to some 1e-8 of the largest entry,
-/// values and residual, where it is close to another, 1e-5 where all three are. Finite for every finite matrix, NaN for others. S0 takes the
-/// roots by arc cosine; we take the one of largest magnitude as [`symmetric_eigen`](crate::symmetric_eigen) does,
-/// and the others by the quadratic that it leaves, which is as accurate and the same on every machine.
+/// Accurate to rounding where the least eigenvalue is well apart, as on a sheet; to some 1e-8 of the largest
+/// entry, values and residual, where it is close to another, 1e-5 where all three are. Finite for every
+/// finite matrix, NaN for others. S0 takes the roots by arc cosine; we take the one of largest magnitude as
+/// [`symmetric_eigen`](crate::symmetric_eigen) does, and the others by the quadratic that it leaves, which is
+/// as accurate and the same on every machine.
 #[must_use]
 pub fn cubic_cholesky_eigen(matrix: [f64; 6]) -> LeastEigen {
     let (down, up) = largest(matrix).powers_of_two();
@@ -60,7 +61,8 @@ const GREATEST_CONSTANT: f64 = 0.384_900_179_459_750_5;
 
 /// A unit vector that B − λI takes to about zero: its Cholesky decomposition with full pivoting ends after as
 /// many steps as its rank, when no pivot is left above 3u times the first (Higham, "Analysis of the Cholesky
-/// decomposition of a semi-definite matrix", 1990); one coordinate that is left is 1, the steps give the others.
+/// decomposition of a semi-definite matrix", 1990); one coordinate that is left is 1, the steps give the
+/// others.
 fn null_vector([xx, xy, xz, yy, yz, zz]: [f64; 6], l: f64) -> [f64; 3] {
     let mut m = [[xx - l, xy, xz], [xy, yy - l, yz], [xz, yz, zz - l]];
     let mut order = [0, 1, 2];

@@ -1,9 +1,9 @@
 //! f(x) = n(x)·(a(x) − x), and whether x lies where that means something.
 //!
 //! Klein & Zachmann 2004, eq. 1–4: a(x) is the weighted mean of the points, n(x) the eigenvector of the least
-//! eigenvalue of their weighted covariance about a(x). We differ in three ways. Each point weighs with its own
-//! bandwidth. The domain is narrower than eq. 6: beside enough support it asks that x be near a(x), which ends
-//! the surface where its samples end, and that the points about x look like one sheet (docs/theory). The
+//! eigenvalue of their weighted covariance about a(x). We differ in three ways. Each point weighs with its
+//! own bandwidth. The domain is narrower than eq. 6: beside enough support it asks that x be near a(x), which
+//! ends the surface where its samples end, and that the points about x look like one sheet (docs/theory). The
 //! sign of n is fixed by its largest component, until a graph orients normals.
 
 use fearless_simd::prelude::*;
@@ -14,13 +14,13 @@ use serde::{Deserialize, Serialize};
 use crate::eigen::solve_scaled;
 use crate::{Moments, SurfacePlan};
 
-/// A surface point is within this many bandwidths of a(x). On a half plane the weighted mean is h/√π = 0.564 h
-/// away from the border; beyond the border it is further.
+/// A surface point is within this many bandwidths of a(x). On a half plane the weighted mean is h/√π = 0.564
+/// h away from the border; beyond the border it is further.
 pub const BORDER: f64 = 0.56;
 
-/// A surface point is in the inner half of some point's horizon (this is the square): further from every sample
-/// nothing but the rims of holes, or of the horizons themselves, holds a zero of f. It bounds where the surface
-/// nearest to a point can be, on which certificates rest.
+/// A surface point is in the inner half of some point's horizon (this is the square): further from every
+/// sample nothing but the rims of holes, or of the horizons themselves, holds a zero of f. It bounds where
+/// the surface nearest to a point can be, on which certificates rest.
 const NEAR_SQ: f32 = 0.25;
 
 /// The least eigenvalue over h²/2: about 0 on a clean sheet, 0.14 on either of two sheets 2h apart, 1 between
@@ -73,8 +73,8 @@ impl Moments {
         self.conclude(plan, x, thrice, vectors[0])
     }
 
-    /// f at each of `places`, about which `moments` were taken, in order: eight eigen solves at a time, and the same
-    /// bits as by [`Self::evaluate`].
+    /// f at each of `places`, about which `moments` were taken, in order: eight eigen solves at a time, and
+    /// the same bits as by [`Self::evaluate`].
     #[inline(always)]
     pub fn evaluate_all<S: Simd>(
         simd: S,
@@ -111,8 +111,8 @@ impl Moments {
         }
     }
 
-    /// The covariance times the square of the weight, over the square of Σw·horizon: these are the units the solver
-    /// wants, and no division waits for another.
+    /// The covariance times the square of the weight, over the square of Σw·horizon: these are the units the
+    /// solver wants, and no division waits for another.
     #[inline(always)]
     fn scaled_covariance(&self) -> [f64; 6] {
         let [wx, wy, wz] = self.first;
@@ -168,8 +168,8 @@ impl Moments {
 const AGREEMENT: f64 = 0.5;
 
 impl Evaluation {
-    /// The same with n on the side of `sum`, the sum of oriented normals that weigh `total` together; ambiguous where these
-    /// are not of one side, |`sum`| < `total` / 2.
+    /// The same with n on the side of `sum`, the sum of oriented normals that weigh `total` together;
+    /// ambiguous where these are not of one side, |`sum`| < `total` / 2.
     #[must_use]
     pub fn turned_to(self, sum: [f64; 3], total: f64) -> Self {
         let sum = Vector3::from(sum);
@@ -184,8 +184,8 @@ fn is_one_sheet([l1, l2, l3]: [f64; 3], h: f64) -> bool {
     l1 < SHEET_RATIO * 0.5 * h * h && l2 - l1 > EIGENVALUE_GAP * (l1 + l2 + l3)
 }
 
-/// `v` or −`v`: the one whose component of largest magnitude (the first of equals) is positive. No branch, as signs
-/// cannot be predicted.
+/// `v` or −`v`: the one whose component of largest magnitude (the first of equals) is positive. No branch, as
+/// signs cannot be predicted.
 #[inline(always)]
 pub(crate) fn with_positive_largest([x, y, z]: [f64; 3]) -> [f64; 3] {
     let largest = if y.abs() > x.abs() { y } else { x };

@@ -92,13 +92,14 @@ fn wendland(t: f32) -> f32 {
 /// Adding this to a number below 2²² rounds it to an integer, which then stands in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// 2^r for |r| ≤ 1/2, that of r⁰ first: of the polynomials that are 1 and have the slope ln 2 at 0 the one whose
-/// greatest relative error, 1.1e-7, is least.
+/// 2^r for |r| ≤ 1/2, that of r⁰ first: of the polynomials that are 1 and have the slope ln 2 at 0 the one
+/// whose greatest relative error, 1.1e-7, is least.
 const EXP2: [f32; 6] =
     [1.0, std::f32::consts::LN_2, 0.240_222_83, 0.055_505_585, 0.009_669_691, 0.001_330_060_7];
 
-/// exp(−t) for 0 ≤ t ≤ 80, with a relative error of 2e-7 + 8e-8 t, which is what the rounding of t makes anyway; the
-/// same bits on every machine, and without a call, so that it vectorises. Beyond 80 the value at 80.
+/// exp(−t) for 0 ≤ t ≤ 80, with a relative error of 2e-7 + 8e-8 t, which is what the rounding of t makes
+/// anyway; the same bits on every machine, and without a call, so that it vectorises. Beyond 80 the value at
+/// 80.
 #[inline]
 #[must_use]
 pub(crate) fn exp_neg(t: f32) -> f32 {

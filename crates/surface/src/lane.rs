@@ -7,8 +7,8 @@ use fearless_simd::{f64x8, mask64x8, u64x8};
 
 /// A double, or as many as fit side by side, of which each gets the same bits as if it were alone.
 ///
-/// Every operation is one that IEEE 754 rounds exactly, so nothing depends on the instruction set. There is no
-/// branching on a value; [`Lane::select`] takes its place.
+/// Every operation is one that IEEE 754 rounds exactly, so nothing depends on the instruction set. There is
+/// no branching on a value; [`Lane::select`] takes its place.
 pub(crate) trait Lane:
     Copy
     + Add<Output = Self>

@@ -40,7 +40,8 @@ pub fn meet(
     const ROUNDS: u32 = 16;
     /// So many rounds in a row may bring no point nearer than any before, by at least a fifth.
     const PATIENCE: u32 = 3;
-    /// So near, in bandwidths, a place without the status ok comes to no other that has it: one in six starts, at tips and folds.
+    /// So near, in bandwidths, a place without the status ok comes to no other that has it: one in six
+    /// starts, at tips and folds.
     const AT_HAND: f64 = 1e-3;
     let mut point = start;
     let mut at = evaluate(point)?;
@@ -67,11 +68,13 @@ pub fn meet(
     }
 }
 
-/// Where the square of the sine between the normals is less, [`meet`] takes them for parallel: to within 1.8°.
+/// Where the square of the sine between the normals is less, [`meet`] takes them for parallel: to within
+/// 1.8°.
 const PARALLEL: f64 = 1e-3;
 
-/// The step of [`meet`] from a place where the two functions are `at`: the least one that makes both vanish to first order, at most
-/// h/2. Where the square of the sine between the normals is less than `parallel`, halfway to either instead.
+/// The step of [`meet`] from a place where the two functions are `at`: the least one that makes both vanish
+/// to first order, at most h/2. Where the square of the sine between the normals is less than `parallel`,
+/// halfway to either instead.
 #[must_use]
 pub fn step_onto_both(at: &[Evaluation; 2], parallel: f64) -> Vector3<f64> {
     let [a, b] = at;

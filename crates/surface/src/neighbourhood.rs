@@ -25,8 +25,8 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Those of the points of all `blocks` whose horizon reaches `x`, by the instructions of `level`, which change no
-    /// bit.
+    /// Those of the points of all `blocks` whose horizon reaches `x`, by the instructions of `level`, which
+    /// change no bit.
     #[must_use]
     pub fn about(
         level: Level,
@@ -63,9 +63,10 @@ impl MeasuredBlock {
 }
 
 impl Moments {
-    /// Those of the points of all `blocks` about `x`, each weighing by the distance given for it. How near the nearest is remains
-    /// a matter of straight distance: it says whether x is where the surface can be, and a way along the surface tells no
-    /// height above it. The instructions of `level` change no bit, the order of the points may.
+    /// Those of the points of all `blocks` about `x`, each weighing by the distance given for it. How near
+    /// the nearest is remains a matter of straight distance: it says whether x is where the surface can be,
+    /// and a way along the surface tells no height above it. The instructions of `level` change no bit, the
+    /// order of the points may.
     #[must_use]
     pub fn measured<'b>(
         level: Level,
@@ -187,9 +188,9 @@ impl PointBlock {
 }
 
 impl PointBlock {
-    /// Writes the lanes of the points that are heard within `distance` of `x`, ascending and each added to `first`,
-    /// to the front of `lanes`; what follows them there means nothing. Returns how many they are. No branch depends
-    /// on the outcome, which no processor could predict.
+    /// Writes the lanes of the points that are heard within `distance` of `x`, ascending and each added to
+    /// `first`, to the front of `lanes`; what follows them there means nothing. Returns how many they are. No
+    /// branch depends on the outcome, which no processor could predict.
     #[inline(always)]
     pub fn heard<S: Simd>(
         &self,
@@ -254,15 +255,15 @@ pub struct HalfBlock {
     id: u32,
 }
 
-/// Points of half a block: what a register of AVX2 holds. More of the halves than of the blocks near x hold no point
-/// that reaches it, and so many sums stay in the registers there are.
+/// Points of half a block: what a register of AVX2 holds. More of the halves than of the blocks near x hold
+/// no point that reaches it, and so many sums stay in the registers there are.
 const HALF: usize = WIDTH / 2;
 
 /// Sums over the points in whose horizon x lies, in the lanes of the half blocks they come in.
 ///
-/// A point adds to the lane of its index modulo 8; what does not reach x adds zero. Blocks come in ascending order, so
-/// the sums do not depend on which were offered besides, nor on the width of a machine's registers. Everything is
-/// inlined into a caller that has it compiled for an instruction set.
+/// A point adds to the lane of its index modulo 8; what does not reach x adds zero. Blocks come in ascending
+/// order, so the sums do not depend on which were offered besides, nor on the width of a machine's registers.
+/// Everything is inlined into a caller that has it compiled for an instruction set.
 #[derive(Debug, Clone, Copy)]
 pub struct Neighbourhood<'a, S: Simd> {
     plan: &'a SurfacePlan,
@@ -304,12 +305,12 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         self.add(simd, block, 1, high);
     }
 
-    /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what `halves` holds afterwards
-    /// means nothing.
+    /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what `halves` holds
+    /// afterwards means nothing.
     ///
-    /// Distances come first, for all blocks. So no branch is taken by whether half a block has a point that reaches x,
-    /// which every other has not whose block's ball holds x; and a chain of operations that wait for each other is cut
-    /// in two that are shorter than what processors look ahead.
+    /// Distances come first, for all blocks. So no branch is taken by whether half a block has a point that
+    /// reaches x, which every other has not whose block's ball holds x; and a chain of operations that wait
+    /// for each other is cut in two that are shorter than what processors look ahead.
     #[inline(always)]
     pub fn offer_all(&mut self, simd: S, blocks: &[PointBlock], heard: &[u32], halves: &mut Vec<HalfBlock>) {
         let most = 2 * heard.len() + 1;

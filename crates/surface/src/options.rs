@@ -14,7 +14,8 @@ pub enum Metric {
     /// In a straight line: Klein & Zachmann 2004, eq. 1.
     #[default]
     Euclidean,
-    /// Along a proximity graph, which does not lead across to a sheet that is near: Klein & Zachmann 2005, eq. 5.
+    /// Along a proximity graph, which does not lead across to a sheet that is near: Klein & Zachmann 2005,
+    /// eq. 5.
     Geodesic,
 }
 

@@ -20,8 +20,8 @@ pub struct Projection {
 /// |f| of a surface point, in bandwidths: ten times the rounding of single-precision sums.
 pub(crate) const ON_SURFACE: f64 = 1e-6;
 
-/// The almost orthogonal projection of `start`: x ← x₀ + ((a(x) − x₀)·n(x)) n(x), until f(x) vanishes (Alexa &
-/// Adamson, "On normals and projection operators for surfaces defined by point sets", SPBG 2004).
+/// The almost orthogonal projection of `start`: x ← x₀ + ((a(x) − x₀)·n(x)) n(x), until f(x) vanishes (Alexa
+/// & Adamson, "On normals and projection operators for surfaces defined by point sets", SPBG 2004).
 ///
 /// `evaluate` is f; at most 12 evaluations.
 pub fn project(start: [f64; 3], mut evaluate: impl FnMut([f64; 3]) -> Evaluation) -> Projection {

@@ -37,8 +37,9 @@ pub fn to_nearest(centres: &[[f64; 3]], x: [f64; 3]) -> f64 {
     centres.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Bounds of the least radius at which balls about `centres` contain all `solids`: the distance of the point of a grid
-/// of `n` + 1 points an edge that is furthest from them; and that of any point in a cell of the grid.
+/// Bounds of the least radius at which balls about `centres` contain all `solids`: the distance of the point
+/// of a grid of `n` + 1 points an edge that is furthest from them; and that of any point in a cell of the
+/// grid.
 #[must_use]
 pub fn covering_radius(centres: &[[f64; 3]], solids: &[Solid], n: u32) -> [f64; 2] {
     let mut bounds = [0.0_f64; 2];
@@ -54,10 +55,10 @@ pub fn covering_radius(centres: &[[f64; 3]], solids: &[Solid], n: u32) -> [f64; 
     bounds
 }
 
-/// How far apart the balls of `radius_a` about `a` that are near `volume_b` and those of `radius_b` about `b` near `volume_a`
-/// are at least, each by whichever says more: the distance of a ball from the other volume, or from all balls of
-/// the other that are near its own. More than `reach` means that nothing in both balls and volume of a is within `reach`
-/// of anything in both balls and volume of b.
+/// How far apart the balls of `radius_a` about `a` that are near `volume_b` and those of `radius_b` about `b`
+/// near `volume_a` are at least, each by whichever says more: the distance of a ball from the other volume,
+/// or from all balls of the other that are near its own. More than `reach` means that nothing in both balls
+/// and volume of a is within `reach` of anything in both balls and volume of b.
 #[must_use]
 pub fn clearance(
     (a, radius_a, volume_a): (&[[f64; 3]], f64, &Solid),

@@ -33,15 +33,16 @@ pub struct Crossing {
     pub slack: f64,
 }
 
-/// Below this sine two planes count as parallel, and discs that far apart, relative to their radii, as coplanar.
+/// Below this sine two planes count as parallel, and discs that far apart, relative to their radii, as
+/// coplanar.
 const PARALLEL: f64 = 1e-12;
 
 /// Whether `a` and `b` have a point in common.
 ///
-/// Planes that meet, do so in a line with direction u = n × m, ‖u‖ = sin φ. Each disc holds a chord of it: the
-/// centre of `a` is |m·(b − a)|/sin φ away from the line, so the chord's half-length is √(R² − that²), about the
-/// projection of the centre. The discs cross iff both chords exist and overlap. Parallel discs cross iff they
-/// are coplanar and their centres no farther apart than both radii together.
+/// Planes that meet, do so in a line with direction u = n × m, ‖u‖ = sin φ. Each disc holds a chord of it:
+/// the centre of `a` is |m·(b − a)|/sin φ away from the line, so the chord's half-length is √(R² − that²),
+/// about the projection of the centre. The discs cross iff both chords exist and overlap. Parallel discs
+/// cross iff they are coplanar and their centres no farther apart than both radii together.
 #[must_use]
 pub fn crossing(a: &Disc, b: &Disc) -> Crossing {
     let (na, nb) = (Vector3::from(a.normal), Vector3::from(b.normal));

@@ -1,9 +1,10 @@
 //! The proximity graph of Klein & Zachmann 2005, §3.2, from all pairs of points.
 //!
-//! `d_i` is the distance of the r-th nearest other point, of the furthest where there are fewer. Points are joined iff `‖p_i − p_j‖ ≤ d_i + d_j`,
-//! distances being the square roots in double precision of squared distances whose every operation is rounded to single.
-//! At a point with five edges or more an edge is long if its length exceeds Q3 + k (Q3 − Q1) and 1.5 times the
-//! median, quantiles being interpolated linearly between order statistics. What is long at either end is virtual.
+//! `d_i` is the distance of the r-th nearest other point, of the furthest where there are fewer. Points are
+//! joined iff `‖p_i − p_j‖ ≤ d_i + d_j`, distances being the square roots in double precision of squared
+//! distances whose every operation is rounded to single. At a point with five edges or more an edge is long
+//! if its length exceeds Q3 + k (Q3 − Q1) and 1.5 times the median, quantiles being interpolated linearly
+//! between order statistics. What is long at either end is virtual.
 
 /// A graph, each edge once, the lesser end first, ascending.
 #[derive(Debug, Clone, PartialEq)]

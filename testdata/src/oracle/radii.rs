@@ -1,12 +1,14 @@
 //! The spacing of every point: how far its neighbours are, made smooth.
 //!
 //! Raw: the distance to the K-th nearest other point, K = 6. While the point and its K nearest look like a
-//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 256, until they do not and one lies
-//! more across their main direction than along it, seen from the point (an arc has none); if that does not happen, the distance to the 6th counts after all. A point whose own six are no line, but which is among the six
-//! nearest of three or more points whose six are, is a bend in a ring: its distance says nothing.
+//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 256, until they do
+//! not and one lies more across their main direction than along it, seen from the point (an arc has none); if
+//! that does not happen, the distance to the 6th counts after all. A point whose own six are no line, but
+//! which is among the six nearest of three or more points whose six are, is a bend in a ring: its distance
+//! says nothing.
 //!
-//! Smooth: `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region, over i
-//! itself, unless it is a bend, and all j that are neither lines to the end nor bends.
+//! Smooth: `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region,
+//! over i itself, unless it is a bend, and all j that are neither lines to the end nor bends.
 
 use nalgebra::{Matrix3, Vector3};
 

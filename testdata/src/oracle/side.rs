@@ -5,11 +5,12 @@ use nearmiss_geometry::TriangleMesh;
 
 use super::count;
 
-/// How far beside a vertex [`falls`] looks, as a share of the shortest edge there: far above rounding, far below the
-/// surface's features.
+/// How far beside a vertex [`falls`] looks, as a share of the shortest edge there: far above rounding, far
+/// below the surface's features.
 const BESIDE: f64 = 1e-5;
 
-/// The solid angle of a triangle seen from `x` (Van Oosterom & Strackee 1983), as a share of the whole; positive from behind.
+/// The solid angle of a triangle seen from `x` (Van Oosterom & Strackee 1983), as a share of the whole;
+/// positive from behind.
 fn solid_angle(x: [f64; 3], corners: [[f64; 3]; 3]) -> f64 {
     let [a, b, c] = corners.map(|corner| Vector3::from(corner) - Vector3::from(x));
     let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
@@ -21,16 +22,17 @@ fn corners(mesh: &TriangleMesh, triangle: [u32; 3]) -> [[f64; 3]; 3] {
     triangle.map(|vertex| mesh.vertices()[vertex as usize])
 }
 
-/// The winding number of `mesh` about `x`: 1 inside of a closed surface whose triangles turn left seen from outside, 0 beyond it.
+/// The winding number of `mesh` about `x`: 1 inside of a closed surface whose triangles turn left seen from
+/// outside, 0 beyond it.
 #[must_use]
 pub fn winding(mesh: &TriangleMesh, x: [f64; 3]) -> f64 {
     mesh.triangles().iter().map(|&triangle| solid_angle(x, corners(mesh, triangle))).sum()
 }
 
-/// For each vertex by how much the winding number falls along `normals` there, from just behind the surface to just before
-/// it: 1 where the normal points out, −1 where it points in, 0 where both of its ends are on one side (of an edge, a fold or
-/// a flap of two triangles back to back), whatever its sign; at open borders some part. 0 where there is no normal or
-/// triangle.
+/// For each vertex by how much the winding number falls along `normals` there, from just behind the surface
+/// to just before it: 1 where the normal points out, −1 where it points in, 0 where both of its ends are on
+/// one side (of an edge, a fold or a flap of two triangles back to back), whatever its sign; at open borders
+/// some part. 0 where there is no normal or triangle.
 ///
 /// Only the triangles about a vertex are looked at: of the others the winding number is continuous there.
 ///

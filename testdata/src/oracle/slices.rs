@@ -1,4 +1,5 @@
-//! Slice maps from the formulas alone: every level of every point is kept, voxel by voxel, and looked at when asked.
+//! Slice maps from the formulas alone: every level of every point is kept, voxel by voxel, and looked at when
+//! asked.
 
 use std::collections::BTreeMap;
 
@@ -69,8 +70,8 @@ impl SliceTwin {
         Some(TwinVoxel { top: high - 255 * s, low: low - 255 * s, is_obstacle })
     }
 
-    /// What a closed box holds: how many voxels with something, whether one is an obstacle; and the heights of the floors below it, column
-    /// by column, where `counts` are the numbers of columns and rows.
+    /// What a closed box holds: how many voxels with something, whether one is an obstacle; and the heights
+    /// of the floors below it, column by column, where `counts` are the numbers of columns and rows.
     #[must_use]
     pub fn query(&self, min: [f64; 3], max: [f64; 3], counts: [i64; 2]) -> (usize, bool, Vec<f64>) {
         let cell = |p: [f64; 3]| [0, 1, 2].map(|k| ((p[k] - self.origin[k]) / self.sides[k]).floor());

@@ -2,8 +2,8 @@
 //!
 //! f(x) = n(x)·(a(x) − x), with a(x) the weighted mean of the points and n(x) the eigenvector of least
 //! eigenvalue of their weighted covariance about a(x): Klein & Zachmann, *Point cloud collision detection*,
-//! Computer Graphics Forum 23(3), 2004, eqs. 1–6 and 9. Deviations: a bandwidth of its own for every point, and
-//! conditions for x to lie on the surface besides f(x) = 0 (see [`Status`]).
+//! Computer Graphics Forum 23(3), 2004, eqs. 1–6 and 9. Deviations: a bandwidth of its own for every point,
+//! and conditions for x to lie on the surface besides f(x) = 0 (see [`Status`]).
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -29,8 +29,8 @@ pub fn least_distance(a: &[[f64; 3]], pose_a: &Pose, b: &[[f64; 3]], pose_b: &Po
     best
 }
 
-/// Whether balls of `radius` about the points of both clouds come within `margin` of each other: iff the least
-/// point distance is at most 2 radius + margin. World units.
+/// Whether balls of `radius` about the points of both clouds come within `margin` of each other: iff the
+/// least point distance is at most 2 radius + margin. World units.
 #[must_use]
 pub fn touches(least_distance: f64, radius: f64, margin: f64) -> bool {
     least_distance <= 2.0 * radius + margin

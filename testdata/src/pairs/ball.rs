@@ -44,7 +44,8 @@ fn approach(a: &Form, target: f64, rng: &mut Stream, distance: impl Fn([f64; 3])
     let start = Vector3::from(part.random_point(rng));
     let direction = Vector3::from(unit_vector(rng));
     let at = |t: f64| -> [f64; 3] { (start + t * direction).into() };
-    // The distance changes by at most one stride a stride; a coarse walk may step over a narrow place, no harm.
+    // The distance changes by at most one stride a stride; a coarse walk may step over a narrow place, no
+    // harm.
     let stride = (0.2 * target).max(0.02);
     let beyond = (1..=STRIDES).map(|k| stride * f64::from(k)).find(|t| distance(at(*t)) >= target)?;
     let (mut low, mut high) = (beyond - stride, beyond);
@@ -60,8 +61,8 @@ fn approach(a: &Form, target: f64, rng: &mut Stream, distance: impl Fn([f64; 3])
     ((distance(found) - target).abs() < 1e-12).then_some(found)
 }
 
-/// For pairs that intersect: whether what is nearest to `x` also reaches as far from it as `reach`, that is out
-/// of B by the depth wanted, so that it crosses B; and is no corner that smoothing may well take away.
+/// For pairs that intersect: whether what is nearest to `x` also reaches as far from it as `reach`, that is
+/// out of B by the depth wanted, so that it crosses B; and is no corner that smoothing may well take away.
 fn is_fair(a: &Form, x: [f64; 3], reach: f64, wanted: Wanted) -> bool {
     /// Smoothing moves a cube's corner by about 0.8 r.
     const CORNER_DEPTH: f64 = 2.0;
@@ -76,8 +77,8 @@ fn is_fair(a: &Form, x: [f64; 3], reach: f64, wanted: Wanted) -> bool {
     crosses && (depth > CORNER_DEPTH * wanted.r || !nearest.is_nearest_at_corner(x))
 }
 
-/// Distance of the upright segment of half length `half` about `middle` to the rectangles of `a`, and the point
-/// of the segment where it is taken.
+/// Distance of the upright segment of half length `half` about `middle` to the rectangles of `a`, and the
+/// point of the segment where it is taken.
 fn segment_distance(a: &Form, middle: [f64; 3], half: f64) -> (f64, [f64; 3]) {
     // (2/3)^80 of the segment is below rounding.
     const CUTS: u32 = 80;

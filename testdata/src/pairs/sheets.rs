@@ -53,13 +53,15 @@ pub(super) fn edge(a: &Form, b: &Form, wanted: Wanted, rng: &mut Stream) -> Opti
     let [_, length, _] = extent(b)?;
     let tilt = rng.random_range(55.0_f64..90.0).to_radians();
     let height = length * tilt.sin();
-    // Without this B might part from A downwards, or sideways, on a shorter way than up: a shift moves the line
-    // in which B meets A's plane by up to √(1 + cot² 55°) = 1.22 times its length, and 0.4 is below 0.5/1.22.
+    // Without this B might part from A downwards, or sideways, on a shorter way than up: a shift moves the
+    // line in which B meets A's plane by up to √(1 + cot² 55°) = 1.22 times its length, and 0.4 is below
+    // 0.5/1.22.
     let least_other = (height + wanted.gap).min(0.4 * width.min(depth));
     if wanted.gap < 0.0 && least_other < -wanted.gap {
         return None;
     }
-    // Turned about x, the edge y = −length/2 points down; where B meets the level of A's top is above its middle.
+    // Turned about x, the edge y = −length/2 points down; where B meets the level of A's top is above its
+    // middle.
     let steep = Pose::from_axis_angle([1.0, 0.0, 0.0], tilt);
     let along = (-wanted.gap).max(0.0) / tilt.tan();
     let middle = [0.0, 0.5 * length * tilt.cos() - along, top + wanted.gap + 0.5 * height];

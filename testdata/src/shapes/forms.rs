@@ -176,8 +176,9 @@ pub fn bars(n: u8, pitch: f64, thickness: f64) -> Form {
     form("bars", parts)
 }
 
-/// Two storeys 2.4 high, 4 by 3 wide, z up from 0: two floors, two outer walls, on the lower floor a wall with
-/// a door, and a staircase of two flights with a landing between them. The other two sides and the top are open.
+/// Two storeys 2.4 high, 4 by 3 wide, z up from 0: two floors, two outer walls, on the lower floor a wall
+/// with a door, and a staircase of two flights with a landing between them. The other two sides and the top
+/// are open.
 ///
 /// Steps are 0.4 high and 0.6 deep, coarser than people's, so that some thousand points can show them.
 #[must_use]
@@ -202,7 +203,8 @@ pub fn building() -> Form {
         rectangle([3.4, WELL, 0.0], x(0.6), z(STOREY)),
         rectangle([2.5, WELL, 1.9], x(0.9), z(STOREY - 1.9)),
     ];
-    // First flight: from (2, 2..3) towards −x up to the landing; second: back along y 1..2 up to the upper floor.
+    // First flight: from (2, 2..3) towards −x up to the landing; second: back along y 1..2 up to the upper
+    // floor.
     let mut at = (2.0, 0.0);
     for _ in 0..2 {
         parts.push(rectangle([at.0, 2.0, at.1], y(1.0), z(RISE)));

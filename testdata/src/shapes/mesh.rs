@@ -10,8 +10,8 @@ use super::{Form, Shape};
 use crate::oracle::count;
 
 impl Form {
-    /// The form as triangles with edges of about `edge` where it is curved, whose corners lie on it; rectangles are two
-    /// each. Its parts are not cut where they cross, and share no corners.
+    /// The form as triangles with edges of about `edge` where it is curved, whose corners lie on it;
+    /// rectangles are two each. Its parts are not cut where they cross, and share no corners.
     ///
     /// # Panics
     /// When there are 2³² corners.

@@ -258,8 +258,8 @@ fn spiral(area: f64, spacing: f64, low: f64, high: f64) -> impl Iterator<Item = 
     })
 }
 
-/// Points on `rows` circles; `row` gives a circle's radius and its point at an angle. Every other row is turned
-/// by half a step.
+/// Points on `rows` circles; `row` gives a circle's radius and its point at an angle. Every other row is
+/// turned by half a step.
 fn rings<F: Fn(f64) -> Oriented>(
     rows: usize,
     spacing: f64,

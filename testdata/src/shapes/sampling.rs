@@ -138,8 +138,9 @@ impl Cells {
     }
 }
 
-/// The radius r of scoring: the 0.9-quantile, over all points, of the distance to the 6th nearest other distinct
-/// point, in the unit of the points. Nothing is smoothed and no rank grows, unlike [`oracle::radii`].
+/// The radius r of scoring: the 0.9-quantile, over all points, of the distance to the 6th nearest other
+/// distinct point, in the unit of the points. Nothing is smoothed and no rank grows, unlike
+/// [`oracle::radii`].
 ///
 /// # Panics
 /// When there are not at least seven distinct points.

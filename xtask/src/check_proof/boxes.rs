@@ -1,7 +1,7 @@
 //! Whether two placed boxes are apart, proven.
 //!
-//! A direction is looked for in floating point, any one will do; that it parts the boxes is then shown in intervals.
-//! A box is exactly the set of `centre + Σ t_k axes_k` with `|t_k| ≤ half_k`, whatever the axes.
+//! A direction is looked for in floating point, any one will do; that it parts the boxes is then shown in
+//! intervals. A box is exactly the set of `centre + Σ t_k axes_k` with `|t_k| ≤ half_k`, whatever the axes.
 
 use super::interval::{Interval, dot};
 use super::proof::{Enclosure, Matrix};
@@ -53,8 +53,8 @@ impl Placed {
     }
 }
 
-/// About how far apart two boxes are along the direction tried, if it is proven that they are disjoint and at least
-/// `wanted` apart.
+/// About how far apart two boxes are along the direction tried, if it is proven that they are disjoint and at
+/// least `wanted` apart.
 pub(crate) fn distance(a: &Placed, b: &Placed, wanted: f64) -> Option<f64> {
     let mut candidates = normals(a, b);
     let apart = minus(a.about, b.about);
@@ -105,8 +105,8 @@ fn normals(a: &Placed, b: &Placed) -> Vec<Vector> {
     normals
 }
 
-/// About the vector from the point of b nearest to a, to the point of a nearest to b: least squares in the six
-/// parameters of the two boxes, one after the other within its bounds, over and over.
+/// About the vector from the point of b nearest to a, to the point of a nearest to b: least squares in the
+/// six parameters of the two boxes, one after the other within its bounds, over and over.
 fn between_nearest(a: &Placed, b: &Placed) -> Vector {
     const SWEEPS: usize = 300;
     let mut between = minus(a.about, b.about);

@@ -95,7 +95,8 @@ impl Checker<'_> {
             let placement = Placement::new(matrix).map_err(|e| format!("{name}: {e}"))?;
             if let Some(poses) = asked {
                 let Subject { scan, bounds, .. } = self.subjects[i];
-                // Of one stored unit is the placement's scale, of one unit of the caller's less by the frame's.
+                // Of one stored unit is the placement's scale, of one unit of the caller's less by the
+                // frame's.
                 let radius = scan.sampling_radius() / scan.frame().scale * placement.scale;
                 let moved = placement.moved(&poses[i], scan.frame(), *bounds) / radius;
                 finding.mended = finding.mended.max(moved);
@@ -108,7 +109,8 @@ impl Checker<'_> {
         Ok([place(0, "placed_a", &line.placed_a)?, place(1, "placed_b", &line.placed_b)?])
     }
 
-    /// The pairs cover all pairs of points, their nodes are the scans', and their enclosures are far enough apart.
+    /// The pairs cover all pairs of points, their nodes are the scans', and their enclosures are far enough
+    /// apart.
     fn separated(
         &self,
         line: &Line,
@@ -189,8 +191,8 @@ impl Checker<'_> {
         one.or_else(other).or_else(both)
     }
 
-    /// The witness lies on both surfaces; or, if these count as meeting from a margin on, points of either are so near
-    /// to it that they are nearer to each other than the margin.
+    /// The witness lies on both surfaces; or, if these count as meeting from a margin on, points of either
+    /// are so near to it that they are nearer to each other than the margin.
     fn intersecting(
         &self,
         line: &Line,

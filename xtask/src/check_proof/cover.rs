@@ -1,4 +1,5 @@
-//! Whether rectangles cover a square of pairs of points. Nothing is assumed of them: they may overlap, nest, leave it.
+//! Whether rectangles cover a square of pairs of points. Nothing is assumed of them: they may overlap, nest,
+//! leave it.
 
 use std::ops::Range;
 

@@ -1,7 +1,8 @@
 //! Intervals of doubles that contain the exact results of sums and products.
 //!
-//! The rounding error of a sum, and of a product that does not underflow, is a double itself. Its sign tells which
-//! of value and neighbour bounds the exact result, so what is exact stays a point and touching is not overlapping.
+//! The rounding error of a sum, and of a product that does not underflow, is a double itself. Its sign tells
+//! which of value and neighbour bounds the exact result, so what is exact stays a point and touching is not
+//! overlapping.
 
 use std::ops::{Add, Mul, Sub};
 

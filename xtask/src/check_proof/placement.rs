@@ -46,8 +46,8 @@ impl Placement {
         [0, 1, 2].map(|j| (0..3).map(|i| m[4 * i + j] * d[i]).sum::<f64>() / (self.scale * self.scale))
     }
 
-    /// How far this puts the corners of some bounds of stored positions from where `pose` does, which maps the
-    /// caller's positions.
+    /// How far this puts the corners of some bounds of stored positions from where `pose` does, which maps
+    /// the caller's positions.
     pub(crate) fn moved(&self, pose: &Matrix, frame: &Frame, bounds: [[f32; 3]; 2]) -> f64 {
         let mut most = 0.0_f64;
         let mut sum = 0.0;

@@ -1,7 +1,7 @@
 //! What `nearmiss collide --prove` writes, read by structs of this checker's own.
 //!
-//! A number with many digits may be read one unit in the last place off. What is checked is what was read: poses,
-//! gaps and witnesses to 1e-16 of what was written, boxes (single precision) exactly.
+//! A number with many digits may be read one unit in the last place off. What is checked is what was read:
+//! poses, gaps and witnesses to 1e-16 of what was written, boxes (single precision) exactly.
 
 use std::collections::BTreeMap;
 use std::fs::File;

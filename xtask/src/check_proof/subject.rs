@@ -146,8 +146,8 @@ fn rounded(x: f64) -> f64 {
     x * (1.0 + 1e-6)
 }
 
-/// Whether every node has the points of its two children, the root all of them: then the nodes that have a point are
-/// its leaf and that leaf's ancestors.
+/// Whether every node has the points of its two children, the root all of them: then the nodes that have a
+/// point are its leaf and that leaf's ancestors.
 fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
     let range =
         |id: usize| nodes.get(id).map(|n| (u64::from(n.first), u64::from(n.first) + u64::from(n.count)));
@@ -173,7 +173,8 @@ fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
     if parents.iter().skip(1).any(|n| *n != 1) { Err("a node has not one parent".into()) } else { Ok(()) }
 }
 
-/// The scan's surface, by summing over all of it, in the frame of the stored positions; and the horizon per radius.
+/// The scan's surface, by summing over all of it, in the frame of the stored positions; and the horizon per
+/// radius.
 fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
     let options = scan.plan().options();
     let kernel = match options.kernel {

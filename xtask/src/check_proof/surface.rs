@@ -1,6 +1,6 @@
-//! Whether the surface lies in the enclosures: points of the surface, projected from random places, and those places
-//! themselves where their status is ok, each in the enclosures of all nodes that have its nearest cloud point; and all
-//! cloud points likewise.
+//! Whether the surface lies in the enclosures: points of the surface, projected from random places, and those
+//! places themselves where their status is ok, each in the enclosures of all nodes that have its nearest
+//! cloud point; and all cloud points likewise.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -22,8 +22,8 @@ struct Trial {
     lines: Vec<Line>,
 }
 
-/// Shifts of the second scan along y, along which it is 0.143 long, from within the first to far away; it is turned
-/// about that axis.
+/// Shifts of the second scan along y, along which it is 0.143 long, from within the first to far away; it is
+/// turned about that axis.
 const SHIFTS: [f64; 9] = [0.0, 0.06, 0.1, 0.14, 0.15, 0.175, 0.18, 0.2, 1.0];
 
 static TRIAL: OnceLock<Trial> = OnceLock::new();

@@ -10,11 +10,13 @@ use super::subject::Subject;
 /// |f| of a witness, in bandwidths. Its |f| in single precision is at most 1e-6.
 const ON_SURFACE: f64 = 1e-5;
 
-/// What single precision may do to a distance beside a horizon, and to what is compared with a condition's bound.
+/// What single precision may do to a distance beside a horizon, and to what is compared with a condition's
+/// bound.
 const DISTANCE: f64 = 1e-5;
 const CONDITION: f64 = 1e-4;
 
-/// Cloud points from which a surface point near a witness is looked for, and steps from each towards the witness.
+/// Cloud points from which a surface point near a witness is looked for, and steps from each towards the
+/// witness.
 const STARTS: usize = 512;
 const STEPS: usize = 12;
 
@@ -51,9 +53,9 @@ fn check_stored(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result
     Ok(Seen { off, residual, bandwidth, on_the_brink })
 }
 
-/// A point on the surface as near to the point `x` of the world as can be found, with its distance; anything within
-/// `enough` will do. Steps towards `x` from the cloud points nearest to it need not find what is nearest, but what
-/// they find is seen to lie on the surface.
+/// A point on the surface as near to the point `x` of the world as can be found, with its distance; anything
+/// within `enough` will do. Steps towards `x` from the cloud points nearest to it need not find what is
+/// nearest, but what they find is seen to lie on the surface.
 ///
 /// # Errors
 /// When none is found.

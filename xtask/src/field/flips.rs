@@ -1,9 +1,9 @@
 //! How often n changes sides within h of a surface.
 //!
-//! A pair of places, 0.1 h apart, lies about a cloud point p: within the local radius along the tangent plane, within h
-//! along the normal N, of the scan before noise. Both normals are turned to the side of N. They flip if they still
-//! differ by more than a right angle: then no sign serves for both, and signs of f there do not tell sides. On a sheet
-//! smoother than h there is no flip.
+//! A pair of places, 0.1 h apart, lies about a cloud point p: within the local radius along the tangent
+//! plane, within h along the normal N, of the scan before noise. Both normals are turned to the side of N.
+//! They flip if they still differ by more than a right angle: then no sign serves for both, and signs of f
+//! there do not tell sides. On a sheet smoother than h there is no flip.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::hierarchy::GatherScratch;
@@ -66,8 +66,8 @@ fn per_million(flips: u64, evaluations: u64) -> f64 {
     1e6 * flips as f64 / evaluations.max(1) as f64
 }
 
-/// Counts over `pairs` pairs about the points of `clean`, of f over `rough`, whose input is in the former's stored
-/// frame.
+/// Counts over `pairs` pairs about the points of `clean`, of f over `rough`, whose input is in the former's
+/// stored frame.
 pub(crate) fn count(clean: &PointHierarchy, rough: &PointHierarchy, pairs: u64, seed: u64) -> Tally {
     let chunks = pairs.div_ceil(CHUNK);
     let origin = Vector3::from(rough.frame().origin);

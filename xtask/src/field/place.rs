@@ -1,8 +1,8 @@
 //! f at a place, with the covariance about either centre.
 //!
-//! Klein & Zachmann 2004 centre the covariance at a(x) (eq. 4), where others had centred it at x. Ours is theirs;
-//! what it would be about x exists here alone, to show the difference. Sums are in double precision and over the
-//! points whose horizon reaches x, found by a descent of this module's own.
+//! Klein & Zachmann 2004 centre the covariance at a(x) (eq. 4), where others had centred it at x. Ours is
+//! theirs; what it would be about x exists here alone, to show the difference. Sums are in double precision
+//! and over the points whose horizon reaches x, found by a descent of this module's own.
 
 use nearmiss::PointHierarchy;
 use nearmiss::geometry::NodeId;

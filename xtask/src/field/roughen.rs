@@ -9,9 +9,9 @@ use crate::repository::Outcome;
 /// Distance from a point of a square lattice to its sixth neighbour, which is its local radius, in spacings.
 const SIXTH: f64 = std::f64::consts::SQRT_2;
 
-/// The points of `clean`, in its stored frame, each moved along its normal by a normally distributed distance whose
-/// standard deviation is `noise` of the local spacing; prepared with default options. Its own stored frame may have
-/// another origin, but has the same unit: stored positions need no other.
+/// The points of `clean`, in its stored frame, each moved along its normal by a normally distributed distance
+/// whose standard deviation is `noise` of the local spacing; prepared with default options. Its own stored
+/// frame may have another origin, but has the same unit: stored positions need no other.
 pub(crate) fn roughened(clean: &PointHierarchy, noise: f64, seed: u64) -> Outcome<Scan> {
     let rng = &mut rng(seed);
     let slices = clean.slices();

@@ -1,9 +1,9 @@
 //! One sign for all normals of a grid, as far as there is one.
 //!
-//! An eigenvector's sign is arbitrary. As Hoppe et al. 1992 orient the normals of a scan along a spanning tree, so
-//! signs are carried over a grid of places from each to its neighbours, the surest neighbours first. Every pair of
-//! neighbours that closes a loop then either agrees, or its normals point to opposite sides: a flip. Where the grid
-//! has none, f has sides; along a line of flips they change.
+//! An eigenvector's sign is arbitrary. As Hoppe et al. 1992 orient the normals of a scan along a spanning
+//! tree, so signs are carried over a grid of places from each to its neighbours, the surest neighbours first.
+//! Every pair of neighbours that closes a loop then either agrees, or its normals point to opposite sides: a
+//! flip. Where the grid has none, f has sides; along a line of flips they change.
 
 use nearmiss::geometry::nalgebra::Vector3;
 

@@ -40,8 +40,8 @@ pub(crate) struct Field {
 const CANDIDATES: usize = 300;
 
 impl Slice {
-    /// The slice about a cloud point, of half side `half`, that cuts the surface as squarely as may be and meets the
-    /// most various directions of it: where it curves, folds, or comes back.
+    /// The slice about a cloud point, of half side `half`, that cuts the surface as squarely as may be and
+    /// meets the most various directions of it: where it curves, folds, or comes back.
     pub(crate) fn telling(scan: &PointHierarchy, half: f64) -> Self {
         let stride = scan.len().div_ceil(CANDIDATES);
         let all: Vec<usize> = (0..scan.len()).step_by(stride).collect();
@@ -53,8 +53,9 @@ impl Slice {
         best.map_or_else(|| Self::facing(Vector3::zeros(), Vector3::z(), half), |(slice, _)| slice)
     }
 
-    /// The slice about `middle` that cuts the surface there most squarely, and how telling it is: by Σnnᵀ of the
-    /// normals n within `half`, the least eigenvalue says how obliquely it is cut, the second how it turns.
+    /// The slice about `middle` that cuts the surface there most squarely, and how telling it is: by Σnnᵀ of
+    /// the normals n within `half`, the least eigenvalue says how obliquely it is cut, the second how it
+    /// turns.
     fn across(scan: &PointHierarchy, middle: Vector3<f64>, half: f64) -> (Self, f64) {
         let mut sums = [0.0; 6];
         for (p, n) in scan.positions().iter().zip(scan.normals()) {
@@ -107,7 +108,8 @@ impl Slice {
         let normal =
             |found: &Option<(Place, bool)>| found.map_or_else(Vector3::zeros, |p| p.0.normal(centre));
         let normals: Vec<Vector3<f64>> = all.par_iter().map(normal).collect();
-        // From the points outward, and along places whose normals agree first: signs then meet where they must.
+        // From the points outward, and along places whose normals agree first: signs then meet where they
+        // must.
         let doubt = |[i, j]: Pair| {
             let away = |(place, _): (Place, bool)| place.offset.norm() / place.bandwidth;
             let furthest = away(all[i]?).max(away(all[j]?));

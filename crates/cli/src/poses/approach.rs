@@ -1,4 +1,5 @@
-//! Where a sliding scan first touches another: by the least distance of their points, found without `collide`.
+//! Where a sliding scan first touches another: by the least distance of their points, found without
+//! `collide`.
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::{Pose, Scan};
@@ -34,8 +35,8 @@ fn stored(scan: &Scan) -> Pose {
 }
 
 impl<'a> Approach<'a> {
-    /// `base` is a's pose; touching means a least point distance of `touch`, and `step` is a length that does not
-    /// matter.
+    /// `base` is a's pose; touching means a least point distance of `touch`, and `step` is a length that does
+    /// not matter.
     pub(super) fn new([a, b]: [&'a Scan; 2], base: &Pose, touch: f64, step: f64) -> Self {
         Self {
             // Only points that are not finite are refused, and a scan has none.
@@ -48,11 +49,11 @@ impl<'a> Approach<'a> {
         }
     }
 
-    /// The distance at which b, on its way in, first touches a; none if it slides through to distance 0. `pose`
-    /// is b's pose at a distance, along a straight line.
+    /// The distance at which b, on its way in, first touches a; none if it slides through to distance 0.
+    /// `pose` is b's pose at a distance, along a straight line.
     ///
-    /// The least point distance g changes by no more than the shift, so steps of g − touch never skip a touch. The
-    /// last step is bisected.
+    /// The least point distance g changes by no more than the shift, so steps of g − touch never skip a
+    /// touch. The last step is bisected.
     pub(super) fn first_touch(&self, pose: impl Fn(f64) -> Pose) -> Option<f64> {
         let apart = |d: f64| self.least_distance(&pose(d)) - self.touch;
         let mut far = FAR;
@@ -77,8 +78,8 @@ impl<'a> Approach<'a> {
         None
     }
 
-    /// The least distance of a point of b in `pose` to a point of a, in the world; what is beyond doubt greater
-    /// than the least so far is left out.
+    /// The least distance of a point of b in `pose` to a point of a, in the world; what is beyond doubt
+    /// greater than the least so far is left out.
     fn least_distance(&self, pose: &Pose) -> f64 {
         let Some(tree) = &self.tree else { return f64::INFINITY };
         let motion = self.to_a.after(pose).after(&stored(self.b));

@@ -16,8 +16,9 @@ use crate::preprocess::{FormatChoice, parse_format, parse_threads};
 /// Options of `slices build`.
 #[derive(Debug, Clone, Args)]
 pub struct BuildArgs {
-    /// Point cloud (PLY, PCD, XYZ or CSV text), read piece by piece unless it is compressed, so it may be larger than memory; or mesh
-    /// (OBJ, PLY with faces), whose surface is sampled so that no pixel of it stays empty
+    /// Point cloud (PLY, PCD, XYZ or CSV text), read piece by piece unless it is compressed, so it may be
+    /// larger than memory; or mesh (OBJ, PLY with faces), whose surface is sampled so that no pixel of it
+    /// stays empty
     pub input: PathBuf,
     /// Folder for the map: new, empty, or with a map, which is replaced
     #[arg(short, long, value_name = "DIR")]
@@ -28,14 +29,15 @@ pub struct BuildArgs {
     /// Height of a slice; by default three pixels
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
     pub slice_height: Option<f64>,
-    /// What spans more than this share of a slice upwards, within a pixel, is an obstacle; 0.07 is the paper's rule
+    /// What spans more than this share of a slice upwards, within a pixel, is an obstacle; 0.07 is the
+    /// paper's rule
     #[arg(long, value_name = "E", allow_hyphen_values = true, conflicts_with_all = ["max_slope", "noise"])]
     pub obstacle: Option<f64>,
     /// What is steeper than this is an obstacle, in degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, default_value_t = 45.0)]
     pub max_slope: f64,
-    /// How far points of a level floor spread upwards within a pixel; by default 0 for a mesh, and estimated from points, of which no more counts than makes
-    /// 90 % of a slice an obstacle
+    /// How far points of a level floor spread upwards within a pixel; by default 0 for a mesh, and estimated
+    /// from points, of which no more counts than makes 90 % of a slice an obstacle
     #[arg(long, value_name = "LEN", allow_hyphen_values = true)]
     pub noise: Option<f64>,
     /// Which way is up: x, y, z, -x, -y or -z
@@ -50,7 +52,8 @@ pub struct BuildArgs {
     /// Threads to work on, 0 for all cores; the result is the same
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub threads: usize,
-    /// One object of JSON instead of sentences; its points are all that are in the map, those that are given twice twice
+    /// One object of JSON instead of sentences; its points are all that are in the map, those that are given
+    /// twice twice
     #[arg(long)]
     pub json: bool,
     /// No progress on the terminal

@@ -15,7 +15,8 @@ use crate::picture::Picture;
 pub struct SlicesExportArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// Folder for the images, `slice-0000.png` the lowest; made if it is not there, and what else is in it stays, images of other maps too
+    /// Folder for the images, `slice-0000.png` the lowest; made if it is not there, and what else is in it
+    /// stays, images of other maps too
     #[arg(short, long, value_name = "FOLDER")]
     pub output: PathBuf,
     /// No progress on the terminal

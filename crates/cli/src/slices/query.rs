@@ -28,7 +28,8 @@ pub struct QueryArgs {
     /// Another map, to be held against this one in the poses of --poses
     #[arg(long, value_name = "DIR", requires = "poses")]
     pub map: Option<PathBuf>,
-    /// Poses about the axis that points up, a line `{"a":[16 numbers],"b":[16 numbers]}` each: a of this map (may be left out), b of the other
+    /// Poses about the axis that points up, a line `{"a":[16 numbers],"b":[16 numbers]}` each: a of this map
+    /// (may be left out), b of the other
     #[arg(long, value_name = "FILE.jsonl", requires = "map")]
     pub poses: Option<PathBuf>,
     /// The floor under a base: its highest pixel, or the mean of all

@@ -7,7 +7,8 @@ use nearmiss::slices::{Grid, Route};
 /// Places of a way that are kept at most: far more than a picture shows.
 const MOST: usize = 1 << 20;
 
-/// Where it went, in the map's coordinates, and how far that was: of longer ways every second place, every fourth, and so on.
+/// Where it went, in the map's coordinates, and how far that was: of longer ways every second place, every
+/// fourth, and so on.
 pub(super) struct Track {
     /// The start first.
     pub(super) places: Vec<[f64; 3]>,

@@ -23,7 +23,8 @@ use crate::{output, picture};
 pub struct WalkArgs {
     /// Folder of the map
     pub folder: PathBuf,
-    /// The route: `{"start":[x,y,z],"points":[[x,y],…]}`, the points by the two coordinates across the axis that points up
+    /// The route: `{"start":[x,y,z],"points":[[x,y],…]}`, the points by the two coordinates across the axis
+    /// that points up
     #[arg(long, value_name = "FILE.json")]
     pub route: PathBuf,
     /// Width, depth and height of the avatar
@@ -32,7 +33,8 @@ pub struct WalkArgs {
     /// How far it climbs at once, and falls in a step
     #[arg(long, value_name = "C", default_value = "0.35", allow_hyphen_values = true, value_parser = parse_length)]
     pub climb: f64,
-    /// Length of a step, at most the lesser side of the avatar's base, so that it steps over nothing; by default a pixel's side
+    /// Length of a step, at most the lesser side of the avatar's base, so that it steps over nothing; by
+    /// default a pixel's side
     #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_length)]
     pub step: Option<f64>,
     /// What it does where something is in the way
@@ -50,8 +52,8 @@ pub struct WalkArgs {
     /// A line a step: distance,x,y,z,blocked,falling
     #[arg(long, value_name = "OUT.csv")]
     pub trace: Option<PathBuf>,
-    /// One object of JSON a step instead of sentences; all of it is the same again but for stalls, which depend on how fast slices are
-    /// loaded ahead: with --no-prefetch they do not
+    /// One object of JSON a step instead of sentences; all of it is the same again but for stalls, which
+    /// depend on how fast slices are loaded ahead: with --no-prefetch they do not
     #[arg(long)]
     pub json: bool,
     /// No progress on the terminal
@@ -181,8 +183,8 @@ impl Tally {
     }
 }
 
-/// Walks on, and tells every step at once: as JSON and in the trace, if asked for. Of the steps themselves only what a picture needs is
-/// kept.
+/// Walks on, and tells every step at once: as JSON and in the trace, if asked for. Of the steps themselves
+/// only what a picture needs is kept.
 fn walk(
     args: &WalkArgs,
     route: &Route,

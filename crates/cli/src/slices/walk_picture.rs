@@ -32,7 +32,8 @@ const ELSEWHERE: Colour = [226, 166, 158];
 const AIM: Colour = [40, 90, 200];
 const INK: Colour = [30, 34, 40];
 
-/// Where there are several, a view holds so many times the avatar's height, unless there would be more than `MOST_VIEWS`.
+/// Where there are several, a view holds so many times the avatar's height, unless there would be more than
+/// `MOST_VIEWS`.
 const STOREY: f64 = 2.0;
 const MOST_VIEWS: f64 = 9.0;
 
@@ -44,8 +45,8 @@ const MORE: f64 = 0.1;
 const SAMPLE: usize = 150;
 const MOST_PLACES: usize = 1500;
 
-/// A view for each storey that the walk was on, lowest first; below them its height over its length. Pixels are shown as they are to the avatar
-/// where it came nearest to them.
+/// A view for each storey that the walk was on, lowest first; below them its height over its length. Pixels
+/// are shown as they are to the avatar where it came nearest to them.
 pub(super) fn paint(map: &SliceMap, track: &Track, avatar: &Avatar) -> Picture {
     let storeys = storeys(track, avatar.options());
     let window = window(map, track, avatar);

@@ -1,4 +1,5 @@
-//! Disks that are full, and processes that are killed, while a scan is saved: there is the old file or the new one.
+//! Disks that are full, and processes that are killed, while a scan is saved: there is the old file or the
+//! new one.
 #![cfg(unix)]
 
 use std::process::{Child, Command, Stdio};

@@ -253,7 +253,8 @@ fn borders_holes_and_strays_are_told() {
 fn more_neighbours_are_advised_where_they_help() {
     use nearmiss_testdata::scanner::{Frame, frame};
     let place = Place::new();
-    // Noise as large as the steps along a ring: six neighbours spread, twelve see the ring and reach the next.
+    // Noise as large as the steps along a ring: six neighbours spread, twelve see the ring and reach the
+    // next.
     let points = frame(&Frame { beams: 16, steps: 1800, noise: 0.01, seed: 1 });
     place.write("frame.xyz", text(&points));
     let prepare = |k: &str, json: &[&str]| {

@@ -75,7 +75,8 @@ fn a_map_is_built_inspected_and_exported() {
     let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     let frame = reader.next_frame(&mut pixels).unwrap();
     assert_eq!((frame.width, frame.height, frame.color_type), (321, 241, png::ColorType::Rgb));
-    // Between the floors: black, or green with blue that tells walls from the few pixels that they only graze.
+    // Between the floors: black, or green with blue that tells walls from the few pixels that they only
+    // graze.
     let mut kinds = [0_u32; 3];
     for pixel in pixels.chunks(3) {
         match pixel {

@@ -72,9 +72,9 @@ impl Edge {
 
 /// What edges weigh when many decide together.
 ///
-/// Of two signs that an edge of strength s holds to agree let (1 + s) / 2 be right; of the dragon's edges with s above 0.95 none
-/// is wrong, of those below 0.2 a third. What independent witnesses say is the sum of their log-odds, ln((1 + s) / (1 − s)).
-/// They are whole numbers here, so that no sum depends on its order.
+/// Of two signs that an edge of strength s holds to agree let (1 + s) / 2 be right; of the dragon's edges
+/// with s above 0.95 none is wrong, of those below 0.2 a third. What independent witnesses say is the sum of
+/// their log-odds, ln((1 + s) / (1 − s)). They are whole numbers here, so that no sum depends on its order.
 #[derive(Debug)]
 pub(super) struct Weights(Vec<i64>);
 

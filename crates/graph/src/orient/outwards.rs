@@ -21,8 +21,8 @@ struct Evidence {
 }
 
 impl Evidence {
-    /// Volumes beyond this share of what they could be are no accident: a plate a hundred times as wide as it is thick
-    /// has one of 0.013, flat noise on a sheet has none.
+    /// Volumes beyond this share of what they could be are no accident: a plate a hundred times as wide as it
+    /// is thick has one of 0.013, flat noise on a sheet has none.
     const VOLUME: f64 = 1e-3;
 
     /// What decides, and whether normals have to be turned.

@@ -121,9 +121,9 @@ impl Tree {
         }
     }
 
-    /// Whether patches are turned relative to the roots of their components, by their own roots: as they were joined, but
-    /// for each that all its `votes` together speak against. These decide one after the other, until none is left; with each
-    /// the votes that are followed weigh more, so that they come to an end.
+    /// Whether patches are turned relative to the roots of their components, by their own roots: as they were
+    /// joined, but for each that all its `votes` together speak against. These decide one after the other,
+    /// until none is left; with each the votes that are followed weigh more, so that they come to an end.
     pub(super) fn settle(&mut self, votes: &[Votes]) -> Vec<bool> {
         let mut turned: Vec<bool> = (0..id(self.above.len())).map(|i| self.root(i).turned).collect();
         let mut by_set = by_set(votes);

@@ -15,7 +15,8 @@ fn honest() -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
-/// The flaw that is found after `lie`, by the checks of the structure alone and by those of the contents as well.
+/// The flaw that is found after `lie`, by the checks of the structure alone and by those of the contents as
+/// well.
 fn found(lie: impl FnOnce(&mut PointHierarchy)) -> [Option<String>; 2] {
     let mut scan = honest();
     lie(&mut scan);

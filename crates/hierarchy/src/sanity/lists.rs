@@ -19,8 +19,8 @@ pub(super) fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(),
     first_wrong("the neighbour list of block", lists.iter().position(|list| !is_there(list)))
 }
 
-/// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that lists
-/// ascend and name groups.
+/// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that
+/// lists ascend and name groups.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let blocks = PointBlock::all(&scan.plan, &scan.positions, &scan.radii);
     let differs = blocks.zip(&scan.blocks).position(|(expected, found)| expected != *found);

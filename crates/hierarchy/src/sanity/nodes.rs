@@ -10,15 +10,16 @@ use crate::topology::Node;
 /// Axes are unit and at right angles to rounding; this is far from rounding and far from a box that lies.
 const ASKEW: f32 = 1e-3;
 
-/// What rounding may make a child stick out of its parent, relative to their coordinates: both boxes were grown by
-/// 2e-6 of their own, and the comparison rounds as much again.
+/// What rounding may make a child stick out of its parent, relative to their coordinates: both boxes were
+/// grown by 2e-6 of their own, and the comparison rounds as much again.
 const STICKS_OUT: f32 = 8e-6;
 
 /// Numbers of a box.
 const NUMBERS: usize = size_of::<OrientedBox>() / size_of::<f32>();
 
-/// For each number of a box the bits that count, all or all but the sign, and the greatest value they may have.
-/// Finite numbers without their sign are ordered like their bits, and what is not finite is above them all.
+/// For each number of a box the bits that count, all or all but the sign, and the greatest value they may
+/// have. Finite numbers without their sign are ordered like their bits, and what is not finite is above them
+/// all.
 const RANGES: [(u32, u32); NUMBERS] = {
     let mut ranges = [(u32::MAX, FARTHEST.to_bits()); NUMBERS];
     let mut i = 0;
@@ -33,8 +34,8 @@ const RANGES: [(u32, u32); NUMBERS] = {
     ranges
 };
 
-/// Checks that the numbers of every box lie in their ranges: the middle, half edges, axes, reach. One pass, at the
-/// speed of memory.
+/// Checks that the numbers of every box lie in their ranges: the middle, half edges, axes, reach. One pass,
+/// at the speed of memory.
 pub(super) fn check_ranges(boxes: &[OrientedBox]) -> Result<(), Flaw> {
     let is_sound = |b: &OrientedBox| {
         let bits: &[u32; NUMBERS] = cast_ref(b);
@@ -47,8 +48,8 @@ pub(super) fn check_ranges(boxes: &[OrientedBox]) -> Result<(), Flaw> {
     first_wrong(boxes.iter().position(|b| !is_sound(b)))
 }
 
-/// Checks the boxes of a tree whose topology and ranges are sound: axes form a frame, and each box lies within its
-/// parent's.
+/// Checks the boxes of a tree whose topology and ranges are sound: axes form a frame, and each box lies
+/// within its parent's.
 pub(super) fn check(nodes: &[Node], boxes: &[OrientedBox]) -> Result<(), Flaw> {
     let askew = boxes.iter().position(|b| !is_frame(&b.axes));
     first_wrong(askew)?;
@@ -82,8 +83,8 @@ fn is_frame(&[x, y, z]: &[[f32; 3]; 3]) -> bool {
     is_unit(x) & is_unit(y) & is_unit(z) & is_right(x, y) & is_right(x, z) & is_right(y, z)
 }
 
-/// Whether `child` may be the box of a node under that of `parent`: along each of its own axes it is no longer than
-/// the discs it is about, which the parent's box holds, and no point below it reaches further.
+/// Whether `child` may be the box of a node under that of `parent`: along each of its own axes it is no
+/// longer than the discs it is about, which the parent's box holds, and no point below it reaches further.
 #[inline]
 fn lies_within(child: &OrientedBox, parent: &OrientedBox) -> bool {
     let d = sub(child.centre, parent.centre);

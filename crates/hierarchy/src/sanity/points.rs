@@ -146,8 +146,8 @@ impl Leaf<'_> {
         Err(Flaw::Value { what, index: start + lane })
     }
 
-    /// Every comparison, in all lanes. Written so that what is no number fails, and with plain loops over lanes,
-    /// so that it compiles to vector code.
+    /// Every comparison, in all lanes. Written so that what is no number fails, and with plain loops over
+    /// lanes, so that it compiles to vector code.
     #[inline]
     fn sound(&self, p: &Block) -> [Sound; COMPARED.len()] {
         let ([x, y, z], [nx, ny, nz]) = (&p.position, &p.normal);

@@ -1,5 +1,5 @@
-//! Samples and coverings: a sample that is not there makes a query leave its arrays, a radius that is too short one
-//! miss a contact.
+//! Samples and coverings: a sample that is not there makes a query leave its arrays, a radius that is too
+//! short one miss a contact.
 
 use super::{FARTHEST, Flaw};
 use crate::build::PointHierarchy;
@@ -8,8 +8,8 @@ use crate::covering::{Centres, Covering};
 /// What rounding may make of a mean of radii.
 const MEAN: f32 = 1.0 + 1e-5;
 
-/// Checks that the samples of each node are points of its own, and the radii lengths, if infinite ones. One pass; the
-/// tree is sound and the arrays as long as they must be.
+/// Checks that the samples of each node are points of its own, and the radii lengths, if infinite ones. One
+/// pass; the tree is sound and the arrays as long as they must be.
 pub(super) fn check_ranges(scan: &PointHierarchy) -> Result<(), Flaw> {
     let lists = scan.sample_lists.chunks_exact(scan.samples_a_node as usize);
     let inner = scan.nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf());
@@ -30,12 +30,12 @@ pub(super) fn check_ranges(scan: &PointHierarchy) -> Result<(), Flaw> {
     wrong.map_or(Ok(()), |index| Err(Flaw::Value { what: "the covering of node", index }))
 }
 
-/// Of the samples of a node's children every so many-th is looked for in its covering: all would take as long as the rest
-/// of the checks.
+/// Of the samples of a node's children every so many-th is looked for in its covering: all would take as long
+/// as the rest of the checks.
 const STEP: usize = 4;
 
-/// Checks that the samples of each node differ, that its covering contains some of those of its children, and that its
-/// spacing is one of its points': given that the ranges are sound.
+/// Checks that the samples of each node differ, that its covering contains some of those of its children, and
+/// that its spacing is one of its points': given that the ranges are sound.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let slices = scan.slices();
     let wrong = |what, index| Err(Flaw::Value { what, index });

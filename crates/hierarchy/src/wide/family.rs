@@ -33,8 +33,8 @@ impl WideTree {
         (siblings.children, siblings.lanes().count_ones() as usize)
     }
 
-    /// The children of the children of an inner node, and those of its children that are leaves, in lanes; and
-    /// the lanes that are taken, as bits.
+    /// The children of the children of an inner node, and those of its children that are leaves, in lanes;
+    /// and the lanes that are taken, as bits.
     ///
     /// # Panics
     /// When there is no such node, or it is a leaf.

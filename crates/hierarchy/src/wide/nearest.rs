@@ -78,8 +78,8 @@ impl Nearest {
 }
 
 impl PointHierarchy {
-    /// As [`Self::nearest_point_near`] if that is within `reach`; else a point that is at most a quarter further away, which
-    /// takes far fewer looks. With the number of nodes that were looked at.
+    /// As [`Self::nearest_point_near`] if that is within `reach`; else a point that is at most a quarter
+    /// further away, which takes far fewer looks. With the number of nodes that were looked at.
     ///
     /// # Panics
     /// When there is no such point.
@@ -104,7 +104,8 @@ impl PointHierarchy {
         while top > 0 {
             top -= 1;
             let (least, child) = stack[top];
-            // A point within reach is never passed over: one that is further away lets all nodes be looked at that come so near.
+            // A point within reach is never passed over: one that is further away lets all nodes be looked at
+            // that come so near.
             let is_rough = |least: f64| least > reach_sq && ROUGHLY * least > nearest.best.0;
             if least > nearest.most || (reach < f64::INFINITY && is_rough(nearest.least(least))) {
                 continue;
@@ -138,7 +139,8 @@ impl PointHierarchy {
         (id32(nearest.best.1), looked_at)
     }
 
-    /// The point nearest to `x`, from the neighbour list of the stored point `i`; `None` where that may lack it.
+    /// The point nearest to `x`, from the neighbour list of the stored point `i`; `None` where that may lack
+    /// it.
     ///
     /// # Panics
     /// When there is no such point.
@@ -149,8 +151,8 @@ impl PointHierarchy {
         ))
     }
 
-    /// A list that is complete at a place names the group of every point there, and `groups` hold the balls about
-    /// blocks that contain their points.
+    /// A list that is complete at a place names the group of every point there, and `groups` hold the balls
+    /// about blocks that contain their points.
     #[inline(always)]
     fn nearest_listed_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Option<u32> {
         let mut nearest = self.nearest_of_leaf(simd, i, x);
@@ -190,7 +192,8 @@ impl PointHierarchy {
         }
     }
 
-    /// Offers those of `points` that stand in a block. Which may be nearer is told in single precision, all at once.
+    /// Offers those of `points` that stand in a block. Which may be nearer is told in single precision, all
+    /// at once.
     #[inline(always)]
     fn offer_block<S: Simd>(&self, simd: S, block: usize, points: &Range<usize>, nearest: &mut Nearest) {
         let d = seen_from(simd, &self.blocks[block], nearest.rounded);

@@ -227,7 +227,8 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
     assert!(found_any > 200, "{found_any}");
 }
 
-/// The leaves that are near in the order of the descent, one pair of boxes after the other, from the binary trees.
+/// The leaves that are near in the order of the descent, one pair of boxes after the other, from the binary
+/// trees.
 fn plunged([a, b]: [&PointHierarchy; 2], relative: &Relative, reach: f32, mut turns: u32) -> Vec<[usize; 2]> {
     let number = |scan: &PointHierarchy, id: NodeId| (scan.nodes[id.index()].first / scan.leaf_size) as usize;
     let is_leaf = |scan: &PointHierarchy, id: NodeId| scan.nodes[id.index()].is_leaf();

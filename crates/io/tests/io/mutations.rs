@@ -1,4 +1,5 @@
-//! Whatever happens to a file, a reader gives a model or an error, and never more points than there is space for.
+//! Whatever happens to a file, a reader gives a model or an error, and never more points than there is space
+//! for.
 
 use std::path::Path;
 

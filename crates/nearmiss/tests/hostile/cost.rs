@@ -57,7 +57,8 @@ fn boundless_boxes_end_a_query_undecided_unless_told_otherwise() {
     }
 }
 
-/// Solid noise in the midst of other such noise, apart by a hair: the most that sound scans were found to need.
+/// Solid noise in the midst of other such noise, apart by a hair: the most that sound scans were found to
+/// need.
 #[test]
 fn sound_scans_stay_far_below_the_limit() {
     let noise = |seed| {

@@ -1,4 +1,5 @@
-//! Everything that a program does with a scan, in small: questions in a few poses, evaluations, checks, saving again.
+//! Everything that a program does with a scan, in small: questions in a few poses, evaluations, checks,
+//! saving again.
 
 use nearmiss::{
     Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evaluation, Evidence, Pose, Reason,
@@ -32,8 +33,8 @@ fn poses(size: f64) -> [Pose; 4] {
 /// Asks `scan` everything, beside `other`.
 ///
 /// # Panics
-/// When a question costs more than to compare every node with every node, an evaluation is no number, or the scan
-/// cannot be written.
+/// When a question costs more than to compare every node with every node, an evaluation is no number, or the
+/// scan cannot be written.
 #[must_use]
 pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let size = other.bounds().half_extents().into_iter().fold(0.0, f64::max);

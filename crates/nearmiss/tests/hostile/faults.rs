@@ -58,7 +58,8 @@ fn a_scan_cut_anywhere_is_refused_even_if_its_header_owns_up() {
 #[test]
 fn a_file_of_a_machine_of_the_other_byte_order_is_named_as_such() {
     let whole = bytes_of(&scan(1));
-    // Such a machine writes its numbers the other way round; the first eight bytes are bytes, or are swapped as one.
+    // Such a machine writes its numbers the other way round; the first eight bytes are bytes, or are swapped
+    // as one.
     for swapped in [&[(0, 8)][..], &[(8, 12)], &[(8, 12), (16, 20), (20, 24), (24, 32), (32, 40), (56, 64)]] {
         let mut other = whole.clone();
         for &(start, end) in swapped {

@@ -1,4 +1,5 @@
-//! Thousands of damaged files. `NEARMISS_MUTATIONS` says how many of each sort, `NEARMISS_SEED` where to begin.
+//! Thousands of damaged files. `NEARMISS_MUTATIONS` says how many of each sort, `NEARMISS_SEED` where to
+//! begin.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};

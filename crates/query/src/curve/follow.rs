@@ -14,16 +14,20 @@ pub(super) const LONGEST: f64 = 2.0;
 /// The shortest, in the same radii: so exactly is it known where a curve ends.
 const SHORTEST: f64 = 1.0 / 64.0;
 
-/// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a bandwidth.
+/// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a
+/// bandwidth.
 pub(super) const PARALLEL: f64 = 0.01;
 
-/// So often a chord that turns too far is halved: to a quarter, which may turn sixteen times as much a length.
+/// So often a chord that turns too far is halved: to a quarter, which may turn sixteen times as much a
+/// length.
 const BRIDGES: u32 = 2;
 
-/// Rounds of Newton's method from a crossing of discs: most that reach the tolerance at all do so in half as many.
+/// Rounds of Newton's method from a crossing of discs: most that reach the tolerance at all do so in half as
+/// many.
 const ROUNDS_TO_BEGIN: u32 = 8;
 
-/// Where the square of the sine is less, a beginning is looked for between the surfaces, as [`meet`](nearmiss_surface::meet) does.
+/// Where the square of the sine is less, a beginning is looked for between the surfaces, as
+/// [`meet`](nearmiss_surface::meet) does.
 const FLAT: f64 = 1e-3;
 
 /// Corrections may make a step a little longer than it aimed for.
@@ -32,8 +36,8 @@ const STRIDE: f64 = 0.98;
 /// A curve that cannot be followed where the sine is below this ends because its surfaces touch.
 const GRAZING: f64 = 0.1;
 
-/// The most a curve turns in the longest step; in a shorter one by as much more. An arc leaves its chord by an eighth of the turn
-/// times its length, so by a fortieth of the longest step.
+/// The most a curve turns in the longest step; in a shorter one by as much more. An arc leaves its chord by
+/// an eighth of the turn times its length, so by a fortieth of the longest step.
 const TURN: f64 = 0.2;
 
 /// No step turns further: 34°.
@@ -42,7 +46,8 @@ const MOST_TURN: f64 = 0.6;
 /// The cosine of the most a surface turns in a step, 30°: more is another sheet.
 const TILT_COSINE: f64 = 0.866;
 
-/// Where the mean of the points is this many bandwidths aside, the surface ends near: at a border it is 0.56, elsewhere seldom 0.2.
+/// Where the mean of the points is this many bandwidths aside, the surface ends near: at a border it is 0.56,
+/// elsewhere seldom 0.2.
 const BESIDE: f64 = 0.4;
 
 /// Rounds of Newton's method a step; a good start needs two.
@@ -51,7 +56,8 @@ const ROUNDS: u32 = 4;
 /// These may lead away from where the step aimed by this share of its length: no nearer is another sheet.
 const MOST_CORRECTION: f64 = 0.25;
 
-/// However short the step, so much in sampling radii: f is no smoother than that where points come into its horizon.
+/// However short the step, so much in sampling radii: f is no smoother than that where points come into its
+/// horizon.
 const LEAST_CORRECTION: f64 = 1.0 / 32.0;
 
 /// What a chord passes within this share of its length it joins: four times as far as an arc leaves it.
@@ -91,8 +97,8 @@ impl Place {
         turned - self.tangent * self.tangent.dot(&turned)
     }
 
-    /// Where the curve passes halfway to `next`: the middle of the cubic with these ends and their tangents, as long as an arc that turns so
-    /// far.
+    /// Where the curve passes halfway to `next`: the middle of the cubic with these ends and their tangents,
+    /// as long as an arc that turns so far.
     fn halfway(&self, next: &Self, way: f64) -> Vector3<f64> {
         let turned = next.tangent - self.tangent;
         let length = way * (next.point - self.point).norm() * (1.0 + turned.norm_squared() / 16.0);
@@ -113,7 +119,8 @@ impl Follower<'_> {
         Some([side(0), side(1)])
     }
 
-    /// The curve through `place`, whose points are added to `points`, not further than `spacing` from each other.
+    /// The curve through `place`, whose points are added to `points`, not further than `spacing` from each
+    /// other.
     pub(super) fn trace(&mut self, place: Place, spacing: f64, points: &mut Vec<[f64; 3]>) -> Curve {
         let start = self.trail.places.len();
         self.trail.push(place);
@@ -133,7 +140,8 @@ impl Follower<'_> {
         Curve { first, count: points.len() - first, ends }
     }
 
-    /// The place on both surfaces that Newton's method leads to from a crossing of discs, if it does; in `Err` that the budget is spent.
+    /// The place on both surfaces that Newton's method leads to from a crossing of discs, if it does; in
+    /// `Err` that the budget is spent.
     pub(super) fn begin(&mut self, crossing: [f64; 3]) -> Result<Option<Place>, CurveEnd> {
         let mut point = Vector3::from(crossing);
         for _ in 0..ROUNDS_TO_BEGIN {
@@ -150,7 +158,8 @@ impl Follower<'_> {
         Ok(None)
     }
 
-    /// From a place of the trail onward, or back (`way` −1), until the curve ends; none when it is there again.
+    /// From a place of the trail onward, or back (`way` −1), until the curve ends; none when it is there
+    /// again.
     fn follow(&mut self, start: usize, way: f64) -> Option<CurveEnd> {
         let shortest = SHORTEST * self.longest.min(self.radius);
         let most = STRIDE * self.longest;
@@ -195,8 +204,9 @@ impl Follower<'_> {
         }
     }
 
-    /// Leaves on the trail `next`, on the same curve as `here`, and before it as many places between as it takes for no chord to turn
-    /// further than it may. Tells which place one of these chords passes, where they stop.
+    /// Leaves on the trail `next`, on the same curve as `here`, and before it as many places between as it
+    /// takes for no chord to turn further than it may. Tells which place one of these chords passes, where
+    /// they stop.
     fn join(&mut self, here: &Place, next: &Place, way: f64, bridges: u32) -> Result<Option<usize>, Refusal> {
         let chord = (next.point - here.point).norm();
         if !turns(here, next, chord, self.longest) {
@@ -260,7 +270,8 @@ impl Follower<'_> {
 struct Refusal {
     /// Why the curve ends if it can come no nearer.
     end: CurveEnd,
-    /// Whether a surface was seen from so near not to go on that another step that far will not be taken either.
+    /// Whether a surface was seen from so near not to go on that another step that far will not be taken
+    /// either.
     is_wall: bool,
 }
 
@@ -277,14 +288,15 @@ fn obstacle(x: Vector3<f64>, at: &[Evaluation; 2]) -> CurveEnd {
     }
 }
 
-/// Whether the curve turns too far between two places for a chord of that length, where `longest` is the longest.
+/// Whether the curve turns too far between two places for a chord of that length, where `longest` is the
+/// longest.
 fn turns(here: &Place, next: &Place, chord: f64, longest: f64) -> bool {
     let turn = (next.tangent - here.tangent).norm();
     turn > MOST_TURN || turn * chord > TURN * longest
 }
 
-/// Adds to `points` the first and the last of `places`, and of those between so many that none is further than `spacing` from the one
-/// before, nor turned by more than a step may.
+/// Adds to `points` the first and the last of `places`, and of those between so many that none is further
+/// than `spacing` from the one before, nor turned by more than a step may.
 fn thin_out<'a>(
     places: impl Iterator<Item = &'a Place>,
     [spacing, longest]: [f64; 2],

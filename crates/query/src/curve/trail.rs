@@ -141,7 +141,8 @@ impl Trail {
         })
     }
 
-    /// Whether a curve has passed `place` within `aside`, or at a place where it tells no direction, within the longest step.
+    /// Whether a curve has passed `place` within `aside`, or at a place where it tells no direction, within
+    /// the longest step.
     pub(super) fn has_passed(&self, place: &Place, aside: f64) -> bool {
         self.near(place.point).any(|i| {
             let other = &self.places[i];

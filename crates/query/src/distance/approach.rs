@@ -1,7 +1,8 @@
 //! Points of two surfaces near two samples, as near to each other as steps along the surfaces lead.
 //!
-//! Projected gradients of the distance with steps that are halved where they lead too far: along flat or bent-away surfaces the first
-//! step is right, over tips it is too long by as much as the other surface is further away than they are round.
+//! Projected gradients of the distance with steps that are halved where they lead too far: along flat or
+//! bent-away surfaces the first step is right, over tips it is too long by as much as the other surface is
+//! further away than they are round.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Projection, Status, project};
@@ -35,9 +36,9 @@ pub(crate) struct Approach<'a, 's> {
 }
 
 impl Approach<'_, '_> {
-    /// Verified points of both surfaces, the nearest that were found: from the samples' feet on, either in turn steps along its surface
-    /// towards the other, at most a local radius, half as far where that led away. None where no such points are found, or the budget
-    /// ends the search for the first.
+    /// Verified points of both surfaces, the nearest that were found: from the samples' feet on, either in
+    /// turn steps along its surface towards the other, at most a local radius, half as far where that led
+    /// away. None where no such points are found, or the budget ends the search for the first.
     pub(crate) fn run(&mut self) -> Option<Feet> {
         let starts = [0, 1].map(|side| self.views[side].point(self.samples[side]));
         let mut feet = [self.land(0, starts[0])?, self.land(1, starts[1])?];
@@ -52,8 +53,8 @@ impl Approach<'_, '_> {
         Some(Feet { points: feet.map(|foot| foot.point), distance })
     }
 
-    /// Moves one foot towards the other along its surface, if that brings it nearer. `share` of the way is gone; half as
-    /// much from then on if it does not. Whether that was worth trying.
+    /// Moves one foot towards the other along its surface, if that brings it nearer. `share` of the way is
+    /// gone; half as much from then on if it does not. Whether that was worth trying.
     fn step(&mut self, side: usize, feet: &mut [Projection; 2], share: &mut f64) -> bool {
         let view = self.views[side];
         let radius = f64::from(view.slices().radii[self.samples[side]]) * view.placed().scale();
@@ -78,7 +79,8 @@ impl Approach<'_, '_> {
         true
     }
 
-    /// The verified surface point below `x`; where the surface ends before that, below the mean of the points that reach there.
+    /// The verified surface point below `x`; where the surface ends before that, below the mean of the points
+    /// that reach there.
     fn land(&mut self, side: usize, x: [f64; 3]) -> Option<Projection> {
         let foot = self.project(side, x)?;
         if foot.at.status != Status::Border || foot.converged {

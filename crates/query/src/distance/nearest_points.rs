@@ -1,5 +1,6 @@
-//! The two nearest points of two leaves: sixteen of b side by side, in single precision, for each of a that may be near; those that
-//! come out nearest are measured in double precision, in the world, as brute force would.
+//! The two nearest points of two leaves: sixteen of b side by side, in single precision, for each of a that
+//! may be near; those that come out nearest are measured in double precision, in the world, as brute force
+//! would.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
@@ -36,7 +37,8 @@ fn has_balls(pair: &Posed<'_>, [a, b]: [&Node; 2]) -> bool {
     pair.part == Part::Obstacle && (has(of_a, a) || has(of_b, b))
 }
 
-/// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that is found.
+/// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that
+/// is found.
 pub(crate) fn nearest(level: Level, pair: &Posed<'_>, leaves: NodePair, best: PointPair) -> PointPair {
     dispatch!(level, simd => simd.vectorize(
         #[inline(always)]

@@ -1,5 +1,5 @@
-//! The nearest pairs of leaves, by branch and bound, nearest pair of nodes first: for the nearest points by boxes, for a bound from below by
-//! enclosures, both in one descent.
+//! The nearest pairs of leaves, by branch and bound, nearest pair of nodes first: for the nearest points by
+//! boxes, for a bound from below by enclosures, both in one descent.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -9,11 +9,13 @@ use nearmiss_hierarchy::{Child, NodePair, Part};
 use crate::bounds::{Limits, Motion};
 use crate::posed::Posed;
 
-/// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in them is at least.
-/// Ordered so that the nearest is greatest, of equally near ones that of the nearest boxes, then the first.
+/// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in
+/// them is at least. Ordered so that the nearest is greatest, of equally near ones that of the nearest boxes,
+/// then the first.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Open {
-    /// How near the enclosures are, and in the lower half the boxes, as numbers in the same order: a heap compares often.
+    /// How near the enclosures are, and in the lower half the boxes, as numbers in the same order: a heap
+    /// compares often.
     key: u64,
     pair: [Child; 2],
 }
@@ -72,8 +74,8 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
-/// So many steps split the nearest pair of all, which a heap finds. Then limits are near what they will be, and what was put off last
-/// comes next: some pairs more, but a heap takes longer than to look at those.
+/// So many steps split the nearest pair of all, which a heap finds. Then limits are near what they will be,
+/// and what was put off last comes next: some pairs more, but a heap takes longer than to look at those.
 const NEAREST_FIRST: u32 = 128;
 
 /// The pairs of nodes still to be looked at. Reused.
@@ -90,7 +92,8 @@ pub(crate) struct Search<'s> {
     open: &'s mut Frontier,
     /// Whether enclosures are asked about too.
     of_surfaces: bool,
-    /// Nothing that is so much further away than the centres of the scans is looked at for the nearest points.
+    /// Nothing that is so much further away than the centres of the scans is looked at for the nearest
+    /// points.
     points: f32,
     /// Nor for the bound from below: some pair of leaves whose enclosures are so near was looked at.
     surfaces: f32,
@@ -99,7 +102,8 @@ pub(crate) struct Search<'s> {
 }
 
 impl<'s> Search<'s> {
-    /// From the pair of the roots on; for the nearest points alone, or for the nearest enclosures of leaves as well.
+    /// From the pair of the roots on; for the nearest points alone, or for the nearest enclosures of leaves
+    /// as well.
     pub(crate) fn new(open: &'s mut Frontier, of_surfaces: bool, pair: &Posed<'_>, motion: &Motion) -> Self {
         open.heap.clear();
         open.stack.clear();
@@ -122,7 +126,8 @@ impl<'s> Search<'s> {
         }
     }
 
-    /// How near, in a's stored frame, surfaces are at least, or points where these alone are looked for. O(open pairs).
+    /// How near, in a's stored frame, surfaces are at least, or points where these alone are looked for.
+    /// O(open pairs).
     pub(crate) fn lower(&self, motion: &Motion) -> f64 {
         let known = if self.of_surfaces { self.surfaces } else { self.points };
         let open = self.open.heap.iter().chain(&self.open.stack);
@@ -156,8 +161,8 @@ impl<'s> Search<'s> {
         stack.is_empty() && heap.is_empty()
     }
 
-    /// Splits the next pair of nodes; a pair of leaves whose points may be nearer than those found so far is taken off. None when the
-    /// search [is over](Self::is_over), too.
+    /// Splits the next pair of nodes; a pair of leaves whose points may be nearer than those found so far is
+    /// taken off. None when the search [is over](Self::is_over), too.
     pub(crate) fn step(&mut self, pair: &mut Posed<'_>, motion: &Motion) -> Option<NodePair> {
         self.steps = self.steps.saturating_add(1);
         let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();

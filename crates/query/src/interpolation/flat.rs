@@ -32,8 +32,8 @@ const OF_THE_ANNULUS: u32 = 4;
 /// A way so many times as long as its ends are apart leads round something.
 const DETOUR: f64 = 4.0;
 
-/// Over virtual edges only points are joined that are no more than so many sampling radii apart: holes that these bridge are
-/// small.
+/// Over virtual edges only points are joined that are no more than so many sampling radii apart: holes that
+/// these bridge are small.
 const NARROW: f32 = 32.0;
 
 /// As near b, in its local sampling radii, a path has arrived.
@@ -42,8 +42,8 @@ const ARRIVED: f64 = 0.1;
 /// A place is on b if |f| is at most so many of its local sampling radii there,
 const ZERO: f64 = 0.25;
 
-/// and no further from the tangent planes of the nearest points of both than so many of theirs: edges cut bends short, and
-/// points are noisy.
+/// and no further from the tangent planes of the nearest points of both than so many of theirs: edges cut
+/// bends short, and points are noisy.
 const OFF: f64 = 0.5;
 
 /// What a search goes by.
@@ -66,7 +66,8 @@ fn id(i: usize) -> u32 {
 }
 
 impl Surfaces<'_> {
-    /// Draws points of a that lie in the box of b, and looks for intersections between those on either side of b.
+    /// Draws points of a that lie in the box of b, and looks for intersections between those on either side
+    /// of b.
     pub(crate) fn interpolate_all(&mut self, search: &Interpolation) -> ControlFlow<()> {
         // No volumes part anything here: nothing is proven.
         self.compared.push(NodePair { a: NodeId::ROOT, b: NodeId::ROOT });
@@ -150,8 +151,8 @@ impl Surfaces<'_> {
         ControlFlow::Continue(true)
     }
 
-    /// One of some points about two surfel radii from `i` along the surface that is on the other side, if the map of
-    /// close pairs reaches there: the annulus of S1 §4.3, at most.
+    /// One of some points about two surfel radii from `i` along the surface that is on the other side, if the
+    /// map of close pairs reaches there: the annulus of S1 §4.3, at most.
     fn partner_around(
         &mut self,
         i: u32,
@@ -313,8 +314,8 @@ impl Surfaces<'_> {
             vb.placed().rotate(self.pair.b.normals[j].map(f64::from)),
         ];
         let from = [va.point(i), vb.point(j)].map(|p| Vector3::from(x) - Vector3::from(p));
-        // Edges lead over gaps of a, and from sheet to sheet; where b ends, its side changes too, but there are no samples, and
-        // between two sheets of it f vanishes.
+        // Edges lead over gaps of a, and from sheet to sheet; where b ends, its side changes too, but there
+        // are no samples, and between two sheets of it f vanishes.
         let far = f64::from(FAR) * radii[0].max(radii[1]);
         let off = [0, 1].map(|k: usize| Vector3::from(normals[k]).dot(&from[k]).abs());
         let is_off = [0, 1].into_iter().any(|k: usize| from[k].norm() > far || off[k] > OFF * radii[k]);
@@ -334,8 +335,8 @@ impl Surfaces<'_> {
         self.hit_by(search, contact, i, j)
     }
 
-    /// Draws the drawn points that are near b towards it: from nearest point to nearest point, until the discs there cross, or
-    /// it goes no nearer.
+    /// Draws the drawn points that are near b towards it: from nearest point to nearest point, until the
+    /// discs there cross, or it goes no nearer.
     fn draw_all_near(&mut self, most: usize, reach: f32, graph: &SurfaceGraph) -> ControlFlow<()> {
         let reach = f64::from(reach) * self.pair.views[0].placed().scale();
         let mut near = std::mem::take(&mut self.interpolation.near);

@@ -7,7 +7,8 @@ use nearmiss_hierarchy::NodePair;
 use super::Interpolation;
 use crate::surface::Surfaces;
 
-/// Distances from b at the ends of an edge that crosses it add up to no more than its length; noise and curvature add to them.
+/// Distances from b at the ends of an edge that crosses it add up to no more than its length; noise and
+/// curvature add to them.
 const CROSSES: f64 = 1.5;
 
 impl Surfaces<'_> {
@@ -21,8 +22,8 @@ impl Surfaces<'_> {
             })
     }
 
-    /// Each edge of a's graph from a point of its leaf near the leaf of b: whether it crosses b. No edge does where sides
-    /// are not known, nor need one where b is thinner than edges are long: there the discs tell.
+    /// Each edge of a's graph from a point of its leaf near the leaf of b: whether it crosses b. No edge does
+    /// where sides are not known, nor need one where b is thinner than edges are long: there the discs tell.
     pub(crate) fn test_edges(&mut self, pair: NodePair, search: &Interpolation) -> ControlFlow<()> {
         let [va, _] = self.pair.views;
         let Some(graph) = va.graph().filter(|_| self.tells_sides(pair)) else {

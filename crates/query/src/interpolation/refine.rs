@@ -42,7 +42,8 @@ impl Surfaces<'_> {
             f64::from(self.pair.a.radii[i]) * va.placed().scale(),
             f64::from(self.pair.b.radii[j]) * self.scale_of_b(),
         ];
-        // The sphere about the place between two neighbouring points holds a common point, unless the surface is bent (S1 §4.6).
+        // The sphere about the place between two neighbouring points holds a common point, unless the surface
+        // is bent (S1 §4.6).
         let (radius, wanted) = (radii[0].max(radii[1]), tolerance * radii[0].max(radii[1]));
         let found = self.look_through(contact, [i, j], (radius, wanted), (by_grid, seed))?;
         self.tries += 1;

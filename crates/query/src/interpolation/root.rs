@@ -1,10 +1,10 @@
 //! A zero of a function along a path, by an interpolation search that ends.
 //!
-//! S1's Algorithm 1 goes where a straight line between the two values at the ends of the bracket is zero. As printed it
-//! need not end, and where the function bends it may come nearer by a point at a time (docs/theory). Ours looks strictly
-//! between the ends, halves the value at an end that stays (the Illinois rule), and bisects where two looks have not halved the
-//! stretch: at most three times as many looks as a bisection by length, and a few in all where the function
-//! is nearly linear.
+//! S1's Algorithm 1 goes where a straight line between the two values at the ends of the bracket is zero. As
+//! printed it need not end, and where the function bends it may come nearer by a point at a time
+//! (docs/theory). Ours looks strictly between the ends, halves the value at an end that stays (the Illinois
+//! rule), and bisects where two looks have not halved the stretch: at most three times as many looks as a
+//! bisection by length, and a few in all where the function is nearly linear.
 
 use nearmiss_graph::{LazyPath, Levels};
 
@@ -79,8 +79,8 @@ pub(crate) enum Root {
 /// So many looks in a row may leave more than half of the stretch.
 const PATIENCE: u32 = 2;
 
-/// Looks for a zero between the ends of `path`, which has two at least, where the function has the `values`, of
-/// different signs; `value` is asked for it at known points by number. None as soon as that gives up.
+/// Looks for a zero between the ends of `path`, which has two at least, where the function has the `values`,
+/// of different signs; `value` is asked for it at known points by number. None as soon as that gives up.
 pub(crate) fn find_root<P: Path>(
     path: &mut P,
     values: [f64; 2],
@@ -235,7 +235,8 @@ mod tests {
         assert!(means[3] <= 6.0 && means[3] <= 2.0 * means[0], "{means:?} looks");
     }
 
-    /// Some change of signs is found however many there are, also where points are unevenly spaced; NaN ends the search.
+    /// Some change of signs is found however many there are, also where points are unevenly spaced; NaN ends
+    /// the search.
     #[test]
     fn searches_end_on_any_path() {
         let (found, looks) = search(even(4096), |k, _| if k == 0 || k % 2 == 0 { -1.0 } else { 1.0 });

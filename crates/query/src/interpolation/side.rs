@@ -1,7 +1,7 @@
 //! On which side of b a place is, and how far from it.
 //!
-//! S1 lets f_B say that everywhere, its sign turned to the normal of the nearest point. Ours ends at the horizon; beyond,
-//! the nearest point says both, as in Hoppe et al. 1992.
+//! S1 lets f_B say that everywhere, its sign turned to the normal of the nearest point. Ours ends at the
+//! horizon; beyond, the nearest point says both, as in Hoppe et al. 1992.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::Status;

@@ -48,8 +48,8 @@ impl Volume {
     }
 }
 
-/// The last of some ascending sums that is not above `wanted`, as the first is: looked for about where it would be if they rose
-/// evenly, in steps that double.
+/// The last of some ascending sums that is not above `wanted`, as the first is: looked for about where it
+/// would be if they rose evenly, in steps that double.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -95,7 +95,8 @@ impl Surfaces<'_> {
         Bounds { volume, reach_sq: own * own }
     }
 
-    /// Looks for the part of a in the box of b, as coarsely as will do. `areas` has the areas of all points before each.
+    /// Looks for the part of a in the box of b, as coarsely as will do. `areas` has the areas of all points
+    /// before each.
     pub(crate) fn survey(&mut self, areas: &[f64], volume: &mut Volume) -> ControlFlow<()> {
         volume.nodes.clear();
         volume.nodes.push(NodeId::ROOT);

@@ -54,8 +54,9 @@ pub(crate) fn nearest_true(x: [f64; 3], cut: &Cut) -> ([f64; 3], f64) {
     all.map(off).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
 }
 
-/// The greatest of how far found places are from true ones and the other way round, in the lesser sampling radius, after the bias
-/// of the surfaces there is taken off; h is no more than the sampling radius. `world` is the pose of a.
+/// The greatest of how far found places are from true ones and the other way round, in the lesser sampling
+/// radius, after the bias of the surfaces there is taken off; h is no more than the sampling radius. `world`
+/// is the pose of a.
 pub(crate) fn hausdorff(found: &Curves, cut: &Cut, world: &Pose, radii: [f64; 2]) -> [f64; 2] {
     let r = radii[0].min(radii[1]);
     let h = radii[0].max(radii[1]);

@@ -26,7 +26,8 @@ fn crate_points() -> Vec<[f64; 3]> {
     points
 }
 
-/// Every pixel of the object against every pixel of the building: squares, one of them turned, by the four axes of their sides.
+/// Every pixel of the object against every pixel of the building: squares, one of them turned, by the four
+/// axes of their sides.
 fn by_the_formulas(building: &SliceMap, object: &SliceMap, pose: &Pose) -> [u64; 2] {
     let (grid, own) = (building.grid(), object.grid());
     let place = |[x, y]: [f64; 2], z: f64| grid.up.to_map(pose.apply(own.up.from_map([x, y, z])));

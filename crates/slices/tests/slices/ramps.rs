@@ -61,7 +61,8 @@ fn options(pixel: f64, degrees: f64, noise: Option<f64>) -> SliceOptions {
     SliceOptions::default().with_pixel(Pixel::Side(pixel)).with_obstacle(Obstacle::Slope { degrees, noise })
 }
 
-/// In a pixel of side t a surface rises by t·tan φ along an axis, by t·(|cos ψ| + |sin ψ|)·tan φ in direction ψ.
+/// In a pixel of side t a surface rises by t·tan φ along an axis, by t·(|cos ψ| + |sin ψ|)·tan φ in direction
+/// ψ.
 #[test]
 fn ramps_switch_at_the_angle_asked_for() {
     for angle in RAMPS {

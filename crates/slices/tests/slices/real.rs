@@ -1,4 +1,5 @@
-//! Walks through buildings that are no part of the repository, where the environment names a folder that has them.
+//! Walks through buildings that are no part of the repository, where the environment names a folder that has
+//! them.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -62,7 +63,8 @@ impl Read {
         builder.finish()
     }
 
-    /// The walk, in the map's coordinates; checks of every step that the avatar is in nothing, by the map and by the points.
+    /// The walk, in the map's coordinates; checks of every step that the avatar is in nothing, by the map and
+    /// by the points.
     fn walk(&self, pixel: Pixel, route: &Route, response: &dyn Response) -> Walked {
         self.walk_as(&AvatarOptions::default(), &self.map(pixel), route, response)
     }
@@ -198,7 +200,8 @@ fn who_is_too_high_is_stopped_under_the_ceiling_of_the_real_staircase() {
     }
 }
 
-/// Half the width of a level patch about a pixel, in pixels; how much it may rise or fall; and how much room is above a floor.
+/// Half the width of a level patch about a pixel, in pixels; how much it may rise or fall; and how much room
+/// is above a floor.
 const PATCH: i64 = 2;
 const LEVEL: f64 = 0.05;
 const ROOM: f64 = 1.0;

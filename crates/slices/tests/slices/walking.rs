@@ -60,7 +60,8 @@ fn stairs_lead_up_and_down_again() {
         |i: u8| steps.iter().filter(|s| (s.position[2] - f64::from(i) * STOREY / 17.0).abs() < 0.02).count();
     assert!((1..17).all(|i| stood(i) >= 4), "{:?}", (1..17).map(stood).collect::<Vec<_>>());
 
-    // Never inside anything: no point of the scan between what can be climbed and the crown, well within the box.
+    // Never inside anything: no point of the scan between what can be climbed and the crown, well within the
+    // box.
     let AvatarOptions { base, height, climb, .. } = *avatar().options();
     let mut near = 0;
     for step in &steps {
@@ -207,7 +208,8 @@ fn no_height_is_fallen_from_at_once() {
     points.push([0.0, 0.0, 2.0]);
     let map = map_of(&points, Up::Z);
     for i in 0..4000_u32 {
-        // A start within reach of a floor stands on it; from any other the feet come down by what it climbs at most.
+        // A start within reach of a floor stands on it; from any other the feet come down by what it climbs
+        // at most.
         let start = 0.36 + 0.0005 * f64::from(i);
         let (ended, steps) = walk(&map, [1.0, 1.0, start], &[[1.0, 1.0]], &Back);
         assert_eq!(ended, Ended::Arrived, "from {start}");
@@ -222,7 +224,8 @@ fn no_height_is_fallen_from_at_once() {
 
 #[test]
 fn what_is_climbed_can_be_left_again() {
-    // A floor, a lower one beyond its edge, and there a block whose top is a climb above the first, two above the second.
+    // A floor, a lower one beyond its edge, and there a block whose top is a climb above the first, two above
+    // the second.
     let mut stopped = 0;
     for block in 0..20_u32 {
         let x = 1.26 + 0.01 * f64::from(block);
@@ -248,7 +251,8 @@ fn what_is_climbed_can_be_left_again() {
 
 #[test]
 fn nothing_is_climbed_that_is_too_high_for_the_floor_below_it() {
-    // A floor, a lower one beyond its edge, and there a block whose top is within a climb of the first, not of the second.
+    // A floor, a lower one beyond its edge, and there a block whose top is within a climb of the first, not
+    // of the second.
     let mut points = level([0.0, 0.0], [0.99, 2.0], 0.0);
     points.extend(level([1.0, 0.0], [3.0, 2.0], -0.3));
     for i in 0..59_u32 {

@@ -164,7 +164,8 @@ fn names_listed_twice_and_reserved_bytes_are_refused() {
 
 #[test]
 fn hostile_metadata_cost_nothing() {
-    // A string of 2^62 bytes, a list of as many numbers, more depth than there is: whatever META holds is an error.
+    // A string of 2^62 bytes, a list of as many numbers, more depth than there is: whatever META holds is an
+    // error.
     for bytes in [vec![253_u8, 0, 0, 0, 0, 0, 0, 0, 0x40], vec![0xFF; 4096], vec![255; 60_000], vec![]] {
         let mut writer = Writer::new(*b"TEST", 1);
         writer.section(*b"METB", 0, &bytes).unwrap();

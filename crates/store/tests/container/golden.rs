@@ -1,4 +1,5 @@
-//! The layout, held fast by a file that is never written again: every later version reads it, or refuses it by name.
+//! The layout, held fast by a file that is never written again: every later version reads it, or refuses it
+//! by name.
 
 use nearmiss_store::{Check, File, LAYOUT, Writer};
 use xxhash_rust::xxh3::xxh3_64;

@@ -80,7 +80,8 @@ impl Content {
     }
 }
 
-/// Touches everything a caller could ask for; errors are welcome, panics are not. Returns the number of good answers.
+/// Touches everything a caller could ask for; errors are welcome, panics are not. Returns the number of good
+/// answers.
 pub(crate) fn use_all(file: &File) -> usize {
     fn total<T: Pod>(array: Result<Array<T>, OpenError>) -> usize {
         array.map_or(0, |array| 1 + array.iter().filter(|e| bytemuck::bytes_of(*e)[0] == 1).count().min(1))

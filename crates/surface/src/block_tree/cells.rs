@@ -1,4 +1,5 @@
-//! A grid over the blocks of a tree: a small sphere begins at the blocks near the cell of its centre instead of at the root.
+//! A grid over the blocks of a tree: a small sphere begins at the blocks near the cell of its centre instead
+//! of at the root.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, mask32x16};
@@ -8,7 +9,8 @@ use super::{Bits, BlockTree, Bounds, bits, id32, load, squared};
 /// A cell takes eight bytes.
 const CELLS_A_POINT: f64 = 1.0;
 
-/// Blocks are named by the cells that are so near, in cells: about a local radius where scans are of surfaces.
+/// Blocks are named by the cells that are so near, in cells: about a local radius where scans are of
+/// surfaces.
 const MARGIN: f64 = 0.5;
 
 /// A cell names no more blocks; where there are more, the tree is as fast. On surfaces there are some six.
@@ -155,8 +157,8 @@ impl BlockTree<'_> {
 }
 
 impl Cells {
-    /// The blocks whose points may be within `radius` of `place`, the nearest first more or less; None if they are not known: radii are
-    /// to be less than half a cell, and blocks few. O(1).
+    /// The blocks whose points may be within `radius` of `place`, the nearest first more or less; None if
+    /// they are not known: radii are to be less than half a cell, and blocks few. O(1).
     #[inline]
     #[must_use]
     pub fn near(&self, place: [f64; 3], radius: f64) -> Option<&[u32]> {

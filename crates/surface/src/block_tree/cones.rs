@@ -1,11 +1,13 @@
-//! What cones over points leave free: the greatest values below theirs that nowhere grow faster than the cones do.
+//! What cones over points leave free: the greatest values below theirs that nowhere grow faster than the
+//! cones do.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 
 use super::{BlockTree, Bounds, MOST_LEVELS, WIDTH, bits, load, squared};
 
-/// By so much rounding may make a square differ from another, relatively; what is as near as that is measured.
+/// By so much rounding may make a square differ from another, relatively; what is as near as that is
+/// measured.
 const SURELY: f32 = 1.0 - 4e-6;
 
 /// A cone over every point of a [`BlockTree`], opening upwards.
@@ -20,8 +22,8 @@ pub struct Cones<'a> {
 }
 
 impl<'a> BlockTree<'a> {
-    /// Cones that rise by `slope`, not negative, per length, with their tips at heights that may be infinite, but are numbers.
-    /// O(n).
+    /// Cones that rise by `slope`, not negative, per length, with their tips at heights that may be infinite,
+    /// but are numbers. O(n).
     ///
     /// # Panics
     /// When there is not a height for every point.
@@ -59,10 +61,11 @@ struct Search<S: Simd> {
 }
 
 impl Cones<'_> {
-    /// The least of each of `heights` over the points of a block and of all cones there: of height + slope · distance, all rounded.
+    /// The least of each of `heights` over the points of a block and of all cones there: of height + slope ·
+    /// distance, all rounded.
     ///
-    /// Exactly so, whatever the order of the points; it decides how much is looked at. Lanes without a point keep their height. Does
-    /// not allocate.
+    /// Exactly so, whatever the order of the points; it decides how much is looked at. Lanes without a point
+    /// keep their height. Does not allocate.
     ///
     /// # Panics
     /// When there is no such block.

@@ -25,10 +25,11 @@ impl Heard {
 }
 
 impl BlockTree<'_> {
-    /// Finds for each point of a block all points whose balls meet its own: nearer than the sum of their horizons.
+    /// Finds for each point of a block all points whose balls meet its own: nearer than the sum of their
+    /// horizons.
     ///
-    /// A node is looked into if for one of the points it may hold an answer, so the cost follows what is found even
-    /// where one lone point with a large horizon lies beside a dense cluster.
+    /// A node is looked into if for one of the points it may hold an answer, so the cost follows what is
+    /// found even where one lone point with a large horizon lies beside a dense cluster.
     ///
     /// # Panics
     /// When there is no such block.
@@ -75,8 +76,8 @@ impl BlockTree<'_> {
         }
     }
 
-    /// Adds the points of block `id` that are heard at points of `block` to the lists of these; `lanes` says which to
-    /// ask for.
+    /// Adds the points of block `id` that are heard at points of `block` to the lists of these; `lanes` says
+    /// which to ask for.
     #[inline(always)]
     fn listen<S: Simd>(&self, simd: S, block: usize, id: usize, lanes: u64, lists: &mut [Vec<u32>; WIDTH]) {
         let own = &self.blocks[block];

@@ -1,7 +1,9 @@
-//! Whether points are near a shape, and which is nearest: boxes sixteen at a time down to blocks, blocks sixteen points at a time.
+//! Whether points are near a shape, and which is nearest: boxes sixteen at a time down to blocks, blocks
+//! sixteen points at a time.
 //!
-//! Single precision with slack tells what is surely within, and what is surely not; what is between is measured again in double
-//! precision. So the answers are those of [`Skeleton::distance_sq`] for every point, whatever the instructions.
+//! Single precision with slack tells what is surely within, and what is surely not; what is between is
+//! measured again in double precision. So the answers are those of [`Skeleton::distance_sq`] for every point,
+//! whatever the instructions.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, mask32x16};
@@ -19,8 +21,8 @@ const LEAST_SURE: f32 = 1e-30;
 const RELATIVE: f64 = 4e-6;
 
 impl BlockTree<'_> {
-    /// Whether a point is within `radius` of a skeleton: exactly if its [distance](Skeleton::distance_sq) is at most that in double
-    /// precision.
+    /// Whether a point is within `radius` of a skeleton: exactly if its [distance](Skeleton::distance_sq) is
+    /// at most that in double precision.
     ///
     /// A few lines of memory where nothing is near; does not allocate.
     #[inline]
@@ -43,7 +45,8 @@ impl BlockTree<'_> {
         ))
     }
 
-    /// As [`Self::any_within`], for a ball about `centre`, given what [`Cells::near`](crate::Cells::near) tells of it: a few blocks instead of a descent.
+    /// As [`Self::any_within`], for a ball about `centre`, given what [`Cells::near`](crate::Cells::near)
+    /// tells of it: a few blocks instead of a descent.
     ///
     /// # Panics
     /// When a block is named that is none.
@@ -95,7 +98,8 @@ impl BlockTree<'_> {
         }
     }
 
-    /// Whether a point of a block is within `radius`: surely if its squared distance is at most `sure`, surely not above `most`.
+    /// Whether a point of a block is within `radius`: surely if its squared distance is at most `sure`,
+    /// surely not above `most`.
     #[inline(always)]
     fn is_within<S: Simd>(
         &self,
@@ -116,8 +120,8 @@ impl BlockTree<'_> {
             || Bits(near).any(|lane| skeleton.distance_sq(self.place(block, lane)) <= radius * radius)
     }
 
-    /// The point nearest to a skeleton and the square of its [distance](Skeleton::distance_sq) in double precision, if that is at most
-    /// `reach`; of equally near ones the first. Does not allocate.
+    /// The point nearest to a skeleton and the square of its [distance](Skeleton::distance_sq) in double
+    /// precision, if that is at most `reach`; of equally near ones the first. Does not allocate.
     #[inline]
     #[must_use]
     pub fn nearest_to(&self, level: Level, skeleton: &Skeleton, reach: f64) -> Option<(usize, f64)> {

@@ -35,9 +35,9 @@ struct Open {
 
 /// What [`BlockTree::nearest`] found. Reused.
 ///
-/// Distance and id of a neighbour are kept as one double: its upper half has the bits of the squared distance,
-/// its lower those of the id. Such doubles are positive and finite, and ascend by distance, then id, so that
-/// the lesser of two is one instruction everywhere.
+/// Distance and id of a neighbour are kept as one double: its upper half has the bits of the squared
+/// distance, its lower those of the id. Such doubles are positive and finite, and ascend by distance, then
+/// id, so that the lesser of two is one instruction everywhere.
 #[derive(Debug, Clone, Default)]
 pub struct Nearest {
     /// A rank each, of all lanes.
@@ -46,8 +46,8 @@ pub struct Nearest {
 }
 
 impl Nearest {
-    /// The neighbours of the block's point in this lane by distance, then id: as many as were asked for, or all. Anything where the
-    /// lane has no point.
+    /// The neighbours of the block's point in this lane by distance, then id: as many as were asked for, or
+    /// all. Anything where the lane has no point.
     ///
     /// # Panics
     /// When `lane` is not below 16.
@@ -55,7 +55,8 @@ impl Nearest {
         self.keys.iter().map_while(move |keys| neighbour(keys[lane / HALF][lane % HALF]))
     }
 
-    /// The one of a rank, from 0 for the nearest; `None` where the points are fewer, or so many were not asked for.
+    /// The one of a rank, from 0 for the nearest; `None` where the points are fewer, or so many were not
+    /// asked for.
     ///
     /// # Panics
     /// When `lane` is not below 16.
@@ -86,8 +87,9 @@ struct Search<S: Simd> {
 impl BlockTree<'_> {
     /// Finds for each point of a block its `count` nearest others, ties by lower id.
     ///
-    /// Six of each take 80 to 190 ns a point on scans with AVX-512, by a kd-tree five to ten times that (`benches/src/bin/graph.rs`). A rank more costs
-    /// four instructions for each point that improves a list; the less the order is one of places, the more are looked at.
+    /// Six of each take 80 to 190 ns a point on scans with AVX-512, by a kd-tree five to ten times that
+    /// (`benches/src/bin/graph.rs`). A rank more costs four instructions for each point that improves a list;
+    /// the less the order is one of places, the more are looked at.
     ///
     /// # Panics
     /// When there is no such block.
@@ -118,7 +120,8 @@ impl BlockTree<'_> {
             limit: f32::INFINITY,
         };
         self.offer(simd, block, true, &mut search, keys);
-        // From the block up, what lies beside it first: so the limit is low before anything far is looked into.
+        // From the block up, what lies beside it first: so the limit is low before anything far is looked
+        // into.
         let mut below = block;
         for level in 0..self.levels.len() {
             let group = below / WIDTH;

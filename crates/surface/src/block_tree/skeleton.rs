@@ -49,8 +49,8 @@ impl Skeleton {
 
     /// How far single precision may be off the distance of a place that is near.
     pub(super) fn slack(&self) -> f64 {
-        /// Of 2⁻²⁴ each: one for a coordinate of the place, of the shape and of their difference, three for products and sums, as
-        /// many for directions that are rounded; together below 40.
+        /// Of 2⁻²⁴ each: one for a coordinate of the place, of the shape and of their difference, three for
+        /// products and sums, as many for directions that are rounded; together below 40.
         const ROUNDING: f64 = 2.5e-6;
         let far = |v: [f64; 3]| v[0].abs() + v[1].abs() + v[2].abs();
         let reach = match *self {
@@ -126,7 +126,8 @@ fn balls<S: Simd>(simd: S, boxes: &Boxes) -> ([f32x16<S>; 3], f32x16<S>) {
     (middle, squared(half).sqrt())
 }
 
-/// What is sure of boxes whose middles are so far from a skeleton, and which its span shows to be `apart_sq` at least.
+/// What is sure of boxes whose middles are so far from a skeleton, and which its span shows to be `apart_sq`
+/// at least.
 #[inline(always)]
 fn outside<S: Simd>(middle_sq: f32x16<S>, radius: f32x16<S>, apart_sq: f32x16<S>) -> f32x16<S> {
     // Of boxes that are none, middle and radius are no numbers; their bounds alone tell.
