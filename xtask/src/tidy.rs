@@ -16,21 +16,41 @@ const COMMENT_WIDTH: usize = 110;
 const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 
 /// Which members of the workspace each crate may use; the table of ARCHITECTURE.md.
-const LAYERS: [(&str, &[&str]); 15] = [
+const LAYERS: [(&str, &[&str]); 17] = [
     ("nearmiss-geometry", &[]),
+    ("nearmiss-lanes", &[]),
+    ("nearmiss-index", &["nearmiss-geometry", "nearmiss-lanes"]),
     ("nearmiss-store", &[]),
     ("nearmiss-io", &["nearmiss-geometry"]),
-    ("nearmiss-filter", &["nearmiss-geometry"]),
-    ("nearmiss-surface", &["nearmiss-geometry"]),
-    ("nearmiss-graph", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-store"]),
-    ("nearmiss-hierarchy", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-store"]),
-    ("nearmiss-query", &["nearmiss-geometry", "nearmiss-surface", "nearmiss-graph", "nearmiss-hierarchy"]),
+    ("nearmiss-filter", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index"]),
+    ("nearmiss-surface", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index"]),
+    (
+        "nearmiss-graph",
+        &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index", "nearmiss-surface", "nearmiss-store"],
+    ),
+    (
+        "nearmiss-hierarchy",
+        &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index", "nearmiss-surface", "nearmiss-store"],
+    ),
+    (
+        "nearmiss-query",
+        &[
+            "nearmiss-geometry",
+            "nearmiss-lanes",
+            "nearmiss-index",
+            "nearmiss-surface",
+            "nearmiss-graph",
+            "nearmiss-hierarchy",
+        ],
+    ),
     ("nearmiss-mesh", &["nearmiss-geometry"]),
-    ("nearmiss-slices", &["nearmiss-geometry", "nearmiss-store", "nearmiss-mesh"]),
+    ("nearmiss-slices", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-store", "nearmiss-mesh"]),
     (
         "nearmiss",
         &[
             "nearmiss-geometry",
+            "nearmiss-lanes",
+            "nearmiss-index",
             "nearmiss-store",
             "nearmiss-io",
             "nearmiss-filter",

@@ -9,7 +9,8 @@ use std::num::NonZero;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::hierarchy::GatherScratch;
-use nearmiss::surface::{Level, PointBlock};
+use nearmiss::index::PointBlock;
+use nearmiss::surface::Level;
 use nearmiss::{BuildOptions, Scan};
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;

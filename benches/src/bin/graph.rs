@@ -8,7 +8,8 @@ use std::hint::black_box;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::graph::{DynamicGraph, GraphOptions, PointGraph, Prune, Touched};
-use nearmiss::surface::{BlockTree, Level, Nearest, PointBlock};
+use nearmiss::index::{BlockTree, Nearest, PointBlock};
+use nearmiss::surface::Level;
 use nearmiss::{BuildOptions, PointHierarchy};
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::counting::Counting;

@@ -5,7 +5,6 @@ mod crop;
 mod error;
 mod neighbours;
 mod outliers;
-mod parallel;
 mod voxel;
 
 pub use crop::crop;

@@ -5,9 +5,9 @@ use std::num::NonZero;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss_geometry::PointCloud;
+use nearmiss_lanes::parallel;
 
 use crate::error::{FilterError, enough, positive};
-use crate::parallel;
 
 /// Returns the points that have at least `n` others within `radius`.
 ///

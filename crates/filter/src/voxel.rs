@@ -1,9 +1,9 @@
 //! Voxel grid: one point for each occupied cell.
 
 use nearmiss_geometry::PointCloud;
+use nearmiss_lanes::parallel;
 
 use crate::error::{FilterError, enough, positive};
-use crate::parallel;
 
 /// A little less than 2⁶³, so that a quotient below it fits into 64 bits whatever its rounding.
 const MOST_CELLS: f64 = 9.2e18;

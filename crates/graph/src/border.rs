@@ -7,10 +7,10 @@
 //! Bounded, Non-orientable Surfaces from Points" (Adamson & Alexa 2004) tell borders by the weighted mean
 //! too, for places off the points.
 
+use nearmiss_lanes::parallel::{map, ranges};
 use nearmiss_surface::symmetric_eigen;
 
 use crate::adjacency::Adjacency;
-use crate::parallel::{map, ranges};
 
 /// From which share on a point is at the border. The outermost of points half a spacing and more apart show
 /// 0.41 to 0.77 at a straight border, those of closed shapes at most 0.33.

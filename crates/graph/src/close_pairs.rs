@@ -11,13 +11,14 @@
 //! the way looks shortest always on a shortest one. Where the way that they show may be longer than promised,
 //! a search looks at all that might be shorter.
 
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::{for_each, ranges, ranges_with};
 use nearmiss_store::Array;
 use serde::{Deserialize, Serialize};
 
 use crate::close_list::{BESIDE, Beside, Close, CloseList, Lists, floor, kept, pack};
 use crate::geodesic::{GeodesicScratch, Reached};
 use crate::length::{Network, step};
-use crate::parallel::{for_each, ranges, ranges_with};
 
 /// No more stretches than this are searched from: memory is made for each.
 const STRETCHES: usize = 64;
@@ -431,12 +432,4 @@ fn sort_lists(starts: &[u32], pairs: &mut [Close]) {
             pairs[list].sort_unstable_by_key(rank);
         }
     });
-}
-
-/// An index as it is stored.
-///
-/// # Panics
-/// When it is 2³² or more.
-pub(crate) fn id32(i: usize) -> u32 {
-    u32::try_from(i).unwrap_or_else(|_| panic!("point {i} is more than an index holds"))
 }

@@ -10,10 +10,11 @@
 //! and each costs a search in an R*-tree ("The R*-tree: an efficient and robust access method for points and
 //! rectangles", Beckmann et al. 1990).
 
+use nearmiss_lanes::vector::distance_sq;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use crate::influence::{distance, distance_sq, horizon, influence, radii_sq};
+use crate::influence::{distance, horizon, influence, radii_sq};
 use crate::options::{GraphError, GraphOptions, check_positions};
 
 type Point = GeomWithData<[f32; 3], u32>;

@@ -1,5 +1,6 @@
 //! The proximity graph of a scan, with what follows from it.
 
+use nearmiss_lanes::parallel::map;
 use nearmiss_store::Array;
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +9,6 @@ use crate::border::borders;
 use crate::components::components;
 use crate::influence::{distance, influence, radii_sq};
 use crate::options::{GraphError, GraphOptions, Prune, check_positions};
-use crate::parallel::map;
 use crate::prune::split;
 
 /// Who is whose neighbour on the surface: the r-SIG of S1 §3.2 without its long edges.

@@ -7,20 +7,15 @@
 //! rounding. Equal distances on a grid stay equal where the differences are: at such a tie the points are
 //! joined. Distances below 1e-19 are none.
 
-use nearmiss_surface::{BlockTree, Heard, Level, Nearest, PointBlock};
+use nearmiss_index::{BlockTree, Heard, Nearest, PointBlock};
+use nearmiss_lanes::parallel::ranges;
+use nearmiss_lanes::vector::distance_sq;
+use nearmiss_surface::Level;
 
 use crate::adjacency::{Adjacency, Lists};
 use crate::options::GraphError;
-use crate::parallel::ranges;
 
 const WIDTH: usize = PointBlock::WIDTH;
-
-/// ‖a − b‖².
-#[inline]
-pub(crate) fn distance_sq(a: [f32; 3], b: [f32; 3]) -> f32 {
-    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    x * x + y * y + z * z
-}
 
 /// ‖a − b‖.
 #[inline]

@@ -12,7 +12,8 @@
 //! from there along the edge, instead of none: or points would fall silent as soon as x left p1, those too
 //! that weigh a tenth.
 
-use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, PointBlock, SurfacePlan};
+use nearmiss_index::PointBlock;
+use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, SurfacePlan};
 
 use crate::Adjacency;
 use crate::close_list::{Close, Lists};
@@ -207,7 +208,8 @@ impl<'a> GeodesicKernel<'a> {
             for (lane, close) in some.iter().enumerate() {
                 // What is heard has a radius, so it has a position.
                 let i = close.point as usize;
-                block.points.set(lane, self.positions[i], self.plan.horizon(self.radii[i]), self.plan);
+                let horizon = self.plan.horizon(self.radii[i]);
+                self.plan.put(&mut block.points, lane, self.positions[i], horizon);
                 block.distance[lane] = close.distance;
             }
             blocks.push(block);

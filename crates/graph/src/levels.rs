@@ -7,10 +7,10 @@
 //! centres is a path of points. A shortest path is searched among the few cells of the coarsest level, then,
 //! level by level, only in the cells near the path found on the level before.
 
+use nearmiss_lanes::id32;
 use nearmiss_store::Array;
 
 use crate::Adjacency;
-use crate::close_pairs::id32;
 use crate::geodesic::{GeodesicScratch, Reached};
 use crate::length::Network;
 

@@ -16,7 +16,6 @@ mod length;
 mod levels;
 mod options;
 mod orient;
-mod parallel;
 mod path_sections;
 mod prune;
 mod sanity;

@@ -17,8 +17,9 @@ mod agreement;
 mod outwards;
 mod patches;
 
+use nearmiss_lanes::parallel::ranges;
+
 use crate::Adjacency;
-use crate::parallel::ranges;
 use agreement::{Weights, agreement, strongest_first};
 use outwards::outwards;
 use patches::{Signed, Tree, Votes};

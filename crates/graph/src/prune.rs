@@ -4,10 +4,11 @@
 //! tighter k and two guards (docs/theory/graph.md): lengths on a grid have no spread, and of fewer than five
 //! nothing is an outlier.
 
+use nearmiss_lanes::parallel::ranges;
+
 use crate::adjacency::{Adjacency, Lists};
 use crate::influence::distance;
 use crate::options::GraphError;
-use crate::parallel::ranges;
 
 /// Fewer edges have no outliers.
 const LEAST_EDGES: usize = 5;

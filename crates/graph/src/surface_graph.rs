@@ -3,13 +3,13 @@
 use std::sync::OnceLock;
 
 use bytemuck::{Pod, Zeroable};
+use nearmiss_lanes::parallel::both;
 use nearmiss_store::{Array, Check, File, WriteError, Writer};
 use nearmiss_surface::SurfacePlan;
 use serde::{Deserialize, Serialize};
 
 use crate::length::distance;
 use crate::orient::{Decision, OrientedPart, Sides, orient};
-use crate::parallel::both;
 use crate::{
     Adjacency, ClosePairs, Flaw, GeodesicKernel, GraphCounts, GraphError, GraphMeta, GraphOptions, LazyPath,
     Levels, LoadError, Network, Paths, PointGraph, edge_lengths,

@@ -6,9 +6,7 @@ mod clouds;
 use clouds::Cloud;
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{Close, ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, Network, Paths};
-use nearmiss_surface::{
-    Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions, SurfacePlan, project,
-};
+use nearmiss_surface::{Evaluation, Kernel, Level, Moments, Status, SurfaceOptions, SurfacePlan, project};
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::shapes::{patch, plates, sphere, torus};
 
@@ -44,7 +42,7 @@ impl Sheet {
 
     /// With straight distances.
     fn straight_at(&self, x: [f64; 3]) -> Evaluation {
-        let blocks = PointBlock::all(&self.plan, &self.cloud.points, &self.cloud.radii);
+        let blocks = self.plan.blocks(&self.cloud.points, &self.cloud.radii);
         Moments::about(Level::new(), &self.plan, x, blocks).evaluate(&self.plan, x)
     }
 

@@ -8,6 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_lanes::vector::{dot, sub};
 
 type Axes = [[f32; 3]; 3];
 
@@ -337,16 +338,6 @@ fn greater(x: Quad, y: Quad) -> Quad {
 #[inline]
 fn product(x: &[Quad; 3], y: &[Quad; 3]) -> Quad {
     plus(plus(times(x[0], y[0]), times(x[1], y[1])), times(x[2], y[2]))
-}
-
-#[inline]
-pub(crate) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline]
-pub(crate) fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// Three unit vectors in single precision.

@@ -1,10 +1,14 @@
 //! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
 
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::on_threads;
+use nearmiss_lanes::vector::dot;
 use nearmiss_store::Array;
-use nearmiss_surface::{Metric, PointBlock, SurfacePlan};
+use nearmiss_surface::{Metric, SurfacePlan};
 
-use crate::boxes::{OrientedBox, dot};
+use crate::boxes::OrientedBox;
 use crate::covering::{Covering, Ground, coverings};
 use crate::enclosure::growths;
 use crate::extents::{Discs, boxes_of_discs};
@@ -18,7 +22,6 @@ use crate::outline::Outline;
 use crate::samples::lists;
 use crate::sampling::Sampling;
 use crate::slices::Slices;
-use crate::split::id32;
 use crate::surfels::{Known, NormalCone, PointKind, Surfels, align, surfels};
 use crate::topology::Node;
 use crate::wide::WideTree;
@@ -70,13 +73,7 @@ impl PointHierarchy {
     /// Names the option that is out of range.
     pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
         options.check()?;
-        #[cfg(feature = "rayon")]
-        if options.threads > 0 {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build();
-            let pool = pool.or(Err(BuildError::Threads(options.threads)))?;
-            return pool.install(|| build(cloud, options));
-        }
-        build(cloud, options)
+        on_threads(options.threads, || build(cloud, options)).or(Err(BuildError::Threads(options.threads)))?
     }
 
     /// The arrays that a query reads.

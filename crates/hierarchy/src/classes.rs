@@ -6,11 +6,12 @@
 //! never widens the bounds of a wall. Noisy points have others all around them: they stay among these.
 
 use fearless_simd::Level;
-use nearmiss_surface::{BlockTree, Nearest, PointBlock};
+use nearmiss_index::{BlockTree, Nearest, PointBlock};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::vector::{dot, sub};
 
-use crate::boxes::{dot, sub};
-use crate::neighbours::chunks;
-use crate::split::{Item, id32};
+use crate::split::Item;
 use crate::surfels::{Fit, PointKind};
 
 const WIDTH: usize = PointBlock::WIDTH;

@@ -9,14 +9,16 @@
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::vector::dot;
 
-use crate::boxes::{OrientedBox, dot};
+use crate::boxes::OrientedBox;
 use crate::enclosure::Cell;
 use crate::gather::TREE_STACK;
 use crate::growth::Growth;
 use crate::samples::Samples;
-use crate::spacing::{fold_nodes, map};
-use crate::split::id32;
+use crate::spacing::fold_nodes;
 use crate::surfels::THICKNESS;
 use crate::topology::{MOST_LEAF_POINTS, Node};
 
@@ -237,7 +239,7 @@ pub(crate) fn coverings<'a>(
     );
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
     let level = Level::new();
-    map(&ids, |&id| {
+    map_all(&ids, |&id| {
         let node = id as usize;
         let centres = Centres::of(samples(node), positions);
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]

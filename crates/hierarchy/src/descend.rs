@@ -1,16 +1,16 @@
 //! The descent of a pair of trees: one loop for every query, what differs is the visitor.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::NodeId;
+use nearmiss_lanes::order::Near;
 use serde::{Deserialize, Serialize};
 
 use crate::topology::Node;
 
 /// A node of either tree, still to be looked at together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct NodePair {
     /// A node of the first tree.
     pub a: NodeId,
@@ -138,32 +138,9 @@ impl Frontier for Stack {
 /// order of their nodes, so the order never depends on anything else.
 #[derive(Debug, Clone, Default)]
 pub struct Heap {
-    pairs: BinaryHeap<Urgent>,
+    /// By their urgency, negated.
+    pairs: BinaryHeap<Near<NodePair>>,
 }
-
-#[derive(Debug, Clone, Copy)]
-struct Urgent(f32, NodePair);
-
-impl Ord for Urgent {
-    fn cmp(&self, other: &Self) -> Ordering {
-        let key = |urgent: &Self| (urgent.1.a, urgent.1.b);
-        self.0.total_cmp(&other.0).then_with(|| key(other).cmp(&key(self)))
-    }
-}
-
-impl PartialOrd for Urgent {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Urgent {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Urgent {}
 
 impl Frontier for Heap {
     fn clear(&mut self) {
@@ -171,15 +148,17 @@ impl Frontier for Heap {
     }
 
     fn push(&mut self, pairs: [(Option<f32>, NodePair); 4]) {
-        self.pairs.extend(pairs.into_iter().filter_map(|(urgency, pair)| Some(Urgent(urgency?, pair))));
+        self.pairs.extend(
+            pairs.into_iter().filter_map(|(urgency, pair)| Some(Near { distance: -urgency?, item: pair })),
+        );
     }
 
     fn pop(&mut self) -> Option<(f32, NodePair)> {
-        self.pairs.pop().map(|Urgent(urgency, pair)| (urgency, pair))
+        self.pairs.pop().map(|near| (-near.distance, near.item))
     }
 
     fn open(&self) -> impl Iterator<Item = (f32, NodePair)> {
-        self.pairs.iter().map(|&Urgent(urgency, pair)| (urgency, pair))
+        self.pairs.iter().map(|near| (-near.distance, near.item))
     }
 }
 

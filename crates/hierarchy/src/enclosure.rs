@@ -20,16 +20,18 @@ use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_surface::{BORDER, PointBlock};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::vector::{cross, tangents};
+use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load, product, seen_from};
+use nearmiss_surface::BORDER;
 
-use crate::boxes::{OrientedBox, dot, sub};
+use crate::boxes::OrientedBox;
 use crate::gather::Index;
 use crate::growth::Growth;
-use crate::lanes::{along, greatest, lanes_of, least, load, product, seen_from};
 use crate::neighbours::Locality;
-use crate::spacing::map;
-use crate::split::id32;
-use crate::surfels::{cross, tangents};
 use crate::topology::Node;
 
 /// Sectors of a tangent plane in which a cell is bounded one by one.
@@ -123,7 +125,7 @@ impl Surroundings {
         let zero = f32x16::splat(simd, 0.0);
         let (mut low, mut high, mut most) = (zero, zero, zero);
         for block in &self.blocks {
-            let d = seen_from(simd, block, p);
+            let d = seen_from(simd, &block.position, p);
             let horizon = f32x16::load_array_ref(simd, &block.horizon);
             let within = horizon + reach;
             let reaches: mask32x16<S> = product(d, d).simd_lt(within * within);
@@ -150,7 +152,7 @@ fn across<'a, S: Simd>(
     // Per sector the greatest reciprocal of a bound.
     let mut closed = f32x16::splat(simd, 0.0);
     for block in near {
-        let d = seen_from(simd, block, p);
+        let d = seen_from(simd, &block.position, p);
         let d_sq = product(d, d);
         let counts: mask32x16<S> = d_sq.simd_gt(0.0) & d_sq.simd_le(within * within);
         if !counts.any_true() {
@@ -334,7 +336,7 @@ pub(crate) fn growths(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBound
     let blocks: Vec<BoxBlock> = of_leaves.chunks(WIDTH).map(BoxBlock::of).collect();
     let leaf_size = nodes.iter().find(|node| node.is_leaf()).map_or(1, |leaf| leaf.count as usize);
     let level = Level::new();
-    map(&ids, |&id| {
+    map_all(&ids, |&id| {
         let (node, bounds) = (&nodes[id as usize], &boxes[id as usize]);
         let range =
             node.first as usize / leaf_size..(node.first + node.count).div_ceil(id32(leaf_size)) as usize;
@@ -387,7 +389,7 @@ fn extents<S: Simd>(
     let (mut low, mut high) = ([most; 3], [none; 3]);
     for number in range.start / WIDTH..range.end.div_ceil(WIDTH) {
         let block = &blocks[number];
-        let inside = mask32x16::from_bitmask(simd, lanes_of(number, range));
+        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, range)));
         for k in 0..3 {
             let middle = along(load(simd, &block.centre), axes[k]);
             let mut spread = f32x16::splat(simd, 0.0);

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_surface::PointBlock;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
 
 use crate::boxes::OrientedBox;
-use crate::lanes::{along, greatest, lanes_of, least, load};
-use crate::spacing::map;
-use crate::split::id32;
 use crate::surfels::THICKNESS;
 use crate::topology::Node;
 
@@ -40,7 +40,7 @@ pub(crate) fn boxes_of_discs(nodes: &[Node], about: &[OrientedBox], discs: &Disc
     let blocks = discs.blocks();
     let ids: Vec<u32> = (0..id32(nodes.len())).collect();
     let level = Level::new();
-    map(&ids, |&id| {
+    map_all(&ids, |&id| {
         let (node, about) = (&nodes[id as usize], &about[id as usize]);
         let [low, high] = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -53,7 +53,7 @@ pub(crate) fn boxes_of_discs(nodes: &[Node], about: &[OrientedBox], discs: &Disc
 impl Discs<'_> {
     fn blocks(&self) -> Vec<DiscBlock> {
         let numbers: Vec<usize> = (0..self.positions.len().div_ceil(WIDTH)).collect();
-        map(&numbers, |&number| self.block(number))
+        map_all(&numbers, |&number| self.block(number))
     }
 
     fn block(&self, number: usize) -> DiscBlock {
@@ -84,7 +84,7 @@ fn extents<S: Simd>(
     let (mut low, mut high) = ([most; 3], [none; 3]);
     for number in points.start / WIDTH..points.end.div_ceil(WIDTH) {
         let block = &blocks[number];
-        let inside = mask32x16::from_bitmask(simd, lanes_of(number, &points));
+        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, &points)));
         let (position, normal) = (load(simd, &block.position), load(simd, &block.normal));
         let (disc, ball) =
             (f32x16::load_array_ref(simd, &block.disc), f32x16::load_array_ref(simd, &block.ball));

@@ -203,7 +203,7 @@ mod tests {
     use rand::RngExt;
 
     use super::*;
-    use crate::boxes::dot;
+    use nearmiss_lanes::vector::dot;
 
     #[test]
     fn four_nodes_are_those_one_by_one() {

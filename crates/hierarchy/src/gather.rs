@@ -2,12 +2,14 @@
 //! a descent where no list holds.
 
 use fearless_simd::{Level, Simd, dispatch};
-use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, PointBlock, SurfacePlan};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, SurfacePlan};
 
-use crate::boxes::{OrientedBox, dot, sub};
+use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::neighbours::{GROUP, GROWN, NeighbourList};
-use crate::split::id32;
 use crate::topology::Node;
 
 /// Room for a descent that keeps at most one sibling a level: trees of 2³² points have 31 levels at most.

@@ -3,10 +3,11 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i16x16};
+use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::vector::sub;
 
-use crate::boxes::{OrientedBox, sub};
+use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
-use crate::spacing::map;
 use crate::surfels::PointKind;
 
 /// Lanes of a block.
@@ -155,7 +156,7 @@ impl Leaves {
             balls.push(node.points().any(|i| !slices.is_on_sheet(i)));
         }
         let numbers: Vec<usize> = (0..ids.len() * blocks_a_leaf).collect();
-        let blocks = map(&numbers, |&number| {
+        let blocks = map_all(&numbers, |&number| {
             let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
             let mut block = LeafBlock::new(&slices.boxes[ids[leaf] as usize]);
             let points = slices.nodes[ids[leaf] as usize].points();

@@ -1,7 +1,8 @@
 //! The samples of nodes as the scan seen from further away: which they are, how far they reach, and f' over
 //! them.
 
-use nearmiss_surface::{Evaluation, Moments, PointBlock};
+use nearmiss_index::PointBlock;
+use nearmiss_surface::{Evaluation, Moments};
 
 use crate::build::PointHierarchy;
 use crate::gather::GatherScratch;
@@ -95,7 +96,7 @@ impl PointHierarchy {
         let blocks = std::iter::from_fn(|| {
             let mut block = PointBlock::EMPTY;
             for (lane, i) in samples.by_ref().take(PointBlock::WIDTH).enumerate() {
-                block.set(lane, slices.positions[i], horizon, self.plan());
+                self.plan().put(&mut block, lane, slices.positions[i], horizon);
             }
             (block.horizon[0] > 0.0).then_some(block)
         });

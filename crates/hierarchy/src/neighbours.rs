@@ -9,13 +9,15 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_surface::{PointBlock, SurfacePlan};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::parallel::{chunks, map_all};
+use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_lanes::wide::{greatest, product, seen_from};
+use nearmiss_surface::SurfacePlan;
 
-use crate::boxes::{ROUNDING, dot, sub};
+use crate::boxes::ROUNDING;
 use crate::build::PointHierarchy;
 use crate::gather::Index;
-use crate::lanes::{greatest, product, seen_from};
-use crate::spacing::map;
 
 /// Points of a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
@@ -34,9 +36,9 @@ pub(crate) const GROWN: f32 = 1.0 + 1e-5;
 /// The points in blocks, with their horizons. O(n), on all cores.
 pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32]) -> Vec<PointBlock> {
     let starts: Vec<usize> = (0..positions.len()).step_by(PointBlock::WIDTH).collect();
-    map(&starts, |&start| {
+    map_all(&starts, |&start| {
         let points = start..(start + PointBlock::WIDTH).min(positions.len());
-        let mut block = PointBlock::all(plan, &positions[points.clone()], &radii[points]);
+        let mut block = plan.blocks(&positions[points.clone()], &radii[points]);
         block.next().unwrap_or(PointBlock::EMPTY)
     })
 }
@@ -76,7 +78,7 @@ fn ball<S: Simd>(simd: S, block: &PointBlock) -> ([f32; 3], f32) {
     let is_there: mask32x16<S> = horizons.simd_gt(0.0);
     let mut best = (centre, f32::INFINITY);
     for step in 2..2 + CENTRING {
-        let d = seen_from(simd, block, centre);
+        let d = seen_from(simd, &block.position, centre);
         let heard = product(d, d).sqrt() + horizons;
         let heard = simd.select_f32x16(is_there, heard, f32x16::splat(simd, 0.0));
         let radius = greatest(heard, 0.0);
@@ -218,20 +220,6 @@ pub(crate) fn neighbours(index: &Index<'_>, positions: &[[f32; 3]], radii: &[f32
     let mut all = Lists::default();
     chunks(&blocks, list).into_iter().for_each(|some| all.append(some));
     all
-}
-
-/// Items that a thread works on at once: enough to hide the hand-over, and a group of blocks.
-const ITEMS_A_TASK: usize = PointBlock::WIDTH;
-
-/// `f` of some items at a time, in order, on all cores where there are several.
-pub(crate) fn chunks<T: Sync, R: Send>(items: &[T], f: impl Fn(&[T]) -> R + Sync + Send) -> Vec<R> {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        items.par_chunks(ITEMS_A_TASK).map(f).collect()
-    }
-    #[cfg(not(feature = "rayon"))]
-    items.chunks(ITEMS_A_TASK).map(f).collect()
 }
 
 impl PointHierarchy {

@@ -2,7 +2,7 @@
 //! them then.
 
 use nearmiss_geometry::PointCloud;
-use nearmiss_surface::{BlockTree, PointBlock};
+use nearmiss_index::{BlockTree, PointBlock};
 
 use crate::boxes::OrientedBox;
 use crate::classes::{dense_first, vote};

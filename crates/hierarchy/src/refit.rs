@@ -5,18 +5,19 @@
 
 use std::ops::Range;
 
-use nearmiss_surface::{BlockTree, Evaluation, Metric, PointBlock};
+use nearmiss_index::{BlockTree, PointBlock};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::vector::dot;
+use nearmiss_surface::{Evaluation, Metric};
 
-use crate::boxes::dot;
 use crate::build::PointHierarchy;
 use crate::classes::vote;
 use crate::covering::{Ground, Solid, coverings};
 use crate::extents::{Discs, boxes_of_discs};
 use crate::levels::samples;
-use crate::neighbours::chunks;
 use crate::slices::{ball, obstacle_ball};
 use crate::spacing::Look;
-use crate::split::id32;
 use crate::surfels::{Fit, NormalCone, PointKind, Surfel, align, cone, fitted, surfel_of};
 
 impl PointHierarchy {
@@ -80,7 +81,7 @@ impl PointHierarchy {
             let mut block = PointBlock::EMPTY;
             for (lane, &i) in points.iter().enumerate() {
                 let horizon = self.plan.horizon(self.radii[i as usize]);
-                block.set(lane, self.positions[i as usize], horizon, &self.plan);
+                self.plan.put(&mut block, lane, self.positions[i as usize], horizon);
             }
             blocks.push(block);
         }

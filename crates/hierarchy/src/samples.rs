@@ -6,10 +6,11 @@
 //! in that leaf alone; and of several draws the one furthest from the samples so far is kept (Mitchell 1991),
 //! which makes the distances between them of the same order, as the paper wants them.
 
-use crate::boxes::{dot, sub};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::vector::{dot, sub};
+
 use crate::covering::Centres;
-use crate::spacing::map;
-use crate::split::id32;
 use crate::topology::Node;
 
 /// How many samples a node may have.
@@ -119,7 +120,8 @@ pub(crate) fn draw(
 /// The lists of all inner nodes, in their order.
 pub(crate) fn lists(positions: &[[f32; 3]], nodes: &[Node], (leaf_size, count): (u32, u32)) -> Vec<u32> {
     let inner: Vec<u32> = (0..id32(nodes.len())).filter(|&id| !nodes[id as usize].is_leaf()).collect();
-    let lists = map(&inner, |&id| draw(positions, (id, &nodes[id as usize]), (leaf_size, count as usize)));
+    let lists =
+        map_all(&inner, |&id| draw(positions, (id, &nodes[id as usize]), (leaf_size, count as usize)));
     lists.iter().flat_map(|list| &list[..count as usize]).copied().collect()
 }
 

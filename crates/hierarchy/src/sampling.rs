@@ -1,6 +1,7 @@
 //! How densely points lie: local radii, the sampling radius, and the points with their horizons.
 
-use nearmiss_surface::{BlockTree, PointBlock, SurfacePlan};
+use nearmiss_index::{BlockTree, PointBlock};
+use nearmiss_surface::SurfacePlan;
 
 use crate::boxes::OrientedBox;
 use crate::options::{BuildError, BuildOptions};
@@ -49,7 +50,7 @@ impl Sampling {
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
         set_reaches(nodes, boxes, &radii);
         for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
-            block.tune(&plan, radii);
+            plan.tune(block, radii);
         }
         Ok(Self { spacings, radii, sampling_radius, reach, plan, blocks })
     }

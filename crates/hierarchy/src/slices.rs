@@ -3,7 +3,8 @@
 
 use std::ops::Range;
 
-use nearmiss_surface::{PointBlock, SurfacePlan};
+use nearmiss_index::PointBlock;
+use nearmiss_surface::SurfacePlan;
 
 use crate::boxes::OrientedBox;
 #[cfg(doc)]

@@ -8,9 +8,10 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use fearless_simd::{Level, Simd, dispatch};
-use nearmiss_surface::{BlockTree, Nearest, PointBlock, symmetric_eigen};
+use nearmiss_index::{BlockTree, Nearest, PointBlock};
+use nearmiss_lanes::parallel::{chunks, map_all};
+use nearmiss_surface::symmetric_eigen;
 
-use crate::neighbours::chunks;
 use crate::topology::Node;
 
 const WIDTH: usize = PointBlock::WIDTH;
@@ -246,17 +247,6 @@ fn length(near: &(f64, usize)) -> f32 {
     near.0.sqrt().max(1e-18) as f32
 }
 
-/// `f` of every item, in order, on all cores where there are several.
-pub(crate) fn map<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
-    #[cfg(feature = "rayon")]
-    {
-        use rayon::prelude::*;
-        items.par_iter().with_min_len(1024).map(f).collect()
-    }
-    #[cfg(not(feature = "rayon"))]
-    items.iter().map(f).collect()
-}
-
 /// Sums over some points, relative to one of them.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
@@ -321,7 +311,7 @@ impl Sums {
 /// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines and bends.
 pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
     // How near points are along a line says nothing of the surface about it.
-    let tips = map(spacings, |s| match s.look {
+    let tips = map_all(spacings, |s| match s.look {
         Look::Area | Look::Ring => s.radius,
         Look::Line | Look::Bend | Look::Sparse => f32::INFINITY,
     });

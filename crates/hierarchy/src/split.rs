@@ -8,10 +8,13 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, f64x2, f64x4};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::both;
+use nearmiss_lanes::vector::dot;
+use nearmiss_lanes::wide::{along, greatest, least};
 use nearmiss_surface::symmetric_eigen;
 
-use crate::boxes::{OrientedBox, dot, to_axes};
-use crate::lanes::{along, greatest, least};
+use crate::boxes::{OrientedBox, to_axes};
 use crate::topology::{Node, left_count, node_count};
 
 /// A point on its way to its place.
@@ -24,7 +27,6 @@ pub(crate) struct Item {
 }
 
 /// Below this many points a task is not worth handing to another thread.
-#[cfg(feature = "rayon")]
 const TASK: usize = 4096;
 
 /// An axis shorter than this share of the longest cannot give smaller children.
@@ -87,20 +89,13 @@ impl Place<'_> {
             first: first + left,
             id: id + 1 + left_nodes,
         };
-        #[cfg(feature = "rayon")]
         if count > TASK {
-            rayon::join(|| l.split(leaf_size, None), || r.split(leaf_size, None));
-            return;
+            both(|| l.split(leaf_size, None), || r.split(leaf_size, None));
+        } else {
+            l.split(leaf_size, None);
+            r.split(leaf_size, None);
         }
-        l.split(leaf_size, None);
-        r.split(leaf_size, None);
     }
-}
-
-/// Point and node numbers fit 32 bits: a cloud has at most 2³² − 1 points and half as many nodes.
-#[expect(clippy::cast_possible_truncation, reason = "bounded by the cloud's size")]
-pub(crate) fn id32(i: usize) -> u32 {
-    i as u32
 }
 
 /// Sums of coordinates and their products are taken in so many lanes: a fixed order, whatever the machine.

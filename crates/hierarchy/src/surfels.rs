@@ -11,16 +11,19 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, PointBlock, Status, symmetric_eigen};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::vector::{dot, sub, tangents};
+use nearmiss_lanes::wide::{along, product, seen_from};
+use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Status, symmetric_eigen};
 use serde::{Deserialize, Serialize};
 
-use crate::boxes::{OrientedBox, dot, sub};
+use crate::boxes::OrientedBox;
 use crate::classes::SLAB;
 use crate::covering::Solid;
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::Index;
-use crate::lanes::{along, product, seen_from};
-use crate::neighbours::{Locality, chunks};
+use crate::neighbours::Locality;
 use crate::slices::{ball, cell_radius, obstacle_ball};
 use crate::spacing::{Look, Spacing};
 
@@ -400,7 +403,7 @@ fn widest_gap<'a, S: Simd>(
     let (u, v) = tangents(normal);
     let mut taken = i32x16::splat(simd, 0);
     for block in near {
-        let d = seen_from(simd, block, p);
+        let d = seen_from(simd, &block.position, p);
         let (x, y) = (along(d, u), along(d, v));
         let length = x.abs() + y.abs();
         // The angle of the diamond |x| + |y| = 1, 0 to 4: a quarter turn each 1, without trigonometry.
@@ -432,15 +435,6 @@ fn bit<S: Simd>(number: f32x16<S>) -> i32x16<S> {
     let exponent = i32x16::truncate_from(number) + ONE;
     let power: f32x16<S> = (exponent << DIGITS).bitcast();
     i32x16::truncate_from(power)
-}
-
-/// Two unit vectors that complete `normal` to a right-handed frame (Duff et al., "Building an orthonormal
-/// basis, revisited", JCGT 6(1), 2017).
-pub(crate) fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {
-    let sign = 1.0_f32.copysign(z);
-    let a = -1.0 / (sign + z);
-    let b = x * y * a;
-    ([1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y])
 }
 
 fn kind(at: &Evaluation, look: Look) -> PointKind {
@@ -481,8 +475,4 @@ pub(crate) fn cone(normals: &[[f32; 3]]) -> NormalCone {
     let axis: [f32; 3] = (main * largest.signum()).map(|c| c as f32).into();
     let cosine = normals.iter().fold(1.0_f32, |least, n| least.min(dot(*n, axis).abs()));
     NormalCone { axis, cosine }
-}
-
-pub(crate) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -6,10 +6,10 @@ use std::ops::Range;
 use fearless_simd::Level;
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_surface::{BlockTree, Nearest, PointBlock};
+use nearmiss_index::{BlockTree, Nearest, PointBlock};
+use nearmiss_lanes::parallel::chunks;
 
 use crate::build::PointHierarchy;
-use crate::neighbours::chunks;
 
 const WIDTH: usize = PointBlock::WIDTH;
 

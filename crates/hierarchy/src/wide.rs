@@ -14,6 +14,8 @@ use std::ops::ControlFlow;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{bits, repeated, spread};
 
 use crate::boxes::{OrientedBox, Relative};
 use crate::build::PointHierarchy;
@@ -21,7 +23,6 @@ use crate::descend::NodePair;
 use crate::lanes::{Boxes, along_normals};
 use crate::leaf_block::Leaves;
 use crate::slices::{Part, Slices};
-use crate::split::id32;
 
 /// Children of a node.
 const WIDTH: usize = 4;
@@ -390,19 +391,23 @@ fn compare<S: Simd>(
     (reach, notes_gaps): (f32, bool),
 ) -> Near {
     let boxes_a = Boxes {
-        centre: each(simd, &a.centre),
-        half: each(simd, &a.half),
-        axes: [each(simd, &a.axes[0]), each(simd, &a.axes[1]), each(simd, &a.axes[2])],
+        centre: each_repeated(simd, &a.centre),
+        half: each_repeated(simd, &a.half),
+        axes: [
+            each_repeated(simd, &a.axes[0]),
+            each_repeated(simd, &a.axes[1]),
+            each_repeated(simd, &a.axes[2]),
+        ],
     };
     let [hx, hy, hz] = four(simd, &b.half);
     let scale = relative.scale();
     let boxes_b = Boxes {
-        centre: spread(relative.points_of_four(four(simd, &b.centre))),
-        half: spread([hx * scale, hy * scale, hz * scale]),
+        centre: each_spread(relative.points_of_four(four(simd, &b.centre))),
+        half: each_spread([hx * scale, hy * scale, hz * scale]),
         axes: [
-            spread(relative.directions_of_four(four(simd, &b.axes[0]))),
-            spread(relative.directions_of_four(four(simd, &b.axes[1]))),
-            spread(relative.directions_of_four(four(simd, &b.axes[2]))),
+            each_spread(relative.directions_of_four(four(simd, &b.axes[0]))),
+            each_spread(relative.directions_of_four(four(simd, &b.axes[1]))),
+            each_spread(relative.directions_of_four(four(simd, &b.axes[2]))),
         ],
     };
     let mut gap = f32x16::splat(simd, f32::MIN);
@@ -446,30 +451,15 @@ fn four<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> [f32x4<S>; 3] {
     [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
 }
 
-/// Child i in lanes i, 4 + i, 8 + i, 12 + i.
 #[inline(always)]
-fn each<S: Simd>(simd: S, rows: &[Lanes; 3]) -> [f32x16<S>; 3] {
+fn each_repeated<S: Simd>(simd: S, rows: &[Lanes; 3]) -> [f32x16<S>; 3] {
     let [x, y, z] = four(simd, rows);
-    [f32x16::block_splat(x), f32x16::block_splat(y), f32x16::block_splat(z)]
-}
-
-/// Child j in lanes 4j to 4j + 3.
-#[inline(always)]
-fn spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> [f32x16<S>; 3] {
-    [spread_one(x), spread_one(y), spread_one(z)]
+    [repeated(x), repeated(y), repeated(z)]
 }
 
 #[inline(always)]
-fn spread_one<S: Simd>(row: f32x4<S>) -> f32x16<S> {
-    let row = f32x16::block_splat(row);
-    let row = row.zip_low(row);
-    row.zip_low(row)
-}
-
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
-    mask.to_bitmask() as u32
+fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> [f32x16<S>; 3] {
+    [spread(x), spread(y), spread(z)]
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy, PointKind};
-use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions};
+use nearmiss_index::PointBlock;
+use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Level, Moments, Status, SurfaceOptions};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::instructions::levels;
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};

@@ -13,6 +13,7 @@ pub use nearmiss_filter as filter;
 pub use nearmiss_geometry as geometry;
 pub use nearmiss_graph as graph;
 pub use nearmiss_hierarchy as hierarchy;
+pub use nearmiss_index as index;
 #[cfg(feature = "io")]
 pub use nearmiss_io as io;
 #[cfg(feature = "mesh")]

@@ -10,10 +10,10 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{LeafBlock, Part, Slices};
+use nearmiss_lanes::wide::{Bits, bits, blocks_of, lanes_of, load};
 use nearmiss_surface::project;
 
-use crate::leaf_pair::{bits, near_box};
-use crate::point_gap::{blocks, lanes};
+use crate::leaf_pair::near_box;
 use crate::posed::Posed;
 use crate::surface::Surfaces;
 use crate::verdict::{Contact, Evidence};
@@ -90,9 +90,8 @@ impl<'a> Targets<'a> {
 /// The points of a block, and the radii of their balls: 0 of those on sheets.
 #[inline(always)]
 fn balls<S: Simd>(simd: S, scan: &Slices<'_>, block: usize) -> ([f32x16<S>; 3], f32x16<S>) {
-    let [x, y, z] = &scan.blocks[block].position;
-    let load = |lanes: &[f32; WIDTH]| f32x16::load_array_ref(simd, lanes);
-    ([load(x), load(y), load(z)], load(&scan.obstacle_balls(block)))
+    let balls = f32x16::load_array_ref(simd, &scan.obstacle_balls(block));
+    (load(simd, &scan.blocks[block].position), balls)
 }
 
 impl Posed<'_> {
@@ -206,12 +205,11 @@ impl Surfaces<'_> {
         if of_a.has_balls(leaf_a) {
             for target in of_b.blocks(leaf_b) {
                 let mut targets = None;
-                for block in blocks(&of_a.points(leaf_a)) {
-                    let mut near = self.pair.balls_of_a(level, block, target.0, reach)
-                        & lanes(&of_a.points(leaf_a), block);
-                    while near != 0 {
-                        let i = block * WIDTH + near.trailing_zeros() as usize;
-                        near &= near - 1;
+                for block in blocks_of(&of_a.points(leaf_a)) {
+                    let near = self.pair.balls_of_a(level, block, target.0, reach)
+                        & lanes_of(block, &of_a.points(leaf_a));
+                    for lane in Bits(near) {
+                        let i = block * WIDTH + lane;
                         let x = relative.point_back(a.positions[i]);
                         let radius = (a.obstacle_ball(i) + reach) * relative.scale_back();
                         let met =
@@ -226,12 +224,11 @@ impl Surfaces<'_> {
         }
         for target in of_a.blocks(leaf_a) {
             let mut targets = None;
-            for block in blocks(&of_b.points(leaf_b)) {
-                let mut near =
-                    self.pair.balls_of_b(level, block, target.0, reach) & lanes(&of_b.points(leaf_b), block);
-                while near != 0 {
-                    let j = block * WIDTH + near.trailing_zeros() as usize;
-                    near &= near - 1;
+            for block in blocks_of(&of_b.points(leaf_b)) {
+                let near = self.pair.balls_of_b(level, block, target.0, reach)
+                    & lanes_of(block, &of_b.points(leaf_b));
+                for lane in Bits(near) {
+                    let j = block * WIDTH + lane;
                     let x = relative.point(b.positions[j]);
                     let radius = b.obstacle_ball(j) * relative.scale() + reach;
                     // Balls of a have been held against those of b.
@@ -245,10 +242,8 @@ impl Surfaces<'_> {
     }
 
     /// Takes down the contacts among the pairs of points that have a bit in `near`.
-    fn balls_meet(&mut self, mut near: u32, points: impl Fn(usize) -> [usize; 2]) -> ControlFlow<()> {
-        while near != 0 {
-            let lane = near.trailing_zeros() as usize;
-            near &= near - 1;
+    fn balls_meet(&mut self, near: u32, points: impl Fn(usize) -> [usize; 2]) -> ControlFlow<()> {
+        for lane in Bits(near) {
             let pair = points(lane);
             self.pair.meter.leaf_work(1);
             let Some((contact, evidence)) = self.pair.ball_contact(pair, self.margin) else { continue };

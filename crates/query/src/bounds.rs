@@ -19,6 +19,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
 use nearmiss_hierarchy::{Child, FourNodes, NodeBounds, Part, SLACK, Slices, WideTree, whole};
+use nearmiss_lanes::wide::{bits, product, repeated, spread};
 
 use crate::view::ScanView;
 
@@ -256,7 +257,7 @@ impl Motion {
                     [false, false] => {
                         let a = of_a.bounds_of_children(simd, part, a);
                         let b = of_b.bounds_of_children(simd, part, b);
-                        (each(&a), all(&self.moved(&b)))
+                        (each_spread(&a), all_repeated(&self.moved(&b)))
                     }
                 };
                 self.gaps(simd, &bounds_a, &bounds_b, limits)
@@ -317,10 +318,10 @@ impl Motion {
         let mut cosines = [[zero; 3]; 3];
         let (mut along_a, mut along_b) = ([zero; 3], [zero; 3]);
         for i in 0..3 {
-            along_a[i] = product(&a.axes[i], &off);
-            along_b[i] = product(&b.axes[i], &off);
+            along_a[i] = product(a.axes[i], off);
+            along_b[i] = product(b.axes[i], off);
             for j in 0..3 {
-                cosines[i][j] = product(&a.axes[i], &b.axes[j]);
+                cosines[i][j] = product(a.axes[i], b.axes[j]);
             }
         }
         // From the centre of b on.
@@ -334,7 +335,7 @@ impl Motion {
             }
             let foot_b = within(&place, &b.half);
             for i in 0..3 {
-                seen[i] = along_a[i] + product(&cosines[i], &foot_b);
+                seen[i] = along_a[i] + product(cosines[i], foot_b);
             }
             foot_a = within(&seen, &a.half);
         }
@@ -345,17 +346,17 @@ impl Motion {
                 line[k] += a.axes[i][k] * apart;
             }
         }
-        let per_length = one / product(&line, &line).sqrt();
+        let per_length = one / product(line, line).sqrt();
         for k in 0..3 {
             line[k] *= per_length;
         }
         let turn = [line[0] - self.direction[0], line[1] - self.direction[1], line[2] - self.direction[2]];
         #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
-        let mut boxes = product(&line, &between) - product(&turn, &turn) * (0.5 * self.distance) as f32;
+        let mut boxes = product(line, between) - product(turn, turn) * (0.5 * self.distance) as f32;
         // Any line bounds: that of the boxes is nearly that of the enclosures.
         let mut growth = zero;
         for k in 0..3 {
-            let (along_a, along_b) = (product(&a.axes[k], &line), product(&b.axes[k], &line));
+            let (along_a, along_b) = (product(a.axes[k], line), product(b.axes[k], line));
             boxes -= a.half[k] * along_a.abs();
             boxes -= b.half[k] * along_b.abs();
             // Towards each other: along the line for a, against it for b.
@@ -367,31 +368,25 @@ impl Motion {
         let boxes = simd.select_f32x16(boxes.simd_gt(least), boxes, least);
         let enclosures = simd.select_f32x16(enclosures.simd_gt(least), enclosures, least);
         let near: mask32x16<S> = boxes.simd_lt(limits.boxes) | enclosures.simd_lt(limits.enclosures);
-        #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-        let near = near.to_bitmask() as u32;
-        Gaps { boxes: boxes.to_array(), enclosures: enclosures.to_array(), near }
+        Gaps { boxes: boxes.to_array(), enclosures: enclosures.to_array(), near: bits(near) }
     }
 }
 
 /// The first of four in four lanes, then the second, and so on.
 #[inline(always)]
-fn each<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
+fn each_spread<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
     four.map(
         #[inline(always)]
-        |four| {
-            let row = f32x16::block_splat(four);
-            let row = row.zip_low(row);
-            row.zip_low(row)
-        },
+        |four| spread(four),
     )
 }
 
 /// The four one after the other, four times.
 #[inline(always)]
-fn all<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
+fn all_repeated<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
     four.map(
         #[inline(always)]
-        |four| f32x16::block_splat(four),
+        |four| repeated(four),
     )
 }
 
@@ -402,11 +397,6 @@ fn alone<S: Simd>(simd: S, one: &NodeBounds<f32>) -> NodeBounds<f32x16<S>> {
         #[inline(always)]
         |one| f32x16::splat(simd, one),
     )
-}
-
-#[inline(always)]
-fn product<S: Simd>(a: &[f32x16<S>; 3], b: &[f32x16<S>; 3]) -> f32x16<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The place of a box nearest to `place`, both along its axes.
@@ -506,7 +496,7 @@ mod tests {
                 let gaps = dispatch!(level, simd => {
                     let a = FourNodes::new(simd, a.each_ref(), more_a.each_ref());
                     let b = FourNodes::new(simd, b.each_ref(), more_b.each_ref());
-                    motion.gaps(simd, &each(&a), &all(&motion.moved(&b)), limits)
+                    motion.gaps(simd, &each_spread(&a), &all_repeated(&motion.moved(&b)), limits)
                 });
                 (gaps, motion)
             });

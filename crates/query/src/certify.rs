@@ -8,12 +8,12 @@
 //! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with
 //! the least bound is split further, for about an eighth as long as all took before.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{Child, NodePair, Slices, Split, Visitor};
+use nearmiss_lanes::order::Near;
 
 use crate::bounds::{LANES, Limits, Motion};
 use crate::posed::{Posed, balls_apart};
@@ -50,32 +50,8 @@ pub(crate) struct Bound {
     pub(crate) pair: NodePair,
 }
 
-/// A pair of nodes in a proof. Ordered so that the pair with the least gap is greatest.
-#[derive(Debug, Clone, Copy)]
-struct Open {
-    gap: f32,
-    pair: [Child; 2],
-}
-
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.gap.total_cmp(&self.gap).then_with(|| other.pair.cmp(&self.pair))
-    }
-}
-
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Open {}
+/// A pair of nodes in a proof, and their gap.
+type Open = Near<[Child; 2]>;
 
 /// The pairs of nodes of a proof. Reused.
 #[derive(Debug, Clone, Default)]
@@ -189,13 +165,14 @@ impl<'a> Certifier<'a> {
         let before = self.pair.meter.spent.node_pairs;
         let pair = [self.pair.a.wide.root(), self.pair.b.wide.root()];
         let gap = self.pair.gaps_of_enclosures([NodeId::ROOT; 2], [NodeId::ROOT; 2])[0];
-        self.file(Open { gap, pair }, &mut run, scratch)?;
+        self.file(Open { distance: gap, item: pair }, &mut run, scratch)?;
         while let Some(next) = scratch.open.pop() {
             self.split(&next, &mut run, scratch)?;
         }
         let compared = self.pair.meter.spent.node_pairs - before;
         let nearest = self.tighten(compared / 8, &mut run, scratch)?;
-        let least = self.in_world(if run.is_cut { nearest.gap.min(run.enough) } else { nearest.gap });
+        let least =
+            self.in_world(if run.is_cut { nearest.distance.min(run.enough) } else { nearest.distance });
         // Far away balls tell more than boxes.
         let balls = balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].placed().scale();
         #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
@@ -203,17 +180,17 @@ impl<'a> Certifier<'a> {
         let distance = self.in_world(gap).max(least);
         if distance > least {
             scratch.clear();
-            scratch.near.push(Open { gap, pair });
+            scratch.near.push(Open { distance: gap, item: pair });
         }
         if is_hinted {
-            let bound = |own: &Open| Bound { gap: own.gap, pair: self.pair.nodes(own.pair) };
+            let bound = |own: &Open| Bound { gap: own.distance, pair: self.pair.nodes(own.item) };
             self.proven.extend(scratch.apart().map(bound));
         }
         if let Some(proof) = proof {
-            let shown = |own: &Open| (self.pair.nodes(own.pair), self.in_world(own.gap));
+            let shown = |own: &Open| (self.pair.nodes(own.item), self.in_world(own.distance));
             proof.pairs.extend(scratch.apart().map(shown));
         }
-        Some((distance, self.pair.band_of(self.pair.nodes(nearest.pair))))
+        Some((distance, self.pair.band_of(self.pair.nodes(nearest.item))))
     }
 
     /// Replaces a pair by its children. A pair that is apart stays if some of its children show less than it
@@ -225,13 +202,14 @@ impl<'a> Certifier<'a> {
         let pair = &mut self.pair;
         let enclosures = if run.lists { f32::INFINITY } else { run.beyond };
         let limits = Limits { boxes: f32::NEG_INFINITY, enclosures };
-        let (pairs, gaps) = run.motion.split(([pair.a, pair.b], pair.part), next.pair, limits);
+        let (pairs, gaps) = run.motion.split(([pair.a, pair.b], pair.part), next.item, limits);
         pair.meter.spent.node_pairs += u64::from(pairs.lanes.count_ones());
         let slack = pair.relative.slack();
         let mut lanes = gaps.near;
-        let shows_less =
-            |lane: usize| lanes >> lane & 1 != 0 && run.motion.gap(gaps.enclosures[lane], slack) <= next.gap;
-        if next.gap > self.reach && (0..LANES).any(shows_less) {
+        let shows_less = |lane: usize| {
+            lanes >> lane & 1 != 0 && run.motion.gap(gaps.enclosures[lane], slack) <= next.distance
+        };
+        if next.distance > self.reach && (0..LANES).any(shows_less) {
             return Some(false);
         }
         run.is_cut |= lanes != pairs.lanes;
@@ -242,7 +220,7 @@ impl<'a> Certifier<'a> {
             lanes &= lanes - 1;
             let pair = pairs.pair(lane);
             let gap = run.motion.gap(gaps.enclosures[lane], slack);
-            let mut own = Open { gap, pair };
+            let mut own = Open { distance: gap, item: pair };
             if gaps.boxes[lane] < least {
                 least = gaps.boxes[lane];
                 match nearest.replace(own) {
@@ -261,15 +239,18 @@ impl<'a> Certifier<'a> {
     /// Puts a pair where it belongs. `None` where two leaves are not apart.
     #[inline]
     fn file(&mut self, mut own: Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<()> {
-        let [a, b] = own.pair.map(Child::is_leaf);
-        let mut is_apart = own.gap > self.reach;
+        let [a, b] = own.item.map(Child::is_leaf);
+        let mut is_apart = own.distance > self.reach;
         if !is_apart && (a || b) {
-            let nodes = self.pair.nodes(own.pair);
-            let gap =
-                if a && b { self.pair.gap_of_parts(nodes) } else { self.pair.better_gap(nodes, own.gap) };
+            let nodes = self.pair.nodes(own.item);
+            let gap = if a && b {
+                self.pair.gap_of_parts(nodes)
+            } else {
+                self.pair.better_gap(nodes, own.distance)
+            };
             is_apart = gap > self.reach;
             if is_apart {
-                own.gap = gap;
+                own.distance = gap;
             } else if a && b {
                 self.doubtful = Some(nodes);
                 return None;
@@ -277,10 +258,10 @@ impl<'a> Certifier<'a> {
         }
         if !is_apart {
             scratch.open.push(own);
-        } else if own.gap < run.enough {
+        } else if own.distance < run.enough {
             scratch.near.push(own);
-            if KEPT * own.gap < run.enough {
-                run.found(own.gap, self.pair.relative.slack());
+            if KEPT * own.distance < run.enough {
+                run.found(own.distance, self.pair.relative.slack());
             }
         } else {
             run.is_cut = true;
@@ -301,7 +282,7 @@ impl<'a> Certifier<'a> {
         let mut last = None;
         while let Some(&least) = nearest.peek() {
             last = Some(least);
-            let are_leaves = least.pair.iter().all(|node| node.is_leaf());
+            let are_leaves = least.item.iter().all(|node| node.is_leaf());
             if are_leaves
                 || self.pair.meter.spent.node_pairs >= most
                 || self.split(&least, run, scratch) != Some(true)
@@ -311,7 +292,7 @@ impl<'a> Certifier<'a> {
             nearest.pop();
             nearest.extend(scratch.near.drain(..));
         }
-        let good = last.map(|last| Open { gap: run.enough, ..last });
+        let good = last.map(|last| Open { distance: run.enough, ..last });
         let least = nearest.peek().copied().or(good);
         scratch.near.extend(nearest.drain());
         scratch.nearest = nearest;

@@ -9,6 +9,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_hierarchy::{LeafBlock, Leaves, Relative, THICKNESS};
+use nearmiss_lanes::wide::{bits, product, squared};
 
 use crate::crossing::{Disc, crossing};
 
@@ -112,7 +113,7 @@ impl LeafPair<'_> {
             let lane = left.trailing_zeros() as usize & (WIDTH - 1);
             let d = [px - x[lane], py - y[lane], pz - z[lane]];
             let reach = radii + self.a.block.disc(lane) * per_scale;
-            let near: mask32x16<S> = product(&d, &d).simd_le(reach * reach);
+            let near: mask32x16<S> = squared(d).simd_le(reach * reach);
             nears[lane] = bits(near) & self.b.lanes();
             candidates &= !(u32::from(nears[lane] == 0 && !each) << lane);
             left &= left - 1;
@@ -126,7 +127,7 @@ impl LeafPair<'_> {
                 let radius = self.a.block.disc(lane) * per_scale;
                 let normal = self.relative.direction_back(self.a.block.normal(lane));
                 let of_b = self.b.block.normals(simd);
-                let crossing = cross(simd, (&d, product(&d, &d)), (normal, radius), (&of_b, radii));
+                let crossing = cross(simd, (&d, squared(d)), (normal, radius), (&of_b, radii));
                 crossings = nears[lane] & bits(crossing);
             }
             if each || crossings != 0 {
@@ -178,7 +179,7 @@ fn cross<S: Simd>(
 ) -> mask32x16<S> {
     let zero = f32x16::simd_from(simd, 0.0);
     let u = d[0] * nx + d[1] * ny + d[2] * nz;
-    let v = product(d, normals);
+    let v = product(*d, *normals);
     let c = normals[0] * nx + normals[1] * ny + normals[2] * nz;
     let g = -(c * c) + 1.0;
     let chord_a = g * (radius * radius) - v * v;
@@ -189,18 +190,6 @@ fn cross<S: Simd>(
     let meet: mask32x16<S> = apart.simd_le(chord_a + chord_b + both * 2.0);
     let thin: mask32x16<S> = u.abs().max(v.abs()).simd_le(radii.min(radius) * THICKNESS);
     (chords & meet) | thin
-}
-
-#[inline(always)]
-fn product<S: Simd>(a: &[f32x16<S>; 3], b: &[f32x16<S>; 3]) -> f32x16<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// The lanes of a mask as bits.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-pub(crate) fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
-    mask.to_bitmask() as u32
 }
 
 #[cfg(test)]

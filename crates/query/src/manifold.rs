@@ -13,7 +13,8 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::PointId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{LeafVisitor, WideStack, descend_wide};
-use nearmiss_surface::PointBlock;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::wide::{bits, blocks_of, lanes_of, load};
 use serde::{Deserialize, Serialize};
 
 use crate::options::{CollideOptions, Semantics};
@@ -281,10 +282,9 @@ impl LeafVisitor for Near<'_, '_> {
     fn leaf_pair(&mut self, [a, b]: [usize; 2]) -> ControlFlow<()> {
         let (of_a, of_b) = (self.pair.a.wide.leaves.points(a), self.pair.b.wide.leaves.points(b));
         self.pair.meter.leaf_pair(of_a.len(), of_b.len());
-        let blocks = |points: &std::ops::Range<usize>| points.start / WIDTH..points.end.div_ceil(WIDTH);
-        for block_a in blocks(&of_a) {
-            for block_b in blocks(&of_b) {
-                let lanes = [lanes(&of_a, block_a), lanes(&of_b, block_b)];
+        for block_a in blocks_of(&of_a) {
+            for block_b in blocks_of(&of_b) {
+                let lanes = [lanes_of(block_a, &of_a), lanes_of(block_b, &of_b)];
                 dispatch!(self.level, simd => simd.vectorize(
                     #[inline(always)]
                     || self.blocks(simd, [block_a, block_b], lanes),
@@ -299,10 +299,10 @@ impl Near<'_, '_> {
     /// The nearest of one block for each point of the other that has one within reach.
     #[inline(always)]
     fn blocks<S: Simd>(&mut self, simd: S, blocks: [usize; 2], [lanes_a, lanes_b]: [u32; 2]) {
-        let own = places(simd, &self.pair.a.blocks[blocks[0]]);
+        let own = load(simd, &self.pair.a.blocks[blocks[0]].position);
         let [x, y, z] = self.pair.relative.points_back(&own);
         let (x, y, z) = (x.to_array(), y.to_array(), z.to_array());
-        let [px, py, pz] = places(simd, &self.pair.b.blocks[blocks[1]]);
+        let [px, py, pz] = load(simd, &self.pair.b.blocks[blocks[1]].position);
         let beyond = f32x16::splat(simd, f32::INFINITY);
         let there = mask32x16::from_bitmask(simd, u64::from(lanes_b));
         let (mut least, mut nearest) = (beyond, f32x16::splat(simd, 0.0));
@@ -337,22 +337,4 @@ impl Near<'_, '_> {
         let (point, nearest) = (point as u32, nearest as u32);
         self.neighbours.push(Neighbour { of_b, point, nearest, distance_sq });
     }
-}
-
-#[inline(always)]
-fn places<S: Simd>(simd: S, block: &PointBlock) -> [f32x16<S>; 3] {
-    let [x, y, z] = &block.position;
-    [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
-}
-
-/// The lanes of a block that have some of these points, as bits.
-fn lanes(points: &std::ops::Range<usize>, block: usize) -> u32 {
-    let below = |i: usize| (1_u32 << i.saturating_sub(block * WIDTH).min(WIDTH)) - 1;
-    below(points.end) & !below(points.start)
-}
-
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
-    mask.to_bitmask() as u32
 }

@@ -5,17 +5,13 @@
 //! the obstacle. Where a leaf straddles a gap, as one of a depth frame does at a silhouette, or holds strays,
 //! its box is mostly empty, and these balls tell far more.
 
-use std::ops::{Range, RangeInclusive};
-
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{Node, NodePair, OrientedBox, Part, Relative, Slices};
-use nearmiss_surface::PointBlock;
+use nearmiss_lanes::wide::{blocks_of, lanes_of, load};
 
 use crate::posed::Posed;
-
-const WIDTH: usize = PointBlock::WIDTH;
 
 /// A leaf longer than so many of its greatest local radii is not a patch of a sheet. Half the length of a
 /// patch of 16 points is some two.
@@ -33,10 +29,9 @@ struct Balls<S: Simd> {
 impl<S: Simd> Balls<S> {
     #[inline(always)]
     fn of(simd: S, scan: &Slices<'_>, leaf: &Node, block: usize) -> Self {
-        let lanes = lanes(&leaf.points(), block);
-        let [x, y, z] = &scan.blocks[block].position;
-        let load = |lanes: &[f32; WIDTH]| f32x16::load_array_ref(simd, lanes);
-        Self { centres: [load(x), load(y), load(z)], reaches: load(&scan.obstacle_reaches(block)), lanes }
+        let lanes = lanes_of(block, &leaf.points());
+        let reaches = f32x16::load_array_ref(simd, &scan.obstacle_reaches(block));
+        Self { centres: load(simd, &scan.blocks[block].position), reaches, lanes }
     }
 
     /// The balls of a, moved into b's frame.
@@ -145,7 +140,7 @@ impl Posed<'_> {
         if of_a {
             let leaf = &self.a.nodes[pair.a.index()];
             let bounds = self.b.obstacle_enclosure(pair.b.index());
-            for block in blocks(&leaf.points()) {
+            for block in blocks_of(&leaf.points()) {
                 let balls = Balls::of(simd, self.a, leaf, block).moved_back(&self.relative);
                 least = least.min(balls.gap_to_box(simd, &bounds));
             }
@@ -153,7 +148,7 @@ impl Posed<'_> {
         }
         let leaf = &self.b.nodes[pair.b.index()];
         let bounds = self.a.obstacle_enclosure(pair.a.index());
-        for block in blocks(&leaf.points()) {
+        for block in blocks_of(&leaf.points()) {
             let balls = Balls::of(simd, self.b, leaf, block).moved(&self.relative);
             least = least.min(balls.gap_to_box(simd, &bounds));
         }
@@ -173,27 +168,13 @@ impl Posed<'_> {
     fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair) -> f32 {
         let (leaf_a, leaf_b) = (&self.a.nodes[pair.a.index()], &self.b.nodes[pair.b.index()]);
         let mut least = f32::INFINITY;
-        for block_b in blocks(&leaf_b.points()) {
+        for block_b in blocks_of(&leaf_b.points()) {
             let of_b = Balls::of(simd, self.b, leaf_b, block_b).moved(&self.relative);
-            for block_a in blocks(&leaf_a.points()) {
+            for block_a in blocks_of(&leaf_a.points()) {
                 let of_a = Balls::of(simd, self.a, leaf_a, block_a);
                 least = least.min(of_a.gap_to_balls(simd, &of_b));
             }
         }
         least
     }
-}
-
-/// The blocks in which the points of a leaf lie.
-#[inline(always)]
-pub(crate) fn blocks(points: &Range<usize>) -> RangeInclusive<usize> {
-    points.start / WIDTH..=(points.end - 1) / WIDTH
-}
-
-/// The lanes of a block that hold any of these points, as bits.
-#[inline(always)]
-pub(crate) fn lanes(points: &Range<usize>, block: usize) -> u32 {
-    let first = block * WIDTH;
-    let below = |i: usize| (1_u32 << i.saturating_sub(first).min(WIDTH)) - 1;
-    below(points.end) & !below(points.start)
 }

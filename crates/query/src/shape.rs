@@ -8,7 +8,7 @@
 use fearless_simd::Level;
 use nearmiss_geometry::{PointId, Pose};
 use nearmiss_hierarchy::PointHierarchy;
-use nearmiss_surface::{BlockTree, Cells, Skeleton};
+use nearmiss_index::{BlockTree, Cells, Skeleton};
 
 use crate::view::ScanView;
 

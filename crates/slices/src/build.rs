@@ -6,12 +6,12 @@
 use std::ops::Range;
 
 use nearmiss_geometry::{PointCloud, TriangleMesh};
+use nearmiss_lanes::parallel::{change_each, map_each};
 use nearmiss_mesh::{Lattice, lattice_samples};
 
 use crate::error::SliceError;
 use crate::map::{About, Index};
 use crate::options::{Obstacle, SlicePlan};
-use crate::parallel::{change_each, map_each};
 use crate::{Grid, SliceMap, finish};
 
 /// Points that a thread sorts at a time: they and what becomes of them fit its cache.
@@ -177,8 +177,8 @@ impl SliceBuilder {
         for points in points.chunks(BLOCK * BLOCKS) {
             let blocks: Vec<&[P]> = points.chunks(BLOCK).collect();
             let sorted = map_each(blocks.len(), |i| Sorted::new(&grid, parts, blocks[i], &to_map));
-            change_each(&mut self.layers, |slice, layer| {
-                change_each(&mut layer.parts(), |part, cells| {
+            change_each(&mut self.layers, 1, |slice, layer| {
+                change_each(&mut layer.parts(), 1, |part, cells| {
                     for block in &sorted {
                         for &(cell, level) in block.part(slice * parts + part) {
                             cells.see(cell, level);

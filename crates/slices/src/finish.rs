@@ -9,10 +9,11 @@
 //! than ε σ; if not, they are one floor. Either voxel keeps its own highest level, so a floor that is looked
 //! up in the lower slice has the height of a point.
 
+use nearmiss_lanes::parallel::map_each;
+
 use crate::Grid;
 use crate::build::Layer;
 use crate::grid::LEVELS;
-use crate::parallel::map_each;
 use crate::slice::{Canvas, Content, Slice};
 
 /// Of the spans of level voxels this share is no greater than the noise: enough that few floors become

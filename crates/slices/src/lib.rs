@@ -28,8 +28,6 @@ mod encode;
 mod store;
 mod target;
 
-mod parallel;
-
 pub use build::SliceBuilder;
 pub use cache::{CacheCounts, CacheOptions, SliceCache};
 pub use error::SliceError;

@@ -6,11 +6,11 @@
 use std::ops::RangeInclusive;
 
 use nearmiss_geometry::Aabb;
+use nearmiss_lanes::parallel::change_each;
 use serde::{Deserialize, Serialize};
 
 use crate::bits::Run;
 use crate::map::{SliceMap, Unloaded};
-use crate::parallel::fill_each;
 use crate::{Block, Grid};
 
 /// Questions that a thread takes at a time.
@@ -119,7 +119,7 @@ impl SliceMap {
     /// When there are not as many answers as boxes.
     pub fn query_each(&self, boxes: &[Aabb], floor: Floor, answers: &mut [Result<Occupancy, Unloaded>]) {
         assert_eq!(boxes.len(), answers.len(), "an answer a box");
-        fill_each(boxes, answers, CHUNK, |bounds| self.query(bounds, floor));
+        change_each(answers, CHUNK, |i, answer| *answer = self.query(&boxes[i], floor));
     }
 
     /// Adds, for each column, the height in the map's coordinates of the highest thing in the slice of `base`

@@ -8,12 +8,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use nearmiss_lanes::parallel::map_each;
 use nearmiss_store::{Check, Fault, File, OpenError, WriteError};
 use thiserror::Error;
 
 use crate::encode::decode;
 use crate::map::{About, Index, SliceMap};
-use crate::parallel::map_each;
 use crate::slice::Slice;
 use crate::{Grid, WalkError};
 

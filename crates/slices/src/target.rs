@@ -9,11 +9,11 @@ use std::fs::{self, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use nearmiss_lanes::parallel::map_each;
 use nearmiss_store::{Check, Fault, File, WriteError, Writer};
 
 use crate::SliceMap;
 use crate::encode::encode;
-use crate::parallel::map_each;
 use crate::slice::Slice;
 use crate::store::{CHECKSUMS, IMAGE, INDEX, INDEX_NAME, PIXELS, SliceFolder, StoreError, image_name};
 

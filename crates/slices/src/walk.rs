@@ -8,12 +8,12 @@
 use std::ops::RangeInclusive;
 
 use nearmiss_geometry::Aabb;
+use nearmiss_lanes::parallel::change_both;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::grid::LEVELS;
 use crate::map::{SliceMap, Unloaded};
-use crate::parallel::walk_each;
 use crate::slice::Slice;
 use crate::{Grid, Response};
 
@@ -495,5 +495,5 @@ pub fn step_each(
     steps: &mut [Result<Step, Unloaded>],
 ) {
     assert!(walkers.len() == targets.len() && walkers.len() == steps.len(), "a target and a step a walker");
-    walk_each(walkers, targets, steps, CHUNK, |walker, target| walker.step(map, *target, response));
+    change_both(walkers, steps, CHUNK, |i, walker, step| *step = walker.step(map, targets[i], response));
 }

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-mod block_tree;
 mod eigen;
 mod eigen_batch;
 mod eigen_cholesky;
@@ -13,7 +12,6 @@ mod neighbourhood;
 mod options;
 mod project;
 
-pub use block_tree::{BlockTree, Cells, Cones, Heard, Nearest, Neighbour, Skeleton};
 pub use eigen::{Eigen3, symmetric_eigen};
 pub use eigen_batch::{EigenBlock, MatrixBlock, symmetric_eigen_batch};
 pub use eigen_cholesky::{LeastEigen, cubic_cholesky_eigen};
@@ -21,6 +19,6 @@ pub use fearless_simd::Level;
 pub use fit::{BORDER, Evaluation, Status};
 pub use kernel::Kernel;
 pub use meet::{Meeting, meet, step_onto_both};
-pub use neighbourhood::{Centre, HalfBlock, MeasuredBlock, Moments, Neighbourhood, PointBlock};
+pub use neighbourhood::{Centre, HalfBlock, MeasuredBlock, Moments, Neighbourhood};
 pub use options::{Bandwidth, Metric, SurfaceError, SurfaceOptions, SurfacePlan};
 pub use project::{Projection, project};

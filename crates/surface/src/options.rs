@@ -1,5 +1,6 @@
 //! What defines the surface: options as plain numbers, and the plan that they validate to.
 
+use nearmiss_index::PointBlock;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -145,6 +146,35 @@ pub struct SurfacePlan {
 }
 
 impl SurfacePlan {
+    /// All points of a scan in blocks, given their positions and local sampling radii.
+    pub fn blocks(&self, positions: &[[f32; 3]], radii: &[f32]) -> impl ExactSizeIterator<Item = PointBlock> {
+        PointBlock::silent(positions).zip(radii.chunks(PointBlock::WIDTH)).map(|(mut block, radii)| {
+            self.tune(&mut block, radii);
+            block
+        })
+    }
+
+    /// Puts a point that is heard as far as `horizon` into a lane of a block.
+    ///
+    /// # Panics
+    /// When there is no such lane.
+    #[inline]
+    pub fn put(&self, block: &mut PointBlock, lane: usize, position: [f32; 3], horizon: f32) {
+        for k in 0..3 {
+            block.position[k][lane] = position[k];
+        }
+        block.horizon[lane] = horizon;
+        block.decay[lane] = self.decay(horizon);
+    }
+
+    /// Lets the first points of a block be heard as their local sampling radii want it.
+    pub fn tune(&self, block: &mut PointBlock, radii: &[f32]) {
+        for ((horizon, decay), radius) in block.horizon.iter_mut().zip(&mut block.decay).zip(radii) {
+            *horizon = self.horizon(*radius);
+            *decay = self.decay(*horizon);
+        }
+    }
+
     /// Validates `options` for a scan with this `sampling_radius`; lengths are in the units of its stored
     /// positions, `unit` of which make one of the caller's, in which a fixed bandwidth is given.
     ///

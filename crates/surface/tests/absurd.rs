@@ -1,8 +1,8 @@
 //! Numbers that no scan has: every function ends, and calls nothing a surface that is not a number.
 
 use nearmiss_surface::{
-    Bandwidth, Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions, SurfacePlan, meet,
-    project, symmetric_eigen,
+    Bandwidth, Evaluation, Kernel, Level, Moments, Status, SurfaceOptions, SurfacePlan, meet, project,
+    symmetric_eigen,
 };
 
 const ABSURD: [f32; 12] = [
@@ -59,7 +59,7 @@ impl Sheet {
 
     fn evaluate(&self, x: [f64; 3]) -> Evaluation {
         let (points, radii): (Vec<[f32; 3]>, Vec<f32>) = self.points.iter().copied().unzip();
-        let blocks = PointBlock::all(&self.plan, &points, &radii);
+        let blocks = self.plan.blocks(&points, &radii);
         let at = Moments::about(Level::new(), &self.plan, x, blocks).evaluate(&self.plan, x);
         assert!(at.f.is_finite() && at.bandwidth.is_finite(), "{at:?}");
         if at.status == Status::Ok {

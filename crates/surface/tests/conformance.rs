@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_surface::{
-    Evaluation, Kernel, Level, Moments, PointBlock, Status, SurfaceOptions, SurfacePlan, meet, project,
+    Evaluation, Kernel, Level, Moments, Status, SurfaceOptions, SurfacePlan, meet, project,
 };
 use nearmiss_testdata::arbitrary;
 
@@ -44,7 +44,7 @@ impl Sheet {
 
     fn at(&self, x: [f64; 3]) -> Evaluation {
         let radii = vec![self.radius; self.points.len()];
-        let blocks = PointBlock::all(&self.plan, &self.points, &radii);
+        let blocks = self.plan.blocks(&self.points, &radii);
         Moments::about(Level::new(), &self.plan, x, blocks).evaluate(&self.plan, x)
     }
 

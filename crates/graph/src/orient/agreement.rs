@@ -1,8 +1,10 @@
 //! How well two normals agree, and the edges in the order of that.
 
+use nearmiss_lanes::parallel::ranges;
+use nearmiss_lanes::vector::{dot, sub};
+
 use super::id;
 use crate::Adjacency;
-use crate::parallel::ranges;
 
 /// Steps of agreement that are told apart; edges of one step are taken in the order of their points.
 const STEPS: u16 = 1024;
@@ -13,16 +15,6 @@ pub(super) struct Agreement {
     pub(super) same: bool,
     pub(super) strength: f32,
     along: f32,
-}
-
-#[inline]
-pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline]
-pub(super) fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// How the normals `m` at `p` and `n` at `q` agree.

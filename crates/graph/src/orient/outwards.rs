@@ -1,6 +1,7 @@
 //! What decides which of the two sides of a component is out.
 
-use super::agreement::{dot, sub};
+use nearmiss_lanes::vector::{dot, sub};
+
 use super::patches::Signed;
 use super::{Decision, OrientedPart, Sides, id};
 

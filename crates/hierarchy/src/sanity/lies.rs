@@ -1,6 +1,7 @@
 //! Hierarchies in which one number lies: each is refused, and by its name.
 
 use nearmiss_geometry::PointCloud;
+use nearmiss_lanes::vector::tangents;
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 use super::Flaw;
@@ -8,7 +9,6 @@ use crate::build::PointHierarchy;
 use crate::covering::Covering;
 use crate::options::BuildOptions;
 use crate::samples::list_number;
-use crate::surfels::tangents;
 
 fn honest() -> PointHierarchy {
     let points = arbitrary::cloud(CloudKind::Sphere, 301, 1);

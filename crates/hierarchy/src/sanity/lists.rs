@@ -1,6 +1,6 @@
 //! Blocks, the balls about them, and neighbour lists: one that lies makes f what it is not.
 
-use nearmiss_surface::PointBlock;
+use nearmiss_index::PointBlock;
 
 use super::Flaw;
 use crate::build::PointHierarchy;
@@ -22,7 +22,7 @@ pub(super) fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(),
 /// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that
 /// lists ascend and name groups.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
-    let blocks = PointBlock::all(&scan.plan, &scan.positions, &scan.radii);
+    let blocks = scan.plan.blocks(&scan.positions, &scan.radii);
     let differs = blocks.zip(&scan.blocks).position(|(expected, found)| expected != *found);
     first_wrong("the copy of the points of block", differs)?;
     let left_out = scan.blocks.iter().enumerate().position(|(number, block)| {

@@ -1,7 +1,7 @@
 //! The numbers about a whole scan: how many entries its arrays have, and what the metadata say.
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
-use nearmiss_surface::PointBlock;
+use nearmiss_index::PointBlock;
 
 use super::{FARTHEST, Flaw};
 use crate::build::PointHierarchy;

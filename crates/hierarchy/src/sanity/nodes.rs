@@ -1,9 +1,10 @@
 //! The boxes: one that is none, or that leaves its parent's, makes a query look everywhere or miss a contact.
 
 use bytemuck::cast_ref;
+use nearmiss_lanes::vector::{dot, sub};
 
 use super::{FARTHEST, Flaw};
-use crate::boxes::{OrientedBox, dot, sub};
+use crate::boxes::OrientedBox;
 use crate::growth::Growth;
 use crate::topology::Node;
 

@@ -1,7 +1,9 @@
 //! The numbers of every point, each against its range and against its leaf.
 
+use nearmiss_lanes::vector::dot;
+
 use super::{FARTHEST, Flaw};
-use crate::boxes::{OrientedBox, dot};
+use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::surfels::{NormalCone, PointKind, THICKNESS};
 

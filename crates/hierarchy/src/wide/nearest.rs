@@ -4,15 +4,16 @@ use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x4, mask32x16};
-use nearmiss_surface::{Centre, PointBlock};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{bits, lanes_of, product, seen_from};
+use nearmiss_surface::Centre;
 
 use super::{Siblings, WIDTH};
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::gather::TREE_STACK;
-use crate::lanes::{lanes_of, product, seen_from};
 use crate::neighbours::GROWN;
-use crate::split::id32;
 
 impl Siblings {
     /// The squared distances of a place from the four boxes.
@@ -160,11 +161,11 @@ impl PointHierarchy {
         let points = 0..self.positions.len();
         for &group in listed {
             let balls = self.groups.get(group as usize)?;
-            let d = seen_from(simd, balls, nearest.rounded);
+            let d = seen_from(simd, &balls.position, nearest.rounded);
             let reach = f32x16::load_array_ref(simd, &balls.horizon) + nearest.within;
             let near: mask32x16<S> = product(d, d).simd_le(reach * reach * GROWN);
             let first = group as usize * PointBlock::WIDTH;
-            let mut left = near.to_bitmask() & lanes_of(group as usize, &(0..self.blocks.len()));
+            let mut left = bits(near) & lanes_of(group as usize, &(0..self.blocks.len()));
             while left != 0 {
                 let block = first + left.trailing_zeros() as usize;
                 left &= left - 1;
@@ -196,9 +197,9 @@ impl PointHierarchy {
     /// at once.
     #[inline(always)]
     fn offer_block<S: Simd>(&self, simd: S, block: usize, points: &Range<usize>, nearest: &mut Nearest) {
-        let d = seen_from(simd, &self.blocks[block], nearest.rounded);
+        let d = seen_from(simd, &self.blocks[block].position, nearest.rounded);
         let near: mask32x16<S> = product(d, d).simd_le(nearest.most);
-        let mut left = near.to_bitmask() & lanes_of(block, points);
+        let mut left = bits(near) & lanes_of(block, points);
         while left != 0 {
             let i = block * PointBlock::WIDTH + left.trailing_zeros() as usize;
             left &= left - 1;

@@ -6,9 +6,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Leaves, Node, NodePair, Part};
-use nearmiss_surface::PointBlock;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::wide::{bits, blocks_of, lanes_of};
 
-use crate::point_gap::{blocks, lanes};
 use crate::posed::Posed;
 
 const WIDTH: usize = PointBlock::WIDTH;
@@ -53,7 +53,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
     let zero = f32x16::simd_from(simd, 0.0);
     let mut reach = reach_of(pair, best.distance);
     let has_balls = has_balls(pair, [a, b]);
-    for block_a in blocks(&a.points()) {
+    for block_a in blocks_of(&a.points()) {
         let [x, y, z] = &pair.a.blocks[block_a].position;
         let own = [
             f32x16::load_array_ref(simd, x),
@@ -72,7 +72,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
         }
         let balls_a = if has_balls { pair.a.obstacle_balls(block_a) } else { [0.0; WIDTH] };
         let balls_a = f32x16::load_array_ref(simd, &balls_a) * pair.relative.scale_back();
-        let mut left = lanes(&a.points(), block_a);
+        let mut left = lanes_of(block_a, &a.points());
         loop {
             let most = balls_a + reach;
             let near: mask32x16<S> = off_sq.simd_le(most * most);
@@ -82,7 +82,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
             }
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            for block_b in blocks(&b.points()) {
+            for block_b in blocks_of(&b.points()) {
                 let [x, y, z] = &pair.b.blocks[block_b].position;
                 let d = [
                     f32x16::load_array_ref(simd, x) - places[0][lane],
@@ -92,7 +92,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
                 let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let balls_b = if has_balls { pair.b.obstacle_balls(block_b) } else { [0.0; WIDTH] };
                 let both = f32x16::load_array_ref(simd, &balls_b) + balls_a.to_array()[lane];
-                let mut left_b = lanes(&b.points(), block_b);
+                let mut left_b = lanes_of(block_b, &b.points());
                 loop {
                     let most = both + reach;
                     let near: mask32x16<S> = d_sq.simd_le(most * most);
@@ -133,10 +133,4 @@ fn least(values: &[f32; WIDTH], lanes: u32) -> usize {
         }
     }
     least
-}
-
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
-fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
-    mask.to_bitmask() as u32
 }

@@ -1,10 +1,11 @@
 //! The nearest pairs of leaves, by branch and bound, nearest pair of nodes first: for the nearest points by
 //! boxes, for a bound from below by enclosures, both in one descent.
 
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use nearmiss_hierarchy::{Child, NodePair, Part};
+use nearmiss_lanes::order::{ascending, from_ascending};
 
 use crate::bounds::{Limits, Motion};
 use crate::posed::Posed;
@@ -12,67 +13,33 @@ use crate::posed::Posed;
 /// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in
 /// them is at least. Ordered so that the nearest is greatest, of equally near ones that of the nearest boxes,
 /// then the first.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Open {
     /// How near the enclosures are, and in the lower half the boxes, as numbers in the same order: a heap
     /// compares often.
-    key: u64,
-    pair: [Child; 2],
+    key: Reverse<u64>,
+    pair: Reverse<[Child; 2]>,
 }
 
 impl Open {
     #[inline]
     fn new(enclosures: f32, boxes: f32, pair: [Child; 2]) -> Self {
-        Self { key: u64::from(ascending(enclosures)) << 32 | u64::from(ascending(boxes)), pair }
+        let key = u64::from(ascending(enclosures)) << 32 | u64::from(ascending(boxes));
+        Self { key: Reverse(key), pair: Reverse(pair) }
     }
 
     #[inline]
     fn enclosures(&self) -> f32 {
-        from_ascending((self.key >> 32) as u32)
+        from_ascending((self.key.0 >> 32) as u32)
     }
 
     #[inline]
     fn boxes(&self) -> f32 {
         #[expect(clippy::cast_possible_truncation, reason = "the lower 32 bits")]
-        let bits = self.key as u32;
+        let bits = self.key.0 as u32;
         from_ascending(bits)
     }
 }
-
-/// Bits that are in the order of the numbers.
-#[inline]
-fn ascending(x: f32) -> u32 {
-    let bits = x.to_bits();
-    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
-}
-
-/// The number with these bits.
-#[inline]
-fn from_ascending(bits: u32) -> f32 {
-    f32::from_bits(if bits >> 31 == 0 { !bits } else { bits & !(1 << 31) })
-}
-
-impl Ord for Open {
-    #[inline]
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.key.cmp(&self.key).then_with(|| other.pair.cmp(&self.pair))
-    }
-}
-
-impl PartialOrd for Open {
-    #[inline]
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Open {}
 
 /// So many steps split the nearest pair of all, which a heap finds. Then limits are near what they will be,
 /// and what was put off last comes next: some pairs more, but a heap takes longer than to look at those.
@@ -168,8 +135,8 @@ impl<'s> Search<'s> {
         let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
         let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
         let (of_enclosures, of_boxes) = (next.enclosures(), next.boxes());
-        if next.pair.iter().all(|node| node.is_leaf()) {
-            let leaves = pair.nodes(next.pair);
+        if next.pair.0.iter().all(|node| node.is_leaf()) {
+            let leaves = pair.nodes(next.pair.0);
             if of_enclosures < self.surfaces {
                 let bound = bound_of_leaves(pair, motion, leaves, of_enclosures, self.surfaces);
                 self.surfaces = self.surfaces.min(bound);
@@ -177,7 +144,7 @@ impl<'s> Search<'s> {
             return (of_boxes < self.points).then_some(leaves);
         }
         let limits = Limits { boxes: self.points, enclosures: self.surfaces };
-        let (pairs, gaps) = motion.split(([pair.a, pair.b], pair.part), next.pair, limits);
+        let (pairs, gaps) = motion.split(([pair.a, pair.b], pair.part), next.pair.0, limits);
         let enclosures = if self.of_surfaces { gaps.enclosures } else { gaps.boxes };
         pair.meter.spent.node_pairs += u64::from(pairs.lanes.count_ones());
         let mut near = gaps.near;

@@ -7,9 +7,11 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, mask32x16};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{Bits, WIDTH, bits, load};
 
 use super::skeleton::{Block, Lanes, Place, Skeleton, Stretch, single};
-use super::{Bits, BlockTree, MOST_LEVELS, WIDTH, bits, id32, load};
+use super::{BlockTree, MOST_LEVELS};
 
 /// Room for a descent that keeps all siblings.
 const STACK: usize = MOST_LEVELS * WIDTH;
@@ -75,7 +77,7 @@ impl BlockTree<'_> {
     fn any_by<S: Simd>(&self, simd: S, lanes: impl Lanes, skeleton: &Skeleton, radius: f64) -> bool {
         let (sure, most) = limits(skeleton, radius);
         // Of each level a group, and its boxes still to be looked into.
-        let mut open = [(0_usize, 0_u64); MOST_LEVELS];
+        let mut open = [(0_usize, 0_u32); MOST_LEVELS];
         let top = self.levels.len();
         let (mut level, mut id) = (top, 0);
         loop {
@@ -109,7 +111,7 @@ impl BlockTree<'_> {
         (sure, most): (f32, f32),
         (skeleton, radius): (&Skeleton, f64),
     ) -> bool {
-        let distances = lanes.of_points(simd, load(simd, &self.blocks[block]));
+        let distances = lanes.of_points(simd, load(simd, &self.blocks[block].position));
         let near: mask32x16<S> = distances.simd_le(most);
         let near = bits(near) & self.present(block);
         if near == 0 {
@@ -171,7 +173,7 @@ impl BlockTree<'_> {
                 continue;
             }
             if above == 0 {
-                let distances = lanes.of_points(simd, load(simd, &self.blocks[id]));
+                let distances = lanes.of_points(simd, load(simd, &self.blocks[id].position));
                 let near: mask32x16<S> = distances.simd_le(most);
                 for lane in Bits(bits(near) & self.present(id)) {
                     let own = (skeleton.distance_sq(self.place(id, lane)), id * WIDTH + lane);
@@ -204,13 +206,13 @@ impl BlockTree<'_> {
 
     /// The lanes of a group that have boxes, as bits.
     #[inline(always)]
-    fn filled(&self, level: usize, group: usize) -> u64 {
+    fn filled(&self, level: usize, group: usize) -> u32 {
         (1 << (self.nodes(level) - group * WIDTH).min(WIDTH)) - 1
     }
 
     /// The lanes of a block that have points, as bits.
     #[inline(always)]
-    fn present(&self, block: usize) -> u64 {
+    fn present(&self, block: usize) -> u32 {
         (1 << self.count(block)) - 1
     }
 
@@ -242,7 +244,7 @@ mod tests {
     use nearmiss_testdata::instructions::levels;
 
     use super::*;
-    use crate::PointBlock;
+    use crate::block::PointBlock;
 
     /// The nearest point, one by one.
     fn nearest(points: &[[f32; 3]], skeleton: &Skeleton) -> (usize, f64) {

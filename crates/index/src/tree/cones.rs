@@ -3,8 +3,9 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_lanes::wide::{WIDTH, bits, load, squared};
 
-use super::{BlockTree, Bounds, MOST_LEVELS, WIDTH, bits, load, squared};
+use super::{BlockTree, Bounds, MOST_LEVELS};
 
 /// By so much rounding may make a square differ from another, relatively; what is as near as that is
 /// measured.
@@ -84,12 +85,12 @@ impl Cones<'_> {
         let mut lowest = [f32::NEG_INFINITY; WIDTH];
         let count = tree.count(block);
         lowest[..count].copy_from_slice(&heights[..count]);
-        let (about, points) = (tree.bounds(0, block), load(simd, &tree.blocks[block]));
+        let (about, points) = (tree.bounds(0, block), load(simd, &tree.blocks[block].position));
         let mut search =
             Search { about, points, lowest: f32x16::load_array(simd, lowest), limit: f32::INFINITY };
         self.offer(simd, block, &mut search);
         // Of each level a group, and its boxes still to be looked into.
-        let mut open = [(0_usize, 0_u64); MOST_LEVELS];
+        let mut open = [(0_usize, 0_u32); MOST_LEVELS];
         let top = tree.levels.len();
         let (mut level, mut id) = (top, 0);
         loop {

@@ -23,11 +23,10 @@ pub use nearest::{Nearest, Neighbour};
 pub use skeleton::Skeleton;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, mask32x16};
+use fearless_simd::{Simd, f32x16};
+use nearmiss_lanes::wide::{WIDTH, squared};
 
-use crate::PointBlock;
-
-const WIDTH: usize = PointBlock::WIDTH;
+use crate::block::PointBlock;
 
 /// 2³² points fill so many levels of groups.
 const MOST_LEVELS: usize = 8;
@@ -197,43 +196,4 @@ fn grouped(bounds: impl Iterator<Item = Bounds>) -> Vec<Boxes> {
         groups[i / WIDTH].set(i % WIDTH, &bounds);
     }
     groups
-}
-
-/// The coordinates of a block's points.
-#[inline(always)]
-fn load<S: Simd>(simd: S, block: &PointBlock) -> [f32x16<S>; 3] {
-    let [x, y, z] = &block.position;
-    [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
-}
-
-/// The squared length of each of some vectors: the sum of squares in this order.
-#[inline(always)]
-fn squared<S: Simd>([x, y, z]: [f32x16<S>; 3]) -> f32x16<S> {
-    x * x + y * y + z * z
-}
-
-/// The lanes that are set, as bits.
-#[inline(always)]
-fn bits<S: Simd>(mask: mask32x16<S>) -> u64 {
-    mask.to_bitmask()
-}
-
-/// The places of the bits that are set, ascending.
-struct Bits(u64);
-
-impl Iterator for Bits {
-    type Item = usize;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        let place = self.0.trailing_zeros() as usize;
-        self.0 &= self.0.wrapping_sub(1);
-        (place < 64).then_some(place)
-    }
-}
-
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, reason = "there are fewer points")]
-fn id32(id: usize) -> u32 {
-    id as u32
 }

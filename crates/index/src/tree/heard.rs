@@ -2,8 +2,10 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{Bits, WIDTH, bits, load};
 
-use super::{Bits, BlockTree, WIDTH, bits, id32, load};
+use super::BlockTree;
 
 /// What [`BlockTree::heard`] found. Reused.
 #[derive(Debug, Clone, Default)]
@@ -46,7 +48,7 @@ impl BlockTree<'_> {
         let Heard { lists, nodes, children } = found;
         lists.iter_mut().for_each(Vec::clear);
         let own = &self.blocks[block];
-        let points = load(simd, own);
+        let points = load(simd, &own.position);
         let horizons = f32x16::load_array_ref(simd, &own.horizon);
         let about = self.bounds(0, block);
         let present = (1 << self.count(block)) - 1;
@@ -79,7 +81,7 @@ impl BlockTree<'_> {
     /// Adds the points of block `id` that are heard at points of `block` to the lists of these; `lanes` says
     /// which to ask for.
     #[inline(always)]
-    fn listen<S: Simd>(&self, simd: S, block: usize, id: usize, lanes: u64, lists: &mut [Vec<u32>; WIDTH]) {
+    fn listen<S: Simd>(&self, simd: S, block: usize, id: usize, lanes: u32, lists: &mut [Vec<u32>; WIDTH]) {
         let own = &self.blocks[block];
         let [x, y, z] = &own.position;
         for lane in Bits(lanes) {

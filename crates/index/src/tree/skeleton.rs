@@ -3,8 +3,9 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16};
 use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_lanes::wide::squared;
 
-use super::{Boxes, squared};
+use super::Boxes;
 
 /// A shape without its thickness. A point of it, and balls about it: a sphere; of a segment: a capsule.
 #[derive(Debug, Clone, Copy, PartialEq)]

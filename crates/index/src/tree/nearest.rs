@@ -2,9 +2,11 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, u32x16};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{Bits, WIDTH, bits, load, squared};
 
-use super::{Bits, BlockTree, Bounds, WIDTH, bits, id32, load, squared};
-use crate::PointBlock;
+use super::{BlockTree, Bounds};
+use crate::block::PointBlock;
 
 /// Half a register's worth of keys each.
 const HALF: usize = WIDTH / 2;
@@ -114,7 +116,7 @@ impl BlockTree<'_> {
         let (never, any) = (f32x16::simd_from(simd, -1.0), f32x16::simd_from(simd, f32::INFINITY));
         let mut search = Search {
             about: self.bounds(0, block),
-            points: load(simd, &self.blocks[block]),
+            points: load(simd, &self.blocks[block].position),
             present,
             last: simd.select_f32x16(present, any, never),
             limit: f32::INFINITY,
@@ -139,7 +141,7 @@ impl BlockTree<'_> {
                 if level == 0 {
                     self.offer(simd, id, false, &mut search, keys);
                 } else {
-                    self.open(simd, (level - 1, id), u64::MAX, &search, open);
+                    self.open(simd, (level - 1, id), u32::MAX, &search, open);
                 }
             }
             below = group;
@@ -152,7 +154,7 @@ impl BlockTree<'_> {
         &self,
         simd: S,
         (level, group): (usize, usize),
-        lanes: u64,
+        lanes: u32,
         search: &Search<S>,
         open: &mut Vec<Open>,
     ) {

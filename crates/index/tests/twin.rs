@@ -1,7 +1,7 @@
 //! Neighbours of blocks of points against all points, in the same arithmetic.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use nearmiss_surface::{BlockTree, Heard, Nearest, PointBlock};
+use nearmiss_index::{BlockTree, Heard, Nearest, PointBlock};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 use nearmiss_testdata::instructions::levels;
 

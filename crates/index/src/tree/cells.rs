@@ -3,8 +3,10 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, mask32x16};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{Bits, bits, load, squared};
 
-use super::{Bits, BlockTree, Bounds, bits, id32, load, squared};
+use super::{BlockTree, Bounds};
 
 /// A cell takes eight bytes.
 const CELLS_A_POINT: f64 = 1.0;
@@ -90,8 +92,8 @@ impl BlockTree<'_> {
     /// Adds the cells that a block is named by.
     #[inline(always)]
     fn name<S: Simd>(&self, simd: S, block: usize, cells: &Cells, all: &mut Vec<Named>) {
-        let points = load(simd, &self.blocks[block]);
-        let present = (1_u64 << self.count(block)) - 1;
+        let points = load(simd, &self.blocks[block].position);
+        let present = (1_u32 << self.count(block)) - 1;
         let [xs, ys, zs] = cells.reached(&self.bounds(0, block));
         for x in xs {
             for y in ys.clone() {

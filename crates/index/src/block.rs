@@ -1,0 +1,99 @@
+//! Points side by side.
+
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, f32x16, mask32x16, u32x16};
+use nearmiss_lanes::wide::WIDTH;
+
+/// Points side by side: those of a scan whose index divided by [`Self::WIDTH`] is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct PointBlock {
+    /// Coordinates; 1e30 where there is no point, which is nobody's neighbour.
+    pub position: [[f32; WIDTH]; 3],
+    /// How far a point is heard; zero where there is none.
+    pub horizon: [f32; WIDTH],
+    /// 1/h² of a point, by which its weight falls off; one where there is none.
+    pub decay: [f32; WIDTH],
+}
+
+impl PointBlock {
+    /// How many points fit.
+    pub const WIDTH: usize = WIDTH;
+
+    /// No points.
+    pub const EMPTY: Self =
+        Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH], decay: [1.0; Self::WIDTH] };
+
+    /// All points of a scan as long as none is heard.
+    #[must_use]
+    pub fn silent(positions: &[[f32; 3]]) -> impl ExactSizeIterator<Item = Self> {
+        positions.chunks(Self::WIDTH).map(|positions| {
+            let mut block = Self::EMPTY;
+            for (lane, p) in positions.iter().enumerate() {
+                for k in 0..3 {
+                    block.position[k][lane] = p[k];
+                }
+            }
+            block
+        })
+    }
+}
+
+impl PointBlock {
+    /// Writes the lanes of the points that are heard within `distance` of `x`, ascending and each added to
+    /// `first`, to the front of `lanes`; what follows them there means nothing. Returns how many they are. No
+    /// branch depends on the outcome, which no processor could predict.
+    #[inline(always)]
+    pub fn heard<S: Simd>(
+        &self,
+        simd: S,
+        x: [f32; 3],
+        distance: f32,
+        first: u32,
+        lanes: &mut [u32; WIDTH],
+    ) -> usize {
+        let [px, py, pz] = &self.position;
+        let (dx, dy, dz) = (
+            f32x16::load_array_ref(simd, px) - x[0],
+            f32x16::load_array_ref(simd, py) - x[1],
+            f32x16::load_array_ref(simd, pz) - x[2],
+        );
+        let far = f32x16::load_array_ref(simd, &self.horizon) + distance;
+        let heard: mask32x16<S> = (dx * dx + dy * dy + dz * dz).simd_lt(far * far);
+        if let Level::Avx512(_) = simd.level() {
+            let ids = u32x16::load_array_ref(simd, &LANES) + first;
+            simd.compress_u32x16(ids, heard).store_slice(&mut lanes[..]);
+            return heard.to_bitmask().count_ones() as usize;
+        }
+        let [low, high, ..] = heard.to_bitmask().to_le_bytes();
+        let count = low.count_ones() as usize;
+        for i in 0..8 {
+            lanes[i] = first + u32::from(BITS[usize::from(low)][i]);
+        }
+        for i in 0..8 {
+            lanes[count + i] = first + 8 + u32::from(BITS[usize::from(high)][i]);
+        }
+        count + high.count_ones() as usize
+    }
+}
+
+const LANES: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+/// The places of the bits of each byte, ascending; zeros follow.
+const BITS: [[u8; 8]; 256] = {
+    let mut places = [[0; 8]; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut bit, mut count) = (0_u8, 0);
+        while bit < 8 {
+            if byte >> bit & 1 != 0 {
+                places[byte][count] = bit;
+                count += 1;
+            }
+            bit += 1;
+        }
+        byte += 1;
+    }
+    places
+};

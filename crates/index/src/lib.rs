@@ -1,0 +1,9 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod block;
+mod tree;
+
+pub use block::PointBlock;
+pub use fearless_simd::Level;
+pub use tree::{BlockTree, Cells, Cones, Heard, Nearest, Neighbour, Skeleton};

@@ -1,0 +1,15 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+pub mod order;
+pub mod parallel;
+pub mod vector;
+pub mod wide;
+
+/// An index as it is stored. There are fewer than 2³² of anything that is numbered.
+#[inline(always)]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32")]
+pub const fn id32(i: usize) -> u32 {
+    i as u32
+}

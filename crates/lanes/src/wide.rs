@@ -1,0 +1,159 @@
+//! Sixteen vectors side by side.
+//!
+//! Sums of products have the order of [`vector::dot`](crate::vector::dot), so each lane has the bits that it
+//! would have alone, by any instructions.
+
+use std::ops::Range;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
+
+/// How many lanes there are: a register of AVX-512, two of AVX2, four of SSE2 or NEON.
+pub const WIDTH: usize = 16;
+
+/// Sixteen vectors, by their coordinates.
+pub type Vectors<S> = [f32x16<S>; 3];
+
+/// The vectors with these coordinates.
+#[inline(always)]
+#[must_use]
+pub fn load<S: Simd>(simd: S, [x, y, z]: &[[f32; WIDTH]; 3]) -> Vectors<S> {
+    [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
+}
+
+/// The points with these coordinates as seen from `p`.
+#[inline(always)]
+#[must_use]
+pub fn seen_from<S: Simd>(simd: S, points: &[[f32; WIDTH]; 3], p: [f32; 3]) -> Vectors<S> {
+    let [x, y, z] = load(simd, points);
+    [x - p[0], y - p[1], z - p[2]]
+}
+
+/// How far each vector goes along `axis`.
+#[inline(always)]
+#[must_use]
+pub fn along<S: Simd>([x, y, z]: Vectors<S>, axis: [f32; 3]) -> f32x16<S> {
+    x * axis[0] + y * axis[1] + z * axis[2]
+}
+
+/// The scalar product of each vector in `a` with that in the same lane of `b`, for any number of lanes.
+#[inline(always)]
+#[must_use]
+pub fn product<S: Simd, V: SimdBase<S>>(a: [V; 3], b: [V; 3]) -> V {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The square of the length of each vector.
+#[inline(always)]
+#[must_use]
+pub fn squared<S: Simd, V: SimdBase<S>>(vectors: [V; 3]) -> V {
+    product(vectors, vectors)
+}
+
+/// Four numbers four times, one after the other: number i in lanes i, 4 + i, 8 + i and 12 + i.
+#[inline(always)]
+#[must_use]
+pub fn repeated<S: Simd>(four: f32x4<S>) -> f32x16<S> {
+    f32x16::block_splat(four)
+}
+
+/// Each of four numbers in four lanes: number i in lanes 4i to 4i + 3.
+#[inline(always)]
+#[must_use]
+pub fn spread<S: Simd>(four: f32x4<S>) -> f32x16<S> {
+    let row = repeated(four);
+    let row = row.zip_low(row);
+    row.zip_low(row)
+}
+
+/// The lanes that are set, as bits.
+#[inline(always)]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+pub fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
+    mask.to_bitmask() as u32
+}
+
+/// The lanes of a block that hold any of `points`, as bits: point i stands in lane i % 16 of block i / 16.
+#[inline(always)]
+#[must_use]
+pub fn lanes_of(block: usize, points: &Range<usize>) -> u32 {
+    let first = block * WIDTH;
+    let below = |i: usize| (1_u32 << i.saturating_sub(first).min(WIDTH)) - 1;
+    below(points.end) & !below(points.start)
+}
+
+/// The blocks that hold any of `points`, which are not none.
+#[inline(always)]
+#[must_use]
+pub fn blocks_of(points: &Range<usize>) -> Range<usize> {
+    points.start / WIDTH..points.end.div_ceil(WIDTH)
+}
+
+/// The places of the bits that are set, ascending.
+#[derive(Debug, Clone, Copy)]
+pub struct Bits(pub u32);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let place = self.0.trailing_zeros() as usize;
+        self.0 &= self.0.wrapping_sub(1);
+        (place < 32).then_some(place)
+    }
+}
+
+/// The least of all lanes and `least`, none of which is NaN.
+#[inline(always)]
+#[must_use]
+pub fn least<S: Simd>(lanes: f32x16<S>, least: f32) -> f32 {
+    fold(lanes, least, |a, b| if a < b { a } else { b })
+}
+
+/// The greatest of all lanes and `greatest`, none of which is NaN.
+#[inline(always)]
+#[must_use]
+pub fn greatest<S: Simd>(lanes: f32x16<S>, greatest: f32) -> f32 {
+    fold(lanes, greatest, |a, b| if a > b { a } else { b })
+}
+
+/// Halves onto each other, for all orders give the same.
+#[inline(always)]
+fn fold<S: Simd>(lanes: f32x16<S>, with: f32, f: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut lanes = lanes.to_array();
+    let mut width = WIDTH / 2;
+    while width > 0 {
+        for i in 0..width {
+            lanes[i] = f(lanes[i], lanes[i + width]);
+        }
+        width /= 2;
+    }
+    f(lanes[0], with)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_and_blocks_are_those_of_the_points() {
+        for start in 0..70 {
+            for end in start + 1..100 {
+                let points = start..end;
+                let blocks: Vec<usize> = points.clone().map(|i| i / WIDTH).collect();
+                assert_eq!(blocks_of(&points), blocks[0]..blocks[blocks.len() - 1] + 1, "{points:?}");
+                for block in 0..8 {
+                    let there: Vec<usize> =
+                        points.clone().filter(|i| i / WIDTH == block).map(|i| i % WIDTH).collect();
+                    assert_eq!(
+                        Bits(lanes_of(block, &points)).collect::<Vec<_>>(),
+                        there,
+                        "{points:?}, {block}"
+                    );
+                }
+            }
+        }
+    }
+}
