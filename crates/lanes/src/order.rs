@@ -24,8 +24,8 @@ pub const fn from_ascending(bits: u32) -> f32 {
     f32::from_bits(if bits >> 31 == 0 { !bits } else { bits & !(1 << 31) })
 }
 
-/// An item and how near it is. The nearest is the greatest, so that a heap gives it first; of those equally near,
-/// the least item.
+/// An item and how near it is. The nearest is the greatest, so that a heap gives it first; of those equally
+/// near, the least item.
 #[derive(Debug, Clone, Copy)]
 pub struct Near<T> {
     /// How near, less is nearer.

@@ -56,8 +56,8 @@ pub fn ranges<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Send
     ranges_with(count, AT_ONCE, || (), |(), range| f(range))
 }
 
-/// As [`ranges`], each `length` long but the last, with scratch that is made now and then and must not change a
-/// result.
+/// As [`ranges`], each `length` long but the last, with scratch that is made now and then and must not change
+/// a result.
 pub fn ranges_with<S, R: Send>(
     count: usize,
     length: usize,
@@ -132,8 +132,8 @@ pub fn sort<T: Ord + Send>(values: &mut [T]) {
     values.sort_unstable();
 }
 
-/// `work` on so many threads, or on those of the current pool if that is 0. Without the feature `rayon` there is
-/// one.
+/// `work` on so many threads, or on those of the current pool if that is 0. Without the feature `rayon` there
+/// is one.
 ///
 /// # Errors
 /// When so many threads cannot be started.
