@@ -3,7 +3,7 @@
 use nearmiss::geometry::nalgebra::Vector3;
 
 use crate::font;
-use crate::picture::Picture;
+use crate::image::Picture;
 
 /// Red, green, blue.
 pub type Colour = [u8; 3];

@@ -18,6 +18,7 @@ use crate::distance::beside;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
+use crate::parse::{parse_duration, parse_radius};
 use crate::posing::{self, PairArgs, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
@@ -109,26 +110,6 @@ pub enum EvidenceName {
     Certified,
     /// By an exhaustive search, with nothing proven: faster
     Estimated,
-}
-
-pub(crate) fn parse_radius(text: &str) -> Result<f64, String> {
-    let radius = text.parse().ok().filter(|r: &f64| *r >= 0.0 && r.is_finite());
-    radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
-}
-
-pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
-    let unit =
-        text.trim_start_matches(|c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | 'e' | 'E' | '-'));
-    let number = text.strip_suffix(unit).unwrap_or_default();
-    let seconds = match unit {
-        "ns" => 1e-9,
-        "us" | "µs" | "μs" => 1e-6,
-        "ms" => 1e-3,
-        "s" => 1.0,
-        _ => return Err("expected a number with one of the units ns, us, ms, s, as in 200us".into()),
-    };
-    let time = number.parse::<f64>().ok().and_then(|n| Duration::try_from_secs_f64(n * seconds).ok());
-    time.ok_or_else(|| "expected a time from zero on, as in 200us".into())
 }
 
 /// Everything that is the same for all queries.
@@ -334,21 +315,14 @@ fn answer_one(
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let [a, b] = question.views(&asked.poses);
-        let style =
-            picture::Style { names: names(args.pair.inputs()), points: args.meaning.thickened.is_some() };
+        let style = picture::Style {
+            names: picture::names(args.pair.inputs()),
+            points: args.meaning.thickened.is_some(),
+        };
         picture::paint([&a, &b], &asked.answer, &style).save(path)?;
         drop(bar);
     }
     question.tell(out, &asked, args)
-}
-
-/// What a legend calls the scans.
-pub(crate) fn names(paths: [&Path; 2]) -> [String; 2] {
-    let mut letters = ["A", "B"].into_iter();
-    paths.map(|path| {
-        let letter = letters.next().unwrap_or_default();
-        path.file_name().map_or(letter.into(), |name| format!("{letter}: {}", name.to_string_lossy()))
-    })
 }
 
 /// Lines held at a time when several threads answer.
@@ -411,21 +385,4 @@ fn read_lines(poses: &mut PoseFile, most: usize, lines: &mut Vec<(u64, String)>)
         lines.push(line);
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_need_a_unit() {
-        for (text, nanos) in
-            [("200us", 200_000), ("1.5ms", 1_500_000), ("20ns", 20), ("0s", 0), ("3µs", 3000)]
-        {
-            assert_eq!(parse_duration(text).map(|d| d.as_nanos()), Ok(nanos), "{text}");
-        }
-        for text in ["", "200", "us", "-1us", "1 us", "1min", "nans", "1e400s"] {
-            assert!(parse_duration(text).is_err(), "{text}");
-        }
-    }
 }

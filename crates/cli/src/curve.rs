@@ -10,7 +10,6 @@ use nearmiss::{
 };
 use serde::Serialize;
 
-use crate::collide::{names, parse_duration};
 use crate::console::{Console, Results, now};
 use crate::curve_picture;
 use crate::digits::{count, rough, short};
@@ -18,6 +17,8 @@ use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::export::refused;
 use crate::no_curve::NoCurve;
+use crate::parse::parse_duration;
+use crate::picture::names;
 use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;

@@ -6,7 +6,8 @@ use nearmiss::{Curve, Curves, ScanView};
 use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat};
 use crate::digits::{count, short};
 use crate::font;
-use crate::picture::{self, Picture, scale_bar, splat, whole_camera};
+use crate::image::Picture;
+use crate::picture::{self, scale_bar, splat, whole_camera};
 
 /// In fine pixels.
 const WIDTH: usize = 1400 * FINE;

@@ -10,13 +10,14 @@ use nearmiss::{
 };
 use serde::Serialize;
 
-use crate::collide::{names, parse_duration};
 use crate::console::{Console, Results, now};
 use crate::digits::{count, rough};
 use crate::distance_picture::paint_distance;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
+use crate::parse::parse_duration;
+use crate::picture::names;
 use crate::posing::{self, PairArgs};
 use crate::preprocess::parse_threads;
 use crate::report::word;

@@ -5,9 +5,10 @@ use nearmiss::{Distance, ScanView};
 
 use crate::canvas::{Area, Camera, Canvas, FINE};
 use crate::digits::{rough, short};
+use crate::image::Picture;
 use crate::picture::{
-    GAP, GROUND, HALO, INK, LARGEST, LEGEND, OF_A, OF_B, PANEL, PANEL_GROUND, Picture, Style, across,
-    directions, dot, legend, obstacle, sample, scale_bar, splat, whole_camera,
+    GAP, GROUND, HALO, INK, LARGEST, LEGEND, OF_A, OF_B, PANEL, PANEL_GROUND, Style, across, directions, dot,
+    legend, obstacle, sample, scale_bar, splat, whole_camera,
 };
 use crate::sentence::{bracket, unit};
 

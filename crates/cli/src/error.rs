@@ -9,7 +9,7 @@ use nearmiss::slices::{SliceError, StoreError};
 use nearmiss::{BuildError, GraphError, LoadError, PlanError, SaveError};
 use thiserror::Error;
 
-use crate::posing::PoseRefused;
+use crate::matrix::PoseRefused;
 
 /// Why a command failed.
 #[derive(Debug, Error)]

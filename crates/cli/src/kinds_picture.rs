@@ -6,7 +6,8 @@ use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::digits::short;
 use crate::font;
 use crate::health::kind_name;
-use crate::picture::{self, Picture};
+use crate::image::Picture;
+use crate::picture;
 
 /// In fine pixels.
 const WIDTH: usize = 1572 * FINE;

@@ -6,7 +6,8 @@ use nearmiss::{Pose, Scan};
 use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::digits::short;
 use crate::export::at_depth;
-use crate::picture::{Picture, scale_bar, scan_camera, splat};
+use crate::image::Picture;
+use crate::picture::{scale_bar, scan_camera, splat};
 use crate::report;
 
 /// In fine pixels.

@@ -3,7 +3,7 @@
 use clap::Args;
 use nearmiss::{Metric, Scan, Semantics};
 
-use crate::collide::parse_radius;
+use crate::parse::parse_radius;
 
 /// Options that say what of two scans is compared. By default their obstacles: surfaces where
 /// points sample a sheet, balls of half the local spacing about all other points, and every

@@ -1,6 +1,5 @@
 //! Pictures of two scans and of the place where they meet.
 
-use std::io::Write;
 use std::path::Path;
 
 use nearmiss::geometry::nalgebra::Vector3;
@@ -11,7 +10,7 @@ use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, shade};
 use crate::digits::short;
 use crate::error::CliError;
 use crate::font;
-use crate::output;
+use crate::image::Picture;
 
 /// In fine pixels.
 pub(crate) const PANEL: usize = 780 * FINE;
@@ -47,44 +46,13 @@ pub(crate) fn check_name(path: &Path) -> Result<(), CliError> {
     }
 }
 
-/// A picture, ready to be saved.
-#[derive(Debug, Clone)]
-pub struct Picture {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    /// Red, green, blue, row by row.
-    pub(crate) pixels: Vec<u8>,
-}
-
-impl Picture {
-    #[cfg(test)]
-    pub(crate) fn pixels(&self) -> &[u8] {
-        &self.pixels
-    }
-
-    /// Width and height in pixels.
-    #[must_use]
-    pub fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
-    }
-
-    /// Writes the picture as PNG, whole or not at all.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), CliError> {
-        output::replace_plain(path, |out| self.encode(out))
-    }
-
-    fn encode(&self, out: impl Write) -> std::io::Result<()> {
-        let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
-        let mut encoder = png::Encoder::new(out, side(self.width), side(self.height));
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.pixels)?;
-        Ok(writer.finish()?)
-    }
+/// What a legend calls the scans.
+pub(crate) fn names(paths: [&Path; 2]) -> [String; 2] {
+    let mut letters = ["A", "B"].into_iter();
+    paths.map(|path| {
+        let letter = letters.next().unwrap_or_default();
+        path.file_name().map_or(letter.into(), |name| format!("{letter}: {}", name.to_string_lossy()))
+    })
 }
 
 /// Both scans as they lie in the world; where they meet, beside that, a close view along the line in which

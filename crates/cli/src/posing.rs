@@ -1,6 +1,5 @@
 //! Poses from the command line and from files.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -8,9 +7,9 @@ use nearmiss::{Pose, PoseError, Scan};
 use serde::Deserialize;
 
 use crate::console::Console;
-use crate::digits::short;
 use crate::error::CliError;
 use crate::input::{TextLines, pieces};
+use crate::matrix::{Matrix, PoseRefused};
 use crate::units::{SizeCheck, UnitName, scaled};
 
 /// Two scans, and where they are.
@@ -76,9 +75,6 @@ pub(crate) fn of_options(matrices: &[Matrix; 2], scans: [&Scan; 2]) -> Result<[P
     Ok([placed("--pose-a", 0)?, placed("--pose-b", 1)?])
 }
 
-/// A matrix as given, row-major.
-pub(crate) type Matrix = [f64; 16];
-
 /// The matrix of an option: sixteen numbers, or a file that holds them; the identity if not given.
 pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, CliError> {
     let Some(given) = given else { return Ok(Pose::IDENTITY.to_row_major()) };
@@ -131,38 +127,6 @@ pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseRefused>
         let is_transposed = cause == PoseError::NotAffine && last_column == [0.0, 0.0, 0.0, 1.0];
         PoseRefused { cause, is_transposed }
     })
-}
-
-/// Why a matrix is no pose; displayed with few digits.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PoseRefused {
-    /// Why not.
-    pub cause: PoseError,
-    /// Whether its transpose has the form of a pose.
-    pub is_transposed: bool,
-}
-
-impl fmt::Display for PoseRefused {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.cause {
-            PoseError::NotAffine if self.is_transposed => {
-                f.write_str("the last row of the pose is not 0 0 0 1; it looks column-major; transpose it")
-            }
-            PoseError::NotProper { determinant } => write!(
-                f,
-                "the pose has determinant {}; a rotation with uniform scale has a positive one",
-                short(*determinant)
-            ),
-            PoseError::NotRigid { moved, tolerance } => write!(
-                f,
-                "the pose is not a rotation with uniform scale: the nearest one moves the object's bounds by {}, \
-                 more than {} (a tenth of the sampling radius)",
-                short(*moved),
-                short(*tolerance)
-            ),
-            cause => write!(f, "{cause}"),
-        }
-    }
 }
 
 /// What the messages show.

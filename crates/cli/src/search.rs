@@ -3,8 +3,8 @@
 use clap::{Args, ValueEnum};
 use nearmiss::{Brackets, CollideOptions, Interpolation, Method, Order, Refinement, Sampling, Scan, Surfels};
 
-use crate::collide::parse_radius;
 use crate::error::CliError;
+use crate::parse::parse_radius;
 
 /// Options of `collide` that say how to search.
 #[derive(Debug, Clone, Copy, Args)]

@@ -10,6 +10,7 @@ use crate::console::{Console, Results, now};
 use crate::digits::{place, short};
 use crate::error::CliError;
 use crate::input::{self, TextLines};
+use crate::matrix::PoseRefused;
 use crate::posing;
 use crate::preprocess::parse_threads;
 
@@ -176,8 +177,7 @@ fn solid(pose: &[f64; 16], half: [f64; 3], r: f64) -> Result<Shape, String> {
     let half = [positive("half", half[0])?, positive("half", half[1])?, positive("half", half[2])?];
     let bounds = Aabb { min: half.map(|h| -h), max: half };
     let pose = Pose::from_row_major(pose, &bounds, 0.1 * r);
-    let pose =
-        pose.map_err(|cause| format!("`pose`: {}", posing::PoseRefused { cause, is_transposed: false }))?;
+    let pose = pose.map_err(|cause| format!("`pose`: {}", PoseRefused { cause, is_transposed: false }))?;
     Ok(Shape::Box { pose, half })
 }
 

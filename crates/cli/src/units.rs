@@ -7,7 +7,7 @@ use nearmiss::{Aabb, ScanView};
 
 use crate::console::Console;
 use crate::digits::rough;
-use crate::posing::Matrix;
+use crate::matrix::Matrix;
 
 /// Scans whose bounds differ more than this in their diagonals may be in different units. An object in a room
 /// is commonly 1 to 30 times smaller than the room; the factors from inches, centimetres and millimetres to

@@ -14,11 +14,11 @@
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{for_each, ranges, ranges_with};
 use nearmiss_store::Array;
-use serde::{Deserialize, Serialize};
 
 use crate::close_list::{BESIDE, Beside, Close, CloseList, Lists, floor, kept, pack};
 use crate::geodesic::{GeodesicScratch, Reached};
 use crate::length::{Network, step};
+use crate::options::Paths;
 
 /// No more stretches than this are searched from: memory is made for each.
 const STRETCHES: usize = 64;
@@ -42,16 +42,6 @@ const SURE: f32 = 1e-4 - ROUNDING;
 /// And a shortest one seems no longer by more, from any of its points: once for the whole, once for what is
 /// left, once for sums.
 const DOUBT: f32 = 3.0 * ROUNDING;
-
-/// What is kept of paths.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Paths {
-    /// Nothing: each step is looked for among the neighbours.
-    #[default]
-    Rebuilt,
-    /// A byte a pair: the rank among the neighbours of where the path goes on.
-    Stored,
-}
 
 /// For every point the points that are heard there, nearest first.
 #[derive(Debug, Clone, PartialEq)]

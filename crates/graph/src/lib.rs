@@ -24,7 +24,7 @@ mod surface_graph;
 
 pub use adjacency::Adjacency;
 pub use close_list::{Close, CloseList};
-pub use close_pairs::{ClosePairs, Paths};
+pub use close_pairs::ClosePairs;
 pub use dynamic::{DynamicGraph, Touched};
 pub use geodesic::{GeodesicScratch, Reached};
 pub use graph::{GraphCounts, PointGraph};
@@ -32,7 +32,7 @@ pub use kernel::{Foot, GeodesicKernel, KernelScratch};
 pub use lazy_path::{LazyPath, PathPoint};
 pub use length::{Network, edge_lengths};
 pub use levels::{Cells, LevelScratch, Levels};
-pub use options::{GraphError, GraphOptions, Prune};
+pub use options::{GraphError, GraphOptions, Paths, Prune};
 pub use orient::{Decision, Orientation, OrientedPart, Sides, orient};
 pub use sanity::Flaw;
 pub use sections::{GraphMeta, LoadError};

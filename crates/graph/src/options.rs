@@ -3,7 +3,15 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::Paths;
+/// What is kept of paths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Paths {
+    /// Nothing: each step is looked for among the neighbours.
+    #[default]
+    Rebuilt,
+    /// A byte a pair: the rank among the neighbours of where the path goes on.
+    Stored,
+}
 
 /// r of the r-SIG: more would join what lies beside each other on no surface.
 const NEIGHBOURS: std::ops::RangeInclusive<u32> = 1..=32;

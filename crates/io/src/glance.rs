@@ -8,8 +8,8 @@ use nearmiss_geometry::Aabb;
 
 use crate::columns::Row;
 use crate::format::{Format, recognise};
-use crate::pieces::{Encoding, Layout};
 use crate::read::{BYTE_ORDER_MARK, check_file};
+use crate::rows::{Encoding, Layout};
 use crate::text::Lines;
 use crate::{obj, pcd, ply, xyz};
 

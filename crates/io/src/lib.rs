@@ -3,6 +3,7 @@
 
 mod glance;
 mod read;
+mod rows;
 
 mod error;
 mod format;

@@ -8,7 +8,7 @@ mod lzf;
 
 use crate::columns::Row;
 use crate::error::{Broken, Fault};
-use crate::pieces::{self, Layout, Rows};
+use crate::rows::{self, Layout, Rows};
 use crate::scalar::{Order, Scalar};
 use crate::sink::Sink;
 use crate::text::{Line, Lines, number, shown, whole};
@@ -39,8 +39,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
 pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     let (header, lines) = header::parse(head).ok()?;
     let encoding = match header.encoding {
-        Encoding::Ascii => pieces::Encoding::of_text(&lines),
-        Encoding::Binary => pieces::Encoding::Binary { stride: header.stride },
+        Encoding::Ascii => rows::Encoding::of_text(&lines),
+        Encoding::Binary => rows::Encoding::Binary { stride: header.stride },
         Encoding::Compressed => return None,
     };
     let promised = Some((header.points, header.line));

@@ -5,16 +5,15 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use nearmiss_geometry::TriangleMesh;
 
-use crate::columns::Row;
-use crate::error::{Broken, Fault, ReadError};
+use crate::error::ReadError;
 use crate::format::{Format, recognise};
 use crate::read::{BYTE_ORDER_MARK, check_file, parse_as};
-use crate::text::{Line, Lines};
+use crate::rows::{Blocks, Encoding, Layout};
 use crate::{pcd, ply, xyz};
 
 /// Bytes at the start in which the header must end; where it does not, the file is read whole.
@@ -43,44 +42,6 @@ enum Source {
         layout: Layout,
         block: usize,
     },
-}
-
-/// Rows of a file, from its header.
-pub(crate) struct Layout {
-    /// Where the first row starts, in bytes from the start of the file or what follows its byte order mark.
-    pub(crate) start: usize,
-    pub(crate) encoding: Encoding,
-    /// What a row is called.
-    pub(crate) element: Box<str>,
-    /// How many there are, and the line that says so.
-    pub(crate) promised: Option<(u64, u64)>,
-    pub(crate) rows: Box<dyn Rows + Send + Sync>,
-}
-
-/// What divides rows.
-#[derive(Clone, Copy)]
-pub(crate) enum Encoding {
-    /// So many bytes each.
-    Binary { stride: usize },
-    /// A line each. The number of the line before the first row, and the byte that ends lines.
-    Text { number: u64, end: u8 },
-}
-
-/// How a row is read, in either encoding; what it does not hold stays as it was.
-pub(crate) trait Rows {
-    /// Whether a line holds a row, or is there for people.
-    fn is_row(&self, line: &Line<'_>) -> bool;
-    /// Reads a line.
-    fn line(&self, line: Line<'_>, row: &mut Row) -> Result<(), Fault>;
-    /// Reads a record; of the right length none is broken.
-    fn record(&self, bytes: &[u8], row: &mut Row);
-}
-
-impl Encoding {
-    /// For the rest of these lines.
-    pub(crate) fn of_text(lines: &Lines<'_>) -> Self {
-        Self::Text { number: lines.number(), end: lines.end() }
-    }
 }
 
 /// Opens a file for going over its points, of which some `block` bytes are read at a time; meshes are read
@@ -145,7 +106,7 @@ impl PointPieces {
         match &self.source {
             Source::Whole(points) => take(points),
             Source::Rows { file, layout, block } => {
-                let mut blocks = Blocks { path: &self.path, file, bytes: Vec::new(), block: *block };
+                let mut blocks = Blocks::new(&self.path, file, *block);
                 blocks.seek(layout.start)?;
                 match layout.encoding {
                     Encoding::Binary { stride } => layout.records(&mut blocks, stride, take)?,
@@ -160,121 +121,5 @@ impl PointPieces {
 impl fmt::Debug for PointPieces {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("PointPieces").field("path", &self.path).finish_non_exhaustive()
-    }
-}
-
-impl Layout {
-    /// Checks that records are as many as promised.
-    fn check_length(&self, length: u64) -> Result<(), Broken> {
-        let Encoding::Binary { stride } = self.encoding else { return Ok(()) };
-        let present = length.saturating_sub(self.start as u64) / stride as u64;
-        self.check_count(present)
-    }
-
-    fn check_count(&self, present: u64) -> Result<(), Broken> {
-        match self.promised {
-            Some((promised, line)) if present < promised => {
-                let fault = Fault::Promised { element: self.element.clone(), promised, present };
-                Err(fault.on_line(line))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn records(
-        &self,
-        blocks: &mut Blocks<'_>,
-        stride: usize,
-        mut take: impl FnMut(&[[f64; 3]]),
-    ) -> Result<(), ReadError> {
-        let mut left = self.promised.map_or(0, |(promised, _)| promised);
-        let together = (blocks.block / stride).max(1);
-        let (mut points, mut row) = (Vec::new(), Row::default());
-        while left > 0 {
-            let many = usize::try_from(left).unwrap_or(usize::MAX).min(together);
-            blocks.fill(many * stride)?;
-            points.clear();
-            for record in blocks.bytes.chunks_exact(stride) {
-                self.rows.record(record, &mut row);
-                points.push([row[0], row[1], row[2]]);
-            }
-            take(&points);
-            left -= many as u64;
-        }
-        Ok(())
-    }
-
-    fn lines(
-        &self,
-        blocks: &mut Blocks<'_>,
-        mut number: u64,
-        end: u8,
-        mut take: impl FnMut(&[[f64; 3]]),
-    ) -> Result<(), ReadError> {
-        let (mut points, mut row, mut index) = (Vec::new(), Row::default(), 0);
-        let mut is_last = false;
-        while !is_last {
-            // What was left over has no end of a line, so that a long one is looked through once.
-            let left_over = blocks.bytes.len();
-            is_last = blocks.fill_more()?;
-            let last = blocks.bytes[left_over..].iter().rposition(|byte| *byte == end);
-            let whole =
-                if is_last { blocks.bytes.len() } else { last.map_or(0, |last| left_over + last + 1) };
-            points.clear();
-            let mut lines = Lines::going_on(&blocks.bytes[..whole], number, end);
-            for line in lines.by_ref().filter(|line| self.rows.is_row(line)) {
-                if self.promised.is_some_and(|(promised, _)| index >= promised) {
-                    return Err(Fault::Surplus.on_line(line.number).of(blocks.path));
-                }
-                let broken = |fault: Fault| fault.on_line(line.number).within(&self.element, index);
-                self.rows.line(line, &mut row).map_err(|fault| broken(fault).of(blocks.path))?;
-                points.push([row[0], row[1], row[2]]);
-                index += 1;
-            }
-            number = lines.number();
-            take(&points);
-            blocks.bytes.drain(..whole);
-        }
-        self.check_count(index).map_err(|broken| broken.of(blocks.path))
-    }
-}
-
-/// A file, a block at a time.
-struct Blocks<'a> {
-    path: &'a Path,
-    file: &'a File,
-    bytes: Vec<u8>,
-    block: usize,
-}
-
-impl Blocks<'_> {
-    fn failed(&self, cause: io::Error) -> ReadError {
-        ReadError::Io { path: self.path.into(), cause }
-    }
-
-    fn seek(&mut self, start: usize) -> Result<(), ReadError> {
-        self.file.seek(SeekFrom::Start(start as u64)).map_err(|cause| self.failed(cause))?;
-        Ok(())
-    }
-
-    /// The next so many bytes, instead of those before.
-    fn fill(&mut self, length: usize) -> Result<(), ReadError> {
-        self.bytes.clear();
-        self.append(length)?;
-        // It was long enough when it was opened.
-        if self.bytes.len() == length { Ok(()) } else { Err(self.failed(ErrorKind::UnexpectedEof.into())) }
-    }
-
-    /// Another block after what is left of those before. Tells whether it is the last.
-    fn fill_more(&mut self) -> Result<bool, ReadError> {
-        let before = self.bytes.len();
-        self.append(self.block)?;
-        Ok(self.bytes.len() - before < self.block)
-    }
-
-    fn append(&mut self, length: usize) -> Result<(), ReadError> {
-        let read = self.file.take(length as u64).read_to_end(&mut self.bytes);
-        read.map_err(|cause| self.failed(cause))?;
-        Ok(())
     }
 }

@@ -11,7 +11,7 @@ mod source;
 
 use crate::columns::{Holds, Row};
 use crate::error::{Broken, Fault};
-use crate::pieces::{self, Layout, Rows};
+use crate::rows::{self, Layout, Rows};
 use crate::scalar::Order;
 use crate::sink::{Sink, corner};
 use crate::text::Line;
@@ -43,13 +43,13 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
         return None;
     }
     let (encoding, order) = match header.encoding {
-        Encoding::Ascii => (pieces::Encoding::of_text(&lines), Order::Little),
+        Encoding::Ascii => (rows::Encoding::of_text(&lines), Order::Little),
         Encoding::Binary(_) if vertex.properties.iter().any(|property| property.list.is_some()) => {
             return None;
         }
         Encoding::Binary(order) => {
             let stride = Binary::new(&[], 0, order).least_size(&vertex);
-            (pieces::Encoding::Binary { stride }, order)
+            (rows::Encoding::Binary { stride }, order)
         }
     };
     let (element, promised) = (vertex.name.clone(), Some((vertex.count, vertex.line)));

@@ -6,7 +6,7 @@
 
 use crate::columns::{Holds, Row, slot};
 use crate::error::{Broken, Fault};
-use crate::pieces::{Encoding, Layout, Rows};
+use crate::rows::{Encoding, Layout, Rows};
 use crate::sink::Sink;
 use crate::text::{Line, Lines, number, shown, whole};
 

@@ -6,7 +6,6 @@
 //! themselves approach each other.
 
 mod approach;
-mod nearest_points;
 mod search;
 
 use std::ops::ControlFlow;
@@ -20,12 +19,12 @@ use nearmiss_surface::Metric;
 use crate::bounds::Motion;
 use crate::budget::{Budget, Meter};
 use crate::collide::{CollideScratch, collide_with};
+use crate::nearest_points::{PointPair, nearest};
 use crate::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
 use crate::posed::{Posed, relative};
 use crate::verdict::{Evidence, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
 use approach::{Approach, Feet};
-pub(crate) use nearest_points::{PointPair, nearest};
 use search::{Frontier, Search};
 
 /// What is asked. Plain values; [`DistancePlan::new`] validates them.

@@ -18,6 +18,7 @@ mod leaf_pair;
 mod likelihood;
 mod manifold;
 mod margin;
+mod nearest_points;
 mod options;
 mod pacer;
 mod point_gap;

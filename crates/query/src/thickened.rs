@@ -6,8 +6,8 @@ use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{LeafVisitor, NodePair};
 
-use crate::distance::{PointPair, nearest};
 use crate::leaf_pair::Instructions;
+use crate::nearest_points::{PointPair, nearest};
 use crate::posed::Posed;
 use crate::verdict::Contact;
 

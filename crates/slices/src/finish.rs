@@ -12,8 +12,8 @@
 use nearmiss_lanes::parallel::map_each;
 
 use crate::Grid;
-use crate::build::Layer;
 use crate::grid::LEVELS;
+use crate::layer::Layer;
 use crate::slice::{Canvas, Content, Slice};
 
 /// Of the spans of level voxels this share is no greater than the noise: enough that few floors become

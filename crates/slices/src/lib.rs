@@ -11,6 +11,7 @@ mod slice;
 mod build;
 mod error;
 mod finish;
+mod layer;
 mod map;
 mod options;
 

@@ -3,8 +3,8 @@
 use nearmiss_geometry::Aabb;
 use serde::{Deserialize, Serialize};
 
-use crate::build::{BLOCKS, Layer, PART};
 use crate::error::SliceError;
+use crate::layer::{BLOCKS, Layer, PART};
 use crate::slice::Slice;
 use crate::{Grid, Up};
 

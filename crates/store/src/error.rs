@@ -6,7 +6,7 @@ use std::io;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-use crate::section::SectionId;
+use crate::id::SectionId;
 use crate::sniff::Looks;
 
 /// A container could not be opened, or does not hold what was asked of it.

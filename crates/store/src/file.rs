@@ -14,7 +14,8 @@ use crate::array::Array;
 use crate::bytes::{Bytes, fill};
 use crate::error::{Fault, OpenError};
 use crate::header::{HEADER_LEN, Header};
-use crate::section::{Section, SectionId, Table, element_size};
+use crate::id::SectionId;
+use crate::section::{Section, Table, element_size};
 use crate::{map, metadata};
 
 /// How much of a file is checked when it is opened.

@@ -7,7 +7,6 @@ use bytemuck::{Pod, Zeroable};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::error::Fault;
-use crate::section::Entry;
 use crate::sniff::Looks;
 
 /// Layout number that this crate writes and reads: the meaning of the header, the table and the padding.
@@ -25,6 +24,9 @@ pub(crate) const ALIGN: usize = 64;
 
 /// The header's length in bytes, also its alignment unit.
 pub(crate) const HEADER_LEN: usize = 64;
+
+/// The length in bytes of a row of the table.
+pub(crate) const ENTRY_LEN: usize = 40;
 
 /// Bytes of the header that its own checksum covers: all before the checksum.
 const SEALED: usize = HEADER_LEN - size_of::<u64>();
@@ -126,7 +128,7 @@ impl Header {
 
     /// Offset of the first byte behind the table; cannot overflow, as the count is a `u32`.
     pub(crate) fn table_end(&self) -> u64 {
-        HEADER_LEN as u64 + u64::from(self.count) * size_of::<Entry>() as u64
+        HEADER_LEN as u64 + u64::from(self.count) * ENTRY_LEN as u64
     }
 
     fn seal(&self) -> u64 {

@@ -7,6 +7,7 @@ compile_error!(
 
 // In reading order: the bytes on disk, what holds them, how they are read, how they are written.
 mod header;
+mod id;
 mod section;
 
 mod array;
@@ -27,7 +28,8 @@ pub use bytes::Bytes;
 pub use error::{Fault, OpenError, WriteError, WriteStep};
 pub use file::{Check, File};
 pub use header::LAYOUT;
+pub use id::SectionId;
 pub use metadata::METADATA_LIMIT;
-pub use section::{Section, SectionId};
+pub use section::Section;
 pub use sniff::Looks;
 pub use writer::Writer;

@@ -5,34 +5,14 @@
 //! sections never overlap, and one pass over the table proves both.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::error::Fault;
-use crate::header::{ALIGN, HEADER_LEN, Header, align_up};
-
-/// Names a section: four bytes that say what it is, and a number that tells several of a kind apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SectionId {
-    /// What the section holds, by custom four upper-case ASCII letters. `META` is taken.
-    pub tag: [u8; 4],
-    /// Which of several sections with one tag; 0 where there is one.
-    pub part: u32,
-}
-
-impl SectionId {
-    /// The one metadata section.
-    pub(crate) const META: Self = Self { tag: *b"META", part: 0 };
-}
-
-impl fmt::Display for SectionId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.tag.escape_ascii(), self.part)
-    }
-}
+use crate::header::{ALIGN, ENTRY_LEN, HEADER_LEN, Header, align_up};
+use crate::id::SectionId;
 
 /// Where a section lies; every value was checked against the file when it was opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,7 +82,7 @@ pub(crate) struct Entry {
     checksum: u64,
 }
 
-const _: () = assert!(size_of::<Entry>() == 40, "a table row is 40 bytes on disk");
+const _: () = assert!(size_of::<Entry>() == ENTRY_LEN, "a table row is 40 bytes on disk");
 
 impl From<Section> for Entry {
     fn from(section: Section) -> Self {

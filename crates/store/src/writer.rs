@@ -13,8 +13,9 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::atomic;
 use crate::error::{WriteError, WriteStep};
 use crate::header::{ALIGN, HEADER_LEN, Header, align_up};
+use crate::id::SectionId;
 use crate::metadata;
-use crate::section::{Entry, Section, SectionId, element_size};
+use crate::section::{Entry, Section, element_size};
 
 /// Collects the sections of a container, then writes it.
 ///

@@ -8,7 +8,7 @@ use super::open;
 use crate::console::{self, Console, Results};
 use crate::digits::count;
 use crate::error::CliError;
-use crate::picture::Picture;
+use crate::image::Picture;
 
 /// Options of `slices export`.
 #[derive(Debug, Clone, Args)]

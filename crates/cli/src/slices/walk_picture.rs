@@ -7,7 +7,8 @@ use super::labels::Labels;
 use super::track::Track;
 use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
 use crate::digits::{rounded, short};
-use crate::picture::{Picture, scale_bar};
+use crate::image::Picture;
+use crate::picture::scale_bar;
 
 /// In fine pixels: the longer side of a view, alone or one of several; the curve, margins, letters.
 const ALONE: f64 = 900.0 * FINE as f64;

@@ -1,0 +1,42 @@
+//! Values of options.
+
+use std::time::Duration;
+
+/// Reads a length.
+pub(crate) fn parse_radius(text: &str) -> Result<f64, String> {
+    let radius = text.parse().ok().filter(|r: &f64| *r >= 0.0 && r.is_finite());
+    radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
+}
+
+/// Reads a time with its unit.
+pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
+    let unit =
+        text.trim_start_matches(|c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | 'e' | 'E' | '-'));
+    let number = text.strip_suffix(unit).unwrap_or_default();
+    let seconds = match unit {
+        "ns" => 1e-9,
+        "us" | "µs" | "μs" => 1e-6,
+        "ms" => 1e-3,
+        "s" => 1.0,
+        _ => return Err("expected a number with one of the units ns, us, ms, s, as in 200us".into()),
+    };
+    let time = number.parse::<f64>().ok().and_then(|n| Duration::try_from_secs_f64(n * seconds).ok());
+    time.ok_or_else(|| "expected a time from zero on, as in 200us".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_need_a_unit() {
+        for (text, nanos) in
+            [("200us", 200_000), ("1.5ms", 1_500_000), ("20ns", 20), ("0s", 0), ("3µs", 3000)]
+        {
+            assert_eq!(parse_duration(text).map(|d| d.as_nanos()), Ok(nanos), "{text}");
+        }
+        for text in ["", "200", "us", "-1us", "1 us", "1min", "nans", "1e400s"] {
+            assert!(parse_duration(text).is_err(), "{text}");
+        }
+    }
+}

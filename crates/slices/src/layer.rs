@@ -1,0 +1,89 @@
+//! What the voxels of a slice have seen while a map is built.
+
+use std::ops::Range;
+
+use crate::error::SliceError;
+
+/// Blocks that are sorted before the map is filled from them; any number gives the same map.
+pub(crate) const BLOCKS: usize = 16;
+
+/// Cells of a part of a slice: as many as fit a cache, so that one large floor keeps several threads busy.
+pub(crate) const PART: usize = 1 << 16;
+
+/// What a voxel has seen: 255 less the lowest level in the high byte, the highest level plus one in the low
+/// byte; 0 if nothing. So either byte only ever grows, and memory that is zero is a map without points.
+pub(crate) type Cell = u16;
+
+/// What the voxels of a slice have seen.
+#[derive(Debug, Default)]
+pub(crate) struct Layer {
+    /// A cell a pixel.
+    cells: Vec<Cell>,
+    /// A bit a cell, whether it has seen something: most have not.
+    filled: Vec<u64>,
+}
+
+impl Layer {
+    /// One that has seen nothing.
+    pub(crate) fn new(area: usize) -> Result<Self, SliceError> {
+        let cells = bytemuck::allocation::try_zeroed_vec(area);
+        let filled = bytemuck::allocation::try_zeroed_vec(area.div_ceil(64));
+        match (cells, filled) {
+            (Ok(cells), Ok(filled)) => Ok(Self { cells, filled }),
+            _ => Err(SliceError::OutOfMemory { bytes: Self::bytes_of(area) }),
+        }
+    }
+
+    /// Bytes that one of so many pixels takes.
+    pub(crate) fn bytes_of(area: usize) -> usize {
+        size_of::<Self>() + area * size_of::<Cell>() + area.div_ceil(64) * size_of::<u64>()
+    }
+
+    /// Which of these cells, have seen something.
+    pub(crate) fn filled(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
+        let words = range.start / 64..range.end.div_ceil(64);
+        let bits = words.flat_map(|i| {
+            let next = |left: u64| Some(left).filter(|left| *left != 0);
+            let bits = std::iter::successors(next(self.filled[i]), move |left| next(left & (left - 1)));
+            bits.map(move |left| 64 * i + left.trailing_zeros() as usize)
+        });
+        bits.filter(move |i| range.contains(i))
+    }
+
+    /// Whether a cell has seen something.
+    #[inline]
+    pub(crate) fn is_filled(&self, i: usize) -> bool {
+        self.filled[i / 64] >> (i % 64) & 1 == 1
+    }
+
+    /// Lowest and highest level of a cell; none if it has seen nothing, for which its bit is enough: the bits
+    /// of a layer fit a cache.
+    #[inline]
+    pub(crate) fn span(&self, i: usize) -> Option<[i32; 2]> {
+        let seen = || self.cells[i];
+        self.is_filled(i).then(seen).map(|seen| [255 - i32::from(seen >> 8), i32::from(seen & 0xff) - 1])
+    }
+
+    /// Parts of [`PART`] cells, with their bits.
+    pub(crate) fn parts(&mut self) -> Vec<Part<'_>> {
+        let parts = self.cells.chunks_mut(PART).zip(self.filled.chunks_mut(PART / 64));
+        parts.map(|(cells, filled)| Part { cells, filled }).collect()
+    }
+}
+
+/// A part of a layer.
+pub(crate) struct Part<'a> {
+    cells: &'a mut [Cell],
+    filled: &'a mut [u64],
+}
+
+impl Part<'_> {
+    /// Most points of a voxel change nothing.
+    #[inline]
+    pub(crate) fn see(&mut self, cell: u16, level: u8) {
+        let (cell, [low, high]) = (usize::from(cell), [u16::from(255 - level), u16::from(level) + 1]);
+        let seen = &mut self.cells[cell];
+        *seen = (*seen >> 8).max(low) << 8 | (*seen & 0xff).max(high);
+        self.filled[cell / 64] |= 1 << (cell % 64);
+    }
+}
