@@ -1,7 +1,7 @@
 //! Whether the coverings of two nodes are apart (Klein & Zachmann 2004, §5.1).
 
 use crate::boxes::{OrientedBox, Relative};
-use crate::covering::Centres;
+use crate::centres::Centres;
 use crate::descend::NodePair;
 use crate::slices::Slices;
 

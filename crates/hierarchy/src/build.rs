@@ -1,5 +1,6 @@
 //! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
 
+use bytemuck::bytes_of;
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
@@ -7,22 +8,25 @@ use nearmiss_lanes::parallel::on_threads;
 use nearmiss_lanes::vector::dot;
 use nearmiss_store::Array;
 use nearmiss_surface::{Metric, SurfacePlan};
+use xxhash_rust::xxh3::Xxh3;
 
 use crate::boxes::OrientedBox;
 use crate::covering::{Covering, Ground, coverings};
 use crate::enclosure::growths;
 use crate::extents::{Discs, boxes_of_discs};
-use crate::gather::Index;
+use crate::gather::{Index, NeighbourList};
 use crate::growth::Growth;
-use crate::levels::samples;
-use crate::neighbours::{NeighbourList, neighbours};
+use crate::kind::PointKind;
+use crate::leaf_block::TreeParts;
+use crate::neighbours::neighbours;
 use crate::options::{BuildError, BuildOptions};
 use crate::ordered::Ordered;
-use crate::outline::Outline;
-use crate::samples::lists;
+use crate::outline::{Ball, Outline};
+use crate::part::Part;
+use crate::samples::{lists, samples};
 use crate::sampling::Sampling;
 use crate::slices::Slices;
-use crate::surfels::{Known, NormalCone, PointKind, Surfels, align, surfels};
+use crate::surfels::{Known, NormalCone, Surfels, align, surfels};
 use crate::topology::Node;
 use crate::wide::WideTree;
 
@@ -218,8 +222,38 @@ impl PointHierarchy {
     /// Makes anew what is not stored, after discs or boxes have changed. Signs of normals, which say nothing
     /// to leaves, do not matter.
     pub(crate) fn derive(&mut self) {
-        self.wide = WideTree::of(self);
-        self.outline = Outline::of(self);
+        let slices = self.slices();
+        let parts = TreeParts {
+            nodes: slices.nodes,
+            boxes: slices.boxes,
+            growths: Part::BOTH.map(|part| slices.growths_of(part)),
+            positions: slices.positions,
+            normals: slices.normals,
+            discs: slices.discs,
+            kinds: slices.kinds,
+            dense: slices.dense,
+            leaf_size: slices.leaf_size,
+        };
+        self.wide = WideTree::of(&parts);
+        self.outline = self.outlined();
+    }
+
+    /// What tells this scan from others, and where it is.
+    fn outlined(&self) -> Outline {
+        let slices = self.slices();
+        let mut hash = Xxh3::new();
+        let frame = self.frame();
+        hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
+        hash.update(bytes_of(&[self.leaf_size, self.samples_a_node, self.dense]));
+        hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
+        hash.update(bytemuck::cast_slice(slices.positions));
+        hash.update(bytemuck::cast_slice(slices.discs));
+        Outline {
+            identity: hash.digest(),
+            surface: Ball::about(&slices.enclosure(0)),
+            obstacle: Ball::about(&slices.obstacle_enclosure(0)),
+            discs: Ball::about(&slices.boxes[0]),
+        }
     }
 
     /// Local sampling radii r_i.
@@ -311,6 +345,28 @@ impl PointHierarchy {
     #[must_use]
     pub fn cones(&self) -> &[NormalCone] {
         &self.cones
+    }
+
+    /// The points in blocks: `i` stands in lane `i` % 16 of block `i` / 16.
+    #[must_use]
+    pub fn blocks(&self) -> &[PointBlock] {
+        &self.blocks
+    }
+
+    /// The balls outside of which no point of a block is heard, like points with horizons: that of block `i`
+    /// stands in lane `i` % 16 of group `i` / 16.
+    #[must_use]
+    pub fn groups(&self) -> &[PointBlock] {
+        &self.groups
+    }
+
+    /// The groups of which a point may be heard within some distance of the middle of the ball of `block`,
+    /// ascending, with that distance; `None` where they are too many, or there is no such block.
+    #[must_use]
+    pub fn neighbours(&self, block: usize) -> Option<(f32, &[u32])> {
+        let list = self.lists.get(block).filter(|list| list.within > 0.0)?;
+        let entries = self.listed.get(list.first as usize..)?.get(..list.count as usize)?;
+        Some((list.within, entries))
     }
 }
 

@@ -11,8 +11,9 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::chunks;
 use nearmiss_lanes::vector::{dot, sub};
 
+use crate::kind::{PointKind, SLAB};
 use crate::split::Item;
-use crate::surfels::{Fit, PointKind};
+use crate::surfels::Fit;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
@@ -29,12 +30,6 @@ const ALONE: usize = 2;
 /// The cosine of the angle between the normals of neighbours on a sheet is no less. On a sphere of the
 /// greatest curvature that a slab holds they differ by 40° at most.
 const AGREEING: f32 = 0.5;
-
-/// Half the thickness of a sheet at a point, in its local radius: the surface nearest to the point, and a
-/// noisy point of the same sheet, lie no further from its tangent plane. A curvature of 0.6 over the local
-/// radius rises so far at its distance, and so do two standard deviations of a noise of a fifth of the
-/// spacing.
-pub const SLAB: f32 = 0.3;
 
 /// Corrects the classes of single points by those of their neighbours. O(n) where all points are on sheets.
 pub(crate) fn vote(tree: &BlockTree<'_>, positions: &[[f32; 3]], radii: &[f32], fits: &mut [Fit]) {

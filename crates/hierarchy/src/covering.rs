@@ -14,13 +14,13 @@ use nearmiss_lanes::parallel::map_all;
 use nearmiss_lanes::vector::dot;
 
 use crate::boxes::OrientedBox;
+use crate::centres::{Centres, WIDTH, fold_min};
 use crate::enclosure::Cell;
-use crate::gather::TREE_STACK;
 use crate::growth::Growth;
+use crate::kind::THICKNESS;
 use crate::samples::Samples;
 use crate::spacing::fold_nodes;
-use crate::surfels::THICKNESS;
-use crate::topology::{MOST_LEAF_POINTS, Node};
+use crate::topology::{Node, TREE_STACK};
 
 /// What is known of a node's sample as a whole; lengths in stored units.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -47,75 +47,16 @@ const CANCELLED: f32 = 1.0 + 2e-6;
 /// What squares may lose below the least normal number, as a length.
 const LOST: f32 = 1e-20;
 
-/// Samples that are worked on together.
-pub(crate) const WIDTH: usize = 16;
-
-/// Places side by side; where there are fewer than lanes, places infinitely far away.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Centres {
-    blocks: [[[f32; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH],
-    len: usize,
-}
-
-impl Default for Centres {
-    fn default() -> Self {
-        Self { blocks: [[[f32::INFINITY; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH], len: 0 }
+/// The samples of a node.
+pub(crate) fn centres_of(samples: Samples<'_>, positions: &[[f32; 3]]) -> Centres {
+    let mut centres = Centres::default();
+    for i in samples.iter() {
+        centres.push(positions[i]);
     }
+    centres
 }
 
 impl Centres {
-    pub(crate) fn of(samples: Samples<'_>, positions: &[[f32; 3]]) -> Self {
-        let mut centres = Self::default();
-        for i in samples.iter() {
-            centres.push(positions[i]);
-        }
-        centres
-    }
-
-    /// Adds a place; there must be room.
-    #[inline]
-    pub(crate) fn push(&mut self, p: [f32; 3]) {
-        let (block, lane) = (self.len / WIDTH, self.len % WIDTH);
-        for (lanes, x) in self.blocks[block].iter_mut().zip(p) {
-            lanes[lane] = x;
-        }
-        self.len += 1;
-    }
-
-    #[inline]
-    pub(crate) fn len(&self) -> usize {
-        self.len
-    }
-
-    pub(crate) fn iter(&self) -> impl Iterator<Item = [f32; 3]> {
-        (0..self.len).map(|i| self.get(i))
-    }
-
-    #[inline(always)]
-    fn get(&self, i: usize) -> [f32; 3] {
-        let [x, y, z] = &self.blocks[i / WIDTH];
-        [x[i % WIDTH], y[i % WIDTH], z[i % WIDTH]]
-    }
-
-    #[inline(always)]
-    fn blocks(&self) -> &[[[f32; WIDTH]; 3]] {
-        &self.blocks[..self.len.div_ceil(WIDTH)]
-    }
-
-    /// The squared distance of the nearest; infinite if there is none.
-    #[inline(always)]
-    pub(crate) fn nearest_sq(&self, p: [f32; 3]) -> f32 {
-        let mut least = [f32::INFINITY; WIDTH];
-        for [x, y, z] in self.blocks() {
-            for i in 0..WIDTH {
-                let d = [x[i] - p[0], y[i] - p[1], z[i] - p[2]];
-                let d_sq = dot(d, d);
-                least[i] = if d_sq < least[i] { d_sq } else { least[i] };
-            }
-        }
-        fold_min(&least)
-    }
-
     /// The square of the least radius at which one ball alone contains the box; infinite if anything is no
     /// number.
     #[inline(always)]
@@ -142,7 +83,7 @@ impl Centres {
     fn each_far_sq(&self, solids: &Solids) -> [f32; WIDTH] {
         let Solids { middle: [px, py, pz], normal: [nx, ny, nz], across, height } = solids;
         let mut least = [f32::INFINITY; WIDTH];
-        for centre in 0..self.len {
+        for centre in 0..self.len() {
             let [x, y, z] = self.get(centre);
             for i in 0..WIDTH {
                 let d = [x - px[i], y - py[i], z - pz[i]];
@@ -156,19 +97,6 @@ impl Centres {
         }
         least
     }
-}
-
-#[inline(always)]
-fn fold_min(lanes: &[f32; WIDTH]) -> f32 {
-    let mut least = *lanes;
-    let mut width = WIDTH / 2;
-    while width > 0 {
-        for i in 0..width {
-            least[i] = if least[i] < least[i + width] { least[i] } else { least[i + width] };
-        }
-        width /= 2;
-    }
-    least[0]
 }
 
 /// As by [`f32::max`], which makes nothing of what is no number.
@@ -241,7 +169,7 @@ pub(crate) fn coverings<'a>(
     let level = Level::new();
     map_all(&ids, |&id| {
         let node = id as usize;
-        let centres = Centres::of(samples(node), positions);
+        let centres = centres_of(samples(node), positions);
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
         let spacing = (squares[node] / f64::from(nodes[node].count)).sqrt() as f32;
         dispatch!(level, simd => simd.vectorize(

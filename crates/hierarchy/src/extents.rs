@@ -10,7 +10,7 @@ use nearmiss_lanes::parallel::map_all;
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
 
 use crate::boxes::OrientedBox;
-use crate::surfels::THICKNESS;
+use crate::kind::THICKNESS;
 use crate::topology::Node;
 
 const WIDTH: usize = PointBlock::WIDTH;

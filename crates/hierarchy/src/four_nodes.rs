@@ -7,7 +7,8 @@ use nearmiss_geometry::NodeId;
 use crate::boxes::{OrientedBox, Relative};
 use crate::growth::Growth;
 use crate::lanes::{Boxes, along_normals};
-use crate::slices::{Part, Slices};
+use crate::part::Part;
+use crate::slices::Slices;
 
 /// Box and enclosure of a node, with `f32` for `V`; of several nodes, a lane each, with a vector.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,7 @@
 //! The points that f(x) needs: those whose horizon reaches x, from the neighbour list of a leaf near x, or by
 //! a descent where no list holds.
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
@@ -8,12 +9,25 @@ use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, SurfacePlan};
 
 use crate::boxes::OrientedBox;
-use crate::build::PointHierarchy;
-use crate::neighbours::{GROUP, GROWN, NeighbourList};
-use crate::topology::Node;
+use crate::topology::{Node, TREE_STACK};
 
-/// Room for a descent that keeps at most one sibling a level: trees of 2³² points have 31 levels at most.
-pub(crate) const TREE_STACK: usize = 64;
+/// Points of a group of blocks.
+pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
+
+/// What rounding may cost a comparison of distances, relatively.
+pub(crate) const GROWN: f32 = 1.0 + 1e-5;
+
+/// Which entries of the array of all lists are a block's, and where they are complete.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct NeighbourList {
+    /// At places no further than this from the middle of the block's ball; negative where there is no list.
+    pub within: f32,
+    /// The first entry.
+    pub first: u32,
+    /// Number of entries.
+    pub count: u32,
+}
 
 /// Reused between evaluations; never influences a result.
 #[derive(Debug, Clone)]
@@ -22,7 +36,7 @@ pub struct GatherScratch {
     /// The block near which f was evaluated last.
     pub(crate) block: usize,
     /// Groups that a descent found.
-    found: Vec<u32>,
+    pub(crate) found: Vec<u32>,
     /// Blocks that are heard at x.
     heard: Vec<u32>,
     /// How near they are.
@@ -108,7 +122,7 @@ impl<'a> Index<'a> {
     }
 
     /// Of the blocks that are heard near `block` the one with the middle nearest to `x`.
-    fn next_block(&self, block: usize, x: [f32; 3]) -> Option<usize> {
+    pub(crate) fn next_block(&self, block: usize, x: [f32; 3]) -> Option<usize> {
         const LANES: usize = PointBlock::WIDTH;
         let list = self.lists.get(block)?;
         let first = list.first as usize;
@@ -207,99 +221,5 @@ impl<'a> Index<'a> {
         let heard = self.heard(simd, groups, x.rounded(), 0.0, heard);
         near.offer_all(simd, self.blocks, heard, halves);
         near.moments(simd)
-    }
-}
-
-impl PointHierarchy {
-    /// f at `x`, in the stored frame.
-    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        self.index().evaluate(x, scratch)
-    }
-
-    /// As [`Self::evaluate_with`], faster where `x` is within a local radius or so of the stored point `i`:
-    /// the list of that point is looked at first.
-    pub fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        scratch.block = i / PointBlock::WIDTH;
-        self.index().evaluate(x, scratch)
-    }
-
-    /// As [`Self::evaluate_with`], faster for places along the surface, each near that which was asked about
-    /// last with this scratch: where the list used there ends, that of the nearest block it names is taken,
-    /// and where that ends too, that of the nearest point, which holds all that is heard on the surface.
-    pub fn evaluate_onward(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        let index = self.index();
-        let place = Centre::new(x).rounded();
-        if index.list(scratch.block, place, 0.0).is_none() {
-            let next = index.next_block(scratch.block, place);
-            scratch.block =
-                next.filter(|&next| index.list(next, place, 0.0).is_some()).unwrap_or_else(|| {
-                    let start = (scratch.block * PointBlock::WIDTH).min(self.len() - 1);
-                    self.nearest_point_near(start, x) as usize / PointBlock::WIDTH
-                });
-        }
-        index.evaluate(x, scratch)
-    }
-
-    /// As [`Self::evaluate_with`], with n, and so the sign of f, on the side of Σ wᵢ nᵢ, the stored normals
-    /// of the points that reach x: positive below the surface. Where these disagree, as between two sheets,
-    /// the place is ambiguous; unless they [are oriented](Self::is_oriented) all is as there.
-    pub fn evaluate_oriented_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
-        let at = self.evaluate_with(x, scratch);
-        if !self.is_oriented || at.support == 0 {
-            return at;
-        }
-        self.index().collect(Centre::new(x).rounded(), 0.0, &mut scratch.found);
-        let (blocks, normals): (&[PointBlock], &[[f32; 3]]) = (&self.blocks, &self.normals);
-        let (mut sum, mut total) = ([0.0; 3], 0.0);
-        for &group in &scratch.found {
-            let first = group as usize * GROUP;
-            for (i, normal) in (first..).zip(&normals[first..(first + GROUP).min(normals.len())]) {
-                let (block, lane) = (&blocks[i / PointBlock::WIDTH], i % PointBlock::WIDTH);
-                let d = [0, 1, 2].map(|k| f64::from(block.position[k][lane]) - x[k]);
-                let t = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) * f64::from(block.decay[lane]);
-                if t < f64::from(self.plan.reach_sq()) {
-                    #[expect(clippy::cast_possible_truncation, reason = "weights are single precision")]
-                    let w = f64::from(self.plan.kernel().weight(t as f32));
-                    total += w;
-                    for (sum, n) in sum.iter_mut().zip(normal) {
-                        *sum += w * f64::from(*n);
-                    }
-                }
-            }
-        }
-        at.turned_to(sum, total)
-    }
-
-    /// The stored point that is nearest to `x`, in the stored frame; of equally near ones the first.
-    #[must_use]
-    pub fn nearest_point(&self, x: [f64; 3]) -> u32 {
-        self.nearest_point_near(0, x)
-    }
-
-    /// As [`Self::nearest_point`], faster where `x` is near the stored point `i`.
-    ///
-    /// # Panics
-    /// When there is no such point.
-    #[must_use]
-    pub fn nearest_point_near(&self, i: usize, x: [f64; 3]) -> u32 {
-        self.nearest_listed(i, x).unwrap_or_else(|| self.nearest_point_within(i, x, f64::INFINITY).0)
-    }
-
-    /// f at `x`, in the stored frame; allocates a scratch of its own.
-    #[must_use]
-    pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
-        self.evaluate_with(x, &mut GatherScratch::default())
-    }
-
-    pub(crate) fn index(&self) -> Index<'_> {
-        Index {
-            nodes: &self.nodes,
-            boxes: &self.boxes,
-            blocks: &self.blocks,
-            groups: &self.groups,
-            lists: &self.lists,
-            listed: &self.listed,
-            plan: &self.plan,
-        }
     }
 }

@@ -7,8 +7,9 @@ use nearmiss_lanes::parallel::map_all;
 use nearmiss_lanes::vector::sub;
 
 use crate::boxes::OrientedBox;
-use crate::build::PointHierarchy;
-use crate::surfels::PointKind;
+use crate::growth::Growth;
+use crate::kind::{PointKind, is_on_sheet};
+use crate::topology::Node;
 
 /// Lanes of a block.
 const WIDTH: usize = 16;
@@ -126,6 +127,22 @@ fn steps<S: Simd>(simd: S, steps: &[i16; WIDTH]) -> f32x16<S> {
     f32x16::float_from(low.combine(high))
 }
 
+/// What the tree in lanes is made of: arrays of a scan.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TreeParts<'a> {
+    pub(crate) nodes: &'a [Node],
+    pub(crate) boxes: &'a [OrientedBox],
+    /// Of surface and obstacle.
+    pub(crate) growths: [&'a [Growth]; 2],
+    pub(crate) positions: &'a [[f32; 3]],
+    pub(crate) normals: &'a [[f32; 3]],
+    pub(crate) discs: &'a [f32],
+    pub(crate) kinds: &'a [u8],
+    /// Points before this are dense.
+    pub(crate) dense: usize,
+    pub(crate) leaf_size: u32,
+}
+
 /// The leaves in the order of their points.
 #[derive(Debug, Clone, Default)]
 pub struct Leaves {
@@ -143,29 +160,30 @@ pub struct Leaves {
 }
 
 impl Leaves {
-    /// Those of this scan. O(n), on all cores.
-    pub(crate) fn of(scan: &PointHierarchy) -> Self {
-        let (slices, leaf_size) = (scan.slices(), scan.leaf_size as usize);
+    /// Those of a scan. O(n), on all cores.
+    pub(crate) fn of(scan: &TreeParts<'_>) -> Self {
+        let leaf_size = scan.leaf_size as usize;
+        let is_on_sheet = |i: usize| is_on_sheet(i, scan.dense, PointKind::from_code(scan.kinds[i]));
         let blocks_a_leaf = leaf_size.div_ceil(WIDTH);
-        let numbered = (0_u32..).zip(slices.nodes).filter(|(_, node)| node.is_leaf());
+        let numbered = (0_u32..).zip(scan.nodes).filter(|(_, node)| node.is_leaf());
         let (mut ids, mut sparse, mut balls) = (Vec::new(), Vec::new(), Vec::new());
         for (id, node) in numbered {
             let is_sparse = |&code: &u8| PointKind::from_code(code).is_sparse();
             ids.push(id);
-            sparse.push(slices.kinds[node.points()].iter().any(is_sparse));
-            balls.push(node.points().any(|i| !slices.is_on_sheet(i)));
+            sparse.push(scan.kinds[node.points()].iter().any(is_sparse));
+            balls.push(node.points().any(|i| !is_on_sheet(i)));
         }
         let numbers: Vec<usize> = (0..ids.len() * blocks_a_leaf).collect();
         let blocks = map_all(&numbers, |&number| {
             let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
-            let mut block = LeafBlock::new(&slices.boxes[ids[leaf] as usize]);
-            let points = slices.nodes[ids[leaf] as usize].points();
+            let mut block = LeafBlock::new(&scan.boxes[ids[leaf] as usize]);
+            let points = scan.nodes[ids[leaf] as usize].points();
             for (lane, i) in points.skip(part * WIDTH).take(WIDTH).enumerate() {
-                block.set(lane, slices.positions[i], slices.normals[i], slices.discs[i]);
+                block.set(lane, scan.positions[i], scan.normals[i], scan.discs[i]);
             }
             block
         });
-        Self { blocks, ids, sparse, balls, points: scan.len(), leaf_size, blocks_a_leaf }
+        Self { blocks, ids, sparse, balls, points: scan.positions.len(), leaf_size, blocks_a_leaf }
     }
 
     /// The leaf's id in the binary tree.

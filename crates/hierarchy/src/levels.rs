@@ -6,7 +6,7 @@ use nearmiss_surface::{Evaluation, Moments};
 
 use crate::build::PointHierarchy;
 use crate::gather::GatherScratch;
-use crate::samples::{Samples, list_number};
+use crate::samples::{Samples, samples};
 use crate::slices::Slices;
 
 impl<'a> Slices<'a> {
@@ -67,20 +67,6 @@ impl<'a> Slices<'a> {
     fn thinning(&self, node: usize) -> f32 {
         (self.nodes[node].count as f32 / self.samples(node).len() as f32).sqrt()
     }
-}
-
-/// The sample of `node`, which has the id `id`.
-#[inline]
-pub(crate) fn samples<'a>(
-    lists: &'a [u32],
-    (id, node): (usize, &crate::Node),
-    (leaf_size, count): (u32, u32),
-) -> Samples<'a> {
-    if node.is_leaf() || node.count <= count {
-        return Samples::all(node);
-    }
-    let start = list_number(id, node, leaf_size) * count as usize;
-    Samples::listed(&lists[start..start + count as usize])
 }
 
 impl PointHierarchy {

@@ -6,7 +6,6 @@
 //! complete for every place within some distance of the middle of the block's ball, far enough for every
 //! surface point whose nearest stored point is the block's (`docs/theory/certificates.md`, fact 2).
 
-use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_index::PointBlock;
@@ -16,11 +15,7 @@ use nearmiss_lanes::wide::{greatest, product, seen_from};
 use nearmiss_surface::SurfacePlan;
 
 use crate::boxes::ROUNDING;
-use crate::build::PointHierarchy;
-use crate::gather::Index;
-
-/// Points of a group of blocks.
-pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
+use crate::gather::{GROWN, Index, NeighbourList};
 
 /// No list is longer; a block that hears more has none, and f near it is found by descent. Blocks on surfaces
 /// hear some seven; where the scan is sparse beside dense, or a bandwidth large, lists would be of
@@ -29,9 +24,6 @@ pub(crate) const MOST_LISTED: usize = 64;
 
 /// Steps towards the least ball about a block (Bădoiu & Clarkson 2003).
 const CENTRING: u8 = 12;
-
-/// What rounding may cost a comparison of distances, relatively.
-pub(crate) const GROWN: f32 = 1.0 + 1e-5;
 
 /// The points in blocks, with their horizons. O(n), on all cores.
 pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32]) -> Vec<PointBlock> {
@@ -95,18 +87,6 @@ fn ball<S: Simd>(simd: S, block: &PointBlock) -> ([f32; 3], f32) {
     let (centre, radius) = best;
     let far = centre.iter().fold(radius, |far, c| far.max(c.abs()));
     (centre, radius * GROWN + ROUNDING * far)
-}
-
-/// Which entries of the array of all lists are a block's, and where they are complete.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct NeighbourList {
-    /// At places no further than this from the middle of the block's ball; negative where there is no list.
-    pub within: f32,
-    /// The first entry.
-    pub first: u32,
-    /// Number of entries.
-    pub count: u32,
 }
 
 /// The lists of all blocks, as they are found one after the other.
@@ -220,28 +200,4 @@ pub(crate) fn neighbours(index: &Index<'_>, positions: &[[f32; 3]], radii: &[f32
     let mut all = Lists::default();
     chunks(&blocks, list).into_iter().for_each(|some| all.append(some));
     all
-}
-
-impl PointHierarchy {
-    /// The points in blocks: `i` stands in lane `i` % 16 of block `i` / 16.
-    #[must_use]
-    pub fn blocks(&self) -> &[PointBlock] {
-        &self.blocks
-    }
-
-    /// The balls outside of which no point of a block is heard, like points with horizons: that of block `i`
-    /// stands in lane `i` % 16 of group `i` / 16.
-    #[must_use]
-    pub fn groups(&self) -> &[PointBlock] {
-        &self.groups
-    }
-
-    /// The groups of which a point may be heard within some distance of the middle of the ball of `block`,
-    /// ascending, with that distance; `None` where they are too many, or there is no such block.
-    #[must_use]
-    pub fn neighbours(&self, block: usize) -> Option<(f32, &[u32])> {
-        let list = self.lists.get(block).filter(|list| list.within > 0.0)?;
-        let entries = self.listed.get(list.first as usize..)?.get(..list.count as usize)?;
-        Some((list.within, entries))
-    }
 }

@@ -15,10 +15,10 @@ use crate::build::PointHierarchy;
 use crate::classes::vote;
 use crate::covering::{Ground, Solid, coverings};
 use crate::extents::{Discs, boxes_of_discs};
-use crate::levels::samples;
-use crate::slices::{ball, obstacle_ball};
+use crate::kind::{PointKind, ball, obstacle_ball};
+use crate::samples::samples;
 use crate::spacing::Look;
-use crate::surfels::{Fit, NormalCone, PointKind, Surfel, align, cone, fitted, surfel_of};
+use crate::surfels::{Fit, NormalCone, Surfel, align, cone, fitted, surfel_of};
 
 impl PointHierarchy {
     /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about

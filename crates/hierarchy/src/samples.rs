@@ -10,7 +10,7 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::map_all;
 use nearmiss_lanes::vector::{dot, sub};
 
-use crate::covering::Centres;
+use crate::centres::Centres;
 use crate::topology::Node;
 
 /// How many samples a node may have.
@@ -73,6 +73,20 @@ impl<'a> Samples<'a> {
 #[inline]
 pub(crate) fn list_number(id: usize, node: &Node, leaf_size: u32) -> usize {
     id - (node.first / leaf_size) as usize
+}
+
+/// The sample of `node`, which has the id `id`.
+#[inline]
+pub(crate) fn samples<'a>(
+    lists: &'a [u32],
+    (id, node): (usize, &Node),
+    (leaf_size, count): (u32, u32),
+) -> Samples<'a> {
+    if node.is_leaf() || node.count <= count {
+        return Samples::all(node);
+    }
+    let start = list_number(id, node, leaf_size) * count as usize;
+    Samples::listed(&lists[start..start + count as usize])
 }
 
 /// `count` distinct points of the inner node `id`, ascending; all of them, and then the last again, if there

@@ -15,8 +15,8 @@ use thiserror::Error;
 use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::build::PointHierarchy;
-use crate::gather::TREE_STACK;
 use crate::topology::Node;
+use crate::topology::TREE_STACK;
 
 /// No stored length exceeds this, so that no square of one overflows. Frames keep coordinates below 2³⁴.
 const FARTHEST: f32 = (1_u64 << 40) as f32;

@@ -7,12 +7,11 @@ use nearmiss_index::PointBlock;
 use nearmiss_surface::SurfacePlan;
 
 use crate::boxes::OrientedBox;
-#[cfg(doc)]
-use crate::build::PointHierarchy;
 use crate::covering::Covering;
 use crate::growth::Growth;
+use crate::kind::{DENSE_SHARES, PointKind, ball, cell_radius, is_on_sheet, obstacle_ball, sheet_reach};
 use crate::outline::Outline;
-use crate::surfels::{PointKind, THICKNESS};
+use crate::part::Part;
 use crate::topology::Node;
 use crate::wide::WideTree;
 
@@ -22,7 +21,7 @@ use crate::wide::WideTree;
 pub struct Slices<'a> {
     /// Positions in leaf order.
     pub positions: &'a [[f32; 3]],
-    /// Unit normals; see [`PointHierarchy::normals`].
+    /// Unit normals; see [`crate::PointHierarchy::normals`].
     pub normals: &'a [[f32; 3]],
     /// Local sampling radii.
     pub radii: &'a [f32],
@@ -42,7 +41,7 @@ pub struct Slices<'a> {
     pub growths: &'a [Growth],
     /// What the boxes must grow by to contain each node's part of the obstacle.
     pub obstacle_growths: &'a [Growth],
-    /// The points in blocks: see [`PointHierarchy::blocks`].
+    /// The points in blocks: see [`crate::PointHierarchy::blocks`].
     pub blocks: &'a [PointBlock],
     /// The samples of the inner nodes in their order, [`samples_a_node`](Self::samples_a_node) of each; see
     /// [`Slices::samples`].
@@ -62,19 +61,6 @@ pub struct Slices<'a> {
     /// Points before this are on sheets or, noisy, among others; sparse points come from here on, and stand
     /// in the obstacle as balls. A leaf has points of one sort alone.
     pub dense: usize,
-}
-
-/// What an enclosure of a node holds beside its points and their discs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// The node's part of the implicit surface.
-    Surface = 0,
-    /// The node's part of the obstacle.
-    Obstacle = 1,
-}
-
-impl Part {
-    pub(crate) const BOTH: [Self; 2] = [Self::Surface, Self::Obstacle];
 }
 
 impl Slices<'_> {
@@ -214,63 +200,4 @@ impl Slices<'_> {
     pub fn ball(&self, i: usize) -> f32 {
         ball(PointKind::from_code(self.kinds[i]), self.radii[i], self.sampling_radius)
     }
-}
-
-/// See [`Slices::obstacle_reach`]: that of a point on a sheet.
-#[inline]
-fn sheet_reach(radius: f32, disc: f32, reach: f32) -> f32 {
-    cell_radius(radius, reach).max(disc * DISC_REACH)
-}
-
-/// See [`Slices::cell_radius`].
-#[inline]
-pub(crate) fn cell_radius(radius: f32, reach: f32) -> f32 {
-    radius.min(0.5 * reach)
-}
-
-/// How far a disc with its thickness reaches, in its radius.
-const DISC_REACH: f32 = 1.0 + THICKNESS;
-
-/// The ball of a point that has others all around, in its local radius: half the radius of a disc of a sheet.
-/// The nearest neighbour is 0.36 local radii away on average, so such balls overlap.
-const BALL_AMONG_OTHERS: f32 = 0.325;
-
-/// The ball of any other point. Half the local radius is the most at which the centres of two balls that
-/// touch are no further apart than the greater of their local radii.
-const BALL_OF_SPARSE: f32 = 0.5;
-
-/// See [`Slices::obstacle_ball`].
-#[inline]
-pub(crate) fn obstacle_ball(i: usize, dense: usize, kind: PointKind, radius: f32) -> f32 {
-    if is_on_sheet(i, dense, kind) { 0.0 } else { ball_share(kind) * radius }
-}
-
-/// The ball of a point that is on no sheet, in its local radius.
-const fn ball_share(kind: PointKind) -> f32 {
-    if kind.is_sparse() { BALL_OF_SPARSE } else { BALL_AMONG_OTHERS }
-}
-
-/// The ball of a point before [`Slices::dense`] by the code of its kind, in its local radius.
-const DENSE_SHARES: [f32; 256] = {
-    let mut shares = [0.0; 256];
-    let mut code = 0;
-    while code <= u8::MAX as usize {
-        #[expect(clippy::cast_possible_truncation, reason = "below 256")]
-        let kind = PointKind::from_code(code as u8);
-        shares[code] = if kind.is_sheet() { 0.0 } else { ball_share(kind) };
-        code += 1;
-    }
-    shares
-};
-
-/// See [`Slices::is_on_sheet`].
-#[inline]
-pub(crate) fn is_on_sheet(i: usize, dense: usize, kind: PointKind) -> bool {
-    i < dense && kind.is_sheet()
-}
-
-/// See [`Slices::ball`].
-#[inline]
-pub(crate) fn ball(kind: PointKind, radius: f32, sampling_radius: f32) -> f32 {
-    if kind.is_sparse() { radius.min(sampling_radius) } else { 0.0 }
 }

@@ -16,15 +16,13 @@ use nearmiss_lanes::parallel::chunks;
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
 use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Status, symmetric_eigen};
-use serde::{Deserialize, Serialize};
 
 use crate::boxes::OrientedBox;
-use crate::classes::SLAB;
 use crate::covering::Solid;
 use crate::enclosure::{Cell, LeafBounds, Surroundings};
 use crate::gather::Index;
+use crate::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
 use crate::neighbours::Locality;
-use crate::slices::{ball, cell_radius, obstacle_ball};
 use crate::spacing::{Look, Spacing};
 
 /// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a
@@ -44,74 +42,8 @@ const INTERIOR_GAP: u32 = 6;
 /// So many mean a border: about 135 degrees. A straight one leaves 180, a right-angled notch 90.
 const BORDER_GAP: u32 = 9;
 
-/// Parallel discs nearer than this share of the smaller radius touch: to first order nothing tells a sheet
-/// that grazes another from one that lies on it. Boxes are that much wider than the discs.
-pub const THICKNESS: f32 = 0.05;
-
 /// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
 const LINE: f64 = 0.05;
-
-/// How the points about a point lie: its class (`docs/theory/obstacle.md`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[repr(u8)]
-#[non_exhaustive]
-pub enum PointKind {
-    /// On one sheet: its tangent disc stands for the surface about it.
-    Sheet = 0,
-    /// At or beyond the border of a sheet; its disc is narrower.
-    Edge = 1,
-    /// No single plane fits: noise, foliage, or several sheets closer than the bandwidth.
-    Noisy = 2,
-    /// On a line, as along one LiDAR ring or a wire.
-    Line = 3,
-    /// Alone: fewer neighbours within its support radius than the surface needs.
-    Stray = 4,
-    /// Its neighbours are further away than the scan's [reach](crate::PointHierarchy::reach).
-    Sparse = 5,
-}
-
-impl PointKind {
-    /// All kinds, in the order of their codes.
-    pub const ALL: [Self; 6] = [Self::Sheet, Self::Edge, Self::Noisy, Self::Line, Self::Stray, Self::Sparse];
-
-    /// Returns the kind stored as `code`; an unknown code is [`Self::Noisy`].
-    #[must_use]
-    pub const fn from_code(code: u8) -> Self {
-        match code {
-            0 => Self::Sheet,
-            1 => Self::Edge,
-            3 => Self::Line,
-            4 => Self::Stray,
-            5 => Self::Sparse,
-            _ => Self::Noisy,
-        }
-    }
-
-    /// The greatest code of a kind.
-    pub(crate) const LAST: u8 = Self::Sparse.code();
-
-    /// Returns `true` if so little is known about the point that its disc is not to be trusted: some surface
-    /// lies within about a local radius.
-    #[inline]
-    #[must_use]
-    pub const fn is_sparse(self) -> bool {
-        matches!(self, Self::Line | Self::Stray | Self::Sparse)
-    }
-
-    /// Returns `true` if the point samples a sheet, so that its tangent disc stands for it in the
-    /// obstacle. All other points stand there as balls.
-    #[inline]
-    #[must_use]
-    pub const fn is_sheet(self) -> bool {
-        matches!(self, Self::Sheet | Self::Edge)
-    }
-
-    /// Returns the number that the kind is stored as.
-    #[must_use]
-    pub const fn code(self) -> u8 {
-        self as u8
-    }
-}
 
 /// The directions of a leaf's normals, up to sign: all within the angle of `cosine` of `axis` or of −`axis`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]

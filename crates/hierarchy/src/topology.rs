@@ -54,3 +54,6 @@ pub(crate) const fn node_count(points: usize, leaf_size: usize) -> usize {
 pub(crate) const fn left_count(points: usize, leaf_size: usize) -> usize {
     points.div_ceil(leaf_size).div_ceil(2) * leaf_size
 }
+
+/// Room for a descent that keeps at most one sibling a level: trees of 2³² points have 31 levels at most.
+pub(crate) const TREE_STACK: usize = 64;

@@ -4,7 +4,8 @@ use nearmiss_index::PointBlock;
 
 use super::Flaw;
 use crate::build::PointHierarchy;
-use crate::neighbours::{MOST_LISTED, NeighbourList};
+use crate::gather::NeighbourList;
+use crate::neighbours::MOST_LISTED;
 
 fn first_wrong(what: &'static str, index: Option<usize>) -> Result<(), Flaw> {
     index.map_or(Ok(()), |index| Err(Flaw::Value { what, index }))

@@ -5,7 +5,8 @@ use nearmiss_lanes::vector::dot;
 use super::{FARTHEST, Flaw};
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
-use crate::surfels::{NormalCone, PointKind, THICKNESS};
+use crate::kind::{PointKind, THICKNESS};
+use crate::surfels::NormalCone;
 
 /// Normals and the axes of their cones are unit, and cones hold their normals, to rounding.
 const NORMAL: f32 = 1e-5;

@@ -3,7 +3,7 @@
 
 use super::{FARTHEST, Flaw};
 use crate::build::PointHierarchy;
-use crate::covering::{Centres, Covering};
+use crate::covering::{Covering, centres_of};
 
 /// What rounding may make of a mean of radii.
 const MEAN: f32 = 1.0 + 1e-5;
@@ -50,7 +50,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         if samples.iter().zip(samples.iter().skip(1)).any(|(one, next)| one >= next) {
             return wrong("a sample of node", id);
         }
-        let centres = Centres::of(samples, &scan.positions);
+        let centres = centres_of(samples, &scan.positions);
         let radius = slices.covering_radius(id);
         for child in [id + 1, node.right as usize] {
             let away =

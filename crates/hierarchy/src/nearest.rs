@@ -9,11 +9,11 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{bits, lanes_of, product, seen_from};
 use nearmiss_surface::Centre;
 
-use super::{Siblings, WIDTH};
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
-use crate::gather::TREE_STACK;
-use crate::neighbours::GROWN;
+use crate::gather::GROWN;
+use crate::topology::TREE_STACK;
+use crate::wide::{Siblings, WIDTH};
 
 impl Siblings {
     /// The squared distances of a place from the four boxes.

@@ -5,8 +5,10 @@ use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
 
 use super::*;
+use crate::build::PointHierarchy;
 use crate::options::BuildOptions;
-use crate::slices::Part;
+use crate::part::Part;
+use nearmiss_geometry::NodeId;
 
 /// A blob, a sheet or a line of so many points.
 fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) -> PointHierarchy {

@@ -3,72 +3,10 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, u32x4};
 
-use super::{Child, LANES, Siblings, WIDTH, WideTree};
 use crate::four_nodes::{FourNodes, NodeBounds};
-use crate::growth::Growth;
-use crate::slices::{Part, Slices};
-
-/// What the enclosures of up to four children reach further than their boxes, as [`Growth::pairs`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[repr(C, align(16))]
-pub(super) struct Growths([[u32; WIDTH]; 3]);
-
-impl Growths {
-    pub(super) fn set(&mut self, lane: usize, growth: &Growth) {
-        for (row, pair) in self.0.iter_mut().zip(growth.pairs()) {
-            row[lane] = pair;
-        }
-    }
-}
-
-impl WideTree {
-    /// The children of an inner node: the first few of four.
-    ///
-    /// # Panics
-    /// When there is no such node, or it is a leaf.
-    #[inline]
-    #[must_use]
-    pub fn children(&self, node: Child) -> ([Child; WIDTH], usize) {
-        let siblings = &self.nodes[node.index()];
-        (siblings.children, siblings.lanes().count_ones() as usize)
-    }
-
-    /// The children of the children of an inner node, and those of its children that are leaves, in lanes;
-    /// and the lanes that are taken, as bits.
-    ///
-    /// # Panics
-    /// When there is no such node, or it is a leaf.
-    #[inline]
-    #[must_use]
-    pub fn grandchildren(&self, node: Child) -> ([Child; LANES], u32) {
-        let (mut below, mut taken) = ([Child::NONE; LANES], 0);
-        for (group, (siblings, lanes)) in self.groups(node).into_iter().enumerate() {
-            below[WIDTH * group..][..WIDTH].copy_from_slice(&self.nodes[siblings].children);
-            taken |= lanes << (WIDTH * group);
-        }
-        (below, taken)
-    }
-
-    /// For each child of an inner node the siblings that hold what takes its place among the grandchildren,
-    /// and their lanes: its own children, or itself.
-    #[inline(always)]
-    fn groups(&self, node: Child) -> [(usize, u32); WIDTH] {
-        let own = node.index();
-        let Siblings { children, .. } = &self.nodes[own];
-        let mut groups = [(own, 0); WIDTH];
-        for (lane, (group, child)) in groups.iter_mut().zip(children).enumerate() {
-            if *child == Child::NONE {
-                break;
-            }
-            *group = if child.is_leaf() {
-                (own, 1 << lane)
-            } else {
-                (child.index(), self.nodes[child.index()].lanes())
-            };
-        }
-        groups
-    }
-}
+use crate::part::Part;
+use crate::slices::Slices;
+use crate::wide::{Child, Growths, WIDTH};
 
 impl Slices<'_> {
     /// Box and enclosure of this part of a node.

@@ -1,0 +1,14 @@
+//! Surface or obstacle.
+
+/// What an enclosure of a node holds beside its points and their discs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The node's part of the implicit surface.
+    Surface = 0,
+    /// The node's part of the obstacle.
+    Obstacle = 1,
+}
+
+impl Part {
+    pub(crate) const BOTH: [Self; 2] = [Self::Surface, Self::Obstacle];
+}
