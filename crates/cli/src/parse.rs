@@ -8,6 +8,12 @@ pub(crate) fn parse_radius(text: &str) -> Result<f64, String> {
     radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
 }
 
+/// A length above zero.
+pub(crate) fn parse_length(text: &str) -> Result<f64, String> {
+    let length = text.parse().ok().filter(|l: &f64| *l > 0.0 && l.is_finite());
+    length.ok_or_else(|| "expected a length, more than zero, in the units of the input".into())
+}
+
 /// Reads a time with its unit.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let unit =

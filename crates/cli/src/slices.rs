@@ -5,16 +5,12 @@ mod export;
 mod inspect;
 mod labels;
 mod query;
+mod report;
 mod track;
 mod walk;
 mod walk_picture;
 
-use std::path::Path;
-use std::time::Duration;
-
 use clap::Subcommand;
-use nearmiss::slices::{About, Obstacle, SliceFolder};
-use serde::Serialize;
 
 pub use build::{BuildArgs, PixelArgs};
 pub use export::SlicesExportArgs;
@@ -22,8 +18,6 @@ pub use inspect::SlicesInspectArgs;
 pub use query::{FloorName, QueryArgs};
 pub use walk::{AvatarBox, ResponseName, WalkArgs};
 
-use crate::console::Results;
-use crate::digits::{count, short};
 use crate::error::CliError;
 
 const BUILD_EXAMPLES: &str = "\
@@ -65,104 +59,4 @@ pub(crate) fn run(command: &SlicesCommand) -> Result<(), CliError> {
         SlicesCommand::Walk(args) => walk::run(args),
         SlicesCommand::Export(args) => export::run(args),
     }
-}
-
-/// What `build` and `inspect` say of a map.
-#[derive(Debug, Serialize)]
-struct Report {
-    slices: u32,
-    distinct: usize,
-    width: u32,
-    height: u32,
-    pixel: f64,
-    slice_height: f64,
-    points: u64,
-    dropped: u64,
-    obstacle: f64,
-    noise: f64,
-    noise_estimated: bool,
-    bytes: u64,
-    seconds: f64,
-}
-
-impl Report {
-    fn new(folder: &SliceFolder, took: Duration) -> Self {
-        let (grid, about) = (folder.grid(), folder.about());
-        let [width, height, slices] = grid.counts;
-        Self {
-            slices,
-            distinct: folder.distinct(),
-            width,
-            height,
-            pixel: grid.pixel,
-            slice_height: grid.slice_height,
-            points: about.points,
-            dropped: about.left_out,
-            obstacle: about.share,
-            noise: about.noise,
-            noise_estimated: about.is_noise_estimated(),
-            bytes: folder.bytes(),
-            seconds: took.as_secs_f64(),
-        }
-    }
-
-    /// As JSON, or for people.
-    fn tell(&self, folder: &SliceFolder, json: bool) -> Result<(), CliError> {
-        let mut results = Results::new();
-        if json {
-            results.json(self)?;
-            return results.flush();
-        }
-        let (grid, about) = (folder.grid(), folder.about());
-        results.line(format_args!(
-            "slices     {} of {} × {} pixels, {} distinct; up is {}",
-            self.slices, self.width, self.height, self.distinct, grid.up
-        ))?;
-        results.line(format_args!(
-            "voxels     {} wide, {} high",
-            short(self.pixel),
-            short(self.slice_height)
-        ))?;
-        results.line(format_args!(
-            "obstacles  what spans more than {} upwards in a pixel ({:.1} % of a slice){}",
-            short(about.share * grid.slice_height),
-            100.0 * about.share,
-            of_noise(about)
-        ))?;
-        #[expect(clippy::cast_precision_loss, reason = "for people")]
-        let megabytes = self.bytes as f64 / 1e6;
-        let left_out = match self.dropped {
-            0 => String::new(),
-            n => format!(", {} left out", count(n, "other")),
-        };
-        results.line(format_args!(
-            "files      {megabytes:.2} MB, of {}{left_out}",
-            count(self.points, "point")
-        ))?;
-        results.line(format_args!("seconds    {:.2}", self.seconds))?;
-        results.flush()
-    }
-}
-
-/// How the rule of a map reckons with noise, for people.
-fn of_noise(about: &About) -> String {
-    let noise = short(about.noise);
-    match about.rule {
-        Obstacle::Share(_) => String::new(),
-        Obstacle::Slope { noise: Some(_), .. } => format!("; noise {noise}"),
-        Obstacle::Slope { .. } if about.is_noise_capped() => {
-            format!("; noise {noise}, estimated, of which no more is allowed for: give higher slices")
-        }
-        Obstacle::Slope { .. } => format!("; noise {noise}, estimated"),
-    }
-}
-
-fn open(folder: &Path) -> Result<SliceFolder, CliError> {
-    Ok(SliceFolder::open(folder)?)
-}
-
-/// A length above zero.
-fn parse_length(text: &str) -> Result<f64, String> {
-    let length = text.parse().ok().filter(|l: &f64| *l > 0.0 && l.is_finite());
-    length.ok_or_else(|| "expected a length, more than zero, in the units of the input".into())
 }

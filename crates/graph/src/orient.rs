@@ -16,53 +16,20 @@
 mod agreement;
 mod outwards;
 mod patches;
+mod sides;
 
+use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::ranges;
 
 use crate::Adjacency;
 use agreement::{Weights, agreement, strongest_first};
 use outwards::outwards;
 use patches::{Signed, Tree, Votes};
+pub use sides::{Decision, OrientedPart, Sides};
 
 /// Normals that agree like this lie on one smooth sheet. If a ring of such edges still turns a normal round,
 /// the sheet has one side only.
 const SMOOTH: f32 = 0.95;
-
-/// Which side is out, where something says so.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Sides<'a> {
-    /// Normals that the scan came with, one a point; zero or NaN where it had none.
-    pub normals: Option<&'a [[f32; 3]]>,
-    /// Where the scanner stood: normals point there.
-    pub scanner: Option<[f32; 3]>,
-}
-
-/// What decided the side of a component.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Decision {
-    /// The greater part of the scan's own normals.
-    Normals,
-    /// The greater part faces the scanner.
-    Scanner,
-    /// The volume it encloses is positive.
-    Volume,
-    /// Nothing: the sum of the normals has a positive component of largest magnitude.
-    Convention,
-}
-
-/// Points that edges connect.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OrientedPart {
-    /// The least index of a point.
-    pub first: u32,
-    /// Number of points.
-    pub points: u32,
-    /// Whether it has two sides: no ring of edges between normals that nearly agree turns a normal round.
-    pub orientable: bool,
-    /// What decided which is out.
-    pub decision: Decision,
-}
 
 /// How well normals could be oriented.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,7 +67,7 @@ pub fn orient(
     let edges = strongest_first(graph, positions, normals);
     let (smooth, rest) = edges.split_at(edges.partition_point(|edge| edge.along() >= SMOOTH));
     smooth.iter().for_each(|&edge| tree.join(edge));
-    let patches: Vec<Signed> = (0..id(count)).map(|i| tree.root(i)).collect();
+    let patches: Vec<Signed> = (0..id32(count)).map(|i| tree.root(i)).collect();
     let weights = Weights::new();
     let votes = tree.between(rest.iter().map(|&edge| Votes::new(edge, &weights)).collect());
     tree.join_by_votes(votes.clone());
@@ -124,11 +91,6 @@ pub fn orient(
     Orientation { confidence, parts }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "graphs have fewer than 2³² points")]
-fn id(i: usize) -> u32 {
-    i as u32
-}
-
 fn confidences(graph: &Adjacency, positions: &[[f32; 3]], normals: &[[f32; 3]], tree: &Tree) -> Vec<u8> {
     let stretches = ranges(graph.len(), |points| {
         let confidence = |i: usize| {
@@ -142,7 +104,7 @@ fn confidences(graph: &Adjacency, positions: &[[f32; 3]], normals: &[[f32; 3]], 
             }
             let share = if all > 0.0 { (votes / all).max(0.0) } else { 0.0 };
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255")]
-            let byte = (255.0 * share.min(tree.weakest(id(i)))).round() as u8;
+            let byte = (255.0 * share.min(tree.weakest(id32(i)))).round() as u8;
             byte
         };
         points.map(confidence).collect::<Vec<u8>>()

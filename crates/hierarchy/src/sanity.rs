@@ -2,6 +2,7 @@
 //! one is loaded, what their answers rely on too when the whole file is compared with its checksums
 //! ([`Check`](nearmiss_store::Check)), and all of it by [`PointHierarchy::sanity_check`].
 
+mod flaw;
 #[cfg(test)]
 mod lies;
 mod lists;
@@ -10,52 +11,13 @@ mod nodes;
 mod points;
 mod samples;
 
-use thiserror::Error;
-
 use nearmiss_geometry::nalgebra::Vector3;
+
+pub use flaw::Flaw;
 
 use crate::build::PointHierarchy;
 use crate::topology::Node;
 use crate::topology::TREE_STACK;
-
-/// No stored length exceeds this, so that no square of one overflows. Frames keep coordinates below 2³⁴.
-const FARTHEST: f32 = (1_u64 << 40) as f32;
-
-/// What is wrong with a hierarchy.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum Flaw {
-    /// Two arrays do not fit each other.
-    #[error("{array} has {found} entries where {expected} belong; prepare the scan again")]
-    Length {
-        /// Which array.
-        array: &'static str,
-        /// How many entries it has.
-        found: usize,
-        /// How many it should have.
-        expected: usize,
-    },
-    /// A node's children or points are not there, or not its own.
-    #[error("node {node} is not a node of this tree; prepare the scan again")]
-    Node {
-        /// Its id.
-        node: usize,
-    },
-    /// A number is none that a build writes, or contradicts what it says about others.
-    #[error("{what} {index} is wrong; prepare the scan again")]
-    Value {
-        /// Which number, and of what.
-        what: &'static str,
-        /// Whose.
-        index: usize,
-    },
-    /// A number about the whole scan is none that a build writes, or contradicts the arrays.
-    #[error("{what} is wrong; prepare the scan again")]
-    Metadata {
-        /// Which number.
-        what: &'static str,
-    },
-}
 
 /// Checks that the nodes form one tree over all points: each node is the child of one before it, splits its
 /// points between its children, and no leaf has more than `leaf_size`. One pass.

@@ -19,11 +19,13 @@ mod likelihood;
 mod manifold;
 mod margin;
 mod nearest_points;
+mod occupancy;
 mod options;
 mod pacer;
 mod point_gap;
 mod posed;
 mod priority;
+mod random;
 mod resolution;
 mod sampling;
 mod shape;
@@ -45,9 +47,12 @@ pub use crossing::{Disc, crossing};
 pub use curve::{Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, curves, curves_with};
 pub use distance::{Distance, DistanceOptions, DistancePlan, DistanceScratch, distance, distance_with};
 pub use hint::PairHint;
-pub use interpolation::{Brackets, Interpolation, Refinement, Surfels, occupancy, points_for};
 pub use manifold::ManifoldPoint;
-pub use options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};
+pub use occupancy::{occupancy, points_for};
+pub use options::{
+    Brackets, CollideOptions, CollidePlan, Detail, Interpolation, Method, Order, PlanError, Refinement,
+    Sampling, Semantics, Surfels,
+};
 pub use pacer::{Pacer, collide_paced};
 pub use shape::{NearestPoint, PlacedIndex, Shape, ShapeIndex};
 pub use verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};

@@ -1,12 +1,15 @@
 //! What is asked: options as plain numbers, and the plan that they validate to.
 
+mod interpolation;
+
 use nearmiss_hierarchy::{Part, PointHierarchy};
 use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::interpolation::{Interpolation, Refinement, Surfels};
 use crate::verdict::Evidence;
+
+pub use interpolation::{Brackets, Interpolation, Refinement, Surfels};
 
 /// What it means that two scans meet.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

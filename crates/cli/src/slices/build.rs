@@ -7,10 +7,11 @@ use nearmiss::io::{Pieces, PointPieces, ReadError, read_in_pieces};
 use nearmiss::slices::{Obstacle, Pixel, SliceBuilder, SliceOptions, SlicePlan, SliceTarget, Up};
 use nearmiss::{Aabb, CloudError};
 
-use super::{Report, open, parse_length};
+use super::report::{Report, open};
 use crate::console::{Console, now};
 use crate::error::CliError;
 use crate::input;
+use crate::parse::parse_length;
 use crate::preprocess::{FormatChoice, parse_format, parse_threads};
 
 /// Options of `slices build`.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::open;
+use super::report::open;
 use crate::console::{self, Console, Results};
 use crate::digits::count;
 use crate::error::CliError;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Report, open};
+use super::report::{Report, open};
 use crate::console::{self, now};
 use crate::error::CliError;
 

@@ -7,7 +7,7 @@ use nearmiss::slices::{Floor, ObjectError, Occupancy, SliceFolder, SliceMap, Sto
 use nearmiss::{Aabb, Pose};
 use serde::{Deserialize, Serialize};
 
-use super::open;
+use super::report::open;
 use crate::console::{self, Results, now};
 use crate::digits::{count, short};
 use crate::error::CliError;

@@ -10,12 +10,14 @@ use nearmiss::slices::{
 };
 use serde::Serialize;
 
+use super::report::open;
 use super::track::Track;
-use super::{open, parse_length, walk_picture};
+use super::walk_picture;
 use crate::console::{self, Console, Results};
 use crate::digits::{count, short};
 use crate::error::CliError;
 use crate::input::pieces;
+use crate::parse::parse_length;
 use crate::{output, picture};
 
 /// Options of `slices walk`.

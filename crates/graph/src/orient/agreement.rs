@@ -1,9 +1,9 @@
 //! How well two normals agree, and the edges in the order of that.
 
+use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::ranges;
 use nearmiss_lanes::vector::{dot, sub};
 
-use super::id;
 use crate::Adjacency;
 
 /// Steps of agreement that are told apart; edges of one step are taken in the order of their points.
@@ -105,7 +105,8 @@ pub(super) fn strongest_first(graph: &Adjacency, positions: &[[f32; 3]], normals
         for i in points {
             let (p, m) = (positions[i], normals[i]);
             for &j in graph.of(i).iter().filter(|&&j| i < j as usize) {
-                let edge = Edge::new([id(i), j], agreement(p, m, positions[j as usize], normals[j as usize]));
+                let edge =
+                    Edge::new([id32(i), j], agreement(p, m, positions[j as usize], normals[j as usize]));
                 counts[usize::from(edge.weakness)] += 1;
                 edges.push(edge);
             }

@@ -1,9 +1,10 @@
 //! What decides which of the two sides of a component is out.
 
+use nearmiss_lanes::id32;
 use nearmiss_lanes::vector::{dot, sub};
 
 use super::patches::Signed;
-use super::{Decision, OrientedPart, Sides, id};
+use super::sides::{Decision, OrientedPart, Sides};
 
 /// What speaks for the normals of a part as they are relative to its root.
 #[derive(Debug, Clone, Copy, Default)]
@@ -60,8 +61,8 @@ pub(super) fn outwards(
     for (i, root) in roots.iter().enumerate() {
         let part = &mut part_of[root.point as usize];
         if *part == u32::MAX {
-            *part = id(evidence.len());
-            evidence.push(Evidence { first: id(i), ..Evidence::default() });
+            *part = id32(evidence.len());
+            evidence.push(Evidence { first: id32(i), ..Evidence::default() });
         }
         let sums = &mut evidence[*part as usize];
         let sign = if root.turned { -1.0 } else { 1.0 };

@@ -1,7 +1,8 @@
 //! Patches along smooth sheets, and their signs by what the edges between them say together.
 
+use nearmiss_lanes::id32;
+
 use super::agreement::{Edge, Weights};
-use super::id;
 
 /// A point, and whether the normal of another is turned relative to its own.
 #[derive(Debug, Clone, Copy)]
@@ -47,9 +48,9 @@ pub(super) struct Tree {
 impl Tree {
     pub(super) fn new(count: usize) -> Self {
         Self {
-            above: (0..id(count)).map(|point| Signed { point, turned: false }).collect(),
+            above: (0..id32(count)).map(|point| Signed { point, turned: false }).collect(),
             size: vec![1; count],
-            joined: (0..id(count)).map(|point| (point, 1.0)).collect(),
+            joined: (0..id32(count)).map(|point| (point, 1.0)).collect(),
             twisted: vec![false; count],
         }
     }
@@ -125,7 +126,7 @@ impl Tree {
     /// joined, but for each that all its `votes` together speak against. These decide one after the other,
     /// until none is left; with each the votes that are followed weigh more, so that they come to an end.
     pub(super) fn settle(&mut self, votes: &[Votes]) -> Vec<bool> {
-        let mut turned: Vec<bool> = (0..id(self.above.len())).map(|i| self.root(i).turned).collect();
+        let mut turned: Vec<bool> = (0..id32(self.above.len())).map(|i| self.root(i).turned).collect();
         let mut by_set = by_set(votes);
         by_set.sort_unstable();
         let mut is_settled = false;
@@ -232,7 +233,7 @@ mod tests {
             let mut tree = Tree::new(usize::try_from(count).unwrap());
             let votes = tree.between(votes);
             tree.join_by_votes(votes.clone());
-            let joined: Vec<bool> = (0..id(tree.above.len())).map(|i| tree.root(i).turned).collect();
+            let joined: Vec<bool> = (0..id32(tree.above.len())).map(|i| tree.root(i).turned).collect();
             let mut settled = tree.settle(&votes);
             let best = followed(&votes, &settled);
             gained += best - followed(&votes, &joined);

@@ -4,7 +4,7 @@ use nearmiss_geometry::PointCloud;
 use nearmiss_lanes::vector::tangents;
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-use super::Flaw;
+use super::flaw::Flaw;
 use crate::build::PointHierarchy;
 use crate::covering::Covering;
 use crate::options::BuildOptions;

@@ -2,7 +2,7 @@
 
 use nearmiss_index::PointBlock;
 
-use super::Flaw;
+use super::flaw::Flaw;
 use crate::build::PointHierarchy;
 use crate::gather::NeighbourList;
 use crate::neighbours::MOST_LISTED;

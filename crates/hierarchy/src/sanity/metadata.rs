@@ -3,7 +3,7 @@
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_index::PointBlock;
 
-use super::{FARTHEST, Flaw};
+use super::flaw::{FARTHEST, Flaw};
 use crate::build::PointHierarchy;
 use crate::options::RADIUS_NEIGHBOURS;
 use crate::samples::SAMPLES;

@@ -3,7 +3,7 @@
 use bytemuck::cast_ref;
 use nearmiss_lanes::vector::{dot, sub};
 
-use super::{FARTHEST, Flaw};
+use super::flaw::{FARTHEST, Flaw};
 use crate::boxes::OrientedBox;
 use crate::growth::Growth;
 use crate::topology::Node;

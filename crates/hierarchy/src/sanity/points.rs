@@ -2,7 +2,7 @@
 
 use nearmiss_lanes::vector::dot;
 
-use super::{FARTHEST, Flaw};
+use super::flaw::{FARTHEST, Flaw};
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::kind::{PointKind, THICKNESS};

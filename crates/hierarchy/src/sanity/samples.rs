@@ -1,7 +1,7 @@
 //! Samples and coverings: a sample that is not there makes a query leave its arrays, a radius that is too
 //! short one miss a contact.
 
-use super::{FARTHEST, Flaw};
+use super::flaw::{FARTHEST, Flaw};
 use crate::build::PointHierarchy;
 use crate::covering::{Covering, centres_of};
 

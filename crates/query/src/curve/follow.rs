@@ -3,8 +3,8 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Evaluation, Status, step_onto_both};
 
-use super::trail::{Place, Trail};
-use super::{Curve, CurveEnd};
+use super::line::{Curve, CurveEnd};
+use super::trail::{PARALLEL, Place, Trail};
 use crate::budget::Meter;
 use crate::view::{ScanView, ViewScratch};
 
@@ -13,10 +13,6 @@ pub(super) const LONGEST: f64 = 2.0;
 
 /// The shortest, in the same radii: so exactly is it known where a curve ends.
 const SHORTEST: f64 = 1.0 / 64.0;
-
-/// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a
-/// bandwidth.
-pub(super) const PARALLEL: f64 = 0.01;
 
 /// So often a chord that turns too far is halved: to a quarter, which may turn sixteen times as much a
 /// length.

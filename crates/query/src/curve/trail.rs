@@ -3,7 +3,9 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::Evaluation;
 
-use super::PARALLEL;
+/// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a
+/// bandwidth.
+pub(super) const PARALLEL: f64 = 0.01;
 
 /// A place on two surfaces, or nearly so.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,11 +9,13 @@ use nearmiss_hierarchy::NodePair;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::root::{GraphPath, Root, Slope, find_root};
-use super::volume::{Bounds, Volume};
-use super::{Brackets, Interpolation, Side, Surfels};
+use super::sides::Side;
+use super::survey::Bounds;
+use super::volume::Volume;
 use crate::crossing::crossing;
 use crate::disc_pair::FAR;
-use crate::sampling::{FLAT, below, stream};
+use crate::options::{Brackets, Interpolation, Surfels};
+use crate::random::{FLAT, below, stream};
 use crate::surface::Surfaces;
 use crate::verdict::{Contact, Reason};
 

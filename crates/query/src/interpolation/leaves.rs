@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use nearmiss_hierarchy::NodePair;
 
-use super::Interpolation;
+use crate::options::Interpolation;
 use crate::surface::Surfaces;
 
 /// Distances from b at the ends of an edge that crosses it add up to no more than its length; noise and
@@ -18,7 +18,7 @@ impl Surfaces<'_> {
         let points = self.pair.b.nodes[pair.b.index()].points();
         vb.scan().is_oriented()
             && vb.graph().is_some_and(|graph| {
-                graph.confidence()[points].iter().all(|&sure| sure >= super::side::CERTAIN)
+                graph.confidence()[points].iter().all(|&sure| sure >= super::sides::CERTAIN)
             })
     }
 

@@ -1,6 +1,6 @@
 //! Drawn points in a grid: for each the nearest of those before it on the other side.
 
-use super::Side;
+use super::sides::Side;
 
 /// A drawn point.
 #[derive(Debug, Clone, Copy)]
@@ -96,7 +96,8 @@ impl Drawn {
 
 #[cfg(test)]
 mod tests {
-    use super::{Drawn, Side};
+    use super::Drawn;
+    use crate::interpolation::sides::Side;
 
     /// Against all pairs, with points far outside of the grid's numbers among them.
     #[test]

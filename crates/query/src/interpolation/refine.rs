@@ -6,9 +6,10 @@ use nearmiss_surface::Status;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 
-use super::{Interpolation, Refinement, points_to_draw};
+use crate::occupancy::points_to_draw;
 use crate::options::Detail;
-use crate::sampling::place_in;
+use crate::options::{Interpolation, Refinement};
+use crate::random::place_in;
 use crate::surface::Surfaces;
 use crate::verdict::Contact;
 

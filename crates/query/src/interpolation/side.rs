@@ -6,53 +6,8 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::Status;
 
+use super::sides::{CERTAIN, Side};
 use crate::surface::Surfaces;
-
-/// Orientation less certain than this, of 255, says nothing about sides.
-pub(super) const CERTAIN: u8 = 64;
-
-/// On which side of b a place is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Side {
-    /// How far from the surface, in the world: positive outside, negative inside.
-    pub(crate) distance: f64,
-    /// The nearest point of b.
-    pub(crate) near: u32,
-    /// How far away that is.
-    pub(crate) away: f64,
-    /// Whether the sign means something: normals are oriented there, and sure of it.
-    pub(crate) is_known: bool,
-}
-
-impl Side {
-    /// The signed distance, if the sign means something.
-    pub(crate) fn known(&self) -> Option<f64> {
-        self.is_known.then_some(self.distance)
-    }
-
-    pub(crate) fn is_opposite(&self, other: &Self) -> bool {
-        self.is_known && other.is_known && (self.distance < 0.0) != (other.distance < 0.0)
-    }
-}
-
-/// So many sides of points are remembered.
-const REMEMBERED: usize = 1024;
-
-/// Sides of points of a that were looked up last.
-#[derive(Debug, Clone)]
-pub(crate) struct Cache(Vec<Option<(u32, Side)>>);
-
-impl Default for Cache {
-    fn default() -> Self {
-        Self(vec![None; REMEMBERED])
-    }
-}
-
-impl Cache {
-    pub(crate) fn clear(&mut self) {
-        self.0.fill(None);
-    }
-}
 
 impl Surfaces<'_> {
     /// The side of a place in the world; fast if b has the point `hint` near there.
@@ -92,12 +47,11 @@ impl Surfaces<'_> {
 
     /// The same, remembered for a while.
     pub(crate) fn side_again(&mut self, i: u32, hint: u32) -> Side {
-        let slot = i as usize % REMEMBERED;
-        match self.interpolation.sides.0[slot] {
+        match *self.interpolation.sides.slot(i) {
             Some((point, side)) if point == i => side,
             _ => {
                 let side = self.side(i, hint);
-                self.interpolation.sides.0[slot] = Some((i, side));
+                *self.interpolation.sides.slot(i) = Some((i, side));
                 side
             }
         }

@@ -1,0 +1,105 @@
+//! What is told of slice maps.
+
+use std::path::Path;
+use std::time::Duration;
+
+use nearmiss::slices::{About, Obstacle, SliceFolder};
+use serde::Serialize;
+
+use crate::console::Results;
+use crate::digits::{count, short};
+use crate::error::CliError;
+
+/// What `build` and `inspect` say of a map.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    slices: u32,
+    distinct: usize,
+    width: u32,
+    height: u32,
+    pixel: f64,
+    slice_height: f64,
+    points: u64,
+    dropped: u64,
+    obstacle: f64,
+    noise: f64,
+    noise_estimated: bool,
+    bytes: u64,
+    seconds: f64,
+}
+
+impl Report {
+    pub(super) fn new(folder: &SliceFolder, took: Duration) -> Self {
+        let (grid, about) = (folder.grid(), folder.about());
+        let [width, height, slices] = grid.counts;
+        Self {
+            slices,
+            distinct: folder.distinct(),
+            width,
+            height,
+            pixel: grid.pixel,
+            slice_height: grid.slice_height,
+            points: about.points,
+            dropped: about.left_out,
+            obstacle: about.share,
+            noise: about.noise,
+            noise_estimated: about.is_noise_estimated(),
+            bytes: folder.bytes(),
+            seconds: took.as_secs_f64(),
+        }
+    }
+
+    /// As JSON, or for people.
+    pub(super) fn tell(&self, folder: &SliceFolder, json: bool) -> Result<(), CliError> {
+        let mut results = Results::new();
+        if json {
+            results.json(self)?;
+            return results.flush();
+        }
+        let (grid, about) = (folder.grid(), folder.about());
+        results.line(format_args!(
+            "slices     {} of {} × {} pixels, {} distinct; up is {}",
+            self.slices, self.width, self.height, self.distinct, grid.up
+        ))?;
+        results.line(format_args!(
+            "voxels     {} wide, {} high",
+            short(self.pixel),
+            short(self.slice_height)
+        ))?;
+        results.line(format_args!(
+            "obstacles  what spans more than {} upwards in a pixel ({:.1} % of a slice){}",
+            short(about.share * grid.slice_height),
+            100.0 * about.share,
+            of_noise(about)
+        ))?;
+        #[expect(clippy::cast_precision_loss, reason = "for people")]
+        let megabytes = self.bytes as f64 / 1e6;
+        let left_out = match self.dropped {
+            0 => String::new(),
+            n => format!(", {} left out", count(n, "other")),
+        };
+        results.line(format_args!(
+            "files      {megabytes:.2} MB, of {}{left_out}",
+            count(self.points, "point")
+        ))?;
+        results.line(format_args!("seconds    {:.2}", self.seconds))?;
+        results.flush()
+    }
+}
+
+/// How the rule of a map reckons with noise, for people.
+fn of_noise(about: &About) -> String {
+    let noise = short(about.noise);
+    match about.rule {
+        Obstacle::Share(_) => String::new(),
+        Obstacle::Slope { noise: Some(_), .. } => format!("; noise {noise}"),
+        Obstacle::Slope { .. } if about.is_noise_capped() => {
+            format!("; noise {noise}, estimated, of which no more is allowed for: give higher slices")
+        }
+        Obstacle::Slope { .. } => format!("; noise {noise}, estimated"),
+    }
+}
+
+pub(super) fn open(folder: &Path) -> Result<SliceFolder, CliError> {
+    Ok(SliceFolder::open(folder)?)
+}
