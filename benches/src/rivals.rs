@@ -4,38 +4,18 @@ pub mod eigen;
 pub mod grid;
 pub mod jacobi;
 pub mod kiddo;
+mod method;
 pub mod ours;
 pub mod parry;
 pub mod triangles;
 pub mod trimesh;
 
-use nearmiss::{BuildOptions, CollideOptions, Detail, Pose, Scan};
+use nearmiss::{BuildOptions, CollideOptions, Detail, Scan};
+
+pub use method::{Method, Reply};
 
 use crate::Failure;
 use crate::object::Object;
-
-/// An answer to the boolean question, with what it cost where that is counted.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Reply {
-    /// Whether the two copies meet.
-    pub hit: bool,
-    /// Evaluations of an implicit function; triangle or point tests of a rival.
-    pub evaluations: u64,
-    /// Node pairs.
-    pub node_pairs: u64,
-}
-
-/// A way to answer whether two posed copies of one object meet.
-pub trait Method {
-    /// What to call it in a table.
-    fn name(&self) -> String;
-
-    /// Done before each question, and not timed.
-    fn prepare(&mut self) {}
-
-    /// Whether the copies at `a` and `b` meet. Poses are rigid; all work that depends on them is done here.
-    fn ask(&mut self, a: &Pose, b: &Pose) -> Reply;
-}
 
 /// A rival by its name: `parry`, `trimesh` or `kiddo`; `None` if it needs a mesh and the object has none.
 ///

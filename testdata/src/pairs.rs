@@ -11,6 +11,7 @@
 mod ball;
 mod bodies;
 mod families;
+mod place;
 mod sheets;
 mod spheres;
 
@@ -176,7 +177,7 @@ fn pairs_of(
     family: &Family,
     [a, b]: [usize; 2],
     repeats: u32,
-    rng: &mut families::Stream,
+    rng: &mut place::Stream,
 ) {
     /// A placement that a random direction does not allow is tried again this often.
     const TRIES: usize = 8;
@@ -184,7 +185,7 @@ fn pairs_of(
     let r = set.radii[a].max(set.radii[b]);
     for multiple in MULTIPLES.iter().flat_map(|m| [*m, -*m]) {
         for _ in 0..repeats {
-            let wanted = families::Wanted { gap: multiple * r, r };
+            let wanted = place::Wanted { gap: multiple * r, r };
             let found = (0..TRIES).find_map(|_| (family.place)(&shape_a.form, &shape_b.form, wanted, rng));
             let Some(placed) = found else { continue };
             let everything = pose(rng, 2.0);

@@ -7,25 +7,16 @@
 //!
 //! Random numbers are the same on every platform; sines and logarithms may differ in their last bit.
 
+mod form;
 mod forms;
 mod mesh;
 mod primitive;
 mod sampling;
 
+pub use form::Form;
 pub use forms::{avatar, bars, bowl, building, cuboid, field, patch, plates, shells, sphere, step, torus};
 pub use primitive::Primitive;
 pub use sampling::{Order, Sampling, scorer_radius};
-
-/// An exact surface: the union of its primitives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Form {
-    /// What it is called.
-    pub name: &'static str,
-    /// The parts. They may touch and cross.
-    pub parts: Vec<Primitive>,
-    /// Whether the union is connected; if not, every part is a component of its own.
-    pub connected: bool,
-}
 
 /// A form with points sampled from it.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,19 +30,6 @@ pub struct Shape {
 }
 
 impl Form {
-    /// Exact distance of `x` to the nearest point of the surface, never negative.
-    #[must_use]
-    pub fn distance(&self, x: [f64; 3]) -> f64 {
-        self.parts.iter().map(|part| part.distance(x)).fold(f64::INFINITY, f64::min)
-    }
-
-    /// The spacing that gives about `n` points.
-    #[must_use]
-    pub fn spacing_for(&self, n: u32) -> f64 {
-        let area: f64 = self.parts.iter().map(Primitive::area).sum();
-        (area / f64::from(n.max(1))).sqrt()
-    }
-
     /// Samples it.
     #[must_use]
     pub fn sample(self, sampling: Sampling) -> Shape {

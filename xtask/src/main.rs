@@ -16,6 +16,7 @@
 
 mod check_proof;
 mod checks;
+mod circles;
 mod demo;
 mod field;
 mod fuzz;

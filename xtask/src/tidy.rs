@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::circles::circles;
 use crate::repository::{Outcome, ask_cargo, members, root};
 
 /// A file longer than this is more than one noun or one step.
@@ -97,6 +98,8 @@ fn find_faults() -> Outcome<Vec<String>> {
                 faults.push(format!("{} may not use {used}: it is no layer below", member.name));
             }
         }
+        let circles = circles(&member.folder.join("src"))?;
+        faults.extend(circles.into_iter().map(|circle| format!("{}: {circle}", member.name)));
         if member.published {
             faults.extend(readme_faults(&member.folder));
         }

@@ -8,7 +8,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::{Aabb, PointCloud, Pose};
 
 use crate::Failure;
-use crate::rivals::{Method, Reply};
+use crate::rivals::method::{Method, Reply};
 
 /// Points under a kd-tree, and how near is a hit.
 #[expect(missing_debug_implementations, reason = "the tree's is a dump of all its points")]

@@ -10,7 +10,7 @@ use nearmiss::{
 
 use crate::Failure;
 use crate::asked::{Limits, best_effort};
-use crate::rivals::{Method, Reply};
+use crate::rivals::method::{Method, Reply};
 
 /// Two prepared scans, often one and a copy of itself, with a scratch that is kept.
 #[derive(Debug, Clone)]

@@ -12,8 +12,8 @@ use parry3d::glamx::{Mat3A, Vec3A};
 use parry3d::math::Vector;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
+use crate::rivals::method::{Method, Reply};
 use crate::rivals::triangles::{Triangle, intersect, normal};
-use crate::rivals::{Method, Reply};
 
 /// Added to the absolute values of a rotation: more than single precision rounds.
 const ROUNDING: f32 = 1e-6;

@@ -6,7 +6,7 @@ use parry3d::query::intersection_test;
 use parry3d::shape::TriMesh;
 
 use crate::Failure;
-use crate::rivals::{Method, Reply};
+use crate::rivals::method::{Method, Reply};
 
 /// A triangle mesh as parry's shape.
 #[expect(missing_debug_implementations, reason = "the shape's is a dump of all its triangles")]

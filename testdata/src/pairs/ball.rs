@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use nearmiss_geometry::Pose;
 use rand::RngExt;
 
-use super::families::{Placed, Stream, Wanted};
+use super::place::{Placed, Stream, Wanted};
 use crate::arbitrary::{rotation, unit_vector};
 use crate::shapes::{Form, Primitive};
 

@@ -1,27 +1,9 @@
 //! The table of families: which bodies, placed how, and why the answer is known.
 
-use nearmiss_geometry::Pose;
-use rand_xoshiro::Xoshiro256PlusPlus;
-
 use super::bodies::Body;
+use super::place::{Placed, Stream, Wanted};
 use super::{ball, sheets, spheres};
 use crate::shapes::Form;
-
-pub(super) type Stream = Xoshiro256PlusPlus;
-
-/// The gap to aim at, and the radius it is judged by.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Wanted {
-    pub(super) gap: f64,
-    pub(super) r: f64,
-}
-
-/// Where B went in A's frame, and the gap there.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
-    pub(super) pose_b: Pose,
-    pub(super) gap: f64,
-}
 
 /// `None` when the forms or this draw do not allow the gap wanted.
 type Place = fn(&Form, &Form, Wanted, &mut Stream) -> Option<Placed>;

@@ -3,7 +3,7 @@
 use nearmiss_geometry::Pose;
 use rand::RngExt;
 
-use super::families::{Placed, Stream, Wanted};
+use super::place::{Placed, Stream, Wanted};
 use crate::shapes::{Form, Primitive};
 
 /// Width and depth of the first rectangle, and the height of the uppermost; all lie level about the z axis.

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{Form, Primitive};
+use super::form::Form;
+use super::primitive::Primitive;
 
 impl Form {
     /// Least and greatest coordinates of a box around it.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::Form;
+use super::form::Form;
 use super::primitive::{Oriented, Primitive};
 use crate::arbitrary::{gaussian, rng};
 use crate::oracle;
