@@ -20,7 +20,7 @@ impl Slices<'_> {
         NodeBounds::of(&self.boxes[id], &self.growths_of(part)[id])
     }
 
-    /// Those of [`WideTree::children`], in the same order; what there is in other lanes says nothing.
+    /// Those of [`crate::WideTree::children`], in the same order; what there is in other lanes says nothing.
     ///
     /// # Panics
     /// When there is no such node, or it is a leaf.
@@ -30,7 +30,7 @@ impl Slices<'_> {
         self.siblings(simd, part, node.index())
     }
 
-    /// Those of [`WideTree::grandchildren`], in the same order; what there is in other lanes says nothing.
+    /// Those of [`crate::WideTree::grandchildren`], in the same order; what there is in other lanes says nothing.
     ///
     /// # Panics
     /// When there is no such node, or it is a leaf.

@@ -101,7 +101,7 @@ impl Growths {
 #[derive(Debug, Clone, Default)]
 pub struct WideTree {
     pub(crate) nodes: Vec<Siblings>,
-    /// What the enclosures of the same children reach further, by [`Part`].
+    /// What the enclosures of the same children reach further, by [`crate::Part`].
     pub(crate) growths: [Vec<Growths>; 2],
     /// The id of each node in the binary tree.
     ids: Vec<u32>,

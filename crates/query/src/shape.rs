@@ -2,7 +2,7 @@
 //!
 //! A shape touches a scan if a point of it is in the shape: what a robot of spheres asks of a depth frame.
 //! Points are held in blocks of sixteen, with bounds about blocks, about sixteen of these, and so on
-//! (`surface::BlockTree`); the blocks are those of the scan. A grid tells which blocks are near small spheres
+//! (`index::BlockTree`); the blocks are those of the scan. A grid tells which blocks are near small spheres
 //! (`surface::Cells`).
 
 use fearless_simd::Level;

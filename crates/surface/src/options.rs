@@ -147,6 +147,7 @@ pub struct SurfacePlan {
 
 impl SurfacePlan {
     /// All points of a scan in blocks, given their positions and local sampling radii.
+    #[must_use]
     pub fn blocks(&self, positions: &[[f32; 3]], radii: &[f32]) -> impl ExactSizeIterator<Item = PointBlock> {
         PointBlock::silent(positions).zip(radii.chunks(PointBlock::WIDTH)).map(|(mut block, radii)| {
             self.tune(&mut block, radii);

@@ -17,7 +17,7 @@ pub enum CurveEnd {
     Budget,
 }
 
-/// One of [`Curves`].
+/// One of [`crate::Curves`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Curve {
     /// Its first point.
