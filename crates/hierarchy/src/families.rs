@@ -30,7 +30,8 @@ impl Slices<'_> {
         self.siblings(simd, part, node.index())
     }
 
-    /// Those of [`crate::WideTree::grandchildren`], in the same order; what there is in other lanes says nothing.
+    /// Those of [`crate::WideTree::grandchildren`], in the same order; what there is in other lanes says
+    /// nothing.
     ///
     /// # Panics
     /// When there is no such node, or it is a leaf.

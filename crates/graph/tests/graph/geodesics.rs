@@ -1,9 +1,7 @@
 //! Shortest paths and the map of close pairs against relaxing every edge until nothing changes.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod clouds;
-
-use clouds::{Cloud, single};
+use crate::clouds::{Cloud, single};
 use nearmiss_graph::{Adjacency, ClosePairs, GeodesicScratch, Network, Paths, edge_lengths};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 use nearmiss_testdata::shapes::torus;
@@ -17,7 +15,7 @@ fn relaxed(graph: &Adjacency, points: &[[f32; 3]], source: usize) -> Vec<(f64, f
         for i in 0..points.len() {
             for &j in graph.of(i) {
                 let (p, q) = (points[i], points[j as usize]);
-                let exact = known[i].0 + clouds::distance(&p, &q);
+                let exact = known[i].0 + crate::clouds::distance(&p, &q);
                 let [x, y, z] = [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
                 let edge = (x * x + y * y + z * z).sqrt();
                 let single = (known[i].1 + edge).max(known[i].1.next_up());
@@ -90,7 +88,7 @@ fn paths_are_as_long_as_said_and_go_along_edges() {
         assert_eq!((path[0], path[path.len() - 1]), (a, b));
         let long = path.windows(2).map(|two| {
             assert!(cloud.graph.of(two[0] as usize).contains(&two[1]), "{two:?} is no edge");
-            clouds::distance(&cloud.points[two[0] as usize], &cloud.points[two[1] as usize])
+            crate::clouds::distance(&cloud.points[two[0] as usize], &cloud.points[two[1] as usize])
         });
         let long: f64 = long.sum();
         assert!((long - f64::from(distance)).abs() < 1e-5, "{long} along a path of {distance}");
@@ -246,7 +244,10 @@ fn stored_and_rebuilt_paths_are_shortest() {
                     assert_eq!([path[0], path[path.len() - 1]], [id, close.point]);
                     let edges = path.windows(2).map(|two| {
                         assert!(cloud.graph.of(two[0] as usize).contains(&two[1]), "{two:?} is no edge");
-                        clouds::distance(&cloud.points[two[0] as usize], &cloud.points[two[1] as usize])
+                        crate::clouds::distance(
+                            &cloud.points[two[0] as usize],
+                            &cloud.points[two[1] as usize],
+                        )
                     });
                     let along: f64 = edges.sum();
                     assert!(is_near(length, along, 1e-5), "{along} along a path of {length}");

@@ -1,11 +1,9 @@
 //! Interpolation search as leaf test, against all edges of a and f of b by its sums.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod graphed;
-
 use std::collections::BTreeSet;
 
-use graphed::Scan;
+use crate::graphed::Scan;
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::BuildOptions;

@@ -6,9 +6,9 @@ use nearmiss::store::{Fault, File, WriteError, WriteStep};
 use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud, Scan};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-use crate::damage::restate_length;
-use crate::exercise::exercise;
-use crate::repair::{HEADER, ROW, repair};
+use crate::hostile::damage::restate_length;
+use crate::hostile::exercise::exercise;
+use crate::hostile::repair::{HEADER, ROW, repair};
 
 fn scan(seed: u64) -> Scan {
     let points = arbitrary::cloud(CloudKind::Sphere, 120, seed);

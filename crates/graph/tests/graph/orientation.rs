@@ -1,9 +1,7 @@
 //! Oriented normals against those of shapes that are known, from arbitrary signs.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod clouds;
-
-use clouds::{Cloud, single};
+use crate::clouds::{Cloud, single};
 use nearmiss_geometry::TriangleMesh;
 use nearmiss_graph::{Adjacency, Decision, Orientation, Sides, orient};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};

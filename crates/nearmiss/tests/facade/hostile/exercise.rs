@@ -6,7 +6,7 @@ use nearmiss::{
     Scan, Semantics, Verdict, collide_with,
 };
 
-use crate::graph::{GraphAnswers, exercise_graph};
+use crate::hostile::graph::{GraphAnswers, exercise_graph};
 
 /// What a scan answered.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,6 @@
 //! Random damage, the same for the same seed.
 
-use crate::repair::{HEADER, ROW};
+use crate::hostile::repair::{HEADER, ROW};
 
 /// `SplitMix64`.
 pub(crate) struct Random(pub(crate) u64);

@@ -1,9 +1,7 @@
 //! Close pairs and levels in a container, and containers that lie.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod clouds;
-
-use clouds::Cloud;
+use crate::clouds::Cloud;
 use nearmiss_graph::{
     Adjacency, ClosePairs, Flaw, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels,
     LoadError, Network, Paths,

@@ -2,9 +2,7 @@
 //! asserted is that the search ends, makes nothing up and says where it could not go on.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod cut;
-
-use cut::{assert_whole, draw, fine, scans, to_found, to_segment};
+use crate::cut::{assert_whole, draw, fine, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{CurveEnd, CurveOptions, Curves, ScanView};

@@ -9,9 +9,9 @@ use nearmiss::{
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-use crate::damage::{Random, damage, restate_length};
-use crate::exercise::{Answers, exercise};
-use crate::repair::repair;
+use crate::hostile::damage::{Random, damage, restate_length};
+use crate::hostile::exercise::{Answers, exercise};
+use crate::hostile::repair::repair;
 
 /// No single file may cost more, on any machine that runs tests.
 const LONGEST: Duration = Duration::from_secs(20);

@@ -1,9 +1,7 @@
 //! Curves against those known exactly: nothing missing, nothing made up, loops closed, ends at borders.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod cut;
-
-use cut::{assert_whole, draw, fine, hausdorff, nearest_true, scans, to_found, to_segment};
+use crate::cut::{assert_whole, draw, fine, hausdorff, nearest_true, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{

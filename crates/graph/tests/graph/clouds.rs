@@ -1,6 +1,5 @@
 //! Clouds with graphs for the tests here: the spheres of influence of the fourth neighbour, found in other
 //! ways than ours.
-#![allow(dead_code, reason = "no test program uses all of it")]
 
 use std::num::NonZero;
 

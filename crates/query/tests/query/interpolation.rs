@@ -1,9 +1,7 @@
 //! Interpolation search: its verdicts, against the truth and the traversal's.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod graphed;
-
-use graphed::Scan;
+use crate::graphed::Scan;
 use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::BuildOptions;
 use nearmiss_query::{

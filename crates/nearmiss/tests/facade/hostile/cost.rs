@@ -21,7 +21,7 @@ fn with_boundless_boxes(scan: &Scan, half: f32) -> Scan {
     for one in bytes[start..end].chunks_exact_mut(64) {
         one.copy_from_slice(&vast);
     }
-    crate::repair::repair(&mut bytes);
+    crate::hostile::repair::repair(&mut bytes);
     Scan::from_bytes(bytes, Check::Structure).unwrap()
 }
 

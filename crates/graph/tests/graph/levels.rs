@@ -1,9 +1,7 @@
 //! Coarser levels: what they promise of centres and cells, and paths against searches of the whole graph.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod clouds;
-
-use clouds::{Cloud, single};
+use crate::clouds::{Cloud, single};
 use nearmiss_graph::{Adjacency, Cells, GeodesicScratch, LevelScratch, Levels, Network};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 use nearmiss_testdata::shapes::{Form, bowl, plates, torus};

@@ -1,16 +1,14 @@
 //! Paths of which only some points are known: whole ones against the graph, and looks against whole ones.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod clouds;
-
-use clouds::Cloud;
+use crate::clouds::Cloud;
 use nearmiss_graph::{GeodesicScratch, LazyPath, Levels, Network, PathPoint};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud, rng};
 use nearmiss_testdata::shapes::torus;
 use rand::RngExt;
 
 fn single(points: Vec<[f64; 3]>) -> Vec<[f32; 3]> {
-    clouds::single(&points)
+    crate::clouds::single(&points)
 }
 
 /// Every step is an edge, as long as it says, and the ends are right.

@@ -1,9 +1,7 @@
 //! What the surfaces of `nearmiss-surface` must do, with distances along the graph.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-mod clouds;
-
-use clouds::Cloud;
+use crate::clouds::Cloud;
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{Close, ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, Network, Paths};
 use nearmiss_surface::{Evaluation, Kernel, Level, Moments, Status, SurfaceOptions, SurfacePlan, project};
@@ -203,7 +201,7 @@ fn weights_are_those_of_the_formulas_at_every_level() {
 fn foot_between(sheet: &Sheet, [a, b]: [u32; 2], share: f64) -> nearmiss_graph::Foot {
     let [p, q] = [a, b].map(|i| sheet.cloud.points[i as usize]);
     #[expect(clippy::cast_possible_truncation, reason = "a length")]
-    nearmiss_graph::Foot { ends: [a, b], share, length: clouds::distance(&p, &q) as f32 }
+    nearmiss_graph::Foot { ends: [a, b], share, length: crate::clouds::distance(&p, &q) as f32 }
 }
 
 #[test]

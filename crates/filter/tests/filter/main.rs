@@ -1,0 +1,4 @@
+//! Filters: everything is one program, which links once.
+
+mod threads;
+mod twin;

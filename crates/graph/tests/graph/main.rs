@@ -1,0 +1,13 @@
+//! The graph: everything is one program, which links once.
+
+mod clouds;
+mod geodesics;
+mod kernel;
+mod lazy_paths;
+mod levels;
+mod looks;
+mod orientation;
+mod stored;
+mod stored_paths;
+mod twin;
+mod updates;

@@ -1,0 +1,19 @@
+//! Queries: everything is one program, which links once.
+
+mod all;
+mod batch;
+mod coherence;
+mod curves;
+mod curves_hard;
+mod cut;
+mod distance;
+mod graphed;
+mod interpolation;
+mod interpolation_leaves;
+mod manifold;
+mod margin;
+mod orders;
+mod shapes;
+mod sparse;
+mod twin;
+mod world;

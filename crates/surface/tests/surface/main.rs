@@ -1,0 +1,5 @@
+//! The surface: everything is one program, which links once.
+
+mod absurd;
+mod conformance;
+mod eigen;
