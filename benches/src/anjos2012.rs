@@ -52,7 +52,7 @@ impl Walked {
     /// # Errors
     /// When it cannot be read.
     pub fn scan(data: &Path) -> Result<Self, Failure> {
-        let cloud = nearmiss::io::read(&data.join(TWO_STOREYS.file), None)?.cloud;
+        let cloud = nearmiss::io::read(data.join(TWO_STOREYS.file), None)?.cloud;
         Ok(Self { cloud, route: serde_json::from_str(TWO_STOREYS.route)? })
     }
 

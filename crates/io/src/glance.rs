@@ -40,7 +40,8 @@ pub struct Glance {
 /// Returns `None` if the file cannot be read or is of an unknown format. A header that promises more points
 /// than the file has space for is not believed.
 #[must_use]
-pub fn glance(path: &Path, format: Option<Format>) -> Option<Glance> {
+pub fn glance(path: impl AsRef<Path>, format: Option<Format>) -> Option<Glance> {
+    let path = path.as_ref();
     check_file(path).ok()?;
     let mut file = File::open(path).ok()?;
     let bytes = file.metadata().ok()?.len();

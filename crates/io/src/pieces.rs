@@ -53,7 +53,12 @@ enum Source {
 ///
 /// # Errors
 /// As [`read`](crate::read()), as far as the header tells. That there are too few points for a cloud is none.
-pub fn read_in_pieces(path: &Path, format: Option<Format>, block: usize) -> Result<Pieces, ReadError> {
+pub fn read_in_pieces(
+    path: impl AsRef<Path>,
+    format: Option<Format>,
+    block: usize,
+) -> Result<Pieces, ReadError> {
+    let path = path.as_ref();
     let failed = |cause| ReadError::Io { path: path.into(), cause };
     check_file(path)?;
     let mut file = File::open(path).map_err(failed)?;

@@ -18,7 +18,8 @@ use crate::{obj, pcd, ply, xyz};
 ///
 /// # Errors
 /// Says which file, what is wrong and where; never panics, whatever the file holds.
-pub fn read(path: &Path, format: Option<Format>) -> Result<Model, ReadError> {
+pub fn read(path: impl AsRef<Path>, format: Option<Format>) -> Result<Model, ReadError> {
+    let path = path.as_ref();
     read_bytes(&load(path)?, format, path)
 }
 
@@ -26,7 +27,8 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Model, ReadError> {
 ///
 /// # Errors
 /// As [`read`], input and output apart.
-pub fn read_bytes(bytes: &[u8], format: Option<Format>, name: &Path) -> Result<Model, ReadError> {
+pub fn read_bytes(bytes: &[u8], format: Option<Format>, name: impl AsRef<Path>) -> Result<Model, ReadError> {
+    let name = name.as_ref();
     parse(bytes, format, name)?.into_model(name)
 }
 
@@ -34,7 +36,8 @@ pub fn read_bytes(bytes: &[u8], format: Option<Format>, name: &Path) -> Result<M
 ///
 /// # Errors
 /// As [`read`], and when the file has no faces.
-pub fn read_mesh(path: &Path, format: Option<Format>) -> Result<TriangleMesh, ReadError> {
+pub fn read_mesh(path: impl AsRef<Path>, format: Option<Format>) -> Result<TriangleMesh, ReadError> {
+    let path = path.as_ref();
     read_mesh_bytes(&load(path)?, format, path)
 }
 
@@ -42,7 +45,12 @@ pub fn read_mesh(path: &Path, format: Option<Format>) -> Result<TriangleMesh, Re
 ///
 /// # Errors
 /// As [`read_mesh`], input and output apart.
-pub fn read_mesh_bytes(bytes: &[u8], format: Option<Format>, name: &Path) -> Result<TriangleMesh, ReadError> {
+pub fn read_mesh_bytes(
+    bytes: &[u8],
+    format: Option<Format>,
+    name: impl AsRef<Path>,
+) -> Result<TriangleMesh, ReadError> {
+    let name = name.as_ref();
     let no_faces = || ReadError::NoFaces { path: name.into() };
     parse(bytes, format, name)?.into_mesh(name)?.ok_or_else(no_faces)
 }

@@ -31,10 +31,11 @@ pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, CollideOptions, CollidePlan, CollideScratch,
     Contact, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, Detail,
     Distance, DistanceOptions, DistancePlan, DistanceScratch, Evidence, Interpolation, ManifoldPoint, Method,
-    NearestPoint, Order, Pacer, PairHint, PlacedIndex, PlanError, Proof, Reason, Refinement, Sampling,
-    ScanView, Semantics, Shape, ShapeIndex, Statistics, Surfels, Until, Verdict, World, answer_each, collide,
-    collide_all, collide_hinted, collide_many, collide_many_with, collide_paced, collide_poses,
-    collide_poses_with, collide_proving, collide_with, curves, curves_with, distance, distance_with,
+    NearestPoint, Order, Pacer, PairHint, PlacedIndex, PlanError, Prepared, Proof, Reason, Refinement,
+    Sampling, ScanView, Semantics, Shape, ShapeIndex, Statistics, Surfels, Until, Verdict, World,
+    answer_each, collide, collide_all, collide_hinted, collide_many, collide_many_with, collide_paced,
+    collide_poses, collide_poses_with, collide_proving, collide_with, curves, curves_with, distance,
+    distance_with,
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -10,7 +10,7 @@ use nearmiss_graph::{
     GeodesicKernel, GraphError, GraphOptions, KernelScratch, Samples, Sides, SurfaceGraph, SurfaceGraphMeta,
 };
 use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy};
-use nearmiss_query::ScanView;
+use nearmiss_query::{Prepared, ScanView};
 use nearmiss_store::{Bytes, Check, File, OpenError, Writer};
 use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
@@ -316,6 +316,12 @@ impl Scan {
             Metric::Euclidean => view,
             Metric::Geodesic => self.geodesic_kernel().map_or(view, |kernel| view.with_kernel(kernel)),
         }
+    }
+}
+
+impl Prepared for Scan {
+    fn at(&self, pose: &Pose) -> ScanView<'_> {
+        Self::at(self, pose)
     }
 }
 

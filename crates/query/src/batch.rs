@@ -10,11 +10,11 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use nearmiss_geometry::Pose;
-use nearmiss_hierarchy::PointHierarchy;
 
 use crate::budget::{Budget, Deadline};
 use crate::collide::{CollideScratch, collide_with};
 use crate::options::CollidePlan;
+use crate::prepared::Prepared;
 use crate::verdict::{Answer, Reason, Statistics, Verdict};
 use crate::view::ScanView;
 
@@ -88,8 +88,8 @@ pub fn collide_many_with<'s>(
 /// Whether two scans meet in each of many pairs of poses. Allocates a scratch of its own; see
 /// [`collide_poses_with`].
 #[must_use]
-pub fn collide_poses(
-    scans: [&PointHierarchy; 2],
+pub fn collide_poses<S: Prepared + Sync + ?Sized>(
+    scans: [&S; 2],
     poses: &[[Pose; 2]],
     plan: &CollidePlan,
     budget: &Budget,
@@ -128,8 +128,8 @@ pub fn collide_poses(
 /// assert!(answers[..6].iter().all(|answer| answer.verdict.is_separated()));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn collide_poses_with<'s>(
-    scans: [&PointHierarchy; 2],
+pub fn collide_poses_with<'s, S: Prepared + Sync + ?Sized>(
+    scans: [&S; 2],
     poses: &[[Pose; 2]],
     plan: &CollidePlan,
     budget: &Budget,
@@ -137,7 +137,7 @@ pub fn collide_poses_with<'s>(
     scratch: &'s mut BatchScratch,
 ) -> &'s [Answer] {
     let ask = |i: usize, scratch: &mut CollideScratch| {
-        let [a, b] = [0, 1].map(|k: usize| ScanView::new(scans[k], &poses[i][k]));
+        let [a, b] = [0, 1].map(|k: usize| scans[k].at(&poses[i][k]));
         collide_with(&a, &b, plan, budget, scratch)
     };
     ask_all(poses.len(), ask, budget.deadline, until, scratch)

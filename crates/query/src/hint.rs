@@ -11,7 +11,6 @@ use std::ops::ControlFlow;
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Ball, Frontier, NodePair, Stack, descend, resume};
-use serde::{Deserialize, Serialize};
 
 use crate::bounds::Motion;
 use crate::certify::{Bound, Certifier, Excluded, are_doubtful};
@@ -37,18 +36,18 @@ const SLOW_PROVEN: f64 = 1.0;
 const LONGEST: f64 = (1_u64 << 40) as f64;
 
 /// What is remembered between queries about the same two scans; for
-/// [`collide_hinted`](crate::collide_hinted). Owned by the caller, one for each pair of scans.
+/// [`collide_hinted`](crate::collide_hinted). Owned by the caller, one for each pair of scans. No hint is read from a
+/// file, which could forge a certificate.
 ///
 /// A continued proof rests on smaller nodes than a fresh one, and on their earlier positions. So about one
 /// separation in a thousand is certified with a hint and estimated without, or the reverse.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(transparent)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct PairHint {
     known: Option<Known>,
 }
 
 /// What was asked: a hint for anything else is none.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Question {
     options: CollideOptions,
     /// Their [identities](nearmiss_hierarchy::Outline).
@@ -58,14 +57,14 @@ struct Question {
 }
 
 /// A pair of nodes that are no nearer each other than b has still to travel until then.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Standing {
     pair: NodePair,
     until: f64,
 }
 
 /// What is known of a question. Lengths are in a's stored frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Known {
     question: Question,
     /// Of b's stored frame in a's, when last asked.

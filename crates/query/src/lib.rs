@@ -24,6 +24,7 @@ mod options;
 mod pacer;
 mod point_gap;
 mod posed;
+mod prepared;
 mod priority;
 mod random;
 mod resolution;
@@ -54,6 +55,7 @@ pub use options::{
     Sampling, Semantics, Surfels,
 };
 pub use pacer::{Pacer, collide_paced};
+pub use prepared::Prepared;
 pub use shape::{NearestPoint, PlacedIndex, Shape, ShapeIndex};
 pub use verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
 pub use view::{ScanView, ViewScratch};

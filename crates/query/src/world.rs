@@ -5,18 +5,18 @@
 //! are further apart than a plan reaches; batches answer the others.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Deref;
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{Aabb, Pose};
-use nearmiss_hierarchy::{PointHierarchy, SLACK};
+use nearmiss_hierarchy::SLACK;
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 use serde::{Deserialize, Serialize};
 
 use crate::batch::{BatchScratch, Until, ask_all};
 use crate::budget::Budget;
 use crate::collide::{CollideScratch, collide_with};
-use crate::options::{CollideOptions, CollidePlan};
+use crate::options::CollidePlan;
+use crate::prepared::Prepared;
 use crate::verdict::{Answer, Reason, Statistics, Verdict};
 use crate::view::ScanView;
 
@@ -35,7 +35,7 @@ pub enum Bodies<'a> {
 
 /// Placed scans, each a *body* with an id.
 ///
-/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc<PointHierarchy>` or a reference. One scan may
+/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its graph and kernel come along. One scan may
 /// be placed many times.
 ///
 /// ```
@@ -86,14 +86,14 @@ struct Body<S> {
     bounds: Option<Aabb>,
 }
 
-impl<S: Deref<Target = PointHierarchy>> Body<S> {
+impl<S: Prepared> Body<S> {
     fn new(scan: S, pose: &Pose) -> Self {
-        let bounds = bounds(&ScanView::new(&scan, pose));
+        let bounds = bounds(&scan.at(pose));
         Self { scan, pose: *pose, bounds }
     }
 
     fn view(&self) -> ScanView<'_> {
-        ScanView::new(&self.scan, &self.pose)
+        self.scan.at(&self.pose)
     }
 }
 
@@ -128,7 +128,7 @@ impl<S> Default for World<S> {
     }
 }
 
-impl<S: Deref<Target = PointHierarchy>> World<S> {
+impl<S: Prepared> World<S> {
     /// A world without bodies.
     #[must_use]
     pub fn new() -> Self {
@@ -295,7 +295,7 @@ fn are_near(a: &Envelope, b: &Envelope, reach: f64) -> bool {
     (0..3).all(|k| low_a[k] <= high_b[k] + reach && low_b[k] <= high_a[k] + reach)
 }
 
-impl<S: Deref<Target = PointHierarchy> + Sync> World<S> {
+impl<S: Prepared + Sync> World<S> {
     /// Which bodies meet: the answers to all near pairs that `asked` lets pass, by ids, the lesser first. Two
     /// bodies that are not told of are apart, or were not asked for.
     ///
@@ -387,15 +387,5 @@ fn bounds(view: &ScanView<'_>) -> Option<Aabb> {
         Aabb { min: [0, 1, 2].map(|k| centre[k] - half[k]), max: [0, 1, 2].map(|k| centre[k] + half[k]) };
     let is_finite = bounds.min.iter().chain(&bounds.max).all(|x| x.abs() <= FARTHEST);
     let is_moderate = (1.0 / GREATEST_SCALE..=GREATEST_SCALE).contains(&scale);
-    (is_finite && is_moderate && has_pose(view)).then_some(bounds)
-}
-
-/// Whether a question about this scan has an answer: the one whether it meets itself, with no work allowed.
-fn has_pose(view: &ScanView<'_>) -> bool {
-    let Ok(plan) = CollidePlan::new(&CollideOptions::default(), view.scan(), view.scan()) else {
-        return false;
-    };
-    let none = Budget::UNLIMITED.with_work(0);
-    let answer = collide_with(view, view, &plan, &none, &mut CollideScratch::default());
-    answer.verdict != Verdict::Undecided(Reason::Pose)
+    (is_finite && is_moderate && view.is_proper()).then_some(bounds)
 }

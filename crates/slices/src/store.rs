@@ -135,7 +135,8 @@ impl SliceFolder {
     ///
     /// # Errors
     /// When there is none, or it is damaged.
-    pub fn open(folder: &Path) -> Result<Self, StoreError> {
+    pub fn open(folder: impl AsRef<Path>) -> Result<Self, StoreError> {
+        let folder = folder.as_ref();
         let path = folder.join(INDEX_NAME);
         let file = File::read(&path, Check::Full)?;
         file.expect(INDEX.0, INDEX.1..=INDEX.1)?;

@@ -45,7 +45,8 @@ impl SliceTarget {
     /// # Errors
     /// When the folder cannot be made or written to, holds other files and no map, or somebody else is
     /// writing there.
-    pub fn new(folder: &Path) -> Result<Self, StoreError> {
+    pub fn new(folder: impl AsRef<Path>) -> Result<Self, StoreError> {
+        let folder = folder.as_ref();
         let missing = folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists());
         let made = Made(missing.map(Path::to_owned).collect());
         fs::create_dir_all(folder).map_err(failed(folder, "make"))?;
@@ -136,7 +137,8 @@ impl SliceMap {
     ///
     /// # Errors
     /// As [`SliceTarget::new`] and [`SliceTarget::save`].
-    pub fn save(&self, folder: &Path) -> Result<u64, StoreError> {
+    pub fn save(&self, folder: impl AsRef<Path>) -> Result<u64, StoreError> {
+        let folder = folder.as_ref();
         SliceTarget::new(folder)?.save(self)
     }
 }

@@ -37,7 +37,7 @@ impl Trial {
         let folder = tempfile::tempdir().unwrap();
         let [scan, poses, proof] =
             ["dragon.nm", "poses.jsonl", "proof.jsonl"].map(|name| folder.path().join(name));
-        let cloud = nearmiss::io::read(&dragon_path(Dragon::Points5k), None).unwrap().cloud;
+        let cloud = nearmiss::io::read(dragon_path(Dragon::Points5k), None).unwrap().cloud;
         Scan::build(&cloud, &BuildOptions::default()).unwrap().save(&scan).unwrap();
         let identity = "[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]";
         let line =

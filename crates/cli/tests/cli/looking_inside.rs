@@ -85,7 +85,7 @@ fn an_export_comes_back() {
     place.ok(&["export", "ball.nm", "--points", "p.ply", "--boxes", "b.obj", "--radii", "r.csv"]);
 
     let given = nearmiss::io::read(&input, None).unwrap().cloud;
-    let back = nearmiss::io::read(&place.path("p.ply"), None).unwrap().cloud;
+    let back = nearmiss::io::read(place.path("p.ply"), None).unwrap().cloud;
     assert_eq!(back.len(), given.len());
     let normals = back.normals().unwrap();
     for i in 0..back.len() {
@@ -161,7 +161,7 @@ fn the_samples_of_a_level_come_with_their_coverings() {
     let given = nearmiss::io::read(&input, None).unwrap().cloud;
     place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet", "--leaf", "8"]);
     place.ok(&["export", "ball.nm", "--samples", "s.ply", "--level", "2"]);
-    let back = nearmiss::io::read(&place.path("s.ply"), None).unwrap().cloud;
+    let back = nearmiss::io::read(place.path("s.ply"), None).unwrap().cloud;
     assert_eq!(back.len(), 4 * 16, "four nodes of sixteen samples");
     let ply = std::fs::read(place.path("s.ply")).unwrap();
     // Three values of eight bytes, then source, node, covering radius and sampling radius.

@@ -98,7 +98,7 @@ fn edges_and_close_pairs_are_exported() {
     place.cloud("ball.xyz", sphere(1.0), 0.1);
     let asked = ["export", "ball.xyz", "--points", "p.ply", "--edges", "e.csv", "--close-pairs", "c.csv"];
     place.ok(&asked);
-    let points = nearmiss::io::read(&place.path("p.ply"), None).unwrap().cloud;
+    let points = nearmiss::io::read(place.path("p.ply"), None).unwrap().cloud;
     let rows = |name: &str, header: &str| {
         let text = std::fs::read_to_string(place.path(name)).unwrap();
         let (first, rest) = text.split_once('\n').unwrap();
@@ -394,7 +394,7 @@ fn far_from_the_origin_nothing_is_lost() {
     }
 
     place.ok(&["export", "far.nm", "--points", "out.ply"]);
-    let back = nearmiss::io::read(&place.path("out.ply"), None).unwrap().cloud;
+    let back = nearmiss::io::read(place.path("out.ply"), None).unwrap().cloud;
     assert_eq!(back.len(), far.len());
     let sources =
         place.ok(&["eval", "far.nm", "--points", name(&place.write("x.xyz", text(&far[..1]))), "--json"]);

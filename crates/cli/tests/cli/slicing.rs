@@ -392,7 +392,7 @@ fn what_does_not_serve_is_refused_by_name() {
 #[test]
 fn the_slice_that_is_needed_and_missing_is_named() {
     let place = with_house();
-    let folder = SliceFolder::open(&place.path("house")).unwrap();
+    let folder = SliceFolder::open(place.path("house")).unwrap();
     let image = |slice: usize| place.path(&format!("house/{:016x}.nms", folder.checksums()[slice]));
     // By checksum they come in another order.
     let lost = [6, 9, 15, 20, 3];

@@ -1,6 +1,4 @@
 //! Shortest paths and the map of close pairs against relaxing every edge until nothing changes.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::clouds::{Cloud, single};
 use nearmiss_graph::{Adjacency, ClosePairs, GeodesicScratch, Network, Paths, edge_lengths};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};

@@ -1,6 +1,4 @@
 //! What the surfaces of `nearmiss-surface` must do, with distances along the graph.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::clouds::Cloud;
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{Close, ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, Network, Paths};

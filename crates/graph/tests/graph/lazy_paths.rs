@@ -1,6 +1,4 @@
 //! Paths of which only some points are known: whole ones against the graph, and looks against whole ones.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::clouds::Cloud;
 use nearmiss_graph::{GeodesicScratch, LazyPath, Levels, Network, PathPoint};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud, rng};

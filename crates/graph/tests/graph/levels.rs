@@ -1,6 +1,4 @@
 //! Coarser levels: what they promise of centres and cells, and paths against searches of the whole graph.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::clouds::{Cloud, single};
 use nearmiss_graph::{Adjacency, Cells, GeodesicScratch, LevelScratch, Levels, Network};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};

@@ -1,6 +1,4 @@
 //! What graphs of known shapes look like: borders, slits, outliers, density.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_graph::{Adjacency, GraphOptions, PointGraph, Prune};
 use nearmiss_testdata::shapes::{self, Form, Order, Sampling};
 

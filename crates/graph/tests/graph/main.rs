@@ -1,4 +1,5 @@
 //! The graph: everything is one program, which links once.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod clouds;
 mod geodesics;

@@ -1,6 +1,4 @@
 //! Oriented normals against those of shapes that are known, from arbitrary signs.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::clouds::{Cloud, single};
 use nearmiss_geometry::TriangleMesh;
 use nearmiss_graph::{Adjacency, Decision, Orientation, Sides, orient};

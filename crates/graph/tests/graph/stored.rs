@@ -1,6 +1,4 @@
 //! The graph in a container, and containers that lie.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_graph::{Flaw, GraphOptions, LoadError, PointGraph};
 use nearmiss_store::{Check, File, Writer};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};

@@ -1,6 +1,4 @@
 //! Close pairs and levels in a container, and containers that lie.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::clouds::Cloud;
 use nearmiss_graph::{
     Adjacency, ClosePairs, Flaw, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels,

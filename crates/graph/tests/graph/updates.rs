@@ -1,6 +1,4 @@
 //! Points that come, go and move, against all pairs of those that are there.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_graph::{DynamicGraph, GraphError, GraphOptions};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud, rng};
 use nearmiss_testdata::oracle::proximity;

@@ -1,6 +1,4 @@
 //! Exclusion by coverings against its naive twin.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::{NodeId, PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, Extent, NodePair, OrientedBox, PointHierarchy, Relative, apart};
 use nearmiss_testdata::arbitrary::{self, CloudKind};

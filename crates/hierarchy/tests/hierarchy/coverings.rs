@@ -1,6 +1,4 @@
 //! Samples and coverings against their definitions.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, OrientedBox, PointHierarchy};
 use nearmiss_surface::{Status, project};

@@ -1,7 +1,5 @@
 //! Enclosures against the surface itself: zeros of f found by projection, and places of status ok, driven
 //! outwards as long as they stay ok, each in the enclosure of every node that holds its nearest point.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, OrientedBox, PointHierarchy};
 use nearmiss_surface::{Bandwidth, Kernel, Status, SurfaceOptions, project};

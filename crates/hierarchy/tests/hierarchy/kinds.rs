@@ -1,6 +1,4 @@
 //! What points are said to be, on clouds whose nature is known.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_testdata::arbitrary::{gaussian, point_in, rng};

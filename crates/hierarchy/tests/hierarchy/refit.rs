@@ -1,6 +1,4 @@
 //! Discs fitted anew follow from what is told of the surface, as those of a build do.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy, PointKind};
 use nearmiss_surface::{Evaluation, Metric, Status};

@@ -1,6 +1,4 @@
 //! What a sample of the points shows of spacing, borders and holes.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_testdata::shapes::{Sampling, sphere};

@@ -1,6 +1,4 @@
 //! The hierarchy against naive twins: radii, the implicit function everywhere, and its invariants.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy, PointKind};
 use nearmiss_index::PointBlock;

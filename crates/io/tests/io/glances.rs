@@ -44,7 +44,7 @@ fn points_are_counted_without_being_read() {
         std::fs::write(path("a.obj"), vertices + &faces).unwrap();
         for (name, tolerance) in [("a.ply", 0.0), ("a.pcd", 0.0), ("a.xyz", 0.3), ("a.obj", 0.3)] {
             check(&path(name), u64::from(count), tolerance);
-            let has_bounds = glance(&path(name), None).unwrap().bounds.is_some();
+            let has_bounds = glance(path(name), None).unwrap().bounds.is_some();
             assert!(has_bounds == (name != "a.obj") || count == 200, "{name} of {count}");
         }
     }
@@ -63,5 +63,5 @@ fn counts_that_the_file_has_no_space_for_are_not_believed() {
     std::fs::write(&path, b"\x01\x02 something else").unwrap();
     assert_eq!(glance(&path, Some(Format::Ply)), None);
     assert_eq!(glance(folder.path(), None), None, "a folder");
-    assert_eq!(glance(&folder.path().join("missing.ply"), None), None);
+    assert_eq!(glance(folder.path().join("missing.ply"), None), None);
 }

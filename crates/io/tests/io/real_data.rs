@@ -86,7 +86,7 @@ fn triangles(model: &Model) -> usize {
 fn known_files_have_their_points_and_faces() {
     let Some(data) = data() else { return };
     for (name, points, faces) in KNOWN {
-        let (model, time) = timed(|| read(&data.join(name), None));
+        let (model, time) = timed(|| read(data.join(name), None));
         let model = model.unwrap_or_else(|e| panic!("{e}"));
         println!("{time:8.1?} {name} {:?}", model.cloud.dropped());
         assert_eq!((given(&model), triangles(&model)), (points, faces), "{name}");
@@ -94,7 +94,7 @@ fn known_files_have_their_points_and_faces() {
             assert_eq!(mesh.vertices().len(), points, "{name}");
         }
     }
-    let dropped = |name: &str| read(&data.join(name), None).unwrap().cloud.dropped();
+    let dropped = |name: &str| read(data.join(name), None).unwrap().cloud.dropped();
     assert_eq!(dropped("scans/room-113k-compressed.pcd").duplicate, 112_586 - 56_159);
     assert_eq!(dropped("scans/rgbd-organised-nan-307k.pcd").not_finite, 57_553);
     assert_eq!(dropped("buildings/two-storey-scan-zup-753k.ply").duplicate, 0);
@@ -103,9 +103,9 @@ fn known_files_have_their_points_and_faces() {
 #[test]
 fn attributes_come_along() {
     let Some(data) = data() else { return };
-    let frame = read(&data.join("scans/rgbd-normals-120k.ply"), None).unwrap();
+    let frame = read(data.join("scans/rgbd-normals-120k.ply"), None).unwrap();
     assert!(frame.cloud.colours().is_some(), "colours");
-    let facade = read(&data.join("buildings/facade-100k.ply"), None).unwrap();
+    let facade = read(data.join("buildings/facade-100k.ply"), None).unwrap();
     for cloud in [&frame.cloud, &facade.cloud] {
         let normals = cloud.normals().expect("normals");
         let unit = normals.iter().filter(|n| {
@@ -114,7 +114,7 @@ fn attributes_come_along() {
         });
         assert!(unit.count() * 10 > 9 * normals.len(), "normals are of unit length");
     }
-    assert!(read(&data.join("scans/rgbd-108k.pcd"), None).unwrap().cloud.colours().is_some());
+    assert!(read(data.join("scans/rgbd-108k.pcd"), None).unwrap().cloud.colours().is_some());
 }
 
 #[test]
@@ -148,7 +148,7 @@ fn every_file_of_a_known_format_reads() {
 #[test]
 fn three_encodings_of_a_sphere_agree() {
     let Some(data) = data() else { return };
-    let of = |kind: &str| read(&data.join(format!("formats/sphere_vnormals_{kind}.ply")), None).unwrap();
+    let of = |kind: &str| read(data.join(format!("formats/sphere_vnormals_{kind}.ply")), None).unwrap();
     assert_eq!(of("bbe"), of("ble"));
     let (text, binary) = (of("ascii"), of("ble"));
     assert_eq!(text.mesh.unwrap().triangles(), binary.mesh.unwrap().triangles());

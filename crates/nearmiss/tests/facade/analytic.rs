@@ -1,6 +1,4 @@
 //! Verdicts on shapes with known answers: nothing wrong outside the band of a sampling radius.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss::{
     Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, PointCloud, Reason, Scan, Verdict,
     collide_with,

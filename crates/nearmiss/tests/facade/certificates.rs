@@ -1,6 +1,4 @@
 //! Certified separations against exact distances, and what the proof of one consists of.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss::hierarchy::Node;
 use nearmiss::{
     Bandwidth, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence,

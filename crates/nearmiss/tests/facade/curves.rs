@@ -1,6 +1,4 @@
 //! Curves by the kernel of the view, and of scans that were saved.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
     Budget, BuildOptions, Check, Curve, CurveOptions, CurvePlan, Curves, GraphOptions, PlanError, PointCloud,

@@ -1,15 +1,15 @@
 //! Scans for the geodesic kernel: what they keep apart, where they agree with straight distances, and what is
 //! kept of them.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
+use std::sync::Arc;
 
 use nearmiss::graph::SurfaceGraphMeta;
 use nearmiss::hierarchy::HierarchyMeta;
 use nearmiss::query::ViewScratch;
 use nearmiss::store::Writer;
 use nearmiss::{
-    Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, GraphError,
+    Bodies, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, GraphError,
     GraphOptions, LoadError, Metric, PlanError, PointCloud, PointKind, Pose, Scan, ScanView, Semantics,
-    Verdict, collide_with,
+    Until, Verdict, World, collide_poses, collide_with,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
@@ -291,4 +291,37 @@ fn it_is_the_same_on_any_number_of_threads() {
     };
     let one = made(1);
     assert!([2, 5].into_iter().all(|threads| made(threads) == one), "other bytes");
+}
+
+#[test]
+fn worlds_and_batches_keep_graph_and_kernel() {
+    let ball = sphere(1.0).sample(Sampling::clean(0.1));
+    let [_, geodesic] = both(&ball.points);
+    let geodesic = Arc::new(geodesic);
+    let options = CollideOptions::default().with_semantics(Semantics::Surface);
+    let plan = CollidePlan::new(&options, &geodesic, &geodesic).unwrap();
+    let poses: Vec<[Pose; 2]> = (0..8_u32)
+        .map(|i| [Pose::IDENTITY, Pose::from_translation([1.0 + 0.1 * f64::from(i), 0.3, 0.1])])
+        .collect();
+    let told = collide_poses([&geodesic, &geodesic], &poses, &plan, &Budget::UNLIMITED, Until::All);
+    let mut certified = 0;
+    for ([a, b], told) in poses.iter().zip(&told) {
+        let views = [geodesic.at(a), geodesic.at(b)];
+        let alone =
+            collide_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut CollideScratch::default());
+        assert_eq!(*told, alone, "a batch");
+        let mut world = World::new();
+        let ids = [world.insert(Arc::clone(&geodesic), a), world.insert(Arc::clone(&geodesic), b)];
+        let pairs = world.collide_many(Bodies::All, |_| true, &plan, &Budget::UNLIMITED, Until::All);
+        assert_eq!(
+            pairs.iter().find(|(pair, _)| *pair == ids).map(|(_, answer)| *answer),
+            Some(alone),
+            "a world"
+        );
+        // Without the kernel no place is verified.
+        let is_certified =
+            matches!(alone.verdict, Verdict::Intersecting { evidence: Evidence::Certified, .. });
+        certified += usize::from(is_certified);
+    }
+    assert!(certified > 4, "{certified} of {} certified", poses.len());
 }

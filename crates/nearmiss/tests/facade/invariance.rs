@@ -1,7 +1,5 @@
 //! The same scene elsewhere, turned, larger or smaller, is the same scene; so it is with its scans exchanged,
 //! their points in another order, given twice, or more of them.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss::{
     Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Evidence, GraphOptions, PointCloud,
     Pose, Reason, Scan, Semantics, Verdict, collide_with,

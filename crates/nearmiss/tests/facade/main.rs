@@ -1,4 +1,5 @@
 //! The facade: everything is one program, which links once.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod analytic;
 mod certificates;

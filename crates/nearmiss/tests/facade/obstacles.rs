@@ -1,7 +1,5 @@
 //! The obstacle of a scan: what is certified, how far the band goes, and how distances bracket, against brute
 //! force.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss::{
     Answer, Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Distance,
     DistanceOptions, DistancePlan, Evidence, PointCloud, PointKind, Pose, Scan, ScanView, Verdict,

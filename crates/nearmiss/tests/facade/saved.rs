@@ -1,6 +1,4 @@
 //! A saved scan is the scan, and a file of an earlier release opens or is refused by name.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss::graph::ClosePairs;
 use nearmiss::store::Fault;
 use nearmiss::{BuildOptions, Check, GraphOptions, Paths, PointCloud, Pose, Scan, Status, SurfaceGraph};

@@ -1,6 +1,4 @@
 //! All contacts against brute force: of every pair of leaves, every pair of discs or points.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::collections::BTreeSet;
 
 use nearmiss_geometry::{PointCloud, Pose};

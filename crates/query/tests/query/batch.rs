@@ -1,6 +1,4 @@
 //! Batches against single queries, on pools of one to four threads.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::ops::ControlFlow;
 #[cfg(feature = "rayon")]
 use std::sync::Barrier;

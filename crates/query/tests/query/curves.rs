@@ -1,6 +1,4 @@
 //! Curves against those known exactly: nothing missing, nothing made up, loops closed, ends at borders.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::cut::{assert_whole, draw, fine, hausdorff, nearest_true, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};

@@ -1,7 +1,5 @@
 //! Curves of tori through each other, whole; and of surfaces that graze or nearly coincide, where what is
 //! asserted is that the search ends, makes nothing up and says where it could not go on.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::cut::{assert_whole, draw, fine, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};

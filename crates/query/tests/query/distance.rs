@@ -1,6 +1,4 @@
 //! Distances against brute force and against what is known of spheres and planes.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::time::Duration;
 
 use nearmiss_geometry::{PointCloud, Pose};

@@ -1,6 +1,4 @@
 //! Interpolation search: its verdicts, against the truth and the traversal's.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use crate::graphed::Scan;
 use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::BuildOptions;

@@ -1,6 +1,4 @@
 //! Interpolation search as leaf test, against all edges of a and f of b by its sums.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::collections::BTreeSet;
 
 use crate::graphed::Scan;

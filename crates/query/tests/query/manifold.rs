@@ -1,6 +1,4 @@
 //! Contacts for a solver: where they are, how deep, which way out, and that nothing deeper was left out.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, PointId, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};

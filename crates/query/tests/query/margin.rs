@@ -1,6 +1,4 @@
 //! Margins: one-sided against brute force on points, right on shapes with known distances.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{

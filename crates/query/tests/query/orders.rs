@@ -1,6 +1,4 @@
 //! Orders, coverings, resolutions and test points: the same verdicts in other ways.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::time::Duration;
 
 use nearmiss_geometry::{PointCloud, Pose};

@@ -1,6 +1,4 @@
 //! Shapes against brute force: every point, by formulas of its own.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{ScanView, Shape, ShapeIndex};

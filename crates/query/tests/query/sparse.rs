@@ -1,6 +1,4 @@
 //! Points on lines and lone ones: a near miss of them is open, and no more than that.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};

@@ -1,6 +1,4 @@
 //! Queries against brute force: every pair of discs, every pair of points.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_query::{

@@ -1,6 +1,4 @@
 //! Worlds against the loop over all pairs.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::sync::LazyLock;
 use std::time::Duration;
 

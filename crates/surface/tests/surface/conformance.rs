@@ -1,6 +1,4 @@
 //! What every kernel must do: one suite, run for each.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_surface::{
     Evaluation, Kernel, Level, Moments, Status, SurfaceOptions, SurfacePlan, meet, project,
 };

@@ -1,6 +1,4 @@
 //! What every eigen solver must do: one suite of matrices, run for each.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use nearmiss_geometry::nalgebra::Matrix3;
 use nearmiss_surface::{
     Eigen3, EigenBlock, Level, MatrixBlock, cubic_cholesky_eigen, symmetric_eigen, symmetric_eigen_batch,
