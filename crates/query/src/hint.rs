@@ -36,8 +36,8 @@ const SLOW_PROVEN: f64 = 1.0;
 const LONGEST: f64 = (1_u64 << 40) as f64;
 
 /// What is remembered between queries about the same two scans; for
-/// [`collide_hinted`](crate::collide_hinted). Owned by the caller, one for each pair of scans. No hint is read from a
-/// file, which could forge a certificate.
+/// [`collide_hinted`](crate::collide_hinted). Owned by the caller, one for each pair of scans. No hint is
+/// read from a file, which could forge a certificate.
 ///
 /// A continued proof rests on smaller nodes than a fresh one, and on their earlier positions. So about one
 /// separation in a thousand is certified with a hint and estimated without, or the reverse.

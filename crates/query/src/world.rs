@@ -35,8 +35,8 @@ pub enum Bodies<'a> {
 
 /// Placed scans, each a *body* with an id.
 ///
-/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its graph and kernel come along. One scan may
-/// be placed many times.
+/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its graph and kernel
+/// come along. One scan may be placed many times.
 ///
 /// ```
 /// use nearmiss_geometry::{PointCloud, Pose};
