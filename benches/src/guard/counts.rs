@@ -109,10 +109,28 @@ impl Scenario {
     }
 }
 
-/// Whether valgrind is installed.
+/// Why nothing can be counted here that compares with the record; `None` if it can.
 #[must_use]
-pub fn has_valgrind() -> bool {
-    Command::new("valgrind").arg("--version").output().is_ok_and(|output| output.status.success())
+pub fn obstacle() -> Option<&'static str> {
+    let installed =
+        || Command::new("valgrind").arg("--version").output().is_ok_and(|told| told.status.success());
+    if !has_avx2() {
+        Some("the processor has no AVX2")
+    } else if !installed() {
+        Some("valgrind is not installed")
+    } else {
+        None
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+fn has_avx2() -> bool {
+    std::arch::is_x86_feature_detected!("avx2")
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+const fn has_avx2() -> bool {
+    false
 }
 
 /// The count of a scenario by valgrind. `program` runs the scenario when given `arguments`.
