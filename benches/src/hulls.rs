@@ -2,8 +2,10 @@
 //! points with those of its border, and K, the union of a node's balls; and the radius as the paper grows it,
 //! without a certificate.
 
-use nearmiss::hierarchy::{OrientedBox, Slices};
-use nearmiss::{PointHierarchy, geometry::nalgebra::Vector3};
+use nearmiss::PointHierarchy;
+use nearmiss::geometry::NodeId;
+use nearmiss::geometry::nalgebra::Vector3;
+use nearmiss::hierarchy::{OrientedBox, Part, Slices};
 
 use crate::sample::count;
 
@@ -29,7 +31,6 @@ struct Hull {
 pub struct Hulls {
     directions: [Vector3<f64>; DIRECTIONS],
     of_leaves: Vec<Hull>,
-    leaf_size: usize,
 }
 
 /// Shares of a box that a node's volumes fill.
@@ -68,14 +69,13 @@ impl Hulls {
             let flat = (1.0 - z * z).sqrt();
             Vector3::new(flat * (golden * count(i)).cos(), flat * (golden * count(i)).sin(), z)
         });
-        let leaves = scan.nodes().iter().zip(scan.boxes()).filter(|(node, _)| node.is_leaf());
-        let of_leaves = leaves.map(|(_, bounds)| hull(scan, bounds, &directions)).collect();
-        Self { directions, of_leaves, leaf_size: scan.leaf_size() as usize }
+        let leaves = scan.boxes().skip(scan.topology().inner());
+        let of_leaves = leaves.map(|bounds| hull(scan, &bounds, &directions)).collect();
+        Self { directions, of_leaves }
     }
 
     fn under(&self, slices: &Slices<'_>, node: usize) -> &[Hull] {
-        let points = slices.nodes[node].points();
-        &self.of_leaves[points.start / self.leaf_size..points.end.div_ceil(self.leaf_size)]
+        &self.of_leaves[slices.tree.topology().leaves_under(node_id(node))]
     }
 
     fn contain(&self, hulls: &[Hull], x: Vector3<f64>) -> bool {
@@ -94,12 +94,10 @@ impl Hulls {
     ) -> Volumes {
         let (centres, hulls) = (centres(slices, node), self.under(slices, node));
         let radius = f64::from(slices.covering_radius(node));
-        let end = slices.nodes[node].points().end;
-        let enclosures: Vec<OrientedBox> = (node..slices.nodes.len())
-            .take_while(|&id| slices.nodes[id].points().start < end)
-            .filter(|&id| slices.nodes[id].is_leaf())
-            .map(|id| slices.enclosure(id))
-            .collect();
+        let topology = slices.tree.topology();
+        let leaves = topology.leaves_under(node_id(node));
+        let enclosures: Vec<OrientedBox> =
+            leaves.map(|leaf| slices.tree.enclosure(Part::Surface, topology.leaf(leaf))).collect();
         let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
         for c in &centres {
             low = low.inf(&c.add_scalar(-radius));
@@ -153,25 +151,30 @@ impl Hulls {
     }
 }
 
+/// The node with an index.
+fn node_id(index: usize) -> NodeId {
+    NodeId(u32::try_from(index).unwrap_or(u32::MAX))
+}
+
 /// The points within a horizon of a leaf's box.
 fn hull(scan: &PointHierarchy, bounds: &OrientedBox, directions: &[Vector3<f64>; DIRECTIONS]) -> Hull {
     let mut points = Vec::new();
-    let mut open = vec![0_usize];
+    let (tree, mut open) = (scan.tree(), vec![NodeId::ROOT]);
     while let Some(id) = open.pop() {
-        let (node, about) = (&scan.nodes()[id], &scan.boxes()[id]);
+        let about = tree.bounds(id);
         let border = scan.plan().horizon(about.reach);
         if bounds.distance_sq(about.centre).sqrt() > border + about.radius() {
             continue;
         }
-        if !node.is_leaf() {
-            open.extend([node.right as usize, id + 1]);
+        if !tree.topology().is_leaf(id) {
+            open.extend(tree.topology().children(id).iter().rev());
             continue;
         }
         let within = |&i: &usize| {
             let border = scan.plan().horizon(scan.radii()[i]);
             bounds.distance_sq(scan.positions()[i]) <= border * border
         };
-        points.extend(node.points().filter(within).map(|i| scan.positions()[i]));
+        points.extend(tree.topology().points(id).filter(within).map(|i| scan.positions()[i]));
     }
     let mut extent = [[f64::INFINITY, f64::NEG_INFINITY]; DIRECTIONS];
     for p in &points {

@@ -10,14 +10,11 @@
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
-use std::ops::ControlFlow;
 use std::process::ExitCode;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::geometry::NodeId;
-use nearmiss::hierarchy::{
-    Extent, GatherScratch, NodePair, Relative, Slices, Split, Stack, Visitor, apart, descend,
-};
+use nearmiss::hierarchy::{Extent, GatherScratch, NodePair, Part, Relative, Slices, Tree, apart};
 use nearmiss::surface::project;
 use nearmiss::{BuildOptions, Pose, Scan};
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -72,7 +69,7 @@ fn bytes(scan: &Scan) {
     let all = scan.bytes_of_nodes();
     println!(
         "{:.1} bytes a node, {:.1} a point for nodes\n",
-        count(all) / count(slices.nodes.len()),
+        count(all) / count(slices.tree.topology().len()),
         count(all) / count(scan.len())
     );
 }
@@ -87,7 +84,7 @@ fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Fail
     };
     let mut scratch = GatherScratch::default();
     let mut random = rng(effort.seed);
-    let mut furthest_sq = vec![0.0_f64; slices.nodes.len()];
+    let mut furthest_sq = vec![0.0_f64; slices.tree.topology().len()];
     let mut found = 0;
     for i in 0.. {
         if found == effort.points || i > 4 * effort.points {
@@ -103,18 +100,14 @@ fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Fail
         found += 1;
         let nearest = tree.query(&foot.point).nearest_one::<SquaredEuclidean<f64>>().execute();
         let point = nearest.item;
-        let mut id = 0;
-        loop {
+        let topology = scan.topology();
+        let mut next = Some(topology.leaf_of(usize::try_from(point)?));
+        while let Some(id) = next.map(NodeId::index) {
             let far = slices.samples(id).iter().map(|i| {
                 (0..3).map(|k| (f64::from(slices.positions[i][k]) - foot.point[k]).powi(2)).sum::<f64>()
             });
             furthest_sq[id] = furthest_sq[id].max(far.fold(f64::INFINITY, f64::min));
-            let node = &slices.nodes[id];
-            if node.is_leaf() {
-                break;
-            }
-            let right = node.right as usize;
-            id = if point < slices.nodes[right].first { id + 1 } else { right };
+            next = next.and_then(|id| topology.parent(id)).map(|(parent, _)| parent);
         }
     }
     let radii: Vec<f64> = furthest_sq.into_iter().map(f64::sqrt).collect();
@@ -125,10 +118,12 @@ fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Fail
 
 /// For each node its depth.
 fn depths(slices: &Slices<'_>) -> Vec<usize> {
-    let mut depths = vec![0; slices.nodes.len()];
-    for (id, node) in slices.nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
-        depths[id + 1] = depths[id] + 1;
-        depths[node.right as usize] = depths[id] + 1;
+    let mut depths = vec![0; slices.tree.topology().len()];
+    let topology = slices.tree.topology();
+    for id in topology.ids().take(topology.inner()) {
+        for child in topology.children(id).iter() {
+            depths[child.index()] = depths[id.index()] + 1;
+        }
     }
     depths
 }
@@ -202,47 +197,38 @@ struct Descent<'a> {
     seen: Vec<NodePair>,
 }
 
-impl Visitor for Descent<'_> {
-    fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
-        let boxes = |slices: &Slices<'_>, ids: [NodeId; 2]| ids.map(|id| slices.boxes[id.index()]);
-        let ([a0, a1], [b0, b1]) = (boxes(&self.a, a), boxes(&self.b, b));
-        let gaps = self.motion.gaps([&a0, &a1], [&b0, &b1]);
-        let mut urgent = [None; 4];
-        for (i, gap) in gaps.into_iter().enumerate() {
-            let doubled = i >> 1 == 1 && a[0] == a[1] || i & 1 == 1 && b[0] == b[1];
-            if doubled || gap > self.motion.slack() {
+impl Descent<'_> {
+    /// Both nodes of each pair whose boxes meet are replaced by their children.
+    fn run(&mut self) {
+        let mut open = vec![NodePair::ROOTS];
+        while let Some(pair) = open.pop() {
+            let (a, b) = (&self.a.tree, &self.b.tree);
+            if self.motion.gap(&a.bounds(pair.a), &b.bounds(pair.b)) > self.motion.slack() {
                 continue;
             }
-            let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
             self.seen.push(pair);
-            let (node_a, node_b) = (pair.a.index(), pair.b.index());
             let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0, Extent::Discs);
-            let leaves = self.a.nodes[node_a].is_leaf() && self.b.nodes[node_b].is_leaf();
-            let kind = if leaves { &mut self.pairs.leaves } else { &mut self.pairs.inner };
+            let leaves = [a.topology().is_leaf(pair.a), b.topology().is_leaf(pair.b)];
+            let kind = if leaves == [true; 2] { &mut self.pairs.leaves } else { &mut self.pairs.inner };
             kind[0] += 1;
             kind[1] += usize::from(excluded);
-            let (a, b) = (self.a.enclosure(node_a), self.b.enclosure(node_b));
-            if self.motion.gaps([&a; 2], [&b; 2])[0] <= self.motion.slack() {
+            let (of_a, of_b) = (a.enclosure(Part::Surface, pair.a), b.enclosure(Part::Surface, pair.b));
+            if self.motion.gap(&of_a, &of_b) <= self.motion.slack() {
                 self.pairs.enclosed[0] += 1;
                 let excluded = apart(&self.a, &self.b, pair, &self.motion, 0.0, Extent::Surface);
                 self.pairs.enclosed[1] += usize::from(excluded);
             }
-            urgent[i] = (!(excluded && self.excludes)).then_some(-gap);
+            if leaves == [true; 2] || excluded && self.excludes {
+                continue;
+            }
+            let below = |tree: &Tree<'_>, id: NodeId| -> Vec<NodeId> {
+                let topology = tree.topology();
+                if topology.is_leaf(id) { vec![id] } else { topology.children(id).iter().collect() }
+            };
+            for a in below(a, pair.a) {
+                open.extend(below(b, pair.b).into_iter().map(|b| NodePair { a, b }));
+            }
         }
-        debug_assert!(count > 0, "there are pairs to look at");
-        urgent
-    }
-
-    fn leaves(&mut self, _: NodePair) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-
-    fn split(&self, _: NodePair) -> Split {
-        Split::Both
-    }
-
-    fn go_on(&mut self) -> ControlFlow<()> {
-        ControlFlow::Continue(())
     }
 }
 
@@ -271,10 +257,7 @@ fn exclusions(object: &Object, scan: &Scan, effort: Effort) -> Result<(), Failur
                     pairs: *sum,
                     seen: Vec::new(),
                 };
-                let nodes = scan.nodes();
-                if descend(nodes, nodes, &mut descent, &mut Stack::default()).is_break() {
-                    return Err("a descent ended early".into());
-                }
+                descent.run();
                 *sum = descent.pairs;
                 let Descent { a, b, motion, seen, .. } = &descent;
                 let parted = |pair: &&NodePair| apart(a, b, **pair, motion, 0.0, Extent::Discs);

@@ -53,7 +53,7 @@ fn main() -> Result<(), Failure> {
 }
 
 fn measure(pair: &str, [a, b]: &[ScanView<'_>; 2], passes: u32) -> Result<(), Failure> {
-    let radius = |view: &ScanView<'_>| f64::from(view.slices().sampling_radius) * view.placed().scale();
+    let radius = |view: &ScanView<'_>| view.sampling_radius();
     let r = radius(a).min(radius(b));
     let options = CollideOptions::default()
         .with_detail(Detail::Verdict)

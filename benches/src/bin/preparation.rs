@@ -104,8 +104,8 @@ fn main() -> Result<(), Failure> {
     println!(
         "\nfile: {bytes} bytes, {:.1} a point; {} nodes, {:.1} bytes a node",
         size / count(n),
-        scan.nodes().len(),
-        count(scan.bytes_of_nodes()) / count(scan.nodes().len())
+        scan.topology().len(),
+        count(scan.bytes_of_nodes()) / count(scan.topology().len())
     );
     println!(
         "{:.2} % of the points usable, sampling radius {:.6}",

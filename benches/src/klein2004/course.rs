@@ -2,6 +2,7 @@
 
 use std::hint::black_box;
 
+use nearmiss::geometry::NodeId;
 use nearmiss::hierarchy::Relative;
 use nearmiss::{Answer, Pose, Reason, Scan, Verdict};
 
@@ -74,9 +75,9 @@ impl Questions {
 /// Whether the boxes of the roots overlap, the second copy of the scan being at `pose`. Objects scaled for
 /// the sweep are stored in their own frame.
 fn roots_meet(scan: &Scan, pose: &Pose) -> bool {
-    let root = &scan.boxes()[0];
+    let root = &scan.tree().bounds(NodeId::ROOT);
     let relative = Relative::new(pose, f64::from(root.radius()));
-    relative.gaps([root; 2], [root; 2])[0] <= relative.slack()
+    relative.gap(root, root) <= relative.slack()
 }
 
 impl Difference {
@@ -182,7 +183,7 @@ mod tests {
     fn boxes_that_hold_a_corner_of_each_other_meet() {
         let object = Object::read("dragon-5k").unwrap().scaled().unwrap();
         let scan = Scan::build(&object.cloud, &BuildOptions::default()).unwrap();
-        let root = scan.boxes()[0];
+        let root = scan.tree().bounds(NodeId::ROOT);
         let [centre, half] = [root.centre, root.half].map(|v| v.map(f64::from));
         let axes = root.axes.map(|axis| axis.map(f64::from));
         let corner = |bits: u32| {

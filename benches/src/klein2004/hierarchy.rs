@@ -32,15 +32,15 @@ impl Makeup {
     /// # Errors
     /// When it cannot be written.
     pub fn of(scan: &Scan) -> Result<Self, Failure> {
-        let (slices, nodes) = (scan.slices(), scan.nodes());
+        let (slices, nodes) = (scan.slices(), scan.topology());
         let mut depths = vec![0_u32; nodes.len()];
-        for (id, node) in nodes.iter().enumerate().filter(|(_, node)| !node.is_leaf()) {
+        for id in nodes.ids().take(nodes.inner()) {
             // Parents come before their children.
-            for child in [id + 1, node.right as usize] {
-                depths[child] = depths[id] + 1;
+            for child in nodes.children(id).iter() {
+                depths[child.index()] = depths[id.index()] + 1;
             }
         }
-        let inner = (0..nodes.len()).filter(|&id| !nodes[id].is_leaf());
+        let inner = 0..nodes.inner();
         let bytes = usize::try_from(scan.write_to(std::io::sink())?)?;
         Ok(Self {
             points: scan.len(),
@@ -83,10 +83,12 @@ mod tests {
         let scan = Scan::build(&Object::read("dragon-5k").unwrap().cloud, &BuildOptions::default()).unwrap();
         let makeup = Makeup::of(&scan).unwrap();
         let leaves = scan.len().div_ceil(16);
-        assert_eq!((makeup.points, makeup.nodes), (5205, 2 * leaves - 1));
-        // Half of the nodes of a balanced tree of 326 leaves are 8 to 9 deep, a quarter one less, and so on.
-        assert!((6.5..8.5).contains(&makeup.depth), "{makeup:?}");
-        assert!(makeup.samples <= 16 * (leaves - 1) && makeup.samples > 8 * (leaves - 1), "{makeup:?}");
+        let inner = scan.topology().inner();
+        assert_eq!((makeup.points, makeup.nodes), (5205, leaves + inner));
+        // 326 leaves lie under 128 nodes at depth 4, these under 32, 8 and 2.
+        assert_eq!(inner, 128 + 32 + 8 + 2 + 1);
+        assert!((4.0..5.0).contains(&makeup.depth), "{makeup:?}");
+        assert!(makeup.samples == 16 * inner, "{makeup:?}");
         assert!(makeup.bytes_a_node > 88.0, "{makeup:?}");
     }
 }

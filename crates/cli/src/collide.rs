@@ -25,7 +25,7 @@ use crate::report::AnswerReport;
 use crate::search::SearchArgs;
 use crate::sentence::{hint, sentence};
 use crate::units::SizeCheck;
-use crate::{input, output, picture, proof};
+use crate::{output, picture, proof};
 
 /// Options of `collide`.
 #[derive(Debug, Clone, Args)]
@@ -279,17 +279,15 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
 
 /// The scans: balls about points know no kernel, so any do for these.
 fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2], CliError> {
+    let opening = args.pair.opening(Some(threads), console);
     if args.meaning.thickened.is_some() {
-        let [path_a, path_b] = args.pair.inputs();
-        let a = input::open(path_a, threads, console)?;
-        let b = if path_a == path_b { a.clone() } else { input::open(path_b, threads, console)? };
-        return Ok([a, b]);
+        return opening.open_points(args.pair.inputs());
     }
     let kernel = args.kernel.map(KernelName::metric);
     let scans = if args.search.wants_graphs() && kernel.is_none() {
-        input::open_both_with_graphs(args.pair.inputs(), threads, console)?
+        opening.open_both_with_graphs(args.pair.inputs())?
     } else {
-        input::open_both(kernel, args.pair.inputs(), threads, console)?
+        opening.open_both(kernel, args.pair.inputs())?
     };
     if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
         let what = "--prove is for the euclidean kernel: by the geodesic one no separation is proven, and what would \

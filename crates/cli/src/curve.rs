@@ -22,7 +22,7 @@ use crate::picture::names;
 use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
-use crate::{input, output, picture, posing};
+use crate::{output, picture, posing};
 
 /// Options of `curve`.
 #[derive(Debug, Clone, Args)]
@@ -105,7 +105,7 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     }
     let matrices = args.pair.matrices()?;
     let kernel = args.kernel.map(KernelName::metric);
-    let [a, b] = input::open_both(kernel, inputs, args.threads.unwrap_or(0), console)?;
+    let [a, b] = args.pair.opening(args.threads, console).open_both(kernel, inputs)?;
     let [pose_a, pose_b] = posing::of_options(&matrices, [&a, &b])?;
     let [a, b] = [a.at(&pose_a), b.at(&pose_b)];
 

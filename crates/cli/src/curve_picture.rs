@@ -42,7 +42,7 @@ pub(crate) fn paint(views: [&ScanView<'_>; 2], found: &Curves, names: &[String; 
     let mut canvas = Canvas::new(WIDTH + 2 * GAP, HEIGHT + LEGEND + 2 * GAP, GROUND);
     let area = Area { left: GAP, top: GAP, width: WIDTH, height: HEIGHT };
     canvas.fill(area, PANEL_GROUND);
-    let radius = |view: &ScanView<'_>| f64::from(view.slices().sampling_radius) * view.placed().scale();
+    let radius = |view: &ScanView<'_>| view.sampling_radius();
     let radii = views.map(radius);
     let seen = Visibility::new(found, radii[0].max(radii[1]));
     let camera = whole_camera(views, area, |points, toward| 8.0 * seen.hidden(points, toward));

@@ -18,7 +18,7 @@ use serde::Serialize;
 use crate::console::{Bar, Console, Results};
 use crate::digits::count;
 use crate::error::CliError;
-use crate::input;
+use crate::input::{self, Opening};
 use crate::poses;
 use crate::preprocess::parse_threads;
 
@@ -84,7 +84,7 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
         let what = "--store keeps the density in a prepared scan; prepare it first";
         return Err(CliError::Usage(what.into()));
     }
-    let scan = input::open_with_graph(&args.a, console)?;
+    let scan = Opening::new(true, console).open_with_graph(&args.a)?;
     let base = poses::normalised(&scan).ok_or_else(|| CliError::Unfit {
         path: args.a.clone(),
         what: "all points lie in one place, so it cannot be scaled to a size of 2".into(),

@@ -23,7 +23,7 @@ use crate::preprocess::parse_threads;
 use crate::report::word;
 use crate::sentence::{bracket, unit, untold};
 use crate::units::SizeCheck;
-use crate::{input, output, picture};
+use crate::{output, picture};
 
 /// Options of `distance`.
 #[derive(Debug, Clone, Args)]
@@ -105,13 +105,11 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let matrices = args.pair.matrices()?;
     let mut poses = args.pair.pose_file(args.poses.as_ref())?;
     let inputs = args.pair.inputs();
-    let threads = args.threads.unwrap_or(0);
+    let opening = args.pair.opening(args.threads, console);
     let [a, b] = if args.meaning.thickened.is_some() {
-        let a = input::open(inputs[0], threads, console)?;
-        let b = if inputs[0] == inputs[1] { a.clone() } else { input::open(inputs[1], threads, console)? };
-        [a, b]
+        opening.open_points(inputs)?
     } else {
-        input::open_both(args.kernel.map(KernelName::metric), inputs, threads, console)?
+        opening.open_both(args.kernel.map(KernelName::metric), inputs)?
     };
     let semantics = args.meaning.semantics(&a);
     let options = DistanceOptions::default().with_semantics(semantics).with_relative(args.relative);

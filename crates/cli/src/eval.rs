@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::console::{Console, Results};
 use crate::digits::{place, short};
 use crate::error::CliError;
-use crate::input::{self, TextLines, pieces};
+use crate::input::{self, Opening, TextLines, pieces};
 
 /// Options of `eval`.
 #[derive(Debug, Clone, Args)]
@@ -28,6 +28,9 @@ pub struct EvalArgs {
     /// One object of JSON a line instead of sentences
     #[arg(long)]
     pub json: bool,
+    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    #[arg(long)]
+    pub verify: bool,
 }
 
 /// A metric, by name.
@@ -71,10 +74,10 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     if next.is_none() {
         return Err(lines.unfit("holds no points; a line is x y z"));
     }
-    let console = Console::new(false);
+    let opening = Opening::new(args.verify, Console::new(false));
     let scan = match args.kernel {
-        None | Some(KernelName::Euclidean) => input::open(&args.file, 0, console)?,
-        Some(KernelName::Geodesic) => input::open_with_graph(&args.file, console)?,
+        None | Some(KernelName::Euclidean) => opening.open(&args.file)?,
+        Some(KernelName::Geodesic) => opening.open_with_graph(&args.file)?,
     };
     let unit = scan.sampling_radius() / 100.0;
     let (view, mut scratch) = (view(&scan, args)?, ViewScratch::default());

@@ -12,8 +12,9 @@ use nearmiss::{Scan, SurfaceGraph};
 
 use crate::console::Console;
 use crate::error::CliError;
+use crate::input::Opening;
 use crate::kinds_picture::{colour, kinds_picture};
-use crate::{input, output, picture, report};
+use crate::{output, picture, report};
 
 /// Options of `export`. At least one output is asked for.
 #[derive(Debug, Clone, Args)]
@@ -51,6 +52,9 @@ pub struct ExportArgs {
     /// Only nodes at this depth, the root's being 0, and leaves above it
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
+    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    #[arg(long)]
+    pub verify: bool,
 }
 
 pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
@@ -66,11 +70,11 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
             return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
         }
     }
-    let console = Console::new(false);
+    let opening = Opening::new(args.verify, Console::new(false));
     let scan = if args.edges.is_some() || args.close_pairs.is_some() {
-        input::open_with_graph(&args.file, console)?
+        opening.open_with_graph(&args.file)?
     } else {
-        input::open(&args.file, 0, console)?
+        opening.open(&args.file)?
     };
     let pairs = scan.graph().and_then(SurfaceGraph::close_pairs);
     // Before anything is written.
@@ -135,7 +139,7 @@ pub(crate) fn at_depth<'a>(
     level: Option<u32>,
 ) -> impl Iterator<Item = usize> + 'a {
     let is_wanted = move |i: usize| match level {
-        Some(level) => depths[i] == level || scan.nodes()[i].is_leaf() && depths[i] < level,
+        Some(level) => depths[i] == level || i >= scan.topology().inner() && depths[i] < level,
         None => true,
     };
     (0..depths.len()).filter(move |&i| is_wanted(i))
@@ -173,8 +177,9 @@ fn boxes(scan: &Scan, level: Option<u32>, out: &mut impl Write) -> io::Result<()
     let depths = report::depths(scan);
     writeln!(out, "# node boxes, eight corners and twelve edges each")?;
     let mut first = 1_u64;
+    let all: Vec<_> = scan.boxes().collect();
     for i in at_depth(scan, &depths, level) {
-        let b = &scan.boxes()[i];
+        let b = &all[i];
         writeln!(out, "o node{i}_depth{}", depths[i])?;
         for corner in 0..8 {
             let mut p = b.centre.map(f64::from);

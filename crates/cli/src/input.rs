@@ -41,100 +41,116 @@ pub(crate) fn check_there(path: &Path) -> Result<(), CliError> {
     }
 }
 
-/// Opens a prepared scan, or prepares a raw input on `threads` threads with default options.
-pub(crate) fn open(path: &Path, threads: usize, console: Console) -> Result<Scan, CliError> {
-    open_for(None, path, threads, console)
+/// How scans are opened.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Opening {
+    /// Threads to prepare raw inputs, 0 for all cores.
+    pub(crate) threads: usize,
+    /// Whether all of a prepared scan is checked, or only what keeps queries in their arrays.
+    pub(crate) verify: bool,
+    pub(crate) console: Console,
 }
 
-/// As [`open`], for this kernel if any: a raw input is prepared for it, else for the euclidean one.
-fn open_for(kernel: Option<Metric>, path: &Path, threads: usize, console: Console) -> Result<Scan, CliError> {
-    check_there(path)?;
-    if is_prepared(path) {
-        let scan = Scan::open(path, Check::Full).map_err(CliError::loading(path))?;
-        return match kernel.filter(|kernel| *kernel != scan.metric()) {
-            Some(kernel) => {
-                let (path, stored) = (path.display(), scan.metric());
-                let what = format!(
-                    "{path}: this scan was prepared for the {stored} kernel, not the {kernel} one; prepare it again \
-                     with `--kernel {kernel}`, or the other one with `--kernel {stored}`"
-                );
-                Err(CliError::Usage(what))
-            }
-            None => Ok(scan),
-        };
+impl Opening {
+    /// On all cores.
+    pub(crate) fn new(verify: bool, console: Console) -> Self {
+        Self { threads: 0, verify, console }
     }
-    let bar = console.spinner(format_args!("reading {}", path.display()));
-    let model = read(path, None)?;
-    drop(bar);
-    let _bar = console.spinner(format_args!("preparing {}", path.display()));
-    let scan = build(path, &model, &BuildOptions::default().with_threads(threads))?;
-    match kernel {
-        None | Some(Metric::Euclidean) => Ok(scan),
-        Some(Metric::Geodesic) => {
-            let scan = with_graph(path, scan, &model, &GraphOptions::default(), None)?;
-            with_geodesic_kernel(path, scan)
+
+    /// Opens a prepared scan, or prepares a raw input with default options.
+    pub(crate) fn open(self, path: &Path) -> Result<Scan, CliError> {
+        self.open_for(None, path)
+    }
+
+    /// As [`Self::open`], for this kernel if any: a raw input is prepared for it, else for the euclidean one.
+    fn open_for(self, kernel: Option<Metric>, path: &Path) -> Result<Scan, CliError> {
+        check_there(path)?;
+        if is_prepared(path) {
+            let check = if self.verify { Check::Full } else { Check::Structure };
+            let scan = Scan::open(path, check).map_err(CliError::loading(path))?;
+            return match kernel.filter(|kernel| *kernel != scan.metric()) {
+                Some(kernel) => {
+                    let (path, stored) = (path.display(), scan.metric());
+                    let what = format!(
+                        "{path}: this scan was prepared for the {stored} kernel, not the {kernel} one; prepare it \
+                         again with `--kernel {kernel}`, or the other one with `--kernel {stored}`"
+                    );
+                    Err(CliError::Usage(what))
+                }
+                None => Ok(scan),
+            };
+        }
+        let bar = self.console.spinner(format_args!("reading {}", path.display()));
+        let model = read(path, None)?;
+        drop(bar);
+        let _bar = self.console.spinner(format_args!("preparing {}", path.display()));
+        let scan = build(path, &model, &BuildOptions::default().with_threads(self.threads))?;
+        match kernel {
+            None | Some(Metric::Euclidean) => Ok(scan),
+            Some(Metric::Geodesic) => {
+                let scan = with_graph(path, scan, &model, &GraphOptions::default(), None)?;
+                with_geodesic_kernel(path, scan)
+            }
         }
     }
-}
 
-/// Opens two scans for this kernel, or for one and the same: that of the first that is prepared. The same
-/// file twice is one scan.
-pub(crate) fn open_both(
-    kernel: Option<Metric>,
-    [a, b]: [&Path; 2],
-    threads: usize,
-    console: Console,
-) -> Result<[Scan; 2], CliError> {
-    if a == b {
-        let scan = open_for(kernel, a, threads, console)?;
-        return Ok([scan.clone(), scan]);
+    /// Opens two scans for this kernel, or for one and the same: that of the first that is prepared. The same
+    /// file twice is one scan.
+    pub(crate) fn open_both(self, kernel: Option<Metric>, [a, b]: [&Path; 2]) -> Result<[Scan; 2], CliError> {
+        if a == b {
+            let scan = self.open_for(kernel, a)?;
+            return Ok([scan.clone(), scan]);
+        }
+        let open_next = |like: &Scan, path| self.open_for(Some(like.metric()), path);
+        if is_prepared(a) || !is_prepared(b) {
+            let a = self.open_for(kernel, a)?;
+            return Ok([a.clone(), open_next(&a, b)?]);
+        }
+        let b = self.open_for(kernel, b)?;
+        Ok([open_next(&b, a)?, b])
     }
-    let open_next = |like: &Scan, path| open_for(Some(like.metric()), path, threads, console);
-    if is_prepared(a) || !is_prepared(b) {
-        let a = open_for(kernel, a, threads, console)?;
-        return Ok([a.clone(), open_next(&a, b)?]);
+
+    /// Opens two scans of whose points alone something is asked, so that any kernel will do.
+    pub(crate) fn open_points(self, [a, b]: [&Path; 2]) -> Result<[Scan; 2], CliError> {
+        let first = self.open(a)?;
+        let second = if a == b { first.clone() } else { self.open(b)? };
+        Ok([first, second])
     }
-    let b = open_for(kernel, b, threads, console)?;
-    Ok([open_next(&b, a)?, b])
+
+    /// As [`Self::open_points`], with graphs for raw inputs.
+    pub(crate) fn open_both_with_graphs(self, [a, b]: [&Path; 2]) -> Result<[Scan; 2], CliError> {
+        let open = |path: &Path| {
+            if is_prepared(path) {
+                return self.open(path);
+            }
+            let model = read(path, None)?;
+            let scan = build(path, &model, &BuildOptions::default().with_threads(self.threads))?;
+            with_graph(path, scan, &model, &GraphOptions::default(), None)
+        };
+        let first = open(a)?;
+        let second = if a == b { first.clone() } else { open(b)? };
+        Ok([first, second])
+    }
+
+    /// As [`Self::open`], for what cannot do without a graph.
+    pub(crate) fn open_with_graph(self, path: &Path) -> Result<Scan, CliError> {
+        if is_prepared(path) {
+            let scan = self.open(path)?;
+            if scan.graph().is_none() {
+                let what = "this scan was prepared without a graph; prepare it again without `--no-graph`";
+                return Err(CliError::Unfit { path: path.to_owned(), what: what.into() });
+            }
+            return Ok(scan);
+        }
+        let model = read(path, None)?;
+        let scan = build(path, &model, &BuildOptions::default())?;
+        with_graph(path, scan, &model, &GraphOptions::default(), None)
+    }
 }
 
 /// The scan for the geodesic kernel.
 pub(crate) fn with_geodesic_kernel(path: &Path, scan: Scan) -> Result<Scan, CliError> {
     scan.with_geodesic_kernel().map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
-}
-
-/// As [`open_both`] as prepared, with graphs for raw inputs.
-pub(crate) fn open_both_with_graphs(
-    [a, b]: [&Path; 2],
-    threads: usize,
-    console: Console,
-) -> Result<[Scan; 2], CliError> {
-    let open = |path: &Path| {
-        if is_prepared(path) {
-            return open(path, threads, console);
-        }
-        let model = read(path, None)?;
-        let scan = build(path, &model, &BuildOptions::default().with_threads(threads))?;
-        with_graph(path, scan, &model, &GraphOptions::default(), None)
-    };
-    let first = open(a)?;
-    let second = if a == b { first.clone() } else { open(b)? };
-    Ok([first, second])
-}
-
-/// As [`open`], for what cannot do without a graph.
-pub(crate) fn open_with_graph(path: &Path, console: Console) -> Result<Scan, CliError> {
-    if is_prepared(path) {
-        let scan = open(path, 0, console)?;
-        if scan.graph().is_none() {
-            let what = "this scan was prepared without a graph; prepare it again without `--no-graph`";
-            return Err(CliError::Unfit { path: path.to_owned(), what: what.into() });
-        }
-        return Ok(scan);
-    }
-    let model = read(path, None)?;
-    let scan = build(path, &model, &BuildOptions::default())?;
-    with_graph(path, scan, &model, &GraphOptions::default(), None)
 }
 
 /// The scan with a graph over its points.

@@ -37,8 +37,8 @@ struct Report {
 pub(crate) fn run(args: &InspectArgs) -> Result<(), CliError> {
     input::check_there(&args.file)?;
     let loading = || CliError::loading(&args.file);
-    // Everything read is compared with its checksum, asked for or not: it costs one pass over the file.
-    let scan = Scan::open(&args.file, Check::Full).map_err(loading())?;
+    let check = if args.verify { Check::Full } else { Check::Structure };
+    let scan = Scan::open(&args.file, check).map_err(loading())?;
     let file = File::open(&args.file, Check::Structure).map_err(|e| loading()(e.into()))?;
     if args.verify {
         scan.sanity_check()

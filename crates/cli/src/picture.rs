@@ -131,7 +131,7 @@ pub(crate) fn obstacle(
     largest: f64,
 ) {
     let largest = largest / camera.scale;
-    let ball = f64::from(view.slices().obstacle_ball(i)) * view.placed().scale();
+    let ball = f64::from(view.scan().slices().obstacle_ball(i)) * view.placed().scale();
     if ball > 0.0 {
         canvas.ball(camera, view.point(i).into(), ball.min(largest).max(SEEN / camera.scale), colour);
     } else {
@@ -307,7 +307,7 @@ fn extent(points: &[Vector3<f64>], views: [&ScanView<'_>; 2]) -> (Vector3<f64>, 
             *sum += v;
         }
     }
-    let [ca, cb] = views.map(|v| Vector3::from(v.placed().apply(v.scan().boxes()[0].centre.map(f64::from))));
+    let [ca, cb] = views.map(|v| Vector3::from(v.placed().apply(v.scan().outline().discs.centre)));
     let apart = (cb - ca).try_normalize(0.0).unwrap_or_default();
     (Vector3::from(symmetric_eigen(s).vectors[2]), apart)
 }

@@ -16,7 +16,8 @@ use serde::Serialize;
 
 use crate::console::{Bar, Console};
 use crate::error::CliError;
-use crate::{input, output};
+use crate::input::Opening;
+use crate::output;
 
 mod approach;
 
@@ -50,6 +51,9 @@ pub struct PosesArgs {
     /// No progress on the terminal
     #[arg(long)]
     pub quiet: bool,
+    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    #[arg(long)]
+    pub verify: bool,
 }
 
 /// Distances of a sweep: 0, 0.25, … 3.
@@ -73,7 +77,7 @@ struct Line {
 pub(crate) fn run(args: &PosesArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.a, &args.b])?;
     let console = Console::new(args.quiet);
-    let [a, b] = input::open_both(None, [&args.a, &args.b], 0, console)?;
+    let [a, b] = Opening::new(args.verify, console).open_both(None, [&args.a, &args.b])?;
     let [base_a, base_b] = [(&args.a, &a), (&args.b, &b)].map(|(path, scan)| {
         let what = || "all points lie in one place, so it cannot be scaled to a size of 2".into();
         normalised(scan).ok_or_else(|| CliError::Unfit { path: path.clone(), what: what() })

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::console::Console;
 use crate::error::CliError;
-use crate::input::{TextLines, pieces};
+use crate::input::{Opening, TextLines, pieces};
 use crate::matrix::{Matrix, PoseRefused};
 use crate::units::{SizeCheck, UnitName, scaled};
 
@@ -32,12 +32,20 @@ pub struct PairArgs {
     /// Unit of the lengths of b
     #[arg(long, value_enum, value_name = "U")]
     pub units_b: Option<UnitName>,
+    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    #[arg(long)]
+    pub verify: bool,
 }
 
 impl PairArgs {
     /// The files.
     pub(crate) fn inputs(&self) -> [&Path; 2] {
         [&self.a, &self.b]
+    }
+
+    /// How the scans are opened.
+    pub(crate) fn opening(&self, threads: Option<usize>, console: Console) -> Opening {
+        Opening { threads: threads.unwrap_or(0), verify: self.verify, console }
     }
 
     /// The matrices of both poses.

@@ -1,8 +1,10 @@
 //! What answers rest on, a line of JSON each, for a checker that shares nothing with the search.
 
 use std::io::{self, Write};
+use std::ops::Range;
 
-use nearmiss::hierarchy::{Node, NodePair, OrientedBox};
+use nearmiss::geometry::NodeId;
+use nearmiss::hierarchy::{NodePair, OrientedBox, Part};
 use nearmiss::{Answer, CollideOptions, Evidence, Proof, ScanView, Semantics, Verdict};
 use serde::Serialize;
 
@@ -34,17 +36,17 @@ struct Line {
 /// A node: its points, as stored, and its enclosure in the stored frame.
 #[derive(Serialize)]
 struct Enclosure {
-    first: u32,
-    count: u32,
+    first: usize,
+    count: usize,
     centre: [f32; 3],
     half: [f32; 3],
     axes: [[f32; 3]; 3],
 }
 
 impl Enclosure {
-    fn new(node: Node, bounds: &OrientedBox) -> Self {
+    fn new(points: &Range<usize>, bounds: &OrientedBox) -> Self {
         let OrientedBox { centre, half, axes, .. } = *bounds;
-        Self { first: node.first, count: node.count, centre, half, axes }
+        Self { first: points.start, count: points.len(), centre, half, axes }
     }
 }
 
@@ -59,8 +61,8 @@ pub(crate) fn write(
 ) -> io::Result<()> {
     let pairs: Vec<NodePair> = proof.pairs.iter().map(|(pair, _)| *pair).collect();
     let of = options.semantics;
-    let (nodes_a, index_a) = nodes(views[0], of, pairs.iter().map(|pair| pair.a.index()));
-    let (nodes_b, index_b) = nodes(views[1], of, pairs.iter().map(|pair| pair.b.index()));
+    let (nodes_a, index_a) = nodes(views[0], of, pairs.iter().map(|pair| pair.a));
+    let (nodes_b, index_b) = nodes(views[1], of, pairs.iter().map(|pair| pair.b));
     let (verdict, evidence, gap, contact) = match answer.verdict {
         Verdict::Intersecting { contact, evidence } => ("intersecting", Some(evidence), None, Some(contact)),
         Verdict::Separated { gap, evidence } => ("separated", Some(evidence), Some(gap), None),
@@ -94,18 +96,16 @@ pub(crate) fn write(
 fn nodes(
     view: &ScanView<'_>,
     of: Semantics,
-    ids: impl Iterator<Item = usize>,
+    ids: impl Iterator<Item = NodeId>,
 ) -> (Vec<Enclosure>, Vec<usize>) {
-    let ids: Vec<usize> = ids.collect();
+    let ids: Vec<NodeId> = ids.collect();
     let mut distinct = ids.clone();
     distinct.sort_unstable();
     distinct.dedup();
-    let slices = view.slices();
-    let bounds = |id: usize| match of {
-        Semantics::Obstacle => slices.obstacle_enclosure(id),
-        _ => slices.enclosure(id),
-    };
-    let enclosures = distinct.iter().map(|&id| Enclosure::new(slices.nodes[id], &bounds(id))).collect();
-    let place = |id: &usize| distinct.binary_search(id).unwrap_or_default();
+    let tree = view.scan().tree();
+    let part = if of == Semantics::Obstacle { Part::Obstacle } else { Part::Surface };
+    let enclosure = |&id: &NodeId| Enclosure::new(&tree.topology().points(id), &tree.enclosure(part, id));
+    let enclosures = distinct.iter().map(enclosure).collect();
+    let place = |id: &NodeId| distinct.binary_search(id).unwrap_or_default();
     (enclosures, ids.iter().map(place).collect())
 }

@@ -107,7 +107,7 @@ impl ScanReport {
     pub(crate) fn new(scan: &Scan, bytes: u64) -> Self {
         let scale = scan.frame().scale;
         let median = median(scan.radii());
-        let nodes = scan.nodes().len();
+        let nodes = scan.topology().len();
         let (leaves, depth_mean) = leaves(scan);
         Self {
             points: scan.len(),
@@ -193,20 +193,19 @@ impl ScanReport {
 #[expect(clippy::cast_precision_loss, reason = "statistics")]
 fn leaves(scan: &Scan) -> (usize, f64) {
     let depths = depths(scan);
-    let of_leaves = scan.nodes().iter().zip(&depths).filter(|(n, _)| n.is_leaf()).map(|(_, &d)| d);
-    let (count, sum) = of_leaves.fold((0_usize, 0_u64), |(c, s), d| (c + 1, s + u64::from(d)));
-    (count, sum as f64 / count.max(1) as f64)
+    let of_leaves = &depths[scan.topology().inner()..];
+    let sum: u64 = of_leaves.iter().map(|&depth| u64::from(depth)).sum();
+    (of_leaves.len(), sum as f64 / of_leaves.len() as f64)
 }
 
 /// The depth of each node. Parents come before their children.
 pub(crate) fn depths(scan: &Scan) -> Vec<u32> {
-    let mut depths = vec![0; scan.nodes().len()];
-    for (i, node) in scan.nodes().iter().enumerate() {
-        if !node.is_leaf() {
-            let below = depths[i] + 1;
-            for child in [i + 1, node.right as usize] {
-                depths[child] = below;
-            }
+    let topology = scan.topology();
+    let mut depths = vec![0; topology.len()];
+    for id in topology.ids().take(topology.inner()) {
+        let below = depths[id.index()] + 1;
+        for child in topology.children(id).iter() {
+            depths[child.index()] = below;
         }
     }
     depths

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::console::{Console, Results, now};
 use crate::digits::{place, short};
 use crate::error::CliError;
-use crate::input::{self, TextLines};
+use crate::input::{Opening, TextLines};
 use crate::matrix::PoseRefused;
 use crate::posing;
 use crate::preprocess::parse_threads;
@@ -30,6 +30,9 @@ pub struct TouchArgs {
     /// Threads to prepare a raw input, 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
+    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    #[arg(long)]
+    pub verify: bool,
     /// One object of JSON a shape instead of sentences
     #[arg(long)]
     pub json: bool,
@@ -51,7 +54,9 @@ struct TouchReport {
 pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     let matrix = posing::from_option("--pose", args.pose.as_deref())?;
     let mut shapes = ShapeFile::open(&args.shapes)?;
-    let scan = input::open(&args.scan, args.threads.unwrap_or(0), Console::new(args.quiet))?;
+    let console = Console::new(args.quiet);
+    let opening = Opening { threads: args.threads.unwrap_or(0), verify: args.verify, console };
+    let scan = opening.open(&args.scan)?;
     let pose = posing::of_scan(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
     let index = ShapeIndex::new(&scan);

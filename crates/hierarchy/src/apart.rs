@@ -1,9 +1,12 @@
 //! Whether the coverings of two nodes are apart (Klein & Zachmann 2004, §5.1).
 
+use nearmiss_geometry::NodeId;
+
 use crate::boxes::{OrientedBox, Relative};
 use crate::centres::Centres;
-use crate::descend::NodePair;
+use crate::part::Part;
 use crate::slices::Slices;
+use crate::topology::NodePair;
 
 /// What motion and arithmetic may do to the distance of two places, in units of [`Relative::slack`], each of
 /// which bounds a coordinate: √3 for either of two places in motion, as much again for the distance itself
@@ -39,8 +42,8 @@ pub fn apart(
     extent: Extent,
 ) -> bool {
     let (node_a, node_b) = (pair.a.index(), pair.b.index());
-    let (radius_a, bounds_a) = extent.of(a, node_a);
-    let (radius_b, bounds_b) = extent.of(b, node_b);
+    let (radius_a, bounds_a) = extent.of(a, pair.a);
+    let (radius_b, bounds_b) = extent.of(b, pair.b);
     let radius_b = radius_b * motion.scale();
     let reach = reach + ROUNDINGS * motion.slack();
     let of_a = a.samples(node_a).iter().map(|i| a.positions[i]);
@@ -55,10 +58,12 @@ pub fn apart(
 impl Extent {
     /// The radius of a node's balls, and its volume.
     #[inline]
-    fn of(self, slices: &Slices<'_>, node: usize) -> (f32, OrientedBox) {
+    fn of(self, slices: &Slices<'_>, node: NodeId) -> (f32, OrientedBox) {
         match self {
-            Self::Discs => (slices.sampling_radius_of(node), slices.boxes[node]),
-            Self::Surface => (slices.covering_radius(node), slices.enclosure(node)),
+            Self::Discs => (slices.sampling_radius_of(node.index()), slices.tree.bounds(node)),
+            Self::Surface => {
+                (slices.covering_radius(node.index()), slices.tree.enclosure(Part::Surface, node))
+            }
         }
     }
 }

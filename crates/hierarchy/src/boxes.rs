@@ -9,11 +9,12 @@ use fearless_simd::{Simd, f32x4, f32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_lanes::vector::{dot, sub};
+use serde::{Deserialize, Serialize};
 
 type Axes = [[f32; 3]; 3];
 
 /// A box about `centre` with half edge lengths `half` along the orthonormal `axes`. One cache line.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, Serialize, Deserialize)]
 #[repr(C, align(64))]
 pub struct OrientedBox {
     /// The middle.
@@ -201,61 +202,46 @@ impl Relative {
         self.slack
     }
 
-    /// How far two boxes of a and two of b are apart, each pair along the face normal that parts it most: the
-    /// pairs (0, 0), (0, 1), (1, 0), (1, 1). Negative when they overlap along all six. A positive value, less
-    /// [`Relative::slack`], is a lower bound of their distance.
-    ///
-    /// Four pairs at once fill the lanes of a vector register; plain arrays compile to them.
+    /// How far a box of a and one of b are apart along the face normal that parts them most. Negative when
+    /// they overlap along all six. A positive value, less [`Relative::slack`], is a lower bound of their
+    /// distance.
     #[inline]
     #[must_use]
-    pub fn gaps(&self, a: [&OrientedBox; 2], b: [&OrientedBox; 2]) -> [f32; 4] {
-        let mut gap = [f32::MIN; 4];
-        self.along_normals(a, b, |distance, reach| gap = greater(gap, minus(distance, reach)));
+    pub fn gap(&self, a: &OrientedBox, b: &OrientedBox) -> f32 {
+        let mut gap = f32::MIN;
+        self.along_normals(a, b, |distance, reach| gap = greater(gap, distance - reach));
         gap
     }
 
-    /// The gaps, and for each pair how much of each other the boxes overlap, with `margin` about them: 1 less
-    /// the distance of their centres along a face normal as a share of how far the two and `margin` reach
-    /// along that, the least of the six. 1 where they share a centre, 0 where they are just so far apart.
+    /// How much of each other two boxes overlap, with `margin` about them: 1 less the distance of their
+    /// centres along a face normal as a share of how far the two and `margin` reach along that, the least of
+    /// the six. 1 where they share a centre, 0 where they are just so far apart.
     #[inline]
     #[must_use]
-    pub fn gaps_and_overlaps(
-        &self,
-        a: [&OrientedBox; 2],
-        b: [&OrientedBox; 2],
-        margin: f32,
-    ) -> ([f32; 4], [f32; 4]) {
-        let (mut gap, mut share) = ([f32::MIN; 4], [0.0; 4]);
-        self.along_normals(a, b, |distance, reach| {
-            gap = greater(gap, minus(distance, reach));
-            share = greater(share, lanes(|i| distance[i] / (reach[i] + margin)));
-        });
-        (gap, lanes(|i| 1.0 - share[i]))
+    pub fn overlap(&self, a: &OrientedBox, b: &OrientedBox, margin: f32) -> f32 {
+        let mut share = 0.0;
+        self.along_normals(a, b, |distance, reach| share = greater(share, distance / (reach + margin)));
+        1.0 - share
     }
 
-    /// Tells of four pairs of boxes, along each of the six face normals, the distance of their centres and
-    /// how far both reach.
+    /// Tells along each of the six face normals of two boxes the distance of their centres and how far both
+    /// reach.
     #[inline]
-    fn along_normals(&self, a: [&OrientedBox; 2], b: [&OrientedBox; 2], mut tell: impl FnMut(Quad, Quad)) {
-        let a = Quads::new([a[0], a[0], a[1], a[1]]);
-        let (b0, b1) = (self.moved(b[0]), self.moved(b[1]));
-        let b = Quads::new([&b0, &b1, &b0, &b1]);
-        let mut d = [[0.0; 4]; 3];
-        for k in 0..3 {
-            d[k] = minus(b.centre[k], a.centre[k]);
-        }
+    fn along_normals(&self, a: &OrientedBox, b: &OrientedBox, mut tell: impl FnMut(f32, f32)) {
+        let b = self.moved(b);
+        let d = sub(b.centre, a.centre);
         let mut reach_b = b.half;
         for i in 0..3 {
             let mut reach_a = a.half[i];
             for j in 0..3 {
-                let cosine = magnitude(product(&a.axes[i], &b.axes[j]));
-                reach_a = plus(reach_a, times(b.half[j], cosine));
-                reach_b[j] = plus(reach_b[j], times(a.half[i], cosine));
+                let cosine = dot(a.axes[i], b.axes[j]).abs();
+                reach_a += b.half[j] * cosine;
+                reach_b[j] += a.half[i] * cosine;
             }
-            tell(magnitude(product(&a.axes[i], &d)), reach_a);
+            tell(dot(a.axes[i], d).abs(), reach_a);
         }
         for j in 0..3 {
-            tell(magnitude(product(&b.axes[j], &d)), reach_b[j]);
+            tell(dot(b.axes[j], d).abs(), reach_b[j]);
         }
     }
 
@@ -280,64 +266,10 @@ fn turned<S: Simd>(rows: &Axes, [x, y, z]: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
     [x * rx[0] + y * rx[1] + z * rx[2], x * ry[0] + y * ry[1] + z * ry[2], x * rz[0] + y * rz[1] + z * rz[2]]
 }
 
-/// Four lanes.
-type Quad = [f32; 4];
-
-/// Four boxes, a lane each.
-struct Quads {
-    centre: [Quad; 3],
-    half: [Quad; 3],
-    axes: [[Quad; 3]; 3],
-}
-
-impl Quads {
-    #[inline]
-    fn new(boxes: [&OrientedBox; 4]) -> Self {
-        let mut quads = Self { centre: [[0.0; 4]; 3], half: [[0.0; 4]; 3], axes: [[[0.0; 4]; 3]; 3] };
-        for k in 0..3 {
-            quads.centre[k] = lanes(|i| boxes[i].centre[k]);
-            quads.half[k] = lanes(|i| boxes[i].half[k]);
-            for j in 0..3 {
-                quads.axes[k][j] = lanes(|i| boxes[i].axes[k][j]);
-            }
-        }
-        quads
-    }
-}
-
+/// The second if either is no number.
 #[inline]
-fn lanes(f: impl Fn(usize) -> f32) -> Quad {
-    [f(0), f(1), f(2), f(3)]
-}
-
-#[inline]
-fn plus(x: Quad, y: Quad) -> Quad {
-    lanes(|i| x[i] + y[i])
-}
-
-#[inline]
-fn minus(x: Quad, y: Quad) -> Quad {
-    lanes(|i| x[i] - y[i])
-}
-
-#[inline]
-fn times(x: Quad, y: Quad) -> Quad {
-    lanes(|i| x[i] * y[i])
-}
-
-#[inline]
-fn magnitude(x: Quad) -> Quad {
-    lanes(|i| x[i].abs())
-}
-
-#[inline]
-fn greater(x: Quad, y: Quad) -> Quad {
-    lanes(|i| if x[i] > y[i] { x[i] } else { y[i] })
-}
-
-#[inline]
-fn product(x: &[Quad; 3], y: &[Quad; 3]) -> Quad {
-    plus(plus(times(x[0], y[0]), times(x[1], y[1])), times(x[2], y[2]))
+fn greater(x: f32, y: f32) -> f32 {
+    if x > y { x } else { y }
 }
 
 /// Three unit vectors in single precision.

@@ -1,10 +1,10 @@
 //! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
 
 use bytemuck::bytes_of;
-use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud, PointId};
+use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::on_threads;
+use nearmiss_lanes::parallel::{map, on_threads};
 use nearmiss_lanes::vector::dot;
 use nearmiss_store::Array;
 use nearmiss_surface::{Metric, SurfacePlan};
@@ -17,7 +17,7 @@ use crate::extents::{Discs, boxes_of_discs};
 use crate::gather::{Index, NeighbourList};
 use crate::growth::Growth;
 use crate::kind::PointKind;
-use crate::leaf_block::TreeParts;
+use crate::leaf_block::{LeafBlock, LeafParts, Leaves};
 use crate::neighbours::neighbours;
 use crate::options::{BuildError, BuildOptions};
 use crate::ordered::Ordered;
@@ -27,8 +27,8 @@ use crate::samples::{lists, samples};
 use crate::sampling::Sampling;
 use crate::slices::Slices;
 use crate::surfels::{Known, NormalCone, Surfels, align, surfels};
-use crate::topology::Node;
-use crate::wide::WideTree;
+use crate::topology::Topology;
+use crate::tree::{Bare, Growths, Root, Siblings, Tree, growths_of_siblings, siblings};
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
 ///
@@ -55,12 +55,15 @@ pub struct PointHierarchy {
     pub(crate) discs: Array<f32>,
     pub(crate) kinds: Array<u8>,
     pub(crate) source: Array<u32>,
-    pub(crate) nodes: Array<Node>,
-    pub(crate) boxes: Array<OrientedBox>,
-    pub(crate) wide: WideTree,
+    pub(crate) topology: Topology,
+    pub(crate) root: Root,
+    pub(crate) siblings: Array<Siblings>,
+    /// By [`Part`].
+    pub(crate) growths: [Array<Growths>; 2],
+    pub(crate) leaf_blocks: Array<LeafBlock>,
+    /// What kinds of points each leaf has.
+    pub(crate) marks: Array<u8>,
     pub(crate) outline: Outline,
-    pub(crate) growths: Array<Growth>,
-    pub(crate) obstacle_growths: Array<Growth>,
     pub(crate) sample_lists: Array<u32>,
     pub(crate) coverings: Array<Covering>,
     pub(crate) cones: Array<NormalCone>,
@@ -90,12 +93,9 @@ impl PointHierarchy {
             radii: &self.radii,
             discs: &self.discs,
             kinds: &self.kinds,
-            nodes: &self.nodes,
-            boxes: &self.boxes,
-            wide: &self.wide,
+            tree: self.tree(),
+            leaves: Leaves { topology: &self.topology, blocks: &self.leaf_blocks, marks: &self.marks },
             outline: &self.outline,
-            growths: &self.growths,
-            obstacle_growths: &self.obstacle_growths,
             blocks: &self.blocks,
             sample_lists: &self.sample_lists,
             coverings: &self.coverings,
@@ -217,29 +217,45 @@ impl PointHierarchy {
             }
         }
         self.is_oriented = true;
+        self.renew_leaves();
     }
 
-    /// Makes anew what is not stored, after discs or boxes have changed. Signs of normals, which say nothing
-    /// to leaves, do not matter.
-    pub(crate) fn derive(&mut self) {
-        let slices = self.slices();
-        let parts = TreeParts {
-            nodes: slices.nodes,
-            boxes: slices.boxes,
-            growths: Part::BOTH.map(|part| slices.growths_of(part)),
-            positions: slices.positions,
-            normals: slices.normals,
-            discs: slices.discs,
-            kinds: slices.kinds,
-            dense: slices.dense,
-            leaf_size: slices.leaf_size,
-        };
-        self.wide = WideTree::of(&parts);
+    /// Takes these boxes of all nodes and what they must grow by, in the order of their ids, for its own, and
+    /// makes anew what follows from them and the discs.
+    pub(crate) fn bound(&mut self, boxes: &[OrientedBox], growths: Option<[&[Growth]; 2]>) {
+        let topology = self.topology;
+        self.root.bounds = boxes[NodeId::ROOT.index()];
+        self.siblings = siblings(&topology, boxes).into();
+        if let Some(growths) = growths {
+            self.root.growths = growths.map(|of| of[NodeId::ROOT.index()]);
+            self.growths = growths.map(|of| growths_of_siblings(&topology, of).into());
+        }
+        self.renew_leaves();
         self.outline = self.outlined();
     }
 
+    /// Makes what leaves are compared by from the points and the boxes about them.
+    fn renew_leaves(&mut self) {
+        let (tree, topology, leaves) = (self.tree(), self.topology, self.leaf_parts());
+        let bounds: Vec<OrientedBox> = map(topology.leaves(), |leaf| tree.bounds(topology.leaf(leaf)));
+        let blocks = leaves.blocks(&topology, &bounds);
+        let marks = map(topology.leaves(), |leaf| leaves.marks(&topology, leaf, &bounds[leaf]));
+        (self.leaf_blocks, self.marks) = (blocks.into(), marks.into());
+    }
+
+    /// What leaves are made of.
+    pub(crate) fn leaf_parts(&self) -> LeafParts<'_> {
+        LeafParts {
+            positions: &self.positions,
+            normals: &self.normals,
+            discs: &self.discs,
+            kinds: &self.kinds,
+            dense: self.dense as usize,
+        }
+    }
+
     /// What tells this scan from others, and where it is.
-    fn outlined(&self) -> Outline {
+    pub(crate) fn outlined(&self) -> Outline {
         let slices = self.slices();
         let mut hash = Xxh3::new();
         let frame = self.frame();
@@ -252,7 +268,7 @@ impl PointHierarchy {
             identity: hash.digest(),
             surface: Ball::about(&slices.enclosure(0)),
             obstacle: Ball::about(&slices.obstacle_enclosure(0)),
-            discs: Ball::about(&slices.boxes[0]),
+            discs: Ball::about(&self.root.bounds),
         }
     }
 
@@ -308,34 +324,61 @@ impl PointHierarchy {
         PointId(self.source[i])
     }
 
-    /// The nodes, in preorder.
+    /// The nodes, and the boxes about them.
     #[must_use]
-    pub fn nodes(&self) -> &[Node] {
-        &self.nodes
+    pub fn tree(&self) -> Tree<'_> {
+        let [surface, obstacle] = &self.growths;
+        Tree {
+            topology: &self.topology,
+            root: &self.root,
+            siblings: &self.siblings,
+            growths: [surface, obstacle],
+        }
     }
 
-    /// A box about the discs of each node's points, and about their [balls](Slices::ball).
+    /// The box about all points.
+    #[inline]
     #[must_use]
-    pub fn boxes(&self) -> &[OrientedBox] {
-        &self.boxes
+    pub fn root_box(&self) -> &OrientedBox {
+        &self.root.bounds
+    }
+
+    /// What tells this scan from others, and where it is.
+    #[inline]
+    #[must_use]
+    pub fn outline(&self) -> &Outline {
+        &self.outline
+    }
+
+    /// Which nodes there are, and which points lie under them.
+    #[inline]
+    #[must_use]
+    pub fn topology(&self) -> &Topology {
+        &self.topology
+    }
+
+    /// A box about the discs of each node's points, and about their [balls](Slices::ball), in the order of
+    /// the nodes' ids.
+    #[must_use]
+    pub fn boxes(&self) -> impl ExactSizeIterator<Item = OrientedBox> {
+        let tree = self.tree();
+        self.topology.ids().map(move |id| tree.bounds(id))
     }
 
     /// A box about each node's part of the surface, proven to contain it (docs/theory/certificates.md): every
     /// surface point whose nearest stored point is the node's.
     #[must_use]
     pub fn enclosures(&self) -> impl ExactSizeIterator<Item = OrientedBox> {
-        let slices = self.slices();
-        (0..self.nodes.len()).map(move |id| slices.enclosure(id))
+        let tree = self.tree();
+        self.topology.ids().map(move |id| tree.enclosure(Part::Surface, id))
     }
 
     /// Bytes of all that is stored for nodes: tree, boxes, enclosures, cones, samples and coverings (S0
     /// §6.1); what points keep, and their neighbour lists, is not counted.
     #[must_use]
     pub fn bytes_of_nodes(&self) -> usize {
-        size_of_val::<[_]>(&self.nodes)
-            + size_of_val::<[_]>(&self.boxes)
-            + size_of_val::<[_]>(&self.growths)
-            + size_of_val::<[_]>(&self.obstacle_growths)
+        size_of_val::<[_]>(&self.siblings)
+            + 2 * size_of_val::<[_]>(&self.growths[0])
             + size_of_val::<[_]>(&self.cones)
             + size_of_val::<[_]>(&self.sample_lists)
             + size_of_val::<[_]>(&self.coverings)
@@ -372,10 +415,11 @@ impl PointHierarchy {
 
 fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, BuildError> {
     let leaf_size = options.leaf_size as usize;
-    let Ordered { nodes, boxes, positions, source, fits, dense, groups, sampling } =
+    let Ordered { topology, boxes, positions, source, fits, dense, groups, sampling } =
         Ordered::of(cloud, options)?;
     let Sampling { radii, sampling_radius, reach, plan, blocks, .. } = sampling;
-    let index = Index::without_lists((&nodes, &boxes), (&blocks, &groups), &plan);
+    let bare = Bare::new(topology, &boxes);
+    let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);
     let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, dense };
     let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves, obstacles } =
@@ -383,13 +427,13 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     drop(fits);
     let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
     let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
-    let boxes = boxes_of_discs(&nodes, &boxes, &of_points);
+    let boxes = boxes_of_discs(&topology, &boxes, &of_points);
     drop(balls);
-    let obstacle_growths = growths(&nodes, &boxes, &obstacles);
-    let growths = growths(&nodes, &boxes, &leaves);
-    let sample_lists = lists(&positions, &nodes, (options.leaf_size, options.samples));
+    let obstacle_growths = growths(&topology, &boxes, &obstacles);
+    let growths = growths(&topology, &boxes, &leaves);
+    let sample_lists = lists(&positions, &topology, options.samples);
     let ground = Ground {
-        nodes: &nodes,
+        topology: &topology,
         boxes: &boxes,
         growths: &growths,
         positions: &positions,
@@ -398,9 +442,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         discs: &flat,
         cells: &cells,
     };
-    let coverings = coverings(&ground, |id| {
-        samples(&sample_lists, (id, &nodes[id]), (options.leaf_size, options.samples))
-    });
+    let coverings = coverings(&ground, |id| samples(&sample_lists, &topology, id, options.samples));
     drop((flat, cells));
 
     let mut hierarchy = PointHierarchy {
@@ -423,12 +465,13 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         discs: discs.into(),
         kinds: kinds.into(),
         source: source.into(),
-        wide: WideTree::default(),
+        topology,
+        root: Root::default(),
+        siblings: Array::default(),
+        growths: Default::default(),
+        leaf_blocks: Array::default(),
+        marks: Array::default(),
         outline: Outline::default(),
-        nodes: nodes.into(),
-        boxes: boxes.into(),
-        growths: growths.into(),
-        obstacle_growths: obstacle_growths.into(),
         sample_lists: sample_lists.into(),
         coverings: coverings.into(),
         cones: cones.into(),
@@ -437,6 +480,6 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         lists: lists_of_blocks.lists.into(),
         listed: lists_of_blocks.entries.into(),
     };
-    hierarchy.derive();
+    hierarchy.bound(&boxes, Some([&growths, &obstacle_growths]));
     Ok(hierarchy)
 }

@@ -9,8 +9,9 @@
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
+use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::vector::dot;
 
 use crate::boxes::OrientedBox;
@@ -20,7 +21,7 @@ use crate::growth::Growth;
 use crate::kind::THICKNESS;
 use crate::samples::Samples;
 use crate::spacing::fold_nodes;
-use crate::topology::{Node, TREE_STACK};
+use crate::topology::{TREE_STACK, Topology};
 
 /// What is known of a node's sample as a whole; lengths in stored units.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
@@ -142,7 +143,7 @@ struct Solids {
 /// What coverings are to contain.
 #[derive(Clone, Copy)]
 pub(crate) struct Ground<'a> {
-    pub(crate) nodes: &'a [Node],
+    pub(crate) topology: &'a Topology,
     pub(crate) boxes: &'a [OrientedBox],
     pub(crate) growths: &'a [Growth],
     pub(crate) positions: &'a [[f32; 3]],
@@ -157,21 +158,21 @@ pub(crate) struct Ground<'a> {
 /// The coverings of all nodes with these samples.
 pub(crate) fn coverings<'a>(
     ground: &Ground<'_>,
-    samples: impl Fn(usize) -> Samples<'a> + Sync + Send,
+    samples: impl Fn(NodeId) -> Samples<'a> + Sync + Send,
 ) -> Vec<Covering> {
-    let Ground { nodes, positions, radii, .. } = *ground;
+    let Ground { topology, positions, radii, .. } = *ground;
     let squares = fold_nodes(
-        nodes,
+        topology,
         |range| radii[range].iter().map(|&r| f64::from(r) * f64::from(r)).sum(),
         |a: f64, b| a + b,
     );
-    let ids: Vec<u32> = (0..id32(nodes.len())).collect();
     let level = Level::new();
-    map_all(&ids, |&id| {
-        let node = id as usize;
+    map(topology.len(), |i| {
+        let node = NodeId(id32(i));
         let centres = centres_of(samples(node), positions);
+        let count = f64::from(id32(topology.points(node).len()));
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
-        let spacing = (squares[node] / f64::from(nodes[node].count)).sqrt() as f32;
+        let spacing = (squares[i] / count).sqrt() as f32;
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || {
@@ -187,32 +188,32 @@ impl Ground<'_> {
     /// A radius at which balls about `centres` contain the surface whose nearest points are under `node`, and
     /// their discs and balls.
     #[inline(always)]
-    fn covering_radius(&self, node: usize, centres: &Centres) -> f32 {
-        let about = |id: usize| self.growths[id].of(&self.boxes[id]);
+    fn covering_radius(&self, node: NodeId, centres: &Centres) -> f32 {
+        let about = |id: NodeId| self.growths[id.index()].of(&self.boxes[id.index()]);
         self.greatest(node, centres, about, self.cells)
     }
 
     /// A radius at which each disc and ball of a point under `node` lies in one of the balls about `centres`.
     #[inline(always)]
-    fn sampling_radius(&self, node: usize, centres: &Centres) -> f32 {
-        self.greatest(node, centres, |id| self.boxes[id], self.discs)
+    fn sampling_radius(&self, node: NodeId, centres: &Centres) -> f32 {
+        self.greatest(node, centres, |id| self.boxes[id.index()], self.discs)
     }
 
     /// The least radius at which under `node` each box `about` a node, or else each of the `solids` of
-    /// points, lies in one of the balls about `centres`. Of two children the further comes first, so that
-    /// little is left to look at.
+    /// points, lies in one of the balls about `centres`. Of siblings the furthest comes first, so that little
+    /// is left to look at.
     #[inline(always)]
     fn greatest(
         &self,
-        node: usize,
+        node: NodeId,
         centres: &Centres,
-        about: impl Fn(usize) -> OrientedBox,
+        about: impl Fn(NodeId) -> OrientedBox,
         solids: &[Solid],
     ) -> f32 {
-        let far_sq = |id: usize| centres.far_sq(&about(id));
+        let far_sq = |id: NodeId| centres.far_sq(&about(id));
         let mut radius_sq = 0.0_f32;
-        let mut stack = [(0_u32, 0.0_f32); TREE_STACK];
-        stack[0] = (id32(node), far_sq(node));
+        let mut stack = [(NodeId::ROOT, 0.0_f32); TREE_STACK];
+        stack[0] = (node, far_sq(node));
         let mut top = 1;
         while top > 0 {
             top -= 1;
@@ -220,9 +221,8 @@ impl Ground<'_> {
             if far <= radius_sq {
                 continue;
             }
-            let at = &self.nodes[id as usize];
-            if at.is_leaf() {
-                let points = at.points();
+            if self.topology.is_leaf(id) {
+                let points = self.topology.points(id);
                 let (mut inside_sq, mut start) = (0.0_f32, points.start);
                 while start < points.end {
                     let far_sq = centres.each_far_sq(&self.side_by_side(solids, start, points.end));
@@ -232,12 +232,18 @@ impl Ground<'_> {
                 radius_sq = radius_sq.max(inside_sq.min(far));
                 continue;
             }
-            let left = (id + 1, far_sq(id as usize + 1));
-            let right = (at.right, far_sq(at.right as usize));
-            let (near, far) = if left.1 > right.1 { (right, left) } else { (left, right) };
-            stack[top] = near;
-            stack[top + 1] = far;
-            top += 2;
+            let bottom = top;
+            for child in self.topology.children(id).iter() {
+                let far = far_sq(child);
+                // The furthest on top.
+                let mut at = top;
+                while at > bottom && stack[at - 1].1 > far {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = (child, far);
+                top += 1;
+            }
         }
         radius_sq.sqrt() * GROWN + LOST
     }

@@ -20,9 +20,10 @@ use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::vector::{cross, tangents};
 use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load, product, seen_from};
@@ -32,7 +33,7 @@ use crate::boxes::OrientedBox;
 use crate::gather::Index;
 use crate::growth::Growth;
 use crate::neighbours::Locality;
-use crate::topology::Node;
+use crate::topology::Topology;
 
 /// Sectors of a tangent plane in which a cell is bounded one by one.
 const SECTORS: usize = 16;
@@ -323,26 +324,25 @@ impl Cells {
 
 /// What the boxes about the discs of all nodes must grow by to be enclosures, given the bounds of the leaves
 /// in order.
-pub(crate) fn growths(nodes: &[Node], boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<Growth> {
-    let ids: Vec<u32> = (0..id32(nodes.len())).collect();
-    let leaf_boxes = nodes.iter().zip(boxes).filter(|(node, _)| node.is_leaf());
+pub(crate) fn growths(topology: &Topology, boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<Growth> {
+    let leaf_boxes = &boxes[topology.inner()..];
     let of_leaves: Vec<(Growth, OrientedBox)> = leaf_boxes
+        .iter()
         .zip(leaves)
-        .map(|((_, bounds), leaf)| {
+        .map(|(bounds, leaf)| {
             let growth = leaf.growth(bounds);
             (growth, growth.of(bounds))
         })
         .collect();
     let blocks: Vec<BoxBlock> = of_leaves.chunks(WIDTH).map(BoxBlock::of).collect();
-    let leaf_size = nodes.iter().find(|node| node.is_leaf()).map_or(1, |leaf| leaf.count as usize);
     let level = Level::new();
-    map_all(&ids, |&id| {
-        let (node, bounds) = (&nodes[id as usize], &boxes[id as usize]);
-        let range =
-            node.first as usize / leaf_size..(node.first + node.count).div_ceil(id32(leaf_size)) as usize;
-        if node.is_leaf() {
+    map(topology.len(), |id| {
+        let id = NodeId(id32(id));
+        let range = topology.leaves_under(id);
+        if topology.is_leaf(id) {
             return of_leaves[range.start].0;
         }
+        let bounds = &boxes[id.index()];
         let [low, high] = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
             || extents(simd, &blocks, &range, &bounds.axes),

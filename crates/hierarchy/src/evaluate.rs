@@ -44,7 +44,7 @@ impl PointHierarchy {
         if !self.is_oriented || at.support == 0 {
             return at;
         }
-        self.index().collect(Centre::new(x).rounded(), 0.0, &mut scratch.found);
+        self.index().collect(scratch.level, Centre::new(x).rounded(), 0.0, &mut scratch.found);
         let (blocks, normals): (&[PointBlock], &[[f32; 3]]) = (&self.blocks, &self.normals);
         let (mut sum, mut total) = ([0.0; 3], 0.0);
         for &group in &scratch.found {
@@ -89,8 +89,7 @@ impl PointHierarchy {
 
     pub(crate) fn index(&self) -> Index<'_> {
         Index {
-            nodes: &self.nodes,
-            boxes: &self.boxes,
+            tree: self.tree(),
             blocks: &self.blocks,
             groups: &self.groups,
             lists: &self.lists,

@@ -4,14 +4,15 @@ use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
 
 use crate::boxes::OrientedBox;
 use crate::kind::THICKNESS;
-use crate::topology::Node;
+use crate::topology::Topology;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
@@ -36,15 +37,18 @@ pub(crate) struct Discs<'a> {
 
 /// For each node the least box along the axes of that `about` it that contains the discs of its points with
 /// their thickness, and their balls. O(n log n).
-pub(crate) fn boxes_of_discs(nodes: &[Node], about: &[OrientedBox], discs: &Discs<'_>) -> Vec<OrientedBox> {
+pub(crate) fn boxes_of_discs(
+    topology: &Topology,
+    about: &[OrientedBox],
+    discs: &Discs<'_>,
+) -> Vec<OrientedBox> {
     let blocks = discs.blocks();
-    let ids: Vec<u32> = (0..id32(nodes.len())).collect();
     let level = Level::new();
-    map_all(&ids, |&id| {
-        let (node, about) = (&nodes[id as usize], &about[id as usize]);
+    map(topology.len(), |id| {
+        let about = &about[id];
         let [low, high] = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || extents(simd, &blocks, node.points(), &about.axes),
+            || extents(simd, &blocks, topology.points(NodeId(id32(id))), &about.axes),
         ));
         OrientedBox::spanned(about.axes, low, high, about.reach)
     })
@@ -52,8 +56,7 @@ pub(crate) fn boxes_of_discs(nodes: &[Node], about: &[OrientedBox], discs: &Disc
 
 impl Discs<'_> {
     fn blocks(&self) -> Vec<DiscBlock> {
-        let numbers: Vec<usize> = (0..self.positions.len().div_ceil(WIDTH)).collect();
-        map_all(&numbers, |&number| self.block(number))
+        map(self.positions.len().div_ceil(WIDTH), |number| self.block(number))
     }
 
     fn block(&self, number: usize) -> DiscBlock {

@@ -2,14 +2,16 @@
 //! a descent where no list holds.
 
 use bytemuck::{Pod, Zeroable};
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, mask32x4};
+use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, SurfacePlan};
 
-use crate::boxes::OrientedBox;
-use crate::topology::{Node, TREE_STACK};
+use crate::topology::TREE_STACK;
+use crate::tree::Tree;
 
 /// Points of a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
@@ -60,8 +62,7 @@ impl GatherScratch {
 /// What a search for neighbours reads.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Index<'a> {
-    pub(crate) nodes: &'a [Node],
-    pub(crate) boxes: &'a [OrientedBox],
+    pub(crate) tree: Tree<'a>,
     pub(crate) blocks: &'a [PointBlock],
     pub(crate) groups: &'a [PointBlock],
     pub(crate) lists: &'a [NeighbourList],
@@ -72,11 +73,11 @@ pub(crate) struct Index<'a> {
 impl<'a> Index<'a> {
     /// One by which lists are made: all is found by descent.
     pub(crate) fn without_lists(
-        (nodes, boxes): (&'a [Node], &'a [OrientedBox]),
+        tree: Tree<'a>,
         (blocks, groups): (&'a [PointBlock], &'a [PointBlock]),
         plan: &'a SurfacePlan,
     ) -> Self {
-        Self { nodes, boxes, blocks, groups, lists: &[], listed: &[], plan }
+        Self { tree, blocks, groups, lists: &[], listed: &[], plan }
     }
 }
 
@@ -88,11 +89,11 @@ impl<'a> Index<'a> {
         let GatherScratch { level, block, found, heard, halves } = scratch;
         let mut list = self.list(*block, place, 0.0);
         if list.is_none() {
-            *block = self.nearest_block(place);
+            *block = self.nearest_block(*level, place);
             list = self.list(*block, place, 0.0);
         }
         let list = list.unwrap_or_else(|| {
-            self.collect(place, 0.0, found);
+            self.collect(*level, place, 0.0, found);
             &*found
         });
         dispatch!(*level, simd => simd.vectorize(
@@ -141,42 +142,62 @@ impl<'a> Index<'a> {
         Some(nearest[lane] as usize * LANES + lane)
     }
 
-    /// A block of the leaf whose box is near `x`: always into the nearer child.
-    fn nearest_block(&self, x: [f32; 3]) -> usize {
-        let mut id = 0;
-        while !self.nodes[id].is_leaf() {
-            let [left, right] = [id + 1, self.nodes[id].right as usize];
-            let nearer = self.boxes[left].distance_sq(x) <= self.boxes[right].distance_sq(x);
-            id = if nearer { left } else { right };
+    /// A block of the leaf whose box is near `x`: always into the nearest child.
+    fn nearest_block(&self, level: Level, x: [f32; 3]) -> usize {
+        let Tree { topology, siblings, .. } = self.tree;
+        let mut id = NodeId::ROOT;
+        while !topology.is_leaf(id) {
+            let distances = dispatch!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || siblings[id.index()].distances_sq(simd, x).to_array(),
+            ));
+            let children = topology.children(id).iter().zip(distances);
+            id = children.reduce(nearer).map_or(id, |(child, _)| child);
         }
-        self.nodes[id].first as usize / PointBlock::WIDTH
+        topology.points(id).start / PointBlock::WIDTH
     }
 
     /// The groups of which a point may be heard within `distance` of `x`, ascending.
-    pub(crate) fn collect(&self, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
+    pub(crate) fn collect(&self, level: Level, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.collect_by(simd, x, distance, found),
+        ));
+    }
+
+    /// [`Self::collect`] by the instructions of the caller.
+    #[inline(always)]
+    pub(crate) fn collect_by<S: Simd>(&self, simd: S, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
         found.clear();
-        let mut stack = [0_u32; TREE_STACK];
+        let Tree { topology, siblings, .. } = self.tree;
+        let mut stack = [NodeId::ROOT; TREE_STACK];
         let mut top = 1;
         // Leaves come in order, and many in one group.
         let mut next = 0;
         while top > 0 {
             top -= 1;
-            let id = stack[top] as usize;
-            let node = &self.nodes[id];
-            let far = (self.plan.horizon(self.boxes[id].reach) + distance) * GROWN;
-            let is_near = self.boxes[id].distance_sq(x) < far * far;
-            let (first, end) =
-                (node.first as usize / GROUP, (node.first as usize + node.count as usize).div_ceil(GROUP));
-            if !is_near || end <= next {
+            let id = stack[top];
+            let points = topology.points(id);
+            let (first, end) = (points.start / GROUP, points.end.div_ceil(GROUP));
+            if end <= next {
                 continue;
             }
-            if node.is_leaf() {
+            if topology.is_leaf(id) {
                 found.extend((first.max(next)..end).map(id32));
                 next = end;
-            } else if top + 2 <= TREE_STACK {
-                stack[top] = node.right;
-                stack[top + 1] = id32(id) + 1;
-                top += 2;
+                continue;
+            }
+            let (children, below) = (topology.children(id), &siblings[id.index()]);
+            let [a, b, c, d] = below.reach;
+            let horizon = |reach: f32| self.plan.horizon(reach);
+            let horizons = f32x4::load_array(simd, [horizon(a), horizon(b), horizon(c), horizon(d)]);
+            let far = (horizons + distance) * GROWN;
+            let is_near: mask32x4<S> = below.distances_sq(simd, x).simd_lt(far * far);
+            let near = is_near.to_bitmask();
+            // The first comes next.
+            for lane in (0..children.len()).rev() {
+                stack[top] = children.lanes()[lane];
+                top += usize::from(near >> lane & 1 != 0);
             }
         }
     }
@@ -222,4 +243,9 @@ impl<'a> Index<'a> {
         near.offer_all(simd, self.blocks, heard, halves);
         near.moments(simd)
     }
+}
+
+/// The nearer of two nodes, the first of equals or where one is no number.
+fn nearer(best: (NodeId, f32), other: (NodeId, f32)) -> (NodeId, f32) {
+    if other.1 < best.1 { other } else { best }
 }

@@ -4,11 +4,12 @@
 //! precision without the lower half of its digits, rounded up.
 
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
 use crate::boxes::{OrientedBox, ROUNDING};
 
 /// By how much an enclosure sticks out of the box of its node, along either side of each axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Growth {
     /// Against the axes: the upper halves of single-precision numbers.
@@ -74,6 +75,14 @@ impl Growth {
     pub(crate) fn pairs(&self) -> [u32; 3] {
         let ([a, b, c], [d, e, f]) = (self.low, self.high);
         [[a, b], [c, d], [e, f]].map(|[first, second]| u32::from(second) << 16 | u32::from(first))
+    }
+
+    /// That of [`Self::pairs`].
+    #[inline]
+    #[expect(clippy::cast_possible_truncation, reason = "halves of the number")]
+    pub(crate) fn from_pairs(pairs: [u32; 3]) -> Self {
+        let [[a, b], [c, d], [e, f]] = pairs.map(|pair| [pair as u16, (pair >> 16) as u16]);
+        Self { low: [a, b, c], high: [d, e, f] }
     }
 
     /// Whether all lengths are lengths, if boundless ones.

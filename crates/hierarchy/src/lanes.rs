@@ -13,7 +13,7 @@ pub(crate) struct Boxes<V> {
 }
 
 /// Tells of boxes of a and b in each lane, along each of the six face normals, the distance of their centres
-/// and how far both reach: in the order of operations of [`Relative::gaps`](crate::Relative::gaps).
+/// and how far both reach: in the order of operations of [`Relative::gap`](crate::Relative::gap).
 #[inline(always)]
 pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>, mut tell: impl FnMut(V, V)) {
     let d = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];

@@ -1,15 +1,15 @@
 //! What two leaves are compared by, in one place: a query comes to a leaf that no other has lately come to,
 //! and waits for each part of memory that it needs.
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i16x16};
-use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::vector::sub;
 
 use crate::boxes::OrientedBox;
-use crate::growth::Growth;
 use crate::kind::{PointKind, is_on_sheet};
-use crate::topology::Node;
+use crate::topology::Topology;
 
 /// Lanes of a block.
 const WIDTH: usize = 16;
@@ -22,7 +22,7 @@ const STEPS: f32 = 32767.0;
 /// Of places and radii sixteen bits are kept, in steps of a 2⁻¹⁵th of the leaf, and of directions as many:
 /// off by less than a thousandth of a local radius and of a degree, where discs say no more than that
 /// surfaces cross to first order; in half the memory.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct LeafBlock {
     positions: [[i16; WIDTH]; 3],
@@ -127,88 +127,92 @@ fn steps<S: Simd>(simd: S, steps: &[i16; WIDTH]) -> f32x16<S> {
     f32x16::float_from(low.combine(high))
 }
 
-/// What the tree in lanes is made of: arrays of a scan.
+/// Whether some point of a leaf is sparse, as a bit.
+const SPARSE: u8 = 1;
+
+/// Whether some point of a leaf stands in the obstacle as a ball.
+const BALLS: u8 = 2;
+
+/// Whether a leaf is loose, as a bit.
+const LOOSE: u8 = 4;
+
+/// A leaf longer than so many of its greatest local radii is not a patch of a sheet. Half the length of a
+/// patch of 16 points is some two.
+const LOOSE_FROM: f32 = 3.0;
+
+/// What leaves are made of.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TreeParts<'a> {
-    pub(crate) nodes: &'a [Node],
-    pub(crate) boxes: &'a [OrientedBox],
-    /// Of surface and obstacle.
-    pub(crate) growths: [&'a [Growth]; 2],
+pub(crate) struct LeafParts<'a> {
     pub(crate) positions: &'a [[f32; 3]],
     pub(crate) normals: &'a [[f32; 3]],
     pub(crate) discs: &'a [f32],
     pub(crate) kinds: &'a [u8],
     /// Points before this are dense.
     pub(crate) dense: usize,
-    pub(crate) leaf_size: u32,
+}
+
+impl LeafParts<'_> {
+    /// How many blocks a leaf has.
+    pub(crate) fn blocks_a_leaf(topology: &Topology) -> usize {
+        topology.leaf_size().div_ceil(WIDTH)
+    }
+
+    /// The block with this number of all leaves'; `bounds` is the box of its leaf.
+    pub(crate) fn block(&self, topology: &Topology, number: usize, bounds: &OrientedBox) -> LeafBlock {
+        let blocks_a_leaf = Self::blocks_a_leaf(topology);
+        let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
+        let mut block = LeafBlock::new(bounds);
+        let points = topology.points_of_leaf(leaf);
+        for (lane, i) in points.skip(part * WIDTH).take(WIDTH).enumerate() {
+            block.set(lane, self.positions[i], self.normals[i], self.discs[i]);
+        }
+        block
+    }
+
+    /// As many blocks for each leaf as a full one needs; `bounds` are the boxes of leaves. O(n), on all
+    /// cores.
+    pub(crate) fn blocks(&self, topology: &Topology, bounds: &[OrientedBox]) -> Vec<LeafBlock> {
+        let blocks_a_leaf = Self::blocks_a_leaf(topology);
+        map(topology.leaves() * blocks_a_leaf, |number| {
+            self.block(topology, number, &bounds[number / blocks_a_leaf])
+        })
+    }
+
+    /// What kinds of points a leaf has, and whether it is loose; `bounds` is its box.
+    pub(crate) fn marks(&self, topology: &Topology, leaf: usize, bounds: &OrientedBox) -> u8 {
+        let kind = |i: usize| PointKind::from_code(self.kinds[i]);
+        let points = topology.points_of_leaf(leaf);
+        let is_sparse = points.clone().any(|i| kind(i).is_sparse());
+        let has_balls = points.into_iter().any(|i| !is_on_sheet(i, self.dense, kind(i)));
+        let is_loose = bounds.half[0] > LOOSE_FROM * bounds.reach;
+        let marks = [(SPARSE, is_sparse), (BALLS, has_balls), (LOOSE, is_loose)];
+        marks.into_iter().filter(|mark| mark.1).fold(0, |marks, mark| marks | mark.0)
+    }
 }
 
 /// The leaves in the order of their points.
-#[derive(Debug, Clone, Default)]
-pub struct Leaves {
+#[derive(Debug, Clone, Copy)]
+pub struct Leaves<'a> {
+    pub(crate) topology: &'a Topology,
     /// As many for each leaf as a full one needs.
-    blocks: Vec<LeafBlock>,
-    /// Their ids in the binary tree.
-    ids: Vec<u32>,
-    /// Whether some point of a leaf is sparse.
-    sparse: Vec<bool>,
-    /// Whether some point of a leaf stands in the obstacle as a ball.
-    balls: Vec<bool>,
-    points: usize,
-    leaf_size: usize,
-    blocks_a_leaf: usize,
+    pub(crate) blocks: &'a [LeafBlock],
+    /// What kinds of points each has, and whether it is loose.
+    pub(crate) marks: &'a [u8],
 }
 
-impl Leaves {
-    /// Those of a scan. O(n), on all cores.
-    pub(crate) fn of(scan: &TreeParts<'_>) -> Self {
-        let leaf_size = scan.leaf_size as usize;
-        let is_on_sheet = |i: usize| is_on_sheet(i, scan.dense, PointKind::from_code(scan.kinds[i]));
-        let blocks_a_leaf = leaf_size.div_ceil(WIDTH);
-        let numbered = (0_u32..).zip(scan.nodes).filter(|(_, node)| node.is_leaf());
-        let (mut ids, mut sparse, mut balls) = (Vec::new(), Vec::new(), Vec::new());
-        for (id, node) in numbered {
-            let is_sparse = |&code: &u8| PointKind::from_code(code).is_sparse();
-            ids.push(id);
-            sparse.push(scan.kinds[node.points()].iter().any(is_sparse));
-            balls.push(node.points().any(|i| !is_on_sheet(i)));
-        }
-        let numbers: Vec<usize> = (0..ids.len() * blocks_a_leaf).collect();
-        let blocks = map_all(&numbers, |&number| {
-            let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
-            let mut block = LeafBlock::new(&scan.boxes[ids[leaf] as usize]);
-            let points = scan.nodes[ids[leaf] as usize].points();
-            for (lane, i) in points.skip(part * WIDTH).take(WIDTH).enumerate() {
-                block.set(lane, scan.positions[i], scan.normals[i], scan.discs[i]);
-            }
-            block
-        });
-        Self { blocks, ids, sparse, balls, points: scan.positions.len(), leaf_size, blocks_a_leaf }
-    }
-
-    /// The leaf's id in the binary tree.
-    ///
-    /// # Panics
-    /// When there is no such leaf, as all here.
-    #[inline]
-    #[must_use]
-    pub fn id(&self, leaf: usize) -> u32 {
-        self.ids[leaf]
-    }
-
-    /// Its points.
+impl<'a> Leaves<'a> {
+    /// The points of a leaf, by its number.
     #[inline]
     #[must_use]
     pub fn points(&self, leaf: usize) -> std::ops::Range<usize> {
-        let first = leaf * self.leaf_size;
-        first..self.points.min(first + self.leaf_size)
+        self.topology.points_of_leaf(leaf)
     }
 
     /// The leaf of a point.
     #[inline]
     #[must_use]
     pub fn leaf_of(&self, i: usize) -> usize {
-        i / self.leaf_size
+        i / self.topology.leaf_size()
     }
 
     /// The block with a point, its first point and how many it has.
@@ -217,33 +221,46 @@ impl Leaves {
     /// When there is no such point.
     #[inline]
     #[must_use]
-    pub fn block_with(&self, i: usize) -> (&LeafBlock, usize, usize) {
-        let (leaf, within) = (i / self.leaf_size, i % self.leaf_size);
+    pub fn block_with(&self, i: usize) -> (&'a LeafBlock, usize, usize) {
+        let leaf_size = self.topology.leaf_size();
+        let (leaf, within) = (i / leaf_size, i % leaf_size);
         let part = within / WIDTH;
         let first = i - within % WIDTH;
         let count = (self.points(leaf).end - first).min(WIDTH);
-        (&self.blocks[leaf * self.blocks_a_leaf + part], first, count)
+        (&self.blocks[leaf * leaf_size.div_ceil(WIDTH) + part], first, count)
     }
 
-    /// Whether some of them are [sparse](PointKind::is_sparse).
+    /// Returns `true` if some points of a leaf are [sparse](PointKind::is_sparse).
+    ///
+    /// # Panics
+    /// When there is no such leaf, as below.
     #[inline]
     #[must_use]
     pub fn is_sparse(&self, leaf: usize) -> bool {
-        self.sparse[leaf]
+        self.marks[leaf] & SPARSE != 0
     }
 
     /// Returns `true` if some of them stand in the obstacle as balls.
     #[inline]
     #[must_use]
     pub fn has_balls(&self, leaf: usize) -> bool {
-        self.balls[leaf]
+        self.marks[leaf] & BALLS != 0
+    }
+
+    /// Returns `true` if its points may tell more of its obstacle than its box: it is longer than a patch of
+    /// a sheet would be.
+    #[inline]
+    #[must_use]
+    pub fn is_loose(&self, leaf: usize) -> bool {
+        self.marks[leaf] & LOOSE != 0
     }
 
     /// Its points in blocks, with the first point of each block and how many it has.
     #[inline]
-    pub fn blocks(&self, leaf: usize) -> impl Iterator<Item = (&LeafBlock, usize, usize)> {
+    pub fn blocks(&self, leaf: usize) -> impl Iterator<Item = (&'a LeafBlock, usize, usize)> + use<'a> {
         let points = self.points(leaf);
-        let blocks = &self.blocks[leaf * self.blocks_a_leaf..][..points.len().div_ceil(WIDTH)];
+        let blocks_a_leaf = self.topology.leaf_size().div_ceil(WIDTH);
+        let blocks = &self.blocks[leaf * blocks_a_leaf..][..points.len().div_ceil(WIDTH)];
         blocks.iter().enumerate().map(move |(i, block)| {
             let first = points.start + i * WIDTH;
             (block, first, (points.end - first).min(WIDTH))

@@ -1,7 +1,9 @@
 //! The samples of nodes as the scan seen from further away: which they are, how far they reach, and f' over
 //! them.
 
+use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
 use nearmiss_surface::{Evaluation, Moments};
 
 use crate::build::PointHierarchy;
@@ -18,7 +20,7 @@ impl<'a> Slices<'a> {
     #[inline]
     #[must_use]
     pub fn samples(&self, node: usize) -> Samples<'a> {
-        samples(self.sample_lists, (node, &self.nodes[node]), (self.leaf_size, self.samples_a_node))
+        samples(self.sample_lists, self.tree.topology, NodeId(id32(node)), self.samples_a_node)
     }
 
     /// The covering radius: balls of this radius about the samples of a node contain its part of the surface,
@@ -65,7 +67,8 @@ impl<'a> Slices<'a> {
     /// √(|P|/|P'|).
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     fn thinning(&self, node: usize) -> f32 {
-        (self.nodes[node].count as f32 / self.samples(node).len() as f32).sqrt()
+        let count = self.tree.topology.points(NodeId(id32(node))).len();
+        (count as f32 / self.samples(node).len() as f32).sqrt()
     }
 }
 

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x4, mask32x16};
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x4, mask32x16};
+use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{bits, lanes_of, product, seen_from};
@@ -12,25 +13,8 @@ use nearmiss_surface::Centre;
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::gather::GROWN;
-use crate::topology::TREE_STACK;
-use crate::wide::{Siblings, WIDTH};
-
-impl Siblings {
-    /// The squared distances of a place from the four boxes.
-    #[inline(always)]
-    fn distances_sq<S: Simd>(&self, simd: S, [x, y, z]: [f32; 3]) -> f32x4<S> {
-        let load = f32x4::load_array_ref;
-        let [cx, cy, cz] = &self.centre;
-        let d = [-(load(simd, cx) - x), -(load(simd, cy) - y), -(load(simd, cz) - z)];
-        let mut sum = f32x4::splat(simd, 0.0);
-        for ([ax, ay, az], half) in self.axes.iter().zip(&self.half) {
-            let along = product([load(simd, ax), load(simd, ay), load(simd, az)], d);
-            let beyond = (along.abs() - load(simd, half)).max(0.0);
-            sum += beyond * beyond;
-        }
-        sum
-    }
-}
+use crate::topology::{FAN, TREE_STACK};
+use crate::tree::lanes_of as lanes_of_children;
 
 /// The number in single precision, or a little more.
 #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
@@ -97,10 +81,11 @@ impl PointHierarchy {
         /// The square of how many times as far a point may be beyond reach.
         const ROUGHLY: f64 = 1.25 * 1.25;
         let reach_sq = reach * reach;
-        let wide = &self.wide;
+        let tree = self.tree();
+        let topology = tree.topology;
         let mut nearest = self.nearest_of_leaf(simd, i, x);
-        let own_leaf = wide.leaves.leaf_of(i);
-        let mut stack = [(0.0, wide.root()); STACK];
+        let own_leaf = topology.leaf_of(i);
+        let mut stack = [(0.0, NodeId::ROOT); TREE_STACK];
         let (mut top, mut looked_at) = (1, 1);
         while top > 0 {
             top -= 1;
@@ -112,21 +97,21 @@ impl PointHierarchy {
                 continue;
             }
             looked_at += 1;
-            if child.is_leaf() {
-                if child.index() != own_leaf {
-                    self.offer_leaf(simd, child.index(), &mut nearest);
+            if topology.is_leaf(child) {
+                if child != own_leaf {
+                    self.offer_leaf(simd, topology.leaf_number(child), &mut nearest);
                 }
                 continue;
             }
-            let siblings = &wide.nodes[child.index()];
+            let (siblings, children) = (&tree.siblings[child.index()], topology.children(child));
             let (bottom, distances) = (top, siblings.distances_sq(simd, nearest.rounded));
             let near: mask32x4<S> = distances.simd_le(nearest.most);
             let (mut left, distances) =
-                (near.to_bitmask() & u64::from(siblings.lanes()), distances.to_array());
+                (near.to_bitmask() & u64::from(lanes_of_children(children)), distances.to_array());
             while left != 0 {
                 let lane = left.trailing_zeros() as usize;
                 left &= left - 1;
-                let (own, child) = (distances[lane % WIDTH], siblings.children[lane % WIDTH]);
+                let (own, child) = (distances[lane % FAN], children.lanes()[lane % FAN]);
                 // The nearest on top.
                 let mut at = top;
                 while at > bottom && stack[at - 1].0 < own {
@@ -180,14 +165,14 @@ impl PointHierarchy {
     fn nearest_of_leaf<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Nearest {
         let mut nearest = Nearest::new(x, self.bounds_radius());
         nearest.offer(i, self.positions[i]);
-        self.offer_leaf(simd, self.wide.leaves.leaf_of(i), &mut nearest);
+        self.offer_leaf(simd, i / self.leaf_size as usize, &mut nearest);
         nearest
     }
 
     /// Offers the points of a leaf.
     #[inline(always)]
     fn offer_leaf<S: Simd>(&self, simd: S, leaf: usize, nearest: &mut Nearest) {
-        let points = self.wide.leaves.points(leaf);
+        let points = self.topology().points_of_leaf(leaf);
         for block in points.start / PointBlock::WIDTH..=(points.end - 1) / PointBlock::WIDTH {
             self.offer_block(simd, block, &points, nearest);
         }
@@ -209,10 +194,8 @@ impl PointHierarchy {
 
     /// No stored coordinate is greater.
     fn bounds_radius(&self) -> f64 {
-        let OrientedBox { centre, .. } = self.boxes[0];
-        f64::from(self.boxes[0].radius()) + f64::from(centre.iter().fold(0.0_f32, |far, c| far.max(c.abs())))
+        let bounds = self.root.bounds;
+        let OrientedBox { centre, .. } = bounds;
+        f64::from(bounds.radius()) + f64::from(centre.iter().fold(0.0_f32, |far, c| far.max(c.abs())))
     }
 }
-
-/// Of each level three children wait while the fourth is looked at.
-const STACK: usize = 3 * TREE_STACK.div_ceil(2) + WIDTH;

@@ -150,7 +150,7 @@ impl Locality {
         // A good guess saves a second descent.
         loop {
             self.within = (own + half) * GROWN;
-            index.collect(middle, self.within, &mut self.groups);
+            index.collect_by(simd, middle, self.within, &mut self.groups);
             let count = index.heard(simd, &self.groups, middle, self.within, &mut self.blocks).len();
             self.blocks.truncate(count);
             self.reach = 0.5 * self.greatest_heard(index, middle, own * GROWN);

@@ -3,6 +3,7 @@
 
 use nearmiss_geometry::PointCloud;
 use nearmiss_index::{BlockTree, PointBlock};
+use nearmiss_lanes::id32;
 
 use crate::boxes::OrientedBox;
 use crate::classes::{dense_first, vote};
@@ -12,12 +13,13 @@ use crate::options::{BuildError, BuildOptions};
 use crate::sampling::{Sampling, set_reaches};
 use crate::split::{Item, split};
 use crate::surfels::{Fit, fits};
-use crate::topology::Node;
+use crate::topology::Topology;
+use crate::tree::Bare;
 
 /// Points in order, with their classes.
 pub(crate) struct Ordered {
-    pub(crate) nodes: Vec<Node>,
-    /// About the points alone.
+    pub(crate) topology: Topology,
+    /// About the points alone, in the order of the nodes' ids.
     pub(crate) boxes: Vec<OrientedBox>,
     pub(crate) positions: Vec<[f32; 3]>,
     /// Their numbers in the input.
@@ -37,15 +39,18 @@ impl Ordered {
         let leaf_size = options.leaf_size as usize;
         let mut items: Vec<Item> =
             (0..).zip(cloud.positions()).map(|(index, &position)| Item { position, index }).collect();
-        let (mut nodes, mut boxes) = split(&mut items, leaf_size, 0);
+        let points = id32(items.len());
+        let topology = Topology::new(points, options.leaf_size);
+        let mut boxes = split(&mut items, &topology, cloud.positions().len());
         let mut positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
         let mut source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
         drop(items);
 
         let mut sampling =
-            Sampling::of(&positions, (&nodes, &mut boxes), options, 1.0 / cloud.frame().scale)?;
+            Sampling::of(&positions, (&topology, &mut boxes), options, 1.0 / cloud.frame().scale)?;
         let mut groups = groups_of(&sampling.blocks);
-        let index = Index::without_lists((&nodes, &boxes), (&sampling.blocks, &groups), &sampling.plan);
+        let bare = Bare::new(topology, &boxes);
+        let index = Index::without_lists(bare.tree(), (&sampling.blocks, &groups), &sampling.plan);
         let mut fits = fits(&index, &positions, (&sampling.radii, &sampling.spacings));
         sampling.spacings = Vec::new();
         let tree = BlockTree::new(&sampling.blocks, positions.len());
@@ -54,16 +59,16 @@ impl Ordered {
         let mut dense = positions.len();
         if let Some((mut items, count)) = dense_first(&positions, &fits, leaf_size) {
             dense = count;
-            (nodes, boxes) = split(&mut items, leaf_size, dense);
+            boxes = split(&mut items, &topology, dense);
             positions = items.iter().map(|item| item.position).collect();
             source = reordered(&items, &source);
             fits = reordered(&items, &fits);
             sampling.radii = reordered(&items, &sampling.radii);
-            set_reaches(&nodes, &mut boxes, &sampling.radii);
+            set_reaches(&topology, &mut boxes, &sampling.radii);
             sampling.blocks = neighbours::blocks(&sampling.plan, &positions, &sampling.radii);
             groups = groups_of(&sampling.blocks);
         }
-        Ok(Self { nodes, boxes, positions, source, fits, dense, groups, sampling })
+        Ok(Self { topology, boxes, positions, source, fits, dense, groups, sampling })
     }
 }
 

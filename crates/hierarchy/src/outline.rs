@@ -1,9 +1,11 @@
 //! What a query asks of a whole scan before it looks at any node.
 
+use serde::{Deserialize, Serialize};
+
 use crate::boxes::OrientedBox;
 
 /// A ball in the stored frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ball {
     /// The middle.
     pub centre: [f64; 3],
@@ -17,9 +19,8 @@ impl Ball {
     }
 }
 
-/// What tells a scan from others, and where it is. Made whenever a scan is made or loaded, in O(n); not
-/// stored.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// What tells a scan from others, and where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Outline {
     /// A hash of all points, their frame and their discs, and of what the tree is made by.
     pub identity: u64,

@@ -8,7 +8,3 @@ pub enum Part {
     /// The node's part of the obstacle.
     Obstacle = 1,
 }
-
-impl Part {
-    pub(crate) const BOTH: [Self; 2] = [Self::Surface, Self::Obstacle];
-}

@@ -15,7 +15,9 @@ use crate::build::PointHierarchy;
 use crate::classes::vote;
 use crate::covering::{Ground, Solid, coverings};
 use crate::extents::{Discs, boxes_of_discs};
+use crate::growth::Growth;
 use crate::kind::{PointKind, ball, obstacle_ball};
+use crate::part::Part;
 use crate::samples::samples;
 use crate::spacing::Look;
 use crate::surfels::{Fit, NormalCone, Surfel, align, cone, fitted, surfel_of};
@@ -40,8 +42,9 @@ impl PointHierarchy {
         metric: Metric,
         fit: impl Fn(u32, &mut S, &mut Vec<u32>) -> Evaluation + Sync + Send,
     ) {
+        let topology = self.topology;
         let leaves: Vec<Range<usize>> =
-            self.nodes.iter().filter(|node| node.is_leaf()).map(|node| node.points()).collect();
+            (0..topology.leaves()).map(|leaf| topology.points_of_leaf(leaf)).collect();
         let surfels = chunks(&leaves, |leaves| {
             let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
             let surfel = |i: usize| {
@@ -120,29 +123,29 @@ impl PointHierarchy {
         } else {
             normals.chunks_mut(leaf_size).map(align).collect()
         };
-        let (nodes, positions) = (&*self.nodes, &*self.positions);
+        let (topology, positions) = (self.topology, &*self.positions);
         let of_points = Discs { positions, normals: &normals, discs: &discs, balls: &balls };
-        let boxes = boxes_of_discs(nodes, &self.boxes, &of_points);
+        let boxes = boxes_of_discs(&topology, &self.boxes().collect::<Vec<_>>(), &of_points);
+        let growths: Vec<Growth> = topology.ids().map(|id| self.tree().growth(Part::Surface, id)).collect();
         let flat: Vec<Solid> =
             discs.iter().zip(&balls).map(|(&disc, &ball)| Solid::of_disc(disc, ball)).collect();
         let ground = Ground {
-            nodes,
+            topology: &topology,
             boxes: &boxes,
-            growths: &self.growths,
+            growths: &growths,
             positions,
             normals: &normals,
             radii: &self.radii,
             discs: &flat,
             cells: &flat,
         };
-        let sizes = (self.leaf_size, self.samples_a_node);
-        let coverings = coverings(&ground, |id| samples(&self.sample_lists, (id, &nodes[id]), sizes));
+        let coverings =
+            coverings(&ground, |id| samples(&self.sample_lists, &topology, id, self.samples_a_node));
         self.kinds = surfels.iter().map(|s| s.kind.code()).collect::<Vec<_>>().into();
         self.normals = normals.into();
         self.discs = discs.into();
         self.cones = cones.into();
-        self.boxes = boxes.into();
         self.coverings = coverings.into();
-        self.derive();
+        self.bound(&boxes, None);
     }
 }

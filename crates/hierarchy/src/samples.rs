@@ -6,12 +6,15 @@
 //! in that leaf alone; and of several draws the one furthest from the samples so far is kept (Mitchell 1991),
 //! which makes the distances between them of the same order, as the paper wants them.
 
+use std::ops::Range;
+
+use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map_all;
+use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::vector::{dot, sub};
 
 use crate::centres::Centres;
-use crate::topology::Node;
+use crate::topology::Topology;
 
 /// How many samples a node may have.
 pub(crate) const SAMPLES: std::ops::RangeInclusive<u32> = 8..=32;
@@ -36,19 +39,21 @@ pub struct Samples<'a> {
     first: usize,
     len: usize,
     list: &'a [u32],
+    /// No point is beyond this one, whatever a file says.
+    last: usize,
 }
 
 impl<'a> Samples<'a> {
-    /// All points of `node`.
+    /// All these points of a node.
     #[inline]
-    pub(crate) fn all(node: &Node) -> Self {
-        Self { first: node.first as usize, len: node.count as usize, list: &[] }
+    pub(crate) fn all(points: &Range<usize>) -> Self {
+        Self { first: points.start, len: points.len(), list: &[], last: points.end - 1 }
     }
 
-    /// Those in a list.
+    /// Those in a list, of a node of these points.
     #[inline]
-    pub(crate) fn listed(list: &'a [u32]) -> Self {
-        Self { first: 0, len: list.len(), list }
+    pub(crate) fn listed(list: &'a [u32], points: &Range<usize>) -> Self {
+        Self { first: points.start, len: list.len(), list, last: points.end - 1 }
     }
 
     /// How many there are; at least one.
@@ -63,49 +68,36 @@ impl<'a> Samples<'a> {
     #[inline]
     #[must_use]
     pub fn iter(&self) -> impl ExactSizeIterator<Item = usize> + use<'a> {
-        let Self { first, len, list } = *self;
-        (0..len).map(move |k| list.get(k).map_or(first + k, |&i| i as usize))
+        let Self { first, len, list, last } = *self;
+        (0..len).map(move |k| list.get(k).map_or(first + k, |&i| (i as usize).clamp(first, last)))
     }
 }
 
-/// Which list is that of the inner node `id`: leaves are full, so their number before it follows from its
-/// first point.
+/// The sample of a node.
 #[inline]
-pub(crate) fn list_number(id: usize, node: &Node, leaf_size: u32) -> usize {
-    id - (node.first / leaf_size) as usize
-}
-
-/// The sample of `node`, which has the id `id`.
-#[inline]
-pub(crate) fn samples<'a>(
-    lists: &'a [u32],
-    (id, node): (usize, &Node),
-    (leaf_size, count): (u32, u32),
-) -> Samples<'a> {
-    if node.is_leaf() || node.count <= count {
-        return Samples::all(node);
+pub(crate) fn samples<'a>(lists: &'a [u32], topology: &Topology, id: NodeId, count: u32) -> Samples<'a> {
+    let points = topology.points(id);
+    let count = count as usize;
+    if topology.is_leaf(id) || points.len() <= count {
+        return Samples::all(&points);
     }
-    let start = list_number(id, node, leaf_size) * count as usize;
-    Samples::listed(&lists[start..start + count as usize])
+    Samples::listed(&lists[id.index() * count..][..count], &points)
 }
 
 /// `count` distinct points of the inner node `id`, ascending; all of them, and then the last again, if there
 /// are no more.
-pub(crate) fn draw(
-    positions: &[[f32; 3]],
-    (id, node): (u32, &Node),
-    (leaf_size, count): (u32, usize),
-) -> List {
-    let end = node.first + node.count;
+pub(crate) fn draw(positions: &[[f32; 3]], topology: &Topology, id: NodeId, count: usize) -> List {
+    let (points, leaf_size) = (topology.points(id), id32(topology.leaf_size()));
+    let (first, end) = (id32(points.start), id32(points.end));
     let mut list = [end - 1; MOST_SAMPLES];
-    if node.count as usize <= count {
-        for (entry, i) in list.iter_mut().zip(node.first..end) {
+    if points.len() <= count {
+        for (entry, i) in list.iter_mut().zip(first..end) {
             *entry = i;
         }
         return list;
     }
-    let leaves = u64::from(node.count.div_ceil(leaf_size));
-    let mut random = Random::new(id);
+    let leaves = u64::from((end - first).div_ceil(leaf_size));
+    let mut random = Random::new(id.0);
     let mut chosen = Centres::default();
     // The leaves of one draw after the other lie far from each other, those of the next sample between them.
     let mut turn = random.next();
@@ -114,15 +106,16 @@ pub(crate) fn draw(
         for _ in 0..DRAWS {
             turn = turn.wrapping_add(GOLDEN);
             let leaf = id32((((turn >> 32) * leaves) >> 32) as usize);
-            let first = node.first + leaf * leaf_size;
-            let i = first + random.point(&positions[first as usize..end.min(first + leaf_size) as usize]);
+            let of_leaf = first + leaf * leaf_size;
+            let points = &positions[of_leaf as usize..end.min(of_leaf + leaf_size) as usize];
+            let i = of_leaf + random.point(points);
             let away = chosen.nearest_sq(positions[i as usize]);
             if away > furthest && !list[..known].contains(&i) {
                 (furthest, best) = (away, Some(i));
             }
         }
-        let start = id32((random.next() >> 32) as usize % node.count as usize);
-        let others = (start..node.count).chain(0..start).map(|i| node.first + i);
+        let start = first + id32((random.next() >> 32) as usize % points.len());
+        let others = (start..end).chain(first..start);
         let Some(i) = best.or_else(|| others.into_iter().find(|i| !list[..known].contains(i))) else { break };
         list[known] = i;
         chosen.push(positions[i as usize]);
@@ -132,10 +125,8 @@ pub(crate) fn draw(
 }
 
 /// The lists of all inner nodes, in their order.
-pub(crate) fn lists(positions: &[[f32; 3]], nodes: &[Node], (leaf_size, count): (u32, u32)) -> Vec<u32> {
-    let inner: Vec<u32> = (0..id32(nodes.len())).filter(|&id| !nodes[id as usize].is_leaf()).collect();
-    let lists =
-        map_all(&inner, |&id| draw(positions, (id, &nodes[id as usize]), (leaf_size, count as usize)));
+pub(crate) fn lists(positions: &[[f32; 3]], topology: &Topology, count: u32) -> Vec<u32> {
+    let lists = map(topology.inner(), |id| draw(positions, topology, NodeId(id32(id)), count as usize));
     lists.iter().flat_map(|list| &list[..count as usize]).copied().collect()
 }
 

@@ -6,7 +6,7 @@ use nearmiss_surface::SurfacePlan;
 use crate::boxes::OrientedBox;
 use crate::options::{BuildError, BuildOptions};
 use crate::spacing::{Spacing, fold_nodes, limit, smooth, spacings};
-use crate::topology::Node;
+use crate::topology::Topology;
 
 /// Share of the points whose local radius is at most the scan's sampling radius.
 const SAMPLING_QUANTILE: f64 = 0.9;
@@ -28,11 +28,11 @@ pub(crate) struct Sampling {
 }
 
 impl Sampling {
-    /// That of points under `nodes`, in whose boxes the reaches are set; `unit` of the points' are one of the
-    /// caller's.
+    /// That of points under the nodes of `topology`, in whose boxes the reaches are set; `unit` of the
+    /// points' are one of the caller's.
     pub(crate) fn of(
         positions: &[[f32; 3]],
-        (nodes, boxes): (&[Node], &mut [OrientedBox]),
+        (topology, boxes): (&Topology, &mut [OrientedBox]),
         options: &BuildOptions,
         unit: f64,
     ) -> Result<Self, BuildError> {
@@ -48,7 +48,7 @@ impl Sampling {
         limit(&mut spacings, &mut radii, reach);
         let sampling_radius = quantile(&radii);
         let plan = SurfacePlan::new(&options.surface, f64::from(sampling_radius), unit)?;
-        set_reaches(nodes, boxes, &radii);
+        set_reaches(topology, boxes, &radii);
         for (block, radii) in blocks.iter_mut().zip(radii.chunks(PointBlock::WIDTH)) {
             plan.tune(block, radii);
         }
@@ -57,8 +57,8 @@ impl Sampling {
 }
 
 /// Sets in the boxes of all nodes the greatest radius of their points.
-pub(crate) fn set_reaches(nodes: &[Node], boxes: &mut [OrientedBox], radii: &[f32]) {
-    let reaches = fold_nodes(nodes, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
+pub(crate) fn set_reaches(topology: &Topology, boxes: &mut [OrientedBox], radii: &[f32]) {
+    let reaches = fold_nodes(topology, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
     for (bounds, reach) in boxes.iter_mut().zip(reaches) {
         bounds.reach = reach;
     }

@@ -7,10 +7,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::build::PointHierarchy;
-use crate::neighbours::blocks;
 use crate::outline::Outline;
-use crate::sanity::Flaw;
-use crate::wide::WideTree;
+use crate::sanity::{Flaw, checked_topology};
+use crate::tree::Root;
 
 const POSITIONS: [u8; 4] = *b"PNTS";
 const NORMALS: [u8; 4] = *b"NRML";
@@ -18,10 +17,12 @@ const RADII: [u8; 4] = *b"RADI";
 const DISCS: [u8; 4] = *b"DISC";
 const KINDS: [u8; 4] = *b"KIND";
 const SOURCE: [u8; 4] = *b"SRCE";
-const NODES: [u8; 4] = *b"NODE";
-const BOXES: [u8; 4] = *b"BOXS";
+const SIBLINGS: [u8; 4] = *b"TREE";
+/// One for each [`Part`](crate::Part).
 const GROWTHS: [u8; 4] = *b"GROW";
-const OBSTACLE_GROWTHS: [u8; 4] = *b"OBST";
+const LEAVES: [u8; 4] = *b"LEAF";
+const MARKS: [u8; 4] = *b"MARK";
+const BLOCKS: [u8; 4] = *b"BLCK";
 const SAMPLES: [u8; 4] = *b"SMPL";
 const COVERINGS: [u8; 4] = *b"COVR";
 const CONES: [u8; 4] = *b"CONE";
@@ -45,6 +46,8 @@ pub struct HierarchyMeta {
     is_oriented: bool,
     metric: Metric,
     surface: SurfaceOptions,
+    root: Root,
+    outline: Outline,
 }
 
 /// Why a container does not hold a hierarchy.
@@ -80,6 +83,8 @@ impl PointHierarchy {
             is_oriented: self.is_oriented,
             metric: self.metric,
             surface: *self.plan.options(),
+            root: self.root,
+            outline: self.outline,
         }
     }
 
@@ -89,10 +94,12 @@ impl PointHierarchy {
     /// When the container has sections of these names already.
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
         writer
-            .section(NODES, 0, &self.nodes)?
-            .section(BOXES, 0, &self.boxes)?
-            .section(GROWTHS, 0, &self.growths)?
-            .section(OBSTACLE_GROWTHS, 0, &self.obstacle_growths)?
+            .section(SIBLINGS, 0, &self.siblings)?
+            .section(GROWTHS, 0, &self.growths[0])?
+            .section(GROWTHS, 1, &self.growths[1])?
+            .section(LEAVES, 0, &self.leaf_blocks)?
+            .section(MARKS, 0, &self.marks)?
+            .section(BLOCKS, 0, &self.blocks)?
             .section(SAMPLES, 0, &self.sample_lists)?
             .section(COVERINGS, 0, &self.coverings)?
             .section(CONES, 0, &self.cones)?
@@ -108,15 +115,17 @@ impl PointHierarchy {
         Ok(())
     }
 
-    /// The hierarchy in `file`, its arrays in place. With either `check` the structure is looked through:
-    /// lengths agree, every node's children and points are there, numbers of boxes and lists lie in their
-    /// ranges. With [`Check::Full`] each box also lies within its parent's, and the numbers of every point
-    /// are looked at.
+    /// The hierarchy in `file`, its arrays in place: nothing is made that grows with the scan. With
+    /// [`Check::Structure`] the metadata and the lengths of arrays are looked at, so that no query leaves
+    /// them; damaged numbers can give wrong answers. With [`Check::Full`] every number is compared with what
+    /// a build writes.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
     pub fn load(file: &File, meta: HierarchyMeta, check: Check) -> Result<Self, LoadError> {
-        let mut hierarchy = Self {
+        let positions: Array<[f32; 3]> = file.array(POSITIONS, 0)?;
+        let topology = checked_topology(positions.len(), meta.leaf_size, meta.dense)?;
+        let hierarchy = Self {
             frame: meta.frame,
             bounds: meta.bounds,
             dropped: meta.dropped,
@@ -130,30 +139,28 @@ impl PointHierarchy {
             is_oriented: meta.is_oriented,
             metric: meta.metric,
             plan: SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale)?,
-            positions: file.array(POSITIONS, 0)?,
+            positions,
             normals: file.array(NORMALS, 0)?,
             radii: file.array(RADII, 0)?,
             discs: file.array(DISCS, 0)?,
             kinds: file.array(KINDS, 0)?,
             source: file.array(SOURCE, 0)?,
-            nodes: file.array(NODES, 0)?,
-            boxes: file.array(BOXES, 0)?,
-            wide: WideTree::default(),
-            outline: Outline::default(),
-            growths: file.array(GROWTHS, 0)?,
-            obstacle_growths: file.array(OBSTACLE_GROWTHS, 0)?,
+            topology,
+            root: meta.root,
+            siblings: file.array(SIBLINGS, 0)?,
+            growths: [file.array(GROWTHS, 0)?, file.array(GROWTHS, 1)?],
+            leaf_blocks: file.array(LEAVES, 0)?,
+            marks: file.array(MARKS, 0)?,
+            outline: meta.outline,
             sample_lists: file.array(SAMPLES, 0)?,
             coverings: file.array(COVERINGS, 0)?,
             cones: file.array(CONES, 0)?,
-            blocks: Array::default(),
+            blocks: file.array(BLOCKS, 0)?,
             groups: file.array(GROUPS, 0)?,
             lists: file.array(LISTS, 0)?,
             listed: file.array(LISTED, 0)?,
         };
         hierarchy.check_structure()?;
-        // They say nothing that points and radii do not.
-        hierarchy.blocks = blocks(&hierarchy.plan, &hierarchy.positions, &hierarchy.radii).into();
-        hierarchy.derive();
         if check == Check::Full {
             hierarchy.check_contents()?;
         }

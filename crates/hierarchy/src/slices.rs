@@ -3,17 +3,18 @@
 
 use std::ops::Range;
 
+use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
 use nearmiss_surface::SurfacePlan;
 
 use crate::boxes::OrientedBox;
 use crate::covering::Covering;
-use crate::growth::Growth;
 use crate::kind::{DENSE_SHARES, PointKind, ball, cell_radius, is_on_sheet, obstacle_ball, sheet_reach};
+use crate::leaf_block::Leaves;
 use crate::outline::Outline;
 use crate::part::Part;
-use crate::topology::Node;
-use crate::wide::WideTree;
+use crate::tree::Tree;
 
 /// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not at every
 /// access.
@@ -29,18 +30,12 @@ pub struct Slices<'a> {
     pub discs: &'a [f32],
     /// What the points' neighbourhoods look like, as [`PointKind::code`].
     pub kinds: &'a [u8],
-    /// The tree.
-    pub nodes: &'a [Node],
-    /// A box about the discs of each node's points, and about their balls.
-    pub boxes: &'a [OrientedBox],
-    /// The tree with four children a node.
-    pub wide: &'a WideTree,
+    /// The nodes, and the boxes about them.
+    pub tree: Tree<'a>,
+    /// What leaves are compared by.
+    pub leaves: Leaves<'a>,
     /// What tells the scan from others, and where it is.
     pub outline: &'a Outline,
-    /// What the boxes must grow by to contain each node's part of the surface.
-    pub growths: &'a [Growth],
-    /// What the boxes must grow by to contain each node's part of the obstacle.
-    pub obstacle_growths: &'a [Growth],
     /// The points in blocks: see [`crate::PointHierarchy::blocks`].
     pub blocks: &'a [PointBlock],
     /// The samples of the inner nodes in their order, [`samples_a_node`](Self::samples_a_node) of each; see
@@ -64,16 +59,6 @@ pub struct Slices<'a> {
 }
 
 impl Slices<'_> {
-    /// What the boxes of the nodes must grow by to contain this part of each.
-    #[inline]
-    #[must_use]
-    pub fn growths_of(&self, part: Part) -> &[Growth] {
-        match part {
-            Part::Surface => self.growths,
-            Part::Obstacle => self.obstacle_growths,
-        }
-    }
-
     /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's
     /// box, and contains it.
     ///
@@ -82,7 +67,7 @@ impl Slices<'_> {
     #[inline]
     #[must_use]
     pub fn enclosure(&self, node: usize) -> OrientedBox {
-        self.growths[node].of(&self.boxes[node])
+        self.tree.enclosure(Part::Surface, NodeId(id32(node)))
     }
 
     /// A box about the part of the obstacle of a node (`docs/theory/obstacle.md`); it has the axes of the
@@ -93,7 +78,7 @@ impl Slices<'_> {
     #[inline]
     #[must_use]
     pub fn obstacle_enclosure(&self, node: usize) -> OrientedBox {
-        self.obstacle_growths[node].of(&self.boxes[node])
+        self.tree.enclosure(Part::Obstacle, NodeId(id32(node)))
     }
 
     /// The radius of the ball that stands for a point in the obstacle: half its local radius, a third where

@@ -12,7 +12,7 @@ use nearmiss_index::{BlockTree, Nearest, PointBlock};
 use nearmiss_lanes::parallel::{chunks, map_all};
 use nearmiss_surface::symmetric_eigen;
 
-use crate::topology::Node;
+use crate::topology::Topology;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
@@ -354,20 +354,21 @@ pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
     }
 }
 
-/// A value for each node from its points, leaves first: `leaf` of a leaf's range, `join` of two children's.
+/// A value of each node, in the order of their ids: of leaves from their points, of others from those of
+/// their children.
 pub(crate) fn fold_nodes<T: Copy + Default>(
-    nodes: &[Node],
+    topology: &Topology,
     leaf: impl Fn(std::ops::Range<usize>) -> T,
     join: impl Fn(T, T) -> T,
 ) -> Vec<T> {
-    let mut values = vec![T::default(); nodes.len()];
+    let mut values = vec![T::default(); topology.len()];
     // Children come after their parent.
-    for id in (0..nodes.len()).rev() {
-        let node = nodes[id];
-        values[id] = if node.is_leaf() {
-            leaf(node.points())
+    for id in topology.ids().rev() {
+        values[id.index()] = if topology.is_leaf(id) {
+            leaf(topology.points(id))
         } else {
-            join(values[id + 1], values[node.right as usize])
+            let children = topology.children(id).iter().map(|child| values[child.index()]);
+            children.reduce(&join).unwrap_or_default()
         };
     }
     values

@@ -8,14 +8,14 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, f64x2, f64x4};
-use nearmiss_lanes::id32;
+use nearmiss_geometry::NodeId;
 use nearmiss_lanes::parallel::both;
 use nearmiss_lanes::vector::dot;
 use nearmiss_lanes::wide::{along, greatest, least};
 use nearmiss_surface::symmetric_eigen;
 
 use crate::boxes::{OrientedBox, to_axes};
-use crate::topology::{Node, left_count, node_count};
+use crate::topology::{Half, Topology};
 
 /// A point on its way to its place.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -35,66 +35,81 @@ const WORTH_A_TRY: f32 = 0.5;
 /// Splits need no more than this many points to tell which axis is better.
 const JUDGED_BY: usize = 512;
 
-/// Orders `items` into leaves and returns the nodes with their boxes about the points; the root parts the
-/// first `sheets`, which fill whole leaves, from the others. O(n log n).
-pub(crate) fn split(items: &mut [Item], leaf_size: usize, dense: usize) -> (Vec<Node>, Vec<OrientedBox>) {
-    let count = node_count(items.len(), leaf_size);
-    let mut nodes = vec![Node::default(); count];
-    let mut boxes = vec![OrientedBox::default(); count];
-    let points = items.len();
-    let place = Place { items, nodes: &mut nodes, boxes: &mut boxes, first: 0, id: 0 };
-    place.split(leaf_size, (0 < dense && dense < points).then_some(dense));
-    (nodes, boxes)
+/// Orders `items` into the leaves of `topology` and returns a box about the points of each node, in the order
+/// of their ids. The first `dense` items, which fill whole leaves unless they are all, stay before the
+/// others. O(n log n).
+pub(crate) fn split(items: &mut [Item], topology: &Topology, dense: usize) -> Vec<OrientedBox> {
+    let mut boxes = vec![OrientedBox::default(); topology.len()];
+    for (id, bounds) in (Place { items, dense, half: Half::ALL }).split(topology) {
+        boxes[id.index()] = bounds;
+    }
+    boxes
 }
 
-/// A subtree: its points and the stretch of the arrays in which its nodes will stand.
+/// The box about some points along their principal axes.
+fn about(level: Level, items: &[Item]) -> OrientedBox {
+    let axes = principal_axes(level, items);
+    let (low, high) = extents(level, items, &axes);
+    OrientedBox::spanned(axes, low, high, 0.0)
+}
+
+/// The points of some leaves.
 struct Place<'a> {
     items: &'a mut [Item],
-    nodes: &'a mut [Node],
-    boxes: &'a mut [OrientedBox],
-    first: usize,
-    id: usize,
+    /// How many of them, the first, are dense.
+    dense: usize,
+    half: Half,
 }
 
-impl Place<'_> {
-    /// `parted`: how many of the items go to the left child, which are the first already.
-    fn split(self, leaf_size: usize, parted: Option<usize>) {
-        let Place { items, nodes, boxes, first, id } = self;
-        let count = items.len();
-        let level = Level::new();
-        let axes = principal_axes(level, items);
-        let (low, high) = extents(level, items, &axes);
-        boxes[0] = OrientedBox::spanned(axes, low, high, 0.0);
-        if count <= leaf_size && parted.is_none() {
-            items.sort_unstable_by_key(|item| item.index);
-            nodes[0] = Node { first: id32(first), count: id32(count), right: 0 };
+impl<'a> Place<'a> {
+    /// Orders them into leaves; returns the nodes that they make with their boxes.
+    fn split(self, topology: &Topology) -> Vec<(NodeId, OrientedBox)> {
+        let mut boxes = Vec::new();
+        self.split_into(topology, &mut boxes);
+        boxes
+    }
+
+    fn split_into(self, topology: &Topology, boxes: &mut Vec<(NodeId, OrientedBox)>) {
+        let bounds = about(Level::new(), self.items);
+        boxes.extend(topology.node_of(self.half).map(|id| (id, bounds)));
+        let leaves = topology.leaves_of(self.half);
+        if leaves.len() == 1 {
+            boxes.push((topology.leaf(leaves.start), bounds));
+            self.items.sort_unstable_by_key(|item| item.index);
             return;
         }
-        let left = parted.unwrap_or_else(|| {
-            let left = left_count(count, leaf_size);
-            let axis = best_axis(level, items, &boxes[0], left);
-            partition(items, axis, left);
-            left
-        });
-        let left_nodes = node_count(left, leaf_size);
-        nodes[0] = Node { first: id32(first), count: id32(count), right: id32(id + 1 + left_nodes) };
-        let (items_l, items_r) = items.split_at_mut(left);
-        let (nodes_l, nodes_r) = nodes[1..].split_at_mut(left_nodes);
-        let (boxes_l, boxes_r) = boxes[1..].split_at_mut(left_nodes);
-        let l = Place { items: items_l, nodes: nodes_l, boxes: boxes_l, first, id: id + 1 };
-        let r = Place {
-            items: items_r,
-            nodes: nodes_r,
-            boxes: boxes_r,
-            first: first + left,
-            id: id + 1 + left_nodes,
-        };
-        if count > TASK {
-            both(|| l.split(leaf_size, None), || r.split(leaf_size, None));
+        let many = self.items.len() > TASK;
+        let [left, right] = self.halve(topology, &bounds);
+        if many {
+            let (of_left, of_right) = both(|| left.split(topology), || right.split(topology));
+            boxes.extend(of_left);
+            boxes.extend(of_right);
         } else {
-            l.split(leaf_size, None);
-            r.split(leaf_size, None);
+            left.split_into(topology, boxes);
+            right.split_into(topology, boxes);
         }
+    }
+
+    /// Parts them; `bounds` is the box about them. What is dense comes first, so where there are both sorts
+    /// only one of them is parted.
+    fn halve(self, topology: &Topology, bounds: &OrientedBox) -> [Self; 2] {
+        let Place { items, dense, half } = self;
+        let ([left, right], all) = (half.halves(), items.len());
+        let count = topology.leaves_of(left).len() * topology.leaf_size();
+        let of_one_sort = if count < dense { 0..dense } else { dense..items.len() };
+        let (some, within) = (&mut items[of_one_sort.clone()], count - of_one_sort.start);
+        if within > 0 && within < some.len() {
+            let level = Level::new();
+            let own = if dense == 0 || dense == all { *bounds } else { about(level, some) };
+            let axis = best_axis(level, some, &own, within);
+            partition(some, axis, within);
+        }
+        let (of_left, of_right) = items.split_at_mut(count);
+        let dense_left = dense.min(count);
+        [
+            Self { items: of_left, dense: dense_left, half: left },
+            Self { items: of_right, dense: dense - dense_left, half: right },
+        ]
     }
 }
 

@@ -163,8 +163,9 @@ pub(crate) fn fits(
 
 /// The ranges of points of all leaves, and the boxes about them.
 fn leaves(index: &Index<'_>) -> Vec<(Range<usize>, OrientedBox)> {
-    let nodes = index.nodes.iter().zip(index.boxes);
-    nodes.filter(|(node, _)| node.is_leaf()).map(|(node, about)| (node.points(), *about)).collect()
+    let topology = index.tree.topology;
+    let leaf = |number| (topology.points_of_leaf(number), index.tree.bounds(topology.leaf(number)));
+    (0..topology.leaves()).map(leaf).collect()
 }
 
 /// The discs of all points and the bounds of all leaves, in order.
@@ -229,7 +230,7 @@ impl Leaf<'_> {
                 let middle = self.about.centre;
                 let own = self.positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
                 let own = own.fold(0.0, f32::max).sqrt();
-                index.collect(middle, own, &mut locality.groups);
+                index.collect_by(simd, middle, own, &mut locality.groups);
                 fits.clear();
                 for p in self.positions {
                     let x = Centre::new(p.map(f64::from));

@@ -16,10 +16,6 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// At most so many blocks of points on sheets are sampled, and half as many of other points.
 const BLOCKS: usize = 128;
 
-/// One block in so many is sampled of a small scan, but no fewer blocks than a quarter of
-/// [`BLOCKS`].
-const SPARED: usize = 8;
-
 /// The spacing is the distance to the neighbour of this rank.
 const RANK: usize = 6;
 
@@ -186,24 +182,27 @@ impl PointHierarchy {
         let (p, normal) = (self.place(i), self.normal(i));
         let reach = f64::from(slices.reach);
         let (mut best, mut far_side) = (FAR * reach, None);
-        let mut open = vec![NodeId(0)];
+        let mut open = vec![NodeId::ROOT];
+        let topology = slices.tree.topology;
         while let Some(id) = open.pop() {
-            let (node, bounds) = (&slices.nodes[id.index()], &slices.boxes[id.index()]);
-            let first = node.first as usize;
+            let (points, bounds) = (topology.points(id), slices.tree.bounds(id));
             let radius = f64::from(bounds.radius());
             let d = Vector3::from(bounds.centre.map(f64::from)) - p;
             let along = outward.dot(&d);
             // A sphere misses the cone if it does so in the plane through the axis and its centre.
             let beside = (d.norm_squared() - along * along).max(0.0).sqrt();
             let sine = (1.0 - CONE * CONE).sqrt();
-            if first >= slices.dense || d.norm() - radius > best || beside * CONE - along * sine > radius {
+            if points.start >= slices.dense
+                || d.norm() - radius > best
+                || beside * CONE - along * sine > radius
+            {
                 continue;
             }
-            if !node.is_leaf() {
-                open.extend(node.children(id));
+            if !topology.is_leaf(id) {
+                open.extend(topology.children(id).iter());
                 continue;
             }
-            for j in first..(first + node.count as usize).min(slices.dense) {
+            for j in points.start..points.end.min(slices.dense) {
                 let d = self.place(j) - p;
                 let width = d.norm();
                 if width < best && width > 0.0 && outward.dot(&d) > CONE * width {
@@ -221,7 +220,7 @@ impl PointHierarchy {
 /// Blocks of `points`, spread evenly: one of each of up to `most` equal runs.
 fn sample(points: Range<usize>, most: usize, seed: u64) -> Vec<usize> {
     let blocks = points.start / WIDTH..points.end.div_ceil(WIDTH);
-    let count = (blocks.len() / SPARED).clamp(most.min(BLOCKS / 4), most).min(blocks.len());
+    let count = most.min(blocks.len());
     let chosen = |run: usize| {
         let run_of = |run: usize| blocks.start + run * blocks.len() / count;
         let (from, to) = (run_of(run), run_of(run + 1));

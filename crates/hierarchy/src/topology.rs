@@ -1,59 +1,421 @@
-//! Which nodes there are and which points lie under them. Ids only: nothing here knows what a point is.
+//! Which nodes a tree has, and which points lie under each: arithmetic alone, nothing of it is stored.
 //!
-//! Nodes stand in preorder: a left child directly follows its parent. Every leaf but the last is full, so the
-//! number of nodes under a node follows from the number of its points alone, and a parallel build knows in
-//! advance where each part belongs.
+//! Points stand in leaf order, and every leaf but the last is full. The leaves are halved again and again: at
+//! binary depth d, part j of 2ᵈ has the leaves from ⌈j m / 2ᵈ⌉ to ⌈(j + 1) m / 2ᵈ⌉ of m. Every other depth is
+//! kept, counted from the bottom. So nodes have four children, but those of the lowest level two to four
+//! leaves, and the root two where the number of depths is even. Nodes are numbered level by level; the
+//! children of a node follow each other.
 
-use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
+
 use nearmiss_geometry::NodeId;
+use nearmiss_lanes::id32;
+use serde::{Deserialize, Serialize};
 
 /// Greatest number of points that a leaf may be built with; queries reserve room for so many.
 pub const MOST_LEAF_POINTS: usize = 64;
 
-/// A node: a contiguous run of points in leaf order, and two children unless it is a leaf.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct Node {
-    /// First point.
-    pub first: u32,
-    /// Number of points, at least one.
-    pub count: u32,
-    /// Id of the right child; 0 for a leaf. The left child has the id after this node's.
-    pub right: u32,
-}
+/// Children of a node.
+pub(crate) const FAN: usize = 4;
 
-impl Node {
-    /// Whether there are no children.
-    #[inline]
-    #[must_use]
-    pub const fn is_leaf(&self) -> bool {
-        self.right == 0
-    }
-
-    /// The children of this node, whose id is `id`; the node must not be a leaf.
-    #[inline]
-    #[must_use]
-    pub const fn children(&self, id: NodeId) -> [NodeId; 2] {
-        [NodeId(id.0 + 1), NodeId(self.right)]
-    }
-
-    /// The points under the node.
-    #[inline]
-    #[must_use]
-    pub const fn points(&self) -> std::ops::Range<usize> {
-        self.first as usize..self.first as usize + self.count as usize
-    }
-}
-
-/// How many nodes a tree of `points` points has, with leaves of at most `leaf_size`.
-pub(crate) const fn node_count(points: usize, leaf_size: usize) -> usize {
-    2 * points.div_ceil(leaf_size) - 1
-}
-
-/// How many of `points` points go to the left child: half the leaves, rounded up, all of them full.
-pub(crate) const fn left_count(points: usize, leaf_size: usize) -> usize {
-    points.div_ceil(leaf_size).div_ceil(2) * leaf_size
-}
-
-/// Room for a descent that keeps at most one sibling a level: trees of 2³² points have 31 levels at most.
+/// Room for a depth-first descent of one tree: of each level three children wait while the fourth is looked
+/// at. Trees of 2³² points have 16 levels of four children and a root.
 pub(crate) const TREE_STACK: usize = 64;
+
+/// A node of either tree, still to be looked at together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct NodePair {
+    /// A node of the first tree.
+    pub a: NodeId,
+    /// A node of the second.
+    pub b: NodeId,
+}
+
+impl NodePair {
+    /// The pair of all points.
+    pub const ROOTS: Self = Self { a: NodeId::ROOT, b: NodeId::ROOT };
+}
+
+/// The children of the children of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Grandchildren {
+    /// Those of child k from lane 4k on; or child k itself in lane 5k, if children are leaves.
+    pub ids: [NodeId; FAN * FAN],
+    /// The lanes that are taken, as bits.
+    pub lanes: u32,
+    /// Where their boxes stand: among those of the children of these nodes, four of each.
+    pub(crate) parents: [NodeId; FAN],
+}
+
+/// The nodes of a tree. Ids count inner nodes first, from the root, then leaves in the order of their points.
+/// The children of a node have consecutive ids.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Topology {
+    points: u32,
+    leaf_size: u32,
+    inner: u32,
+    leaves: u32,
+    /// The first node with leaves for children.
+    bottom: u32,
+    /// Binary depth of these.
+    depth: u32,
+}
+
+/// The children of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Children {
+    /// The first of them.
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+}
+
+impl Children {
+    /// How many there are: one to four.
+    #[inline(always)]
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "an inner node has children")]
+    pub const fn len(self) -> usize {
+        self.count as usize
+    }
+
+    /// Their ids, ascending.
+    #[inline]
+    pub fn iter(self) -> impl DoubleEndedIterator<Item = NodeId> + ExactSizeIterator {
+        (self.first..self.first + self.count).map(NodeId)
+    }
+
+    /// Their ids, and then others, up to four.
+    #[inline(always)]
+    #[must_use]
+    pub const fn lanes(self) -> [NodeId; FAN] {
+        let first = self.first;
+        [NodeId(first), NodeId(first + 1), NodeId(first + 2), NodeId(first + 3)]
+    }
+}
+
+impl Topology {
+    /// The tree of so many points, which are not none.
+    pub(crate) fn new(points: u32, leaf_size: u32) -> Self {
+        let leaves = points.div_ceil(leaf_size);
+        // At the lowest binary depth each node has two to four leaves.
+        let depth = leaves.div_ceil(4).next_power_of_two().ilog2();
+        let bottom = Self::level_start(depth % 2, depth.div_ceil(2));
+        let inner = if leaves > 1 { bottom + (1 << depth) } else { 0 };
+        Self { points, leaf_size, inner, leaves, bottom, depth }
+    }
+
+    /// The first node of a level, given whether the root has two children only: one third of what the next
+    /// level has, less rounding.
+    const fn level_start(is_odd: u32, level: u32) -> u32 {
+        if is_odd == 0 || level == 0 {
+            ((1 << (2 * level)) - 1) / 3
+        } else {
+            1 + 2 * (((1 << (2 * level - 2)) - 1) / 3)
+        }
+    }
+
+    /// Whether the root has two children only, as a number.
+    #[inline(always)]
+    const fn is_odd(&self) -> u32 {
+        self.depth % 2
+    }
+
+    /// The leaves of part `j` at a binary depth.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "at most the number of leaves")]
+    fn leaves_at(&self, depth: u32, j: u32) -> Range<u32> {
+        let leaves = u64::from(self.leaves);
+        let parts = u64::from(j) * leaves + (1 << depth) - 1;
+        (parts >> depth) as u32..((parts + leaves) >> depth) as u32
+    }
+
+    /// Number of nodes, leaves included.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "a tree has a root")]
+    pub const fn len(&self) -> usize {
+        (self.inner + self.leaves) as usize
+    }
+
+    /// All nodes.
+    #[must_use]
+    pub fn ids(&self) -> impl DoubleEndedIterator<Item = NodeId> + ExactSizeIterator + use<> {
+        (0..self.inner + self.leaves).map(NodeId)
+    }
+
+    /// Number of nodes that have children.
+    #[inline]
+    #[must_use]
+    pub const fn inner(&self) -> usize {
+        self.inner as usize
+    }
+
+    /// Number of leaves.
+    #[inline]
+    #[must_use]
+    pub const fn leaves(&self) -> usize {
+        self.leaves as usize
+    }
+
+    /// Points of a full leaf.
+    #[inline]
+    #[must_use]
+    pub const fn leaf_size(&self) -> usize {
+        self.leaf_size as usize
+    }
+
+    /// Returns `true` if the node has no children.
+    #[inline(always)]
+    #[must_use]
+    pub const fn is_leaf(&self, id: NodeId) -> bool {
+        id.0 >= self.inner
+    }
+
+    /// Returns `true` if there is such a node.
+    #[inline]
+    #[must_use]
+    pub const fn has(&self, id: NodeId) -> bool {
+        id.0 < self.inner + self.leaves
+    }
+
+    /// The leaf with this number.
+    #[inline(always)]
+    #[must_use]
+    #[expect(clippy::cast_possible_truncation, reason = "leaves are counted in 32 bits")]
+    pub const fn leaf(&self, number: usize) -> NodeId {
+        NodeId(self.inner + number as u32)
+    }
+
+    /// The number of a leaf.
+    #[inline(always)]
+    #[must_use]
+    pub const fn leaf_number(&self, leaf: NodeId) -> usize {
+        (leaf.0 - self.inner) as usize
+    }
+
+    /// The leaf with a point.
+    #[inline]
+    #[must_use]
+    pub const fn leaf_of(&self, point: usize) -> NodeId {
+        self.leaf(point / self.leaf_size as usize)
+    }
+
+    /// The points of a leaf, by its number.
+    #[inline(always)]
+    #[must_use]
+    pub fn points_of_leaf(&self, number: usize) -> Range<usize> {
+        let first = number * self.leaf_size();
+        first..(self.points as usize).min(first + self.leaf_size())
+    }
+
+    /// The children of an inner node.
+    #[inline(always)]
+    #[must_use]
+    pub fn children(&self, id: NodeId) -> Children {
+        if id.0 >= self.bottom {
+            let leaves = self.leaves_at(self.depth, id.0 - self.bottom);
+            return Children { first: self.inner + leaves.start, count: leaves.end - leaves.start };
+        }
+        match (id.0, self.is_odd()) {
+            (0, 1) => Children { first: 1, count: 2 },
+            (id, is_odd) => Children { first: 4 * id + 1 - 2 * is_odd, count: 4 },
+        }
+    }
+
+    /// The children of the children of an inner node.
+    #[inline(always)]
+    #[must_use]
+    pub fn grandchildren(&self, id: NodeId) -> Grandchildren {
+        /// The lanes of children that are leaves.
+        const DIAGONAL: u32 = 0b1000_0100_0010_0001;
+        let Children { first, count } = self.children(id);
+        if self.is_leaf(NodeId(first)) {
+            let mut ids = [NodeId::ROOT; FAN * FAN];
+            for k in 0..FAN {
+                ids[(FAN + 1) * k] = NodeId(first + id32(k));
+            }
+            return Grandchildren { ids, lanes: DIAGONAL & ((1 << (5 * count - 4)) - 1), parents: [id; FAN] };
+        }
+        let mut ids = [NodeId::ROOT; FAN * FAN];
+        let mut lanes = (1 << (4 * count)) - 1;
+        if first < self.bottom {
+            // They follow each other as their parents do.
+            let next = self.children(NodeId(first)).first;
+            for (k, id) in (0_u32..).zip(&mut ids) {
+                *id = NodeId(next + k);
+            }
+        } else {
+            lanes = 0;
+            for k in 0..count {
+                let children = self.children(NodeId(first + k));
+                ids[FAN * k as usize..][..FAN].copy_from_slice(&children.lanes());
+                lanes |= ((1 << children.count) - 1) << (4 * k);
+            }
+        }
+        let last = first + count - 1;
+        let parent = |k: u32| NodeId(last.min(first + k));
+        Grandchildren { ids, lanes, parents: [parent(0), parent(1), parent(2), parent(3)] }
+    }
+
+    /// The parent of a node, and which of its children the node is; `None` of the root.
+    #[inline]
+    #[must_use]
+    pub fn parent(&self, id: NodeId) -> Option<(NodeId, usize)> {
+        if id == NodeId::ROOT {
+            return None;
+        }
+        if self.is_leaf(id) {
+            let number = id.0 - self.inner;
+            #[expect(clippy::cast_possible_truncation, reason = "no more than there are nodes")]
+            let j = ((u64::from(number) << self.depth) / u64::from(self.leaves)) as u32;
+            return Some((NodeId(self.bottom + j), (number - self.leaves_at(self.depth, j).start) as usize));
+        }
+        let place = id.0 - 1 + 2 * self.is_odd();
+        // The two children of a root are the last two of four.
+        let lane = if place < 4 { place - 2 * self.is_odd() } else { place % 4 };
+        Some((NodeId(place / 4), lane as usize))
+    }
+
+    /// The leaves under a node, by their numbers.
+    #[inline]
+    #[must_use]
+    pub fn leaves_under(&self, id: NodeId) -> Range<usize> {
+        if self.is_leaf(id) {
+            let number = self.leaf_number(id);
+            return number..number + 1;
+        }
+        if id == NodeId::ROOT {
+            return 0..self.leaves();
+        }
+        let (is_odd, number, id) = (self.is_odd(), id.0, u64::from(id.0));
+        let level =
+            if is_odd == 0 { (3 * id + 1).ilog2() / 2 } else { (3 * (id - 1) / 2 + 1).ilog2() / 2 + 1 };
+        let leaves = self.leaves_at(2 * level - is_odd, number - Self::level_start(is_odd, level));
+        leaves.start as usize..leaves.end as usize
+    }
+
+    /// The points under a node.
+    #[inline]
+    #[must_use]
+    pub fn points(&self, id: NodeId) -> Range<usize> {
+        let leaves = self.leaves_under(id);
+        leaves.start * self.leaf_size()..(self.points as usize).min(leaves.end * self.leaf_size())
+    }
+
+    /// The leaves of a half.
+    pub(crate) fn leaves_of(&self, half: Half) -> Range<usize> {
+        let leaves = self.leaves_at(half.depth, half.j);
+        leaves.start as usize..leaves.end as usize
+    }
+
+    /// The inner node that a half is, if it is one.
+    pub(crate) fn node_of(&self, Half { depth, j }: Half) -> Option<NodeId> {
+        let level = depth.div_ceil(2);
+        let is_kept = depth == 0 || depth <= self.depth && depth % 2 == self.depth % 2;
+        (is_kept && self.inner > 0).then(|| NodeId(Self::level_start(self.is_odd(), level) + j))
+    }
+}
+
+/// One of the parts into which halving again and again divides the leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Half {
+    depth: u32,
+    j: u32,
+}
+
+impl Half {
+    /// All leaves.
+    pub(crate) const ALL: Self = Self { depth: 0, j: 0 };
+
+    /// Its two halves.
+    pub(crate) fn halves(self) -> [Self; 2] {
+        [0, 1].map(|k| Self { depth: self.depth + 1, j: 2 * self.j + k })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trees() -> impl Iterator<Item = Topology> {
+        let sizes = (1..300).chain([1000, 4095, 4096, 4097, 70_000, 1_000_003]);
+        sizes.flat_map(|points| [4, 5, 16, 64].map(|leaf_size| Topology::new(points, leaf_size)))
+    }
+
+    #[test]
+    fn every_node_but_the_root_is_the_child_of_its_parent_alone() {
+        for tree in trees().filter(|tree| tree.len() < 3000) {
+            let mut seen = vec![0; tree.len()];
+            for id in tree.ids().filter(|&id| !tree.is_leaf(id)) {
+                for (lane, child) in tree.children(id).iter().enumerate() {
+                    seen[child.index()] += 1;
+                    assert_eq!(tree.parent(child), Some((id, lane)), "{tree:?}");
+                }
+            }
+            assert_eq!(tree.parent(NodeId::ROOT), None);
+            assert!(seen[0] == 0 && seen[1..].iter().all(|&count| count == 1), "{tree:?}: {seen:?}");
+        }
+    }
+
+    #[test]
+    fn children_share_the_points_of_their_parent_in_order() {
+        for tree in trees().filter(|tree| tree.len() < 3000) {
+            assert_eq!(tree.points(NodeId::ROOT), 0..tree.points as usize, "{tree:?}");
+            for id in tree.ids().filter(|&id| !tree.is_leaf(id)) {
+                let (own, mut next) = (tree.points(id), tree.points(id).start);
+                for child in tree.children(id).iter() {
+                    let points = tree.points(child);
+                    assert!(points.start == next && !points.is_empty(), "{tree:?}, {id:?}");
+                    next = points.end;
+                }
+                assert_eq!(next, own.end, "{tree:?}, {id:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn inner_nodes_are_at_most_two_thirds_as_many_as_leaves() {
+        for tree in trees() {
+            assert!(3 * tree.inner() <= 2 * tree.leaves() + 6, "{tree:?}");
+            let lowest = tree.ids().filter(|&id| !tree.is_leaf(id)).filter(|&id| {
+                id != NodeId::ROOT && tree.children(id).iter().all(|child| tree.is_leaf(child))
+            });
+            assert!(lowest.into_iter().all(|id| tree.children(id).len() >= 2), "{tree:?}");
+        }
+    }
+
+    #[test]
+    fn halves_that_are_nodes_have_their_leaves() {
+        for tree in trees().filter(|tree| tree.len() < 3000) {
+            let mut seen = vec![false; tree.len()];
+            seen[0] = true;
+            let mut open = vec![Half::ALL];
+            while let Some(half) = open.pop() {
+                let leaves = tree.leaves_of(half);
+                if let Some(id) = tree.node_of(half) {
+                    assert_eq!(tree.leaves_under(id), leaves, "{tree:?}, {half:?}");
+                    seen[id.index()] = true;
+                }
+                if leaves.len() > 1 {
+                    open.extend(half.halves());
+                } else {
+                    seen[tree.leaf(leaves.start).index()] = true;
+                }
+            }
+            assert!(seen.iter().all(|&seen| seen), "{tree:?}");
+        }
+    }
+
+    #[test]
+    fn the_greatest_scan_has_a_tree() {
+        let tree = Topology::new(u32::MAX, 4);
+        let last = tree.leaf(tree.leaves() - 1);
+        assert_eq!(tree.points(last).end, u32::MAX as usize);
+        let (mut id, mut depth) = (NodeId::ROOT, 0);
+        while !tree.is_leaf(id) {
+            id = tree.children(id).iter().next_back().unwrap();
+            depth += 1;
+        }
+        assert_eq!(id, last);
+        assert!(3 * depth + FAN < TREE_STACK, "{depth}");
+    }
+}

@@ -60,11 +60,10 @@ impl From<nearmiss_graph::LoadError> for LoadError {
 const KIND: [u8; 4] = *b"SCAN";
 
 /// Version of the layout of a scan's sections and metadata.
-const VERSION: u32 = 8;
+const VERSION: u32 = 9;
 
-/// Versions before this are refused by name. This one has the reach, classes and obstacle enclosures of
-/// points, and counts the points that filters left out.
-const OLDEST: u32 = 8;
+/// Versions before this are refused by name. This one holds the tree, leaves and blocks as queries read them.
+const OLDEST: u32 = 9;
 
 /// What a scan's file holds beside arrays.
 #[derive(Debug, Serialize, Deserialize)]
@@ -260,12 +259,13 @@ impl Scan {
         Ok(writer)
     }
 
-    /// Opens a saved scan by mapping it: nothing is copied, and with [`Check::Structure`] little is read.
+    /// Opens a saved scan by mapping it: nothing is copied, and memory is read when a query looks at it.
     ///
-    /// [`Check::Structure`] looks through the nodes and their boxes, for files one has written oneself.
-    /// [`Check::Full`], for all others, compares checksums too, and looks at every number of every point:
-    /// what it lets pass could have been written by [`Scan::save`]. Either way a query ends, and never leaves
-    /// its arrays.
+    /// [`Check::Structure`] looks at the metadata and the lengths of arrays, for files one has written
+    /// oneself: a damaged number may then give a wrong answer. Without a graph it takes the same time for any
+    /// scan. [`Check::Full`], for all others, compares checksums too, and looks at every number of every
+    /// point: what it lets pass could have been written by [`Scan::save`]. Either way a query ends, and never
+    /// leaves its arrays.
     ///
     /// The file must not be changed in place while it is open (see `nearmiss_store::File::open`); replacing
     /// it by [`Scan::save`] is fine.

@@ -197,7 +197,7 @@ impl Surfaces<'_> {
     #[cold]
     pub(crate) fn compare_balls(&mut self, [leaf_a, leaf_b]: [usize; 2]) -> ControlFlow<()> {
         let (a, b) = (self.pair.a, self.pair.b);
-        let (of_a, of_b) = (&a.wide.leaves, &b.wide.leaves);
+        let (of_a, of_b) = (a.leaves, b.leaves);
         let relative = self.pair.relative;
         // Two places as near as this in the world may come out so much further apart.
         let reach = self.reach + 2.0 * relative.slack();

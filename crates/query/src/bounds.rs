@@ -15,10 +15,10 @@
 use std::ops::{Add, Mul};
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
-use nearmiss_geometry::Pose;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
-use nearmiss_hierarchy::{Child, FourNodes, NodeBounds, Part, SLACK, Slices, WideTree, whole};
+use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_hierarchy::{NodeBounds, NodePair, Part, SLACK, Slices, whole};
 use nearmiss_lanes::wide::{bits, product, repeated, spread};
 
 use crate::view::ScanView;
@@ -37,8 +37,8 @@ const FAN: usize = 4;
 /// of either node, or one node and the grandchildren of the other.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pairs {
-    of_a: [Child; LANES],
-    of_b: [Child; LANES],
+    of_a: [NodeId; LANES],
+    of_b: [NodeId; LANES],
     /// A lane's node of a is that with the lane's number shifted by this.
     shift: u32,
     /// A lane's node of b is that with these bits of the lane's number.
@@ -48,34 +48,10 @@ pub(crate) struct Pairs {
 }
 
 impl Pairs {
-    /// Those that take the place of `pair`, the nodes that are [`whole`] by themselves.
-    #[inline]
-    fn of([tree_a, tree_b]: [&WideTree; 2], [a, b]: [Child; 2], whole: [bool; 2]) -> Self {
-        let (alone_a, alone_b) = ([a; LANES], [b; LANES]);
-        match whole {
-            [true, true] => Self { of_a: alone_a, of_b: alone_b, shift: 0, mask: 0, lanes: 1 },
-            [true, false] => {
-                let (of_b, lanes) = tree_b.grandchildren(b);
-                Self { of_a: alone_a, of_b, shift: 0, mask: LANES - 1, lanes }
-            }
-            [false, true] => {
-                let (of_a, lanes) = tree_a.grandchildren(a);
-                Self { of_a, of_b: alone_b, shift: 0, mask: 0, lanes }
-            }
-            [false, false] => {
-                let ([a, b], mut of_a, mut of_b) =
-                    ([tree_a.children(a), tree_b.children(b)], alone_a, alone_b);
-                of_a[..FAN].copy_from_slice(&a.0);
-                of_b[..FAN].copy_from_slice(&b.0);
-                Self { of_a, of_b, shift: 2, mask: FAN - 1, lanes: FAN_LANES[a.1 - 1][b.1 - 1] }
-            }
-        }
-    }
-
     /// The pair in this lane.
     #[inline]
-    pub(crate) fn pair(&self, lane: usize) -> [Child; 2] {
-        [self.of_a[(lane % LANES) >> self.shift], self.of_b[lane & self.mask]]
+    pub(crate) fn pair(&self, lane: usize) -> NodePair {
+        NodePair { a: self.of_a[(lane % LANES) >> self.shift], b: self.of_b[lane & self.mask] }
     }
 }
 
@@ -143,7 +119,7 @@ impl Motion {
     /// That of two views, whose relative pose is `pose`.
     #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
     pub(crate) fn new(level: Level, [a, b]: [&ScanView<'_>; 2], pose: &Pose) -> Self {
-        let [root_a, root_b] = [a, b].map(|view| &view.slices().boxes[0]);
+        let [root_a, root_b] = [a, b].map(|view| view.scan().root_box());
         let [ca, cb] = [root_a, root_b].map(|root| Vector3::from(root.centre.map(f64::from)));
         let turned = pose.scale() * (pose.rotation() * cb);
         let offset = turned + Vector3::from(pose.translation()) - ca;
@@ -234,33 +210,55 @@ impl Motion {
     pub(crate) fn split(
         &self,
         ([of_a, of_b], part): ([&Slices<'_>; 2], Part),
-        [a, b]: [Child; 2],
+        pair: NodePair,
         limits: Limits,
     ) -> (Pairs, Gaps) {
-        let whole = whole([of_a.wide, of_b.wide], [a, b], self.scale);
-        let pairs = Pairs::of([of_a.wide, of_b.wide], [a, b], whole);
-        let mut gaps = dispatch!(self.level, simd => simd.vectorize(
+        let ([of_a, of_b], NodePair { a, b }) = ([&of_a.tree, &of_b.tree], pair);
+        let leaves = [of_a.topology().is_leaf(a), of_b.topology().is_leaf(b)];
+        let whole = whole([of_a, of_b], pair, leaves, self.scale);
+        let (pairs, mut gaps) = dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
             || {
-                let (bounds_a, bounds_b) = match whole {
-                    [true, true] => {
-                        (alone(simd, &of_a.bounds_of(part, a)), alone(simd, &self.moved(&of_b.bounds_of(part, b))))
-                    }
+                let (alone_a, alone_b) = ([a; LANES], [b; LANES]);
+                let (pairs, bounds_a, bounds_b) = match whole {
+                    [true, true] => (
+                        Pairs { of_a: alone_a, of_b: alone_b, shift: 0, mask: 0, lanes: 1 },
+                        alone(simd, &of_a.bounds_of(part, a)),
+                        alone(simd, &self.moved(&of_b.bounds_of(part, b))),
+                    ),
                     [true, false] => {
-                        let below = of_b.bounds_of_grandchildren(simd, part, b);
-                        (alone(simd, &of_a.bounds_of(part, a)), self.moved(&below))
+                        let below = of_b.topology().grandchildren(b);
+                        let bounds = of_b.bounds_of_grandchildren(simd, part, &below);
+                        (
+                            Pairs { of_a: alone_a, of_b: below.ids, shift: 0, mask: LANES - 1, lanes: below.lanes },
+                            alone(simd, &of_a.bounds_of(part, a)),
+                            self.moved(&bounds),
+                        )
                     }
                     [false, true] => {
-                        let below = of_a.bounds_of_grandchildren(simd, part, a);
-                        (below, alone(simd, &self.moved(&of_b.bounds_of(part, b))))
+                        let below = of_a.topology().grandchildren(a);
+                        (
+                            Pairs { of_a: below.ids, of_b: alone_b, shift: 0, mask: 0, lanes: below.lanes },
+                            of_a.bounds_of_grandchildren(simd, part, &below),
+                            alone(simd, &self.moved(&of_b.bounds_of(part, b))),
+                        )
                     }
                     [false, false] => {
+                        let (below_a, below_b) = (of_a.topology().children(a), of_b.topology().children(b));
+                        let (mut ids_a, mut ids_b) = (alone_a, alone_b);
+                        ids_a[..FAN].copy_from_slice(&below_a.lanes());
+                        ids_b[..FAN].copy_from_slice(&below_b.lanes());
+                        let lanes = FAN_LANES[below_a.len() - 1][below_b.len() - 1];
                         let a = of_a.bounds_of_children(simd, part, a);
                         let b = of_b.bounds_of_children(simd, part, b);
-                        (each_spread(&a), all_repeated(&self.moved(&b)))
+                        (
+                            Pairs { of_a: ids_a, of_b: ids_b, shift: 2, mask: FAN - 1, lanes },
+                            each_spread(&a),
+                            all_repeated(&self.moved(&b)),
+                        )
                     }
                 };
-                self.gaps(simd, &bounds_a, &bounds_b, limits)
+                (pairs, self.gaps(simd, &bounds_a, &bounds_b, limits))
             },
         ));
         gaps.near &= pairs.lanes;
@@ -374,7 +372,7 @@ impl Motion {
 
 /// The first of four in four lanes, then the second, and so on.
 #[inline(always)]
-fn each_spread<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
+fn each_spread<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
     four.map(
         #[inline(always)]
         |four| spread(four),
@@ -383,7 +381,7 @@ fn each_spread<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
 
 /// The four one after the other, four times.
 #[inline(always)]
-fn all_repeated<S: Simd>(four: &FourNodes<S>) -> NodeBounds<f32x16<S>> {
+fn all_repeated<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
     four.map(
         #[inline(always)]
         |four| repeated(four),
@@ -449,6 +447,22 @@ mod tests {
         bytemuck::cast(lengths.map(|length| u16::try_from(length.to_bits() >> 16).unwrap()))
     }
 
+    /// Four boxes and what they grow by, a lane each.
+    fn four<S: Simd>(simd: S, boxes: &[OrientedBox; FAN], growths: &[Growth; FAN]) -> NodeBounds<f32x4<S>> {
+        let lanes = |of: &dyn Fn(usize) -> f32| f32x4::load_array(simd, [of(0), of(1), of(2), of(3)]);
+        let length = |lane: usize, k: usize| {
+            let halves: [u16; 6] = bytemuck::cast(growths[lane]);
+            f32::from_bits(u32::from(halves[k]) << 16)
+        };
+        NodeBounds {
+            centre: [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].centre[k])),
+            half: [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].half[k])),
+            axes: [0, 1, 2].map(|i| [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].axes[i][k]))),
+            low: [0, 1, 2].map(|k| lanes(&|lane| length(lane, k))),
+            high: [0, 1, 2].map(|k| lanes(&|lane| length(lane, 3 + k))),
+        }
+    }
+
     /// The motion by `pose` between scans about their origins that reach as far as 4.
     fn motion(level: Level, pose: &Pose) -> Motion {
         let offset = Vector3::from(pose.translation());
@@ -494,8 +508,7 @@ mod tests {
             let found = levels().into_iter().map(|level| {
                 let motion = motion(level, &pose);
                 let gaps = dispatch!(level, simd => {
-                    let a = FourNodes::new(simd, a.each_ref(), more_a.each_ref());
-                    let b = FourNodes::new(simd, b.each_ref(), more_b.each_ref());
+                    let (a, b) = (four(simd, &a, &more_a), four(simd, &b, &more_b));
                     motion.gaps(simd, &each_spread(&a), &all_repeated(&motion.moved(&b)), limits)
                 });
                 (gaps, motion)
@@ -541,10 +554,10 @@ mod tests {
             let scans = [scan(rng, count[0], 1.0), scan(rng, count[1], size)];
             let pose = rotation(rng).with_scale(0.7).with_translation(point_in(rng, 3.0));
             let [a, b] = [scans[0].slices(), scans[1].slices()];
-            let points = |[of_a, of_b]: [Child; 2]| {
-                let [a, b] = [(&a, of_a), (&b, of_b)].map(|(scan, node)| {
-                    let node = &scan.nodes[scan.wide.id(node).index()];
-                    (node.points().start, node.points().end)
+            let points = |pair: NodePair| {
+                let [a, b] = [(&a, pair.a), (&b, pair.b)].map(|(scan, node)| {
+                    let points = scan.tree.topology().points(node);
+                    (points.start, points.end)
                 });
                 (a, b)
             };
@@ -552,7 +565,7 @@ mod tests {
             for level in levels() {
                 let motion = motion(level, &pose);
                 let infinite = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
-                let mut open = vec![[a.wide.root(), b.wide.root()]];
+                let mut open = vec![NodePair::ROOTS];
                 while let Some(pair) = open.pop() {
                     let (pairs, gaps) = motion.split(([&a, &b], Part::Obstacle), pair, infinite);
                     assert_eq!(gaps.near, pairs.lanes);
@@ -562,8 +575,8 @@ mod tests {
                     assert_eq!(sum, product(points(pair)), "{pair:?}");
                     for (lane, below) in below {
                         let own = dispatch!(level, simd => {
-                            let a = alone(simd, &a.bounds_of(Part::Obstacle, below[0]));
-                            let b = motion.moved(&b.bounds_of(Part::Obstacle, below[1]));
+                            let a = alone(simd, &a.tree.bounds_of(Part::Obstacle, below.a));
+                            let b = motion.moved(&b.tree.bounds_of(Part::Obstacle, below.b));
                             motion.gaps(simd, &a, &alone(simd, &b), infinite)
                         });
                         assert_eq!(own.boxes[0], gaps.boxes[lane], "{below:?}, {level:?}");

@@ -142,7 +142,7 @@ impl Meter {
         const EVALUATIONS: f64 = 10.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 2¹⁶")]
         let evaluations = (EVALUATIONS / step).clamp(1.0, 65536.0) as u64;
-        let leaves = views.map(|view| view.slices().nodes.len().div_ceil(2) as u64);
+        let leaves = views.map(|view| view.scan().topology().leaves() as u64);
         let points = views.map(|view| u64::from(view.scan().leaf_size()));
         Self { spent, ..Self::new(budget, leaves, points, evaluations) }
     }

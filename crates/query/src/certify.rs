@@ -9,31 +9,13 @@
 //! the least bound is split further, for about an eighth as long as all took before.
 
 use std::collections::BinaryHeap;
-use std::ops::ControlFlow;
 
-use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Child, NodePair, Slices, Split, Visitor};
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::NodePair;
 use nearmiss_lanes::order::Near;
 
 use crate::bounds::{LANES, Limits, Motion};
 use crate::posed::{Posed, balls_apart};
-
-/// Pairs of either of `a` with either of `b`, some of which were excluded.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Excluded {
-    pub(crate) a: [NodeId; 2],
-    pub(crate) b: [NodeId; 2],
-    /// How far the boxes of those that were excluded are apart.
-    pub(crate) gaps: [Option<f32>; 4],
-}
-
-impl Excluded {
-    /// The pairs that were excluded, with their gaps.
-    pub(crate) fn pairs(&self) -> impl Iterator<Item = (f32, NodePair)> {
-        let pair = |i: usize| NodePair { a: self.a[i >> 1], b: self.b[i & 1] };
-        (0..4).filter_map(move |i| Some((self.gaps[i]?, pair(i))))
-    }
-}
 
 /// A proof that two scans are apart: pairs of nodes with disjoint enclosures, which together cover the pair
 /// of the roots.
@@ -51,7 +33,7 @@ pub(crate) struct Bound {
 }
 
 /// A pair of nodes in a proof, and their gap.
-type Open = Near<[Child; 2]>;
+type Open = Near<NodePair>;
 
 /// The pairs of nodes of a proof. Reused.
 #[derive(Debug, Clone, Default)]
@@ -104,17 +86,12 @@ impl Run<'_> {
     }
 }
 
-/// The pair of all points.
-pub(crate) const ROOTS: NodePair = NodePair { a: NodeId::ROOT, b: NodeId::ROOT };
-
 /// Returns `true` if a proof would fail at two leaves: neither their enclosures nor their points are further
 /// apart than `reach`.
 pub(crate) fn are_doubtful(pair: &Posed<'_>, motion: &Motion, leaves: NodePair, reach: f32) -> bool {
-    if pair.gap_of_parts(leaves) > reach {
+    if pair.better_gap(leaves, f32::NEG_INFINITY) > reach || pair.gap_of_enclosures(leaves) > reach {
         return false;
     }
-    let child = |scan: &Slices<'_>, id: NodeId| scan.wide.leaf_of(scan.nodes[id.index()].first as usize);
-    let leaves = [child(pair.a, leaves.a), child(pair.b, leaves.b)];
     let all = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
     let (_, gaps) = motion.split(([pair.a, pair.b], pair.part), leaves, all);
     let gap = motion.gap(gaps.enclosures[0], pair.relative.slack());
@@ -163,14 +140,13 @@ impl<'a> Certifier<'a> {
         scratch.clear();
         self.proven.clear();
         let before = self.pair.meter.spent.node_pairs;
-        let pair = [self.pair.a.wide.root(), self.pair.b.wide.root()];
-        let gap = self.pair.gaps_of_enclosures([NodeId::ROOT; 2], [NodeId::ROOT; 2])[0];
-        self.file(Open { distance: gap, item: pair }, &mut run, scratch)?;
+        let gap = self.pair.gap_of_enclosures(NodePair::ROOTS);
+        self.file(Open { distance: gap, item: NodePair::ROOTS }, &mut run, scratch)?;
         while let Some(next) = scratch.open.pop() {
             self.split(&next, &mut run, scratch)?;
         }
         let compared = self.pair.meter.spent.node_pairs - before;
-        let nearest = self.tighten(compared / 8, &mut run, scratch)?;
+        let nearest = self.tighten((compared / 8).max(32), &mut run, scratch)?;
         let least =
             self.in_world(if run.is_cut { nearest.distance.min(run.enough) } else { nearest.distance });
         // Far away balls tell more than boxes.
@@ -180,17 +156,38 @@ impl<'a> Certifier<'a> {
         let distance = self.in_world(gap).max(least);
         if distance > least {
             scratch.clear();
-            scratch.near.push(Open { distance: gap, item: pair });
+            scratch.near.push(Open { distance: gap, item: NodePair::ROOTS });
         }
         if is_hinted {
-            let bound = |own: &Open| Bound { gap: own.distance, pair: self.pair.nodes(own.item) };
+            let bound = |own: &Open| Bound { gap: own.distance, pair: own.item };
             self.proven.extend(scratch.apart().map(bound));
         }
         if let Some(proof) = proof {
-            let shown = |own: &Open| (self.pair.nodes(own.item), self.in_world(own.distance));
+            let shown = |own: &Open| (own.item, self.in_world(own.distance));
             proof.pairs.extend(scratch.apart().map(shown));
         }
-        Some((distance, self.pair.band_of(self.pair.nodes(nearest.item))))
+        Some((distance, self.pair.band_of(nearest.item)))
+    }
+
+    /// Splits `open` pairs of a proof, b's stored frame at `pose` in a's, until all are apart; `None` where
+    /// that fails. The pairs that are apart are left in `proven`.
+    pub(crate) fn prove_on(
+        &mut self,
+        pose: &Pose,
+        open: &[NodePair],
+        scratch: &mut ProofScratch,
+    ) -> Option<()> {
+        let motion = &Motion::new(self.pair.level, self.pair.views, pose);
+        let infinite = f32::INFINITY;
+        let mut run = Run { motion, lists: true, enough: infinite, beyond: infinite, is_cut: false };
+        scratch.clear();
+        self.proven.clear();
+        scratch.open.extend(open.iter().map(|&item| Open { distance: f32::NEG_INFINITY, item }));
+        while let Some(next) = scratch.open.pop() {
+            self.split(&next, &mut run, scratch)?;
+        }
+        self.proven.extend(scratch.apart().map(|own| Bound { gap: own.distance, pair: own.item }));
+        Some(())
     }
 
     /// Replaces a pair by its children. A pair that is apart stays if some of its children show less than it
@@ -239,15 +236,14 @@ impl<'a> Certifier<'a> {
     /// Puts a pair where it belongs. `None` where two leaves are not apart.
     #[inline]
     fn file(&mut self, mut own: Open, run: &mut Run<'_>, scratch: &mut ProofScratch) -> Option<()> {
-        let [a, b] = own.item.map(Child::is_leaf);
+        let [a, b] = self.pair.which_are_leaves(own.item);
         let mut is_apart = own.distance > self.reach;
         if !is_apart && (a || b) {
-            let nodes = self.pair.nodes(own.item);
-            let gap = if a && b {
-                self.pair.gap_of_parts(nodes)
-            } else {
-                self.pair.better_gap(nodes, own.distance)
-            };
+            let nodes = own.item;
+            let mut gap = self.pair.better_gap(nodes, own.distance);
+            if a && b && gap <= self.reach {
+                gap = self.pair.gap_of_enclosures(nodes);
+            }
             is_apart = gap > self.reach;
             if is_apart {
                 own.distance = gap;
@@ -282,7 +278,7 @@ impl<'a> Certifier<'a> {
         let mut last = None;
         while let Some(&least) = nearest.peek() {
             last = Some(least);
-            let are_leaves = least.item.iter().all(|node| node.is_leaf());
+            let are_leaves = self.pair.which_are_leaves(least.item) == [true; 2];
             if are_leaves
                 || self.pair.meter.spent.node_pairs >= most
                 || self.split(&least, run, scratch) != Some(true)
@@ -305,55 +301,4 @@ impl<'a> Certifier<'a> {
         // Less the rounding of the scale and of the product.
         f64::from(gap - slack) * self.pair.views[0].placed().scale() * (1.0 - 1e-9)
     }
-
-    /// The depth of overlap of those pairs in `mask` whose enclosures are not apart.
-    #[inline]
-    fn overlaps(&mut self, a: [NodeId; 2], b: [NodeId; 2], mask: [bool; 4]) -> [Option<f32>; 4] {
-        let gaps = self.pair.gaps_of_enclosures(a, b);
-        let mut overlaps = [None; 4];
-        for i in 0..4 {
-            if !mask[i] {
-                continue;
-            }
-            self.pair.meter.spent.node_pairs += 1;
-            let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
-            let gap = if gaps[i] > self.reach { gaps[i] } else { self.pair.better_gap(pair, gaps[i]) };
-            if gap > self.reach {
-                self.proven.push(Bound { gap, pair });
-            } else {
-                overlaps[i] = Some(-gaps[i]);
-            }
-        }
-        overlaps
-    }
-}
-
-impl Visitor for Certifier<'_> {
-    #[inline]
-    fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], _count: u8) -> [Option<f32>; 4] {
-        self.overlaps(a, b, distinct(a, b))
-    }
-
-    /// Two leaves that nothing parts.
-    fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        self.doubtful = Some(pair);
-        ControlFlow::Break(())
-    }
-
-    #[inline]
-    fn split(&self, pair: NodePair) -> Split {
-        self.pair.split(pair)
-    }
-
-    #[inline]
-    fn go_on(&mut self) -> ControlFlow<()> {
-        self.pair.meter.go_on()
-    }
-}
-
-/// Which of the four pairs are not doubles of others.
-#[inline]
-pub(crate) fn distinct(a: [NodeId; 2], b: [NodeId; 2]) -> [bool; 4] {
-    let (two_a, two_b) = (a[0] != a[1], b[0] != b[1]);
-    [true, two_b, two_a, two_a && two_b]
 }

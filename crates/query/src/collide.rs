@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use fearless_simd::Level;
 use nearmiss_geometry::Pose;
-use nearmiss_hierarchy::{Frontier, Heap, NodePair, Stack, Visitor, WideStack, descend, descend_wide};
+use nearmiss_hierarchy::{Heap, NodePair, Plunging, Stack, descend};
 
 use crate::budget::{Budget, Meter, NODE_PAIRS_A_LEAF_PAIR};
-use crate::certify::{Bound, Certifier, Excluded, Proof, ProofScratch, ROOTS};
+use crate::certify::{Bound, Certifier, Proof, ProofScratch};
 use crate::hint::{Known, PairHint};
 use crate::interpolation::InterpolationScratch;
 use crate::leaf_pair::Instructions;
@@ -20,7 +20,7 @@ use crate::likelihood::likelihood;
 use crate::manifold::{self, ManifoldPoint, ManifoldScratch};
 use crate::options::{CollideOptions, CollidePlan, Detail, Method, Order, Semantics};
 use crate::posed::{Posed, relative};
-use crate::surface::{Surfaces, Workspace};
+use crate::surface::{Closer, Plain, Surfaces, Workspace};
 use crate::thickened::{Balls, balls_meet};
 use crate::verdict::{Answer, Contact, Evidence, Reason, Statistics, Verdict};
 use crate::view::{ScanView, ViewScratch};
@@ -31,7 +31,7 @@ pub struct CollideScratch {
     frontiers: Frontiers,
     instructions: Instructions,
     gathers: [ViewScratch; 2],
-    excluded: Vec<Excluded>,
+    excluded: Vec<Bound>,
     compared: Vec<NodePair>,
     members: Vec<u32>,
     interpolation: InterpolationScratch,
@@ -44,9 +44,7 @@ pub struct CollideScratch {
 /// The pairs of nodes still to be looked at, by how a search goes on.
 #[derive(Debug, Clone, Default)]
 struct Frontiers {
-    /// All leaves that are near.
-    wide: WideStack,
-    /// Depth first, with what is excluded noted.
+    /// Depth first.
     stack: Stack,
     /// The most urgent first.
     heap: Heap,
@@ -54,15 +52,13 @@ struct Frontiers {
 
 impl Frontiers {
     fn clear(&mut self) {
-        self.wide.clear();
         self.stack.clear();
         self.heap.clear();
     }
 
     /// What is still there. A search goes on from a front depth first, whatever its order.
-    fn open(&self, pair: &Posed<'_>) -> impl Iterator<Item = NodePair> {
-        let narrow = self.stack.open().chain(self.heap.open());
-        narrow.map(|(_, pair)| pair).chain(self.wide.open(pair.a, pair.b))
+    fn open(&self) -> impl Iterator<Item = NodePair> {
+        self.stack.iter().chain(self.heap.iter())
     }
 }
 
@@ -207,7 +203,7 @@ fn search(
             }
             let verdict = early.map_or(Verdict::Undecided(Reason::Pose), |distance| {
                 if let Some(proof) = extras.proof {
-                    proof.pairs.push((ROOTS, distance));
+                    proof.pairs.push((NodePair::ROOTS, distance));
                 }
                 apart(options, distance, true)
             });
@@ -217,12 +213,14 @@ fn search(
         }
     };
     let by = (scratch.instructions.0, options.semantics.part());
-    let answer = decide(Posed::new([a, b], relative, meter, by), pose, (plan, budget), scratch, extras);
+    let slices = [a.scan().slices(), b.scan().slices()];
+    let pair = Posed::new([a, b], slices.each_ref(), relative, meter, by);
+    let answer = decide(pair, pose, (plan, budget), scratch, extras);
     match answer.verdict {
         Verdict::Intersecting { contact, .. } if options.detail == Detail::Manifold => {
             let mut spent = self::meter([a, b], options, budget);
             spent.spent = answer.statistics;
-            let mut pair = Posed::new([a, b], relative, spent, by);
+            let mut pair = Posed::new([a, b], slices.each_ref(), relative, spent, by);
             manifold::gather(&mut pair, options, &contact, scratch.instructions.0, &mut scratch.manifold);
             Answer { statistics: pair.meter.spent, ..answer }
         }
@@ -233,14 +231,14 @@ fn search(
 /// The greatest local radius of any point of two scans, in the world.
 fn greatest_band(views: [&ScanView<'_>; 2]) -> f64 {
     views
-        .map(|view| f64::from(view.slices().boxes[0].reach) * view.placed().scale())
+        .map(|view| f64::from(view.scan().root_box().reach) * view.placed().scale())
         .into_iter()
         .fold(0.0, f64::max)
 }
 
 /// What a query may spend.
 fn meter(views: [&ScanView<'_>; 2], options: &CollideOptions, budget: &Budget) -> Meter {
-    let leaves = views.map(|view| view.slices().nodes.len().div_ceil(2) as u64);
+    let leaves = views.map(|view| view.scan().topology().leaves() as u64);
     let points = views.map(|view| u64::from(view.scan().leaf_size()));
     let test_points = match options.method {
         Method::Traversal => 0,
@@ -248,7 +246,7 @@ fn meter(views: [&ScanView<'_>; 2], options: &CollideOptions, budget: &Budget) -
         Method::Interpolation(_) => points[0],
     };
     let looked_at = match options.order {
-        Some(Order::Sides | Order::SidesByGap) => views[0].slices().samples(0).len() as u64,
+        Some(Order::Sides | Order::SidesByGap) => views[0].scan().slices().samples(0).len() as u64,
         _ => 0,
     };
     let evaluations = 2 * test_points + NODE_PAIRS_A_LEAF_PAIR * looked_at;
@@ -278,7 +276,7 @@ fn decide(
         }
         known.come_to(pose, &pair);
         let distance = known.distance(&pair, plan.reach())?;
-        Some((apart(options, distance, true), pair.band_of(ROOTS)))
+        Some((apart(options, distance, true), pair.band_of(NodePair::ROOTS)))
     });
     if let Some((verdict, band)) = early {
         return Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent };
@@ -329,11 +327,11 @@ fn surfaces(
     let mut certifier = Certifier::new(pair, reach, proven);
     // Enclosures hold the boxes: what they part has no contact.
     if let Some(known) = &mut known
-        && let Some(distance) = known.prove_again(&mut certifier, &mut frontiers.stack)
+        && let Some(distance) = known.prove_again(pose, &mut certifier, (&mut *compared, &mut *open))
     {
         let (verdict, statistics) = (apart(options, distance, true), certifier.pair.meter.spent);
         *longest_stretch = certifier.pair.meter.longest_stretch;
-        let band = certifier.pair.band_of(ROOTS);
+        let band = certifier.pair.band_of(NodePair::ROOTS);
         return Answer { verdict, band, distance_estimate: None, statistics };
     }
     let Certifier { pair, proven, .. } = certifier;
@@ -349,11 +347,12 @@ fn surfaces(
     let parted = !ended && search.found.is_none();
     let Surfaces { pair, found, doubt, estimate, excluded, compared, met, .. } = search;
     let mut certifier = Certifier::new(pair, reach, proven);
-    let mut band = met.map_or_else(|| certifier.pair.band_of(ROOTS), |met| certifier.pair.band(met));
+    let mut band =
+        met.map_or_else(|| certifier.pair.band_of(NodePair::ROOTS), |met| certifier.pair.band(met));
     let verdict = match (found, doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
-            let likelihood = likelihood(&certifier.pair, reach, frontiers.open(&certifier.pair));
+            let likelihood = likelihood(&certifier.pair, reach, frontiers.open());
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         (None, Some(reason)) => Verdict::Undecided(reason),
@@ -410,7 +409,8 @@ fn look(
     }
     if let Some(known) = known {
         if let Some(points) = known.met(&search.pair) {
-            search.leaves(search.pair.leaves_of(points))?;
+            let leaves = search.pair.numbers(search.pair.leaves_of(points));
+            search.leaf_pair(leaves)?;
             search.compared.clear();
         }
         if known.has_front(&search.pair, search.reach, options.certifies()) {
@@ -418,15 +418,17 @@ fn look(
         }
         known.forget(None);
     }
-    if search.is_plain {
-        let Posed { a, b, relative, .. } = search.pair;
-        let level = search.instructions.0;
-        return descend_wide((a, b), &relative, search.reach, level, &mut frontiers.wide, search);
-    }
-    let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
-    match search.order {
-        Order::DepthFirst => descend(nodes_a, nodes_b, search, &mut frontiers.stack),
-        _ => descend(nodes_a, nodes_b, search, &mut frontiers.heap),
+    let (relative, level) = (search.pair.relative, search.instructions.0);
+    let trees = search.pair.trees(&relative, search.reach);
+    let Frontiers { stack, heap } = frontiers;
+    match (search.order, search.is_plain) {
+        (Order::DepthFirst, true) if search.wants_any() => {
+            descend(trees, level, &mut Plunging::new(stack), &mut Plain(search))
+        }
+        (Order::DepthFirst, true) => descend(trees, level, stack, &mut Plain(search)),
+        (Order::DepthFirst, false) => descend(trees, level, stack, &mut Closer(search)),
+        (_, true) => descend(trees, level, heap, &mut Plain(search)),
+        (_, false) => descend(trees, level, heap, &mut Closer(search)),
     }
 }
 
@@ -445,10 +447,15 @@ fn balls(
     let mut ended = again.is_some_and(|points| search.compare(search.pair.leaves_of(points)).is_break());
     if !ended {
         search.apart = f64::INFINITY;
-        let Posed { a, b, relative, .. } = search.pair;
-        let reach = search.reach_stored;
-        let (level, stack) = (scratch.instructions.0, &mut scratch.frontiers.wide);
-        ended = descend_wide((a, b), &relative, reach, level, stack, &mut search).is_break();
+        let relative = search.pair.relative;
+        let trees = search.pair.trees(&relative, search.reach_stored);
+        let (level, stack) = (scratch.instructions.0, &mut scratch.frontiers.stack);
+        let flow = if search.all.is_none() {
+            descend(trees, level, &mut Plunging::new(stack), &mut search)
+        } else {
+            descend(trees, level, stack, &mut search)
+        };
+        ended = flow.is_break();
     }
     if let Some(complete) = complete {
         *complete = !ended;
@@ -456,8 +463,7 @@ fn balls(
     let verdict = match search.found {
         Some((contact, _)) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
         None if ended => {
-            let likelihood =
-                likelihood(&search.pair, search.reach_stored, scratch.frontiers.open(&search.pair));
+            let likelihood = likelihood(&search.pair, search.reach_stored, scratch.frontiers.open());
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         None => apart(plan.options(), search.apart, true),
@@ -469,8 +475,9 @@ fn balls(
         }
     }
     scratch.longest_stretch = search.pair.meter.longest_stretch;
-    let band =
-        search.found.map_or_else(|| search.pair.band_of(ROOTS), |(_, points)| search.pair.band(points));
+    let band = search
+        .found
+        .map_or_else(|| search.pair.band_of(NodePair::ROOTS), |(_, points)| search.pair.band(points));
     Answer { verdict, band, distance_estimate: None, statistics: search.pair.meter.spent }
 }
 

@@ -2,49 +2,18 @@
 
 use std::ops::ControlFlow;
 
-use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Child, LeafBlock, LeafVisitor, Leaves, NodePair, Part};
+use nearmiss_hierarchy::{LeafBlock, Leaves, Part};
 
 use crate::disc_pair::FAR;
 use crate::leaf_pair::{Discs, LeafPair, Near};
 use crate::surface::Surfaces;
 use crate::verdict::Reason;
 
-impl LeafVisitor for Surfaces<'_> {
-    #[inline]
-    fn wants_any(&self) -> bool {
-        // Within a margin boxes that overlap most are beside each other rather than near, and fewer witnesses
-        // verify there.
-        self.all.is_none() && self.margin == 0.0
-    }
-
-    #[inline]
-    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
-        self.pair.meter.spent.node_pairs += u64::from(pairs);
-        self.pair.meter.go_on()
-    }
-
-    #[inline]
-    fn is_apart(&mut self, pair: [Child; 2]) -> bool {
-        self.pair.gap_by_leaf(self.pair.nodes(pair)).is_some_and(|gap| gap > self.reach)
-    }
-
-    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
-        let (a, b) = (&self.pair.a.wide.leaves, &self.pair.b.wide.leaves);
-        let [of_a, of_b] = leaves;
-        self.pair.meter.leaf_pair(a.points(of_a).len(), b.points(of_b).len());
-        if self.notes_leaves {
-            self.compared.push(NodePair { a: NodeId(a.id(of_a)), b: NodeId(b.id(of_b)) });
-        }
-        self.compare_leaves(leaves, true)
-    }
-}
-
 impl Surfaces<'_> {
     /// The points of two leaves, by their numbers, against each other.
     pub(crate) fn compare_leaves(&mut self, [leaf_a, leaf_b]: [usize; 2], by_discs: bool) -> ControlFlow<()> {
         let (a, b) = (self.pair.a, self.pair.b);
-        let (of_a, of_b) = (&a.wide.leaves, &b.wide.leaves);
+        let (of_a, of_b) = (a.leaves, b.leaves);
         if self.pair.part == Part::Obstacle && (of_a.has_balls(leaf_a) || of_b.has_balls(leaf_b)) {
             let tries = self.tries;
             self.compare_balls([leaf_a, leaf_b])?;
@@ -53,7 +22,7 @@ impl Surfaces<'_> {
                 return ControlFlow::Continue(());
             }
         }
-        let is_sparse = |leaves: &Leaves, leaf| self.pair.part == Part::Surface && leaves.is_sparse(leaf);
+        let is_sparse = |leaves: Leaves<'_>, leaf| self.pair.part == Part::Surface && leaves.is_sparse(leaf);
         let sparse = [is_sparse(of_a, leaf_a), is_sparse(of_b, leaf_b)];
         if !by_discs && sparse == [false; 2] {
             return ControlFlow::Continue(());

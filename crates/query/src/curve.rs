@@ -167,7 +167,7 @@ pub fn curves_with(
     found.complete = contacts.complete;
     found.statistics = answer.statistics;
     let views = [a, b];
-    let radius = |view: &ScanView<'_>| f64::from(view.slices().sampling_radius) * view.placed().scale();
+    let radius = |view: &ScanView<'_>| view.sampling_radius();
     let radius = radius(a).min(radius(b));
     let spacing = plan.options.spacing.unwrap_or(2.0 * radius);
     let longest = spacing.min(LONGEST * radius);

@@ -94,7 +94,7 @@ impl Posed<'_> {
     /// Whether the discs of points `i` and `j` cross, as when leaves are compared, so that it says something.
     /// Of a sparse leaf it takes more to say.
     pub(crate) fn crosses(&self, [i, j]: [usize; 2]) -> bool {
-        let (a, b) = (&self.a.wide.leaves, &self.b.wide.leaves);
+        let (a, b) = (&self.a.leaves, &self.b.leaves);
         let is_sparse = || a.is_sparse(a.leaf_of(i)) || b.is_sparse(b.leaf_of(j));
         if self.part == Part::Surface && is_sparse() {
             return false;

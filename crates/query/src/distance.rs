@@ -177,12 +177,13 @@ pub fn distance_with(
             statistics: Statistics::default(),
         };
     };
-    let leaves = views.map(|view| view.slices().nodes.len().div_ceil(2) as u64);
+    let leaves = views.map(|view| view.scan().topology().leaves() as u64);
     let points = views.map(|view| u64::from(view.scan().leaf_size()));
     let meter = Meter::new(budget, leaves, points, 0);
     let level = Level::new();
     let motion = Motion::new(level, views, &pose);
-    let pair = Posed::new(views, relative, meter, (level, plan.options.semantics.part()));
+    let slices = views.map(|view| view.scan().slices());
+    let pair = Posed::new(views, slices.each_ref(), relative, meter, (level, plan.options.semantics.part()));
     let best = PointPair::new(&pair, [0, 0]);
     let search = Apart { plan, budget, motion, pair, best };
     match plan.options.semantics {
@@ -208,7 +209,7 @@ struct Apart<'a> {
 impl Apart<'_> {
     /// Balls of this radius about the points.
     fn balls(mut self, radius: f64, scratch: &mut DistanceScratch) -> Distance {
-        let mut search = Search::new(&mut scratch.open, false, &self.pair, &self.motion);
+        let mut search = Search::new(&mut scratch.open, false, &self.motion);
         search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         let beyond = |distance: f64| (distance - 2.0 * radius).max(0.0);
         let mut flow = ControlFlow::Continue(());
@@ -237,7 +238,7 @@ impl Apart<'_> {
         let DistanceScratch { open, gathers, collide } = scratch;
         // By the geodesic metric enclosures prove nothing.
         let is_bounded = self.plan.options.metric != Some(Metric::Geodesic);
-        let mut search = Search::new(open, is_bounded, &self.pair, &self.motion);
+        let mut search = Search::new(open, is_bounded, &self.motion);
         search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         // Whether they touch costs a hundredth of the rest. A budget is spent on bounds first.
         let mut is_asked = self.budget.work.is_none() && self.budget.deadline.is_none();
@@ -277,8 +278,8 @@ impl Apart<'_> {
     /// A step of a search, and a look at the points of the leaves it leads to.
     fn step(&mut self, search: &mut Search<'_>) {
         if let Some(leaves) = search.step(&mut self.pair, &self.motion) {
-            let (a, b) = (&self.pair.a.nodes[leaves.a.index()], &self.pair.b.nodes[leaves.b.index()]);
-            self.pair.meter.leaf_pair(a.count as usize, b.count as usize);
+            let [a, b] = self.pair.numbers(leaves);
+            self.pair.meter.leaf_pair(self.pair.a.leaves.points(a).len(), self.pair.b.leaves.points(b).len());
             self.best = nearest(self.motion.level(), &self.pair, leaves, self.best);
             search.found_points(self.motion.bound_of(self.best.distance.max(0.0)), &self.motion);
             if self.of_obstacles() {
@@ -357,7 +358,7 @@ impl Apart<'_> {
     fn samples(&self) -> Distance {
         let PointPair { distance, points } = self.best;
         let views = self.pair.views;
-        let half = |k: usize| 0.5 * f64::from(views[k].slices().radii[points[k]]) * views[k].placed().scale();
+        let half = |k: usize| 0.5 * f64::from(views[k].scan().radii()[points[k]]) * views[k].placed().scale();
         let of_obstacles = self.of_obstacles();
         let places = [0, 1].map(|k| views[k].point(points[k]));
         Distance {

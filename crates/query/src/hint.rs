@@ -10,13 +10,13 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Ball, Frontier, NodePair, Stack, descend, resume};
+use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, descend, resume};
 
 use crate::bounds::Motion;
-use crate::certify::{Bound, Certifier, Excluded, are_doubtful};
+use crate::certify::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::options::CollideOptions;
 use crate::posed::Posed;
-use crate::surface::Surfaces;
+use crate::surface::{Closer, Surfaces};
 
 /// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they
 /// need be.
@@ -93,7 +93,7 @@ impl PairHint {
     pub(crate) fn recall(&mut self, pair: &Posed<'_>, options: &CollideOptions) -> &mut Known {
         let question = Question {
             options: *options,
-            scans: pair.views.map(|view| view.slices().outline.identity),
+            scans: pair.views.map(|view| view.scan().outline().identity),
             scale: pair.views[0].placed().scale(),
         };
         match &mut self.known {
@@ -193,44 +193,48 @@ impl Known {
 
     /// Whether the front is whole, and of nodes that there are.
     fn is_there(&self, pair: &Posed<'_>) -> bool {
-        let (nodes_a, nodes_b) = (pair.a.nodes.len(), pair.b.nodes.len());
-        let is_there = |at: &Standing| at.pair.a.index() < nodes_a && at.pair.b.index() < nodes_b;
-        self.is_whole && self.front.iter().all(is_there)
+        let (a, b) = (pair.a.tree.topology(), pair.b.tree.topology());
+        self.is_whole && self.front.iter().all(|at| a.has(at.pair.a) && b.has(at.pair.b))
     }
 
     /// Goes on from the front instead of the roots.
     pub(crate) fn look_again(&mut self, search: &mut Surfaces<'_>, stack: &mut Stack) -> ControlFlow<()> {
         stack.clear();
-        let (nodes_a, nodes_b) = (search.pair.a.nodes, search.pair.b.nodes);
-        let (reach, slack) = (search.reach, search.pair.relative.slack());
+        let (reach, slack, relative) = (search.reach, search.pair.relative.slack(), search.pair.relative);
         let gap = |pair: NodePair| {
-            let gap = search.pair.gaps([pair.a; 2], [pair.b; 2], 1)[0];
+            let gap = search.pair.gap(pair);
             search.pair.gap_by_leaf(pair).map_or(gap, |by_points| by_points.max(gap))
         };
-        if !self.advance(reach, slack, stack, gap) {
+        let is_front = self.advance(reach, slack, gap, |pair, key| stack.push(Open { pair, key }));
+        let (trees, level) = (search.pair.trees(&relative, reach), search.instructions.0);
+        if !is_front {
             // After a long way the roots are nearer than what was the front.
             self.forget(None);
-            return descend(nodes_a, nodes_b, search, stack);
+            return descend(trees, level, stack, &mut Closer(search));
         }
-        resume(nodes_a, nodes_b, search, stack)
+        resume(trees, level, stack, &mut Closer(search))
     }
 
     /// Goes on from the front of a proof, if there is one: how far the scans are apart at least, if it can be
     /// made whole again.
-    pub(crate) fn prove_again(&mut self, certifier: &mut Certifier<'_>, stack: &mut Stack) -> Option<f64> {
+    pub(crate) fn prove_again(
+        &mut self,
+        pose: &Pose,
+        certifier: &mut Certifier<'_>,
+        (expired, scratch): (&mut Vec<NodePair>, &mut ProofScratch),
+    ) -> Option<f64> {
         let pair = &certifier.pair;
         if !self.is_proof || !self.is_slow(pair, SLOW_PROVEN) || !self.is_there(pair) {
             return None;
         }
-        stack.clear();
-        let (nodes_a, nodes_b) = (certifier.pair.a.nodes, certifier.pair.b.nodes);
+        expired.clear();
         let (reach, slack) = (certifier.reach, certifier.pair.relative.slack());
         let gap = |pair: NodePair| {
             certifier.pair.meter.spent.node_pairs += 1;
             certifier.pair.gap_of_parts(pair)
         };
-        let whole = self.advance(reach, slack, stack, gap)
-            && resume(nodes_a, nodes_b, certifier, stack).is_continue();
+        let whole = self.advance(reach, slack, gap, |pair, _| expired.push(pair))
+            && certifier.prove_on(pose, expired, scratch).is_some();
         if !whole {
             self.forget(None);
             return None;
@@ -240,13 +244,13 @@ impl Known {
     }
 
     /// Looks at the pairs of the front whose time has come: those that are still apart wait again, the others
-    /// leave it for the stack. False if they are too many.
+    /// leave it and are handed out with their gaps. Returns `false` if they are too many.
     fn advance(
         &mut self,
         reach: f32,
         slack: f32,
-        stack: &mut Stack,
         mut gap: impl FnMut(NodePair) -> f32,
+        mut open: impl FnMut(NodePair, f32),
     ) -> bool {
         let parted = self.travel + (f64::from(reach) + f64::from(slack));
         let expired = self.front.iter().filter(|standing| standing.until <= parted).count();
@@ -265,8 +269,7 @@ impl Known {
                 i += 1;
             } else {
                 self.front.swap_remove(i);
-                let none = (None, pair);
-                stack.push([(Some(-gap), pair), none, none, none]);
+                open(pair, gap);
             }
         }
         true
@@ -293,12 +296,12 @@ impl Known {
     /// that is wanted has failed, at the leaves `doubtful` if that is known.
     pub(crate) fn parted(
         &mut self,
-        (excluded, compared): (&[Excluded], &[NodePair]),
+        (excluded, compared): (&[Bound], &[NodePair]),
         slack: f32,
         proof_failed: bool,
         doubtful: Option<NodePair>,
     ) {
-        let apart = excluded.iter().flat_map(Excluded::pairs);
+        let apart = excluded.iter().map(|bound| (bound.gap, bound.pair));
         // Leaves that were compared have to be compared again.
         let compared = compared.iter().map(|&pair| (f32::NEG_INFINITY, pair));
         self.add(apart.chain(compared), slack);

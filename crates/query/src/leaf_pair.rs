@@ -35,7 +35,7 @@ pub(crate) struct Discs<'a> {
 
 impl<'a> Discs<'a> {
     /// Those of the block with point `i`, and its lane.
-    pub(crate) fn about(leaves: &'a Leaves, i: usize) -> (Self, usize) {
+    pub(crate) fn about(leaves: &Leaves<'a>, i: usize) -> (Self, usize) {
         let (block, first, count) = leaves.block_with(i);
         (Self { block, count }, i - first)
     }

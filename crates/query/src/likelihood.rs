@@ -48,10 +48,11 @@ struct Content {
 impl Content {
     /// Of a node, in a frame of which the lengths are `scale` times as long.
     fn of(scan: &Slices<'_>, id: NodeId, scale: f64) -> Self {
-        let OrientedBox { half, reach, .. } = &scan.boxes[id.index()];
+        let OrientedBox { half, reach, .. } = scan.tree.bounds(id);
         let half = half.map(|edge| f64::from(edge) * scale);
         let radius = f64::from(reach.min(scan.sampling_radius)) * scale;
-        let count = f64::from(scan.nodes[id.index()].count);
+        #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+        let count = scan.tree.topology().points(id).len() as f64;
         Self {
             size: half.iter().sum(),
             volume: 8.0 * half.iter().product::<f64>(),
@@ -62,8 +63,8 @@ impl Content {
 
 impl Hint {
     fn of(pair: &Posed<'_>, reach: f32, nodes: NodePair) -> Self {
-        let boxes = (&pair.a.boxes[nodes.a.index()], &pair.b.boxes[nodes.b.index()]);
-        let share = pair.relative.gaps_and_overlaps([boxes.0; 2], [boxes.1; 2], reach).1[0];
+        let (bounds_a, bounds_b) = (pair.a.tree.bounds(nodes.a), pair.b.tree.bounds(nodes.b));
+        let share = pair.relative.overlap(&bounds_a, &bounds_b, reach);
         let a = Content::of(pair.a, nodes.a, 1.0);
         let b = Content::of(pair.b, nodes.b, f64::from(pair.relative.scale()));
         let ratio = (a.size / b.size).ln().abs();
@@ -80,7 +81,7 @@ impl Hint {
 /// `reach`.
 pub(crate) fn likelihood(pair: &Posed<'_>, reach: f32, open: impl Iterator<Item = NodePair>) -> f64 {
     let mut open = open.take(LOOKED_AT).peekable();
-    let roots = open.peek().is_none().then_some(NodePair { a: NodeId::ROOT, b: NodeId::ROOT });
+    let roots = open.peek().is_none().then_some(NodePair::ROOTS);
     let (mut best, mut sheets) = (Hint { share: 0.0, sheets: 0.0, ratio: 0.0 }, 0.0);
     for nodes in open.chain(roots) {
         let hint = Hint::of(pair, reach, nodes);

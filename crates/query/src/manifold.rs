@@ -12,7 +12,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::PointId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{LeafVisitor, WideStack, descend_wide};
+use nearmiss_hierarchy::{PairVisitor, Stack, TreePair, descend};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::wide::{bits, blocks_of, lanes_of, load};
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ pub struct ManifoldPoint {
 /// Memory for manifolds, used again by the next.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ManifoldScratch {
-    stack: WideStack,
+    stack: Stack,
     neighbours: Vec<Neighbour>,
     candidates: Vec<(ManifoldPoint, f64)>,
     /// The last manifold.
@@ -92,10 +92,12 @@ pub(crate) fn gather(
     neighbours.clear();
     let reach = pair.stored(solid.reach());
     let (a, b, relative) = (pair.a, pair.b, pair.relative);
+    let trees = TreePair { a: &a.tree, b: &b.tree, relative: &relative, reach };
+    stack.clear();
     let back = reach * relative.scale_back();
     let mut near = Near { pair: &mut *pair, level, reach_sq: back * back, neighbours };
     // What was found is worth as much where the budget ends it.
-    let _ended = descend_wide((a, b), &relative, reach, level, stack, &mut near);
+    let _ended = descend(trees, level, stack, &mut near);
     neighbours.sort_unstable_by(Neighbour::order);
     neighbours.dedup_by_key(|it| (it.of_b, it.point));
     candidates.clear();
@@ -144,13 +146,13 @@ struct Solid {
 
 impl Solid {
     fn new(pair: &Posed<'_>, options: &CollideOptions) -> Self {
-        let spacing = pair.views.map(|view| f64::from(view.slices().sampling_radius) * view.placed().scale());
-        let radii = pair.views.map(|view| view.slices().outline.discs.radius * view.placed().scale());
+        let spacing = pair.views.map(|view| view.sampling_radius());
+        let radii = pair.views.map(|view| view.scan().outline().discs.radius * view.placed().scale());
         Self {
             semantics: options.semantics,
             margin: options.margin,
             spacing: spacing[0].max(spacing[1]),
-            centres: pair.views.map(|view| view.placed().apply(view.slices().outline.discs.centre).into()),
+            centres: pair.views.map(|view| view.placed().apply(view.scan().outline().discs.centre).into()),
             lesser: usize::from(radii[1] < radii[0]),
             oriented: pair.views.map(|view| view.scan().is_oriented()),
         }
@@ -220,7 +222,7 @@ impl Solid {
     /// scan is on the side of its middle, as a cup is on the table and the table in the room.
     fn way_out(&self, pair: &Posed<'_>, of_b: bool, points: [usize; 2]) -> Vector3<f64> {
         let normal = |side: usize| {
-            let stored = pair.views[side].slices().normals[points[side]].map(f64::from);
+            let stored = pair.views[side].scan().normals()[points[side]].map(f64::from);
             Vector3::from(pair.views[side].placed().rotate(stored))
         };
         let own = usize::from(!of_b);
@@ -267,12 +269,7 @@ struct Near<'a, 'p> {
     neighbours: &'a mut Vec<Neighbour>,
 }
 
-impl LeafVisitor for Near<'_, '_> {
-    #[inline]
-    fn wants_any(&self) -> bool {
-        false
-    }
-
+impl PairVisitor for Near<'_, '_> {
     #[inline]
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.pair.meter.spent.node_pairs += u64::from(pairs);
@@ -280,7 +277,7 @@ impl LeafVisitor for Near<'_, '_> {
     }
 
     fn leaf_pair(&mut self, [a, b]: [usize; 2]) -> ControlFlow<()> {
-        let (of_a, of_b) = (self.pair.a.wide.leaves.points(a), self.pair.b.wide.leaves.points(b));
+        let (of_a, of_b) = (self.pair.a.leaves.points(a), self.pair.b.leaves.points(b));
         self.pair.meter.leaf_pair(of_a.len(), of_b.len());
         for block_a in blocks_of(&of_a) {
             for block_b in blocks_of(&of_b) {

@@ -5,7 +5,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Leaves, Node, NodePair, Part};
+use nearmiss_hierarchy::{NodePair, Part};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::wide::{bits, blocks_of, lanes_of};
 
@@ -31,10 +31,8 @@ impl PointPair {
 
 /// Returns `true` if balls stand for some points of either leaf.
 #[inline(always)]
-fn has_balls(pair: &Posed<'_>, [a, b]: [&Node; 2]) -> bool {
-    let (of_a, of_b) = (&pair.a.wide.leaves, &pair.b.wide.leaves);
-    let has = |leaves: &Leaves, node: &Node| leaves.has_balls(leaves.leaf_of(node.points().start));
-    pair.part == Part::Obstacle && (has(of_a, a) || has(of_b, b))
+fn has_balls(pair: &Posed<'_>, [a, b]: [usize; 2]) -> bool {
+    pair.part == Part::Obstacle && (pair.a.leaves.has_balls(a) || pair.b.leaves.has_balls(b))
 }
 
 /// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that
@@ -48,12 +46,13 @@ pub(crate) fn nearest(level: Level, pair: &Posed<'_>, leaves: NodePair, best: Po
 
 #[inline(always)]
 fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: PointPair) -> PointPair {
-    let (a, b) = (&pair.a.nodes[leaves.a.index()], &pair.b.nodes[leaves.b.index()]);
-    let bounds = &pair.b.boxes[leaves.b.index()];
+    let [leaf_a, leaf_b] = pair.numbers(leaves);
+    let (points_a, points_b) = (pair.a.leaves.points(leaf_a), pair.b.leaves.points(leaf_b));
+    let bounds = &pair.b.tree.bounds(leaves.b);
     let zero = f32x16::simd_from(simd, 0.0);
     let mut reach = reach_of(pair, best.distance);
-    let has_balls = has_balls(pair, [a, b]);
-    for block_a in blocks_of(&a.points()) {
+    let has_balls = has_balls(pair, [leaf_a, leaf_b]);
+    for block_a in blocks_of(&points_a) {
         let [x, y, z] = &pair.a.blocks[block_a].position;
         let own = [
             f32x16::load_array_ref(simd, x),
@@ -72,7 +71,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
         }
         let balls_a = if has_balls { pair.a.obstacle_balls(block_a) } else { [0.0; WIDTH] };
         let balls_a = f32x16::load_array_ref(simd, &balls_a) * pair.relative.scale_back();
-        let mut left = lanes_of(block_a, &a.points());
+        let mut left = lanes_of(block_a, &points_a);
         loop {
             let most = balls_a + reach;
             let near: mask32x16<S> = off_sq.simd_le(most * most);
@@ -82,7 +81,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
             }
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            for block_b in blocks_of(&b.points()) {
+            for block_b in blocks_of(&points_b) {
                 let [x, y, z] = &pair.b.blocks[block_b].position;
                 let d = [
                     f32x16::load_array_ref(simd, x) - places[0][lane],
@@ -92,7 +91,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &Posed<'_>, leaves: NodePair, mut best: Po
                 let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
                 let balls_b = if has_balls { pair.b.obstacle_balls(block_b) } else { [0.0; WIDTH] };
                 let both = f32x16::load_array_ref(simd, &balls_b) + balls_a.to_array()[lane];
-                let mut left_b = lanes_of(block_b, &b.points());
+                let mut left_b = lanes_of(block_b, &points_b);
                 loop {
                     let most = both + reach;
                     let near: mask32x16<S> = d_sq.simd_le(most * most);

@@ -5,17 +5,15 @@
 //! the obstacle. Where a leaf straddles a gap, as one of a depth frame does at a silhouette, or holds strays,
 //! its box is mostly empty, and these balls tell far more.
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::{Node, NodePair, OrientedBox, Part, Relative, Slices};
+use nearmiss_hierarchy::{NodePair, OrientedBox, Part, Relative, Slices};
 use nearmiss_lanes::wide::{blocks_of, lanes_of, load};
 
 use crate::posed::Posed;
-
-/// A leaf longer than so many of its greatest local radii is not a patch of a sheet. Half the length of a
-/// patch of 16 points is some two.
-const LOOSE: f32 = 3.0;
 
 /// Points of a leaf in lanes, in one of the two stored frames, with how far the obstacle reaches from each.
 #[derive(Clone, Copy)]
@@ -28,8 +26,8 @@ struct Balls<S: Simd> {
 
 impl<S: Simd> Balls<S> {
     #[inline(always)]
-    fn of(simd: S, scan: &Slices<'_>, leaf: &Node, block: usize) -> Self {
-        let lanes = lanes_of(block, &leaf.points());
+    fn of(simd: S, scan: &Slices<'_>, leaf: &Range<usize>, block: usize) -> Self {
+        let lanes = lanes_of(block, leaf);
         let reaches = f32x16::load_array_ref(simd, &scan.obstacle_reaches(block));
         Self { centres: load(simd, &scan.blocks[block].position), reaches, lanes }
     }
@@ -91,22 +89,17 @@ impl<S: Simd> Balls<S> {
 }
 
 impl Posed<'_> {
-    /// Returns `true` if the points of this node of a, or of b, may tell more of its obstacle than its box.
-    #[inline]
-    fn is_loose(scan: &Slices<'_>, id: NodeId) -> bool {
-        let bounds = &scan.boxes[id.index()];
-        scan.nodes[id.index()].is_leaf() && bounds.half[0] > LOOSE * bounds.reach
-    }
-
     /// A lower bound of the distance of the obstacles of two nodes by the points of a loose leaf, or of two
     /// leaves; `None` where boxes tell as much.
     #[inline]
     pub(crate) fn gap_by_points(&self, pair: NodePair) -> Option<f32> {
-        let [a, b] = [self.a.nodes[pair.a.index()].is_leaf(), self.b.nodes[pair.b.index()].is_leaf()];
+        let [a, b] = self.which_are_leaves(pair);
         if a && b {
             return Some(self.gap_of_leaves(pair));
         }
-        let [loose_a, loose_b] = [a && Self::is_loose(self.a, pair.a), b && Self::is_loose(self.b, pair.b)];
+        let is_loose =
+            |scan: &Slices<'_>, leaf: NodeId| scan.leaves.is_loose(scan.tree.topology().leaf_number(leaf));
+        let [loose_a, loose_b] = [a && is_loose(self.a, pair.a), b && is_loose(self.b, pair.b)];
         if !(loose_a || loose_b) {
             return None;
         }
@@ -120,7 +113,7 @@ impl Posed<'_> {
     /// The same of a leaf and an inner node of obstacles; `None` for others.
     #[inline]
     pub(crate) fn gap_by_leaf(&self, pair: NodePair) -> Option<f32> {
-        let [a, b] = [self.a.nodes[pair.a.index()].is_leaf(), self.b.nodes[pair.b.index()].is_leaf()];
+        let [a, b] = self.which_are_leaves(pair);
         if a == b || self.part == Part::Surface { None } else { self.gap_by_points(pair) }
     }
 
@@ -138,17 +131,17 @@ impl Posed<'_> {
     fn gap_of_points<S: Simd>(&self, simd: S, pair: NodePair, of_a: bool) -> f32 {
         let mut least = f32::INFINITY;
         if of_a {
-            let leaf = &self.a.nodes[pair.a.index()];
-            let bounds = self.b.obstacle_enclosure(pair.b.index());
-            for block in blocks_of(&leaf.points()) {
+            let leaf = &self.a.tree.topology().points(pair.a);
+            let bounds = self.b.tree.enclosure(Part::Obstacle, pair.b);
+            for block in blocks_of(leaf) {
                 let balls = Balls::of(simd, self.a, leaf, block).moved_back(&self.relative);
                 least = least.min(balls.gap_to_box(simd, &bounds));
             }
             return least * self.relative.scale();
         }
-        let leaf = &self.b.nodes[pair.b.index()];
-        let bounds = self.a.obstacle_enclosure(pair.a.index());
-        for block in blocks_of(&leaf.points()) {
+        let leaf = &self.b.tree.topology().points(pair.b);
+        let bounds = self.a.tree.enclosure(Part::Obstacle, pair.a);
+        for block in blocks_of(leaf) {
             let balls = Balls::of(simd, self.b, leaf, block).moved(&self.relative);
             least = least.min(balls.gap_to_box(simd, &bounds));
         }
@@ -166,11 +159,12 @@ impl Posed<'_> {
 
     #[inline(always)]
     fn gap_of_leaves_by<S: Simd>(&self, simd: S, pair: NodePair) -> f32 {
-        let (leaf_a, leaf_b) = (&self.a.nodes[pair.a.index()], &self.b.nodes[pair.b.index()]);
+        let (leaf_a, leaf_b) =
+            (&self.a.tree.topology().points(pair.a), &self.b.tree.topology().points(pair.b));
         let mut least = f32::INFINITY;
-        for block_b in blocks_of(&leaf_b.points()) {
+        for block_b in blocks_of(leaf_b) {
             let of_b = Balls::of(simd, self.b, leaf_b, block_b).moved(&self.relative);
-            for block_a in blocks_of(&leaf_a.points()) {
+            for block_a in blocks_of(leaf_a) {
                 let of_a = Balls::of(simd, self.a, leaf_a, block_a);
                 least = least.min(of_a.gap_to_balls(simd, &of_b));
             }

@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{Ball, Child, Node, NodePair, Part, Relative, SLACK, Slices, Split};
+use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, Slices, TreePair};
 
 use crate::budget::Meter;
 use crate::options::{CollidePlan, Semantics};
@@ -26,30 +26,52 @@ pub(crate) struct Posed<'a> {
 impl<'a> Posed<'a> {
     pub(crate) fn new(
         views: [&'a ScanView<'a>; 2],
+        slices: [&'a Slices<'a>; 2],
         relative: Relative,
         meter: Meter,
         (level, part): (Level, Part),
     ) -> Self {
-        let [a, b] = views.map(ScanView::slices);
+        let [a, b] = slices;
         Self { views, a, b, relative, meter, part, level }
-    }
-
-    /// A pair of nodes of the wide trees as one of the binary trees.
-    #[inline]
-    pub(crate) fn nodes(&self, [a, b]: [Child; 2]) -> NodePair {
-        NodePair { a: self.a.wide.id(a), b: self.b.wide.id(b) }
     }
 
     /// Returns `true` if these are leaves, and not other nodes or none at all.
     pub(crate) fn are_leaves(&self, pair: NodePair) -> bool {
-        let is_leaf = |nodes: &[Node], id: NodeId| nodes.get(id.index()).is_some_and(Node::is_leaf);
-        is_leaf(self.a.nodes, pair.a) && is_leaf(self.b.nodes, pair.b)
+        let is_leaf = |scan: &Slices<'_>, id: NodeId| {
+            let topology = scan.tree.topology();
+            topology.has(id) && topology.is_leaf(id)
+        };
+        is_leaf(self.a, pair.a) && is_leaf(self.b, pair.b)
+    }
+
+    /// Which of two nodes are leaves.
+    #[inline]
+    pub(crate) fn which_are_leaves(&self, pair: NodePair) -> [bool; 2] {
+        [self.a.tree.topology().is_leaf(pair.a), self.b.tree.topology().is_leaf(pair.b)]
     }
 
     /// The leaves with a point of either scan.
     pub(crate) fn leaves_of(&self, [i, j]: [usize; 2]) -> NodePair {
-        let (a, b) = (&self.a.wide.leaves, &self.b.wide.leaves);
-        NodePair { a: NodeId(a.id(a.leaf_of(i))), b: NodeId(b.id(b.leaf_of(j))) }
+        NodePair { a: self.a.tree.topology().leaf_of(i), b: self.b.tree.topology().leaf_of(j) }
+    }
+
+    /// The numbers of two leaves.
+    #[inline]
+    pub(crate) fn numbers(&self, leaves: NodePair) -> [usize; 2] {
+        [self.a.tree.topology().leaf_number(leaves.a), self.b.tree.topology().leaf_number(leaves.b)]
+    }
+
+    /// The leaves with these numbers.
+    pub(crate) fn leaves(&self, [a, b]: [usize; 2]) -> NodePair {
+        NodePair { a: self.a.tree.topology().leaf(a), b: self.b.tree.topology().leaf(b) }
+    }
+
+    /// The trees of both scans, whose boxes are near within `reach`, in a's stored frame.
+    pub(crate) fn trees<'t>(&self, relative: &'t Relative, reach: f32) -> TreePair<'t>
+    where
+        'a: 't,
+    {
+        TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach }
     }
 
     /// The band at two points, in the world: the greater of their local radii.
@@ -60,7 +82,7 @@ impl<'a> Posed<'a> {
     /// The band where the nearest places are of two nodes, in the world: the greatest local radius of any
     /// point of theirs.
     pub(crate) fn band_of(&self, nodes: NodePair) -> f64 {
-        self.in_world([self.a.boxes[nodes.a.index()].reach, self.b.boxes[nodes.b.index()].reach])
+        self.in_world([self.a.tree.reach(nodes.a), self.b.tree.reach(nodes.b)])
     }
 
     /// The greater of two lengths in the frames of the scans.
@@ -76,25 +98,22 @@ impl<'a> Posed<'a> {
         length + self.relative.slack()
     }
 
-    /// The gaps between the boxes of either of `a` and either of `b`, of which `count` pairs are counted.
-    #[inline]
-    pub(crate) fn gaps(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [f32; 4] {
-        self.meter.spent.node_pairs += u64::from(count);
-        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
-        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
-        self.relative.gaps(boxes_a, boxes_b)
+    /// The gap between the boxes of two nodes.
+    pub(crate) fn gap(&mut self, pair: NodePair) -> f32 {
+        self.meter.spent.node_pairs += 1;
+        self.relative.gap(&self.a.tree.bounds(pair.a), &self.b.tree.bounds(pair.b))
     }
 
-    /// The gaps between the enclosures of either of `a` and either of `b`.
-    #[inline]
-    pub(crate) fn gaps_of_enclosures(&self, a: [NodeId; 2], b: [NodeId; 2]) -> [f32; 4] {
-        self.relative.gaps_of_enclosures(self.level, self.part, [self.a, self.b], a, b)
+    /// The gap between the enclosures of two nodes.
+    pub(crate) fn gap_of_enclosures(&self, pair: NodePair) -> f32 {
+        let (a, b) = (self.a.tree.enclosure(self.part, pair.a), self.b.tree.enclosure(self.part, pair.b));
+        self.relative.gap(&a, &b)
     }
 
     /// The gap between the parts of two nodes: that of their enclosures or, of obstacles, that of their
     /// points if it is more.
     pub(crate) fn gap_of_parts(&self, pair: NodePair) -> f32 {
-        self.better_gap(pair, self.gaps_of_enclosures([pair.a; 2], [pair.b; 2])[0])
+        self.better_gap(pair, self.gap_of_enclosures(pair))
     }
 
     /// `gap`, that of the enclosures of two nodes, or the gap that their points show if it is more.
@@ -103,35 +122,6 @@ impl<'a> Posed<'a> {
         match self.part {
             Part::Obstacle => self.gap_by_points(pair).map_or(gap, |by_points| by_points.max(gap)),
             Part::Surface => gap,
-        }
-    }
-
-    /// The gaps of boxes, with how much of each other the boxes overlap when `margin` is about them.
-    #[inline]
-    pub(crate) fn gaps_and_overlaps(
-        &mut self,
-        a: [NodeId; 2],
-        b: [NodeId; 2],
-        count: u8,
-        margin: f32,
-    ) -> ([f32; 4], [f32; 4]) {
-        self.meter.spent.node_pairs += u64::from(count);
-        let boxes_a = [&self.a.boxes[a[0].index()], &self.a.boxes[a[1].index()]];
-        let boxes_b = [&self.b.boxes[b[0].index()], &self.b.boxes[b[1].index()]];
-        self.relative.gaps_and_overlaps(boxes_a, boxes_b, margin)
-    }
-
-    /// Both nodes, unless one is more than twice as long as the other: then that one.
-    #[inline]
-    pub(crate) fn split(&self, pair: NodePair) -> Split {
-        let a = self.a.boxes[pair.a.index()].half[0];
-        let b = self.b.boxes[pair.b.index()].half[0] * self.relative.scale();
-        if a > 2.0 * b {
-            Split::First
-        } else if b > 2.0 * a {
-            Split::Second
-        } else {
-            Split::Both
         }
     }
 }
@@ -154,9 +144,9 @@ pub(crate) fn relative(
         return Err(None);
     }
     let about = |view: &ScanView<'_>| match plan.options().semantics {
-        Semantics::Obstacle => view.slices().outline.obstacle,
-        Semantics::Surface => view.slices().outline.surface,
-        Semantics::Thickened(_) => view.slices().outline.discs,
+        Semantics::Obstacle => view.scan().outline().obstacle,
+        Semantics::Surface => view.scan().outline().surface,
+        Semantics::Thickened(_) => view.scan().outline().discs,
     };
     let own = about(a);
     let Balls { distance, radii: [ra, rb], gap, lost } = Balls::of([a, b], [own, about(b)]);
@@ -212,8 +202,8 @@ impl Balls {
 /// less than 0 where these overlap.
 pub(crate) fn balls_apart([a, b]: [&ScanView<'_>; 2], part: Part) -> f64 {
     let about = |view: &ScanView<'_>| match part {
-        Part::Obstacle => view.slices().outline.obstacle,
-        Part::Surface => view.slices().outline.surface,
+        Part::Obstacle => view.scan().outline().obstacle,
+        Part::Surface => view.scan().outline().surface,
     };
     Balls::of([a, b], [about(a), about(b)]).gap
 }

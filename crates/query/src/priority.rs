@@ -5,7 +5,6 @@
 //! those count that are further from it than the covering radius of b's node, for nearer ones say little of
 //! f_B.
 
-use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Extent, NodePair, apart as coverings_apart};
 use nearmiss_surface::Status;
@@ -14,28 +13,21 @@ use crate::options::Order;
 use crate::surface::Surfaces;
 
 impl Surfaces<'_> {
-    /// Takes those pairs back that coverings part, and adds to the urgencies of the others what their sample
-    /// points say. At most one before, an urgency then decides between pairs of as many sample points.
-    #[cold]
-    pub(crate) fn look_closer(&mut self, a: [NodeId; 2], b: [NodeId; 2], admitted: &mut [Option<f32>; 4]) {
-        for (i, admitted) in admitted.iter_mut().enumerate() {
-            let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
-            let double = (i >> 1 == 1 && a[0] == a[1]) || (i & 1 == 1 && b[0] == b[1]);
-            let Some(urgency) = admitted.filter(|_| !double) else { continue };
-            let (slices_a, slices_b) = (self.pair.a, self.pair.b);
-            if self.coverings
-                && coverings_apart(slices_a, slices_b, pair, &self.pair.relative, self.reach, Extent::Discs)
-            {
-                *admitted = None;
-                continue;
-            }
-            let sides = match self.order {
-                Order::Sides => self.sides(pair, |_| 1.0),
-                Order::SidesByGap => self.sides(pair, eigenvalue_gap),
-                _ => 0.0,
-            };
-            *admitted = Some(urgency + sides);
+    /// `None` where coverings part the pair; otherwise `share`, the less the more urgent, less what the
+    /// sample points say. At most about one itself, a share decides between pairs of as many sample points.
+    pub(crate) fn look_closer(&mut self, pair: NodePair, share: f32) -> Option<f32> {
+        let (slices_a, slices_b) = (self.pair.a, self.pair.b);
+        if self.coverings
+            && coverings_apart(slices_a, slices_b, pair, &self.pair.relative, self.reach, Extent::Discs)
+        {
+            return None;
         }
+        let sides = match self.order {
+            Order::Sides => self.sides(pair, |_| 1.0),
+            Order::SidesByGap => self.sides(pair, eigenvalue_gap),
+            _ => 0.0,
+        };
+        Some(share - sides)
     }
 
     /// The lesser number, weighted, of a's sample points on one of the sides of f′_B.
@@ -43,7 +35,7 @@ impl Surfaces<'_> {
         let [va, vb] = self.pair.views;
         let near = f64::from(self.pair.b.covering_radius(pair.b.index()));
         // f′_B's normals are turned to one side: that of the least extent of b's node.
-        let up = Vector3::from(self.pair.b.boxes[pair.b.index()].axes[2].map(f64::from));
+        let up = Vector3::from(self.pair.b.tree.bounds(pair.b).axes[2].map(f64::from));
         let mut sides = [0.0_f64; 2];
         for i in self.pair.a.samples(pair.a.index()).iter() {
             if self.pair.meter.go_on().is_break() {

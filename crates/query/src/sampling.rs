@@ -9,7 +9,7 @@ use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, OrientedBox};
+use nearmiss_hierarchy::{NodePair, OrientedBox, Part};
 use nearmiss_surface::{Evaluation, Status};
 
 use crate::budget::{Meter, POINTS_A_PAIR};
@@ -39,25 +39,23 @@ impl Surfaces<'_> {
 
     /// Random test points about the points of one leaf, in the volume of the other.
     pub(crate) fn test_leaves(&mut self, pair: NodePair, sampling: &Sampling) -> ControlFlow<()> {
-        let (a, b) = (pair.a.index(), pair.b.index());
-        let volume = self.pair.relative.moved(&self.pair.b.enclosure(b));
-        let node = self.pair.a.nodes[a];
-        let radius = self.pair.a.covering_radius(a);
+        let volume = self.pair.relative.moved(&self.pair.b.tree.enclosure(Part::Surface, pair.b));
+        let points = [self.pair.a.tree.topology().points(pair.a), self.pair.b.tree.topology().points(pair.b)];
+        let radius = self.pair.a.covering_radius(pair.a.index());
         let mut rng = stream(sampling.seed, pair);
         let mut draws = DRAWS * sampling.test_points;
         let mut accepted = 0;
         while accepted < sampling.test_points && draws > 0 {
             draws -= 1;
             self.draw()?;
-            let i = node.first as usize + below(&mut rng, node.count as usize);
+            let i = points[0].start + below(&mut rng, points[0].len());
             let x = place_in(&mut rng, self.pair.a.positions[i], radius);
             if volume.distance_sq(x) > 0.0 {
                 continue;
             }
             accepted += 1;
-            let points = [node.points(), self.pair.b.nodes[b].points()];
             let contacts = self.all.as_ref().map(|all| all.len());
-            self.test(x, [i, points[1].start], points, sampling)?;
+            self.test(x, [i, points[1].start], points.clone(), sampling)?;
             if self.all.as_ref().map(|all| all.len()) > contacts {
                 break;
             }
@@ -68,9 +66,9 @@ impl Surfaces<'_> {
     /// Random test points about all points of a that lie in the box of b.
     pub(crate) fn test_all(&mut self, sampling: &Sampling) -> ControlFlow<()> {
         // No volumes part anything here: nothing is proven.
-        self.compared.push(NodePair { a: NodeId::ROOT, b: NodeId::ROOT });
+        self.compared.push(NodePair::ROOTS);
         let volume = self.pair.relative.moved(&self.pair.b.enclosure(0));
-        let own = self.pair.a.boxes[0].reach;
+        let own = self.pair.a.tree.reach(NodeId::ROOT);
         let within = |bounds: &OrientedBox, p: [f32; 3]| bounds.distance_sq(p) <= own * own;
         self.members.clear();
         for (i, &p) in (0_u32..).zip(self.pair.a.positions) {
@@ -166,11 +164,11 @@ fn near(view: &ScanView<'_>, x: [f64; 3], points: Range<usize>, meter: &mut Mete
         let end = points.end.min(start + A_STRETCH as usize);
         meter.leaf_work((end - start) as u64 / POINTS_A_PAIR);
         for i in start..end {
-            let away = away_sq(view.slices().positions[i]);
+            let away = away_sq(view.scan().positions()[i]);
             nearest = if away < nearest.0 { (away, i) } else { nearest };
         }
     }
     let (away, i) = nearest;
-    let radius = f64::from(FAR * view.slices().radii[i]);
+    let radius = f64::from(FAR * view.scan().radii()[i]);
     (away <= radius * radius).then_some(i)
 }

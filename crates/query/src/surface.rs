@@ -9,13 +9,12 @@
 
 use std::ops::{ControlFlow, Range};
 
-use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Node, NodePair, Part, Slices, Split, Visitor};
+use nearmiss_hierarchy::{NodePair, PairVisitor, Part};
 use nearmiss_surface::meet;
 
 use crate::budget::Budget;
-use crate::certify::{Excluded, distinct};
+use crate::certify::Bound;
 use crate::crossing::Disc;
 use crate::interpolation::InterpolationScratch;
 use crate::leaf_pair::Instructions;
@@ -25,7 +24,7 @@ use crate::verdict::{Contact, Evidence, Reason};
 use crate::view::{ScanView, ViewScratch};
 
 /// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
-const TRIES: u32 = 4;
+const TRIES: u32 = 5;
 
 /// A verified point further than this from the crossing, in the greater of the two local radii, is some other
 /// place.
@@ -57,7 +56,7 @@ pub(crate) struct Surfaces<'a> {
     /// The least gap of any pair excluded.
     nearest: f32,
     /// The pairs that were excluded.
-    pub(crate) excluded: &'a mut Vec<Excluded>,
+    pub(crate) excluded: &'a mut Vec<Bound>,
     /// The pairs whose points were compared, without a hit.
     pub(crate) compared: &'a mut Vec<NodePair>,
     pub(crate) instructions: Instructions,
@@ -83,7 +82,7 @@ pub(crate) struct Surfaces<'a> {
 pub(crate) struct Workspace<'a> {
     pub(crate) instructions: Instructions,
     pub(crate) gathers: &'a mut [ViewScratch; 2],
-    pub(crate) excluded: &'a mut Vec<Excluded>,
+    pub(crate) excluded: &'a mut Vec<Bound>,
     pub(crate) compared: &'a mut Vec<NodePair>,
     pub(crate) members: &'a mut Vec<u32>,
     pub(crate) interpolation: &'a mut InterpolationScratch,
@@ -106,8 +105,7 @@ impl<'a> Surfaces<'a> {
         let may_end = budget.work.is_some() || budget.deadline.is_some();
         let order = options.order.unwrap_or(if may_end { Order::Overlap } else { Order::DepthFirst });
         let looks_closer = options.coverings || matches!(order, Order::Sides | Order::SidesByGap);
-        let is_whole = options.method == Method::Traversal && budget.resolution.is_none();
-        let is_plain = is_whole && order == Order::DepthFirst && !looks_closer && !notes;
+        let is_plain = budget.resolution.is_none() && !looks_closer && !notes;
         Self {
             detail: options.detail,
             margin: options.margin,
@@ -234,94 +232,118 @@ fn comes_within(radius: f32, p: [f32; 3], disc: &Disc) -> bool {
     radius > 0.0 && height * height + beside.max(0.0).powi(2) <= radius * radius
 }
 
-impl Visitor for Surfaces<'_> {
+/// A search that goes by boxes alone.
+pub(crate) struct Plain<'s, 'a>(pub(crate) &'s mut Surfaces<'a>);
+
+impl PairVisitor for Plain<'_, '_> {
     #[inline]
-    fn admit(&mut self, a: [NodeId; 2], b: [NodeId; 2], count: u8) -> [Option<f32>; 4] {
-        let reach = self.reach;
-        let (mut gaps, urgencies) = if self.order == Order::DepthFirst {
-            let gaps = self.pair.gaps(a, b, count);
-            (gaps, gaps.map(|gap| -gap))
-        } else {
-            self.pair.gaps_and_overlaps(a, b, count, reach)
-        };
-        let mut admitted = [0, 1, 2, 3].map(|i| if gaps[i] > reach { None } else { Some(urgencies[i]) });
-        for i in 0..4 {
-            let pair = NodePair { a: a[i >> 1], b: b[i & 1] };
-            if admitted[i].is_some()
-                && let Some(gap) = self.pair.gap_by_leaf(pair)
-                && gap > reach
-            {
-                (gaps[i], admitted[i]) = (gap, None);
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.0.compared(pairs)
+    }
+
+    #[inline]
+    fn is_apart(&mut self, pair: NodePair) -> bool {
+        self.0.pair.gap_by_leaf(pair).is_some_and(|gap| gap > self.0.reach)
+    }
+
+    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+        self.0.leaf_pair(leaves)
+    }
+}
+
+/// A search that notes what it excludes, or looks at more than boxes.
+pub(crate) struct Closer<'s, 'a>(pub(crate) &'s mut Surfaces<'a>);
+
+impl PairVisitor for Closer<'_, '_> {
+    const NOTES_PAIRS: bool = true;
+    const LOOKS_CLOSER: bool = true;
+
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.0.compared(pairs)
+    }
+
+    fn apart(&mut self, pair: NodePair, gap: f32) {
+        self.0.exclude(pair, gap);
+    }
+
+    fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
+        if self.0.looks_closer { self.0.look_closer(pair, share) } else { Some(share) }
+    }
+
+    fn is_apart(&mut self, pair: NodePair) -> bool {
+        match self.0.pair.gap_by_leaf(pair) {
+            Some(gap) if gap > self.0.reach => {
+                self.0.exclude(pair, gap);
+                true
             }
+            _ => false,
         }
-        if self.looks_closer {
-            self.look_closer(a, b, &mut admitted);
-        }
-        if self.notes {
-            let distinct = distinct(a, b);
-            let gaps = [0, 1, 2, 3].map(|i| Some(gaps[i]).filter(|_| distinct[i] && admitted[i].is_none()));
-            if gaps.iter().any(Option::is_some) {
-                let least = gaps.iter().flatten().fold(f32::INFINITY, |least, &gap| least.min(gap));
-                self.excluded.push(Excluded { a, b, gaps });
-                // The nearest come last.
-                if least < self.nearest {
-                    self.nearest = least;
-                } else {
-                    let last = self.excluded.len() - 1;
-                    self.excluded.swap(last, last.saturating_sub(1));
-                }
-            }
-        }
-        admitted
     }
 
-    #[inline]
-    fn split(&self, pair: NodePair) -> Split {
-        self.pair.split(pair)
+    fn is_fine(&self, pair: NodePair) -> [bool; 2] {
+        if self.0.resolution >= 0.0 { self.0.is_fine(pair) } else { [false; 2] }
     }
 
-    #[inline]
-    fn whole(&self, pair: NodePair) -> [bool; 2] {
-        if self.resolution >= 0.0 { self.is_fine(pair) } else { [false; 2] }
+    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+        self.0.leaf_pair(leaves)
     }
 
-    #[inline]
-    fn go_on(&mut self) -> ControlFlow<()> {
-        self.pair.meter.go_on()
-    }
-
-    fn leaves(&mut self, pair: NodePair) -> ControlFlow<()> {
-        if self.notes_leaves {
-            self.compared.push(pair);
+    fn fine_pair(&mut self, pair: NodePair) -> ControlFlow<()> {
+        if self.0.notes_leaves {
+            self.0.compared.push(pair);
         }
-        self.compare(pair)
+        self.0.samples_meet(pair)
     }
 }
 
 impl Surfaces<'_> {
-    /// Two leaves, or nodes that answer by their samples.
-    fn compare(&mut self, pair: NodePair) -> ControlFlow<()> {
-        let (node_a, node_b) = (self.pair.a.nodes[pair.a.index()], self.pair.b.nodes[pair.b.index()]);
-        if !(node_a.is_leaf() && node_b.is_leaf()) {
-            return self.samples_meet(pair);
+    /// Whether any pair of leaves that meets is as good as another: then the likeliest come first.
+    pub(crate) fn wants_any(&self) -> bool {
+        // Within a margin boxes that overlap most are beside each other rather than near, and fewer witnesses
+        // verify there.
+        self.all.is_none() && self.margin == 0.0
+    }
+
+    #[inline]
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.pair.meter.spent.node_pairs += u64::from(pairs);
+        self.pair.meter.go_on()
+    }
+
+    /// Notes a pair whose boxes are apart, if that is wanted. The nearest comes last.
+    fn exclude(&mut self, pair: NodePair, gap: f32) {
+        if !self.notes {
+            return;
         }
-        self.pair.meter.leaf_pair(node_a.count as usize, node_b.count as usize);
-        let by_discs = !matches!(self.method, Method::Sampling(_));
+        self.excluded.push(Bound { gap, pair });
+        if gap < self.nearest {
+            self.nearest = gap;
+        } else {
+            let last = self.excluded.len() - 1;
+            self.excluded.swap(last, last.saturating_sub(1));
+        }
+    }
+
+    /// The points of two leaves, by their numbers.
+    pub(crate) fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+        let (a, b) = (self.pair.a.leaves, self.pair.b.leaves);
+        self.pair.meter.leaf_pair(a.points(leaves[0]).len(), b.points(leaves[1]).len());
+        if self.notes_leaves {
+            self.compared.push(self.pair.leaves(leaves));
+        }
         if let Method::Interpolation(interpolation) = self.method {
             let tries = self.tries;
-            self.test_edges(pair, &interpolation)?;
+            self.test_edges(self.pair.leaves(leaves), &interpolation)?;
             if self.tries > tries {
                 return ControlFlow::Continue(());
             }
         }
         let tries = self.tries;
-        let leaf = |node: &Node, scan: &Slices<'_>| (node.first / scan.leaf_size) as usize;
-        self.compare_leaves([leaf(&node_a, self.pair.a), leaf(&node_b, self.pair.b)], by_discs)?;
-        if self.tries > tries {
-            return ControlFlow::Continue(());
-        }
+        self.compare_leaves(leaves, !matches!(self.method, Method::Sampling(_)))?;
         match self.method {
-            Method::Sampling(sampling) => self.test_leaves(pair, &sampling),
+            Method::Sampling(sampling) if self.tries == tries => {
+                self.test_leaves(self.pair.leaves(leaves), &sampling)
+            }
             _ => ControlFlow::Continue(()),
         }
     }

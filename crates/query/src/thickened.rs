@@ -2,9 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{LeafVisitor, NodePair};
+use nearmiss_hierarchy::{NodePair, PairVisitor};
 
 use crate::leaf_pair::Instructions;
 use crate::nearest_points::{PointPair, nearest};
@@ -20,7 +19,7 @@ pub(crate) struct Balls<'a> {
     reach: f64,
     pub(crate) reach_stored: f32,
     /// The nearest such pair of every pair of leaves, if all are wanted.
-    all: Option<&'a mut Vec<Contact>>,
+    pub(crate) all: Option<&'a mut Vec<Contact>>,
     /// The first such pair, and its points.
     pub(crate) found: Option<(Contact, [usize; 2])>,
     /// A lower bound of the distance of all points looked at or excluded, in the world.
@@ -54,16 +53,11 @@ impl<'a> Balls<'a> {
     }
 }
 
-impl LeafVisitor for Balls<'_> {
+impl PairVisitor for Balls<'_> {
     const NOTES_GAPS: bool = true;
 
     #[inline]
-    fn wants_any(&self) -> bool {
-        self.all.is_none()
-    }
-
-    #[inline]
-    fn apart(&mut self, least: f32) {
+    fn least_apart(&mut self, least: f32) {
         let bound = f64::from(least - self.pair.relative.slack()) * self.pair.views[0].placed().scale();
         self.apart = self.apart.min(bound);
     }
@@ -75,9 +69,9 @@ impl LeafVisitor for Balls<'_> {
     }
 
     fn leaf_pair(&mut self, [a, b]: [usize; 2]) -> ControlFlow<()> {
-        let (of_a, of_b) = (&self.pair.a.wide.leaves, &self.pair.b.wide.leaves);
+        let (of_a, of_b) = (self.pair.a.leaves, self.pair.b.leaves);
         self.pair.meter.leaf_pair(of_a.points(a).len(), of_b.points(b).len());
-        self.compare(NodePair { a: NodeId(of_a.id(a)), b: NodeId(of_b.id(b)) })
+        self.compare(self.pair.leaves([a, b]))
     }
 }
 

@@ -16,7 +16,6 @@ pub struct ViewScratch {
 #[derive(Debug, Clone, Copy)]
 pub struct ScanView<'a> {
     scan: &'a PointHierarchy,
-    slices: Slices<'a>,
     kernel: Option<GeodesicKernel<'a>>,
     graph: Option<&'a SurfaceGraph>,
     /// Stored frame → world.
@@ -33,7 +32,7 @@ impl<'a> ScanView<'a> {
         let frame = scan.frame();
         let stored = Pose::IDENTITY.with_scale(frame.scale).with_translation(frame.origin);
         let placed = pose.after(&stored);
-        Self { slices: scan.slices(), scan, kernel: None, graph: None, placed, is_proper: is_proper(&placed) }
+        Self { scan, kernel: None, graph: None, placed, is_proper: is_proper(&placed) }
     }
 
     /// The same view with f by distances along the graph of this scan. Those of scans for the [geodesic
@@ -61,10 +60,10 @@ impl<'a> ScanView<'a> {
         self.scan
     }
 
-    /// Its points and nodes.
+    /// The scan's sampling radius in the world.
     #[must_use]
-    pub fn slices(&self) -> &Slices<'a> {
-        &self.slices
+    pub fn sampling_radius(&self) -> f64 {
+        self.scan.sampling_radius() / self.scan.frame().scale * self.placed.scale()
     }
 
     /// The pose of the scan's stored frame.
@@ -84,12 +83,13 @@ impl<'a> ScanView<'a> {
     pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
         let x = self.placed.apply_inverse(x);
         let nearest = self.scan.nearest_point_near(i, x) as usize;
-        let Slices { positions, normals, radii, .. } = self.slices;
+        let slices = self.scan.slices();
+        let Slices { positions, normals, radii, .. } = slices;
         let away = [0, 1, 2].map(|k| x[k] - f64::from(positions[nearest][k]));
         let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
         let distance_sq: f64 = away.iter().map(|d| d * d).sum();
-        let most = f64::from(self.slices.cell_radius(nearest));
-        self.slices.is_on_sheet(nearest)
+        let most = f64::from(slices.cell_radius(nearest));
+        slices.is_on_sheet(nearest)
             && height.abs() <= f64::from(SLAB * radii[nearest])
             && distance_sq <= most * most
     }
@@ -100,7 +100,7 @@ impl<'a> ScanView<'a> {
     /// When there is no such point.
     #[must_use]
     pub fn point(&self, i: usize) -> [f64; 3] {
-        self.placed.apply(self.slices.positions[i].map(f64::from))
+        self.placed.apply(self.scan.positions()[i].map(f64::from))
     }
 
     /// Whether f is by the metric that the scan's discs are for: only then its zeros verify what these say.
@@ -142,7 +142,7 @@ impl<'a> ScanView<'a> {
         let nearest = self.scan.nearest_point_near(i, x);
         let at = kernel.evaluate(x, nearest, scratch);
         let at = if self.scan.is_oriented() {
-            at.turned_to(self.slices.normals[nearest as usize].map(f64::from), 1.0)
+            at.turned_to(self.scan.normals()[nearest as usize].map(f64::from), 1.0)
         } else {
             at
         };
@@ -155,7 +155,7 @@ impl<'a> ScanView<'a> {
         match &self.kernel {
             None => {
                 let at = self.scan.evaluate_near(i, self.placed.apply_inverse(x), &mut scratch.gather);
-                self.in_world(at.turned_to(self.slices.normals[i].map(f64::from), 0.0))
+                self.in_world(at.turned_to(self.scan.normals()[i].map(f64::from), 0.0))
             }
             Some(kernel) => self.evaluate_by_near(kernel, i, x, &mut scratch.kernel),
         }

@@ -7,8 +7,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{Aabb, Pose};
-use nearmiss_hierarchy::SLACK;
+use nearmiss_geometry::{Aabb, NodeId, Pose};
+use nearmiss_hierarchy::{Part, SLACK};
 use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
 use serde::{Deserialize, Serialize};
 
@@ -367,7 +367,7 @@ const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
 /// A box of the world about all that a query looks at of a scan; half of the rounding that it allows for
 /// included. None of a scan in a pose that is none, or that is extreme.
 fn bounds(view: &ScanView<'_>) -> Option<Aabb> {
-    let root = view.slices().enclosure(0);
+    let root = view.scan().tree().enclosure(Part::Surface, NodeId::ROOT);
     let placed = view.placed();
     let scale = placed.scale();
     let centre = placed.apply(root.centre.map(f64::from));

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
-use nearmiss::hierarchy::Node;
+use nearmiss::geometry::NodeId;
 use nearmiss::{Bandwidth, BuildOptions, Check, Kernel, PointKind, Scan};
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 
@@ -25,7 +26,7 @@ pub(crate) struct Subject {
     /// Of a point, per unit of the twin's radii.
     pub(crate) horizon: f64,
     /// Ids of the nodes by their points.
-    ids: BTreeMap<(u32, u32), usize>,
+    ids: BTreeMap<(usize, usize), usize>,
     /// Of the stored positions.
     pub(crate) bounds: [[f32; 3]; 2],
 }
@@ -48,8 +49,9 @@ impl Subject {
     /// # Errors
     /// When its nodes are no tree over its points, or its surface has no naive twin.
     pub(crate) fn new(scan: Scan) -> Result<Self, String> {
-        check_tree(scan.nodes(), scan.len())?;
-        let ids = scan.nodes().iter().enumerate().map(|(id, n)| ((n.first, n.count), id)).collect();
+        let nodes = nodes(&scan);
+        check_tree(&nodes, scan.len())?;
+        let ids = nodes.iter().enumerate().map(|(id, n)| ((n.points.start, n.points.len()), id)).collect();
         let mut bounds = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
         for p in scan.positions() {
             for k in 0..3 {
@@ -120,7 +122,7 @@ impl Subject {
     /// When no node has these points, or its enclosure differs in a bit.
     pub(crate) fn check_node(&self, claimed: &Enclosure, semantics: Semantics) -> Result<(), String> {
         let Enclosure { first, count, .. } = *claimed;
-        let Some(&id) = self.ids.get(&(first, count)) else {
+        let Some(&id) = self.ids.get(&(first as usize, count as usize)) else {
             return Err(format!("no node has the points {first} to {first} + {count}"));
         };
         let slices = self.scan.slices();
@@ -149,28 +151,44 @@ fn rounded(x: f64) -> f64 {
 /// Whether every node has the points of its two children, the root all of them: then the nodes that have a
 /// point are its leaf and that leaf's ancestors.
 fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
-    let range =
-        |id: usize| nodes.get(id).map(|n| (u64::from(n.first), u64::from(n.first) + u64::from(n.count)));
-    if range(0) != Some((0, points as u64)) {
+    if nodes.first().map(|root| &root.points) != Some(&(0..points)) {
         return Err("the root has not all points".into());
     }
     let mut parents = vec![0_u32; nodes.len()];
-    for (id, node) in nodes.iter().enumerate() {
-        let Some((right, own)) = (node.right != 0).then_some(node.right as usize).zip(range(id)) else {
-            continue;
-        };
-        let children = (range(id + 1), range(right));
-        let (Some(left), Some(other)) = children else {
-            return Err(format!("node {id} has no children there"));
-        };
-        if left.0 != own.0 || left.1 != other.0 || other.1 != own.1 || left.0 == left.1 || other.0 == other.1
-        {
+    for (id, node) in nodes.iter().enumerate().filter(|(_, node)| !node.children.is_empty()) {
+        let mut next = node.points.start;
+        for &child in &node.children {
+            let Some(own) = nodes.get(child).map(|child| &child.points) else {
+                return Err(format!("node {id} has no children there"));
+            };
+            if own.start != next || own.is_empty() {
+                return Err(format!("node {id} has not the points of its children"));
+            }
+            next = own.end;
+            parents[child] += 1;
+        }
+        if next != node.points.end {
             return Err(format!("node {id} has not the points of its children"));
         }
-        parents[id + 1] += 1;
-        parents[right] += 1;
     }
     if parents.iter().skip(1).any(|n| *n != 1) { Err("a node has not one parent".into()) } else { Ok(()) }
+}
+
+/// A node as this tool sees it.
+#[derive(Debug, Clone)]
+struct Node {
+    points: Range<usize>,
+    children: Vec<usize>,
+}
+
+fn nodes(scan: &Scan) -> Vec<Node> {
+    let topology = scan.topology();
+    let children = |id: NodeId| match topology.is_leaf(id) {
+        true => Vec::new(),
+        false => topology.children(id).iter().map(NodeId::index).collect(),
+    };
+    let node = |id: NodeId| Node { points: topology.points(id), children: children(id) };
+    topology.ids().map(node).collect()
 }
 
 /// The scan's surface, by summing over all of it, in the frame of the stored positions; and the horizon per
@@ -202,19 +220,20 @@ mod tests {
 
     #[test]
     fn nodes_that_are_no_tree_are_refused() {
-        let node = |first, count, right| Node { first, count, right };
-        let tree = [node(0, 10, 4), node(0, 6, 3), node(0, 3, 0), node(3, 3, 0), node(6, 4, 0)];
+        let node = |points: Range<usize>, children: &[usize]| Node { points, children: children.into() };
+        let tree =
+            [node(0..10, &[1, 2]), node(0..6, &[3, 4]), node(6..10, &[]), node(0..3, &[]), node(3..6, &[])];
         assert_eq!(check_tree(&tree, 10), Ok(()));
         assert!(check_tree(&tree, 11).is_err(), "a point without a node");
         for (id, wrong) in [
-            (1, node(0, 5, 3)),
-            (4, node(5, 5, 0)),
-            (1, node(0, 6, 2)),
-            (0, node(0, 10, 9)),
-            (2, node(0, 0, 0)),
+            (1, node(0..5, &[3, 4])),
+            (2, node(5..10, &[])),
+            (1, node(0..6, &[2, 4])),
+            (0, node(0..10, &[1, 9])),
+            (3, node(0..0, &[])),
         ] {
-            let mut nodes = tree;
-            nodes[id] = wrong;
+            let mut nodes = tree.clone();
+            nodes[id] = wrong.clone();
             assert!(check_tree(&nodes, 10).is_err(), "{wrong:?} for node {id}");
         }
     }

@@ -88,16 +88,15 @@ impl<'a> Tree<'a> {
         let inverse = |b: OrientedBox| Inverse::new(b.centre, b.half, b.axes);
         let boxes = scan.enclosures().map(inverse).collect();
         let slices = scan.slices();
-        let of_obstacle = (0..scan.nodes().len()).map(|id| inverse(slices.obstacle_enclosure(id))).collect();
-        let mut parents = vec![0; scan.nodes().len()];
+        let topology = scan.topology();
+        let of_obstacle = topology.ids().map(|id| inverse(slices.obstacle_enclosure(id.index()))).collect();
+        let mut parents = vec![0; topology.len()];
         let mut leaves = vec![0; scan.len()];
-        for (id, node) in scan.nodes().iter().enumerate() {
-            let first = node.first as usize;
-            if node.right == 0 {
-                leaves[first..first + node.count as usize].fill(id);
+        for id in topology.ids() {
+            if topology.is_leaf(id) {
+                leaves[topology.points(id)].fill(id.index());
             } else {
-                parents[id + 1] = id;
-                parents[node.right as usize] = id;
+                topology.children(id).iter().for_each(|child| parents[child.index()] = id.index());
             }
         }
         Self { subject, neighbours: Neighbours::new(scan.positions()), boxes, of_obstacle, parents, leaves }

@@ -48,18 +48,19 @@ impl Place {
         let (mut first, mut second) = (Vector3::zeros(), [0.0; 6]);
         #[expect(clippy::cast_possible_truncation, reason = "boxes are single precision; see the slack")]
         let near = [x.x as f32, x.y as f32, x.z as f32];
-        let mut stack = vec![0_u32];
+        let (tree, mut stack) = (slices.tree, vec![NodeId::ROOT]);
+        let topology = tree.topology();
         while let Some(id) = stack.pop() {
-            let (node, bounds) = (&slices.nodes[id as usize], &slices.boxes[id as usize]);
+            let bounds = tree.bounds(id);
             let reach = plan.horizon(bounds.reach) * (1.0 + 1e-4);
             if bounds.distance_sq(near) > reach * reach {
                 continue;
             }
-            if !node.is_leaf() {
-                stack.extend(node.children(NodeId(id)).map(|child| child.0));
+            if !topology.is_leaf(id) {
+                stack.extend(topology.children(id).iter());
                 continue;
             }
-            for i in node.points() {
+            for i in topology.points(id) {
                 let d = Vector3::from(slices.positions[i].map(f64::from)) - x;
                 let horizon = f64::from(plan.horizon(slices.radii[i]));
                 let share = d.norm_squared() / (horizon * horizon);

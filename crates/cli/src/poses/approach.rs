@@ -2,6 +2,7 @@
 //! `collide`.
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use nearmiss::geometry::NodeId;
 use nearmiss::{Pose, Scan};
 
 /// How many balls a descent may have open: one sibling a level, and no tree of 2³² points is deeper.
@@ -42,7 +43,7 @@ impl<'a> Approach<'a> {
             // Only points that are not finite are refused, and a scan has none.
             tree: ImmutableKdTree::new_from_slice(a.positions()).ok(),
             b,
-            balls: b.nodes().iter().map(|node| ball(&b.positions()[node.points()])).collect(),
+            balls: b.topology().ids().map(|id| ball(&b.positions()[b.topology().points(id)])).collect(),
             to_a: base.after(&stored(a)).inverse(),
             touch,
             step,
@@ -88,14 +89,14 @@ impl<'a> Approach<'a> {
             let query = motion.apply(p).map(|c| c as f32);
             f64::from(tree.query(&query).nearest_one::<SquaredEuclidean<f32>>().execute().distance).sqrt()
         };
-        let bound = |id: usize| {
-            let (centre, radius) = self.balls[id];
+        let bound = |id: NodeId| {
+            let (centre, radius) = self.balls[id.index()];
             nearest(centre) - radius * motion.scale()
         };
-        let nodes = self.b.nodes();
+        let topology = self.b.topology();
         let mut best = f64::INFINITY;
-        let mut stack = [(0.0, 0_usize); ROOM];
-        stack[0] = (bound(0), 0);
+        let mut stack = [(0.0, NodeId::ROOT); ROOM];
+        stack[0] = (bound(NodeId::ROOT), NodeId::ROOT);
         let mut top = 1;
         while top > 0 {
             top -= 1;
@@ -103,18 +104,18 @@ impl<'a> Approach<'a> {
             if low >= best {
                 continue;
             }
-            let node = nodes[id];
-            if node.is_leaf() || top + 2 > ROOM {
-                let points = &self.b.positions()[node.points()];
+            if topology.is_leaf(id) {
+                let points = &self.b.positions()[topology.points(id)];
                 best = points.iter().map(|p| nearest(p.map(f64::from))).fold(best, f64::min);
                 continue;
             }
-            let [left, right] = [id + 1, node.right as usize].map(|child| (bound(child), child));
-            // The nearer one last, to be looked at first.
-            let (later, sooner) = if left.0 < right.0 { (right, left) } else { (left, right) };
-            stack[top] = later;
-            stack[top + 1] = sooner;
-            top += 2;
+            let bottom = top;
+            for child in topology.children(id).iter() {
+                stack[top] = (bound(child), child);
+                top += 1;
+            }
+            // The nearest one last, to be looked at first.
+            stack[bottom..top].sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
         }
         best / self.to_a.scale()
     }

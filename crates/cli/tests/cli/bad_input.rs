@@ -55,18 +55,24 @@ fn prepared_files_are_refused_when_anything_is_off() {
     with("zeros.nm", &|b| b.fill(0));
     let mut names: Vec<String> =
         ["cut", "head", "none", "longer", "text", "zeros"].map(|n| format!("{n}.nm")).into();
+    place.write("at.txt", "0 0 0");
+    for file in &names {
+        let file = file.as_str();
+        place.refused(1, &["inspect", file], &[file]);
+        place.refused(1, &["collide", file, "ball.nm"], &[file]);
+        place.refused(1, &["eval", file, "--points", "at.txt"], &[file]);
+    }
     for place_of_flip in (0..good.len()).step_by(good.len() / 40) {
         let name = format!("flip{place_of_flip}.nm");
         with(&name, &|b| b[place_of_flip] ^= 0x10);
         names.push(name);
     }
-    place.write("at.txt", "0 0 0");
+    // A wrong number shows when all are looked at.
     for file in &names {
         let file = file.as_str();
         place.refused(1, &["inspect", file, "--verify"], &[file]);
-        place.refused(1, &["inspect", file], &[file]);
-        place.refused(1, &["collide", file, "ball.nm"], &[file]);
-        place.refused(1, &["eval", file, "--points", "at.txt"], &[file]);
+        place.refused(1, &["collide", file, "ball.nm", "--verify"], &[file]);
+        place.refused(1, &["eval", file, "--points", "at.txt", "--verify"], &[file]);
     }
     place.refused(1, &["inspect", "missing.nm"], &["missing.nm: no such file; check the path"]);
     place.refused(1, &["inspect", "ball.xyz"], &["ball.xyz", "preprocess"]);

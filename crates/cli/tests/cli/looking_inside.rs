@@ -109,9 +109,9 @@ fn an_export_comes_back() {
     let count = |text: &str, start: &str| text.lines().filter(|l| l.starts_with(start)).count() as u64;
     let nodes = report["nodes"].as_u64().unwrap();
     assert_eq!((count(&obj, "v "), count(&obj, "l ")), (8 * nodes, 12 * nodes));
-    place.ok(&["export", "ball.nm", "--boxes", "b2.obj", "--level", "2"]);
+    place.ok(&["export", "ball.nm", "--boxes", "b2.obj", "--level", "1"]);
     let level = std::fs::read_to_string(place.path("b2.obj")).unwrap();
-    assert_eq!(count(&level, "v "), 8 * 4, "four nodes at depth 2");
+    assert_eq!(count(&level, "v "), 8 * 2, "two nodes at depth 1");
 
     let radii = std::fs::read_to_string(place.path("r.csv")).unwrap();
     let mut lines = radii.lines();
@@ -162,7 +162,7 @@ fn the_samples_of_a_level_come_with_their_coverings() {
     place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet", "--leaf", "8"]);
     place.ok(&["export", "ball.nm", "--samples", "s.ply", "--level", "2"]);
     let back = nearmiss::io::read(place.path("s.ply"), None).unwrap().cloud;
-    assert_eq!(back.len(), 4 * 16, "four nodes of sixteen samples");
+    assert_eq!(back.len(), 8 * 16, "eight nodes of sixteen samples");
     let ply = std::fs::read(place.path("s.ply")).unwrap();
     // Three values of eight bytes, then source, node, covering radius and sampling radius.
     let rows = &ply[ply.len() - 40 * back.len()..];
@@ -176,7 +176,7 @@ fn the_samples_of_a_level_come_with_their_coverings() {
         assert!(0.0 < sampling && sampling < covering && covering < 3.0, "{sampling}, {covering}");
     }
     nodes.dedup();
-    assert_eq!(nodes.len(), 4, "{nodes:?}");
+    assert_eq!(nodes.len(), 8, "{nodes:?}");
     place.refused(2, &["export", "ball.nm", "--samples", "s.ply"], &["--level"]);
     place.refused(2, &["export", "ball.nm", "--points", "p.ply", "--level", "1"], &["--samples"]);
 }

@@ -29,9 +29,10 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
     let number = |field: &str| report[field].as_f64().unwrap();
     let bytes = std::fs::metadata(place.path("ball.nm")).unwrap().len();
     assert_eq!(report["bytes"].as_u64(), Some(bytes));
-    assert!((100.0..=160.0).contains(&number("bytes_per_node")), "{report}");
-    assert_eq!(number("nodes"), 2.0 * number("leaves") - 1.0, "a binary tree");
-    let depth = number("leaves").log2();
+    assert!((100.0..=250.0).contains(&number("bytes_per_node")), "{report}");
+    let inner = number("nodes") / number("leaves") - 1.0;
+    assert!((0.33..0.67).contains(&inner), "two to four leaves a node: {report}");
+    let depth = number("leaves").log2() / 2.0;
     assert!((number("depth_mean") - depth).abs() < 1.0, "balanced: {} for {depth}", number("depth_mean"));
     let radius = number("sampling_radius");
     assert!((0.1..0.25).contains(&radius), "radius {radius} at a spacing of 0.1");
@@ -52,7 +53,7 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
 
     let mut seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
     let version = seen.as_object_mut().unwrap().remove("format_version").unwrap();
-    assert_eq!(version.as_u64(), Some(8));
+    assert_eq!(version.as_u64(), Some(9));
     let mut told = report.clone();
     told.as_object_mut().unwrap().remove("seconds");
     assert_eq!(seen, told, "inspect sees what preprocess told");
@@ -237,11 +238,11 @@ fn borders_holes_and_strays_are_told() {
     assert!(find(&told, "lie at borders").contains("`collide --margin 0."), "{told:?}");
     let holes = &report["health"]["holes"];
     let widths = numbers(&holes["widths"]);
-    assert!(widths[0] > report["reach"].as_f64().unwrap() && (1.9..2.4).contains(&widths[1]), "{holes}");
+    assert!(widths[0] > report["reach"].as_f64().unwrap() && (1.5..2.4).contains(&widths[1]), "{holes}");
     assert!((0.01..0.05).contains(&holes["share"].as_f64().unwrap()), "84 of 3205: {holes}");
     let closing = find(&told, "holes wider than the reach").split("--thickened ").nth(1).unwrap();
     let closing: f64 = closing.split('`').next().unwrap().parse().unwrap();
-    assert!((0.9..1.2).contains(&closing), "half the hole: {told:?}");
+    assert!((0.75..1.2).contains(&closing), "half the hole, less in its corners: {told:?}");
     assert!(!told.iter().any(|line| line.contains("times sparser")), "strays are no sheet: {told:?}");
     assert!(find(&told, "much denser points").contains("of the points, about 5, are strays"), "{told:?}");
     let kinds = &report["kinds"];

@@ -1,14 +1,15 @@
 //! Hierarchies in which one number lies: each is refused, and by its name.
 
-use nearmiss_geometry::PointCloud;
+use nearmiss_geometry::{NodeId, PointCloud};
+use nearmiss_lanes::id32;
 use nearmiss_lanes::vector::tangents;
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 use super::flaw::Flaw;
+use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::covering::Covering;
 use crate::options::BuildOptions;
-use crate::samples::list_number;
 
 fn honest() -> PointHierarchy {
     let points = arbitrary::cloud(CloudKind::Sphere, 301, 1);
@@ -45,42 +46,87 @@ fn nothing_is_wrong_with_an_honest_one() {
     assert_eq!(found(|_| ()), [None, None]);
 }
 
+/// The siblings that hold the box of node 7, and its lane there.
+fn place(scan: &PointHierarchy, id: usize) -> (usize, usize) {
+    let (parent, lane) = scan.topology().parent(NodeId(id32(id))).unwrap();
+    (parent.index(), lane)
+}
+
+/// A box lies.
+fn lying(scan: &mut PointHierarchy, id: usize, lie: impl FnOnce(&mut OrientedBox)) {
+    let (parent, lane) = place(scan, id);
+    let siblings = &mut scan.siblings.to_mut()[parent];
+    let mut bounds = siblings.get(lane);
+    lie(&mut bounds);
+    siblings.set(lane, &bounds);
+}
+
 #[test]
 fn boxes_that_are_none() {
+    let wrong = |lie: &dyn Fn(&mut OrientedBox)| deep("the box of node 7", |scan| lying(scan, 7, lie));
     for value in NONE.into_iter().chain([2e12, -2e12]) {
         for k in 0..3 {
-            plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].centre[k] = value);
-            plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].half[k] = value);
-            plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].axes[k][1] = value);
+            wrong(&|bounds| bounds.centre[k] = value);
+            wrong(&|bounds| bounds.half[k] = value);
+            wrong(&|bounds| bounds.axes[k][1] = value);
         }
-        plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].reach = value);
+        wrong(&|bounds| bounds.reach = value);
+        plain("the box of the root is wrong", |scan| scan.root.bounds.half[0] = value);
     }
-    plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].half[2] = -1e-3);
-    plain("the box of node 7 is wrong", |scan| scan.boxes.to_mut()[7].axes[2][0] = 1.01);
-    deep("the box of node 7", |scan| scan.boxes.to_mut()[7].axes = [[0.0; 3]; 3]);
-    deep("the box of node 7", |scan| {
-        let [x, _, z] = scan.boxes[7].axes;
-        scan.boxes.to_mut()[7].axes = [x, x, z];
+    wrong(&|bounds| bounds.half[2] = -1e-3);
+    wrong(&|bounds| bounds.axes[2][0] = 1.01);
+    wrong(&|bounds| bounds.axes = [[0.0; 3]; 3]);
+    wrong(&|bounds| bounds.axes[1] = bounds.axes[0]);
+    deep("the box of node 0", |scan| scan.root.bounds.axes[1] = scan.root.bounds.axes[0]);
+}
+
+#[test]
+fn lanes_without_a_child_that_say_something() {
+    let scan = honest();
+    let inner = scan.topology().ids().take(scan.topology().inner());
+    let few = inner.into_iter().find(|&id| scan.topology().children(id).len() < 4).unwrap();
+    deep(&format!("the boxes of the children of node {}", few.0), |scan| {
+        scan.siblings.to_mut()[few.index()].half[0][3] = 7.0;
     });
 }
 
 #[test]
 fn boxes_that_leave_their_parents_or_their_points() {
-    let nodes = honest().nodes.to_vec();
-    for (id, node) in nodes.iter().enumerate().skip(1) {
+    let topology = *honest().topology();
+    for id in 1..topology.len() {
         for k in 0..3 {
             // Some boxes have room in their parent's: grow until there can be none.
-            deep(&format!("the box of node {id}"), |scan| scan.boxes.to_mut()[id].half[k] = 2.0);
-            deep(&format!("the box of node {id}"), |scan| scan.boxes.to_mut()[id].centre[k] += 4.0);
+            deep(&format!("the box of node {id}"), |scan| lying(scan, id, |bounds| bounds.half[k] = 2.0));
+            deep(&format!("the box of node {id}"), |scan| lying(scan, id, |bounds| bounds.centre[k] += 4.0));
         }
-        deep(&format!("the box of node {id}"), |scan| scan.boxes.to_mut()[id].reach *= 2.0);
-        if node.is_leaf() {
+        deep(&format!("the box of node {id}"), |scan| lying(scan, id, |bounds| bounds.reach *= 2.0));
+        if id >= topology.inner() {
             // Smaller than the discs it is about: one of its points, or more, stick out.
-            let [_, flaw] = found(|scan| scan.boxes.to_mut()[id].half[0] *= 0.9);
+            let [_, flaw] = found(|scan| lying(scan, id, |bounds| bounds.half[0] *= 0.9));
             assert!(flaw.is_some_and(|words| words.starts_with("the box about point ")), "leaf {id}");
-            let [_, flaw] = found(|scan| scan.boxes.to_mut()[id].reach *= 0.5);
+            let [_, flaw] = found(|scan| lying(scan, id, |bounds| bounds.reach *= 0.5));
             assert!(flaw.is_some_and(|words| words.starts_with("the radius of point ")), "leaf {id}");
         }
+    }
+}
+
+#[test]
+fn enclosures_that_are_none() {
+    for part in 0..2 {
+        deep("the enclosure of node 7", |scan| {
+            let (parent, lane) = place(scan, 7);
+            scan.growths[part].to_mut()[parent].0[1][lane] = 0x8001;
+        });
+    }
+}
+
+#[test]
+fn leaves_that_are_not_their_points() {
+    for (leaf, lane) in [(0, 3), (7, 15), (18, 12), (18, 13)] {
+        let block = format!("the block of leaf {leaf}");
+        deep(&block, |scan| scan.leaf_blocks.to_mut()[leaf].set(lane, [0.01; 3], [1.0, 0.0, 0.0], 0.02));
+        deep(&block, |scan| scan.leaf_blocks.to_mut()[leaf].half[1] *= 2.0);
+        deep(&block, |scan| scan.marks.to_mut()[leaf] ^= 1);
     }
 }
 
@@ -137,13 +183,13 @@ fn blocks_that_are_not_the_points() {
 fn lists_that_are_none() {
     let words = "the neighbour list of block 4";
     for value in NONE {
-        plain(&format!("{words} is wrong"), |scan| scan.lists.to_mut()[4].within = value);
+        deep(words, |scan| scan.lists.to_mut()[4].within = value);
     }
     for value in [129, u32::MAX] {
-        plain(&format!("{words} is wrong"), |scan| scan.lists.to_mut()[4].count = value);
+        deep(words, |scan| scan.lists.to_mut()[4].count = value);
     }
     for value in [1 << 20, u32::MAX] {
-        plain(&format!("{words} is wrong"), |scan| scan.lists.to_mut()[4].first = value);
+        deep(words, |scan| scan.lists.to_mut()[4].first = value);
     }
     let at = honest().lists[4].first as usize;
     deep(words, |scan| scan.listed.to_mut()[at + 1] = scan.listed[at]);
@@ -170,22 +216,22 @@ fn a_list_that_leaves_a_block_out_is_for_the_thorough_check() {
 #[test]
 fn samples_and_coverings_that_are_none() {
     let scan = honest();
-    let (id, node) = scan.nodes.iter().enumerate().rfind(|(_, node)| !node.is_leaf()).unwrap();
-    let at = list_number(id, node, scan.leaf_size) * scan.samples_a_node as usize;
-    let (first, end) = (node.first, node.first + node.count);
-    for value in [first.wrapping_sub(1), end, 301, u32::MAX] {
-        plain(&format!("a sample of node {id} is wrong"), |scan| scan.sample_lists.to_mut()[at + 3] = value);
+    let topology = scan.topology();
+    let inner = topology.ids().take(topology.inner());
+    let id = inner.rev().find(|&id| topology.points(id).len() > scan.samples_a_node as usize).unwrap();
+    let (at, points) = (id.index() * scan.samples_a_node as usize, topology.points(id));
+    let named = format!("a sample of node {}", id.0);
+    for value in [id32(points.start).wrapping_sub(1), id32(points.end), 301, u32::MAX] {
+        deep(&named, |scan| scan.sample_lists.to_mut()[at + 3] = value);
     }
-    deep(&format!("a sample of node {id}"), |scan| {
-        scan.sample_lists.to_mut()[at + 3] = scan.sample_lists[at + 2]
-    });
+    deep(&named, |scan| scan.sample_lists.to_mut()[at + 3] = scan.sample_lists[at + 2]);
     for value in [f32::NAN, -1.0, f32::NEG_INFINITY] {
-        plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].radius = value);
-        plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].sampling = value);
-        plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].spacing = value);
+        deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].radius = value);
+        deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].sampling = value);
+        deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].spacing = value);
     }
-    plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].sampling = 1e3);
-    plain("the covering of node 5 is wrong", |scan| scan.coverings.to_mut()[5].spacing = 2e12);
+    deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].sampling = 1e3);
+    deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].spacing = 2e12);
     deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].spacing *= 10.0);
     deep("the covering of node 0", |scan| {
         scan.coverings.to_mut()[0] = Covering { radius: 0.1, sampling: 0.1, ..scan.coverings[0] };

@@ -1,6 +1,6 @@
 //! Blocks, the balls about them, and neighbour lists: one that lies makes f what it is not.
 
-use nearmiss_index::PointBlock;
+use nearmiss_index::{Level, PointBlock};
 
 use super::flaw::Flaw;
 use crate::build::PointHierarchy;
@@ -12,7 +12,7 @@ fn first_wrong(what: &'static str, index: Option<usize>) -> Result<(), Flaw> {
 }
 
 /// Checks that every list is there, and none so long that an evaluation would take its time.
-pub(super) fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
+fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
     let is_there = |list: &NeighbourList| {
         let (first, count) = (list.first as usize, list.count as usize);
         count <= MOST_LISTED && first <= listed && count <= listed - first && list.within.is_finite()
@@ -23,6 +23,7 @@ pub(super) fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(),
 /// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that
 /// lists ascend and name groups.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
+    check_ranges(&scan.lists, scan.listed.len())?;
     let blocks = scan.plan.blocks(&scan.positions, &scan.radii);
     let differs = blocks.zip(&scan.blocks).position(|(expected, found)| expected != *found);
     first_wrong("the copy of the points of block", differs)?;
@@ -63,7 +64,7 @@ pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
         let (Some((within, list)), Some([cx, cy, cz])) = (scan.neighbours(block), index.middle(block)) else {
             return false;
         };
-        index.collect([cx, cy, cz], within, &mut found);
+        index.collect(Level::new(), [cx, cy, cz], within, &mut found);
         let is_heard = |PointBlock { position: [x, y, z], horizon, .. }: &PointBlock| {
             (0..PointBlock::WIDTH).any(|i| {
                 let d = [x[i] - cx, y[i] - cy, z[i] - cz];

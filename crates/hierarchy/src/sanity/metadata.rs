@@ -4,16 +4,36 @@ use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_index::PointBlock;
 
 use super::flaw::{FARTHEST, Flaw};
+use super::nodes::is_in_range;
 use crate::build::PointHierarchy;
+use crate::leaf_block::LeafParts;
 use crate::options::RADIUS_NEIGHBOURS;
 use crate::samples::SAMPLES;
 use crate::sampling::sampling_rank;
+use crate::topology::Topology;
+
+/// The nodes over so many points.
+///
+/// # Errors
+/// Names the number that no build writes.
+pub(crate) fn checked_topology(points: usize, leaf_size: u32, dense: u32) -> Result<Topology, Flaw> {
+    let wrong = |what| Err(Flaw::Metadata { what });
+    let Some(count) = u32::try_from(points).ok().filter(|&count| count > 0) else {
+        return wrong("the number of points");
+    };
+    if !(4..=64).contains(&leaf_size) {
+        return wrong("the number of points of a leaf");
+    }
+    if dense > count || (dense < count && !dense.is_multiple_of(leaf_size)) {
+        return wrong("the number of points that are not sparse");
+    }
+    Ok(Topology::new(count, leaf_size))
+}
 
 impl PointHierarchy {
     pub(super) fn check_lengths(&self) -> Result<(), Flaw> {
         let points = self.positions.len();
-        let leaves = points.div_ceil(self.leaf_size.max(1) as usize);
-        let nodes = self.nodes.len();
+        let (leaves, inner) = (self.topology.leaves(), self.topology.inner());
         let blocks = points.div_ceil(PointBlock::WIDTH);
         let expected = [
             ("normals", self.normals.len(), points),
@@ -21,15 +41,14 @@ impl PointHierarchy {
             ("discs", self.discs.len(), points),
             ("kinds", self.kinds.len(), points),
             ("source", self.source.len(), points),
-            ("boxes", self.boxes.len(), nodes),
-            ("growths", self.growths.len(), nodes),
-            ("growths of the obstacle", self.obstacle_growths.len(), nodes),
-            (
-                "samples",
-                self.sample_lists.len(),
-                leaves.saturating_sub(1).saturating_mul(self.samples_a_node as usize),
-            ),
-            ("coverings", self.coverings.len(), nodes),
+            ("boxes", self.siblings.len(), inner),
+            ("growths", self.growths[0].len(), inner),
+            ("growths of the obstacle", self.growths[1].len(), inner),
+            ("leaves", self.leaf_blocks.len(), leaves * LeafParts::blocks_a_leaf(&self.topology)),
+            ("marks", self.marks.len(), leaves),
+            ("blocks", self.blocks.len(), blocks),
+            ("samples", self.sample_lists.len(), inner.saturating_mul(self.samples_a_node as usize)),
+            ("coverings", self.coverings.len(), self.topology.len()),
             ("cones", self.cones.len(), leaves),
             ("groups", self.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
             ("lists", self.lists.len(), blocks),
@@ -62,14 +81,8 @@ impl PointHierarchy {
         if !(self.reach > 0.0 && self.reach <= FARTHEST) {
             return wrong("the reach");
         }
-        let fills_leaves = self.leaf_size > 0 && self.dense.is_multiple_of(self.leaf_size);
-        let is_parted = || match &self.nodes[..] {
-            [_, left, ..] => left.count == self.dense,
-            _ => false,
-        };
-        let all = self.dense as usize == self.len();
-        if !(all || self.dense == 0 || fills_leaves && is_parted()) {
-            return wrong("the number of points that are not sparse");
+        if !is_in_range(&self.root.bounds) {
+            return wrong("the box of the root");
         }
         if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
             return wrong("the number of neighbours for a radius");
@@ -112,6 +125,10 @@ impl PointHierarchy {
         let rank = sampling_rank(self.len());
         if less > rank || more > self.len() - 1 - rank {
             return Err(Flaw::Metadata { what: "the sampling radius" });
+        }
+        // As text, so that what is no number equals itself.
+        if format!("{:?}", self.outlined()) != format!("{:?}", self.outline) {
+            return Err(Flaw::Metadata { what: "the outline of the scan" });
         }
         Ok(())
     }

@@ -1,12 +1,16 @@
 //! The boxes: one that is none, or that leaves its parent's, makes a query look everywhere or miss a contact.
 
-use bytemuck::cast_ref;
+use bytemuck::{bytes_of, cast_ref};
+use nearmiss_geometry::NodeId;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::ranges;
 use nearmiss_lanes::vector::{dot, sub};
 
 use super::flaw::{FARTHEST, Flaw};
 use crate::boxes::OrientedBox;
+use crate::build::PointHierarchy;
 use crate::growth::Growth;
-use crate::topology::Node;
+use crate::tree::Siblings;
 
 /// Axes are unit and at right angles to rounding; this is far from rounding and far from a box that lies.
 const ASKEW: f32 = 1e-3;
@@ -35,45 +39,49 @@ const RANGES: [(u32, u32); NUMBERS] = {
     ranges
 };
 
-/// Checks that the numbers of every box lie in their ranges: the middle, half edges, axes, reach. One pass,
-/// at the speed of memory.
-pub(super) fn check_ranges(boxes: &[OrientedBox]) -> Result<(), Flaw> {
-    let is_sound = |b: &OrientedBox| {
-        let bits: &[u32; NUMBERS] = cast_ref(b);
-        let mut beyond = 0;
-        for (x, (mask, most)) in bits.iter().zip(RANGES) {
-            beyond |= u32::from(x & mask > most);
-        }
-        beyond == 0
-    };
-    first_wrong(boxes.iter().position(|b| !is_sound(b)))
+/// Returns `true` if the numbers of a box lie in their ranges: the middle, half edges, axes, reach.
+pub(super) fn is_in_range(bounds: &OrientedBox) -> bool {
+    let bits: &[u32; NUMBERS] = cast_ref(bounds);
+    let mut beyond = 0;
+    for (x, (mask, most)) in bits.iter().zip(RANGES) {
+        beyond |= u32::from(x & mask > most);
+    }
+    beyond == 0
 }
 
-/// Checks the boxes of a tree whose topology and ranges are sound: axes form a frame, and each box lies
-/// within its parent's.
-pub(super) fn check(nodes: &[Node], boxes: &[OrientedBox]) -> Result<(), Flaw> {
-    let askew = boxes.iter().position(|b| !is_frame(&b.axes));
-    first_wrong(askew)?;
-    for (id, (node, bounds)) in nodes.iter().zip(boxes).enumerate() {
-        if !node.is_leaf() {
-            for child in [id + 1, node.right as usize] {
-                if !lies_within(&boxes[child], bounds) {
-                    return first_wrong(Some(child));
+/// Checks the boxes and enclosures of all nodes: their numbers lie in their ranges, axes form a frame, each
+/// box lies within its parent's, and where there is no child nothing is said.
+pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
+    let (topology, tree) = (scan.topology(), scan.tree());
+    let wrong = |what, id: NodeId| Err(Flaw::Value { what, index: id.index() });
+    let is_sound = |bounds: &OrientedBox| is_in_range(bounds) && is_frame(&bounds.axes);
+    if !is_sound(&scan.root.bounds) {
+        return wrong("the box of node", NodeId::ROOT);
+    }
+    let found = ranges(topology.inner(), |parents| {
+        for parent in parents {
+            let (id, siblings) = (NodeId(id32(parent)), &tree.siblings[parent]);
+            let own = tree.bounds(id);
+            let children = topology.children(id);
+            let mut again = Siblings::NONE;
+            for (lane, child) in children.iter().enumerate() {
+                let bounds = siblings.get(lane);
+                again.set(lane, &bounds);
+                if !(is_sound(&bounds) && lies_within(&bounds, &own)) {
+                    return wrong("the box of node", child);
+                }
+                let growths = tree.growths.map(|of| of[parent].get(lane));
+                if !growths.iter().all(Growth::is_sound) {
+                    return wrong("the enclosure of node", child);
                 }
             }
+            if bytes_of(&again) != bytes_of(siblings) {
+                return wrong("the boxes of the children of node", id);
+            }
         }
-    }
-    Ok(())
-}
-
-/// Checks that enclosures are no smaller than boxes, and finite.
-pub(super) fn check_growths(growths: &[Growth]) -> Result<(), Flaw> {
-    let wrong = growths.iter().position(|growth| !growth.is_sound());
-    wrong.map_or(Ok(()), |index| Err(Flaw::Value { what: "the enclosure of node", index }))
-}
-
-fn first_wrong(node: Option<usize>) -> Result<(), Flaw> {
-    node.map_or(Ok(()), |index| Err(Flaw::Value { what: "the box of node", index }))
+        Ok(())
+    });
+    found.into_iter().collect()
 }
 
 /// Whether three vectors are unit and at right angles. Written so that what is no number fails.

@@ -37,9 +37,9 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         source: &scan.source,
     };
     let last = u32::try_from(scan.given() - 1).unwrap_or(u32::MAX);
-    let (nodes, boxes, cones) = (&*scan.nodes, &*scan.boxes, &*scan.cones);
-    for (node, bounds) in nodes.iter().zip(boxes).filter(|(node, _)| node.is_leaf()) {
-        let number = (node.first / scan.leaf_size) as usize;
+    let (topology, cones) = (scan.topology(), &*scan.cones);
+    for number in 0..topology.leaves() {
+        let bounds = &scan.tree().bounds(topology.leaf(number));
         let cone = &cones[number];
         let is_unit = (dot(cone.axis, cone.axis) - 1.0).abs() <= NORMAL;
         if !(is_unit && (-NORMAL..=1.0 + NORMAL).contains(&cone.cosine)) {
@@ -47,7 +47,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         }
         let size = |v: [f32; 3]| v[0].abs() + v[1].abs() + v[2].abs();
         let leaf = Leaf { bounds, cone, last, slack: SLACK * (size(bounds.centre) + size(bounds.half)) };
-        let points = node.points();
+        let points = topology.points_of_leaf(number);
         for start in points.clone().step_by(LANES) {
             leaf.check(&arrays.block(start, points.end), start)?;
         }

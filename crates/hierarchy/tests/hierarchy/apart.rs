@@ -22,7 +22,9 @@ fn covering(scan: &PointHierarchy, node: usize, pose: &Pose, extent: Extent) -> 
     let slices = scan.slices();
     let centres = slices.samples(node).iter().map(|i| pose.apply(slices.positions[i].map(f64::from)));
     let (radius, volume) = match extent {
-        Extent::Discs => (slices.sampling_radius_of(node), slices.boxes[node]),
+        Extent::Discs => {
+            (slices.sampling_radius_of(node), slices.tree.bounds(NodeId(u32::try_from(node).unwrap())))
+        }
         Extent::Surface => (slices.covering_radius(node), slices.enclosure(node)),
     };
     (centres.collect(), pose.scale() * f64::from(radius), moved(pose, &volume))
@@ -33,9 +35,9 @@ fn compare(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose, reach: f64, exte
     let motion = Relative::new(pose, 10.0);
     let id = |k: usize| NodeId(u32::try_from(k).unwrap());
     let mut counts = [0; 3];
-    for i in 0..a.nodes().len() {
+    for i in 0..a.topology().len() {
         let (centres_a, radius_a, volume_a) = covering(a, i, &Pose::IDENTITY, extent);
-        for j in 0..b.nodes().len() {
+        for j in 0..b.topology().len() {
             let (centres_b, radius_b, volume_b) = covering(b, j, pose, extent);
             let clear = clearance((&centres_a, radius_a, &volume_a), (&centres_b, radius_b, &volume_b));
             let pair = NodePair { a: id(i), b: id(j) };

@@ -21,10 +21,10 @@ fn nearest(scan: &PointHierarchy, x: [f64; 3]) -> usize {
 /// Fails unless `x` is in the enclosures of all nodes that hold its nearest point.
 fn check_enclosed(scan: &PointHierarchy, enclosures: &[OrientedBox], x: [f64; 3]) {
     let p = nearest(scan, x);
-    for (id, node) in scan.nodes().iter().enumerate() {
-        if node.points().contains(&p) {
-            let beyond = outside(&enclosures[id], x);
-            assert!(beyond <= 0.0, "{x:?} is {beyond} outside node {id}, near point {p}");
+    for id in scan.topology().ids() {
+        if scan.topology().points(id).contains(&p) {
+            let beyond = outside(&enclosures[id.index()], x);
+            assert!(beyond <= 0.0, "{x:?} is {beyond} outside node {id:?}, near point {p}");
         }
     }
 }
@@ -35,8 +35,7 @@ fn driven_outwards(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
     let mut scratch = GatherScratch::default();
     let mut random = arbitrary::rng(seed);
     let enclosures: Vec<OrientedBox> = scan.enclosures().collect();
-    let leaf_of =
-        |p: usize| scan.nodes().iter().position(|n| n.is_leaf() && n.points().contains(&p)).unwrap();
+    let leaf_of = |p: usize| scan.topology().leaf_of(p).index();
     let mut starts = 0;
     for i in 0..count {
         let i = i % scan.len();
@@ -148,7 +147,7 @@ fn surface_points_are_in_every_enclosure_of_their_nearest_point() {
 fn an_enclosure_holds_the_box_of_its_node() {
     let cloud = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 2000, 1)).unwrap();
     let scan = PointHierarchy::build(&cloud, &BuildOptions::default()).unwrap();
-    for (inner, outer) in scan.boxes().iter().zip(scan.enclosures()) {
+    for (inner, outer) in scan.boxes().zip(scan.enclosures()) {
         for k in 0..3 {
             let shift: f32 = (0..3).map(|i| outer.axes[k][i] * (inner.centre[i] - outer.centre[i])).sum();
             assert!(shift.abs() + inner.half[k] <= outer.half[k] * (1.0 + 1e-6));

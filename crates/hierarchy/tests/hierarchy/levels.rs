@@ -1,6 +1,6 @@
 //! f' of a node against the naive twin of f over its samples with one bandwidth.
 
-use nearmiss_geometry::PointCloud;
+use nearmiss_geometry::{NodeId, PointCloud};
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy};
 use nearmiss_surface::{Bandwidth, Kernel, Status, SurfaceOptions};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
@@ -16,12 +16,14 @@ fn f_of_a_node_equals_the_twin_over_its_samples() {
             let options = BuildOptions::default().with_surface(surface);
             let scan = PointHierarchy::build(&cloud, &options).unwrap();
             let (mut scratch, mut random) = (GatherScratch::default(), arbitrary::rng(8));
-            for id in (0..scan.nodes().len()).step_by(3) {
-                let (slices, node) = (scan.slices(), scan.nodes()[id]);
+            for id in (0..scan.topology().len()).step_by(3) {
+                let slices = scan.slices();
+                let points = scan.topology().points(NodeId(u32::try_from(id).unwrap()));
+                let count = points.len() as f64;
                 let samples: Vec<usize> = slices.samples(id).iter().collect();
                 // Eq. 10 and 9.
-                let thinning = (f64::from(node.count) / samples.len() as f64).sqrt();
-                let squares = slices.radii[node.points()].iter().map(|&r| f64::from(r).powi(2)).sum::<f64>();
+                let thinning = (count / samples.len() as f64).sqrt();
+                let squares = slices.radii[points].iter().map(|&r| f64::from(r).powi(2)).sum::<f64>();
                 let reach = match kernel {
                     Kernel::Wendland => 7.2_f64.sqrt(),
                     _ => (-(1e-4_f64).ln()).sqrt(),
@@ -30,7 +32,7 @@ fn f_of_a_node_equals_the_twin_over_its_samples() {
                     * match bandwidth {
                         Bandwidth::Global => 3.0 * f64::from(slices.sampling_radius) / reach,
                         Bandwidth::Fixed(h) => h,
-                        _ => 3.0 * (squares / f64::from(node.count)).sqrt() / reach,
+                        _ => 3.0 * (squares / count).sqrt() / reach,
                     };
                 assert!((f64::from(slices.node_bandwidth(id)) / h - 1.0).abs() < 1e-5, "node {id}: {h}");
                 assert!((f64::from(slices.node_horizon(id)) / (h * reach) - 1.0).abs() < 1e-5, "node {id}");

@@ -56,9 +56,10 @@ fn a_fit_by_straight_distances_changes_nothing() {
         if differ > 0 {
             continue;
         }
-        for id in 0..scan.nodes().len() {
-            let [(e, b), (f, c)] =
-                [&again, &scan].map(|scan| (scan.slices().enclosure(id), scan.boxes()[id]));
+        let boxes = [&again, &scan].map(|scan| scan.boxes().collect::<Vec<_>>());
+        for id in 0..scan.topology().len() {
+            let [e, f] = [&again, &scan].map(|scan| scan.slices().enclosure(id));
+            let [b, c] = [boxes[0][id], boxes[1][id]];
             for k in 0..3 {
                 let same =
                     near(b.half[k], c.half[k]) && (e.half[k] - f.half[k]).abs() < 0.01 * f.half[k].max(0.1);

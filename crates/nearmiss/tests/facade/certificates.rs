@@ -1,5 +1,4 @@
 //! Certified separations against exact distances, and what the proof of one consists of.
-use nearmiss::hierarchy::Node;
 use nearmiss::{
     Bandwidth, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence,
     PointCloud, Pose, Proof, Scan, Semantics, SurfaceOptions, Verdict, collide_proving, collide_with,
@@ -67,9 +66,9 @@ fn a_proof_covers_all_pairs_of_points() {
         assert!(proof.pairs.iter().all(|(_, distance)| *distance >= gap), "{gap} is the least of all");
         let mut covered = vec![0_u8; scan.len() * scan.len()];
         for (pair, _) in &proof.pairs {
-            let points = |id: usize| -> std::ops::Range<usize> { Node::points(&scan.nodes()[id]) };
-            for i in points(pair.a.index()) {
-                for j in points(pair.b.index()) {
+            let points = |id| scan.topology().points(id);
+            for i in points(pair.a) {
+                for j in points(pair.b) {
                     covered[i * scan.len() + j] = 1;
                 }
             }

@@ -268,7 +268,7 @@ fn without_the_map_there_is_no_such_scan() {
     for scan in [&bare, &without] {
         let meta =
             Meta { hierarchy: whole.meta(), graph: scan.graph().map(|graph| graph.meta()), density: None };
-        let (mut writer, mut bytes) = (Writer::new(*b"SCAN", 8), Vec::new());
+        let (mut writer, mut bytes) = (Writer::new(*b"SCAN", 9), Vec::new());
         writer.metadata(&meta).unwrap();
         (*whole).add_to(&mut writer).unwrap();
         if let Some(graph) = scan.graph() {

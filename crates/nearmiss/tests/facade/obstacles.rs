@@ -28,7 +28,7 @@ fn how_far(a: &ScanView<'_>, b: &ScanView<'_>) -> Distance {
 /// The points of a scan in the world, each with the radius of its ball and the radius within which its part
 /// of the obstacle lies: from the definition in `docs/theory/obstacle.md` alone.
 fn matter(view: &ScanView<'_>) -> Vec<([f64; 3], f64, f64)> {
-    let (slices, scale) = (view.slices(), view.placed().scale());
+    let (slices, scale) = (view.scan().slices(), view.placed().scale());
     let part = |i: usize| {
         let (radius, reach) = (f64::from(slices.radii[i]), f64::from(slices.reach));
         let kind = view.scan().kind(i);

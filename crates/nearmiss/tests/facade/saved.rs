@@ -23,8 +23,8 @@ fn same(a: &Scan, b: &Scan) {
     assert_eq!(a.radii(), b.radii(), "radii");
     assert_eq!(a.discs(), b.discs(), "discs");
     assert_eq!(a.source(), b.source(), "source");
-    assert_eq!(a.nodes(), b.nodes(), "nodes");
-    assert_eq!(a.boxes(), b.boxes(), "boxes");
+    assert_eq!(a.topology(), b.topology(), "nodes");
+    assert!(a.boxes().eq(b.boxes()), "boxes");
     assert!(a.enclosures().eq(b.enclosures()), "enclosures");
     assert_eq!(a.cones(), b.cones(), "cones");
     assert_eq!(a.graph().map(SurfaceGraph::counts), b.graph().map(SurfaceGraph::counts), "graph");
@@ -49,7 +49,7 @@ fn what_is_saved_is_what_opens() {
 
 #[test]
 fn golden_files_of_older_versions_are_refused_by_name() {
-    for version in [1, 2, 3, 4, 5, 6] {
+    for version in [1, 2, 3, 4, 5, 6, 8] {
         let path = format!("{}/tests/golden/sphere-v{version}.nm", env!("CARGO_MANIFEST_DIR"));
         let refused = Scan::open(path, Check::Full).unwrap_err().to_string();
         assert!(refused.contains(&format!("version {version}")) && refused.contains("prepare"), "{refused}");
@@ -57,8 +57,8 @@ fn golden_files_of_older_versions_are_refused_by_name() {
 }
 
 #[test]
-fn the_golden_file_of_version_eight_opens() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v8.nm");
+fn the_golden_file_of_version_nine_opens() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v9.nm");
     let golden = Scan::open(path, Check::Full).unwrap();
     assert_eq!(golden.sanity_check(), Ok(()), "a valid scan");
     same(&golden, &small());
@@ -157,23 +157,6 @@ fn another_version_is_refused_by_name() {
     );
 }
 
-#[test]
-fn a_tree_that_lies_is_refused() {
-    let scan = small();
-    let mut bytes = Vec::new();
-    scan.write_to(&mut bytes).unwrap();
-    let file = nearmiss::store::File::from_bytes(bytes.clone(), Check::Full).unwrap();
-    let nodes = file.sections().iter().find(|s| s.id.tag == *b"NODE").unwrap();
-    let at = usize::try_from(nodes.offset).unwrap();
-    let mut refused = 0;
-    for field in 0..9 {
-        let mut lying = bytes.clone();
-        lying[at + 4 * field..at + 4 * field + 4].copy_from_slice(&77_u32.to_le_bytes());
-        refused += u32::from(Scan::from_bytes(lying, Check::Structure).is_err());
-    }
-    assert_eq!(refused, 9, "every field of the first three nodes is checked without checksums");
-}
-
 /// Points, normals and discs that no build would write must not lead a query out of its arrays.
 #[test]
 fn absurd_numbers_do_not_panic() {
@@ -195,7 +178,12 @@ fn absurd_numbers_do_not_panic() {
         for tags in [
             &[b"DISC"][..],
             &[b"NRML"],
-            &[b"BOXS"],
+            &[b"TREE"],
+            &[b"LEAF"],
+            &[b"BLCK"],
+            &[b"SMPL"],
+            &[b"LIST"],
+            &[b"NEAR"],
             &[b"RADI"],
             &[b"PNTS"],
             &[b"DISC", b"NRML"],

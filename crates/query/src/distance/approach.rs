@@ -57,7 +57,7 @@ impl Approach<'_, '_> {
     /// gone; half as much from then on if it does not. Whether that was worth trying.
     fn step(&mut self, side: usize, feet: &mut [Projection; 2], share: &mut f64) -> bool {
         let view = self.views[side];
-        let radius = f64::from(view.slices().radii[self.samples[side]]) * view.placed().scale();
+        let radius = f64::from(view.scan().radii()[self.samples[side]]) * view.placed().scale();
         let to = between(feet) * [1.0, -1.0][side];
         let (distance, normal) = (to.norm(), Vector3::from(feet[side].at.normal));
         let along = to - normal * normal.dot(&to);

@@ -4,7 +4,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use nearmiss_hierarchy::{Child, NodePair, Part};
+use nearmiss_hierarchy::{NodePair, Part};
 use nearmiss_lanes::order::{ascending, from_ascending};
 
 use crate::bounds::{Limits, Motion};
@@ -18,12 +18,12 @@ pub(crate) struct Open {
     /// How near the enclosures are, and in the lower half the boxes, as numbers in the same order: a heap
     /// compares often.
     key: Reverse<u64>,
-    pair: Reverse<[Child; 2]>,
+    pair: Reverse<NodePair>,
 }
 
 impl Open {
     #[inline]
-    fn new(enclosures: f32, boxes: f32, pair: [Child; 2]) -> Self {
+    fn new(enclosures: f32, boxes: f32, pair: NodePair) -> Self {
         let key = u64::from(ascending(enclosures)) << 32 | u64::from(ascending(boxes));
         Self { key: Reverse(key), pair: Reverse(pair) }
     }
@@ -71,11 +71,10 @@ pub(crate) struct Search<'s> {
 impl<'s> Search<'s> {
     /// From the pair of the roots on; for the nearest points alone, or for the nearest enclosures of leaves
     /// as well.
-    pub(crate) fn new(open: &'s mut Frontier, of_surfaces: bool, pair: &Posed<'_>, motion: &Motion) -> Self {
+    pub(crate) fn new(open: &'s mut Frontier, of_surfaces: bool, motion: &Motion) -> Self {
         open.heap.clear();
         open.stack.clear();
-        let pair = [pair.a.wide.root(), pair.b.wide.root()];
-        open.stack.push(Open::new(motion.least(), motion.least(), pair));
+        open.stack.push(Open::new(motion.least(), motion.least(), NodePair::ROOTS));
         let surfaces = if of_surfaces { f32::INFINITY } else { f32::NEG_INFINITY };
         Self { open, of_surfaces, points: f32::INFINITY, surfaces, steps: 0 }
     }
@@ -135,8 +134,8 @@ impl<'s> Search<'s> {
         let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
         let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
         let (of_enclosures, of_boxes) = (next.enclosures(), next.boxes());
-        if next.pair.0.iter().all(|node| node.is_leaf()) {
-            let leaves = pair.nodes(next.pair.0);
+        if pair.which_are_leaves(next.pair.0) == [true; 2] {
+            let leaves = next.pair.0;
             if of_enclosures < self.surfaces {
                 let bound = bound_of_leaves(pair, motion, leaves, of_enclosures, self.surfaces);
                 self.surfaces = self.surfaces.min(bound);
@@ -156,10 +155,11 @@ impl<'s> Search<'s> {
             let children = pairs.pair(lane);
             let (mut of_enclosures, mut of_boxes) =
                 (enclosures[lane].max(of_enclosures), gaps.boxes[lane].max(of_boxes));
-            if children[0].is_leaf() != children[1].is_leaf() {
+            let [is_leaf_a, is_leaf_b] = pair.which_are_leaves(children);
+            if is_leaf_a != is_leaf_b {
                 // The points of a loose leaf say more than its box, also of points.
                 if pair.part == Part::Obstacle
-                    && let Some(gap) = pair.gap_by_points(pair.nodes(children))
+                    && let Some(gap) = pair.gap_by_points(children)
                 {
                     of_enclosures = of_enclosures.max(motion.no_nearer(f64::from(gap)));
                 }

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use nearmiss_hierarchy::NodePair;
+use nearmiss_lanes::id32;
 
 use crate::options::Interpolation;
 use crate::surface::Surfaces;
@@ -15,7 +16,7 @@ impl Surfaces<'_> {
     /// Whether the leaf of b says which side of it a place is on: its normals are oriented, and sure of it.
     fn tells_sides(&self, pair: NodePair) -> bool {
         let [_, vb] = self.pair.views;
-        let points = self.pair.b.nodes[pair.b.index()].points();
+        let points = self.pair.b.tree.topology().points(pair.b);
         vb.scan().is_oriented()
             && vb.graph().is_some_and(|graph| {
                 graph.confidence()[points].iter().all(|&sure| sure >= super::sides::CERTAIN)
@@ -31,11 +32,10 @@ impl Surfaces<'_> {
         };
         let (edges, longest) = (graph.points().edges(), graph.points().reaches());
         let scale = va.placed().scale();
-        let leaf = self.pair.a.nodes[pair.a.index()].points();
-        let other = &self.pair.b.boxes[pair.b.index()];
-        let volume = self.pair.relative.moved(other);
-        let hint = self.pair.b.nodes[pair.b.index()].first;
-        let own = self.pair.a.boxes[pair.a.index()].reach;
+        let leaf = self.pair.a.tree.topology().points(pair.a);
+        let volume = self.pair.relative.moved(&self.pair.b.tree.bounds(pair.b));
+        let hint = id32(self.pair.b.tree.topology().points(pair.b).start);
+        let own = self.pair.a.tree.reach(pair.a);
         for i in leaf.clone() {
             let reach = volume.reach + own.max(longest[i]) + self.reach;
             if volume.distance_sq(self.pair.a.positions[i]) > reach * reach {

@@ -1,9 +1,10 @@
 //! Which points of a lie in the box of b.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::NodeId;
-use nearmiss_hierarchy::OrientedBox;
+use nearmiss_hierarchy::{NodePair, OrientedBox};
+use nearmiss_lanes::id32;
 
 use super::volume::{Row, Volume};
 use crate::surface::Surfaces;
@@ -27,7 +28,7 @@ impl Bounds {
 impl Surfaces<'_> {
     pub(crate) fn bounds_of_b(&self) -> Bounds {
         let volume = self.pair.relative.moved(&self.pair.b.enclosure(0));
-        let own = self.pair.a.boxes[0].reach;
+        let own = self.pair.a.tree.reach(NodeId::ROOT);
         Bounds { volume, reach_sq: own * own }
     }
 
@@ -36,21 +37,20 @@ impl Surfaces<'_> {
     pub(crate) fn survey(&mut self, areas: &[f64], volume: &mut Volume) -> ControlFlow<()> {
         volume.nodes.clear();
         volume.nodes.push(NodeId::ROOT);
-        let root = [NodeId::ROOT; 2];
+        let topology = self.pair.a.tree.topology();
         loop {
             volume.finer.clear();
             let mut is_finest = true;
             for &id in &volume.nodes {
                 self.pair.meter.go_on()?;
-                if self.pair.gaps([id; 2], root, 1)[0] > self.reach {
+                if self.pair.gap(NodePair { a: id, b: NodeId::ROOT }) > self.reach {
                     continue;
                 }
-                let node = self.pair.a.nodes[id.index()];
-                if node.is_leaf() {
+                if topology.is_leaf(id) {
                     volume.finer.push(id);
                 } else {
                     is_finest = false;
-                    volume.finer.extend([NodeId(id.0 + 1), NodeId(node.right)]);
+                    volume.finer.extend(topology.children(id).iter());
                 }
             }
             std::mem::swap(&mut volume.nodes, &mut volume.finer);
@@ -61,9 +61,9 @@ impl Surfaces<'_> {
         volume.rows.clear();
         (volume.area, volume.count) = (0.0, 0);
         for id in &volume.nodes {
-            let node = self.pair.a.nodes[id.index()];
-            let points = node.first..node.first + node.count;
-            volume.count += node.count;
+            let Range { start, end } = topology.points(*id);
+            let points = id32(start)..id32(end);
+            volume.count += points.end - points.start;
             let own = areas[points.end as usize] - areas[points.start as usize];
             match volume.rows.last_mut() {
                 Some(last) if last.points.end == points.start => last.points.end = points.end,

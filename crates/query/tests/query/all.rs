@@ -18,8 +18,9 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
 /// The leaf of every stored point.
 fn leaves(scan: &PointHierarchy) -> Vec<usize> {
     let mut of = vec![0; scan.len()];
-    for (id, node) in scan.nodes().iter().enumerate().filter(|(_, node)| node.is_leaf()) {
-        of[node.points()].fill(id);
+    let topology = scan.topology();
+    for leaf in 0..topology.leaves() {
+        of[topology.points_of_leaf(leaf)].fill(leaf);
     }
     of
 }

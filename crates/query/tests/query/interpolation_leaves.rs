@@ -59,8 +59,9 @@ impl<'a> Twin<'a> {
 /// The leaf of every stored point.
 fn leaves(view: &ScanView<'_>) -> Vec<usize> {
     let mut of = vec![0; view.scan().len()];
-    for (id, node) in view.scan().nodes().iter().enumerate().filter(|(_, node)| node.is_leaf()) {
-        of[node.points()].fill(id);
+    let topology = view.scan().topology();
+    for leaf in 0..topology.leaves() {
+        of[topology.points_of_leaf(leaf)].fill(leaf);
     }
     of
 }

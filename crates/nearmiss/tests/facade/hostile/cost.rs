@@ -12,14 +12,15 @@ fn with_boundless_boxes(scan: &Scan, half: f32) -> Scan {
     let mut bytes = Vec::new();
     scan.write_to(&mut bytes).unwrap();
     let sections = File::from_bytes(bytes.clone(), Check::Full).unwrap().sections().to_vec();
-    let boxes = sections.iter().find(|s| s.id.tag == *b"BOXS").unwrap();
+    let boxes = sections.iter().find(|s| s.id.tag == *b"TREE").unwrap();
     let start = usize::try_from(boxes.offset).unwrap();
     let end = start + usize::try_from(boxes.length).unwrap();
-    let mut vast = [0.0, 0.0, 0.0, half, half, half, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    vast[15] = scan.boxes()[0].reach;
-    let vast: Vec<u8> = vast.iter().flat_map(|x: &f32| x.to_le_bytes()).collect();
-    for one in bytes[start..end].chunks_exact_mut(64) {
-        one.copy_from_slice(&vast);
+    let reach = scan.boxes().next().unwrap().reach;
+    let vast = [0.0, 0.0, 0.0, half, half, half, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, reach];
+    // A row of four siblings for each number.
+    let vast: Vec<u8> = vast.iter().flat_map(|x: &f32| x.to_le_bytes().repeat(4)).collect();
+    for siblings in bytes[start..end].chunks_exact_mut(vast.len()) {
+        siblings.copy_from_slice(&vast);
     }
     crate::hostile::repair::repair(&mut bytes);
     Scan::from_bytes(bytes, Check::Structure).unwrap()
@@ -30,8 +31,9 @@ fn boundless_boxes_end_a_query_undecided_unless_told_otherwise() {
     let points = arbitrary::cloud(CloudKind::Sphere, 12_000, 1);
     let cloud = PointCloud::from_positions(&points).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
-    let leaves = scan.nodes().len().div_ceil(2) as u64;
-    let away = Pose::from_translation([3.0, 0.0, 0.0]);
+    let leaves = scan.topology().leaves() as u64;
+    // A sphere within a sphere: balls about the two say nothing.
+    let away = Pose::IDENTITY.with_scale(0.5);
     for half in [10.0, 1e12] {
         let lying = with_boundless_boxes(&scan, half);
         for semantics in [Semantics::Surface, Semantics::Thickened(0.01)] {
@@ -70,6 +72,6 @@ fn sound_scans_stay_far_below_the_limit() {
     let plan = CollidePlan::new(&options, &a, &b).unwrap();
     let answer = collide(&a.at(&Pose::IDENTITY), &b.at(&Pose::IDENTITY), &plan, &Budget::UNLIMITED);
     assert!(answer.verdict.is_separated(), "{answer:?}");
-    let leaves = (a.nodes().len() + b.nodes().len()) as u64 / 2;
+    let leaves = (a.topology().leaves() + b.topology().leaves()) as u64;
     assert!(answer.statistics.leaf_pairs < 128 * leaves / 6, "{:?} of {leaves} leaves", answer.statistics);
 }

@@ -40,7 +40,8 @@ pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let size = other.bounds().half_extents().into_iter().fold(0.0, f64::max);
     let mut scratch = CollideScratch::default();
     let mut collide = Vec::new();
-    let everything = (2 * scan.nodes().len() * 2 * other.nodes().len().max(scan.nodes().len())) as u64;
+    let everything =
+        (4 * scan.topology().len() * 4 * other.topology().len().max(scan.topology().len())) as u64;
     let surface = CollideOptions::default();
     let balls = surface.with_semantics(Semantics::Thickened(1e-3 * size));
     let all = [

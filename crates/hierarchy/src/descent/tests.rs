@@ -1,6 +1,7 @@
 use std::collections::BTreeSet;
 
-use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_geometry::{NodeId, PointCloud, Pose};
+use nearmiss_lanes::id32;
 use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
 
@@ -8,7 +9,7 @@ use super::*;
 use crate::build::PointHierarchy;
 use crate::options::BuildOptions;
 use crate::part::Part;
-use nearmiss_geometry::NodeId;
+use crate::topology::Grandchildren;
 
 /// A blob, a sheet or a line of so many points.
 fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) -> PointHierarchy {
@@ -27,14 +28,9 @@ struct All {
     leaves: Vec<[usize; 2]>,
     most: usize,
     compared: u64,
-    wants_any: bool,
 }
 
-impl LeafVisitor for All {
-    fn wants_any(&self) -> bool {
-        self.wants_any
-    }
-
+impl PairVisitor for All {
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.compared += u64::from(pairs);
         ControlFlow::Continue(())
@@ -51,40 +47,20 @@ impl LeafVisitor for All {
 
 /// The points of a leaf, in a's frame by `place`.
 fn points(scan: &PointHierarchy, leaf: usize, place: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<[f32; 3]> {
-    scan.wide.leaves.points(leaf).map(|i| place(scan.positions[i])).collect()
+    scan.topology().points_of_leaf(leaf).map(|i| place(scan.positions[i])).collect()
 }
 
 #[test]
-fn every_leaf_is_below_one_node_and_every_box_is_its_own() {
+fn leaves_in_lanes_are_their_points() {
     let rng = &mut rng(3);
     for (count, leaf_size) in
         [(9, 16), (16, 16), (17, 16), (33, 16), (48, 16), (700, 16), (700, 5), (900, 40)]
     {
         let scan = scan(rng, count, [1.0; 3], leaf_size);
-        let tree = &scan.wide;
-        let (mut seen, mut open) = (BTreeSet::new(), vec![tree.root()]);
-        while let Some(child) = open.pop() {
-            if child.is_leaf() {
-                assert!(seen.insert(child.index()), "leaf {} twice", child.index());
-                continue;
-            }
-            let siblings = &tree.nodes[child.index()];
-            for (lane, &below) in siblings.children.iter().enumerate().filter(|(_, c)| **c != Child::NONE) {
-                let bounds = &scan.boxes[tree.id(below).index()];
-                assert_eq!(siblings.centre.map(|row| row[lane]), bounds.centre);
-                assert_eq!(siblings.half.map(|row| row[lane]), bounds.half);
-                assert_eq!(siblings.axes.map(|axis| axis.map(|row| row[lane])), bounds.axes);
-                open.push(below);
-            }
-            assert!(siblings.lanes().trailing_ones() == siblings.lanes().count_ones());
-        }
-        let leaves = scan.nodes.iter().filter(|node| node.is_leaf());
-        for (number, node) in leaves.enumerate() {
-            assert!(seen.remove(&number), "leaf {number} is nowhere");
-            assert_eq!(tree.leaves.points(number), node.points());
-            assert_eq!(scan.nodes[tree.leaves.id(number) as usize], *node);
-            for (block, first, points) in tree.leaves.blocks(number) {
-                let bounds = &scan.boxes[tree.leaves.id(number) as usize];
+        let (topology, leaves) = (scan.topology(), scan.slices().leaves);
+        for number in 0..topology.leaves() {
+            let bounds = scan.tree().bounds(topology.leaf(number));
+            for (block, first, points) in leaves.blocks(number) {
                 assert_eq!((block.centre, block.half, block.axes), (bounds.centre, bounds.half, bounds.axes));
                 // Sixteen bits of each number, and the lanes as one by one.
                 let off = |x: [f32; 3], y: [f32; 3]| (0..3).fold(0.0_f32, |m, k| m.max((x[k] - y[k]).abs()));
@@ -111,10 +87,9 @@ fn every_leaf_is_below_one_node_and_every_box_is_its_own() {
                     }
                 }
             }
-            let counts = tree.leaves.blocks(number).map(|(.., points)| points);
-            assert_eq!(counts.sum::<usize>(), node.count as usize);
+            let counts = leaves.blocks(number).map(|(.., points)| points);
+            assert_eq!(counts.sum::<usize>(), topology.points_of_leaf(number).len());
         }
-        assert!(seen.is_empty());
     }
 }
 
@@ -133,16 +108,17 @@ fn sixteen_pairs_at_once_are_what_one_by_one_is() {
         let turned = Pose::from_axis_angle(unit_vector(rng), 3.0);
         let relative = Relative::new(&turned.with_scale(scale).with_translation(point_in(rng, 1.0)), 8.0);
         let reach = [0.0, 0.1, 0.5][round % 3];
-        let pair = [&a, &b].map(|scan| &scan.wide.nodes[round * 7 % scan.wide.nodes.len()]);
-        let bounds = |scan: &Slices<'_>, child: Child| scan.boxes[scan.wide.id(child).index()];
+        let parents = [&a, &b].map(|scan| NodeId(id32(round * 7 % scan.tree.topology().inner())));
+        let sides = [Side::below(&a.tree, parents[0]), Side::below(&b.tree, parents[1])];
         let (mut near, mut compared, mut most) = (0, 0, f32::NEG_INFINITY);
         let overlap = |lane: u32| {
-            let [of_a, of_b] = [pair[0].children[lane as usize % 4], pair[1].children[lane as usize / 4]];
-            (of_a != Child::NONE && of_b != Child::NONE).then(|| {
-                let (box_a, box_b) = (bounds(&a, of_a), bounds(&b, of_b));
-                let (gaps, overlaps) =
-                    relative.gaps_and_overlaps([&box_a; 2], [&box_b; 2], f32::MIN_POSITIVE);
-                (gaps[0], overlaps[0])
+            let [i, j] = [lane % 4, lane / 4];
+            let is_there = sides[0].lanes >> i & 1 == 1 && sides[1].lanes >> j & 1 == 1;
+            is_there.then(|| {
+                let [of_a, of_b] = [sides[0].id(i), sides[1].id(j)];
+                let (box_a, box_b) = (a.tree.bounds(of_a), b.tree.bounds(of_b));
+                let overlap = relative.overlap(&box_a, &box_b, f32::MIN_POSITIVE);
+                (relative.gap(&box_a, &box_b), overlap)
             })
         };
         let mut apart = f32::INFINITY;
@@ -158,16 +134,25 @@ fn sixteen_pairs_at_once_are_what_one_by_one_is() {
         for level in levels() {
             let found = dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || compare(simd, &relative, pair, (reach, true)),
+                || {
+                    let pair = TreePair { a: &a.tree, b: &b.tree, relative: &relative, reach };
+                    let there = (0..16).filter(|&lane| overlap(lane).is_some()).fold(0, |bits, lane| bits | 1 << lane);
+                    assert_eq!(there, (sides[0].lanes * 0x1111) & EACH_IN_FOUR[sides[1].lanes as usize]);
+                    let found = pair.compare(simd, [sides[0].boxes, sides[1].boxes], there, true);
+                    (found.lanes, found.most, found.shares, found.apart, found.gaps.to_array())
+                },
             ));
-            assert_eq!((found.lanes, found.compared), (near, compared), "round {round}, {level:?}");
-            assert_eq!(found.apart.to_bits(), apart.to_bits(), "round {round}, {level:?}");
-            for lane in (0..16).filter(|lane| near >> lane & 1 == 1) {
-                let expected = overlap(lane).map(|(_, overlap)| overlap);
-                assert_eq!(Some(1.0 - found.shares[lane as usize]), expected, "{round}, {level:?}");
+            let (lanes, first, shares, least, gaps) = found;
+            assert_eq!(lanes, near, "round {round}, {level:?}");
+            assert_eq!(least.to_bits(), apart.to_bits(), "round {round}, {level:?}");
+            for (lane, expected) in (0..16).filter_map(|lane| Some((lane, overlap(lane)?))) {
+                assert_eq!(gaps[lane as usize], expected.0, "round {round}, {level:?}");
+                if near >> lane & 1 == 1 {
+                    assert_eq!(1.0 - shares[lane as usize], expected.1, "{round}, {level:?}");
+                }
             }
             if near != 0 {
-                assert_eq!(overlap(found.most).map(|(_, overlap)| overlap), Some(most), "{round}, {level:?}");
+                assert_eq!(overlap(first).map(|(_, overlap)| overlap), Some(most), "{round}, {level:?}");
             }
         }
         near_ones += near.count_ones();
@@ -191,10 +176,10 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
         let relative = Relative::new(&pose.with_translation(shift), 64.0);
         let reach = relative.slack() + [0.1, 0.3][round % 2];
         let mut visitor = All { most: usize::MAX, ..All::default() };
-        let stack = &mut WideStack::default();
-        let pair = (&a.slices(), &b.slices());
-        let flow = descend_wide(pair, &relative, reach, Level::new(), stack, &mut visitor);
-        assert!(flow.is_continue() && stack.pairs.is_empty());
+        let stack = &mut Stack::default();
+        let pair = TreePair { a: &a.tree(), b: &b.tree(), relative: &relative, reach };
+        let flow = descend(pair, Level::new(), stack, &mut visitor);
+        assert!(flow.is_continue() && stack.iter().next().is_none());
         let found: BTreeSet<[usize; 2]> = visitor.leaves.iter().copied().collect();
         assert_eq!(found.len(), visitor.leaves.len(), "round {round}: some leaves twice");
         let leaves = |scan: &PointHierarchy| scan.len().div_ceil(leaf_size as usize);
@@ -214,34 +199,36 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
         }
         // Ended and gone on with from the open pairs, nothing is lost.
         let mut first = All { most: found.len() / 2, ..All::default() };
-        let flow = descend_wide(pair, &relative, reach, Level::new(), stack, &mut first);
+        let flow = descend(pair, Level::new(), stack, &mut first);
         assert_eq!(flow.is_break(), !found.is_empty());
-        let open: Vec<NodePair> = stack.open(pair.0, pair.1).collect();
+        let open: Vec<NodePair> = stack.iter().collect();
         for &[leaf_a, leaf_b] in found.iter().filter(|leaves| !first.leaves.contains(leaves)) {
             let holds = |scan: &PointHierarchy, id: NodeId, leaf: usize| {
-                let (points, node) = (scan.wide.leaves.points(leaf), scan.nodes[id.index()].points());
+                let (points, node) = (scan.topology().points_of_leaf(leaf), scan.topology().points(id));
                 node.start <= points.start && points.end <= node.end
             };
             let is_open = open.iter().any(|pair| holds(&a, pair.a, leaf_a) && holds(&b, pair.b, leaf_b));
             assert!(is_open, "round {round}: {leaf_a}, {leaf_b} is not open");
         }
+        let mut rest = All { most: usize::MAX, ..All::default() };
+        assert!(resume(pair, Level::new(), stack, &mut rest).is_continue());
+        let all: BTreeSet<[usize; 2]> = first.leaves.iter().chain(&rest.leaves).copied().collect();
+        assert_eq!(all, found, "round {round}: gone on with");
+        // In whatever order.
+        let mut best = All { most: usize::MAX, ..All::default() };
+        assert!(descend(pair, Level::new(), &mut Heap::default(), &mut best).is_continue());
+        let by_heap: BTreeSet<[usize; 2]> = best.leaves.iter().copied().collect();
+        assert_eq!((by_heap, best.leaves.len()), (found.clone(), found.len()), "round {round}: by urgency");
     }
     assert!(found_any > 200, "{found_any}");
 }
 
-/// The leaves that are near in the order of the descent, one pair of boxes after the other, from the binary
-/// trees.
+/// The leaves that are near in the order of the descent, one pair of boxes after the other.
 fn plunged([a, b]: [&PointHierarchy; 2], relative: &Relative, reach: f32, mut turns: u32) -> Vec<[usize; 2]> {
-    let number = |scan: &PointHierarchy, id: NodeId| (scan.nodes[id.index()].first / scan.leaf_size) as usize;
-    let is_leaf = |scan: &PointHierarchy, id: NodeId| scan.nodes[id.index()].is_leaf();
-    let below = |scan: &PointHierarchy, id: NodeId| -> Vec<NodeId> {
-        let children = |id: NodeId| {
-            if is_leaf(scan, id) { vec![id] } else { scan.nodes[id.index()].children(id).to_vec() }
-        };
-        children(id).into_iter().flat_map(children).collect()
-    };
+    let is_leaf = |scan: &PointHierarchy, id: NodeId| scan.topology().is_leaf(id);
+    let below = |scan: &PointHierarchy, id: NodeId| scan.topology().children(id).iter().collect::<Vec<_>>();
     let longest = |scan: &PointHierarchy, id: NodeId| {
-        below(scan, id).into_iter().map(|id| scan.boxes[id.index()].half[0]).fold(0.0, f32::max)
+        below(scan, id).into_iter().map(|id| scan.tree().bounds(id).half[0]).fold(0.0, f32::max)
     };
     let mut order = Vec::new();
     let mut open = vec![(NodeId::ROOT, NodeId::ROOT, 1.0)];
@@ -249,7 +236,7 @@ fn plunged([a, b]: [&PointHierarchy; 2], relative: &Relative, reach: f32, mut tu
         let leaves = [is_leaf(a, of_a), is_leaf(b, of_b)];
         let mut whole = leaves;
         if leaves == [true; 2] {
-            order.push([number(a, of_a), number(b, of_b)]);
+            order.push([a.topology().leaf_number(of_a), b.topology().leaf_number(of_b)]);
         } else if leaves == [false; 2] {
             let lengths = [longest(a, of_a), longest(b, of_b) * relative.scale()];
             whole = [lengths[1] > 2.0 * lengths[0], lengths[0] > 2.0 * lengths[1]];
@@ -259,10 +246,9 @@ fn plunged([a, b]: [&PointHierarchy; 2], relative: &Relative, reach: f32, mut tu
             let split = |scan, id, whole: bool| if whole { vec![id] } else { below(scan, id) };
             for &b_id in &split(b, of_b, whole[1]) {
                 for &a_id in &split(a, of_a, whole[0]) {
-                    let boxes = ([&a.boxes[a_id.index()]; 2], [&b.boxes[b_id.index()]; 2]);
-                    let (gaps, overlaps) = relative.gaps_and_overlaps(boxes.0, boxes.1, f32::MIN_POSITIVE);
-                    if gaps[0] <= reach {
-                        near.push((a_id, b_id, overlaps[0]));
+                    let (of_a, of_b) = (a.tree().bounds(a_id), b.tree().bounds(b_id));
+                    if relative.gap(&of_a, &of_b) <= reach {
+                        near.push((a_id, b_id, relative.overlap(&of_a, &of_b, f32::MIN_POSITIVE)));
                     }
                 }
             }
@@ -295,12 +281,17 @@ fn after_nothing_comes_what_overlaps_most_of_all_that_is_left() {
         let pose = Pose::from_axis_angle(unit_vector(rng), 2.0).with_scale([1.0, 0.3, 4.0][round % 3]);
         let relative = Relative::new(&pose.with_translation(point_in(rng, 0.5)), 64.0);
         let wants_any = round % 4 != 0;
-        let expected = plunged([&a, &b], &relative, 0.05, if wants_any { TURNS } else { 0 });
+        let expected = plunged([&a, &b], &relative, 0.05, if wants_any { frontier::TURNS } else { 0 });
         for level in levels() {
-            let mut visitor = All { most: usize::MAX, wants_any, ..All::default() };
-            let stack = &mut WideStack::default();
-            let trees = (&a.slices(), &b.slices());
-            assert!(descend_wide(trees, &relative, 0.05, level, stack, &mut visitor).is_continue());
+            let mut visitor = All { most: usize::MAX, ..All::default() };
+            let stack = &mut Stack::default();
+            let trees = TreePair { a: &a.tree(), b: &b.tree(), relative: &relative, reach: 0.05 };
+            let flow = if wants_any {
+                descend(trees, level, &mut Plunging::new(stack), &mut visitor)
+            } else {
+                descend(trees, level, stack, &mut visitor)
+            };
+            assert!(flow.is_continue());
             assert_eq!(visitor.leaves, expected, "round {round}, {level:?}");
         }
         pairs += expected.len();
@@ -314,46 +305,38 @@ fn children_and_grandchildren_in_lanes_have_the_bounds_of_their_nodes() {
     let rng = &mut rng(6);
     for (count, leaf_size) in [(9, 16), (33, 16), (48, 16), (700, 5), (900, 40)] {
         let scan = scan(rng, count, [1.0, 1.0, 0.1], leaf_size);
-        let slices = scan.slices();
-        let mut open = vec![scan.wide.root()];
-        while let Some(node) = open.pop() {
-            let alone = slices.bounds_of(Part::Surface, node);
-            let id = scan.wide.id(node).index();
-            assert_eq!((alone.centre, alone.axes), (slices.boxes[id].centre, slices.boxes[id].axes));
-            if node.is_leaf() {
+        let (topology, tree) = (scan.topology(), scan.tree());
+        for node in topology.ids() {
+            let alone = tree.bounds_of(Part::Surface, node);
+            assert_eq!((alone.centre, alone.axes), (tree.bounds(node).centre, tree.bounds(node).axes));
+            if topology.is_leaf(node) {
                 continue;
             }
-            let (children, known) = scan.wide.children(node);
-            let (below, lanes) = scan.wide.grandchildren(node);
-            let expected = |lane: usize| slices.bounds_of(Part::Surface, children[lane]);
+            let children: Vec<NodeId> = topology.children(node).iter().collect();
+            let grandchildren = topology.grandchildren(node);
+            let Grandchildren { ids: below, lanes, .. } = grandchildren;
+            let expected = |lane: usize| tree.bounds_of(Part::Surface, children[lane]);
             for level in levels() {
                 dispatch!(level, simd => {
-                    let own = slices.bounds_of_children(simd, Part::Surface, node);
-                    for lane in 0..known {
+                    let own = tree.bounds_of_children(simd, Part::Surface, node);
+                    for lane in 0..children.len() {
                         assert_eq!(own.map(|row| row[lane]), expected(lane), "{node:?}, {lane}, {level:?}");
                     }
-                    let own = slices.bounds_of_grandchildren(simd, Part::Surface, node);
+                    let own = tree.bounds_of_grandchildren(simd, Part::Surface, &grandchildren);
                     for lane in (0..LANES).filter(|lane| lanes >> lane & 1 != 0) {
-                        let expected = slices.bounds_of(Part::Surface, below[lane]);
+                        let expected = tree.bounds_of(Part::Surface, below[lane]);
                         assert_eq!(own.map(|row| row[lane]), expected, "{node:?}, {lane}, {level:?}");
                     }
                 });
             }
             // In the place of each child stand its own children, or a leaf itself.
-            let found: Vec<Child> =
+            let found: Vec<NodeId> =
                 (0..LANES).filter(|lane| lanes >> lane & 1 != 0).map(|lane| below[lane]).collect();
-            let expected: Vec<Child> = children[..known]
-                .iter()
-                .flat_map(|&child| {
-                    if child.is_leaf() {
-                        return vec![child];
-                    }
-                    let (below, known) = scan.wide.children(child);
-                    below[..known].to_vec()
-                })
-                .collect();
-            assert_eq!(found, expected);
-            open.extend(&children[..known]);
+            let of_child = |&child: &NodeId| match topology.is_leaf(child) {
+                true => vec![child],
+                false => topology.children(child).iter().collect(),
+            };
+            assert_eq!(found, children.iter().flat_map(of_child).collect::<Vec<_>>());
         }
     }
 }

@@ -1,0 +1,356 @@
+//! The descent of a pair of trees: one loop, sixteen pairs of boxes in one pass. What differs between
+//! questions is the visitor, and in which order it wants pairs.
+
+mod frontier;
+
+use std::ops::ControlFlow;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
+use nearmiss_lanes::wide::{bits, repeated, spread};
+
+use crate::boxes::Relative;
+use crate::lanes::{Boxes, along_normals};
+use crate::topology::{FAN, NodePair};
+use crate::tree::{LANES, Lanes, Siblings, Tree, lanes_of, whole};
+
+pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
+
+/// What a descent does with what it finds.
+pub trait PairVisitor {
+    /// Whether [`Self::least_apart`] is called.
+    const NOTES_GAPS: bool = false;
+
+    /// Whether [`Self::apart`] is called.
+    const NOTES_PAIRS: bool = false;
+
+    /// Whether [`Self::urgency`] is called.
+    const LOOKS_CLOSER: bool = false;
+
+    /// So many pairs of boxes were compared; may end the descent.
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()>;
+
+    /// Two leaves, by their numbers, whose boxes are not apart.
+    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()>;
+
+    /// Of the pairs of boxes that were compared last those that are apart are no less so than this.
+    fn least_apart(&mut self, gap: f32) {
+        let _ = gap;
+    }
+
+    /// A pair whose boxes are apart by this gap, or that [`Self::urgency`] left out.
+    fn apart(&mut self, pair: NodePair, gap: f32) {
+        let _ = (pair, gap);
+    }
+
+    /// Which pairs come first: those for which this is least. `share` is the distance of the centres of two
+    /// boxes as a share of how far these reach. `None` where nothing below the pair can matter.
+    fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
+        let _ = pair;
+        Some(share)
+    }
+
+    /// Returns `true` if a leaf and an inner node, whose boxes are not apart, are known to hold nothing that
+    /// meets.
+    fn is_apart(&mut self, pair: NodePair) -> bool {
+        let _ = pair;
+        false
+    }
+
+    /// Which nodes of a pair are not to be split although they may have children.
+    fn is_fine(&self, pair: NodePair) -> [bool; 2] {
+        let _ = pair;
+        [false; 2]
+    }
+
+    /// Two nodes that are not to be split, of which one or both have children.
+    fn fine_pair(&mut self, pair: NodePair) -> ControlFlow<()> {
+        let _ = pair;
+        ControlFlow::Continue(())
+    }
+}
+
+/// Two trees in relative motion, and which of their boxes are near each other.
+#[derive(Debug, Clone, Copy)]
+pub struct TreePair<'a> {
+    /// The tree whose frame is that of lengths.
+    pub a: &'a Tree<'a>,
+    /// The other tree.
+    pub b: &'a Tree<'a>,
+    /// The motion of b's frame into a's.
+    pub relative: &'a Relative,
+    /// Boxes no further apart than this are near.
+    pub reach: f32,
+}
+
+/// Visits the pairs of leaves whose boxes are near, from the pair of the roots down, until `visitor` ends it.
+pub fn descend<V: PairVisitor, F: Frontier>(
+    pair: TreePair<'_>,
+    level: Level,
+    frontier: &mut F,
+    visitor: &mut V,
+) -> ControlFlow<()> {
+    frontier.push(Open { pair: NodePair::ROOTS, key: 0.0 });
+    resume(pair, level, frontier, visitor)
+}
+
+/// As [`descend`], from the pairs that the frontier holds. Where the visitor ends it, the frontier holds what
+/// is left, a pair that was not looked at to the end included.
+pub fn resume<V: PairVisitor, F: Frontier>(
+    pair: TreePair<'_>,
+    level: Level,
+    frontier: &mut F,
+    visitor: &mut V,
+) -> ControlFlow<()> {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || pair.resume_by(simd, frontier, visitor),
+    ))
+}
+
+/// What takes the place of a node: its children, or itself.
+struct Side<'a> {
+    boxes: &'a Siblings,
+    /// The lanes that count, as bits.
+    lanes: u32,
+    /// What is in lane `i`: this node, or the `i`-th from it.
+    first: u32,
+    step: u32,
+}
+
+impl<'a> Side<'a> {
+    #[inline(always)]
+    fn below(tree: &Tree<'a>, id: NodeId) -> Self {
+        let children = tree.topology.children(id);
+        Self { boxes: &tree.siblings[id.index()], lanes: lanes_of(children), first: children.first, step: 1 }
+    }
+
+    /// The box of a node stands among those of its siblings; that of a root is written to `alone`.
+    #[inline(always)]
+    fn whole(tree: &'a Tree<'_>, id: NodeId, alone: &'a mut Siblings) -> Self {
+        let (boxes, lane) = if let Some((parent, lane)) = tree.topology.parent(id) {
+            (&tree.siblings[parent.index()], lane)
+        } else {
+            alone.set(0, &tree.root.bounds);
+            (&*alone, 0)
+        };
+        Self { boxes, lanes: 1 << lane, first: id.0, step: 0 }
+    }
+
+    /// The node in a lane.
+    #[inline(always)]
+    fn id(&self, lane: u32) -> NodeId {
+        NodeId(self.first + lane * self.step)
+    }
+}
+
+impl TreePair<'_> {
+    #[inline(always)]
+    fn resume_by<S: Simd, V: PairVisitor, F: Frontier>(
+        &self,
+        simd: S,
+        frontier: &mut F,
+        visitor: &mut V,
+    ) -> ControlFlow<()> {
+        let (a, b) = (self.a, self.b);
+        let (mut alone_a, mut alone_b) = (Siblings::NONE, Siblings::NONE);
+        while let Some(open) = frontier.pop() {
+            let pair = open.pair;
+            let leaves = [a.topology.is_leaf(pair.a), b.topology.is_leaf(pair.b)];
+            let fine = visitor.is_fine(pair);
+            if (leaves[0] || fine[0]) && (leaves[1] || fine[1]) {
+                let flow = if leaves == [true; 2] {
+                    visitor.leaf_pair([a.topology.leaf_number(pair.a), b.topology.leaf_number(pair.b)])
+                } else {
+                    visitor.fine_pair(pair)
+                };
+                if flow.is_break() {
+                    // It was not looked at to the end, so it is still open.
+                    frontier.push(open);
+                    return flow;
+                }
+                frontier.settle(simd);
+                continue;
+            }
+            if leaves[0] != leaves[1] && visitor.is_apart(pair) {
+                frontier.settle(simd);
+                continue;
+            }
+            let [whole_a, whole_b] =
+                if fine == [false; 2] { whole([a, b], pair, leaves, self.relative.scale()) } else { fine };
+            let below_a = if whole_a { Side::whole(a, pair.a, &mut alone_a) } else { Side::below(a, pair.a) };
+            let below_b = if whole_b { Side::whole(b, pair.b, &mut alone_b) } else { Side::below(b, pair.b) };
+            let compared = self.put_near(simd, [&below_a, &below_b], frontier, visitor);
+            visitor.compared(compared)?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Puts the pairs that are near into the frontier; returns how many were compared.
+    #[inline(always)]
+    fn put_near<S: Simd, V: PairVisitor, F: Frontier>(
+        &self,
+        simd: S,
+        [a, b]: [&Side<'_>; 2],
+        frontier: &mut F,
+        visitor: &mut V,
+    ) -> u32 {
+        let there = (a.lanes * 0x1111) & EACH_IN_FOUR[b.lanes as usize % LANES];
+        let near = self.compare(simd, [a.boxes, b.boxes], there, V::NOTES_GAPS);
+        let pair = |lane: u32| NodePair { a: a.id(lane % 4), b: b.id(lane / 4) };
+        let mut lanes = near.lanes;
+        if V::NOTES_GAPS {
+            visitor.least_apart(near.apart);
+        }
+        if V::NOTES_PAIRS {
+            let mut apart = there & !lanes;
+            while apart != 0 {
+                let lane = apart.trailing_zeros();
+                apart &= apart - 1;
+                visitor.apart(pair(lane), near.gaps[lane as usize % LANES]);
+            }
+        }
+        if V::LOOKS_CLOSER {
+            let mut most: Option<Open> = None;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros();
+                lanes &= lanes - 1;
+                let (pair, of) = (pair(lane), lane as usize % LANES);
+                let Some(key) = visitor.urgency(pair, near.shares[of]) else {
+                    visitor.apart(pair, near.gaps[of]);
+                    continue;
+                };
+                let mut open = Open { pair, key };
+                if let Some(known) = &mut most {
+                    if key < known.key {
+                        std::mem::swap(known, &mut open);
+                    }
+                    frontier.push(open);
+                } else {
+                    most = Some(open);
+                }
+            }
+            if let Some(most) = most {
+                frontier.push(most);
+            }
+        } else if lanes == 0 {
+            frontier.settle(simd);
+        } else {
+            let open = |lane: u32| Open { pair: pair(lane), key: near.shares[lane as usize % LANES] };
+            lanes &= !(1 << near.most);
+            while lanes != 0 {
+                frontier.push(open(lanes.trailing_zeros()));
+                lanes &= lanes - 1;
+            }
+            frontier.push(open(near.most));
+        }
+        there.count_ones()
+    }
+
+    /// As [`Relative::gap`] and [`Relative::overlap`], in the same order of operations.
+    #[inline(always)]
+    fn compare<S: Simd>(&self, simd: S, [a, b]: [&Siblings; 2], there: u32, notes_gaps: bool) -> Near<S> {
+        let boxes_a = Boxes {
+            centre: each_repeated(simd, &a.centre),
+            half: each_repeated(simd, &a.half),
+            axes: [
+                each_repeated(simd, &a.axes[0]),
+                each_repeated(simd, &a.axes[1]),
+                each_repeated(simd, &a.axes[2]),
+            ],
+        };
+        let [hx, hy, hz] = four(simd, &b.half);
+        let (relative, scale) = (self.relative, self.relative.scale());
+        let boxes_b = Boxes {
+            centre: each_spread(relative.points_of_four(four(simd, &b.centre))),
+            half: each_spread([hx * scale, hy * scale, hz * scale]),
+            axes: [
+                each_spread(relative.directions_of_four(four(simd, &b.axes[0]))),
+                each_spread(relative.directions_of_four(four(simd, &b.axes[1]))),
+                each_spread(relative.directions_of_four(four(simd, &b.axes[2]))),
+            ],
+        };
+        let mut gap = f32x16::splat(simd, f32::MIN);
+        let mut share = f32x16::splat(simd, 0.0);
+        along_normals(
+            &boxes_a,
+            &boxes_b,
+            #[inline(always)]
+            |away, reach| {
+                gap = gap.max(away - reach);
+                share = share.max(away / (reach + f32::MIN_POSITIVE));
+            },
+        );
+        let there = mask32x16::from_bitmask(simd, u64::from(there));
+        let near = gap.simd_le(self.reach) & there;
+        let apart = if notes_gaps {
+            (there & !near).select(gap, f32x16::splat(simd, f32::INFINITY)).reduce_min()
+        } else {
+            f32::INFINITY
+        };
+        let share = near.select(share, f32x16::splat(simd, f32::INFINITY));
+        let lanes = bits(near);
+        let most = bits(share.simd_eq(share.reduce_min())) & lanes;
+        Near {
+            lanes,
+            // What is no number has no least.
+            most: if most == 0 { lanes } else { most }.trailing_zeros(),
+            shares: share.to_array(),
+            gaps: gap,
+            apart,
+        }
+    }
+}
+
+/// What of sixteen pairs of boxes is near. Lane 4j + i is child i of a and child j of b.
+#[derive(Debug, Clone, Copy)]
+struct Near<S: Simd> {
+    /// Those that are not apart, as bits.
+    lanes: u32,
+    /// The one of these that overlaps most.
+    most: u32,
+    /// How far their centres are from each other, as shares of how far the boxes reach.
+    shares: [f32; LANES],
+    gaps: f32x16<S>,
+    /// How far those that are apart are at least, if that is wanted.
+    apart: f32,
+}
+
+/// For each set of four lanes of b the lanes of its pairs.
+const EACH_IN_FOUR: [u32; LANES] = {
+    let mut each = [0; LANES];
+    let mut lanes = 0;
+    while lanes < LANES {
+        let mut lane = 0;
+        while lane < FAN {
+            if lanes >> lane & 1 != 0 {
+                each[lanes] |= 0xf << (FAN * lane);
+            }
+            lane += 1;
+        }
+        lanes += 1;
+    }
+    each
+};
+
+// A closure given to the standard library would not be compiled for the instruction set.
+
+#[inline(always)]
+fn four<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> [f32x4<S>; 3] {
+    [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
+}
+
+#[inline(always)]
+fn each_repeated<S: Simd>(simd: S, rows: &[Lanes; 3]) -> [f32x16<S>; 3] {
+    let [x, y, z] = four(simd, rows);
+    [repeated(x), repeated(y), repeated(z)]
+}
+
+#[inline(always)]
+fn each_spread<S: Simd>([x, y, z]: [f32x4<S>; 3]) -> [f32x16<S>; 3] {
+    [spread(x), spread(y), spread(z)]
+}
+
+#[cfg(test)]
+mod tests;
