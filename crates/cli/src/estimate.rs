@@ -67,11 +67,13 @@ impl Preparation {
         BASE + self.cost().bytes * points
     }
 
-    /// A cheaper product, and the option that asks for it.
+    /// Cheaper products, and what asks for them.
     fn lighter(self) -> &'static [(Self, &'static str)] {
         match self {
-            Self::ClosePairs => &[(Self::Graph, "--no-close-pairs"), (Self::Hierarchy, "--no-graph")],
-            Self::Graph => &[(Self::Hierarchy, "--no-graph")],
+            Self::ClosePairs => {
+                &[(Self::Graph, "to do without --close-pairs"), (Self::Hierarchy, "to do without a graph")]
+            }
+            Self::Graph => &[(Self::Hierarchy, "to do without a graph")],
             Self::Hierarchy | Self::Geodesic => &[],
         }
     }
@@ -280,15 +282,16 @@ mod tests {
         let message = refused.unwrap_err().to_string();
         let expected = "big.ply: 30,000,000 points need about 44 GB, 8.0 GB are available; try --voxel ";
         assert!(message.starts_with(expected), "{message}");
-        assert!(message.ends_with(", --no-graph, or --memory 46GB to run anyway"), "{message}");
+        assert!(message.ends_with(", to do without a graph, or --memory 46GB to run anyway"), "{message}");
         let size: f64 = message[expected.len()..].split(',').next().unwrap().parse().unwrap();
         assert!((0.01..0.1).contains(&size), "{message}");
 
         let refused = forecast(Limit::Asked(20_000_000_000), Preparation::ClosePairs, &path);
         let message = refused.check_preparing(30_000_000, None).unwrap_err().to_string();
         assert!(
-            message
-                .contains("20 GB are allowed by --memory; try --voxel with a length, --no-close-pairs, or"),
+            message.contains(
+                "20 GB are allowed by --memory; try --voxel with a length, to do without --close-pairs, or"
+            ),
             "{message}"
         );
         let message = refused.check_reading(1_000_000_000, 0).unwrap_err().to_string();

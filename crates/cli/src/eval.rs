@@ -109,7 +109,7 @@ fn view<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<ScanView<'a>, CliError> {
         Metric::Geodesic => {
             let missing = || {
                 let what = "this scan was prepared without a map of close pairs, along which the geodesic \
-                            kernel measures; prepare it again without `--no-close-pairs`";
+                            kernel measures; prepare it again with `--close-pairs`";
                 CliError::Unfit { path: args.file.clone(), what: what.into() }
             };
             Ok(view.with_kernel(scan.geodesic_kernel().ok_or_else(missing)?))

@@ -79,8 +79,8 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     let pairs = scan.graph().and_then(SurfaceGraph::close_pairs);
     // Before anything is written.
     if args.close_pairs.is_some() && pairs.is_none() {
-        let what = "this scan was prepared without a map of close pairs; prepare it again without \
-                    `--no-close-pairs`";
+        let what = "this scan was prepared without a map of close pairs; prepare it again with \
+                    `--close-pairs`";
         return Err(CliError::Unfit { path: args.file.clone(), what: what.into() });
     }
     if let (Some(path), Some(graph)) = (&args.edges, scan.graph()) {

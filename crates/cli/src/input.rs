@@ -137,7 +137,7 @@ impl Opening {
         if is_prepared(path) {
             let scan = self.open(path)?;
             if scan.graph().is_none() {
-                let what = "this scan was prepared without a graph; prepare it again without `--no-graph`";
+                let what = "this scan was prepared without a graph; prepare it again with `--graph`";
                 return Err(CliError::Unfit { path: path.to_owned(), what: what.into() });
             }
             return Ok(scan);

@@ -50,25 +50,27 @@ pub struct PreprocessArgs {
     /// Points in a leaf of the hierarchy, 4 to 64
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(4..=64))]
     pub leaf: u32,
-    /// R: two points are neighbours if the spheres about them that reach their R-th nearest points meet; 1 to
-    /// 32
-    #[arg(long, value_name = "R", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=32))]
-    pub neighbours: u32,
-    /// No graph: normals keep either sign, and nothing is known of distances along the surface
-    #[arg(long, conflicts_with_all = ["neighbours", "paths", "no_close_pairs", "scanner"])]
-    pub no_graph: bool,
-    /// No map of close pairs, which takes most of the file; the geodesic kernel needs it
-    #[arg(long, conflicts_with = "paths")]
-    pub no_close_pairs: bool,
-    /// Whether shortest paths are stored, a byte a pair, or rebuilt when wanted
-    #[arg(long, value_enum, default_value_t = PathsName::Rebuilt)]
-    pub paths: PathsName,
+    /// Add a graph over the points: normals are turned to one side, and searches can go along the surface
+    #[arg(long)]
+    pub graph: bool,
+    /// R: two points are neighbours in the graph if the spheres about them that reach their R-th nearest
+    /// points meet; 1 to 32, by default 4. Implies --graph
+    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(1..=32))]
+    pub neighbours: Option<u32>,
+    /// Add a map of close pairs to the graph, which takes most of the file; the geodesic kernel needs it.
+    /// Implies --graph
+    #[arg(long)]
+    pub close_pairs: bool,
+    /// Whether shortest paths of close pairs are stored, a byte a pair, or rebuilt when wanted, the default.
+    /// Implies --close-pairs
+    #[arg(long, value_enum)]
+    pub paths: Option<PathsName>,
     /// Which distances define the surface: straight ones, or those along the graph, which keep sheets apart
-    /// that are close to each other; the latter takes some tenths longer, and nothing but witnesses is
-    /// certified of it
+    /// that are close to each other. The latter implies --close-pairs, and nothing but witnesses is certified
+    /// of it
     #[arg(long, value_enum, default_value_t = KernelName::Euclidean)]
     pub kernel: KernelName,
-    /// Where the scanner stood, in the frame of the input: normals are turned towards it
+    /// Where the scanner stood, in the frame of the input: normals are turned towards it. Implies --graph
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse_place)]
     pub scanner: Option<Place>,
     /// Threads to work on, 0 for all cores; the result is the same
@@ -171,13 +173,18 @@ struct Seconds {
     write: f64,
 }
 
+impl PreprocessArgs {
+    fn wants_graph(&self) -> bool {
+        self.graph || self.neighbours.is_some() || self.scanner.is_some() || self.wants_close_pairs()
+    }
+
+    fn wants_close_pairs(&self) -> bool {
+        self.close_pairs || self.paths.is_some() || self.kernel == KernelName::Geodesic
+    }
+}
+
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     output::check_apart(&args.output, &[&args.input])?;
-    if args.kernel == KernelName::Geodesic && (args.no_graph || args.no_close_pairs) {
-        let what = "the geodesic kernel measures along the graph by its map of close pairs; leave --no-graph and \
-                    --no-close-pairs out";
-        return Err(CliError::Usage(what.into()));
-    }
     let console = Console::new(args.quiet);
     let name = args.input.display();
 
@@ -247,9 +254,9 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
 
 /// What to expect of the preparation.
 fn forecast(args: &PreprocessArgs, console: Console) -> Forecast<'_> {
-    let preparation = match (args.no_graph, args.no_close_pairs, args.kernel) {
-        (true, ..) => Preparation::Hierarchy,
-        (_, true, _) => Preparation::Graph,
+    let preparation = match (args.wants_graph(), args.wants_close_pairs(), args.kernel) {
+        (false, ..) => Preparation::Hierarchy,
+        (_, false, _) => Preparation::Graph,
         (_, _, KernelName::Euclidean) => Preparation::ClosePairs,
         (_, _, KernelName::Geodesic) => Preparation::Geodesic,
     };
@@ -288,14 +295,14 @@ fn options(args: &PreprocessArgs) -> BuildOptions {
 
 /// What graph is wanted, if any, and where the scanner stood.
 fn graph_options(args: &PreprocessArgs) -> Option<(GraphOptions, Option<[f64; 3]>)> {
-    if args.no_graph {
+    if !args.wants_graph() {
         return None;
     }
     let paths = match args.paths {
-        PathsName::Stored => Paths::Stored,
-        PathsName::Rebuilt => Paths::Rebuilt,
+        Some(PathsName::Stored) => Paths::Stored,
+        Some(PathsName::Rebuilt) | None => Paths::Rebuilt,
     };
-    let pairs = (!args.no_close_pairs).then_some(paths);
-    let options = GraphOptions::default().with_neighbours(args.neighbours).with_close_pairs(pairs);
+    let default = GraphOptions::default().with_close_pairs(args.wants_close_pairs().then_some(paths));
+    let options = args.neighbours.map_or(default, |neighbours| default.with_neighbours(neighbours));
     Some((options, args.scanner.map(|place| place.0)))
 }

@@ -121,8 +121,8 @@ impl SearchArgs {
         if self.wants_graphs() && (lacks(a) || lacks(b)) {
             let which = if lacks(a) { "the first" } else { "the second" };
             return Err(CliError::Usage(format!(
-                "--method interpolation searches along the proximity graph, which {which} scan has not: prepare it without \
-                 --no-graph, or use --method traversal"
+                "--method interpolation searches along the proximity graph, which {which} scan has not: prepare it with \
+                 --graph, or use --method traversal"
             )));
         }
         Ok(())

@@ -162,9 +162,7 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], options: &CollideOptions) ->
                 percent(share)
             )
         }
-        Reason::NoGraph => {
-            "the first scan has no graph to search along; prepare it without --no-graph".to_owned()
-        }
+        Reason::NoGraph => "the first scan has no graph to search along; prepare it with --graph".to_owned(),
         Reason::Pose => "a pose is not finite or makes one object vanish beside the other".to_owned(),
         _ => "for a reason that this program does not know; update it".to_owned(),
     }

@@ -9,7 +9,7 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.05);
     let refused = |options: &[&str], words: &[&str]| {
-        let command = ["preprocess", "ball.xyz", "-o", "ball.nm"];
+        let command = ["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs"];
         place.refused(1, &[&command[..], options].concat(), words);
     };
     let all = [
@@ -20,13 +20,13 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
         "MB to run anyway",
     ];
     refused(&["--memory", "22MB"], &all);
-    refused(&["--memory", "24MB"], &["--no-close-pairs, or --memory"]);
+    refused(&["--memory", "24MB"], &["to do without --close-pairs, or --memory"]);
     refused(&["--memory", "1MB"], &["reading ", "a part of the file, or --memory 2"]);
     refused(&["--memory", "22MB", "--voxel", "0.01", "--quiet"], &["points need about", "--memory 2"]);
     place.refused(2, &["preprocess", "ball.xyz", "-o", "b.nm", "--memory", "big"], &["--memory", "500MB"]);
     for fitting in [
-        &["--memory", "22MB", "--voxel", "0.5"][..],
-        &["--memory", "24MB", "--no-graph"],
+        &["--memory", "22MB", "--voxel", "0.5", "--close-pairs"][..],
+        &["--memory", "24MB"],
         &["--memory", "1GB"],
     ] {
         let done = place.ok(&[&["preprocess", "ball.xyz", "-o", "ball.nm"], fitting].concat());
@@ -35,7 +35,7 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
     // Nothing is read before it is refused: the file is broken further on.
     let rows = text(&sphere(1.0).sample(Sampling::clean(0.02)).points);
     place.write("broken.xyz", format!("{rows}one two three\n"));
-    place.refused(1, &["preprocess", "broken.xyz", "-o", "b.nm", "--memory", "30MB"], &["points need about"]);
+    place.refused(1, &["preprocess", "broken.xyz", "-o", "b.nm", "--memory", "25MB"], &["points need about"]);
     place.refused(1, &["preprocess", "broken.xyz", "-o", "b.nm"], &["`one`"]);
 }
 
@@ -48,14 +48,15 @@ fn long_runs_are_announced() {
     let path = place.write("zeros.ply", header);
     let file = std::fs::File::options().append(true).open(path).unwrap();
     file.set_len(header.len() as u64 + 600_000 * 12).unwrap();
-    let command = ["preprocess", "zeros.ply", "-o", "z.nm", "--threads", "1", "--memory", "4GB"];
+    let command =
+        ["preprocess", "zeros.ply", "-o", "z.nm", "--threads", "1", "--memory", "4GB", "--close-pairs"];
     let done = place.run(&command);
     let mut lines = done.errors.lines();
     assert_eq!(lines.next(), Some("preparing 600,000 points takes about 16 s and 890 MB"), "{}", done.errors);
     assert!(lines.next().is_some_and(|line| line.contains("1 distinct")), "{}", done.errors);
     let quiet = place.run(&[&command[..], &["--quiet"]].concat());
     assert_eq!(quiet.errors.lines().count(), 1, "{}", quiet.errors);
-    let quick = place.run(&[&command[..], &["--no-graph"]].concat());
+    let quick = place.run(&command[..command.len() - 1]);
     assert_eq!(quick.errors.lines().count(), 1, "{}", quick.errors);
 }
 

@@ -96,8 +96,16 @@ fn normals_and_the_graph_follow_the_points_that_stay() {
         let row = |[x, y, z]: &[f64; 3]| format!("{x} {y} {z} {} {} {}\n", side * x, side * y, side * z);
         let rows: String = points.iter().map(row).collect();
         place.write("all.csv", format!("x y z nx ny nz\n{rows}"));
-        let done =
-            place.ok(&["preprocess", "all.csv", "-o", "ball.nm", "--json", "--crop", "-2,-2,-2,2,2,2"]);
+        let done = place.ok(&[
+            "preprocess",
+            "all.csv",
+            "-o",
+            "ball.nm",
+            "--graph",
+            "--json",
+            "--crop",
+            "-2,-2,-2,2,2,2",
+        ]);
         assert_eq!(done.json()[0]["points"], ball);
         assert_eq!(done.json()[0]["graph"]["components"], 1);
         let values = place.ok(&["eval", "ball.nm", "--points", "at.txt", "--json"]).json();

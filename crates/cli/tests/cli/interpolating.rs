@@ -24,14 +24,14 @@ fn is_on_the_circle(place: &Value, off: f64) -> bool {
 fn scans_without_a_graph_are_refused_and_raw_ones_get_one() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.08);
-    place.ok(&["preprocess", "ball.xyz", "-o", "bare.nm", "--no-graph", "--quiet"]);
-    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "bare.nm", "--quiet"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs", "--quiet"]);
     for (scans, which) in
         [(["bare.nm", "ball.nm"], "the first scan"), (["ball.nm", "bare.nm"], "the second scan")]
     {
         for flat in [&[][..], &["--flat"]] {
             let asked = [&["collide", scans[0], scans[1]], &METHOD[..], flat].concat();
-            place.refused(2, &asked, &[which, "--no-graph", "--method traversal"]);
+            place.refused(2, &asked, &[which, "--graph", "--method traversal"]);
         }
     }
     let touching = shift(1.2, 0.0, 0.0);
@@ -56,7 +56,7 @@ fn scans_without_a_graph_are_refused_and_raw_ones_get_one() {
 fn all_contacts_are_listed() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.08);
-    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs", "--quiet"]);
     let touching = shift(1.2, 0.0, 0.0);
     for (flat, least) in [(&[][..], 20), (&["--flat"], 8), (&["--flat", "--brackets", "annulus"], 8)] {
         let options = [&["--all", "--pose-b", &touching], flat].concat();
@@ -80,7 +80,7 @@ fn all_contacts_are_listed() {
 fn numbers_of_the_search_count_or_are_refused() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.04);
-    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs", "--quiet"]);
     // Nothing is found: all that is drawn is evaluated.
     let apart = shift(1.7, 1.2, 0.0);
     let evaluations = |options: &[&str]| {
@@ -124,7 +124,7 @@ fn numbers_of_the_search_count_or_are_refused() {
 fn a_density_is_measured_derived_and_stored() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.1);
-    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs", "--quiet"]);
     let options = ["density", "ball.nm", "--error", "0.02", "--per-distance", "10", "--json", "--quiet"];
     let told = place.ok(&options).json().remove(0);
     assert_eq!(told["derived"], 216, "30 surfels, one in fifty empty");

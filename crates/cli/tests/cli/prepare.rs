@@ -12,7 +12,7 @@ const FIELDS: &str = "points dropped bounds kernel sampling_radius reach bandwid
 fn the_report_has_the_fields_that_scripts_rely_on() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.1);
-    let done = place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--json"]);
+    let done = place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs", "--json"]);
     let [report] = &done.json()[..] else { panic!("one line: {}", done.results) };
     assert_eq!(keys(report), sorted(&format!("{FIELDS} seconds")));
     assert_eq!(keys(&report["dropped"]), ["duplicate", "not_finite"]);
@@ -60,36 +60,36 @@ fn the_report_has_the_fields_that_scripts_rely_on() {
 }
 
 #[test]
-fn a_graph_is_left_out_where_nobody_wants_it() {
+fn a_graph_is_made_where_it_is_asked_for() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.1);
     let mut sizes = Vec::new();
-    for asked in [&["--no-graph"][..], &["--no-close-pairs"], &[], &["--paths", "stored"]] {
+    for asked in [&[][..], &["--graph"], &["--close-pairs"], &["--paths", "stored"]] {
         let mut words = vec!["preprocess", "ball.xyz", "-o", "ball.nm", "--json"];
         words.extend(asked);
         let report = place.ok(&words).json().remove(0);
         sizes.push(report["bytes"].as_u64().unwrap());
         let seen = place.ok(&["inspect", "ball.nm", "--verify", "--json"]).json().remove(0);
         assert_eq!(seen["graph"], report["graph"], "{asked:?}");
-        assert_eq!(report["graph"].is_null(), asked == ["--no-graph"], "{asked:?}");
+        assert_eq!(report["graph"].is_null(), asked.is_empty(), "{asked:?}");
     }
     assert!(sizes.is_sorted_by(|a, b| a < b), "{sizes:?}");
-    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--no-graph"]);
-    place.refused(1, &["export", "ball.nm", "--edges", "e.csv"], &["ball.nm", "--no-graph"]);
-    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--no-close-pairs"]);
+    place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm"]);
+    place.refused(1, &["export", "ball.nm", "--edges", "e.csv"], &["ball.nm", "--graph"]);
+    // Its options ask for it.
+    for asked in [["--neighbours", "5"], ["--scanner", "0,0,0"]] {
+        let words = [&["preprocess", "ball.xyz", "-o", "ball.nm", "--json"][..], &asked].concat();
+        let report = place.ok(&words).json().remove(0);
+        assert_eq!(report["graph"]["close_pairs"].as_u64(), Some(0), "{report}");
+    }
     for asked in [
         &["export", "ball.nm", "--close-pairs", "c.csv"][..],
         &["export", "ball.nm", "--edges", "e.csv", "--close-pairs", "c.csv"],
         &["eval", "ball.nm", "--points", "ball.xyz", "--kernel", "geodesic"],
     ] {
-        place.refused(1, asked, &["ball.nm", "--no-close-pairs"]);
+        place.refused(1, asked, &["ball.nm", "with `--close-pairs`"]);
     }
     place.refused(2, &["preprocess", "ball.xyz", "-o", "ball.nm", "--scanner", "1,2"], &["--scanner"]);
-    place.refused(
-        2,
-        &["preprocess", "ball.xyz", "-o", "b.nm", "--no-graph", "--paths", "stored"],
-        &["--paths"],
-    );
 }
 
 /// Edges and close pairs name exported points, and their lengths are those between these.
@@ -184,7 +184,7 @@ fn grid(from: [f64; 2], counts: [u16; 2], step: f64) -> Vec<[f64; 3]> {
 fn examined(points: &[[f64; 3]], options: &[&str]) -> (serde_json::Value, Vec<String>) {
     let place = Place::new();
     place.write("scan.xyz", text(points));
-    place.ok(&[&["preprocess", "scan.xyz", "-o", "scan.nm", "--no-graph", "--quiet"], options].concat());
+    place.ok(&[&["preprocess", "scan.xyz", "-o", "scan.nm", "--quiet"], options].concat());
     let report = place.ok(&["inspect", "scan.nm", "--json"]).json().remove(0);
     let told = place.ok(&["inspect", "scan.nm"]).results;
     let advice = told.lines().filter(|line| line.starts_with("advice") || line.starts_with("health"));
@@ -215,8 +215,7 @@ fn uneven_spacing_is_told_with_its_share_of_the_area() {
     let place = Place::new();
     let points = [grid([0.0, 0.0], [150, 150], 0.02), grid([3.0, 0.0], [8, 8], 0.4)].concat();
     place.write("scan.xyz", text(&points));
-    let joined =
-        place.ok(&["preprocess", "scan.xyz", "-o", "s.nm", "--no-graph", "--json", "--reach", reach]).json();
+    let joined = place.ok(&["preprocess", "scan.xyz", "-o", "s.nm", "--json", "--reach", reach]).json();
     assert!(joined[0]["kinds"]["sparse"].as_f64().unwrap() < 0.0001, "{}", joined[0]);
     assert!((joined[0]["reach"].as_f64().unwrap() - reach.parse::<f64>().unwrap()).abs() < 1e-6);
 }
@@ -426,10 +425,6 @@ fn scans_are_prepared_for_a_kernel() {
     };
     prepare("euclidean", "straight.nm");
     prepare("geodesic", "along.nm");
-    for without in ["--no-graph", "--no-close-pairs"] {
-        let words = ["preprocess", "ball.xyz", "-o", "b.nm", "--kernel", "geodesic", without];
-        place.refused(2, &words, &["geodesic", without]);
-    }
 
     let touching = crate::running::shift(1.2, 0.0, 0.0);
     let ask = |a: &str, b: &str, options: &[&str]| {
