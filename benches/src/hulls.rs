@@ -53,7 +53,7 @@ fn distance_sq(centres: &[Vector3<f64>], x: Vector3<f64>) -> f64 {
 }
 
 fn centres(slices: &Slices<'_>, node: usize) -> Vec<Vector3<f64>> {
-    slices.samples(node).iter().map(|i| wide(slices.positions[i])).collect()
+    slices.samples(node).iter().map(|i| wide(slices.position(i))).collect()
 }
 
 impl Hulls {

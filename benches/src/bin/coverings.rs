@@ -79,7 +79,7 @@ fn bytes(scan: &Scan) {
 fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Failure> {
     let slices = scan.slices();
     let tree: ImmutableKdTree<f64, 3> = {
-        let points: Vec<[f64; 3]> = slices.positions.iter().map(|p| p.map(f64::from)).collect();
+        let points: Vec<[f64; 3]> = scan.positions().iter().map(|p| p.map(f64::from)).collect();
         ImmutableKdTree::new_from_slice(&points).map_err(|e| format!("{e:?}"))?
     };
     let mut scratch = GatherScratch::default();
@@ -92,7 +92,7 @@ fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Fail
         }
         let i = i % scan.len();
         let away = point_in(&mut random, 1.5 * f64::from(slices.radii[i]));
-        let start = [0, 1, 2].map(|k| f64::from(slices.positions[i][k]) + away[k]);
+        let start = [0, 1, 2].map(|k| f64::from(slices.position(i)[k]) + away[k]);
         let foot = project(start, |x| scan.evaluate_with(x, &mut scratch));
         if !foot.converged {
             continue;
@@ -104,7 +104,7 @@ fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Fail
         let mut next = Some(topology.leaf_of(usize::try_from(point)?));
         while let Some(id) = next.map(NodeId::index) {
             let far = slices.samples(id).iter().map(|i| {
-                (0..3).map(|k| (f64::from(slices.positions[i][k]) - foot.point[k]).powi(2)).sum::<f64>()
+                (0..3).map(|k| (f64::from(slices.position(i)[k]) - foot.point[k]).powi(2)).sum::<f64>()
             });
             furthest_sq[id] = furthest_sq[id].max(far.fold(f64::INFINITY, f64::min));
             next = next.and_then(|id| topology.parent(id)).map(|(parent, _)| parent);

@@ -154,7 +154,7 @@ fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), WriteErr
     let length = |stored: f32| (f64::from(stored) * frame.scale) as f32;
     for node in at_depth(scan, &report::depths(scan), Some(level)) {
         for i in slices.samples(node).iter() {
-            positions.push(frame.to_world(slices.positions[i]));
+            positions.push(frame.to_world(slices.position(i)));
             source.push(scan.source()[i]);
             nodes.push(u32::try_from(node).unwrap_or(u32::MAX));
             covering.push(length(slices.covering_radius(node)));

@@ -46,9 +46,9 @@ pub fn apart(
     let (radius_b, bounds_b) = extent.of(b, pair.b);
     let radius_b = radius_b * motion.scale();
     let reach = reach + ROUNDINGS * motion.slack();
-    let of_a = a.samples(node_a).iter().map(|i| a.positions[i]);
+    let of_a = a.samples(node_a).iter().map(|i| a.position(i));
     let near_a = within(of_a, &motion.moved(&bounds_b), radius_a + reach);
-    let of_b = b.samples(node_b).iter().map(|i| motion.point(b.positions[i]));
+    let of_b = b.samples(node_b).iter().map(|i| motion.point(b.position(i)));
     let near_b = within(of_b, &bounds_a, radius_b + reach);
     let least = radius_a + radius_b + reach;
     let (few, many) = if near_a.len() < near_b.len() { (&near_a, &near_b) } else { (&near_b, &near_a) };

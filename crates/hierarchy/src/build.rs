@@ -1,5 +1,7 @@
 //! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
 
+use std::sync::{Arc, OnceLock};
+
 use bytemuck::bytes_of;
 use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
 use nearmiss_index::PointBlock;
@@ -26,7 +28,7 @@ use crate::part::Part;
 use crate::samples::{lists, samples};
 use crate::sampling::Sampling;
 use crate::slices::Slices;
-use crate::surfels::{Known, NormalCone, Surfels, align, surfels};
+use crate::surfels::{Known, Surfels, align, surfels};
 use crate::topology::Topology;
 use crate::tree::{Bare, Growths, Root, Siblings, Tree, growths_of_siblings, siblings};
 
@@ -49,7 +51,8 @@ pub struct PointHierarchy {
     pub(crate) is_oriented: bool,
     pub(crate) metric: Metric,
     pub(crate) plan: SurfacePlan,
-    pub(crate) positions: Array<[f32; 3]>,
+    /// One by one, where they were wanted; they stand in blocks.
+    pub(crate) positions: OnceLock<Arc<Vec<[f32; 3]>>>,
     pub(crate) normals: Array<[f32; 3]>,
     pub(crate) radii: Array<f32>,
     pub(crate) discs: Array<f32>,
@@ -66,7 +69,6 @@ pub struct PointHierarchy {
     pub(crate) outline: Outline,
     pub(crate) sample_lists: Array<u32>,
     pub(crate) coverings: Array<Covering>,
-    pub(crate) cones: Array<NormalCone>,
     pub(crate) blocks: Array<PointBlock>,
     pub(crate) groups: Array<PointBlock>,
     pub(crate) lists: Array<NeighbourList>,
@@ -88,7 +90,6 @@ impl PointHierarchy {
     #[must_use]
     pub fn slices(&self) -> Slices<'_> {
         Slices {
-            positions: &self.positions,
             normals: &self.normals,
             radii: &self.radii,
             discs: &self.discs,
@@ -112,7 +113,7 @@ impl PointHierarchy {
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a cloud has at least eight points")]
     pub fn len(&self) -> usize {
-        self.positions.len()
+        self.source.len()
     }
 
     /// The frame of the stored positions in the caller's.
@@ -184,14 +185,18 @@ impl PointHierarchy {
         self.samples_a_node
     }
 
-    /// Positions in leaf order.
+    /// Positions in leaf order. A scan from a file makes them when they are first wanted, in O(n):
+    /// [`Slices::position`] gives one without.
     #[must_use]
     pub fn positions(&self) -> &[[f32; 3]] {
-        &self.positions
+        self.positions.get_or_init(|| {
+            let (blocks, points): (&[PointBlock], _) = (&self.blocks, 0..self.len());
+            Arc::new(points.map(|i| PointBlock::position_in(blocks, i)).collect())
+        })
     }
 
-    /// Unit normals: of either sign, within a leaf all on the side of its cone's axis, until they
-    /// [are turned](Self::turn_normals).
+    /// Unit normals: of either sign, within a leaf all on one side, until they [are
+    /// turned](Self::turn_normals).
     #[must_use]
     pub fn normals(&self) -> &[[f32; 3]] {
         &self.normals
@@ -246,7 +251,7 @@ impl PointHierarchy {
     /// What leaves are made of.
     pub(crate) fn leaf_parts(&self) -> LeafParts<'_> {
         LeafParts {
-            positions: &self.positions,
+            positions: self.positions(),
             normals: &self.normals,
             discs: &self.discs,
             kinds: &self.kinds,
@@ -262,7 +267,7 @@ impl PointHierarchy {
         hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
         hash.update(bytes_of(&[self.leaf_size, self.samples_a_node, self.dense]));
         hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
-        hash.update(bytemuck::cast_slice(slices.positions));
+        hash.update(bytemuck::cast_slice(self.positions()));
         hash.update(bytemuck::cast_slice(slices.discs));
         Outline {
             identity: hash.digest(),
@@ -379,15 +384,8 @@ impl PointHierarchy {
     pub fn bytes_of_nodes(&self) -> usize {
         size_of_val::<[_]>(&self.siblings)
             + 2 * size_of_val::<[_]>(&self.growths[0])
-            + size_of_val::<[_]>(&self.cones)
             + size_of_val::<[_]>(&self.sample_lists)
             + size_of_val::<[_]>(&self.coverings)
-    }
-
-    /// The directions of a leaf's normals. Leaves are numbered in the order of their points.
-    #[must_use]
-    pub fn cones(&self) -> &[NormalCone] {
-        &self.cones
     }
 
     /// The points in blocks: `i` stands in lane `i` % 16 of block `i` / 16.
@@ -425,7 +423,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves, obstacles } =
         surfels(&index, &known, &fits);
     drop(fits);
-    let cones: Vec<NormalCone> = normals.chunks_mut(leaf_size).map(align).collect();
+    normals.chunks_mut(leaf_size).for_each(align);
     let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
     let boxes = boxes_of_discs(&topology, &boxes, &of_points);
     drop(balls);
@@ -459,7 +457,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         is_oriented: false,
         metric: Metric::Euclidean,
         plan,
-        positions: positions.into(),
+        positions: Arc::new(positions).into(),
         normals: normals.into(),
         radii: radii.into(),
         discs: discs.into(),
@@ -474,7 +472,6 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         outline: Outline::default(),
         sample_lists: sample_lists.into(),
         coverings: coverings.into(),
-        cones: cones.into(),
         blocks: blocks.into(),
         groups: groups.into(),
         lists: lists_of_blocks.lists.into(),

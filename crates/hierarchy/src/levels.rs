@@ -85,7 +85,7 @@ impl PointHierarchy {
         let blocks = std::iter::from_fn(|| {
             let mut block = PointBlock::EMPTY;
             for (lane, i) in samples.by_ref().take(PointBlock::WIDTH).enumerate() {
-                self.plan().put(&mut block, lane, slices.positions[i], horizon);
+                self.plan().put(&mut block, lane, slices.position(i), horizon);
             }
             (block.horizon[0] > 0.0).then_some(block)
         });

@@ -52,7 +52,6 @@ pub use samples::Samples;
 pub use sanity::Flaw;
 pub use sections::{HierarchyMeta, LoadError};
 pub use slices::Slices;
-pub use surfels::NormalCone;
 pub use survey::Survey;
 pub use topology::{Children, Grandchildren, MOST_LEAF_POINTS, NodePair, Topology};
 pub use tree::{Growths, NodeBounds, Siblings, Tree, whole};

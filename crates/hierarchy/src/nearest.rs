@@ -143,7 +143,7 @@ impl PointHierarchy {
     fn nearest_listed_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Option<u32> {
         let mut nearest = self.nearest_of_leaf(simd, i, x);
         let listed = self.index().list(i / PointBlock::WIDTH, nearest.rounded, nearest.within)?;
-        let points = 0..self.positions.len();
+        let points = 0..self.len();
         for &group in listed {
             let balls = self.groups.get(group as usize)?;
             let d = seen_from(simd, &balls.position, nearest.rounded);
@@ -164,7 +164,7 @@ impl PointHierarchy {
     #[inline(always)]
     fn nearest_of_leaf<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Nearest {
         let mut nearest = Nearest::new(x, self.bounds_radius());
-        nearest.offer(i, self.positions[i]);
+        nearest.offer(i, PointBlock::position_in(&self.blocks, i));
         self.offer_leaf(simd, i / self.leaf_size as usize, &mut nearest);
         nearest
     }
@@ -188,7 +188,7 @@ impl PointHierarchy {
         while left != 0 {
             let i = block * PointBlock::WIDTH + left.trailing_zeros() as usize;
             left &= left - 1;
-            nearest.offer(i, self.positions[i]);
+            nearest.offer(i, PointBlock::position_in(&self.blocks, i));
         }
     }
 

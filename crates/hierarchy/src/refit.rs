@@ -20,7 +20,7 @@ use crate::kind::{PointKind, ball, obstacle_ball};
 use crate::part::Part;
 use crate::samples::samples;
 use crate::spacing::Look;
-use crate::surfels::{Fit, NormalCone, Surfel, align, cone, fitted, surfel_of};
+use crate::surfels::{Fit, Surfel, align, fitted, surfel_of};
 
 impl PointHierarchy {
     /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about
@@ -57,7 +57,7 @@ impl PointHierarchy {
         });
         let mut surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
         let mut fits: Vec<Fit> = surfels.iter().map(|s| Fit { normal: s.normal, kind: s.kind }).collect();
-        vote(&BlockTree::new(&self.blocks, self.positions.len()), &self.positions, &self.radii, &mut fits);
+        vote(&BlockTree::new(&self.blocks, self.len()), self.positions(), &self.radii, &mut fits);
         let corrected: Vec<usize> = (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].kind).collect();
         let discs = chunks(&corrected, |points| {
             let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
@@ -66,7 +66,7 @@ impl PointHierarchy {
                 fit(id32(i), &mut scratch, &mut heard);
                 self.gather(&heard, &mut near);
                 let fit = Fit { normal: self.on_its_side(i, fits[i].normal), ..fits[i] };
-                surfel_of(&fit, self.positions[i], (self.radii[i], self.reach), &near)
+                surfel_of(&fit, self.positions()[i], (self.radii[i], self.reach), &near)
             };
             points.iter().map(surfel).collect::<Vec<_>>()
         });
@@ -84,7 +84,7 @@ impl PointHierarchy {
             let mut block = PointBlock::EMPTY;
             for (lane, &i) in points.iter().enumerate() {
                 let horizon = self.plan.horizon(self.radii[i as usize]);
-                self.plan.put(&mut block, lane, self.positions[i as usize], horizon);
+                self.plan.put(&mut block, lane, self.positions()[i as usize], horizon);
             }
             blocks.push(block);
         }
@@ -98,7 +98,7 @@ impl PointHierarchy {
             _ => Look::Area,
         };
         let fit = fitted(at, look);
-        let surfel = surfel_of(&fit, self.positions[i], (self.radii[i], self.reach), near);
+        let surfel = surfel_of(&fit, self.positions()[i], (self.radii[i], self.reach), near);
         Surfel { normal: self.on_its_side(i, surfel.normal), ..surfel }
     }
 
@@ -118,12 +118,10 @@ impl PointHierarchy {
             ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, dense, s.kind, r))
         };
         let balls: Vec<f32> = surfels.iter().zip(&self.radii).enumerate().map(ball).collect();
-        let cones: Vec<NormalCone> = if self.is_oriented {
-            normals.chunks(leaf_size).map(cone).collect()
-        } else {
-            normals.chunks_mut(leaf_size).map(align).collect()
-        };
-        let (topology, positions) = (self.topology, &*self.positions);
+        if !self.is_oriented {
+            normals.chunks_mut(leaf_size).for_each(align);
+        }
+        let (topology, positions) = (self.topology, self.positions());
         let of_points = Discs { positions, normals: &normals, discs: &discs, balls: &balls };
         let boxes = boxes_of_discs(&topology, &self.boxes().collect::<Vec<_>>(), &of_points);
         let growths: Vec<Growth> = topology.ids().map(|id| self.tree().growth(Part::Surface, id)).collect();
@@ -144,7 +142,6 @@ impl PointHierarchy {
         self.kinds = surfels.iter().map(|s| s.kind.code()).collect::<Vec<_>>().into();
         self.normals = normals.into();
         self.discs = discs.into();
-        self.cones = cones.into();
         self.coverings = coverings.into();
         self.bound(&boxes, None);
     }

@@ -74,7 +74,7 @@ impl PointHierarchy {
     fn box_holds(&self, id: NodeId, i: usize) -> bool {
         let bounds = self.tree().bounds(id);
         let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));
-        let d = double(self.positions[i]) - double(bounds.centre);
+        let d = double(self.positions()[i]) - double(bounds.centre);
         let ball = f64::from(self.slices().ball(i).max(self.slices().obstacle_ball(i)));
         (0..3).all(|k| {
             let axis = double(bounds.axes[k]);

@@ -1,5 +1,7 @@
 //! The hierarchy in a container: one section an array, the rest in the metadata.
 
+use std::sync::OnceLock;
+
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_store::{Array, Check, File, OpenError, WriteError, Writer};
 use nearmiss_surface::{Metric, SurfaceError, SurfaceOptions, SurfacePlan};
@@ -11,7 +13,6 @@ use crate::outline::Outline;
 use crate::sanity::{Flaw, checked_topology};
 use crate::tree::Root;
 
-const POSITIONS: [u8; 4] = *b"PNTS";
 const NORMALS: [u8; 4] = *b"NRML";
 const RADII: [u8; 4] = *b"RADI";
 const DISCS: [u8; 4] = *b"DISC";
@@ -25,7 +26,6 @@ const MARKS: [u8; 4] = *b"MARK";
 const BLOCKS: [u8; 4] = *b"BLCK";
 const SAMPLES: [u8; 4] = *b"SMPL";
 const COVERINGS: [u8; 4] = *b"COVR";
-const CONES: [u8; 4] = *b"CONE";
 const GROUPS: [u8; 4] = *b"GRUP";
 const LISTS: [u8; 4] = *b"LIST";
 const LISTED: [u8; 4] = *b"NEAR";
@@ -102,11 +102,9 @@ impl PointHierarchy {
             .section(BLOCKS, 0, &self.blocks)?
             .section(SAMPLES, 0, &self.sample_lists)?
             .section(COVERINGS, 0, &self.coverings)?
-            .section(CONES, 0, &self.cones)?
             .section(GROUPS, 0, &self.groups)?
             .section(LISTS, 0, &self.lists)?
             .section(LISTED, 0, &self.listed)?
-            .section(POSITIONS, 0, &self.positions)?
             .section(NORMALS, 0, &self.normals)?
             .section(RADII, 0, &self.radii)?
             .section(DISCS, 0, &self.discs)?
@@ -123,8 +121,8 @@ impl PointHierarchy {
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
     pub fn load(file: &File, meta: HierarchyMeta, check: Check) -> Result<Self, LoadError> {
-        let positions: Array<[f32; 3]> = file.array(POSITIONS, 0)?;
-        let topology = checked_topology(positions.len(), meta.leaf_size, meta.dense)?;
+        let source: Array<u32> = file.array(SOURCE, 0)?;
+        let topology = checked_topology(source.len(), meta.leaf_size, meta.dense)?;
         let hierarchy = Self {
             frame: meta.frame,
             bounds: meta.bounds,
@@ -139,12 +137,12 @@ impl PointHierarchy {
             is_oriented: meta.is_oriented,
             metric: meta.metric,
             plan: SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale)?,
-            positions,
+            positions: OnceLock::new(),
             normals: file.array(NORMALS, 0)?,
             radii: file.array(RADII, 0)?,
             discs: file.array(DISCS, 0)?,
             kinds: file.array(KINDS, 0)?,
-            source: file.array(SOURCE, 0)?,
+            source,
             topology,
             root: meta.root,
             siblings: file.array(SIBLINGS, 0)?,
@@ -154,7 +152,6 @@ impl PointHierarchy {
             outline: meta.outline,
             sample_lists: file.array(SAMPLES, 0)?,
             coverings: file.array(COVERINGS, 0)?,
-            cones: file.array(CONES, 0)?,
             blocks: file.array(BLOCKS, 0)?,
             groups: file.array(GROUPS, 0)?,
             lists: file.array(LISTS, 0)?,

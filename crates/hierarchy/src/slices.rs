@@ -20,8 +20,6 @@ use crate::tree::Tree;
 /// access.
 #[derive(Debug, Clone, Copy)]
 pub struct Slices<'a> {
-    /// Positions in leaf order.
-    pub positions: &'a [[f32; 3]],
     /// Unit normals; see [`crate::PointHierarchy::normals`].
     pub normals: &'a [[f32; 3]],
     /// Local sampling radii.
@@ -59,6 +57,16 @@ pub struct Slices<'a> {
 }
 
 impl Slices<'_> {
+    /// The `i`-th position in leaf order.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline(always)]
+    #[must_use]
+    pub fn position(&self, i: usize) -> [f32; 3] {
+        PointBlock::position_in(self.blocks, i)
+    }
+
     /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's
     /// box, and contains it.
     ///

@@ -7,7 +7,6 @@
 
 use std::ops::Range;
 
-use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
@@ -44,16 +43,6 @@ const BORDER_GAP: u32 = 9;
 
 /// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
 const LINE: f64 = 0.05;
-
-/// The directions of a leaf's normals, up to sign: all within the angle of `cosine` of `axis` or of −`axis`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
-#[repr(C)]
-pub struct NormalCone {
-    /// Unit; its largest component is positive.
-    pub axis: [f32; 3],
-    /// Cosine of the half angle, 0 to 1.
-    pub cosine: f32,
-}
 
 /// The surface at a point to first order, and the point's class.
 #[derive(Debug, Clone, Copy)]
@@ -382,21 +371,10 @@ fn kind(at: &Evaluation, look: Look) -> PointKind {
     }
 }
 
-/// The cone of a leaf's `normals`, each of which is turned to the axis' side.
-pub(crate) fn align(normals: &mut [[f32; 3]]) -> NormalCone {
-    let cone = cone(normals);
-    for n in normals {
-        if dot(*n, cone.axis) < 0.0 {
-            *n = n.map(|x| -x);
-        }
-    }
-    cone
-}
-
-/// The cone of a leaf's `normals`, of any sign.
-pub(crate) fn cone(normals: &[[f32; 3]]) -> NormalCone {
+/// Turns a leaf's `normals` to one side: that of their main axis, whose largest component is positive.
+pub(crate) fn align(normals: &mut [[f32; 3]]) {
     let mut s = [0.0_f64; 6];
-    for n in normals {
+    for n in &*normals {
         let [x, y, z] = n.map(f64::from);
         for (sum, v) in s.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
             *sum += v;
@@ -404,8 +382,11 @@ pub(crate) fn cone(normals: &[[f32; 3]]) -> NormalCone {
     }
     let main = Vector3::from(symmetric_eigen(s).vectors[2]);
     let largest = main.iter().fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
-    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    #[expect(clippy::cast_possible_truncation, reason = "as normals are stored")]
     let axis: [f32; 3] = (main * largest.signum()).map(|c| c as f32).into();
-    let cosine = normals.iter().fold(1.0_f32, |least, n| least.min(dot(*n, axis).abs()));
-    NormalCone { axis, cosine }
+    for n in normals {
+        if dot(*n, axis) < 0.0 {
+            *n = n.map(|x| -x);
+        }
+    }
 }

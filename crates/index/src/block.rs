@@ -13,8 +13,6 @@ pub struct PointBlock {
     pub position: [[f32; WIDTH]; 3],
     /// How far a point is heard; zero where there is none.
     pub horizon: [f32; WIDTH],
-    /// 1/h² of a point, by which its weight falls off; one where there is none.
-    pub decay: [f32; WIDTH],
 }
 
 impl PointBlock {
@@ -22,8 +20,18 @@ impl PointBlock {
     pub const WIDTH: usize = WIDTH;
 
     /// No points.
-    pub const EMPTY: Self =
-        Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH], decay: [1.0; Self::WIDTH] };
+    pub const EMPTY: Self = Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH] };
+
+    /// The `i`-th of the points in some blocks.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline(always)]
+    #[must_use]
+    pub fn position_in(blocks: &[Self], i: usize) -> [f32; 3] {
+        let (block, lane) = (&blocks[i / WIDTH], i % WIDTH);
+        [block.position[0][lane], block.position[1][lane], block.position[2][lane]]
+    }
 
     /// All points of a scan as long as none is heard.
     #[must_use]

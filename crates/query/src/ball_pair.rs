@@ -37,7 +37,7 @@ impl<'a> Targets<'a> {
     fn new(scan: &Slices<'_>, (block, first, count): (&'a LeafBlock, usize, usize)) -> Self {
         let (mut positions, mut balls, mut discs) = ([[0.0; WIDTH]; 3], [0.0; WIDTH], 0);
         for lane in 0..count {
-            let p = scan.positions[first + lane];
+            let p = scan.position(first + lane);
             for k in 0..3 {
                 positions[k][lane] = p[k];
             }
@@ -210,7 +210,7 @@ impl Surfaces<'_> {
                         & lanes_of(block, &of_a.points(leaf_a));
                     for lane in Bits(near) {
                         let i = block * WIDTH + lane;
-                        let x = relative.point_back(a.positions[i]);
+                        let x = relative.point_back(a.position(i));
                         let radius = (a.obstacle_ball(i) + reach) * relative.scale_back();
                         let met =
                             targets.get_or_insert_with(|| Targets::new(b, target)).within(level, x, radius);
@@ -229,7 +229,7 @@ impl Surfaces<'_> {
                     & lanes_of(block, &of_b.points(leaf_b));
                 for lane in Bits(near) {
                     let j = block * WIDTH + lane;
-                    let x = relative.point(b.positions[j]);
+                    let x = relative.point(b.position(j));
                     let radius = b.obstacle_ball(j) * relative.scale() + reach;
                     // Balls of a have been held against those of b.
                     let discs = targets.get_or_insert_with(|| Targets::new(a, target).discs());

@@ -19,12 +19,12 @@ pub(crate) const FAR: f32 = 0.9;
 
 impl Posed<'_> {
     pub(crate) fn disc_a(&self, i: usize) -> Disc {
-        Disc { centre: self.a.positions[i], normal: self.a.normals[i], radius: self.a.discs[i] }
+        Disc { centre: self.a.position(i), normal: self.a.normals[i], radius: self.a.discs[i] }
     }
 
     pub(crate) fn disc_b(&self, j: usize) -> Disc {
         Disc {
-            centre: self.relative.point(self.b.positions[j]),
+            centre: self.relative.point(self.b.position(j)),
             normal: self.relative.direction(self.b.normals[j]),
             radius: self.b.discs[j] * self.relative.scale(),
         }
@@ -48,8 +48,8 @@ impl Posed<'_> {
 
     /// The distance of two points, and their local radii, in a's stored frame.
     pub(crate) fn points(&self, i: usize, j: usize) -> (f32, [f32; 2]) {
-        let q = self.relative.point(self.b.positions[j]);
-        let distance = (Vector3::from(self.a.positions[i]) - Vector3::from(q)).norm();
+        let q = self.relative.point(self.b.position(j));
+        let distance = (Vector3::from(self.a.position(i)) - Vector3::from(q)).norm();
         (distance, [self.a.radii[i], self.b.radii[j] * self.relative.scale()])
     }
 

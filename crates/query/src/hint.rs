@@ -146,7 +146,7 @@ impl Known {
     /// The points that met last time, if there are such: files lie.
     pub(crate) fn met(&self, pair: &Posed<'_>) -> Option<[usize; 2]> {
         let met = self.met?.map(|i| i as usize);
-        (met[0] < pair.a.positions.len() && met[1] < pair.b.positions.len()).then_some(met)
+        (met[0] < pair.a.normals.len() && met[1] < pair.b.normals.len()).then_some(met)
     }
 
     /// b has come to `pose`, and the same points meet there: nothing else rests on the way.

@@ -30,9 +30,9 @@ impl Surfaces<'_> {
         let radius_b = b.sampling_radius_of(pair.b.index()) * relative.scale();
         let reach = radius_a + radius_b + self.reach + relative.slack();
         for j in samples_b.iter() {
-            let q = Vector3::from(relative.point(b.positions[j]));
+            let q = Vector3::from(relative.point(b.position(j)));
             for i in samples_a.iter() {
-                let p = Vector3::from(a.positions[i]);
+                let p = Vector3::from(a.position(i));
                 // What is no number is near.
                 if (p - q).norm() > reach {
                     continue;

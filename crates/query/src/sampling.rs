@@ -49,7 +49,7 @@ impl Surfaces<'_> {
             draws -= 1;
             self.draw()?;
             let i = points[0].start + below(&mut rng, points[0].len());
-            let x = place_in(&mut rng, self.pair.a.positions[i], radius);
+            let x = place_in(&mut rng, self.pair.a.position(i), radius);
             if volume.distance_sq(x) > 0.0 {
                 continue;
             }
@@ -71,7 +71,7 @@ impl Surfaces<'_> {
         let own = self.pair.a.tree.reach(NodeId::ROOT);
         let within = |bounds: &OrientedBox, p: [f32; 3]| bounds.distance_sq(p) <= own * own;
         self.members.clear();
-        for (i, &p) in (0_u32..).zip(self.pair.a.positions) {
+        for (i, &p) in (0_u32..).zip(self.pair.views[0].scan().positions()) {
             if i % A_STRETCH == 0 {
                 self.pair.meter.leaf_work(u64::from(A_STRETCH) / POINTS_A_PAIR);
                 self.pair.meter.go_on()?;
@@ -92,9 +92,9 @@ impl Surfaces<'_> {
         for _ in 0..wanted {
             self.draw()?;
             let i = self.members[below(&mut rng, self.members.len())] as usize;
-            let x = place_in(&mut rng, self.pair.a.positions[i], self.pair.a.radii[i]);
+            let x = place_in(&mut rng, self.pair.a.position(i), self.pair.a.radii[i]);
             if volume.distance_sq(x) <= 0.0 {
-                let points = [self.pair.a, self.pair.b].map(|slices| 0..slices.positions.len());
+                let points = [self.pair.a, self.pair.b].map(|slices| 0..slices.normals.len());
                 self.test(x, [i, 0], points, sampling)?;
             }
         }
@@ -164,7 +164,7 @@ fn near(view: &ScanView<'_>, x: [f64; 3], points: Range<usize>, meter: &mut Mete
         let end = points.end.min(start + A_STRETCH as usize);
         meter.leaf_work((end - start) as u64 / POINTS_A_PAIR);
         for i in start..end {
-            let away = away_sq(view.scan().positions()[i]);
+            let away = away_sq(view.scan().slices().position(i));
             nearest = if away < nearest.0 { (away, i) } else { nearest };
         }
     }

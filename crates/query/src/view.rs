@@ -3,6 +3,7 @@
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{GeodesicKernel, KernelScratch, SurfaceGraph};
 use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, Slices};
+use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Metric};
 
 /// Memory for evaluations of f, used again by the next; never influences a result.
@@ -84,8 +85,8 @@ impl<'a> ScanView<'a> {
         let x = self.placed.apply_inverse(x);
         let nearest = self.scan.nearest_point_near(i, x) as usize;
         let slices = self.scan.slices();
-        let Slices { positions, normals, radii, .. } = slices;
-        let away = [0, 1, 2].map(|k| x[k] - f64::from(positions[nearest][k]));
+        let (position, Slices { normals, radii, .. }) = (slices.position(nearest), slices);
+        let away = [0, 1, 2].map(|k| x[k] - f64::from(position[k]));
         let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
         let distance_sq: f64 = away.iter().map(|d| d * d).sum();
         let most = f64::from(slices.cell_radius(nearest));
@@ -100,7 +101,7 @@ impl<'a> ScanView<'a> {
     /// When there is no such point.
     #[must_use]
     pub fn point(&self, i: usize) -> [f64; 3] {
-        self.placed.apply(self.scan.positions()[i].map(f64::from))
+        self.placed.apply(PointBlock::position_in(self.scan.blocks(), i).map(f64::from))
     }
 
     /// Whether f is by the metric that the scan's discs are for: only then its zeros verify what these say.

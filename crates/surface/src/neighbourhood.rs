@@ -214,7 +214,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     #[inline(always)]
     fn offer_measured(&mut self, simd: S, block: &MeasuredBlock) {
         let distance = f32x16::load_array_ref(simd, &block.distance);
-        let t = distance * distance * f32x16::load_array_ref(simd, &block.points.decay);
+        let t = distance * distance * self.decay(simd, &block.points);
         let counts: mask32x16<S> = t.simd_lt(self.plan.reach_sq());
         let support = self.support + counts.to_bitmask().count_ones();
         let (straight, _) = self.distances(simd, &block.points);
@@ -227,6 +227,13 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         (self.nearest, self.support) = (nearest, support);
     }
 
+    /// 1/h² of the points of a block, by which their weights fall off; infinite where there is none.
+    #[inline(always)]
+    fn decay(&self, simd: S, block: &PointBlock) -> f32x16<S> {
+        let horizon = f32x16::load_array_ref(simd, &block.horizon);
+        f32x16::splat(simd, self.plan.reach_sq()) / (horizon * horizon)
+    }
+
     /// d²/h² of the points of a block, and whether any in either half reaches x. Those that do are counted.
     #[inline(always)]
     fn distances(&mut self, simd: S, block: &PointBlock) -> (f32x16<S>, [bool; 2]) {
@@ -235,7 +242,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let x = (f32x16::load_array_ref(simd, px) - high[0]) - low[0];
         let y = (f32x16::load_array_ref(simd, py) - high[1]) - low[1];
         let z = (f32x16::load_array_ref(simd, pz) - high[2]) - low[2];
-        let t = (x * x + y * y + z * z) * f32x16::load_array_ref(simd, &block.decay);
+        let t = (x * x + y * y + z * z) * self.decay(simd, block);
         let counts: mask32x16<S> = t.simd_lt(self.plan.reach_sq());
         let bits = counts.to_bitmask();
         self.support += bits.count_ones();

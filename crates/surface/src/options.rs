@@ -165,14 +165,12 @@ impl SurfacePlan {
             block.position[k][lane] = position[k];
         }
         block.horizon[lane] = horizon;
-        block.decay[lane] = self.decay(horizon);
     }
 
     /// Lets the first points of a block be heard as their local sampling radii want it.
     pub fn tune(&self, block: &mut PointBlock, radii: &[f32]) {
-        for ((horizon, decay), radius) in block.horizon.iter_mut().zip(&mut block.decay).zip(radii) {
+        for (horizon, radius) in block.horizon.iter_mut().zip(radii) {
             *horizon = self.horizon(*radius);
-            *decay = self.decay(*horizon);
         }
     }
 
@@ -238,7 +236,8 @@ impl SurfacePlan {
 
     /// 1/h² of a point that is heard as far as `horizon`.
     #[inline(always)]
-    pub(crate) fn decay(&self, horizon: f32) -> f32 {
+    #[must_use]
+    pub fn decay(&self, horizon: f32) -> f32 {
         self.reach_sq / (horizon * horizon)
     }
 

@@ -82,23 +82,22 @@ impl Subject {
     /// Whether `x`, a place of the surface in the stored frame, belongs to the obstacle, up to rounding: it
     /// is in the cell of its nearest point, which samples a sheet.
     pub(crate) fn is_in_cell(&self, x: [f64; 3]) -> bool {
-        let slices = self.scan.slices();
         let away = |p: &[f32; 3]| [0, 1, 2].map(|k| x[k] - f64::from(p[k]));
         let length_sq = |d: [f64; 3]| d.iter().map(|x| x * x).sum::<f64>();
         let least = |(i, p): (usize, &[f32; 3])| (length_sq(away(p)), i);
-        let nearest = slices.positions.iter().enumerate().map(least).min_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest = self.scan.positions().iter().enumerate().map(least).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((distance_sq, nearest)) = nearest else { return false };
         // Of places half-way between two points either may be the nearest.
         let is_nearest = |p: &[f32; 3]| length_sq(away(p)) <= rounded(distance_sq);
         self.is_in_cell_of(nearest, x)
-            || slices.positions.iter().enumerate().any(|(i, p)| is_nearest(p) && self.is_in_cell_of(i, x))
+            || self.scan.positions().iter().enumerate().any(|(i, p)| is_nearest(p) && self.is_in_cell_of(i, x))
     }
 
     /// Whether `x` in the stored frame is in the cell of point `i`, up to rounding, if that is its nearest
     /// point.
     pub(crate) fn is_in_cell_of(&self, i: usize, x: [f64; 3]) -> bool {
         let slices = self.scan.slices();
-        let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.positions[i][k]));
+        let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.position(i)[k]));
         let height: f64 = (0..3).map(|k| d[k] * f64::from(slices.normals[i][k])).sum();
         let distance = d.iter().map(|x| x * x).sum::<f64>().sqrt();
         self.is_on_sheet(i)

@@ -95,7 +95,7 @@ fn places(scan: &PointHierarchy, i: usize, rng: &mut impl rand::Rng) -> ([Vector
     let along = (direction - up * up.dot(&direction)).try_normalize(1e-9).unwrap_or_default();
     // The root spreads places evenly over the disc.
     let (out, height) = (rng.random_range(0.0_f64..1.0).sqrt() * r, rng.random_range(-h..h));
-    let x = Vector3::from(slices.positions[i].map(f64::from)) + along * out + up * height;
+    let x = Vector3::from(slices.position(i).map(f64::from)) + along * out + up * height;
     ([x, x + Vector3::from(unit_vector(rng)) * (STEP * h)], up)
 }
 

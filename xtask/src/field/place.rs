@@ -61,7 +61,7 @@ impl Place {
                 continue;
             }
             for i in topology.points(id) {
-                let d = Vector3::from(slices.positions[i].map(f64::from)) - x;
+                let d = Vector3::from(slices.position(i).map(f64::from)) - x;
                 let horizon = f64::from(plan.horizon(slices.radii[i]));
                 let share = d.norm_squared() / (horizon * horizon);
                 if share < 1.0 {

@@ -47,7 +47,7 @@ impl PairVisitor for All {
 
 /// The points of a leaf, in a's frame by `place`.
 fn points(scan: &PointHierarchy, leaf: usize, place: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<[f32; 3]> {
-    scan.topology().points_of_leaf(leaf).map(|i| place(scan.positions[i])).collect()
+    scan.topology().points_of_leaf(leaf).map(|i| place(scan.positions()[i])).collect()
 }
 
 #[test]
@@ -67,7 +67,7 @@ fn leaves_in_lanes_are_their_points() {
                 let step = bounds.radius() / 32767.0;
                 for lane in 0..points {
                     let i = first + lane;
-                    assert!(off(block.position(lane), scan.positions[i]) <= 0.52 * step);
+                    assert!(off(block.position(lane), scan.positions()[i]) <= 0.52 * step);
                     assert!(off(block.normal(lane), scan.normals[i]) <= 0.52 / 32767.0);
                     assert!((block.disc(lane) - scan.discs[i]).abs() <= 0.52 * step);
                 }

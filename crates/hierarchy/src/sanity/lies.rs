@@ -1,8 +1,9 @@
 //! Hierarchies in which one number lies: each is refused, and by its name.
 
+use std::sync::OnceLock;
+
 use nearmiss_geometry::{NodeId, PointCloud};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::vector::tangents;
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 use super::flaw::Flaw;
@@ -130,37 +131,33 @@ fn leaves_that_are_not_their_points() {
     }
 }
 
+/// A position lies.
+fn lie_of_position(scan: &mut PointHierarchy, i: usize, k: usize, value: f32) {
+    scan.blocks.to_mut()[i / 16].position[k][i % 16] = value;
+    scan.positions = OnceLock::new();
+}
+
 #[test]
 fn points_that_no_build_writes() {
     // The last point of all shares its block with lanes that are filled up.
     for i in [0, 7, 8, 150, 300] {
         let named = |words: &str| format!("{words} of point {i}");
         for value in NONE {
-            deep(&named("the position"), |scan| scan.positions.to_mut()[i][1] = value);
+            deep(&named("the position"), |scan| lie_of_position(scan, i, 1, value));
             deep(&named("the normal"), |scan| scan.normals.to_mut()[i][2] = value);
         }
         for value in NONE.into_iter().chain([0.0, -0.1, 1e3]) {
             deep(&named("the radius"), |scan| scan.radii.to_mut()[i] = value);
             deep(&named("the disc"), |scan| scan.discs.to_mut()[i] = value);
         }
-        deep(&format!("the box about point {i}"), |scan| scan.positions.to_mut()[i][0] += 1.0);
-        deep(&named("the normal"), |scan| scan.normals.to_mut()[i] = [0.0; 3]);
-        deep(&format!("the cone about the normal of point {i}"), |scan| {
-            let (tangent, _) = tangents(scan.normals[i]);
-            scan.normals.to_mut()[i] = tangent;
+        deep(&format!("the box about point {i}"), |scan| {
+            let x = scan.slices().position(i)[0];
+            lie_of_position(scan, i, 0, x + 1.0);
         });
+        deep(&named("the normal"), |scan| scan.normals.to_mut()[i] = [0.0; 3]);
         deep(&named("the kind"), |scan| scan.kinds.to_mut()[i] = 6);
         deep(&named("the place in the input"), |scan| scan.source.to_mut()[i] = 301);
     }
-}
-
-#[test]
-fn cones_that_are_none() {
-    for value in NONE.into_iter().chain([-0.1, 1.1]) {
-        deep("the cone of leaf 3", |scan| scan.cones.to_mut()[3].cosine = value);
-    }
-    deep("the cone of leaf 3", |scan| scan.cones.to_mut()[3].axis = [0.0; 3]);
-    deep("the cone of leaf 3", |scan| scan.cones.to_mut()[3].axis[1] = f32::NAN);
 }
 
 #[test]

@@ -24,7 +24,7 @@ fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
 /// lists ascend and name groups.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     check_ranges(&scan.lists, scan.listed.len())?;
-    let blocks = scan.plan.blocks(&scan.positions, &scan.radii);
+    let blocks = scan.plan.blocks(scan.positions(), &scan.radii);
     let differs = blocks.zip(&scan.blocks).position(|(expected, found)| expected != *found);
     first_wrong("the copy of the points of block", differs)?;
     let left_out = scan.blocks.iter().enumerate().position(|(number, block)| {

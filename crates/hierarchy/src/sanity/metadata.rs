@@ -32,7 +32,7 @@ pub(crate) fn checked_topology(points: usize, leaf_size: u32, dense: u32) -> Res
 
 impl PointHierarchy {
     pub(super) fn check_lengths(&self) -> Result<(), Flaw> {
-        let points = self.positions.len();
+        let points = self.len();
         let (leaves, inner) = (self.topology.leaves(), self.topology.inner());
         let blocks = points.div_ceil(PointBlock::WIDTH);
         let expected = [
@@ -49,7 +49,6 @@ impl PointHierarchy {
             ("blocks", self.blocks.len(), blocks),
             ("samples", self.sample_lists.len(), inner.saturating_mul(self.samples_a_node as usize)),
             ("coverings", self.coverings.len(), self.topology.len()),
-            ("cones", self.cones.len(), leaves),
             ("groups", self.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
             ("lists", self.lists.len(), blocks),
         ];
@@ -105,8 +104,8 @@ impl PointHierarchy {
 
     /// What the metadata say, against the points, which are sound.
     pub(super) fn check_summary(&self) -> Result<(), Flaw> {
-        let [mut low, mut high] = [self.positions[0]; 2];
-        for p in &self.positions {
+        let [mut low, mut high] = [self.positions()[0]; 2];
+        for p in self.positions() {
             for k in 0..3 {
                 low[k] = if p[k] < low[k] { p[k] } else { low[k] };
                 high[k] = if p[k] > high[k] { p[k] } else { high[k] };

@@ -1,14 +1,11 @@
 //! The numbers of every point, each against its range and against its leaf.
 
-use nearmiss_lanes::vector::dot;
-
 use super::flaw::{FARTHEST, Flaw};
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
 use crate::kind::{PointKind, THICKNESS};
-use crate::surfels::NormalCone;
 
-/// Normals and the axes of their cones are unit, and cones hold their normals, to rounding.
+/// Normals are unit to rounding.
 const NORMAL: f32 = 1e-5;
 
 /// What rounding may make of a coordinate in a box that was grown by 1e-6 of its coordinates.
@@ -29,7 +26,7 @@ type Sound = [u32; LANES];
 /// Checks all points of a hierarchy whose structure is sound.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let arrays = Arrays {
-        positions: &scan.positions,
+        positions: scan.positions(),
         normals: &scan.normals,
         radii: &scan.radii,
         discs: &scan.discs,
@@ -37,16 +34,11 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         source: &scan.source,
     };
     let last = u32::try_from(scan.given() - 1).unwrap_or(u32::MAX);
-    let (topology, cones) = (scan.topology(), &*scan.cones);
+    let topology = scan.topology();
     for number in 0..topology.leaves() {
         let bounds = &scan.tree().bounds(topology.leaf(number));
-        let cone = &cones[number];
-        let is_unit = (dot(cone.axis, cone.axis) - 1.0).abs() <= NORMAL;
-        if !(is_unit && (-NORMAL..=1.0 + NORMAL).contains(&cone.cosine)) {
-            return Err(Flaw::Value { what: "the cone of leaf", index: number });
-        }
         let size = |v: [f32; 3]| v[0].abs() + v[1].abs() + v[2].abs();
-        let leaf = Leaf { bounds, cone, last, slack: SLACK * (size(bounds.centre) + size(bounds.half)) };
+        let leaf = Leaf { bounds, last, slack: SLACK * (size(bounds.centre) + size(bounds.half)) };
         let points = topology.points_of_leaf(number);
         for start in points.clone().step_by(LANES) {
             leaf.check(&arrays.block(start, points.end), start)?;
@@ -113,7 +105,6 @@ fn transposed(vectors: &[[f32; 3]; LANES]) -> [Lanes; 3] {
 /// What the points of a leaf are held against.
 struct Leaf<'a> {
     bounds: &'a OrientedBox,
-    cone: &'a NormalCone,
     /// The last place in the caller's input.
     last: u32,
     /// What rounding may cost in this leaf.
@@ -121,14 +112,13 @@ struct Leaf<'a> {
 }
 
 /// What is compared, in the order of [`Leaf::sound`].
-const COMPARED: [&str; 8] = [
+const COMPARED: [&str; 7] = [
     "the position of point",
     "the normal of point",
     "the radius of point",
     "the disc of point",
     "the kind of point",
     "the place in the input of point",
-    "the cone about the normal of point",
     "the box about point",
 ];
 
@@ -154,7 +144,6 @@ impl Leaf<'_> {
     #[inline]
     fn sound(&self, p: &Block) -> [Sound; COMPARED.len()] {
         let ([x, y, z], [nx, ny, nz]) = (&p.position, &p.normal);
-        let [ax, ay, az] = self.cone.axis;
         let mut sound = [[1; LANES]; COMPARED.len()];
         for i in 0..LANES {
             let placed = (x[i].abs() <= FARTHEST) & (y[i].abs() <= FARTHEST) & (z[i].abs() <= FARTHEST);
@@ -172,11 +161,7 @@ impl Leaf<'_> {
             sound[4][i] = u32::from(p.kind[i] <= PointKind::LAST);
             sound[5][i] = u32::from(p.source[i] <= self.last);
         }
-        for i in 0..LANES {
-            let aside = nx[i] * ax + ny[i] * ay + nz[i] * az;
-            sound[6][i] = u32::from(aside.abs() >= self.cone.cosine - NORMAL);
-        }
-        sound[7] = self.in_box(p);
+        sound[6] = self.in_box(p);
         sound
     }
 

@@ -45,10 +45,10 @@ fn check_node(scan: &PointHierarchy, id: NodeId) -> Result<(), Flaw> {
     if !(list.iter().all(is_own) && ascends) {
         return wrong("a sample of node");
     }
-    let centres = centres_of(slices.samples(id.index()), &scan.positions);
+    let centres = centres_of(slices.samples(id.index()), scan.positions());
     for child in topology.children(id).iter() {
         let samples = slices.samples(child.index());
-        let away = samples.iter().step_by(STEP).map(|i| centres.nearest_sq(scan.positions[i]));
+        let away = samples.iter().step_by(STEP).map(|i| centres.nearest_sq(scan.positions()[i]));
         if away.fold(0.0, f32::max).sqrt() > radius {
             return wrong("the covering of node");
         }

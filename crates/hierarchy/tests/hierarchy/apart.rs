@@ -20,7 +20,7 @@ fn moved(pose: &Pose, b: &OrientedBox) -> Solid {
 /// The balls of a node in a pose, and its volume.
 fn covering(scan: &PointHierarchy, node: usize, pose: &Pose, extent: Extent) -> (Vec<[f64; 3]>, f64, Solid) {
     let slices = scan.slices();
-    let centres = slices.samples(node).iter().map(|i| pose.apply(slices.positions[i].map(f64::from)));
+    let centres = slices.samples(node).iter().map(|i| pose.apply(slices.position(i).map(f64::from)));
     let (radius, volume) = match extent {
         Extent::Discs => {
             (slices.sampling_radius_of(node), slices.tree.bounds(NodeId(u32::try_from(node).unwrap())))

@@ -132,7 +132,7 @@ impl Surfaces<'_> {
     fn try_drawn(&mut self, i: u32, bounds: &Bounds, ways: &mut Ways<'_>) -> ControlFlow<(), bool> {
         self.pair.meter.leaf_work(1);
         self.pair.meter.go_on()?;
-        let place = self.pair.a.positions[i as usize];
+        let place = self.pair.a.position(i as usize);
         if !bounds.holds(place) {
             return ControlFlow::Continue(false);
         }
@@ -183,7 +183,7 @@ impl Surfaces<'_> {
 
     /// Looks for an intersection on the path between two points on either side.
     fn search_between(&mut self, bracket: &Bracket, ways: &mut Ways<'_>) -> ControlFlow<()> {
-        let (positions, radii) = (self.pair.a.positions, self.pair.a.radii);
+        let (positions, radii) = (self.pair.views[0].scan().positions(), self.pair.a.radii);
         let Ways { search, graph, path, .. } = ways;
         let tries = self.tries;
         let mut length = f64::INFINITY;
@@ -217,7 +217,7 @@ impl Surfaces<'_> {
         let arrived = ARRIVED * f64::from(self.pair.b.radii[hint as usize]) * self.scale_of_b();
         let nearer = usize::from(last.distance.abs() < first.distance.abs());
         let slope = self.slope(bracket.points[nearer], &bracket.sides[nearer]);
-        let (positions, radii) = (self.pair.a.positions, self.pair.a.radii);
+        let (positions, radii) = (self.pair.views[0].scan().positions(), self.pair.a.radii);
         let mut along = GraphPath { path, levels: graph.levels(positions, radii), positions, slope };
         let root = find_root(&mut along, [first.distance, last.distance], arrived, |along, k| {
             if self.pair.meter.go_on().is_break() {
@@ -252,11 +252,11 @@ impl Surfaces<'_> {
 
     /// The distance from b to first order about a point of a, in a's stored frame.
     fn slope(&self, i: u32, side: &Side) -> Slope {
-        let (place, j) = (self.pair.a.positions[i as usize], side.near as usize);
+        let (place, j) = (self.pair.a.position(i as usize), side.near as usize);
         let normal = self.pair.relative.direction(self.pair.b.normals[j]);
         // Far from b its nearest point is the centre of all that is as far away.
         let is_far = side.distance.abs() >= side.away && side.away > 0.0;
-        let from = Vector3::from(place) - Vector3::from(self.pair.relative.point(self.pair.b.positions[j]));
+        let from = Vector3::from(place) - Vector3::from(self.pair.relative.point(self.pair.b.position(j)));
         let outwards = if side.distance < 0.0 { -from } else { from };
         let gradient = outwards.try_normalize(0.0).filter(|_| is_far).map_or(normal, Into::into);
         Slope { place, value: side.distance / self.pair.views[0].placed().scale(), gradient }

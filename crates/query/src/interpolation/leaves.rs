@@ -38,7 +38,7 @@ impl Surfaces<'_> {
         let own = self.pair.a.tree.reach(pair.a);
         for i in leaf.clone() {
             let reach = volume.reach + own.max(longest[i]) + self.reach;
-            if volume.distance_sq(self.pair.a.positions[i]) > reach * reach {
+            if volume.distance_sq(self.pair.a.position(i)) > reach * reach {
                 continue;
             }
             self.pair.meter.go_on()?;
