@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::{Aabb, NearestPoint, PlacedIndex, Pose, Shape, ShapeIndex};
+use nearmiss::{Aabb, NearestPoint, PlacedIndex, Pose, ScanView, Shape, ShapeIndex};
 use serde::{Deserialize, Serialize};
 
 use crate::console::{Console, Results, now};
@@ -59,16 +59,20 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     let scan = opening.open(&args.scan)?;
     let pose = posing::of_scan(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
-    let index = ShapeIndex::new(&scan);
-    let placed = index.at(&pose);
+    let (view, mut index) = (scan.at(&pose), None);
     // Lengths that the sampling carries.
     let r = scan.sampling_radius() * pose.scale();
     let mut results = Results::new();
+    let mut asked = 0;
     while let Some((line, text)) = shapes.next_line()? {
         // What was answered before a faulty line is told before the fault.
         let read = shapes.shape(line, &text, r);
         let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
-        let (touches, nearest, micros) = answer(&placed, &shape);
+        asked += 1;
+        if asked == MANY {
+            index = Some(ShapeIndex::new(&scan));
+        }
+        let (touches, nearest, micros) = answer(&view, index.as_ref().map(|index| index.at(&pose)), &shape);
         let Some(nearest) = nearest else {
             return Err(shapes
                 .lines
@@ -84,10 +88,19 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-fn answer(placed: &PlacedIndex<'_>, shape: &Shape) -> (bool, Option<NearestPoint>, f64) {
+/// From so many shapes on an index pays for itself.
+const MANY: u32 = 256;
+
+fn answer(
+    view: &ScanView<'_>,
+    placed: Option<PlacedIndex<'_>>,
+    shape: &Shape,
+) -> (bool, Option<NearestPoint>, f64) {
     let start = now();
-    let touches = placed.touches(shape);
-    let nearest = placed.nearest(shape, f64::INFINITY);
+    let (touches, nearest) = match placed {
+        Some(placed) => (placed.touches(shape), placed.nearest(shape, f64::INFINITY)),
+        None => (view.touches(shape), view.nearest(shape, f64::INFINITY)),
+    };
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
     (touches, nearest, micros)

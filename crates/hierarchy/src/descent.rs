@@ -2,6 +2,7 @@
 //! questions is the visitor, and in which order it wants pairs.
 
 mod frontier;
+mod single;
 
 use std::ops::ControlFlow;
 
@@ -16,6 +17,7 @@ use crate::topology::{FAN, NodePair};
 use crate::tree::{LANES, Lanes, Siblings, Tree, lanes_of, whole};
 
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
+pub use single::PlaceVisitor;
 
 /// What a descent does with what it finds.
 pub trait PairVisitor {

@@ -40,7 +40,9 @@ pub use apart::{Extent, apart};
 pub use boxes::{OrientedBox, Relative, SLACK};
 pub use build::PointHierarchy;
 pub use covering::Covering;
-pub use descent::{Frontier, Heap, Open, PairVisitor, Plunging, Stack, TreePair, descend, resume};
+pub use descent::{
+    Frontier, Heap, Open, PairVisitor, PlaceVisitor, Plunging, Stack, TreePair, descend, resume,
+};
 pub use gather::{GatherScratch, NeighbourList};
 pub use growth::Growth;
 pub use kind::{PointKind, SLAB, THICKNESS};

@@ -1,10 +1,9 @@
 //! The point nearest to a place: from a neighbour list, or four boxes at a time, the nearest of them first.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x4, mask32x16};
-use nearmiss_geometry::NodeId;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{bits, lanes_of, product, seen_from};
@@ -12,9 +11,8 @@ use nearmiss_surface::Centre;
 
 use crate::boxes::OrientedBox;
 use crate::build::PointHierarchy;
+use crate::descent::PlaceVisitor;
 use crate::gather::GROWN;
-use crate::topology::{FAN, TREE_STACK};
-use crate::tree::lanes_of as lanes_of_children;
 
 /// The number in single precision, or a little more.
 #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
@@ -62,6 +60,48 @@ impl Nearest {
     }
 }
 
+/// The search for a point that is nearest, or nearly so.
+struct Search<'a> {
+    scan: &'a PointHierarchy,
+    nearest: Nearest,
+    /// The leaf that was looked at before.
+    own_leaf: usize,
+    /// The square of the distance beyond which a point may be a quarter further away than the nearest.
+    reach_sq: f64,
+    /// How many nodes were looked at.
+    looked_at: u32,
+}
+
+impl PlaceVisitor for Search<'_> {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.nearest.most
+    }
+
+    #[inline(always)]
+    fn is_wanted(&mut self, least: f32) -> bool {
+        /// The square of how many times as far a point may be beyond reach.
+        const ROUGHLY: f64 = 1.25 * 1.25;
+        // A point within reach is never passed over: one that is further away lets all nodes be looked at
+        // that come so near.
+        let (reach_sq, best) = (self.reach_sq, self.nearest.best.0);
+        let is_rough = |least: f64| least > reach_sq && ROUGHLY * least > best;
+        if least > self.nearest.most || (reach_sq < f64::INFINITY && is_rough(self.nearest.least(least))) {
+            return false;
+        }
+        self.looked_at += 1;
+        true
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()> {
+        if number != self.own_leaf {
+            self.scan.offer_leaf(simd, number, &mut self.nearest);
+        }
+        ControlFlow::Continue(())
+    }
+}
+
 impl PointHierarchy {
     /// As [`Self::nearest_point_near`] if that is within `reach`; else a point that is at most a quarter
     /// further away, which takes far fewer looks. With the number of nodes that were looked at.
@@ -78,51 +118,13 @@ impl PointHierarchy {
 
     #[inline(always)]
     fn nearest_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3], reach: f64) -> (u32, u32) {
-        /// The square of how many times as far a point may be beyond reach.
-        const ROUGHLY: f64 = 1.25 * 1.25;
-        let reach_sq = reach * reach;
-        let tree = self.tree();
-        let topology = tree.topology;
-        let mut nearest = self.nearest_of_leaf(simd, i, x);
-        let own_leaf = topology.leaf_of(i);
-        let mut stack = [(0.0, NodeId::ROOT); TREE_STACK];
-        let (mut top, mut looked_at) = (1, 1);
-        while top > 0 {
-            top -= 1;
-            let (least, child) = stack[top];
-            // A point within reach is never passed over: one that is further away lets all nodes be looked at
-            // that come so near.
-            let is_rough = |least: f64| least > reach_sq && ROUGHLY * least > nearest.best.0;
-            if least > nearest.most || (reach < f64::INFINITY && is_rough(nearest.least(least))) {
-                continue;
-            }
-            looked_at += 1;
-            if topology.is_leaf(child) {
-                if child != own_leaf {
-                    self.offer_leaf(simd, topology.leaf_number(child), &mut nearest);
-                }
-                continue;
-            }
-            let (siblings, children) = (&tree.siblings[child.index()], topology.children(child));
-            let (bottom, distances) = (top, siblings.distances_sq(simd, nearest.rounded));
-            let near: mask32x4<S> = distances.simd_le(nearest.most);
-            let (mut left, distances) =
-                (near.to_bitmask() & u64::from(lanes_of_children(children)), distances.to_array());
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize;
-                left &= left - 1;
-                let (own, child) = (distances[lane % FAN], children.lanes()[lane % FAN]);
-                // The nearest on top.
-                let mut at = top;
-                while at > bottom && stack[at - 1].0 < own {
-                    stack[at] = stack[at - 1];
-                    at -= 1;
-                }
-                stack[at] = (own, child);
-                top += 1;
-            }
-        }
-        (id32(nearest.best.1), looked_at)
+        let nearest = self.nearest_of_leaf(simd, i, x);
+        let place = nearest.rounded;
+        let own_leaf = i / self.leaf_size as usize;
+        let mut search = Search { scan: self, nearest, own_leaf, reach_sq: reach * reach, looked_at: 1 };
+        // Nothing ends it.
+        let _whole = self.tree().descend_to_by(simd, place, &mut search);
+        (id32(search.nearest.best.1), search.looked_at)
     }
 
     /// The point nearest to `x`, from the neighbour list of the stored point `i`; `None` where that may lack

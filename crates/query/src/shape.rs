@@ -5,9 +5,12 @@
 //! (`index::BlockTree`); the blocks are those of the scan. A grid tells which blocks are near small spheres
 //! (`surface::Cells`).
 
-use fearless_simd::Level;
+use std::ops::ControlFlow;
+
+use fearless_simd::{Level, Simd};
+use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointId, Pose};
-use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_hierarchy::{PlaceVisitor, PointHierarchy, Slices};
 use nearmiss_index::{BlockTree, Cells, Skeleton};
 
 use crate::view::ScanView;
@@ -94,7 +97,7 @@ impl PlacedIndex<'_> {
     #[inline]
     #[must_use]
     pub fn touches(&self, shape: &Shape) -> bool {
-        let (skeleton, radius) = self.stored(shape);
+        let (skeleton, radius) = self.view.stored(shape);
         self.holds(&skeleton, radius, self.near(&skeleton, radius))
     }
 
@@ -123,7 +126,7 @@ impl PlacedIndex<'_> {
     /// nearest point is that nearest to its centre or segment.
     #[must_use]
     pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
-        let (skeleton, radius) = self.stored(shape);
+        let (skeleton, radius) = self.view.stored(shape);
         let scale = self.view.placed().scale();
         let reach = radius + reach / scale;
         if !(radius >= 0.0 && reach >= 0.0) {
@@ -163,7 +166,7 @@ impl PlacedIndex<'_> {
         let mut looked_up = [(Skeleton::Point([0.0; 3]), 0.0, None); TOGETHER];
         for (shapes, answers) in shapes.chunks(TOGETHER).zip(answers.chunks_mut(TOGETHER)) {
             for (shape, looked_up) in shapes.iter().zip(&mut looked_up) {
-                let (skeleton, radius) = self.stored(shape);
+                let (skeleton, radius) = self.view.stored(shape);
                 *looked_up = (skeleton, radius, self.near(&skeleton, radius));
             }
             for ((skeleton, radius, near), answer) in looked_up.iter().zip(answers) {
@@ -171,12 +174,69 @@ impl PlacedIndex<'_> {
             }
         }
     }
+}
+
+impl ScanView<'_> {
+    /// Whether a point of the scan is in `shape`, its boundary included, as [`PlacedIndex::touches`] says it.
+    ///
+    /// Goes down the tree of the scan and needs no index: right for some shapes, or for a scan of a file of
+    /// which little is to be read. Does not allocate. What comes near a shape is told by a ball about it, so
+    /// a long capsule looks at more than an index would.
+    #[must_use]
+    pub fn touches(&self, shape: &Shape) -> bool {
+        let (skeleton, radius) = self.stored(shape);
+        radius >= 0.0 && self.nearest_within(&skeleton, radius, true).is_some()
+    }
+
+    /// The point nearest to `shape`, if it is no further than `reach` from it, in the world, as
+    /// [`PlacedIndex::nearest`] says it. Costs as [`Self::touches`].
+    #[must_use]
+    pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
+        let (skeleton, radius) = self.stored(shape);
+        let scale = self.placed().scale();
+        let reach = radius + reach / scale;
+        if !(radius >= 0.0 && reach >= 0.0) {
+            return None;
+        }
+        let (i, distance_sq) = self.nearest_within(&skeleton, reach, false)?;
+        let gap = (distance_sq.sqrt() - radius) * scale;
+        Some(NearestPoint { source: self.scan().id(i), point: self.point(i), gap })
+    }
+
+    /// The point nearest to a skeleton within `reach`, the first of equals, with its squared distance; or any
+    /// such point.
+    fn nearest_within(&self, skeleton: &Skeleton, reach: f64, any: bool) -> Option<(usize, f64)> {
+        /// Squares of longer distances leave single precision.
+        const FARTHEST: f64 = 1e15;
+        let (centre, radius) = skeleton.ball();
+        let (middle, bounds) = (Vector3::from(centre), self.scan().root_box());
+        let far = middle.amax() + f64::from(Vector3::from(bounds.centre).amax() + bounds.radius());
+        // All boxes matter to what is too far away to be told from them.
+        let (place, radius) = if far > FARTHEST { ([0.0; 3], f64::INFINITY) } else { (centre, radius) };
+        let slices = self.scan().slices();
+        let mut search = Search {
+            slices: &slices,
+            skeleton,
+            any,
+            // What single precision may lose of the distance of a box.
+            beyond: radius * (1.0 + 1e-9) + 4e-6 * far,
+            best: (reach * reach, usize::MAX),
+            most_sq: 0.0,
+        };
+        search.limit();
+        #[expect(clippy::cast_possible_truncation, reason = "counted in `beyond`")]
+        let place = place.map(|c| c as f32);
+        // Whether it was ended says no more than that something was found.
+        let _ended = slices.tree.descend_to(Level::new(), place, &mut search);
+        let (distance_sq, i) = search.best;
+        (i != usize::MAX).then_some((i, distance_sq))
+    }
 
     /// A shape in the stored frame of the scan: what it is about, and how thick; less than nothing for a box
     /// that has a negative edge.
     #[inline]
     fn stored(&self, shape: &Shape) -> (Skeleton, f64) {
-        let placed = self.view.placed();
+        let placed = self.placed();
         match *shape {
             Shape::Sphere { centre, radius } => {
                 (Skeleton::Point(placed.apply_inverse(centre)), radius / placed.scale())
@@ -200,5 +260,47 @@ impl PlacedIndex<'_> {
                 (skeleton, if half.iter().all(|&h| h >= 0.0) { 0.0 } else { -1.0 })
             }
         }
+    }
+}
+
+/// The search for the point nearest to a skeleton, within a ball about which boxes are looked into.
+struct Search<'a> {
+    slices: &'a Slices<'a>,
+    skeleton: &'a Skeleton,
+    /// Whether any point within reach will do.
+    any: bool,
+    /// How much further a box that matters may be from the middle than from the skeleton.
+    beyond: f64,
+    /// The least squared distance so far, at first that of the reach, and which point has it.
+    best: (f64, usize),
+    most_sq: f32,
+}
+
+impl Search<'_> {
+    /// Boxes further away than the best point do not matter.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+    fn limit(&mut self) {
+        let most = ((self.best.0.sqrt() + self.beyond) as f32).next_up();
+        self.most_sq = (most * most).next_up();
+    }
+}
+
+impl PlaceVisitor for Search<'_> {
+    fn most_sq(&self) -> f32 {
+        self.most_sq
+    }
+
+    fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
+        for i in self.slices.leaves.points(number) {
+            let own = (self.skeleton.distance_sq(self.slices.position(i).map(f64::from)), i);
+            if own < self.best {
+                self.best = own;
+                self.limit();
+                if self.any {
+                    return ControlFlow::Break(());
+                }
+            }
+        }
+        ControlFlow::Continue(())
     }
 }

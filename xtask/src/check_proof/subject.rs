@@ -90,7 +90,12 @@ impl Subject {
         // Of places half-way between two points either may be the nearest.
         let is_nearest = |p: &[f32; 3]| length_sq(away(p)) <= rounded(distance_sq);
         self.is_in_cell_of(nearest, x)
-            || self.scan.positions().iter().enumerate().any(|(i, p)| is_nearest(p) && self.is_in_cell_of(i, x))
+            || self
+                .scan
+                .positions()
+                .iter()
+                .enumerate()
+                .any(|(i, p)| is_nearest(p) && self.is_in_cell_of(i, x))
     }
 
     /// Whether `x` in the stored frame is in the cell of point `i`, up to rounding, if that is its nearest

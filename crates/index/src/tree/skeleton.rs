@@ -48,6 +48,19 @@ impl Skeleton {
         }
     }
 
+    /// The middle and the radius of a ball that holds all of it.
+    #[must_use]
+    pub fn ball(&self) -> ([f64; 3], f64) {
+        match *self {
+            Self::Point(centre) => (centre, 0.0),
+            Self::Segment([from, to]) => {
+                let (from, to) = (Vector3::from(from), Vector3::from(to));
+                (from.lerp(&to, 0.5).into(), 0.5 * (to - from).norm())
+            }
+            Self::Box { centre, half, .. } => (centre, Vector3::from(half).norm()),
+        }
+    }
+
     /// How far single precision may be off the distance of a place that is near.
     pub(super) fn slack(&self) -> f64 {
         /// Of 2⁻²⁴ each: one for a coordinate of the place, of the shape and of their difference, three for

@@ -92,6 +92,9 @@ fn shapes_touch_what_brute_force_says_and_the_nearest_point_is_nearest() {
             };
             seen[of][usize::from(touches)] += 1;
             let nearest = placed.nearest(&shape, f64::INFINITY).unwrap();
+            // Without an index.
+            assert_eq!(view.touches(&shape), touches, "{what}");
+            assert_eq!(view.nearest(&shape, f64::INFINITY), Some(nearest), "{what}");
             assert!((nearest.gap - least).abs() <= lost + 1e-9 * least.abs(), "{what} for {nearest:?}");
             let own = gap(&shape, nearest.point);
             assert!(
@@ -100,6 +103,7 @@ fn shapes_touch_what_brute_force_says_and_the_nearest_point_is_nearest() {
             );
             assert_eq!(touches, nearest.gap <= 0.0 || (touches && nearest.gap.abs() < lost), "{what}");
             let within = placed.nearest(&shape, least + radius);
+            assert_eq!(view.nearest(&shape, least + radius), within, "{what}");
             assert_eq!(within, Some(nearest), "{what}");
             if least > lost {
                 assert_eq!(placed.nearest(&shape, 0.5 * least - lost), None, "{what}");
@@ -132,7 +136,7 @@ fn many_shapes_are_answered_as_one_by_one_on_any_number_of_threads() {
 fn what_is_no_shape_touches_nothing_and_what_is_endless_everything() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Random, 200, 4), 16);
     let index = ShapeIndex::new(&scan);
-    let placed = index.at(&Pose::IDENTITY);
+    let (placed, view) = (index.at(&Pose::IDENTITY), ScanView::new(&scan, &Pose::IDENTITY));
     let sphere = |centre: [f64; 3], radius: f64| Shape::Sphere { centre, radius };
     for shape in [
         sphere([0.0; 3], -1.0),
@@ -144,13 +148,15 @@ fn what_is_no_shape_touches_nothing_and_what_is_endless_everything() {
         Shape::Box { pose: Pose::IDENTITY, half: [1.0, -1.0, 1.0] },
         Shape::Box { pose: Pose::IDENTITY, half: [1.0, f64::NAN, 1.0] },
     ] {
-        assert!(!placed.touches(&shape), "{shape:?}");
+        assert!(!placed.touches(&shape) && !view.touches(&shape), "{shape:?}");
     }
     for radius in [4.0, 1e10, 1e19, 1e30, 1e100] {
-        assert!(placed.touches(&sphere([0.0; 3], radius)), "{radius}");
+        let all = sphere([0.0; 3], radius);
+        assert!(placed.touches(&all) && view.touches(&all), "{radius}");
         let far = sphere([2.0 * radius, 0.0, 0.0], radius);
         assert!(!placed.touches(&far), "beside it: {radius}");
         let nearest = placed.nearest(&far, f64::INFINITY).unwrap();
         assert!((nearest.gap / radius - 1.0).abs() < 0.3, "{radius}: {nearest:?}");
+        assert_eq!(view.nearest(&far, f64::INFINITY), Some(nearest), "{radius}");
     }
 }

@@ -1,0 +1,84 @@
+//! The descent of one tree towards a place: the loop of all questions about what is near.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, mask32x4};
+use nearmiss_geometry::NodeId;
+
+use crate::topology::{FAN, TREE_STACK};
+use crate::tree::{Tree, lanes_of};
+
+/// What a descent towards a place does with what it finds. Distances are squares in single precision.
+pub trait PlaceVisitor {
+    /// Boxes further away than this are not looked into.
+    fn most_sq(&self) -> f32;
+
+    /// Returns `true` if a box at this distance is to be looked into; asked just before.
+    #[inline(always)]
+    fn is_wanted(&mut self, least_sq: f32) -> bool {
+        least_sq <= self.most_sq()
+    }
+
+    /// A leaf, by its number, whose box is near; may end the descent.
+    fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()>;
+}
+
+impl Tree<'_> {
+    /// Visits the leaves whose boxes are near a place, of siblings the nearest first, until `visitor` ends
+    /// it.
+    pub fn descend_to<V: PlaceVisitor>(
+        &self,
+        level: Level,
+        place: [f32; 3],
+        visitor: &mut V,
+    ) -> ControlFlow<()> {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.descend_to_by(simd, place, visitor),
+        ))
+    }
+
+    /// [`Self::descend_to`] by the instructions of the caller.
+    #[inline(always)]
+    pub(crate) fn descend_to_by<S: Simd, V: PlaceVisitor>(
+        &self,
+        simd: S,
+        place: [f32; 3],
+        visitor: &mut V,
+    ) -> ControlFlow<()> {
+        let topology = self.topology;
+        let mut stack = [(0.0, NodeId::ROOT); TREE_STACK];
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (least, node) = stack[top];
+            if !visitor.is_wanted(least) {
+                continue;
+            }
+            if topology.is_leaf(node) {
+                visitor.leaf(simd, topology.leaf_number(node))?;
+                continue;
+            }
+            let (siblings, children) = (&self.siblings[node.index()], topology.children(node));
+            let (bottom, distances) = (top, siblings.distances_sq(simd, place));
+            let near: mask32x4<S> = distances.simd_le(visitor.most_sq());
+            let (mut left, distances) =
+                (near.to_bitmask() & u64::from(lanes_of(children)), distances.to_array());
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let (own, child) = (distances[lane % FAN], children.lanes()[lane % FAN]);
+                // The nearest on top.
+                let mut at = top;
+                while at > bottom && stack[at - 1].0 < own {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = (own, child);
+                top += 1;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
