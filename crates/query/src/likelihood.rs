@@ -92,6 +92,6 @@ pub(crate) fn likelihood(pair: &Posed<'_>, reach: f32, open: impl Iterator<Item 
     }
     let [least, most] = SHEETS;
     let of_sheets = 0.514 * sheets.clamp(least, most).ln();
-    let logit = -4.38 + of_sheets + 2.30 * best.ratio + best.share * (11.57 - 4.49 * best.ratio);
+    let logit = -4.80 + of_sheets + 2.30 * best.ratio + best.share * (11.57 - 4.49 * best.ratio);
     1.0 / (1.0 + (-logit).exp())
 }
