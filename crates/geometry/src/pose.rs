@@ -33,6 +33,15 @@ pub enum PoseError {
         /// Determinant of the linear part.
         determinant: f64,
     },
+    /// The matrix shears or scales unevenly, and nothing is known of the object.
+    #[error(
+        "expected a rotation with uniform scale, got a pose with an entry that is {off} of the scale away from \
+         the nearest one; give its translation and a quaternion instead"
+    )]
+    Skewed {
+        /// Greatest difference of an entry of the linear part, as a share of the scale.
+        off: f64,
+    },
     /// The matrix shears or scales unevenly.
     #[error(
         "the pose is not a rotation with uniform scale: the nearest one moves the object's bounds by {moved}, \
@@ -95,30 +104,64 @@ impl Pose {
         Self { rotation: unit.to_rotation_matrix().into_inner(), ..Self::IDENTITY }
     }
 
+    /// The turn of a quaternion (x, y, z, w), as [`Self::from_quaternion`], then the shift by `translation`:
+    /// what engines call an isometry.
+    ///
+    /// ```
+    /// use nearmiss_geometry::Pose;
+    ///
+    /// // A quarter turn about z.
+    /// let half = 0.5_f64.sqrt();
+    /// let pose = Pose::new([1.0, 2.0, 3.0], [0.0, 0.0, half, half]);
+    /// let moved = pose.apply([1.0, 0.0, 0.0]);
+    /// assert!((0..3).all(|k| (moved[k] - [1.0, 3.0, 3.0][k]).abs() < 1e-12));
+    /// ```
+    #[must_use]
+    pub fn new(translation: [f64; 3], quaternion: [f64; 4]) -> Self {
+        Self::from_quaternion(quaternion).with_translation(translation)
+    }
+
+    /// The pose of a row-major 4×4 matrix whose linear part is a rotation with uniform scale to 1e-5 of the
+    /// scale, as single precision leaves it: the nearest one, in the sense of the polar decomposition.
+    ///
+    /// [`Self::from_row_major`] accepts what is further off, if it moves an object little.
+    ///
+    /// ```
+    /// use nearmiss_geometry::{Pose, PoseError};
+    ///
+    /// let pose = Pose::from_matrix(&[
+    ///     0.0, -2.0, 0.0, 5.0, //
+    ///     2.0, 0.0, 0.0, 6.0, //
+    ///     0.0, 0.0, 2.0, 7.0, //
+    ///     0.0, 0.0, 0.0, 1.0,
+    /// ])?;
+    /// assert_eq!((pose.scale(), pose.translation()), (2.0, [5.0, 6.0, 7.0]));
+    ///
+    /// let mut sheared = Pose::IDENTITY.to_row_major();
+    /// sheared[1] = 0.1;
+    /// assert!(matches!(Pose::from_matrix(&sheared), Err(PoseError::Skewed { .. })));
+    /// # Ok::<(), PoseError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// When the matrix is not finite, not affine, mirrors, shears or scales unevenly.
+    pub fn from_matrix(m: &[f64; 16]) -> Result<Self, PoseError> {
+        /// Some eighty roundings of single precision.
+        const MOST_OFF: f64 = 1e-5;
+        let (pose, linear) = decomposed(m)?;
+        let off = (linear / pose.scale - pose.rotation).amax();
+        // Written so that a NaN is refused.
+        if off <= MOST_OFF { Ok(pose) } else { Err(PoseError::Skewed { off }) }
+    }
+
     /// The pose of a row-major 4×4 matrix: the nearest rotation and uniform scale, in the sense of the polar
     /// decomposition, provided it moves no corner of `bounds` by more than `tolerance` (world units).
     ///
     /// # Errors
     /// When the matrix is not finite, not affine, mirrors, or differs too much from a pose.
     pub fn from_row_major(m: &[f64; 16], bounds: &Aabb, tolerance: f64) -> Result<Self, PoseError> {
-        if let Some(index) = m.iter().position(|x| !x.is_finite()) {
-            return Err(PoseError::NotFinite { index });
-        }
-        if let Some(index) = m.iter().position(|x| x.abs() > FARTHEST) {
-            return Err(PoseError::TooLarge { index });
-        }
-        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
-            return Err(PoseError::NotAffine);
-        }
-        let linear = Matrix3::from_fn(|i, j| m[4 * i + j]);
-        let translation = Vector3::new(m[3], m[7], m[11]);
-        let determinant = linear.determinant();
-        let scale = determinant.cbrt();
-        let rotation = if scale.is_normal() && scale > 0.0 { nearest_rotation(linear / scale) } else { None };
-        let Some(rotation) = rotation else {
-            return Err(PoseError::NotProper { determinant });
-        };
-        let pose = Self { rotation, translation, scale };
+        let (pose, linear) = decomposed(m)?;
+        let Self { rotation, scale, .. } = pose;
         let moved = bounds
             .corners()
             .map(|c| {
@@ -227,6 +270,26 @@ impl Pose {
         let translation = -(rotation * self.translation) / self.scale;
         Self { rotation, translation, scale: 1.0 / self.scale }
     }
+}
+
+/// The pose nearest to a row-major 4×4 matrix, and its linear part.
+fn decomposed(m: &[f64; 16]) -> Result<(Pose, Matrix3<f64>), PoseError> {
+    if let Some(index) = m.iter().position(|x| !x.is_finite()) {
+        return Err(PoseError::NotFinite { index });
+    }
+    if let Some(index) = m.iter().position(|x| x.abs() > FARTHEST) {
+        return Err(PoseError::TooLarge { index });
+    }
+    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+        return Err(PoseError::NotAffine);
+    }
+    let linear = Matrix3::from_fn(|i, j| m[4 * i + j]);
+    let translation = Vector3::new(m[3], m[7], m[11]);
+    let determinant = linear.determinant();
+    let scale = determinant.cbrt();
+    let rotation = if scale.is_normal() && scale > 0.0 { nearest_rotation(linear / scale) } else { None };
+    let rotation = rotation.ok_or(PoseError::NotProper { determinant })?;
+    Ok((Pose { rotation, translation, scale }, linear))
 }
 
 /// The orthogonal factor of the polar decomposition, by Newton's iteration R ← (R + R⁻ᵀ)/2, which converges
