@@ -184,7 +184,6 @@ fn absurd_numbers_do_not_panic() {
             &[b"LIST"],
             &[b"NEAR"],
             &[b"RADI"],
-            &[b"PNTS"],
             &[b"DISC", b"NRML"],
             &[b"GRUP"],
             &[b"COVR"],
