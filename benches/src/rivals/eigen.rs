@@ -15,7 +15,7 @@ const ITERATIONS: usize = 1000;
 
 /// A solver with its problems, in its own form, and room for its answers.
 pub trait Contender {
-    /// What to call it in a table.
+    /// The name shown in tables.
     fn name(&self) -> String;
 
     /// Takes these problems; no part of the time.

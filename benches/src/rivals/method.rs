@@ -1,4 +1,4 @@
-//! What ours and rivals have in common.
+//! The interface that nearmiss and its rivals share in the benchmarks.
 
 use nearmiss::Pose;
 
@@ -15,7 +15,7 @@ pub struct Reply {
 
 /// A way to answer whether two posed copies of one object meet.
 pub trait Method {
-    /// What to call it in a table.
+    /// The name shown in tables.
     fn name(&self) -> String;
 
     /// Done before each question, and not timed.

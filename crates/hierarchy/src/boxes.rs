@@ -266,7 +266,7 @@ fn turned<S: Simd>(rows: &Axes, [x, y, z]: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
     [x * rx[0] + y * rx[1] + z * rx[2], x * ry[0] + y * ry[1] + z * ry[2], x * rz[0] + y * rz[1] + z * rz[2]]
 }
 
-/// The second if either is no number.
+/// The greater of `x` and `y`; `y` if either is NaN.
 #[inline]
 fn greater(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }

@@ -64,7 +64,7 @@ pub struct PointHierarchy {
     /// By [`Part`].
     pub(crate) growths: [Array<Growths>; 2],
     pub(crate) leaf_blocks: Array<LeafBlock>,
-    /// What kinds of points each leaf has.
+    /// The marks of each leaf: whether it holds sparse points or balls, and whether it is loose.
     pub(crate) marks: Array<u8>,
     pub(crate) outline: Outline,
     pub(crate) sample_lists: Array<u32>,
@@ -248,7 +248,7 @@ impl PointHierarchy {
         (self.leaf_blocks, self.marks) = (blocks.into(), marks.into());
     }
 
-    /// What leaves are made of.
+    /// The arrays that leaf blocks are built from.
     pub(crate) fn leaf_parts(&self) -> LeafParts<'_> {
         LeafParts {
             positions: self.positions(),
@@ -259,7 +259,7 @@ impl PointHierarchy {
         }
     }
 
-    /// What tells this scan from others, and where it is.
+    /// The hash that identifies this scan, and its bounding balls.
     pub(crate) fn outlined(&self) -> Outline {
         let slices = self.slices();
         let mut hash = Xxh3::new();
@@ -348,7 +348,7 @@ impl PointHierarchy {
         &self.root.bounds
     }
 
-    /// What tells this scan from others, and where it is.
+    /// The hash that identifies this scan, and its bounding balls.
     #[inline]
     #[must_use]
     pub fn outline(&self) -> &Outline {

@@ -19,7 +19,7 @@ use crate::tree::{LANES, Lanes, Siblings, Tree, lanes_of, whole};
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
 pub use single::PlaceVisitor;
 
-/// What a descent does with what it finds.
+/// The callbacks of a descent over pairs of nodes.
 pub trait PairVisitor {
     /// Whether [`Self::least_apart`] is called.
     const NOTES_GAPS: bool = false;
@@ -111,12 +111,12 @@ pub fn resume<V: PairVisitor, F: Frontier>(
     ))
 }
 
-/// What takes the place of a node: its children, or itself.
+/// The boxes that stand for one node of a pair: those of its children, or its own.
 struct Side<'a> {
     boxes: &'a Siblings,
     /// The lanes that count, as bits.
     lanes: u32,
-    /// What is in lane `i`: this node, or the `i`-th from it.
+    /// The node in lane `i` is `first + i * step`.
     first: u32,
     step: u32,
 }
@@ -296,7 +296,7 @@ impl TreePair<'_> {
         let most = bits(share.simd_eq(share.reduce_min())) & lanes;
         Near {
             lanes,
-            // What is no number has no least.
+            // Without a finite gap, any lane serves.
             most: if most == 0 { lanes } else { most }.trailing_zeros(),
             shares: share.to_array(),
             gaps: gap,
@@ -305,7 +305,7 @@ impl TreePair<'_> {
     }
 }
 
-/// What of sixteen pairs of boxes is near. Lane 4j + i is child i of a and child j of b.
+/// The near pairs among sixteen pairs of boxes. Lane 4j + i is child i of a and child j of b.
 #[derive(Debug, Clone, Copy)]
 struct Near<S: Simd> {
     /// Those that are not apart, as bits.

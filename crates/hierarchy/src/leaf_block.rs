@@ -140,7 +140,7 @@ const LOOSE: u8 = 4;
 /// patch of 16 points is some two.
 const LOOSE_FROM: f32 = 3.0;
 
-/// What leaves are made of.
+/// The arrays that leaf blocks are built from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LeafParts<'a> {
     pub(crate) positions: &'a [[f32; 3]],

@@ -1,7 +1,8 @@
-//! Neighbour lists: what is heard near each block of points, so that f there needs no descent.
+//! Neighbour lists: for each block of points, the groups of blocks whose horizons reach near it, so that f is
+//! evaluated there without a descent.
 //!
 //! The lists of molecular dynamics (Verlet 1967), kept for blocks of points instead of particles. About every
-//! block there is a ball outside of which none of its points is heard; the balls of [`PointBlock::WIDTH`]
+//! block there is a ball that contains the horizons of all its points; the balls of [`PointBlock::WIDTH`]
 //! blocks, a group, stand side by side like points with horizons. The list of a block names groups. It is
 //! complete for every place within some distance of the middle of the block's ball, far enough for every
 //! surface point whose nearest stored point is the block's (`docs/theory/certificates.md`, fact 2).

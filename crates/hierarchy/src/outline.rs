@@ -19,7 +19,7 @@ impl Ball {
     }
 }
 
-/// What tells a scan from others, and where it is.
+/// The hash that identifies a scan, and its bounding balls.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Outline {
     /// A hash of all points, their frame and their discs, and of what the tree is made by.
