@@ -4,10 +4,9 @@
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
-    Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions,
-    CurvePlan, CurveScratch, Curves, Deadline, Detail, DistanceOptions, DistancePlan, DistanceScratch,
-    Evidence, GraphOptions, Interpolation, Method, Pose, Scan, Semantics, Verdict, collide_all, collide_with,
-    curves_with, distance_with,
+    Brackets, Budget, BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves,
+    Deadline, Detail, DistanceOptions, DistancePlan, Evidence, GraphOptions, Interpolation, ManifoldPoint,
+    Method, Pair, Pose, Scan, Scratch, Semantics, Verdict,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -24,8 +23,7 @@ const POSES: usize = 300;
 /// What is asked, and within what.
 fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
     let options = CollideOptions::default();
-    let [verdict, witness, manifold] =
-        [Detail::Verdict, Detail::Witness, Detail::Manifold].map(|detail| options.with_detail(detail));
+    let [verdict, witness] = [Detail::Verdict, Detail::Witness].map(|detail| options.with_detail(detail));
     let thick = options.with_semantics(Semantics::Thickened(0.5 * r));
     let whole = Budget::UNLIMITED;
     let hour = whole.with_deadline(Deadline::within(Duration::from_secs(3600)));
@@ -44,8 +42,6 @@ fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
         (witness, hour),
         (verdict.with_evidence(Evidence::Certified), whole),
         (witness.with_margin(r), whole),
-        (manifold, whole),
-        (manifold.with_semantics(Semantics::Thickened(0.5 * r)), whole),
     ];
     let plan = |options: &CollideOptions| CollidePlan::new(options, scan, scan).expect("options in range");
     asked.map(|(options, budget)| (plan(&options), budget)).to_vec()
@@ -56,13 +52,13 @@ fn ask_all(
     scan: &Scan,
     questions: &[(CollidePlan, Budget)],
     poses: &[Pose],
-    scratch: &mut CollideScratch,
+    (scratch, places): (&mut Scratch, &mut Vec<ManifoldPoint>),
 ) -> [usize; 3] {
     let mut verdicts = [0; 3];
     for (plan, budget) in questions {
         for pose in poses {
             let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
-            let kind = match collide_with(&a, &b, plan, budget, scratch).verdict {
+            let kind = match Pair::new(a, b).within(budget).manifold(places).collide(plan, scratch).verdict {
                 Verdict::Intersecting { .. } => 0,
                 Verdict::Separated { .. } => 1,
                 Verdict::Undecided(_) => 2,
@@ -81,13 +77,13 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     poses.extend(poses::sweep(POSES / 10, 1, 0).into_iter().flatten());
     let along = scan.clone().with_graph(&object.cloud, &GraphOptions::default(), None).unwrap();
     let along = along.with_geodesic_kernel().unwrap();
-    let mut scratch = CollideScratch::default();
+    let (mut scratch, mut places) = (Scratch::default(), Vec::new());
     for scan in [&scan, &along] {
         let (questions, kernel) = (questions(scan, object.r), scan.metric());
         // The very same questions: buffers grow to what these need and no further.
-        let first = ask_all(scan, &questions, &poses, &mut scratch);
+        let first = ask_all(scan, &questions, &poses, (&mut scratch, &mut places));
         let before = ALLOCATOR.calls();
-        let second = ask_all(scan, &questions, &poses, &mut scratch);
+        let second = ask_all(scan, &questions, &poses, (&mut scratch, &mut places));
         assert_eq!(ALLOCATOR.calls() - before, 0, "queries by the {kernel} kernel allocated");
         assert_eq!(first, second, "verdicts depend on the scratch");
         assert!(first.iter().all(|&n| n > 20), "of every kind of verdict some: {first:?}");
@@ -96,14 +92,13 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     let plan = CurvePlan::new(&CurveOptions::default(), &scan, &scan).unwrap();
     let options = CollideOptions::default();
     let everything = CollidePlan::new(&options, &scan, &scan).unwrap();
-    let (mut found, mut of_curves, mut contacts) =
-        (Curves::default(), CurveScratch::default(), Contacts::default());
+    let (mut found, mut contacts) = (Curves::default(), Contacts::default());
     let mut draw_all = || {
         let mut points = 0;
         for pose in &poses {
             let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
-            curves_with(&a, &b, &plan, &Budget::UNLIMITED, &mut found, &mut of_curves);
-            collide_all(&a, &b, &everything, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+            Pair::new(a, b).curves(&plan, &mut found, &mut scratch);
+            Pair::new(a, b).contacts(&mut contacts).collide(&everything, &mut scratch);
             points += found.points.len();
         }
         points
@@ -114,7 +109,6 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     assert_eq!(ALLOCATOR.calls() - before, 0, "curves allocated");
     assert!(first > 1000, "{first} points of curves");
 
-    let mut of_distances = DistanceScratch::default();
     let mut measure_all = || {
         let mut sum = 0.0;
         for semantics in [Semantics::Surface, Semantics::Thickened(0.5 * object.r)] {
@@ -123,7 +117,7 @@ fn warm_queries_and_evaluations_allocate_nothing() {
             for (pose, work) in poses.iter().zip([u64::MAX, 400].into_iter().cycle()) {
                 let budget = Budget::UNLIMITED.with_work(work);
                 let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
-                sum += distance_with(&a, &b, &plan, &budget, &mut of_distances).upper;
+                sum += Pair::new(a, b).within(&budget).distance(&plan, &mut scratch).upper;
             }
         }
         sum

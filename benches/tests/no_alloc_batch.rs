@@ -3,9 +3,11 @@
 //!
 //! One test alone: the counter is of the whole process.
 
+use std::ops::ControlFlow;
+
 use nearmiss::{
-    BatchScratch, Bodies, Budget, BuildOptions, CollideOptions, CollidePlan, Evidence, Pose, Scan, Until,
-    World, collide_poses_with,
+    Answer, BatchScratch, Bodies, Budget, BuildOptions, CollideOptions, CollidePlan, Evidence, Pair, Pose,
+    Scan, World, each,
 };
 use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
@@ -38,11 +40,13 @@ fn warm_batches_and_broad_phases_allocate_nothing() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let (mut batch, mut of_world, mut pairs) =
             (BatchScratch::default(), BatchScratch::default(), Vec::new());
+        let mut answers = vec![Answer::UNASKED; poses.len()];
         pool.install(|| {
             let mut ask = |count: usize| {
-                let until = Until::All;
-                let budget = Budget::UNLIMITED;
-                collide_poses_with([&scan, &scan], &poses[..count], &plan, &budget, until, &mut batch).len()
+                each(&mut answers[..count], None, &mut batch, |i, scratch| {
+                    let [a, b] = [0, 1].map(|k: usize| scan.at(&poses[i][k]));
+                    ControlFlow::Continue(Pair::new(a, b).collide(&plan, scratch))
+                })
             };
             // Which thread asks what differs from time to time, so scratches need some rounds to be warm.
             (0..10).for_each(|_| assert_eq!(ask(poses.len()), poses.len()));
@@ -53,9 +57,13 @@ fn warm_batches_and_broad_phases_allocate_nothing() {
                 assert!(few < 10 && many < 10, "{few} and {many} times, whatever the number of questions");
             }
             let mut ask = || {
-                world.near_pairs_with(Bodies::All, &plan, &mut pairs);
+                world.near_pairs(Bodies::All, plan.reach(), &mut pairs);
                 let budget = Budget::UNLIMITED.with_work(50);
-                world.collide_pairs_with(&pairs, &plan, &budget, Until::All, &mut of_world).len()
+                answers.resize(pairs.len().max(answers.len()), Answer::UNASKED);
+                each(&mut answers[..pairs.len()], None, &mut of_world, |i, scratch| {
+                    let pair = world.pair(pairs[i]).expect("both bodies are there");
+                    ControlFlow::Continue(pair.within(&budget).collide(&plan, scratch))
+                })
             };
             assert!(ask() > 1000, "enough pairs");
             (0..3).for_each(|_| _ = ask());

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use nearmiss::{
-    Answer, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, Pose, Scan,
-    ScanView, Semantics, Verdict, collide_with,
+    Answer, BuildOptions, Check, CollideOptions, CollidePlan, Evidence, Pair, Placed, Pose, Scan, Scratch,
+    Semantics, Verdict,
 };
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
@@ -42,17 +42,17 @@ pub(crate) fn run() -> Outcome {
         "{:>8}  {:<10} {:<10} {:>8} {:>8} {:>9} {:>9} {:>12} {:>11}",
         "offset", "verdict", "evidence", "nearest", "gap", "residual", "µs", "evaluations", "node pairs"
     );
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let certified = CollideOptions::default().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&certified, &scan, &scan)?;
     let a = scan.at(&Pose::IDENTITY);
     // Warm: the first question pays for memory.
-    collide_with(&a, &scan.at(&pose(&scan, touch)), &plan, &Budget::UNLIMITED, &mut scratch);
+    Pair::new(a, scan.at(&pose(&scan, touch))).collide(&plan, &mut scratch);
     for offset in STEPS {
         let b_pose = pose(&scan, touch - offset * r);
         let b = scan.at(&b_pose);
         let start = now();
-        let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
+        let answer = Pair::new(a, b).collide(&plan, &mut scratch);
         let micros = start.elapsed().as_secs_f64() * 1e6;
         let distance = least_distance(&scan, &a, &b, &mut scratch)? / r;
         print_row(offset, &answer, [distance, r], micros);
@@ -100,18 +100,13 @@ fn pose(scan: &Scan, distance: f64) -> Pose {
 }
 
 /// The least distance of any two points: twice the radius at which balls about them come to touch.
-fn least_distance(
-    scan: &Scan,
-    a: &ScanView<'_>,
-    b: &ScanView<'_>,
-    scratch: &mut CollideScratch,
-) -> Outcome<f64> {
+fn least_distance(scan: &Scan, a: &Placed<'_>, b: &Placed<'_>, scratch: &mut Scratch) -> Outcome<f64> {
     let (mut apart, mut touching) = (0.0, 20.0 * scan.sampling_radius());
     for _ in 0..16 {
         let radius = 0.5 * (apart + touching);
         let balls = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
         let plan = CollidePlan::new(&balls, scan, scan)?;
-        if collide_with(a, b, &plan, &Budget::UNLIMITED, scratch).verdict.is_intersecting() {
+        if Pair::new(*a, *b).collide(&plan, scratch).verdict.is_intersecting() {
             touching = radius;
         } else {
             apart = radius;
@@ -125,10 +120,10 @@ fn least_distance(
 fn first_touch(scan: &Scan) -> Outcome<f64> {
     let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
     let plan = CollidePlan::new(&balls, scan, scan)?;
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut touches = |distance: f64| {
         let (a, b) = (scan.at(&Pose::IDENTITY), pose(scan, distance));
-        collide_with(&a, &scan.at(&b), &plan, &Budget::UNLIMITED, &mut scratch).verdict.is_intersecting()
+        Pair::new(a, scan.at(&b)).collide(&plan, &mut scratch).verdict.is_intersecting()
     };
     let half = scan.bounds().half_extents();
     let mut apart = 2.0 * half.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -167,10 +162,10 @@ fn print_row(offset: f64, answer: &Answer, [distance, r]: [f64; 2], micros: f64)
     );
 }
 
-fn draw(scan: &Scan, a: &ScanView<'_>, plan: &CollidePlan, distance: f64, path: PathBuf) -> Outcome<PathBuf> {
+fn draw(scan: &Scan, a: &Placed<'_>, plan: &CollidePlan, distance: f64, path: PathBuf) -> Outcome<PathBuf> {
     let b_pose = pose(scan, distance);
     let b = scan.at(&b_pose);
-    let answer = nearmiss::collide(a, &b, plan, &Budget::UNLIMITED);
+    let answer = Pair::new(*a, b).collide(plan, &mut Scratch::default());
     nearmiss_cli::contact_picture(a, &b, &answer).save(&path)?;
     Ok(path)
 }

@@ -9,7 +9,7 @@
 
 use std::process::ExitCode;
 
-use nearmiss::{Budget, BuildOptions, CollideOptions, CollidePlan, Pose, Scan, Verdict, collide};
+use nearmiss::{BuildOptions, CollideOptions, CollidePlan, Pair, Pose, Scan, Scratch, Verdict};
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::poses::{NearPose, near};
@@ -50,7 +50,9 @@ fn compare(source: &str, count: usize, seed: u64) -> Result<u32, Failure> {
     let [mut outside, mut hits, mut misses, mut undecided, mut inside, mut differ] = [0_u32; 6];
     for NearPose { pose, .. } in near(&object, count, seed)? {
         let truth = mesh.ask(&Pose::IDENTITY, &pose).hit;
-        let verdict = collide(&scan.at(&Pose::IDENTITY), &scan.at(&pose), &plan, &Budget::UNLIMITED).verdict;
+        let verdict = Pair::new(scan.at(&Pose::IDENTITY), scan.at(&pose))
+            .collide(&plan, &mut Scratch::default())
+            .verdict;
         if !is_steady(mesh.as_mut(), &pose, truth, SHIFT * object.r) {
             inside += 1;
             differ += u32::from(verdict.is_intersecting() != truth);

@@ -9,13 +9,11 @@
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
-use nearmiss::{
-    Budget, BuildOptions, CollidePlan, CollideScratch, PointCloud, Reason, Scan, Verdict, collide_with,
-};
+use nearmiss::{BuildOptions, CollidePlan, Pair, PointCloud, Reason, Scan, Scratch, Verdict};
 use nearmiss_benches::Failure;
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::asked;
-use nearmiss_testdata::pairs::{Pair, SetOptions, analytic_set};
+use nearmiss_testdata::pairs::{self, SetOptions, analytic_set};
 
 /// One in this many thin pairs may be `Ambiguous`.
 const THIN_ALLOWANCE: usize = 20;
@@ -33,7 +31,7 @@ struct Row {
 }
 
 impl Row {
-    fn count(&mut self, pair: &Pair, verdict: &Verdict) -> bool {
+    fn count(&mut self, pair: &pairs::Pair, verdict: &Verdict) -> bool {
         let undecided = matches!(verdict, Verdict::Undecided(_));
         let wrong = !undecided && verdict.is_intersecting() != pair.truth;
         if pair.is_in_band() {
@@ -67,7 +65,7 @@ fn main() -> Result<ExitCode, Failure> {
         Ok(Scan::build(&PointCloud::from_positions(points)?, &BuildOptions::default())?)
     };
     let scans: Vec<Scan> = set.shapes.iter().map(|shape| build(&shape.points)).collect::<Result<_, _>>()?;
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     // By family and noise in tenths of a percent.
     let mut rows: BTreeMap<(&str, String), Row> = BTreeMap::new();
     let mut clean = true;
@@ -75,7 +73,7 @@ fn main() -> Result<ExitCode, Failure> {
         let (a, b) = (&scans[pair.a], &scans[pair.b]);
         let plan = CollidePlan::new(&asked, a, b)?;
         let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
-        let verdict = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
+        let verdict = Pair::new(va, vb).collide(&plan, &mut scratch).verdict;
         let row = rows.entry((pair.family, format!("{:4.2}", pair.noise))).or_default();
         let right = row.count(pair, &verdict);
         clean &= right;

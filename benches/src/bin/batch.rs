@@ -5,11 +5,12 @@
 //! Times are the least of some runs.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
 use nearmiss::{
-    Aabb, Answer, BatchScratch, Bodies, BodyId, Budget, BuildOptions, CollideOptions, CollidePlan,
-    CollideScratch, Deadline, Detail, Pose, Scan, Until, World, collide_poses_with, collide_with,
+    Aabb, Answer, BatchScratch, Bodies, BodyId, Budget, BuildOptions, CollideOptions, CollidePlan, Deadline,
+    Detail, Pair, Pose, Scan, Scratch, World, each,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -83,11 +84,11 @@ fn many_poses(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) ->
     let poses: Vec<[Pose; 2]> = sweep.into_iter().flatten().map(|b| [Pose::IDENTITY, b]).collect();
     println!("## {} poses of {name}, {} points\n", poses.len(), scan.len());
     println!("| | time | µs a pose | speed-up |\n| --- | --: | --: | --: |");
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let singly = || -> Vec<Answer> {
         let ask = |pair: &[Pose; 2]| {
             let [a, b] = pair.map(|pose| scan.at(&pose));
-            collide_with(&a, &b, plan, &Budget::UNLIMITED, &mut scratch)
+            Pair::new(a, b).collide(plan, &mut scratch)
         };
         poses.iter().map(ask).collect()
     };
@@ -99,18 +100,11 @@ fn many_poses(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) ->
     row("loop of single queries", single);
     for &threads in &options.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-        let mut scratch = BatchScratch::default();
+        let (mut scratch, mut answers) = (BatchScratch::default(), vec![Answer::UNASKED; poses.len()]);
         let (whole, time) = pool.install(|| {
             options.fastest(|| {
-                let told = collide_poses_with(
-                    [scan, scan],
-                    &poses,
-                    plan,
-                    &Budget::UNLIMITED,
-                    Until::All,
-                    &mut scratch,
-                );
-                told == expected
+                collide_all([scan, scan], &poses, plan, &Budget::UNLIMITED, (&mut answers, &mut scratch));
+                answers == expected
             })
         });
         row(&format!("batch, {threads} threads"), time);
@@ -128,14 +122,15 @@ fn deadlines(scan: &Scan, plan: &CollidePlan) {
     println!("| --- | --: | --: | --: | --: |");
     let sweep = poses::sweep(SHORT_BATCH / DISTANCES, 2, 0);
     let poses: Vec<[Pose; 2]> = sweep.into_iter().flatten().map(|b| [Pose::IDENTITY, b]).collect();
-    let mut scratch = BatchScratch::default();
+    let (mut scratch, mut answers) = (BatchScratch::default(), vec![Answer::UNASKED; poses.len()]);
     for micros in [100, 1000, 5000] {
         let (mut overruns, mut answered) = (Sample::default(), 0);
         for _ in 0..REPEATS {
             let time = Duration::from_micros(micros);
-            let (answers, taken) = timed(|| {
+            answers.fill(Answer::UNASKED);
+            let ((), taken) = timed(|| {
                 let budget = Budget::UNLIMITED.with_deadline(Deadline::within(time));
-                collide_poses_with([scan, scan], &poses, plan, &budget, Until::All, &mut scratch)
+                collide_all([scan, scan], &poses, plan, &budget, (&mut answers, &mut scratch));
             });
             answered += answers.iter().filter(|answer| answer.statistics.node_pairs > 0).count();
             overruns.push(nanoseconds(taken.saturating_sub(time)));
@@ -146,6 +141,20 @@ fn deadlines(scan: &Scan, plan: &CollidePlan) {
         println!("| {micros} µs | {answered} | {median:.1} µs | {p99:.1} µs | {worst:.1} µs |");
     }
     println!();
+}
+
+/// Whether two scans meet in each pair of poses.
+fn collide_all(
+    [a, b]: [&Scan; 2],
+    poses: &[[Pose; 2]],
+    plan: &CollidePlan,
+    budget: &Budget,
+    (answers, scratch): (&mut [Answer], &mut BatchScratch),
+) {
+    each(answers, budget.deadline, scratch, |i, scratch| {
+        let pair = Pair::new(a.at(&poses[i][0]), b.at(&poses[i][1])).within(budget);
+        ControlFlow::Continue(pair.collide(plan, scratch))
+    });
 }
 
 /// Bodies in a cube, some of them moving.
@@ -167,11 +176,11 @@ fn world(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) -> Resu
     row("inserting all bodies", insert, 0);
 
     let mut pairs = Vec::new();
-    let (_, time) = options.fastest(|| world.near_pairs_with(Bodies::All, plan, &mut pairs));
+    let (_, time) = options.fastest(|| world.near_pairs(Bodies::All, plan.reach(), &mut pairs));
     row("all near pairs", time, pairs.len());
     let mut some = Vec::new();
     let (_, time) = options.fastest(|| {
-        ids.iter().for_each(|&id| world.near_pairs_with(Bodies::These(&[id]), plan, &mut some));
+        ids.iter().for_each(|&id| world.near_pairs(Bodies::These(&[id]), plan.reach(), &mut some));
     });
     row("near pairs of one body, for each", time, 2 * pairs.len());
 
@@ -193,25 +202,29 @@ fn world(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) -> Resu
         ids.iter().zip(&moved).for_each(|(&id, pose)| _ = world.move_to(id, pose));
     });
     row("moving all bodies anywhere", time, 0);
-    let (_, time) = options.fastest(|| world.near_pairs_with(Bodies::All, plan, &mut pairs));
+    let (_, time) = options.fastest(|| world.near_pairs(Bodies::All, plan.reach(), &mut pairs));
     row("all near pairs after that", time, pairs.len());
     for _ in 0..20 {
         for poses in [&placed, &moved] {
             ids.iter().zip(poses).for_each(|(&id, pose)| _ = world.move_to(id, pose));
         }
     }
-    let (_, time) = options.fastest(|| world.near_pairs_with(Bodies::All, plan, &mut pairs));
+    let (_, time) = options.fastest(|| world.near_pairs(Bodies::All, plan.reach(), &mut pairs));
     row("all near pairs after forty more such moves", time, pairs.len());
 
     println!("\n| narrow phase, its near pairs | time | hits |\n| --- | --: | --: |");
     for &threads in &options.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-        let mut scratch = BatchScratch::default();
+        let (mut scratch, mut meets) = (BatchScratch::default(), vec![false; pairs.len()]);
         let (hits, time) = pool.install(|| {
             options.fastest(|| {
-                let answers =
-                    world.collide_pairs_with(&pairs, plan, &Budget::UNLIMITED, Until::All, &mut scratch);
-                answers.iter().filter(|answer| answer.verdict.is_intersecting()).count()
+                each(&mut meets, None, &mut scratch, |i, scratch| {
+                    let pair = world.pair(pairs[i]);
+                    ControlFlow::Continue(
+                        pair.is_some_and(|pair| pair.collide(plan, scratch).verdict.is_intersecting()),
+                    )
+                });
+                meets.iter().filter(|&&meets| meets).count()
             })
         });
         row(&format!("{threads} threads"), time, hits);

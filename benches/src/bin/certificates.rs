@@ -11,8 +11,8 @@
 use std::process::ExitCode;
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, PointCloud, Pose,
-    Scan, Verdict, collide_with,
+    BuildOptions, CollideOptions, CollidePlan, Detail, Evidence, Pair, PointCloud, Pose, Scan, Scratch,
+    Verdict,
 };
 use nearmiss_benches::Failure;
 use nearmiss_benches::arguments::Arguments;
@@ -88,7 +88,7 @@ fn one_family(name: &str, form: Form, count: usize, seed: u64, rows: &mut [Row])
     let (a, b) = (scan(&shape)?, scan(&ball)?);
     let options = CollideOptions::default().with_detail(Detail::Verdict).with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&options, &a, &b)?;
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let (mut bad, mut greatest) = (0, f64::NEG_INFINITY);
     let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
     for i in 0..count {
@@ -103,8 +103,7 @@ fn one_family(name: &str, form: Form, count: usize, seed: u64, rows: &mut [Row])
         };
         let gap = shape.distance(centre) - BALL;
         let turn = rotation(&mut random).with_translation(centre);
-        let answer =
-            collide_with(&a.at(&Pose::IDENTITY), &b.at(&turn), &plan, &Budget::UNLIMITED, &mut scratch);
+        let answer = Pair::new(a.at(&Pose::IDENTITY), b.at(&turn)).collide(&plan, &mut scratch);
         let row = &mut rows[EDGES.iter().rposition(|edge| gap / r >= *edge).unwrap_or(0)];
         match answer.verdict {
             Verdict::Intersecting { .. } => row.hits += 1,

@@ -11,8 +11,8 @@
 use std::fs;
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, DistanceOptions, DistancePlan,
-    DistanceScratch, Evidence, PairHint, Pose, Scan, Verdict, collide_hinted, distance_with,
+    BuildOptions, CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Evidence, Pair, PairHint, Pose,
+    Scan, Scratch, Verdict,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -96,13 +96,12 @@ impl Found {
         let plan = DistancePlan::new(&DistanceOptions::default(), &a, &b)?;
         let certified = CollideOptions::default().with_evidence(Evidence::Certified);
         let asked = CollidePlan::new(&certified, &a, &b)?;
-        let (mut apart, mut scratch) = (DistanceScratch::default(), CollideScratch::default());
+        let (mut apart, mut scratch) = (Scratch::default(), Scratch::default());
         let (mut hint, mut found) = (PairHint::default(), Self::default());
         for (way, pose) in path {
             let (va, vb) = (a.at(&Pose::IDENTITY), b.at(pose));
-            let (distance, time) = timed(|| distance_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut apart));
-            let (answer, brief) =
-                timed(|| collide_hinted(&va, &vb, &asked, &Budget::UNLIMITED, &mut hint, &mut scratch));
+            let (distance, time) = timed(|| Pair::new(va, vb).distance(&plan, &mut apart));
+            let (answer, brief) = timed(|| Pair::new(va, vb).hinted(&mut hint).collide(&asked, &mut scratch));
             let (nearest, ..) = tree.nearest_pair(&body.cloud, pose);
             found.wrong += usize::from(distance.lower.max(distance.upper) > nearest * (1.0 + 1e-6));
             match answer.verdict {

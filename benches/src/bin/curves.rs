@@ -6,11 +6,10 @@
 //! the second of a pair turned a little and shifted by X along x.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
-use nearmiss::query::ViewScratch;
 use nearmiss::surface::meet;
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveOptions, CurvePlan,
-    CurveScratch, Curves, Detail, Evidence, Order, Pose, Scan, ScanView, collide_all, curves_with,
+    BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, Detail, Evidence,
+    Order, Pair, Placed, Pose, Scan, Scratch,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, processor_time, timed};
@@ -52,28 +51,28 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
-fn measure(pair: &str, [a, b]: &[ScanView<'_>; 2], passes: u32) -> Result<(), Failure> {
-    let radius = |view: &ScanView<'_>| view.sampling_radius();
+fn measure(pair: &str, [a, b]: &[Placed<'_>; 2], passes: u32) -> Result<(), Failure> {
+    let radius = |view: &Placed<'_>| view.sampling_radius();
     let r = radius(a).min(radius(b));
     let options = CollideOptions::default()
         .with_detail(Detail::Verdict)
         .with_evidence(Evidence::Estimated)
         .with_order(Order::DepthFirst);
     let plan = CollidePlan::new(&options, a.scan(), b.scan())?;
-    let (mut contacts, mut scratch) = (Contacts::default(), CollideScratch::default());
+    let (mut contacts, mut scratch) = (Contacts::default(), Scratch::default());
     let times = time(passes, || {
-        collide_all(a, b, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+        Pair::new(*a, *b).contacts(&mut contacts).collide(&plan, &mut scratch);
     });
     println!("| {pair} | contacts | | | {} | | | | {times} |", contacts.contacts.len());
 
-    let [mut of_a, mut of_b] = [ViewScratch::default(), ViewScratch::default()];
+    let [mut of_a, mut of_b] = [Scratch::default(), Scratch::default()];
     let (mut evaluations, mut verified) = (0, 0);
     let times = time(passes, || {
         (evaluations, verified) = (0, 0);
         for contact in &contacts.contacts {
             let meeting = meet(contact.point, |x| {
                 evaluations += 2;
-                Some([a.evaluate_with(x, &mut of_a), b.evaluate_with(x, &mut of_b)])
+                Some([a.evaluate(x, &mut of_a), b.evaluate(x, &mut of_b)])
             });
             verified += usize::from(meeting.is_some_and(|meeting| meeting.verified));
         }
@@ -82,8 +81,8 @@ fn measure(pair: &str, [a, b]: &[ScanView<'_>; 2], passes: u32) -> Result<(), Fa
 
     for spacing in SPACINGS {
         let plan = CurvePlan::new(&CurveOptions::default().with_spacing(spacing * r), a.scan(), b.scan())?;
-        let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
-        let times = time(passes, || curves_with(a, b, &plan, &Budget::UNLIMITED, &mut found, &mut scratch));
+        let (mut found, mut scratch) = (Curves::default(), Scratch::default());
+        let times = time(passes, || Pair::new(*a, *b).curves(&plan, &mut found, &mut scratch));
         println!(
             "| {pair} | contacts and curves, {spacing} r | {} | {} | {} | {:.1} | {:.1e} | {} | {times} |",
             found.curves.len(),

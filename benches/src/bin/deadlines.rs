@@ -10,8 +10,8 @@
 use std::time::{Duration, Instant};
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Deadline, Evidence, Method, Order,
-    Pose, Reason, Sampling, Scan, Verdict, collide_with,
+    Budget, BuildOptions, CollideOptions, CollidePlan, Deadline, Evidence, Method, Order, Pair, Pose, Reason,
+    Sampling, Scan, Scratch, Verdict,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::now;
@@ -59,13 +59,13 @@ fn main() -> Result<(), Failure> {
         let plan = CollidePlan::new(&options, &scan, &scan)?;
         for micros in MICROS {
             let time = Duration::from_micros(micros);
-            let mut scratch = CollideScratch::default();
+            let mut scratch = Scratch::default();
             let (mut late, mut spun) = (Vec::new(), Vec::new());
             for i in 0..queries {
                 let views = [scan.at(&Pose::IDENTITY), scan.at(&poses[i % poses.len()])];
                 let end = now() + time;
                 let budget = Budget::UNLIMITED.with_deadline(Deadline::at(end));
-                let answer = collide_with(&views[0], &views[1], &plan, &budget, &mut scratch);
+                let answer = Pair::new(views[0], views[1]).within(&budget).collide(&plan, &mut scratch);
                 let after = micros_since(end);
                 if matches!(answer.verdict, Verdict::Undecided(Reason::Budget { .. })) {
                     late.push(after);
@@ -111,11 +111,11 @@ fn main() -> Result<(), Failure> {
 
 /// The longest time that a query does not look at the clock, in microseconds.
 fn stretch(scan: &Scan, plan: &CollidePlan, pose: &Pose) -> f64 {
-    let mut scratch = CollideScratch::default();
-    let ask = |scratch: &mut CollideScratch| {
+    let mut scratch = Scratch::default();
+    let ask = |scratch: &mut Scratch| {
         let views = [scan.at(&Pose::IDENTITY), scan.at(pose)];
         let budget = Budget::UNLIMITED.with_deadline(Deadline::within(LONG));
-        collide_with(&views[0], &views[1], plan, &budget, scratch);
+        Pair::new(views[0], views[1]).within(&budget).collide(plan, scratch);
         1e6 * scratch.longest_stretch().as_secs_f64()
     };
     (0..REPEATS).map(|_| ask(&mut scratch)).fold(f64::INFINITY, f64::min)

@@ -9,8 +9,7 @@
 use std::hint::black_box;
 
 use nearmiss::{
-    Budget, BuildOptions, Distance, DistanceOptions, DistancePlan, DistanceScratch, Evidence, Pose, Scan,
-    Semantics, distance_with,
+    BuildOptions, Distance, DistanceOptions, DistancePlan, Evidence, Pair, Pose, Scan, Scratch, Semantics,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -55,10 +54,10 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     println!("## {}: {} points, r {:.5}\n", object.name, object.cloud.len(), object.r);
     for (name, semantics) in [("surfaces", Semantics::Surface), ("points", Semantics::Thickened(0.0))] {
         let plan = DistancePlan::new(&DistanceOptions::default().with_semantics(semantics), &scan, &scan)?;
-        let mut scratch = DistanceScratch::default();
+        let mut scratch = Scratch::default();
         let ask = |pose: &Pose| {
             let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(pose));
-            distance_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch)
+            Pair::new(a, b).distance(&plan, &mut scratch)
         };
         println!("### {name}\n");
         tell(&columns(options, options.per_distance, ask), options.from, object.r);

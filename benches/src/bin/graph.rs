@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::graph::{DynamicGraph, GraphOptions, PointGraph, Prune, Touched};
-use nearmiss::index::{BlockTree, Nearest, PointBlock};
+use nearmiss::index::{BlockBoxes, Nearest, PointBlock};
 use nearmiss::surface::Level;
 use nearmiss::{BuildOptions, PointHierarchy};
 use nearmiss_benches::clock::timed;
@@ -42,7 +42,8 @@ fn neighbours(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
         }
     }
     println!("| nearest {COUNT}, one thread | ns a point |\n| --- | --: |");
-    let tree = measure("build of the tree", n, runs, || BlockTree::new(&blocks, n));
+    let boxes = measure("build of the tree", n, runs, || BlockBoxes::new(&blocks, n));
+    let tree = boxes.over(&blocks);
     let mut found = Nearest::default();
     for (name, level) in [("best", Level::new()), ("baseline", Level::baseline())] {
         measure(&format!("block tree, {name} instructions"), n, runs, || {

@@ -4,8 +4,7 @@
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, PairHint, Pose,
-    Scan, collide_hinted, collide_with,
+    BuildOptions, CollideOptions, CollidePlan, Detail, Evidence, Pair, PairHint, Pose, Scan, Scratch,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -71,8 +70,7 @@ impl Walked {
         (heading, step): ([f64; 3], f64),
         steps: u32,
     ) {
-        let (mut hint, mut cold, mut warm) =
-            (PairHint::default(), CollideScratch::default(), CollideScratch::default());
+        let (mut hint, mut cold, mut warm) = (PairHint::default(), Scratch::default(), Scratch::default());
         let from = start.translation();
         for i in 0..steps {
             // Half of the step is a turn, which moves points one unit away.
@@ -80,11 +78,9 @@ impl Walked {
             let turned = Pose::from_axis_angle(heading, way).after(&start.with_translation([0.0; 3]));
             let pose = turned.with_translation([0, 1, 2].map(|k| from[k] + heading[k] * way));
             let views = [scan.at(&Pose::IDENTITY), scan.at(&pose)];
-            let (one, time) =
-                timed(|| collide_with(&views[0], &views[1], plan, &Budget::UNLIMITED, &mut cold));
-            let (other, hinted) = timed(|| {
-                collide_hinted(&views[0], &views[1], plan, &Budget::UNLIMITED, &mut hint, &mut warm)
-            });
+            let (one, time) = timed(|| Pair::new(views[0], views[1]).collide(plan, &mut cold));
+            let (other, hinted) =
+                timed(|| Pair::new(views[0], views[1]).hinted(&mut hint).collide(plan, &mut warm));
             let meets = one.verdict.is_intersecting();
             self.differ += usize::from(other.verdict.is_intersecting() != meets);
             if i > 0 {

@@ -11,8 +11,8 @@ use std::fmt::Write;
 use std::time::Duration;
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Method, Order, Pacer, Pose,
-    Sampling, Scan, collide_paced, collide_with,
+    BuildOptions, CollideOptions, CollidePlan, Detail, Method, Order, Pacer, Pair, Pose, Sampling, Scan,
+    Scratch,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::figures::FigureOptions;
@@ -233,11 +233,9 @@ fn as_in_the_paper() -> CollideOptions {
 
 fn run(scan: &Scan, options: &CollideOptions, questions: &Questions) -> Result<Course, Failure> {
     let plan = CollidePlan::new(options, scan, scan)?;
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let a = scan.at(&Pose::IDENTITY);
-    Ok(Course::run(questions, PASSES, |pose| {
-        collide_with(&a, &scan.at(pose), &plan, &Budget::UNLIMITED, &mut scratch)
-    }))
+    Ok(Course::run(questions, PASSES, |pose| Pair::new(a, scan.at(pose)).collide(&plan, &mut scratch)))
 }
 
 /// Times and differences over distance, one figure.
@@ -326,10 +324,12 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
     let poses = sweep(options.figures.poses, options.figures.seed, 1);
     let questions = Questions::new(poses, &scan, mesh.as_mut().map(|mesh| mesh as &mut dyn Rival));
     let plan = CollidePlan::new(&as_in_the_paper(), &scan, &scan)?;
-    let (mut pacer, mut scratch) = (Pacer::new(options.target), CollideScratch::default());
+    let (mut pacer, mut scratch) = (Pacer::new(options.target), Scratch::default());
     let a = scan.at(&Pose::IDENTITY);
-    let paced =
-        Course::run(&questions, 1, |pose| collide_paced(&a, &scan.at(pose), &plan, &mut pacer, &mut scratch));
+    let paced = Course::run(&questions, 1, |pose| {
+        let pair = Pair::new(a, scan.at(pose));
+        pacer.pace(&plan, |plan, budget| pair.within(budget).collide(plan, &mut scratch))
+    });
     let free = run(&scan, &as_in_the_paper(), &questions)?;
     let micros = options.target.as_micros();
     writeln!(

@@ -9,10 +9,9 @@
 use std::fmt::Write;
 use std::hint::black_box;
 
-use nearmiss::query::{Contacts, collide_all};
 use nearmiss::{
-    Answer, Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, GraphOptions,
-    Interpolation, Method, Pose, Sampling, Scan, Surfels, collide_with,
+    Answer, BuildOptions, CollideOptions, CollidePlan, Contacts, Detail, GraphOptions, Interpolation, Method,
+    Pair, Pose, Sampling, Scan, Scratch, Surfels,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -101,18 +100,18 @@ fn interpolation(surfels: u32, approaches: bool) -> Interpolation {
 struct Asking<'a> {
     scan: &'a Scan,
     plan: CollidePlan,
-    scratch: CollideScratch,
+    scratch: Scratch,
 }
 
 impl<'a> Asking<'a> {
     fn new(scan: &'a Scan, method: Method) -> Result<Self, Failure> {
         let plan = CollidePlan::new(&verdict(method), scan, scan)?;
-        Ok(Self { scan, plan, scratch: CollideScratch::default() })
+        Ok(Self { scan, plan, scratch: Scratch::default() })
     }
 
     fn ask(&mut self, pose: &Pose) -> Answer {
         let (a, b) = (self.scan.at(&Pose::IDENTITY), self.scan.at(pose));
-        collide_with(&a, &b, &self.plan, &Budget::UNLIMITED, &mut self.scratch)
+        Pair::new(a, b).collide(&self.plan, &mut self.scratch)
     }
 }
 
@@ -315,14 +314,13 @@ fn figure_9(text: &mut String, options: &Options) -> Result<(), Failure> {
         let density = object.density();
         let scan = prepared(&object)?;
         let plan = CollidePlan::new(&verdict(Method::Interpolation(interpolation(29, false))), &scan, &scan)?;
-        let (mut scratch, mut contacts) = (CollideScratch::default(), Contacts::default());
+        let (mut scratch, mut contacts) = (Scratch::default(), Contacts::default());
         let a = scan.at(&Pose::IDENTITY);
         let poses = sweep(options.figures.poses, options.figures.seed, 0);
         let (mut tally, mut found) = (Tally::default(), 0);
         for pose in poses[..WITHIN].iter().flatten() {
             let b = scan.at(pose);
-            let mut ask =
-                || timed(|| collide_all(&a, &b, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch));
+            let mut ask = || timed(|| Pair::new(a, b).contacts(&mut contacts).collide(&plan, &mut scratch));
             let (answer, time) = ask();
             let again = ask().1;
             tally.asked += 1;

@@ -12,9 +12,8 @@
 use std::hint::black_box;
 
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Distance, DistanceOptions,
-    DistancePlan, DistanceScratch, Evidence, PairHint, PointCloud, Pose, Scan, Verdict, collide_hinted,
-    collide_with, distance_with,
+    BuildOptions, CollideOptions, CollidePlan, Detail, Distance, DistanceOptions, DistancePlan, Evidence,
+    Pair, PairHint, PointCloud, Pose, Scan, Scratch, Verdict,
 };
 use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
@@ -106,13 +105,11 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     let mut score = Score::default();
     let far = verdicts([&a, &b], &truths, options, &mut score)?;
     let plan = DistancePlan::new(&DistanceOptions::default(), &a, &b)?;
-    let mut scratch = DistanceScratch::default();
+    let mut scratch = Scratch::default();
     let (mut distances, mut again) = (Sample::default(), Sample::default());
     for (i, truth) in truths.iter().enumerate() {
         let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&truth.pose));
-        let mut ask = || {
-            timed(|| black_box(distance_with(&va, black_box(&vb), &plan, &Budget::UNLIMITED, &mut scratch)))
-        };
+        let mut ask = || timed(|| black_box(Pair::new(va, *black_box(&vb)).distance(&plan, &mut scratch)));
         let (found, time) = ask();
         distances.push(nanoseconds(time));
         // As a planner asks about nearly the same pose: what it looks at is in the cache.
@@ -160,11 +157,10 @@ fn verdicts(
 ) -> Result<Sample, Failure> {
     let asked = CollideOptions::default().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&asked, a, b)?;
-    let (mut scratch, mut far) = (CollideScratch::default(), Sample::default());
+    let (mut scratch, mut far) = (Scratch::default(), Sample::default());
     for (i, truth) in truths.iter().enumerate() {
         let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&truth.pose));
-        let (answer, time) =
-            timed(|| black_box(collide_with(&va, black_box(&vb), &plan, &Budget::UNLIMITED, &mut scratch)));
+        let (answer, time) = timed(|| black_box(Pair::new(va, *black_box(&vb)).collide(&plan, &mut scratch)));
         let is_far = truth.distance >= FAR * truth.spacing;
         match answer.verdict {
             Verdict::Separated { evidence, gap } => {
@@ -232,7 +228,7 @@ fn truths(
 fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Result<f64, Failure> {
     let asked = CollideOptions::default().with_evidence(Evidence::Certified).with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&asked, a, b)?;
-    let (mut scratch, mut all) = (CollideScratch::default(), Sample::default());
+    let (mut scratch, mut all) = (Scratch::default(), Sample::default());
     let rng = &mut rng(options.seed ^ 1);
     for truth in truths.iter().filter(|truth| truth.distance >= FAR * truth.spacing).take(50) {
         let way = unit_vector(rng);
@@ -245,9 +241,8 @@ fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Resul
             let along = if most > 0.0 { most - (far % (2.0 * most) - most).abs() } else { 0.0 };
             pose = pose.with_translation([0, 1, 2].map(|k| from[k] + way[k] * along));
             let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&pose));
-            let (_, time) = timed(|| {
-                black_box(collide_hinted(&va, &vb, &plan, &Budget::UNLIMITED, &mut hint, &mut scratch))
-            });
+            let (_, time) =
+                timed(|| black_box(Pair::new(va, vb).hinted(&mut hint).collide(&plan, &mut scratch)));
             if step > 1 {
                 all.push(nanoseconds(time));
             }

@@ -42,7 +42,7 @@ fn main() -> Result<(), Failure> {
 fn measure(object: &Object, (number, passes, radius, seed): (usize, u32, f64, u64)) -> Result<(), Failure> {
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let (index, made) = timed(|| ShapeIndex::new(&scan));
-    let placed = index.at(&Pose::IDENTITY);
+    let placed = scan.at(&Pose::IDENTITY).with_shapes(&index);
     #[expect(clippy::cast_possible_truncation, reason = "the rivals are single precision")]
     let single = |p: [f64; 3]| p.map(|c| c as f32);
     let points: Vec<[f32; 3]> = (0..object.cloud.len()).map(|i| single(object.cloud.point(i))).collect();

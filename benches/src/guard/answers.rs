@@ -4,9 +4,8 @@ use std::fmt::{self, Display};
 use std::str::FromStr;
 
 use nearmiss::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, CurveOptions, CurvePlan, CurveScratch, Curves,
-    Detail, Distance, DistanceOptions, DistancePlan, DistanceScratch, Evidence, Metric, Pose, Scan, ScanView,
-    Semantics, Shape, ShapeIndex, Verdict, collide_with, curves_with, distance_with,
+    CollideOptions, CollidePlan, CurveOptions, CurvePlan, Curves, Detail, Distance, DistanceOptions,
+    DistancePlan, Evidence, Metric, Pair, Placed, Pose, Scan, Scratch, Semantics, Shape, ShapeIndex, Verdict,
 };
 
 use super::cases::{Case, Question};
@@ -225,20 +224,18 @@ pub fn faults(new: &[Row], old: &[Row]) -> Vec<String> {
 /// # Errors
 /// When a plan does not fit the scans.
 pub fn ask(case: &Case) -> Result<Vec<Row>, Failure> {
-    let mut scratch = Scratch::default();
-    let ask = |(i, question): (usize, &Question)| scratch.ask(case, question, i % ONE_OF == 0);
+    let mut asker = Asker::default();
+    let ask = |(i, question): (usize, &Question)| asker.ask(case, question, i % ONE_OF == 0);
     case.questions.iter().enumerate().map(ask).collect()
 }
 
 #[derive(Debug, Default)]
-struct Scratch {
-    collide: CollideScratch,
-    distance: DistanceScratch,
-    curve: CurveScratch,
+struct Asker {
+    scratch: Scratch,
     curves: Curves,
 }
 
-impl Scratch {
+impl Asker {
     fn ask(&mut self, case: &Case, question: &Question, aside: bool) -> Result<Row, Failure> {
         let [a, b] = [&case.scans[question.a], &case.scans[question.b]];
         let views = [a.at(&question.poses[0]), b.at(&question.poses[1])];
@@ -261,24 +258,24 @@ impl Scratch {
         })
     }
 
-    fn collide(&mut self, [a, b]: &[ScanView<'_>; 2], options: &CollideOptions) -> Result<Verdict, Failure> {
+    fn collide(&mut self, [a, b]: &[Placed<'_>; 2], options: &CollideOptions) -> Result<Verdict, Failure> {
         let plan = CollidePlan::new(options, a.scan(), b.scan())?;
-        Ok(collide_with(a, b, &plan, &Budget::UNLIMITED, &mut self.collide).verdict)
+        Ok(Pair::new(*a, *b).collide(&plan, &mut self.scratch).verdict)
     }
 
-    fn distance(&mut self, [a, b]: &[ScanView<'_>; 2]) -> Result<Distance, Failure> {
+    fn distance(&mut self, [a, b]: &[Placed<'_>; 2]) -> Result<Distance, Failure> {
         let plan = DistancePlan::new(&DistanceOptions::default(), a.scan(), b.scan())?;
-        Ok(distance_with(a, b, &plan, &Budget::UNLIMITED, &mut self.distance))
+        Ok(Pair::new(*a, *b).distance(&plan, &mut self.scratch))
     }
 
     fn aside(
         &mut self,
-        [a, b]: &[ScanView<'_>; 2],
+        [a, b]: &[Placed<'_>; 2],
         scan: &Scan,
         question: &Question,
     ) -> Result<Aside, Failure> {
         let plan = CurvePlan::new(&CurveOptions::default(), a.scan(), b.scan())?;
-        curves_with(a, b, &plan, &Budget::UNLIMITED, &mut self.curves, &mut self.curve);
+        Pair::new(*a, *b).curves(&plan, &mut self.curves, &mut self.scratch);
         Ok(Aside {
             curves: self.curves.curves.len(),
             closed: self.curves.closed(),
@@ -304,6 +301,6 @@ fn touches(a: &Scan, question: &Question) -> u32 {
     ];
     let index = ShapeIndex::new(a);
     let mut answers = [false; 3];
-    index.at(&pose).touch_each(&shapes, &mut answers);
+    a.at(&pose).with_shapes(&index).touch_each(&shapes, &mut answers);
     answers.iter().enumerate().map(|(i, &touches)| u32::from(touches) << i).sum()
 }

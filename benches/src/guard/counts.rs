@@ -7,9 +7,8 @@ use std::path::Path;
 use std::process::Command;
 
 use nearmiss::{
-    Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Detail, DistanceOptions,
-    DistancePlan, DistanceScratch, Evidence, PairHint, PointCloud, Pose, Scan, collide_hinted, collide_with,
-    distance_with,
+    BuildOptions, Check, CollideOptions, CollidePlan, Detail, DistanceOptions, DistancePlan, Evidence, Pair,
+    PairHint, PointCloud, Pose, Scan, Scratch,
 };
 use nearmiss_testdata::arbitrary::{rng, unit_vector};
 use nearmiss_testdata::scanner::{self, Frame};
@@ -187,17 +186,11 @@ fn hall() -> Result<Case, Failure> {
 /// Of a case whose questions are all about its first and its last scan.
 fn verdicts(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
     let [a, b] = [&case.scans[0], &case.scans[case.scans.len() - 1]];
-    let (plan, mut scratch) = (CollidePlan::new(options, a, b)?, CollideScratch::default());
+    let (plan, mut scratch) = (CollidePlan::new(options, a, b)?, Scratch::default());
     counted(&mut || {
         for question in &case.questions {
             let [at_a, at_b] = &question.poses;
-            std::hint::black_box(collide_with(
-                &a.at(at_a),
-                &b.at(at_b),
-                &plan,
-                &Budget::UNLIMITED,
-                &mut scratch,
-            ));
+            std::hint::black_box(Pair::new(a.at(at_a), b.at(at_b)).collide(&plan, &mut scratch));
         }
     });
     Ok(())
@@ -206,17 +199,11 @@ fn verdicts(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
 fn distances(case: &Case) -> Result<(), Failure> {
     let [a, b] = [&case.scans[0], &case.scans[case.scans.len() - 1]];
     let plan = DistancePlan::new(&DistanceOptions::default(), a, b)?;
-    let mut scratch = DistanceScratch::default();
+    let mut scratch = Scratch::default();
     counted(&mut || {
         for question in &case.questions {
             let [at_a, at_b] = &question.poses;
-            std::hint::black_box(distance_with(
-                &a.at(at_a),
-                &b.at(at_b),
-                &plan,
-                &Budget::UNLIMITED,
-                &mut scratch,
-            ));
+            std::hint::black_box(Pair::new(a.at(at_a), b.at(at_b)).distance(&plan, &mut scratch));
         }
     });
     Ok(())
@@ -225,7 +212,7 @@ fn distances(case: &Case) -> Result<(), Failure> {
 fn hinted(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
     const STEPS: u32 = 10;
     let scan = &case.scans[0];
-    let (plan, mut scratch) = (CollidePlan::new(options, scan, scan)?, CollideScratch::default());
+    let (plan, mut scratch) = (CollidePlan::new(options, scan, scan)?, Scratch::default());
     let (still, step) = (scan.at(&Pose::IDENTITY), 0.1 * f64::from(scan.slices().sampling_radius));
     let rng = &mut rng(1);
     let walks: Vec<(Pose, [f64; 3])> = case
@@ -240,14 +227,9 @@ fn hinted(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
                 let [x, y, z] = start.translation();
                 let shift = step.map(|d| d * f64::from(i));
                 let at = start.with_translation([x + shift[0], y + shift[1], z + shift[2]]);
-                std::hint::black_box(collide_hinted(
-                    &still,
-                    &scan.at(&at),
-                    &plan,
-                    &Budget::UNLIMITED,
-                    &mut hint,
-                    &mut scratch,
-                ));
+                std::hint::black_box(
+                    Pair::new(still, scan.at(&at)).hinted(&mut hint).collide(&plan, &mut scratch),
+                );
             }
         }
     });

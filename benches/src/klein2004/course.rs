@@ -177,7 +177,7 @@ mod tests {
     use crate::object::Object;
     use crate::poses::sweep;
     use crate::rivals::parry::MeshTree;
-    use nearmiss::{Budget, BuildOptions, CollideOptions, CollidePlan, collide};
+    use nearmiss::{Budget, BuildOptions, CollideOptions, CollidePlan, Pair, Scratch};
 
     #[test]
     fn boxes_that_hold_a_corner_of_each_other_meet() {
@@ -226,12 +226,16 @@ mod tests {
 
         let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
         let a = scan.at(&Pose::IDENTITY);
-        let course =
-            Course::run(&questions, 2, |pose| collide(&a, &scan.at(pose), &plan, &Budget::UNLIMITED));
+        let course = Course::run(&questions, 2, |pose| {
+            Pair::new(a, scan.at(pose)).collide(&plan, &mut Scratch::default())
+        });
         let Difference { tests, differ, undecided, unfinished } = course.averaged();
         assert!(tests > 80 && differ * 10 < tests && undecided * 10 < tests && unfinished == 0, "{course:?}");
         let none = Budget::UNLIMITED.with_work(0);
-        let guessed = Course::run(&questions, 1, |pose| collide(&a, &scan.at(pose), &plan, &none)).averaged();
+        let guessed = Course::run(&questions, 1, |pose| {
+            Pair::new(a, scan.at(pose)).within(&none).collide(&plan, &mut Scratch::default())
+        })
+        .averaged();
         assert!(guessed.tests == tests && guessed.unfinished > tests / 2, "{guessed:?}");
         let times: usize = course.times.iter().map(Sample::len).sum();
         assert_eq!(times, 30 * DISTANCES);

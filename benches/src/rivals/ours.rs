@@ -4,8 +4,8 @@ use std::hint::black_box;
 
 use fearless_simd::Level;
 use nearmiss::{
-    Answer, CollideOptions, CollidePlan, CollideScratch, Evidence, Method as Search, Metric, Pose, Scan,
-    Verdict, collide_with,
+    Answer, CollideOptions, CollidePlan, Evidence, Method as Search, Metric, Pair, Pose, Scan, Scratch,
+    Verdict,
 };
 
 use crate::Failure;
@@ -18,7 +18,7 @@ pub struct Ours<'a> {
     scans: [&'a Scan; 2],
     plan: CollidePlan,
     limits: Limits,
-    scratch: CollideScratch,
+    scratch: Scratch,
     level: Option<Level>,
     /// What is read before each question, so that nothing of the scan is left in any cache.
     evicting: Vec<u64>,
@@ -42,7 +42,7 @@ impl<'a> Ours<'a> {
     /// When there is no plan for that.
     pub fn of(scans: [&'a Scan; 2], options: &CollideOptions) -> Result<Self, Failure> {
         let plan = CollidePlan::new(options, scans[0], scans[1])?;
-        let scratch = CollideScratch::default();
+        let scratch = Scratch::default();
         Ok(Self { scans, plan, limits: Limits::default(), scratch, level: None, evicting: Vec::new() })
     }
 
@@ -55,7 +55,7 @@ impl<'a> Ours<'a> {
     /// The same by this instruction set.
     #[must_use]
     pub fn by_level(self, level: Level) -> Self {
-        Self { scratch: CollideScratch::by_level(level), level: Some(level), ..self }
+        Self { scratch: Scratch::by_level(level), level: Some(level), ..self }
     }
 
     /// The same with nothing in the caches when asked.
@@ -67,7 +67,7 @@ impl<'a> Ours<'a> {
     /// The whole answer.
     pub fn answer(&mut self, a: &Pose, b: &Pose) -> Answer {
         let (a, b) = (self.scans[0].at(a), self.scans[1].at(b));
-        collide_with(&a, &b, &self.plan, &self.limits.begin(), &mut self.scratch)
+        Pair::new(a, b).within(&self.limits.begin()).collide(&self.plan, &mut self.scratch)
     }
 }
 

@@ -1,6 +1,6 @@
 //! How well a scan is sampled, in words, and what to do if badly.
 
-use nearmiss::{Bandwidth, BuildOptions, PointHierarchy, PointKind, Scan, ScanView};
+use nearmiss::{Bandwidth, BuildOptions, Placed, PointHierarchy, PointKind, Scan};
 
 use crate::digits::{percent, rough, short, short_up};
 use crate::health::Health;
@@ -189,7 +189,7 @@ fn has_local_bandwidth(bandwidth: Bandwidth) -> bool {
 
 /// Remedies where points of `view` that sample no sheet leave surfaces in doubt. `radius` is the greater
 /// sampling radius of both scans in the world; `first` comes first.
-pub(crate) fn for_sparse(view: &ScanView<'_>, radius: f64, first: Option<&str>) -> String {
+pub(crate) fn for_sparse(view: &Placed<'_>, radius: f64, first: Option<&str>) -> String {
     let scan = view.scan();
     let mut ways: Vec<String> = first.map(Into::into).into_iter().collect();
     if scan.share(PointKind::Line) >= scan.share(PointKind::Stray) {
@@ -207,7 +207,7 @@ pub(crate) fn for_sparse(view: &ScanView<'_>, radius: f64, first: Option<&str>) 
 }
 
 /// Remedies where the points of `views` do not look like one sheet.
-pub(crate) fn for_ambiguous(views: [&ScanView<'_>; 2], radius: f64, first: Option<&str>) -> String {
+pub(crate) fn for_ambiguous(views: [&Placed<'_>; 2], radius: f64, first: Option<&str>) -> String {
     let is_local = views.iter().any(|v| has_local_bandwidth(v.scan().plan().options().bandwidth));
     let mut ways: Vec<String> = first.map(Into::into).into_iter().collect();
     if is_local {

@@ -8,9 +8,8 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Deadline, Detail,
-    Evidence, ManifoldPoint, Metric, Pose, Proof, Scan, ScanView, answer_each, collide_all, collide_proving,
-    collide_with,
+    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Contacts, Deadline, Detail, Evidence,
+    ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch, each,
 };
 
 use crate::console::{self, Console, Results, now};
@@ -72,7 +71,7 @@ pub struct CollideArgs {
     pub detail: DetailName,
     /// All contacts, one for each pair of leaves that meets or, without hierarchy, each bracket: to first
     /// order, beside the answer
-    #[arg(long, conflicts_with = "prove")]
+    #[arg(long)]
     pub all: bool,
     /// How to search
     #[command(flatten)]
@@ -122,26 +121,33 @@ struct Question {
     resolution: Option<f64>,
     prove: bool,
     all: bool,
+    manifold: bool,
     sizes: SizeCheck,
 }
 
 impl Question {
     /// The answer to the question on this line of the file of poses.
-    fn ask(&self, line: Option<u64>, poses: [Pose; 2], scratch: &mut CollideScratch) -> Asked {
+    fn ask(&self, line: Option<u64>, poses: [Pose; 2], scratch: &mut Scratch) -> Asked {
         let start = now();
         let [a, b] = self.views(&poses);
         let budget = self.budget_from(start);
         let mut proof = self.prove.then(Proof::default);
         let mut contacts = self.all.then(Contacts::default);
-        let answer = match (&mut proof, &mut contacts) {
-            (_, Some(contacts)) => collide_all(&a, &b, &self.plan, &budget, contacts, scratch),
-            (Some(proof), None) => collide_proving(&a, &b, &self.plan, &budget, scratch, proof),
-            (None, None) => collide_with(&a, &b, &self.plan, &budget, scratch),
-        };
+        let mut manifold = self.manifold.then(Vec::new);
+        let pair = Pair::new(a, b).within(&budget);
+        let mut question = pair.question();
+        if let Some(proof) = &mut proof {
+            question = question.proof(proof);
+        }
+        if let Some(contacts) = &mut contacts {
+            question = question.contacts(contacts);
+        }
+        if let Some(manifold) = &mut manifold {
+            question = question.manifold(manifold);
+        }
+        let answer = question.collide(&self.plan, scratch);
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
-        let wants_manifold = self.plan.options().detail == Detail::Manifold;
-        let manifold = wants_manifold.then(|| scratch.manifold().to_vec());
         Asked { line, poses, answer, proof, contacts, manifold, micros }
     }
 
@@ -160,7 +166,7 @@ impl Question {
         budget
     }
 
-    fn views(&self, poses: &[Pose; 2]) -> [ScanView<'_>; 2] {
+    fn views(&self, poses: &[Pose; 2]) -> [Placed<'_>; 2] {
         [self.a.at(&poses[0]), self.b.at(&poses[1])]
     }
 
@@ -239,8 +245,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let semantics = args.meaning.semantics(&a);
     let detail = match args.detail {
         DetailName::Verdict => Detail::Verdict,
-        DetailName::Witness => Detail::Witness,
-        DetailName::Manifold => Detail::Manifold,
+        DetailName::Witness | DetailName::Manifold => Detail::Witness,
     };
     let evidence = match args.evidence {
         None | Some(EvidenceName::Certified) => Evidence::Certified,
@@ -260,7 +265,8 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let prove = args.prove.is_some();
     let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);
     let sizes = args.pair.size_check(console);
-    let question = Question { a, b, plan, budget, work, resolution, prove, all: args.all, sizes };
+    let manifold = args.detail == DetailName::Manifold;
+    let question = Question { a, b, plan, budget, work, resolution, prove, all: args.all, manifold, sizes };
 
     let mut results = Results::new();
     let mut answer = |out: &mut Outputs<'_, '_>| match &mut poses {
@@ -309,7 +315,7 @@ fn answer_one(
     out: &mut Outputs<'_, '_>,
 ) -> Result<(), CliError> {
     let poses = posing::of_options(matrices, [&question.a, &question.b])?;
-    let asked = question.ask(None, poses, &mut CollideScratch::default());
+    let asked = question.ask(None, poses, &mut Scratch::default());
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let [a, b] = question.views(&asked.poses);
@@ -341,7 +347,7 @@ fn answer_all(
     loop {
         lines.clear();
         let read = read_lines(poses, most, &mut lines);
-        let ask = |i: usize, scratch: &mut CollideScratch| {
+        let ask = |i: usize, scratch: &mut Scratch| {
             let (line, text): &(u64, String) = &lines[i];
             let poses = poses.poses(*line, text, [&question.a, &question.b]);
             let asked = poses.map(|poses| question.ask(Some(*line), poses, scratch));
@@ -351,7 +357,7 @@ fn answer_all(
         };
         answers.clear();
         answers.resize_with(lines.len(), || None);
-        let mut answer = || answer_each(&mut answers, None, ask, &mut scratch);
+        let mut answer = || each(&mut answers, None, &mut scratch, ask);
         let told = match &pool {
             Some(pool) => pool.install(answer),
             None => answer(),

@@ -5,9 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use nearmiss::io::{Column, PlyPoints};
-use nearmiss::{
-    Budget, Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, ScanView, curves_with,
-};
+use nearmiss::{Budget, Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Pair, Placed, Scratch};
 use serde::Serialize;
 
 use crate::console::{Console, Results, now};
@@ -112,12 +110,12 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     let mut options = CurveOptions::default();
     (options.spacing, options.tolerance) = (args.spacing, args.tolerance);
     let plan = CurvePlan::new(&options, a.scan(), b.scan())?;
-    let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
+    let (mut found, mut scratch) = (Curves::default(), Scratch::default());
     let start = now();
     let mut budget = Budget::UNLIMITED;
     (budget.work, budget.deadline) =
         (args.work, args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
-    curves_with(&a, &b, &plan, &budget, &mut found, &mut scratch);
+    Pair::new(a, b).within(&budget).curves(&plan, &mut found, &mut scratch);
     let missed = if found.curves.is_empty() && found.complete {
         let spent = found.statistics.evaluations + found.statistics.node_pairs;
         budget.work = budget.work.map(|units| units.saturating_sub(spent));
@@ -154,7 +152,7 @@ fn write(path: &Path, found: &Curves) -> Result<(), CliError> {
 fn tell(
     found: &Curves,
     missed: Option<&NoCurve>,
-    views: [&ScanView<'_>; 2],
+    views: [&Placed<'_>; 2],
     micros: f64,
     json: bool,
 ) -> Result<(), CliError> {
@@ -250,8 +248,8 @@ fn sentence(found: &Curves) -> String {
 }
 
 /// Why curves may be missing.
-fn unfinished(views: [&ScanView<'_>; 2]) -> &'static str {
-    let is_finite = |view: &&ScanView<'_>| view.placed().to_row_major().iter().all(|c| c.is_finite());
+fn unfinished(views: [&Placed<'_>; 2]) -> &'static str {
+    let is_finite = |view: &&Placed<'_>| view.placed().to_row_major().iter().all(|c| c.is_finite());
     if views.iter().all(is_finite) {
         "The budget ran out first; curves may be missing. Try a greater --budget or --work."
     } else {

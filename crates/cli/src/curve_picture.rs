@@ -1,7 +1,7 @@
 //! A picture of two scans and the curves in which they cut each other.
 
 use nearmiss::geometry::nalgebra::Vector3;
-use nearmiss::{Curve, Curves, ScanView};
+use nearmiss::{Curve, Curves, Placed};
 
 use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat};
 use crate::digits::{count, short};
@@ -33,16 +33,16 @@ const POINT_SAMPLE: usize = 3000;
 
 /// Both scans, softly, and their curves, from where most of these are seen; thin where they are hidden.
 #[must_use]
-pub fn curve_picture(a: &ScanView<'_>, b: &ScanView<'_>, found: &Curves) -> Picture {
+pub fn curve_picture(a: &Placed<'_>, b: &Placed<'_>, found: &Curves) -> Picture {
     paint([a, b], found, &["A", "B"].map(Into::into))
 }
 
 /// [`curve_picture`] with names for the scans.
-pub(crate) fn paint(views: [&ScanView<'_>; 2], found: &Curves, names: &[String; 2]) -> Picture {
+pub(crate) fn paint(views: [&Placed<'_>; 2], found: &Curves, names: &[String; 2]) -> Picture {
     let mut canvas = Canvas::new(WIDTH + 2 * GAP, HEIGHT + LEGEND + 2 * GAP, GROUND);
     let area = Area { left: GAP, top: GAP, width: WIDTH, height: HEIGHT };
     canvas.fill(area, PANEL_GROUND);
-    let radius = |view: &ScanView<'_>| view.sampling_radius();
+    let radius = |view: &Placed<'_>| view.sampling_radius();
     let radii = views.map(radius);
     let seen = Visibility::new(found, radii[0].max(radii[1]));
     let camera = whole_camera(views, area, |points, toward| 8.0 * seen.hidden(points, toward));

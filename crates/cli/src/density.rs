@@ -9,8 +9,7 @@ use std::path::PathBuf;
 use clap::Args;
 use nearmiss::query::points_for;
 use nearmiss::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Density, Detail, Interpolation, Method, Pose, Scan,
-    Surfels, collide_with,
+    CollideOptions, CollidePlan, Density, Detail, Interpolation, Method, Pair, Pose, Scan, Scratch, Surfels,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -198,13 +197,13 @@ impl Tests<'_> {
     fn verdicts(&self, method: Method) -> Result<Vec<bool>, CliError> {
         let options = CollideOptions::default().with_detail(Detail::Verdict).with_method(method);
         let plan = CollidePlan::new(&options, self.scan, self.scan)?;
-        let ask = |scratch: &mut CollideScratch, pose: &Pose| {
+        let ask = |scratch: &mut Scratch, pose: &Pose| {
             let views = [self.scan.at(self.base), self.scan.at(pose)];
             self.bar.advance(1);
-            let answer = collide_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, scratch);
+            let answer = Pair::new(views[0], views[1]).collide(&plan, scratch);
             answer.verdict.is_intersecting()
         };
         self.scan.make_ready();
-        Ok(self.poses.par_iter().map_init(CollideScratch::default, ask).collect())
+        Ok(self.poses.par_iter().map_init(Scratch::default, ask).collect())
     }
 }

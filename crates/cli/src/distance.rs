@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use nearmiss::{
-    Budget, Deadline, Distance, DistanceOptions, DistancePlan, DistanceScratch, Pose, Scan, ScanView,
-    Semantics, distance_with,
+    Budget, Deadline, Distance, DistanceOptions, DistancePlan, Pair, Placed, Pose, Scan, Scratch, Semantics,
 };
 use serde::Serialize;
 
@@ -115,7 +114,7 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let options = DistanceOptions::default().with_semantics(semantics).with_relative(args.relative);
     let plan = DistancePlan::new(&options, &a, &b)?;
     let question = Question { scans: [&a, &b], plan, args, sizes: args.pair.size_check(console) };
-    let mut scratch = DistanceScratch::default();
+    let mut scratch = Scratch::default();
     let mut results = Results::new();
     match &mut poses {
         Some(poses) => {
@@ -139,7 +138,7 @@ impl Question<'_> {
         &self,
         line: Option<u64>,
         poses: &[Pose; 2],
-        scratch: &mut DistanceScratch,
+        scratch: &mut Scratch,
         results: &mut Results,
     ) -> Result<(), CliError> {
         let start = now();
@@ -147,7 +146,7 @@ impl Question<'_> {
         let mut budget = Budget::UNLIMITED;
         (budget.work, budget.deadline) =
             (self.args.work, self.args.budget.and_then(|time| start.checked_add(time)).map(Deadline::at));
-        let found = distance_with(&a, &b, &self.plan, &budget, scratch);
+        let found = Pair::new(a, b).within(&budget).distance(&self.plan, scratch);
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
         self.sizes.compare([&a, &b]);
@@ -195,7 +194,7 @@ fn report(found: &Distance, micros: f64) -> DistanceReport {
 }
 
 /// The distance, for people.
-fn sentence(found: &Distance, views: [&ScanView<'_>; 2], semantics: Semantics) -> String {
+fn sentence(found: &Distance, views: [&Placed<'_>; 2], semantics: Semantics) -> String {
     let unfinished = if found.complete { "" } else { " The budget ran out first." };
     if found.upper <= 0.0 {
         let untold = match semantics {
@@ -216,10 +215,10 @@ fn sentence(found: &Distance, views: [&ScanView<'_>; 2], semantics: Semantics) -
 }
 
 /// How far `a` and `b` are apart within a budget, to be told beside a separation.
-pub(crate) fn beside(views: [&ScanView<'_>; 2], semantics: Semantics, budget: &Budget) -> Option<Distance> {
+pub(crate) fn beside(views: [&Placed<'_>; 2], semantics: Semantics, budget: &Budget) -> Option<Distance> {
     let options = DistanceOptions::default().with_semantics(semantics);
     let plan = DistancePlan::new(&options, views[0].scan(), views[1].scan()).ok()?;
-    Some(distance_with(views[0], views[1], &plan, budget, &mut DistanceScratch::default()))
+    Some(Pair::new(*views[0], *views[1]).within(budget).distance(&plan, &mut Scratch::default()))
 }
 
 /// Reads a relative precision.

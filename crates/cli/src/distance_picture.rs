@@ -1,7 +1,7 @@
 //! Pictures of two scans, of their nearest places and the segment between these.
 
 use nearmiss::geometry::nalgebra::Vector3;
-use nearmiss::{Distance, ScanView};
+use nearmiss::{Distance, Placed};
 
 use crate::canvas::{Area, Camera, Canvas, FINE};
 use crate::digits::{rough, short};
@@ -27,7 +27,7 @@ const END: f64 = 9.0;
 
 /// Both scans as they lie in the world; beside that a close view across the segment between the
 /// nearest places, what is before it taken away.
-pub(crate) fn paint_distance(views: [&ScanView<'_>; 2], found: &Distance, style: &Style) -> Picture {
+pub(crate) fn paint_distance(views: [&Placed<'_>; 2], found: &Distance, style: &Style) -> Picture {
     let mut canvas = Canvas::new(2 * PANEL + 3 * GAP, PANEL + LEGEND + 2 * GAP, GROUND);
     let segment = Segment::new(found);
     let area = Area { left: GAP, top: GAP, width: PANEL, height: PANEL };
@@ -121,7 +121,7 @@ impl Segment {
         &self,
         canvas: &mut Canvas,
         camera: &Camera,
-        views: [&ScanView<'_>; 2],
+        views: [&Placed<'_>; 2],
         look: &Look,
         shown: impl Fn(Vector3<f64>) -> bool,
     ) {
@@ -173,7 +173,7 @@ impl Segment {
 
 #[cfg(test)]
 mod tests {
-    use nearmiss::{BuildOptions, DistanceOptions, DistancePlan, PointCloud, Pose, Scan};
+    use nearmiss::{BuildOptions, DistanceOptions, DistancePlan, Pair, PointCloud, Pose, Scan, Scratch};
 
     use super::*;
 
@@ -191,7 +191,7 @@ mod tests {
         .unwrap();
         let [a, b] = [scan.at(&Pose::IDENTITY), scan.at(&above)];
         let plan = DistancePlan::new(&DistanceOptions::default(), &scan, &scan).unwrap();
-        let found = nearmiss::query::distance(&a, &b, &plan, &nearmiss::Budget::UNLIMITED);
+        let found = Pair::new(a, b).distance(&plan, &mut Scratch::default());
         assert!((found.upper - 9.0).abs() < 1e-6, "{found:?}");
         let style = Style { names: ["A", "B"].map(Into::into), points: false };
         let picture = paint_distance([&a, &b], &found, &style);

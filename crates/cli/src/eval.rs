@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use nearmiss::query::ViewScratch;
-use nearmiss::{Evaluation, Metric, Pose, Scan, ScanView, Status};
+use nearmiss::graph::{GeodesicKernel, KernelScratch};
+use nearmiss::{Evaluation, Metric, Placed, Pose, Scan, Scratch, Status};
 use serde::Serialize;
 
 use crate::console::{Console, Results};
@@ -80,10 +80,16 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
         Some(KernelName::Geodesic) => opening.open_with_graph(&args.file)?,
     };
     let unit = scan.sampling_radius() / 100.0;
-    let (view, mut scratch) = (view(&scan, args)?, ViewScratch::default());
+    let kernel = kernel(&scan, args)?;
+    // Without its graph a scan has straight distances alone.
+    let placed = Placed::new(&scan, &Pose::IDENTITY);
+    let (mut scratch, mut geodesic) = (Scratch::default(), KernelScratch::default());
     let mut results = Results::new();
     while let Some(x) = next {
-        let at = view.evaluate_with(x, &mut scratch);
+        let at = match &kernel {
+            None => placed.evaluate(x, &mut scratch),
+            Some(kernel) => placed.evaluate_by(kernel, x, &mut geodesic),
+        };
         if args.json {
             let defined = at.status == Status::Ok;
             results.json(&Report {
@@ -101,18 +107,17 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// The scan where it is, with f by the kernel that is asked for.
-fn view<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<ScanView<'a>, CliError> {
-    let view = ScanView::new(scan, &Pose::IDENTITY);
+/// The geodesic kernel, if that is asked for.
+fn kernel<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<Option<GeodesicKernel<'a>>, CliError> {
     match args.kernel.map_or(scan.metric(), KernelName::metric) {
-        Metric::Euclidean => Ok(view),
+        Metric::Euclidean => Ok(None),
         Metric::Geodesic => {
             let missing = || {
                 let what = "this scan was prepared without a map of close pairs, along which the geodesic \
                             kernel measures; prepare it again with `--close-pairs`";
                 CliError::Unfit { path: args.file.clone(), what: what.into() }
             };
-            Ok(view.with_kernel(scan.geodesic_kernel().ok_or_else(missing)?))
+            scan.geodesic_kernel().ok_or_else(missing).map(Some)
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The sentence and the JSON of `curve` where no curve was found: what `collide` knows of the same poses.
 
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Contact, Detail, Evidence, PlanError,
-    Reason, ScanView, Semantics, Statistics, Verdict, collide_with,
+    Answer, Budget, CollideOptions, CollidePlan, Contact, Detail, Evidence, Pair, Placed, PlanError, Reason,
+    Scratch, Semantics, Statistics, Verdict,
 };
 
 use crate::console::now;
@@ -21,8 +21,8 @@ pub(crate) struct NoCurve {
 
 impl NoCurve {
     /// Asks `collide` of both semantics, each within `budget`.
-    pub(crate) fn ask([a, b]: [&ScanView<'_>; 2], budget: &Budget) -> Result<Self, PlanError> {
-        let mut scratch = CollideScratch::default();
+    pub(crate) fn ask([a, b]: [&Placed<'_>; 2], budget: &Budget) -> Result<Self, PlanError> {
+        let mut scratch = Scratch::default();
         let mut ask = |semantics| {
             let options = CollideOptions::default()
                 .with_semantics(semantics)
@@ -30,7 +30,7 @@ impl NoCurve {
                 .with_evidence(Evidence::Certified);
             let plan = CollidePlan::new(&options, a.scan(), b.scan())?;
             let start = now();
-            let answer = collide_with(a, b, &plan, budget, &mut scratch);
+            let answer = Pair::new(*a, *b).within(budget).collide(&plan, &mut scratch);
             #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
             let micros = start.elapsed().as_nanos() as f64 / 1e3;
             Ok((answer, micros))
@@ -62,7 +62,7 @@ impl NoCurve {
     }
 
     /// Both answers for people.
-    pub(crate) fn sentence(&self, views: [&ScanView<'_>; 2]) -> String {
+    pub(crate) fn sentence(&self, views: [&Placed<'_>; 2]) -> String {
         let [ra, rb] = views.map(world_radius);
         sentence([self.surfaces.0.verdict, self.obstacles.0.verdict], ra.min(rb) / 100.0)
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::surface::symmetric_eigen;
-use nearmiss::{Answer, Contact, Evidence, PointId, ScanView, Verdict};
+use nearmiss::{Answer, Contact, Evidence, Placed, PointId, Verdict};
 
 use crate::canvas::{Area, Camera, Canvas, Colour, FINE, Splat, shade};
 use crate::digits::short;
@@ -58,7 +58,7 @@ pub(crate) fn names(paths: [&Path; 2]) -> [String; 2] {
 /// Both scans as they lie in the world; where they meet, beside that, a close view along the line in which
 /// the surfaces cut each other, the near half taken away, with the witness and both normals.
 #[must_use]
-pub fn contact_picture(a: &ScanView<'_>, b: &ScanView<'_>, answer: &Answer) -> Picture {
+pub fn contact_picture(a: &Placed<'_>, b: &Placed<'_>, answer: &Answer) -> Picture {
     paint([a, b], answer, &Style { names: ["A", "B"].map(Into::into), points: false })
 }
 
@@ -72,7 +72,7 @@ pub(crate) struct Style {
 }
 
 /// [`contact_picture`] in a style.
-pub(crate) fn paint(views: [&ScanView<'_>; 2], answer: &Answer, style: &Style) -> Picture {
+pub(crate) fn paint(views: [&Placed<'_>; 2], answer: &Answer, style: &Style) -> Picture {
     let mut canvas = Canvas::new(2 * PANEL + 3 * GAP, PANEL + LEGEND + 2 * GAP, GROUND);
     let contact = match answer.verdict {
         Verdict::Intersecting { contact, .. } => Some(Close::new(views, &contact, style.points)),
@@ -111,7 +111,7 @@ pub(crate) fn paint(views: [&ScanView<'_>; 2], answer: &Answer, style: &Style) -
 }
 
 /// The disc of the `i`-th stored point in the world.
-pub(crate) fn splat(view: &ScanView<'_>, i: usize) -> Splat {
+pub(crate) fn splat(view: &Placed<'_>, i: usize) -> Splat {
     let scan = view.scan();
     Splat {
         centre: view.point(i).into(),
@@ -125,7 +125,7 @@ pub(crate) fn splat(view: &ScanView<'_>, i: usize) -> Splat {
 pub(crate) fn obstacle(
     canvas: &mut Canvas,
     camera: &Camera,
-    view: &ScanView<'_>,
+    view: &Placed<'_>,
     i: usize,
     colour: Colour,
     largest: f64,
@@ -163,7 +163,7 @@ struct Close {
 }
 
 impl Close {
-    fn new(views: [&ScanView<'_>; 2], contact: &Contact, points: bool) -> Self {
+    fn new(views: [&Placed<'_>; 2], contact: &Contact, points: bool) -> Self {
         let at = |k: usize| stored_index(views[k], contact.sources[k]);
         let indices = [at(0), at(1)];
         let normals = match contact.normals {
@@ -195,7 +195,7 @@ impl Close {
         Camera { axes: [up.cross(&toward), up, toward], centre: self.point, scale, area }
     }
 
-    fn paint(&self, canvas: &mut Canvas, views: [&ScanView<'_>; 2], area: Area) {
+    fn paint(&self, canvas: &mut Canvas, views: [&Placed<'_>; 2], area: Area) {
         let camera = self.camera(area);
         let chord = self.chord();
         for (view, colour) in views.into_iter().zip([OF_A, OF_B]) {
@@ -236,7 +236,7 @@ impl Close {
     }
 }
 
-pub(crate) fn stored_index(view: &ScanView<'_>, id: PointId) -> usize {
+pub(crate) fn stored_index(view: &Placed<'_>, id: PointId) -> usize {
     view.scan().source().iter().position(|&s| s == id.0).unwrap_or_default()
 }
 
@@ -248,8 +248,8 @@ pub(crate) fn across(v: Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Some points of both scans.
-pub(crate) fn sample(views: [&ScanView<'_>; 2]) -> Vec<Vector3<f64>> {
-    let points = |view: &ScanView<'_>| {
+pub(crate) fn sample(views: [&Placed<'_>; 2]) -> Vec<Vector3<f64>> {
+    let points = |view: &Placed<'_>| {
         let view = *view;
         let stride = view.scan().len().div_ceil(SAMPLE);
         (0..view.scan().len()).step_by(stride).map(move |i| Vector3::from(view.point(i))).collect::<Vec<_>>()
@@ -260,7 +260,7 @@ pub(crate) fn sample(views: [&ScanView<'_>; 2]) -> Vec<Vector3<f64>> {
 /// A view of everything: what matters unhidden, as `hides` says of points and a direction towards the viewer,
 /// else the scans beside each other; the longest extent lies across.
 pub(crate) fn whole_camera(
-    views: [&ScanView<'_>; 2],
+    views: [&Placed<'_>; 2],
     area: Area,
     hides: impl Fn(&[Vector3<f64>], &Vector3<f64>) -> f64,
 ) -> Camera {
@@ -292,12 +292,12 @@ pub(crate) fn whole_camera(
 }
 
 /// A view of one scan.
-pub(crate) fn scan_camera(view: &ScanView<'_>, area: Area) -> Camera {
+pub(crate) fn scan_camera(view: &Placed<'_>, area: Area) -> Camera {
     whole_camera([view, view], area, |_, _| 0.0)
 }
 
 /// The direction of greatest extent, and the unit direction from one scan's middle to the other's, or zero.
-fn extent(points: &[Vector3<f64>], views: [&ScanView<'_>; 2]) -> (Vector3<f64>, Vector3<f64>) {
+fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> (Vector3<f64>, Vector3<f64>) {
     #[expect(clippy::cast_precision_loss, reason = "a count")]
     let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let mut s = [0.0; 6];

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use nearmiss::geometry::NodeId;
 use nearmiss::hierarchy::{NodePair, OrientedBox, Part};
-use nearmiss::{Answer, CollideOptions, Evidence, Proof, ScanView, Semantics, Verdict};
+use nearmiss::{Answer, CollideOptions, Evidence, Placed, Proof, Semantics, Verdict};
 use serde::Serialize;
 
 use crate::report::word;
@@ -54,7 +54,7 @@ impl Enclosure {
 pub(crate) fn write(
     out: &mut impl Write,
     query: u64,
-    views: [&ScanView<'_>; 2],
+    views: [&Placed<'_>; 2],
     options: &CollideOptions,
     answer: &Answer,
     proof: &Proof,
@@ -94,7 +94,7 @@ pub(crate) fn write(
 
 /// The nodes of these ids, each once, and where each id is among them.
 fn nodes(
-    view: &ScanView<'_>,
+    view: &Placed<'_>,
     of: Semantics,
     ids: impl Iterator<Item = NodeId>,
 ) -> (Vec<Enclosure>, Vec<usize>) {

@@ -2,7 +2,7 @@
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
-    Aabb, Answer, CollideOptions, Contact, Distance, Method, Metric, PointKind, Reason, ScanView, Semantics,
+    Aabb, Answer, CollideOptions, Contact, Distance, Method, Metric, Placed, PointKind, Reason, Semantics,
     Verdict,
 };
 
@@ -15,7 +15,7 @@ use crate::report::word;
 /// is told without one: the proven gap of a verdict is no clearance.
 pub(crate) fn sentence(
     answer: &Answer,
-    views: [&ScanView<'_>; 2],
+    views: [&Placed<'_>; 2],
     options: &CollideOptions,
     distance: Option<&Distance>,
 ) -> String {
@@ -90,19 +90,19 @@ pub(crate) fn untold(band: f64) -> String {
 }
 
 /// Lengths are told to a hundredth of the lesser sampling radius.
-pub(crate) fn unit(views: [&ScanView<'_>; 2]) -> f64 {
+pub(crate) fn unit(views: [&Placed<'_>; 2]) -> f64 {
     let [ra, rb] = views.map(world_radius);
     ra.min(rb) / 100.0
 }
 
 /// The distance between the two points that show a contact.
-fn points_apart(contact: &Contact, views: [&ScanView<'_>; 2]) -> f64 {
+fn points_apart(contact: &Contact, views: [&Placed<'_>; 2]) -> f64 {
     let at = |k: usize| Vector3::from(views[k].point(stored_index(views[k], contact.sources[k])));
     (at(1) - at(0)).norm()
 }
 
 /// A hint where two scans are further from each other than they are large, which is rarely meant.
-pub(crate) fn hint(answer: &Answer, views: [&ScanView<'_>; 2]) -> Option<String> {
+pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
     if !answer.verdict.is_separated() {
         return None;
     }
@@ -115,21 +115,21 @@ pub(crate) fn hint(answer: &Answer, views: [&ScanView<'_>; 2]) -> Option<String>
 }
 
 /// Bounds, in the world, of the bounds of a scan.
-fn world_bounds(view: &ScanView<'_>) -> Aabb {
+fn world_bounds(view: &Placed<'_>) -> Aabb {
     let frame = view.scan().frame();
     let to_stored = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - frame.origin[k]) / frame.scale);
     Aabb::of(view.scan().bounds().corners().map(|p| view.placed().apply(to_stored(p))))
 }
 
 /// Why there is no verdict, and what would help.
-fn doubt(reason: Reason, views: [&ScanView<'_>; 2], options: &CollideOptions) -> String {
+fn doubt(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> String {
     // Only surfaces are ever in doubt; balls stand for all other points of obstacles.
     let first = match (options.method, options.metric) {
         (_, Some(Metric::Geodesic)) => None,
         (Method::Traversal, _) => Some("leave --surface-only out"),
         _ => Some("--method traversal"),
     };
-    let worse = |share: fn(&ScanView<'_>) -> f64| {
+    let worse = |share: fn(&Placed<'_>) -> f64| {
         let [of_a, of_b] = views.map(share);
         if of_b > of_a { ("b", views[1], of_b) } else { ("a", views[0], of_a) }
     };
@@ -141,9 +141,8 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], options: &CollideOptions) ->
             )
         }
         Reason::Undersampled => {
-            let lines = |v: &ScanView<'_>| v.scan().share(PointKind::Line);
-            let sparse =
-                |v: &ScanView<'_>| v.scan().share(PointKind::Line) + v.scan().share(PointKind::Stray);
+            let lines = |v: &Placed<'_>| v.scan().share(PointKind::Line);
+            let sparse = |v: &Placed<'_>| v.scan().share(PointKind::Line) + v.scan().share(PointKind::Stray);
             let (name, view, share) = worse(sparse);
             let how = if lines(view) >= 0.5 * share { "sampled as lines" } else { "sampled too sparsely" };
             let ways = advice::for_sparse(view, radius, first);
@@ -169,6 +168,6 @@ fn doubt(reason: Reason, views: [&ScanView<'_>; 2], options: &CollideOptions) ->
 }
 
 /// A scan's sampling radius in the world.
-pub(crate) fn world_radius(view: &ScanView<'_>) -> f64 {
+pub(crate) fn world_radius(view: &Placed<'_>) -> f64 {
     view.scan().sampling_radius() * view.placed().scale() / view.scan().frame().scale
 }

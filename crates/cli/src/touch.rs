@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::{Aabb, NearestPoint, PlacedIndex, Pose, ScanView, Shape, ShapeIndex};
+use nearmiss::{Aabb, NearestPoint, Placed, Pose, Shape, ShapeIndex};
 use serde::{Deserialize, Serialize};
 
 use crate::console::{Console, Results, now};
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     let scan = opening.open(&args.scan)?;
     let pose = posing::of_scan(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
-    let (view, mut index) = (scan.at(&pose), None);
+    let (placed, mut index) = (scan.at(&pose), None);
     // Lengths that the sampling carries.
     let r = scan.sampling_radius() * pose.scale();
     let mut results = Results::new();
@@ -72,7 +72,8 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
         if asked == MANY {
             index = Some(ShapeIndex::new(&scan));
         }
-        let (touches, nearest, micros) = answer(&view, index.as_ref().map(|index| index.at(&pose)), &shape);
+        let placed = index.as_ref().map_or(placed, |index| placed.with_shapes(index));
+        let (touches, nearest, micros) = answer(&placed, &shape);
         let Some(nearest) = nearest else {
             return Err(shapes
                 .lines
@@ -91,16 +92,9 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
 /// From so many shapes on an index pays for itself.
 const MANY: u32 = 256;
 
-fn answer(
-    view: &ScanView<'_>,
-    placed: Option<PlacedIndex<'_>>,
-    shape: &Shape,
-) -> (bool, Option<NearestPoint>, f64) {
+fn answer(placed: &Placed<'_>, shape: &Shape) -> (bool, Option<NearestPoint>, f64) {
     let start = now();
-    let (touches, nearest) = match placed {
-        Some(placed) => (placed.touches(shape), placed.nearest(shape, f64::INFINITY)),
-        None => (view.touches(shape), view.nearest(shape, f64::INFINITY)),
-    };
+    let (touches, nearest) = (placed.touches(shape), placed.nearest(shape, f64::INFINITY));
     #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
     let micros = start.elapsed().as_nanos() as f64 / 1e3;
     (touches, nearest, micros)

@@ -3,7 +3,7 @@
 use std::sync::Once;
 
 use clap::ValueEnum;
-use nearmiss::{Aabb, ScanView};
+use nearmiss::{Aabb, Placed};
 
 use crate::console::Console;
 use crate::digits::rough;
@@ -67,9 +67,9 @@ impl SizeCheck {
     }
 
     /// Asks if the first views to be compared differ too much in size.
-    pub(crate) fn compare(&self, views: [&ScanView<'_>; 2]) {
+    pub(crate) fn compare(&self, views: [&Placed<'_>; 2]) {
         self.once.call_once(|| {
-            let size = |view: &ScanView<'_>| {
+            let size = |view: &Placed<'_>| {
                 let scan = view.scan();
                 diagonal(scan.bounds()) * view.placed().scale() / scan.frame().scale
             };

@@ -7,7 +7,7 @@
 //! rounding. Equal distances on a grid stay equal where the differences are: at such a tie the points are
 //! joined. Distances below 1e-19 are none.
 
-use nearmiss_index::{BlockTree, Heard, Nearest, PointBlock};
+use nearmiss_index::{BlockBoxes, Heard, Nearest, PointBlock};
 use nearmiss_lanes::parallel::ranges;
 use nearmiss_lanes::vector::distance_sq;
 use nearmiss_surface::Level;
@@ -33,7 +33,8 @@ pub(crate) fn horizon(radius_sq: f32) -> f32 {
 /// The spheres of influence: `d_i²` of each point.
 pub(crate) fn radii_sq(positions: &[[f32; 3]], neighbours: u32) -> Vec<f32> {
     let blocks = blocks(positions, |_| 0.0);
-    let tree = BlockTree::new(&blocks, positions.len());
+    let boxes = BlockBoxes::new(&blocks, positions.len());
+    let tree = boxes.over(&blocks);
     let level = Level::new();
     let parts = ranges(blocks.len(), |range| {
         let (mut found, mut radii) = (Nearest::default(), Vec::new());
@@ -50,7 +51,8 @@ pub(crate) fn radii_sq(positions: &[[f32; 3]], neighbours: u32) -> Vec<f32> {
 /// The graph, given the spheres.
 pub(crate) fn influence(positions: &[[f32; 3]], radii_sq: &[f32]) -> Result<Adjacency, GraphError> {
     let blocks = blocks(positions, |i| horizon(radii_sq[i]));
-    let tree = BlockTree::new(&blocks, positions.len());
+    let boxes = BlockBoxes::new(&blocks, positions.len());
+    let tree = boxes.over(&blocks);
     let level = Level::new();
     let radius = |i: usize| f64::from(radii_sq[i]).sqrt();
     let parts = ranges(blocks.len(), |range| {

@@ -2,7 +2,7 @@
 //! them then.
 
 use nearmiss_geometry::PointCloud;
-use nearmiss_index::{BlockTree, PointBlock};
+use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
 
 use crate::boxes::OrientedBox;
@@ -53,9 +53,9 @@ impl Ordered {
         let index = Index::without_lists(bare.tree(), (&sampling.blocks, &groups), &sampling.plan);
         let mut fits = fits(&index, &positions, (&sampling.radii, &sampling.spacings));
         sampling.spacings = Vec::new();
-        let tree = BlockTree::new(&sampling.blocks, positions.len());
-        vote(&tree, &positions, &sampling.radii, &mut fits);
-        drop(tree);
+        let neighbours = BlockBoxes::new(&sampling.blocks, positions.len());
+        vote(&neighbours.over(&sampling.blocks), &positions, &sampling.radii, &mut fits);
+        drop(neighbours);
         let mut dense = positions.len();
         if let Some((mut items, count)) = dense_first(&positions, &fits, leaf_size) {
             dense = count;

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use nearmiss_index::{BlockTree, PointBlock};
+use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::chunks;
 use nearmiss_lanes::vector::dot;
@@ -57,7 +57,8 @@ impl PointHierarchy {
         });
         let mut surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
         let mut fits: Vec<Fit> = surfels.iter().map(|s| Fit { normal: s.normal, kind: s.kind }).collect();
-        vote(&BlockTree::new(&self.blocks, self.len()), self.positions(), &self.radii, &mut fits);
+        let neighbours = BlockBoxes::new(&self.blocks, self.len());
+        vote(&neighbours.over(&self.blocks), self.positions(), &self.radii, &mut fits);
         let corrected: Vec<usize> = (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].kind).collect();
         let discs = chunks(&corrected, |points| {
             let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());

@@ -1,6 +1,6 @@
 //! How densely points lie: local radii, the sampling radius, and the points with their horizons.
 
-use nearmiss_index::{BlockTree, PointBlock};
+use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_surface::SurfacePlan;
 
 use crate::boxes::OrientedBox;
@@ -37,7 +37,8 @@ impl Sampling {
         unit: f64,
     ) -> Result<Self, BuildError> {
         let mut blocks: Vec<PointBlock> = PointBlock::silent(positions).collect();
-        let tree = BlockTree::new(&blocks, positions.len());
+        let neighbours = BlockBoxes::new(&blocks, positions.len());
+        let tree = neighbours.over(&blocks);
         let mut spacings = spacings(positions, &tree, options.radius_neighbours as usize);
         let mut radii = smooth(&tree, &spacings);
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]

@@ -6,7 +6,7 @@ use std::ops::Range;
 use fearless_simd::Level;
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_index::{BlockTree, Nearest, PointBlock};
+use nearmiss_index::{BlockBoxes, BlockTree, Nearest, PointBlock};
 use nearmiss_lanes::parallel::chunks;
 
 use crate::build::PointHierarchy;
@@ -80,7 +80,8 @@ impl PointHierarchy {
     #[expect(clippy::cast_precision_loss, reason = "counts")]
     pub fn survey(&self, seed: u64) -> Survey {
         let slices = self.slices();
-        let tree = BlockTree::new(slices.blocks, self.len());
+        let boxes = BlockBoxes::new(slices.blocks, self.len());
+        let tree = boxes.over(slices.blocks);
         let mut survey = Survey::default();
         let parts = [(0..slices.dense, BLOCKS), (slices.dense..self.len(), BLOCKS / 2)];
         for (points, most) in parts {

@@ -119,12 +119,10 @@ impl Bounds {
     }
 }
 
-/// A tree of boxes over points in blocks.
-///
-/// Built in O(n); a 16th of the points' memory and a little more. See [`Self::nearest`] and [`Self::heard`].
+/// The boxes of a tree over points in blocks, which they do not hold: a 16th of their memory and a little
+/// more.
 #[derive(Debug, Clone)]
-pub struct BlockTree<'a> {
-    blocks: &'a [PointBlock],
+pub struct BlockBoxes {
     /// How many points there are.
     points: usize,
     /// The box of block `i` stands in lane `i` % 16 of group `i` / 16 of the first level, that of such a
@@ -132,13 +130,13 @@ pub struct BlockTree<'a> {
     levels: Vec<Vec<Boxes>>,
 }
 
-impl<'a> BlockTree<'a> {
-    /// The tree over the first `points` points of `blocks`, with the horizons that they have there.
+impl BlockBoxes {
+    /// The boxes over the first `points` points of `blocks`, with the horizons that they have there. O(n).
     ///
     /// # Panics
     /// When there are fewer, or a block more than hold them, or 2³² − 1 points.
     #[must_use]
-    pub fn new(blocks: &'a [PointBlock], points: usize) -> Self {
+    pub fn new(blocks: &[PointBlock], points: usize) -> Self {
         assert_eq!(blocks.len(), points.div_ceil(WIDTH), "{points} points fill other blocks");
         assert!(points < u32::MAX as usize, "{points} points have no ids");
         let counts = (0..blocks.len()).map(|block| (points - block * WIDTH).min(WIDTH));
@@ -147,9 +145,44 @@ impl<'a> BlockTree<'a> {
             let above = grouped(level.iter().map(Bounds::of_group));
             levels.push(above);
         }
-        Self { blocks, points, levels }
+        Self { points, levels }
     }
 
+    /// The tree over `blocks`, of which these are the boxes.
+    ///
+    /// # Panics
+    /// When they are more or fewer.
+    #[inline]
+    #[must_use]
+    pub fn over<'a>(&'a self, blocks: &'a [PointBlock]) -> BlockTree<'a> {
+        assert_eq!(blocks.len(), self.points.div_ceil(WIDTH), "{} points fill other blocks", self.points);
+        BlockTree { blocks, points: self.points, levels: &self.levels }
+    }
+
+    /// How many points there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.points
+    }
+
+    /// Whether there are no points.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.points == 0
+    }
+}
+
+/// A tree of boxes over points in blocks, from [`BlockBoxes::over`]. See [`Self::nearest`] and
+/// [`Self::heard`].
+#[derive(Debug, Clone, Copy)]
+pub struct BlockTree<'a> {
+    blocks: &'a [PointBlock],
+    /// How many points there are.
+    points: usize,
+    levels: &'a [Vec<Boxes>],
+}
+
+impl<'a> BlockTree<'a> {
     /// How many points there are.
     #[must_use]
     pub fn len(&self) -> usize {

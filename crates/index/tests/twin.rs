@@ -1,7 +1,7 @@
 //! Neighbours of blocks of points against all points, in the same arithmetic.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use nearmiss_index::{BlockTree, Heard, Nearest, PointBlock};
+use nearmiss_index::{BlockBoxes, Heard, Nearest, PointBlock};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 use nearmiss_testdata::instructions::levels;
 
@@ -43,7 +43,8 @@ fn naive_nearest(points: &[Point], i: usize, count: usize) -> Vec<(f32, u32)> {
 
 fn compare_nearest(points: &[Point], counts: &[usize], what: &str) {
     let blocks = blocks(points, |_| 0.0);
-    let tree = BlockTree::new(&blocks, points.len());
+    let boxes = BlockBoxes::new(&blocks, points.len());
+    let tree = boxes.over(&blocks);
     let mut found = Nearest::default();
     for level in levels() {
         for &count in counts {
@@ -89,7 +90,8 @@ fn neither_size_nor_an_order_without_places_changes_an_answer() {
 
 fn compare_heard(points: &[Point], horizon: impl Fn(usize) -> f32, what: &str) {
     let blocks = blocks(points, &horizon);
-    let tree = BlockTree::new(&blocks, points.len());
+    let boxes = BlockBoxes::new(&blocks, points.len());
+    let tree = boxes.over(&blocks);
     let mut found = Heard::default();
     for level in levels() {
         for block in 0..blocks.len() {
@@ -132,7 +134,8 @@ fn what_is_heard_is_what_a_look_at_all_points_hears() {
 
 fn compare_cones(points: &[Point], tips: &[f32], own: &[f32], slope: f32, what: &str) {
     let blocks = blocks(points, |_| 0.0);
-    let tree = BlockTree::new(&blocks, points.len());
+    let boxes = BlockBoxes::new(&blocks, points.len());
+    let tree = boxes.over(&blocks);
     let cones = tree.cones(tips, slope);
     for level in levels() {
         for (block, own) in own.chunks(16).enumerate() {

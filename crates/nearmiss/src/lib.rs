@@ -28,14 +28,11 @@ pub use nearmiss_geometry::{Aabb, CloudError, PointCloud, PointId, Pose, PoseErr
 pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
 pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
 pub use nearmiss_query::{
-    Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, CollideOptions, CollidePlan, CollideScratch,
-    Contact, Contacts, Curve, CurveEnd, CurveOptions, CurvePlan, CurveScratch, Curves, Deadline, Detail,
-    Distance, DistanceOptions, DistancePlan, DistanceScratch, Evidence, Interpolation, ManifoldPoint, Method,
-    NearestPoint, Order, Pacer, PairHint, PlacedIndex, PlanError, Prepared, Proof, Reason, Refinement,
-    Sampling, ScanView, Semantics, Shape, ShapeIndex, Statistics, Surfels, Until, Verdict, World,
-    answer_each, collide, collide_all, collide_hinted, collide_many, collide_many_with, collide_paced,
-    collide_poses, collide_poses_with, collide_proving, collide_with, curves, curves_with, distance,
-    distance_with,
+    Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, CollideOptions, CollidePlan, Contact, Contacts,
+    Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions,
+    DistancePlan, Evidence, Interpolation, ManifoldPoint, Method, NearestPoint, Order, Pacer, Pair, PairHint,
+    Placed, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
+    ShapeIndex, Statistics, Surfels, Until, Verdict, World, each,
 };
 pub use nearmiss_store::Check;
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -1,7 +1,7 @@
 //! All of `{x | f_A(x) = f_B(x) = 0}`: the curves in which two surfaces cut each other, as polylines.
 //!
-//! [`collide_all`] says where discs of either scan cross. From the first of these places that no curve has
-//! passed, Newton's method leads onto both surfaces, and from there the curve is followed both ways
+//! All contacts of the two scans say where discs of either scan cross. From the first of these places that no
+//! curve has passed, Newton's method leads onto both surfaces, and from there the curve is followed both ways
 //! (`follow`): ahead along `n_A × n_B`, back onto both surfaces by Newton's method, in steps that get shorter
 //! where the curve turns. Crossings that it passed start no other (`trail`). Places where the surfaces cross
 //! steeply come first: where they graze, first order says little (docs/theory/curves.md).
@@ -13,17 +13,22 @@ mod trail;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointHierarchy;
 
-use crate::budget::{Budget, Meter};
-use crate::collide::{CollideScratch, Contacts, collide_all};
-use crate::options::{CollideOptions, CollidePlan, Detail, Order, PlanError, Semantics};
-use crate::verdict::{Contact, Evidence, Statistics};
-use crate::view::{ScanView, ViewScratch};
+use crate::ask::answer::{Contact, Contacts, Evidence, Statistics};
+use crate::ask::budget::Budget;
+use crate::ask::options::{CollideOptions, CollidePlan, Detail, Order, PlanError, Semantics};
+use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
+use crate::pair::meter::Meter;
+use crate::pair::placed::Placed;
 use follow::{Follower, LONGEST, SAME_TURN};
 pub use line::{Curve, CurveEnd};
 use trail::{Place, Trail};
 
 /// Tolerances below this share of the lesser sampling radius are not reached by single-precision sums.
 const LEAST_TOLERANCE: f64 = 1e-5;
+
+/// Evaluations along curves, in steps of a sampling radius, for each of the pairs of leaves that sound scans
+/// may have at most, of which few are on a curve: a tenth of what it takes to follow one through.
+const EVALUATIONS: f64 = 10.0;
 
 /// Crossings of discs at angles with a sine from this on start curves before all others.
 const STEEP: f64 = 0.3;
@@ -110,7 +115,7 @@ impl Curves {
     pub fn length(&self) -> f64 {
         let between =
             |[i, j]: [usize; 2]| (Vector3::from(self.points[i]) - Vector3::from(self.points[j])).norm();
-        self.curves.iter().flat_map(Curve::edges).map(between).sum()
+        self.curves.iter().flat_map(Curve::edges).map(between).fold(0.0, |sum, length| sum + length)
     }
 
     /// How many of the curves are loops.
@@ -120,61 +125,42 @@ impl Curves {
     }
 }
 
-/// Reused between queries, one a thread; never influences an answer.
+/// Reused between queries.
 #[derive(Debug, Clone, Default)]
-pub struct CurveScratch {
-    collide: CollideScratch,
+pub(crate) struct CurveScratch {
     contacts: Contacts,
-    gathers: [ViewScratch; 2],
     trail: Trail,
 }
 
-/// The curves in which the surfaces of `a` and `b` cut each other. Allocates a scratch of its own; see
-/// [`curves_with`].
-#[must_use]
-pub fn curves(a: &ScanView<'_>, b: &ScanView<'_>, plan: &CurvePlan, budget: &Budget) -> Curves {
-    let mut found = Curves::default();
-    curves_with(a, b, plan, budget, &mut found, &mut CurveScratch::default());
-    found
-}
-
-/// Leaves in `found` the curves in which the surfaces of `a` and `b`, each by the kernel of its view, cut
-/// each other, as far as `budget` lasts.
-///
-/// At each point both |f| are within the tolerance, and a chord deviates from its curve by at most a fortieth
-/// of the wanted spacing, or of two sampling radii if that is less: 0.05 radii by default, where curves are
-/// as smooth as arcs; on a rough scan one chord in a hundred by 0.06 to 0.16. Of the true surfaces' curve it
-/// is as far as the bias of both surfaces, h²H/2 each, over the sine of their angle. No curve is missed of
-/// which a leaf of either scan saw discs cross; one that is shorter than a leaf and nearer to another than a
-/// sampling radius may be taken for that. Swapped scans give the same curves with other points on them. Scans
-/// of the geodesic metric need views with their kernel.
-///
-/// Costs, beside [`collide_all`], three pairs of evaluations for each sampling radius of length; does not
-/// allocate once `found` and `scratch` are warm.
-pub fn curves_with(
-    a: &ScanView<'_>,
-    b: &ScanView<'_>,
+/// Leaves in `found` the curves in which two surfaces cut each other. See
+/// [`Pair::curves`](crate::Pair::curves).
+pub(crate) fn curves(
+    views: [&Placed<'_>; 2],
     plan: &CurvePlan,
     budget: &Budget,
     found: &mut Curves,
-    scratch: &mut CurveScratch,
+    (contact, scratch): (&mut ContactScratch, &mut CurveScratch),
 ) {
     found.points.clear();
     found.curves.clear();
     found.max_residual = 0.0;
-    let CurveScratch { collide, contacts, gathers, trail } = scratch;
-    let answer = collide_all(a, b, &plan.contacts, budget, contacts, collide);
+    let CurveScratch { contacts, trail } = scratch;
+    let outputs = Outputs { contacts: Some(&mut *contacts), ..Outputs::default() };
+    let asked = Asked { scans: views, plan: &plan.contacts, budget };
+    let answer = collide(asked, contact, outputs);
     found.complete = contacts.complete;
     found.statistics = answer.statistics;
-    let views = [a, b];
-    let radius = |view: &ScanView<'_>| view.sampling_radius();
-    let radius = radius(a).min(radius(b));
+    let [a, b] = views.map(|view| view.sampling_radius());
+    let radius = a.min(b);
+    let gathers = &mut contact.gathers;
     let spacing = plan.options.spacing.unwrap_or(2.0 * radius);
     let longest = spacing.min(LONGEST * radius);
     let tolerance = plan.options.tolerance.unwrap_or(1e-3 * radius).max(LEAST_TOLERANCE * radius);
     let Some(first) = contacts.contacts.first() else { return };
     trail.clear(first.point.into(), longest);
-    let meter = Meter::resumed(budget, views, longest / radius, answer.statistics);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "1 to 2¹⁶")]
+    let evaluations = (EVALUATIONS * radius / longest).clamp(1.0, 65536.0) as u64;
+    let meter = Meter::new(budget, views, evaluations).after(answer.statistics);
     let mut follower = Follower { views, gathers, nearest: [0; 2], meter, longest, radius, tolerance, trail };
     for steep in [true, false] {
         for contact in &contacts.contacts {

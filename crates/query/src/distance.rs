@@ -10,22 +10,23 @@ mod search;
 
 use std::ops::ControlFlow;
 
-use fearless_simd::Level;
 use nearmiss_geometry::PointId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointHierarchy;
 use nearmiss_surface::Metric;
 
-use crate::bounds::Motion;
-use crate::budget::{Budget, Meter};
-use crate::collide::{CollideScratch, collide_with};
-use crate::nearest_points::{PointPair, nearest};
-use crate::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
-use crate::posed::{Posed, relative};
-use crate::verdict::{Evidence, Statistics, Verdict};
-use crate::view::{ScanView, ViewScratch};
+use crate::ask::answer::{Evidence, Statistics, Verdict};
+use crate::ask::budget::Budget;
+use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
+use crate::contact::bounds::Motion;
+use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
+use crate::leaf::nearest_points::{PointPair, nearest};
+use crate::pair::meter::Meter;
+use crate::pair::placed::{Placed, ViewScratch};
+use crate::pair::scan_pair::{ScanPair, relative};
 use approach::{Approach, Feet};
-use search::{Frontier, Search};
+pub(crate) use search::Frontier;
+use search::Search;
 
 /// What is asked. Plain values; [`DistancePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +67,8 @@ impl DistanceOptions {
     }
 }
 
-/// Validated options for two scans.
+/// Validated options for two scans. Serves every pair of scans of the same metric, as a
+/// [`CollidePlan`] does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistancePlan {
     options: DistanceOptions,
@@ -129,42 +131,16 @@ pub struct Distance {
     pub statistics: Statistics,
 }
 
-/// Reused between queries, one a thread; never influences an answer.
-#[derive(Debug, Clone, Default)]
-pub struct DistanceScratch {
-    open: Frontier,
-    gathers: [ViewScratch; 2],
-    collide: CollideScratch,
-}
-
-/// How far `a` and `b` are apart. Allocates a scratch of its own; see [`distance_with`].
-#[must_use]
-pub fn distance(a: &ScanView<'_>, b: &ScanView<'_>, plan: &DistancePlan, budget: &Budget) -> Distance {
-    distance_with(a, b, plan, budget, &mut DistanceScratch::default())
-}
-
-/// How far `a` and `b` are apart, as `plan` means it, within `budget`: lower ≤ distance ≤ upper whenever that
-/// ends the search.
-///
-/// Of [`Semantics::Thickened`] the distance is that of the nearest two points less both radii, as brute force
-/// in double precision has it, and both bounds are that once the search is complete. Of surfaces `lower` is
-/// what enclosures prove (docs/theory/certificates.md), as certified gaps of [`collide_with`] are: some
-/// sampling radii less than the distance, and nothing for scans of the geodesic metric. `upper` is the
-/// distance of two points on the surfaces, near the two nearest samples; a step further along either surface
-/// leads no nearer. Surfaces that meet, as [`collide_with`] says it, are at distance 0.
-///
-/// A budget's resolution is not looked at. Does not allocate once `scratch` is warm. Costs one or two tenths
-/// of a millisecond for scans of 100,000 points that are apart (benches/record), ten microseconds for
-/// surfaces that meet; balls about the points of scans that lie in each other cost as much as all leaves that
-/// are so near.
-pub fn distance_with(
-    a: &ScanView<'_>,
-    b: &ScanView<'_>,
+/// How far two scans are apart, as `plan` means it, within `budget`. See
+/// [`Pair::distance`](crate::Pair::distance).
+pub(crate) fn distance(
+    views: [&Placed<'_>; 2],
     plan: &DistancePlan,
     budget: &Budget,
-    scratch: &mut DistanceScratch,
+    open: &mut Frontier,
+    contact: &mut ContactScratch,
 ) -> Distance {
-    let views = [a, b];
+    let [a, b] = views;
     let Ok((pose, relative)) = relative(a, b, &plan.boundless) else {
         return Distance {
             lower: 0.0,
@@ -177,18 +153,16 @@ pub fn distance_with(
             statistics: Statistics::default(),
         };
     };
-    let leaves = views.map(|view| view.scan().topology().leaves() as u64);
-    let points = views.map(|view| u64::from(view.scan().leaf_size()));
-    let meter = Meter::new(budget, leaves, points, 0);
-    let level = Level::new();
+    let (level, meter) = (contact.level, Meter::new(budget, views, 0));
     let motion = Motion::new(level, views, &pose);
     let slices = views.map(|view| view.scan().slices());
-    let pair = Posed::new(views, slices.each_ref(), relative, meter, (level, plan.options.semantics.part()));
+    let part = plan.options.semantics.part();
+    let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, part));
     let best = PointPair::new(&pair, [0, 0]);
     let search = Apart { plan, budget, motion, pair, best };
     match plan.options.semantics {
-        Semantics::Thickened(radius) => search.balls(radius, scratch),
-        Semantics::Obstacle | Semantics::Surface => search.surfaces(scratch),
+        Semantics::Thickened(radius) => search.balls(radius, open),
+        Semantics::Obstacle | Semantics::Surface => search.surfaces(open, contact),
     }
 }
 
@@ -201,15 +175,15 @@ struct Apart<'a> {
     plan: &'a DistancePlan,
     budget: &'a Budget,
     motion: Motion,
-    pair: Posed<'a>,
+    pair: ScanPair<'a>,
     /// The nearest points so far.
     best: PointPair,
 }
 
 impl Apart<'_> {
     /// Balls of this radius about the points.
-    fn balls(mut self, radius: f64, scratch: &mut DistanceScratch) -> Distance {
-        let mut search = Search::new(&mut scratch.open, false, &self.motion);
+    fn balls(mut self, radius: f64, open: &mut Frontier) -> Distance {
+        let mut search = Search::new(open, false, &self.motion);
         search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         let beyond = |distance: f64| (distance - 2.0 * radius).max(0.0);
         let mut flow = ControlFlow::Continue(());
@@ -234,21 +208,20 @@ impl Apart<'_> {
         }
     }
 
-    fn surfaces(mut self, scratch: &mut DistanceScratch) -> Distance {
-        let DistanceScratch { open, gathers, collide } = scratch;
+    fn surfaces(mut self, open: &mut Frontier, contact: &mut ContactScratch) -> Distance {
         // By the geodesic metric enclosures prove nothing.
         let is_bounded = self.plan.options.metric != Some(Metric::Geodesic);
         let mut search = Search::new(open, is_bounded, &self.motion);
         search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
         // Whether they touch costs a hundredth of the rest. A budget is spent on bounds first.
         let mut is_asked = self.budget.work.is_none() && self.budget.deadline.is_none();
-        if is_asked && let Some(touching) = self.touch(collide) {
+        if is_asked && let Some(touching) = self.touch(contact) {
             return touching;
         }
         let flow = loop {
             if !is_asked && (!is_bounded || self.motion.proven(search.upper(&self.motion)) <= 0.0) {
                 is_asked = true;
-                if let Some(touching) = self.touch(collide) {
+                if let Some(touching) = self.touch(contact) {
                     return touching;
                 }
             }
@@ -262,7 +235,7 @@ impl Apart<'_> {
         };
         let lower = if is_bounded { self.motion.proven(search.lower(&self.motion)) } else { 0.0 };
         let is_worth = !self.of_obstacles() || self.best.distance <= FAR_FEET * self.band();
-        let feet = if flow.is_continue() && is_worth { self.approach(gathers) } else { None };
+        let feet = if flow.is_continue() && is_worth { self.approach(&mut contact.gathers) } else { None };
         let found = Distance { lower, complete: flow.is_continue(), ..self.samples() };
         let of_points = self.of_obstacles();
         let feet = feet.filter(|feet| !of_points || feet.distance < found.upper && self.are_obstacle(feet));
@@ -322,12 +295,12 @@ impl Apart<'_> {
     }
 
     /// The answer if the surfaces meet.
-    fn touch(&mut self, scratch: &mut CollideScratch) -> Option<Distance> {
+    fn touch(&mut self, scratch: &mut ContactScratch) -> Option<Distance> {
         let spent = &mut self.pair.meter.spent;
         let work = self.budget.work.map(|work| work.saturating_sub(spent.evaluations + spent.node_pairs));
-        let budget = Budget { work, resolution: None, ..*self.budget };
-        let [a, b] = self.pair.views;
-        let answer = collide_with(a, b, &self.plan.touching, &budget, scratch);
+        let budget = Budget { work, ..*self.budget };
+        let asked = Asked { scans: self.pair.views, plan: &self.plan.touching, budget: &budget };
+        let answer = collide(asked, scratch, Outputs::default());
         spent.evaluations += answer.statistics.evaluations;
         spent.node_pairs += answer.statistics.node_pairs;
         spent.leaf_pairs += answer.statistics.leaf_pairs;

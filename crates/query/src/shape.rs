@@ -2,18 +2,19 @@
 //!
 //! A shape touches a scan if a point of it is in the shape: what a robot of spheres asks of a depth frame.
 //! Points are held in blocks of sixteen, with bounds about blocks, about sixteen of these, and so on
-//! (`index::BlockTree`); the blocks are those of the scan. A grid tells which blocks are near small spheres
-//! (`surface::Cells`).
+//! ([`nearmiss_index::BlockTree`]); the blocks are those of the scan. A grid tells which blocks are near
+//! small spheres ([`nearmiss_index::Cells`]).
 
 use std::ops::ControlFlow;
 
 use fearless_simd::{Level, Simd};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_geometry::{PointId, Pose};
-use nearmiss_hierarchy::{PlaceVisitor, PointHierarchy, Slices};
-use nearmiss_index::{BlockTree, Cells, Skeleton};
+use nearmiss_geometry::{Aabb, PointId, Pose};
+use nearmiss_hierarchy::{PlaceVisitor, Slices};
+use nearmiss_index::Skeleton;
 
-use crate::view::ScanView;
+use crate::pair::placed::Placed;
+use crate::pair::shape_index::ShapeIndex;
 
 /// A shape in the world. Radii and half edge lengths are zero or more; nothing touches one that is less, or
 /// no number.
@@ -43,6 +44,31 @@ pub enum Shape {
     },
 }
 
+impl Shape {
+    /// A bounding box of the shape in the world, rounding included; `None` if a size is negative or NaN.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Aabb> {
+        /// Of the coordinates: what double precision may lose of a corner.
+        const ROUNDING: f64 = 4e-15;
+        let (centres, half): ([[f64; 3]; 2], [f64; 3]) = match *self {
+            Self::Sphere { centre, radius } => ([centre; 2], [radius; 3]),
+            Self::Capsule { ends, radius } => (ends, [radius; 3]),
+            Self::Box { pose, half } => {
+                let turn = pose.rotation();
+                let reach = |k: usize| (0..3).map(|j| (turn[(k, j)] * half[j]).abs()).sum::<f64>();
+                ([pose.translation(); 2], [0, 1, 2].map(|k| reach(k) * pose.scale()))
+            }
+        };
+        let [p, q] = centres;
+        let more = [0, 1, 2].map(|k| half[k] + ROUNDING * (p[k].abs() + q[k].abs() + half[k]));
+        let bounds = Aabb {
+            min: [0, 1, 2].map(|k| p[k].min(q[k]) - more[k]),
+            max: [0, 1, 2].map(|k| p[k].max(q[k]) + more[k]),
+        };
+        half.iter().all(|&h| h >= 0.0).then_some(bounds)
+    }
+}
+
 /// The point of a scan nearest to a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestPoint {
@@ -54,102 +80,51 @@ pub struct NearestPoint {
     pub gap: f64,
 }
 
-/// The points of a scan, ready for shapes. Made once for a scan, in O(n): some milliseconds and two megabytes
-/// for 100,000 points.
-#[derive(Debug, Clone)]
-pub struct ShapeIndex<'a> {
-    scan: &'a PointHierarchy,
-    tree: BlockTree<'a>,
-    cells: Cells,
-    level: Level,
-}
-
-impl<'a> ShapeIndex<'a> {
-    /// That of `scan`.
-    #[must_use]
-    pub fn new(scan: &'a PointHierarchy) -> Self {
-        let tree = BlockTree::new(scan.slices().blocks, scan.len());
-        let level = Level::new();
-        let cells = tree.cells(level);
-        Self { scan, tree, cells, level }
-    }
-
-    /// The scan in `pose`, which leads from the frame of its input to the world.
-    #[must_use]
-    pub fn at(&self, pose: &Pose) -> PlacedIndex<'_> {
-        PlacedIndex { index: self, view: ScanView::new(self.scan, pose) }
-    }
-}
-
-/// A scan in a pose, to be asked about shapes.
-#[derive(Debug, Clone, Copy)]
-pub struct PlacedIndex<'a> {
-    index: &'a ShapeIndex<'a>,
-    view: ScanView<'a>,
-}
-
-impl PlacedIndex<'_> {
-    /// Whether a point of the scan is in `shape`, its boundary included: exactly what double precision says
-    /// of each point in the stored frame of the scan ([`Skeleton::distance_sq`]).
+impl Placed<'_> {
+    /// Returns `true` if a point of the scan is inside `shape` or on its boundary. Exact: the same as testing
+    /// each point in double precision in the stored frame of the scan ([`Skeleton::distance_sq`]).
     ///
-    /// A small sphere looks at some five blocks of points, named by the cell of its centre; others descend
-    /// through some ten registers' worth of boxes near the surface (benches/record). Does not allocate.
+    /// With [a shape index](Self::with_shapes) a small sphere compares some five blocks of points, and other
+    /// shapes some ten groups of boxes (benches/record). Without one, the search descends the tree of the
+    /// scan, which suits a few shapes, or a file of which little should be read. That search prunes with a
+    /// ball about the shape, so a long capsule visits more nodes. Does not allocate.
     #[inline]
     #[must_use]
     pub fn touches(&self, shape: &Shape) -> bool {
-        let (skeleton, radius) = self.view.stored(shape);
-        self.holds(&skeleton, radius, self.near(&skeleton, radius))
-    }
-
-    /// The blocks that may have a point within `radius` of a skeleton, if the cells know.
-    #[inline]
-    fn near(&self, skeleton: &Skeleton, radius: f64) -> Option<&[u32]> {
-        match *skeleton {
-            Skeleton::Point(centre) => self.index.cells.near(centre, radius),
-            _ => None,
+        let (skeleton, radius) = self.stored(shape);
+        match self.shapes() {
+            Some(index) => self.holds(index, (&skeleton, radius), near(index, &skeleton, radius)),
+            None => radius >= 0.0 && self.nearest_within(&skeleton, radius, true).is_some(),
         }
     }
 
-    /// Whether a point, of these blocks if they are known, is within `radius` of a skeleton.
-    #[inline]
-    fn holds(&self, skeleton: &Skeleton, radius: f64, near: Option<&[u32]>) -> bool {
-        let ShapeIndex { tree, level, .. } = self.index;
-        radius >= 0.0
-            && match *skeleton {
-                Skeleton::Point(centre) => tree.any_in_ball(*level, near, centre, radius),
-                _ => tree.any_within(*level, skeleton, radius),
-            }
-    }
-
-    /// The point nearest to `shape`, if it is no further than `reach` from it, in the world; of equally near
-    /// ones the first in the order of the scan. Exact as [`Self::touches`]. Within a sphere or capsule the
-    /// nearest point is that nearest to its centre or segment.
+    /// The point nearest to `shape` within `reach` of it, in world units; of equally near ones the first in
+    /// the order of the scan. Exact, and at the cost, of [`Self::touches`]. Inside a sphere or capsule, the
+    /// nearest point is the one nearest to the centre or the segment.
     #[must_use]
     pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
-        let (skeleton, radius) = self.view.stored(shape);
-        let scale = self.view.placed().scale();
+        let (skeleton, radius) = self.stored(shape);
+        let scale = self.placed().scale();
         let reach = radius + reach / scale;
         if !(radius >= 0.0 && reach >= 0.0) {
             return None;
         }
-        let (i, distance_sq) = self.index.tree.nearest_to(self.index.level, &skeleton, reach)?;
-        Some(NearestPoint {
-            source: self.index.scan.id(i),
-            point: self.view.point(i),
-            gap: (distance_sq.sqrt() - radius) * scale,
-        })
+        let (i, distance_sq) = match self.shapes() {
+            Some(index) => index.tree(self.scan()).nearest_to(index.level, &skeleton, reach),
+            None => self.nearest_within(&skeleton, reach, false),
+        }?;
+        let gap = (distance_sq.sqrt() - radius) * scale;
+        Some(NearestPoint { source: self.scan().id(i), point: self.point(i), gap })
     }
 
-    /// Which of many shapes [touch](Self::touches) the scan, in order, on the threads of the current rayon
-    /// pool; the same on any number.
-    ///
-    /// # Panics
-    /// When there are not as many answers as shapes.
+    /// Writes to `answers[i]` whether `shapes[i]` [touches](Self::touches) the scan, on the threads of the
+    /// current rayon pool. If the slices differ in length, the rest of the longer one is ignored.
     pub fn touch_each(&self, shapes: &[Shape], answers: &mut [bool]) {
         /// Shapes that a thread takes at once: some 50 µs of work.
         #[cfg(feature = "rayon")]
         const AT_ONCE: usize = 1024;
-        assert_eq!(shapes.len(), answers.len(), "an answer a shape");
+        let count = shapes.len().min(answers.len());
+        let (shapes, answers) = (&shapes[..count], &mut answers[..count]);
         #[cfg(feature = "rayon")]
         if shapes.len() > AT_ONCE {
             use rayon::prelude::*;
@@ -163,44 +138,33 @@ impl PlacedIndex<'_> {
     fn touch_in_turn(&self, shapes: &[Shape], answers: &mut [bool]) {
         /// So many are looked up before they are asked: their cells are fetched at the same time.
         const TOGETHER: usize = 16;
+        let Some(index) = self.shapes() else {
+            for (shape, answer) in shapes.iter().zip(answers) {
+                *answer = self.touches(shape);
+            }
+            return;
+        };
         let mut looked_up = [(Skeleton::Point([0.0; 3]), 0.0, None); TOGETHER];
         for (shapes, answers) in shapes.chunks(TOGETHER).zip(answers.chunks_mut(TOGETHER)) {
             for (shape, looked_up) in shapes.iter().zip(&mut looked_up) {
-                let (skeleton, radius) = self.view.stored(shape);
-                *looked_up = (skeleton, radius, self.near(&skeleton, radius));
+                let (skeleton, radius) = self.stored(shape);
+                *looked_up = (skeleton, radius, near(index, &skeleton, radius));
             }
             for ((skeleton, radius, near), answer) in looked_up.iter().zip(answers) {
-                *answer = self.holds(skeleton, *radius, *near);
+                *answer = self.holds(index, (skeleton, *radius), *near);
             }
         }
     }
-}
 
-impl ScanView<'_> {
-    /// Whether a point of the scan is in `shape`, its boundary included, as [`PlacedIndex::touches`] says it.
-    ///
-    /// Goes down the tree of the scan and needs no index: right for some shapes, or for a scan of a file of
-    /// which little is to be read. Does not allocate. What comes near a shape is told by a ball about it, so
-    /// a long capsule looks at more than an index would.
-    #[must_use]
-    pub fn touches(&self, shape: &Shape) -> bool {
-        let (skeleton, radius) = self.stored(shape);
-        radius >= 0.0 && self.nearest_within(&skeleton, radius, true).is_some()
-    }
-
-    /// The point nearest to `shape`, if it is no further than `reach` from it, in the world, as
-    /// [`PlacedIndex::nearest`] says it. Costs as [`Self::touches`].
-    #[must_use]
-    pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
-        let (skeleton, radius) = self.stored(shape);
-        let scale = self.placed().scale();
-        let reach = radius + reach / scale;
-        if !(radius >= 0.0 && reach >= 0.0) {
-            return None;
-        }
-        let (i, distance_sq) = self.nearest_within(&skeleton, reach, false)?;
-        let gap = (distance_sq.sqrt() - radius) * scale;
-        Some(NearestPoint { source: self.scan().id(i), point: self.point(i), gap })
+    /// Whether a point, of these blocks if they are known, is within `radius` of a skeleton.
+    #[inline]
+    fn holds(&self, index: &ShapeIndex, (skeleton, radius): (&Skeleton, f64), near: Option<&[u32]>) -> bool {
+        let tree = index.tree(self.scan());
+        radius >= 0.0
+            && match *skeleton {
+                Skeleton::Point(centre) => tree.any_in_ball(index.level, near, centre, radius),
+                _ => tree.any_within(index.level, skeleton, radius),
+            }
     }
 
     /// The point nearest to a skeleton within `reach`, the first of equals, with its squared distance; or any
@@ -260,6 +224,15 @@ impl ScanView<'_> {
                 (skeleton, if half.iter().all(|&h| h >= 0.0) { 0.0 } else { -1.0 })
             }
         }
+    }
+}
+
+/// The blocks that may have a point within `radius` of a skeleton, if the cells know.
+#[inline]
+fn near<'a>(index: &'a ShapeIndex, skeleton: &Skeleton, radius: f64) -> Option<&'a [u32]> {
+    match *skeleton {
+        Skeleton::Point(centre) => index.cells.near(centre, radius),
+        _ => None,
     }
 }
 

@@ -33,7 +33,7 @@ impl<'a> BlockTree<'a> {
         assert_eq!(heights.len(), self.len(), "a height a point");
         let tips = rows(heights);
         let mut least: Vec<Vec<[f32; WIDTH]>> = Vec::with_capacity(self.levels.len());
-        for _ in &self.levels {
+        for _ in self.levels {
             let below = least.last().unwrap_or(&tips);
             let tips: Vec<f32> =
                 below.iter().map(|row| row.iter().copied().fold(f32::INFINITY, f32::min)).collect();

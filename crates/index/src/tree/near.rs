@@ -245,6 +245,7 @@ mod tests {
 
     use super::*;
     use crate::block::PointBlock;
+    use crate::tree::BlockBoxes;
 
     /// The nearest point, one by one.
     fn nearest(points: &[[f32; 3]], skeleton: &Skeleton) -> (usize, f64) {
@@ -264,7 +265,8 @@ mod tests {
             points.sort_unstable_by(|p, q| p[0].total_cmp(&q[0]));
             let size = points.iter().flatten().fold(0.0, |far: f64, c| far.max(f64::from(c.abs())));
             let blocks: Vec<PointBlock> = PointBlock::silent(&points).collect();
-            let tree = BlockTree::new(&blocks, points.len());
+            let boxes = BlockBoxes::new(&blocks, points.len());
+            let tree = boxes.over(&blocks);
             let cells = tree.cells(Level::new());
             for round in 0..40_usize {
                 let about = points[(7919 * round) % points.len()].map(f64::from);

@@ -1,8 +1,5 @@
 //! Verdicts on shapes with known answers: nothing wrong outside the band of a sampling radius.
-use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, PointCloud, Reason, Scan, Verdict,
-    collide_with,
-};
+use nearmiss::{BuildOptions, CollideOptions, CollidePlan, Pair, PointCloud, Reason, Scan, Scratch, Verdict};
 use nearmiss_testdata::pairs::{AnalyticSet, SetOptions, analytic_set};
 
 /// Wrong verdicts and undecided ones outside the band, with what they were asked.
@@ -13,13 +10,13 @@ fn score(set: &AnalyticSet) -> (Vec<String>, Vec<String>, usize) {
             Scan::build(&cloud, &BuildOptions::default()).unwrap()
         })
         .collect();
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let (mut wrong, mut undecided, mut judged) = (Vec::new(), Vec::new(), 0);
     for pair in set.pairs.iter().filter(|pair| !pair.is_in_band()) {
         let (a, b) = (&scans[pair.a], &scans[pair.b]);
         let plan = CollidePlan::new(&CollideOptions::default(), a, b).unwrap();
         let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
-        let verdict = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
+        let verdict = Pair::new(va, vb).collide(&plan, &mut scratch).verdict;
         let case = format!(
             "{} noise {} gap {:.2} r: {verdict:?} for {} ({})",
             pair.family,

@@ -1,7 +1,7 @@
 //! Certified separations against exact distances, and what the proof of one consists of.
 use nearmiss::{
-    Bandwidth, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence,
-    PointCloud, Pose, Proof, Scan, Semantics, SurfaceOptions, Verdict, collide_proving, collide_with,
+    Bandwidth, BuildOptions, Check, CollideOptions, CollidePlan, Detail, Evidence, Pair, PointCloud, Pose,
+    Proof, Scan, Scratch, Semantics, SurfaceOptions, Verdict,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -15,7 +15,7 @@ fn scan(points: &[[f64; 3]]) -> Scan {
 fn no_certificate_is_false_and_nearly_all_clear_separations_have_one() {
     let set = analytic_set(2, &SetOptions { noises: vec![0.0, 0.1], repeats: 2 });
     let scans: Vec<Scan> = set.shapes.iter().map(|shape| scan(&shape.points)).collect();
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let options = CollideOptions::default().with_detail(Detail::Verdict);
     let (mut clear, mut certified) = (0, 0);
     for pair in &set.pairs {
@@ -23,7 +23,7 @@ fn no_certificate_is_false_and_nearly_all_clear_separations_have_one() {
         let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
         let mut ask = |options: CollideOptions| {
             let plan = CollidePlan::new(&options, a, b).unwrap();
-            collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict
+            Pair::new(va, vb).collide(&plan, &mut scratch).verdict
         };
         let estimated = ask(options);
         let verdict = ask(options.with_evidence(Evidence::Certified));
@@ -49,14 +49,14 @@ fn a_proof_covers_all_pairs_of_points() {
     let plan = CollidePlan::new(&CollideOptions::default().with_evidence(Evidence::Certified), &scan, &scan)
         .unwrap();
     let mut rng = arbitrary::rng(3);
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut proof = Proof::default();
     let (mut proven, mut most) = (0, 0);
     for round in 0..60 {
         let away = arbitrary::unit_vector(&mut rng).map(|c| c * (2.0 + r * f64::from(round % 12)));
         let pose = arbitrary::rotation(&mut rng).with_translation(away);
         let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&pose));
-        let answer = collide_proving(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch, &mut proof);
+        let answer = Pair::new(a, b).proof(&mut proof).collide(&plan, &mut scratch);
         let Verdict::Separated { gap, evidence: Evidence::Certified } = answer.verdict else {
             assert!(proof.pairs.is_empty(), "nothing is proven of {:?}", answer.verdict);
             continue;
@@ -97,7 +97,7 @@ fn leaves_that_were_compared_are_not_certified() {
         let (a, b) = (scan(&bowl), scan(&lattice(0.02, &|x, _| height + 0.3 * x)));
         let plan = CollidePlan::new(&options, &a, &b).unwrap();
         let (va, vb) = (a.at(&Pose::IDENTITY), b.at(&Pose::IDENTITY));
-        let answer = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut CollideScratch::default());
+        let answer = Pair::new(va, vb).collide(&plan, &mut Scratch::default());
         assert!(answer.statistics.leaf_pairs > 0, "the leaves are compared");
         assert!(
             !matches!(answer.verdict, Verdict::Separated { evidence: Evidence::Certified, .. }),
@@ -138,10 +138,10 @@ fn grids_along_the_axes_are_enclosed_to_their_rims() {
     let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&pose));
     let meeting = [6.177_413_816_683_716, -0.653_311_282_612_506_4, 1.26e-7];
     for view in [&a, &b] {
-        let at = view.evaluate_with(meeting, &mut nearmiss::query::ViewScratch::default());
+        let at = view.evaluate(meeting, &mut Scratch::default());
         assert!(at.f.abs() < 1e-6 * at.bandwidth, "a point of either surface: {}", at.f);
     }
-    let verdict = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict;
+    let verdict = Pair::new(a, b).collide(&plan, &mut Scratch::default()).verdict;
     assert!(!matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. }), "{verdict:?}");
 }
 
@@ -161,7 +161,7 @@ fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
                 CollideOptions::default().with_semantics(semantics).with_evidence(Evidence::Certified);
             let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
             let (a, b) = (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.0, 20.0, 0.0])));
-            collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict
+            Pair::new(a, b).collide(&plan, &mut Scratch::default()).verdict
         };
         let nothing = Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated };
         assert_eq!(asked(Semantics::Surface), nothing, "{h}");
@@ -185,8 +185,8 @@ fn distances_are_proven_however_far() {
         let (a, b) =
             (scan.at(&Pose::IDENTITY), scan.at(&Pose::from_translation([0.6 * away, 0.0, 0.8 * away])));
         let mut proof = Proof::default();
-        let scratch = &mut CollideScratch::default();
-        let verdict = collide_proving(&a, &b, &plan, &Budget::UNLIMITED, scratch, &mut proof).verdict;
+        let scratch = &mut Scratch::default();
+        let verdict = Pair::new(a, b).proof(&mut proof).collide(&plan, scratch).verdict;
         let Verdict::Separated { gap, evidence: Evidence::Certified } = verdict else {
             panic!("{away}: {verdict:?}")
         };

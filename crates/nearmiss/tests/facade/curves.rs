@@ -1,14 +1,17 @@
 //! Curves by the kernel of the view, and of scans that were saved.
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
-    Budget, BuildOptions, Check, Curve, CurveOptions, CurvePlan, Curves, GraphOptions, PlanError, PointCloud,
-    Pose, Scan, curves,
+    BuildOptions, Check, Curve, CurveOptions, CurvePlan, Curves, GraphOptions, Pair, PlanError, PointCloud,
+    Pose, Scan, Scratch,
 };
 use nearmiss_testdata::shapes::{Sampling, plates, sphere};
 
 fn draw(a: &Scan, b: &Scan, pose: &Pose) -> Curves {
     let plan = CurvePlan::new(&CurveOptions::default(), a, b).unwrap();
-    curves(&a.at(&Pose::IDENTITY), &b.at(pose), &plan, &Budget::UNLIMITED)
+    let mut found = Curves::default();
+    let pair = Pair::new(a.at(&Pose::IDENTITY), b.at(pose));
+    pair.curves(&plan, &mut found, &mut Scratch::default());
+    found
 }
 
 /// By straight distances and by those along the graph.

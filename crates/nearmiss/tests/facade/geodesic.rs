@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use nearmiss::graph::SurfaceGraphMeta;
 use nearmiss::hierarchy::HierarchyMeta;
-use nearmiss::query::ViewScratch;
 use nearmiss::store::Writer;
 use nearmiss::{
-    Bodies, Budget, BuildOptions, Check, CollideOptions, CollidePlan, CollideScratch, Evidence, GraphError,
-    GraphOptions, LoadError, Metric, PlanError, PointCloud, PointKind, Pose, Scan, ScanView, Semantics,
-    Until, Verdict, World, collide_poses, collide_with,
+    Answer, BatchScratch, BuildOptions, Check, CollideOptions, CollidePlan, Evidence, GraphError,
+    GraphOptions, LoadError, Metric, Pair, Placed, PlanError, PointCloud, PointKind, Pose, Scan, Scratch,
+    Semantics, Until, Verdict, World, each,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
@@ -30,15 +29,15 @@ fn bytes(scan: &Scan) -> Vec<u8> {
     bytes
 }
 
-fn ask(a: &Scan, b: &Scan, pose: &Pose, scratch: &mut CollideScratch) -> Verdict {
+fn ask(a: &Scan, b: &Scan, pose: &Pose, scratch: &mut Scratch) -> Verdict {
     let plan = CollidePlan::new(&CollideOptions::default().with_semantics(Semantics::Surface), a, b).unwrap();
-    collide_with(&a.at(&Pose::IDENTITY), &b.at(pose), &plan, &Budget::UNLIMITED, scratch).verdict
+    Pair::new(a.at(&Pose::IDENTITY), b.at(pose)).collide(&plan, scratch).verdict
 }
 
 /// How many verdicts are separated, certified hits, other hits, and none.
 fn tally(a: &Scan, b: &Scan, poses: &[Pose]) -> [usize; 4] {
     let mut counts = [0; 4];
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     for pose in poses {
         let kind = match ask(a, b, pose, &mut scratch) {
             Verdict::Separated { .. } => 0,
@@ -129,7 +128,7 @@ fn what_passes_between_close_plates_is_apart_and_what_cuts_them_is_certain() {
 fn where_no_other_sheet_is_near_verdicts_agree() {
     let dragon: Vec<[f64; 3]> = dragon_mesh(Dragon::Points5k).unwrap().vertices().to_vec();
     let sampling = Sampling { seed: 2, ..Sampling::clean(0.08) };
-    let (mut rng, mut scratch) = (arbitrary::rng(3), CollideScratch::default());
+    let (mut rng, mut scratch) = (arbitrary::rng(3), Scratch::default());
     // The dragon has edges and clefts: of its ways some may end at such.
     for (name, points, most) in [
         ("sphere", sphere(1.0).sample(sampling).points, 0),
@@ -199,8 +198,8 @@ fn the_metric_is_kept_and_a_plan_holds_to_it() {
     let far = Pose::from_translation([9.0, 0.0, 0.0]);
     for (scan, evidence) in [(&straight, Evidence::Certified), (&geodesic, Evidence::Estimated)] {
         let plan = plan(None, scan, scan).unwrap();
-        let (a, b, mut scratch) = (scan.at(&Pose::IDENTITY), scan.at(&far), CollideScratch::default());
-        match collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch).verdict {
+        let (a, b, mut scratch) = (scan.at(&Pose::IDENTITY), scan.at(&far), Scratch::default());
+        match Pair::new(a, b).collide(&plan, &mut scratch).verdict {
             Verdict::Separated { evidence: found, .. } => assert_eq!(found, evidence),
             other => panic!("{other:?}"),
         }
@@ -210,30 +209,25 @@ fn the_metric_is_kept_and_a_plan_holds_to_it() {
 /// Views that were made without the kernel see the same discs, and verify nothing.
 #[test]
 fn a_witness_is_verified_by_the_scans_own_kernel_alone() {
-    let [straight, geodesic] = both(&arbitrary::cloud(CloudKind::Sphere, 600, 3));
+    let [_, geodesic] = both(&arbitrary::cloud(CloudKind::Sphere, 600, 3));
     let pose = Pose::from_translation([1.1, 0.2, 0.0]);
-    let asked = |a: &ScanView<'_>, b: &ScanView<'_>| {
+    let asked = |a: &Placed<'_>, b: &Placed<'_>| {
         let plan = CollidePlan::new(&CollideOptions::default(), a.scan(), b.scan()).unwrap();
-        match collide_with(a, b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict {
+        match Pair::new(*a, *b).collide(&plan, &mut Scratch::default()).verdict {
             Verdict::Intersecting { contact, evidence } => (contact, evidence),
             other => panic!("{other:?}"),
         }
     };
-    let along = |pose: &Pose| ScanView::new(&straight, pose).with_kernel(straight.geodesic_kernel().unwrap());
-    let bare = |pose: &Pose| ScanView::new(&geodesic, pose);
+    let bare = |pose: &Pose| Placed::new(&geodesic, pose);
     let (contact, evidence) = asked(&geodesic.at(&Pose::IDENTITY), &geodesic.at(&pose));
     assert_eq!(evidence, Evidence::Certified);
     for pose in [Pose::IDENTITY, pose] {
-        let at = geodesic.at(&pose).evaluate_with(contact.point, &mut ViewScratch::default());
+        let at = geodesic.at(&pose).evaluate(contact.point, &mut Scratch::default());
         assert!(at.f.abs() <= 1e-6 * at.bandwidth, "the witness is {} off by the geodesic kernel", at.f);
-        let at = bare(&pose).evaluate_with(contact.point, &mut ViewScratch::default());
+        let at = bare(&pose).evaluate(contact.point, &mut Scratch::default());
         assert!(at.f.abs() > 1e-6 * at.bandwidth, "and on the surface of straight distances");
     }
-    for (a, b) in [
-        (bare(&Pose::IDENTITY), bare(&pose)),
-        (geodesic.at(&Pose::IDENTITY), bare(&pose)),
-        (along(&Pose::IDENTITY), along(&pose)),
-    ] {
+    for (a, b) in [(bare(&Pose::IDENTITY), bare(&pose)), (geodesic.at(&Pose::IDENTITY), bare(&pose))] {
         assert_eq!(asked(&a, &b).1, Evidence::Estimated);
     }
 }
@@ -303,21 +297,20 @@ fn worlds_and_batches_keep_graph_and_kernel() {
     let poses: Vec<[Pose; 2]> = (0..8_u32)
         .map(|i| [Pose::IDENTITY, Pose::from_translation([1.0 + 0.1 * f64::from(i), 0.3, 0.1])])
         .collect();
-    let told = collide_poses([&geodesic, &geodesic], &poses, &plan, &Budget::UNLIMITED, Until::All);
+    let mut told = vec![Answer::UNASKED; poses.len()];
+    each(&mut told, None, &mut BatchScratch::default(), |i, scratch| {
+        let [a, b] = [0, 1].map(|k: usize| geodesic.at(&poses[i][k]));
+        Until::All.after(Pair::new(a, b).collide(&plan, scratch))
+    });
     let mut certified = 0;
     for ([a, b], told) in poses.iter().zip(&told) {
         let views = [geodesic.at(a), geodesic.at(b)];
-        let alone =
-            collide_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut CollideScratch::default());
+        let alone = Pair::new(views[0], views[1]).collide(&plan, &mut Scratch::default());
         assert_eq!(*told, alone, "a batch");
         let mut world = World::new();
         let ids = [world.insert(Arc::clone(&geodesic), a), world.insert(Arc::clone(&geodesic), b)];
-        let pairs = world.collide_many(Bodies::All, |_| true, &plan, &Budget::UNLIMITED, Until::All);
-        assert_eq!(
-            pairs.iter().find(|(pair, _)| *pair == ids).map(|(_, answer)| *answer),
-            Some(alone),
-            "a world"
-        );
+        let pair = world.pair(ids).unwrap();
+        assert_eq!(pair.collide(&plan, &mut Scratch::default()), alone, "a world");
         // Without the kernel no place is verified.
         let is_certified =
             matches!(alone.verdict, Verdict::Intersecting { evidence: Evidence::Certified, .. });

@@ -1,8 +1,8 @@
 //! The same scene elsewhere, turned, larger or smaller, is the same scene; so it is with its scans exchanged,
 //! their points in another order, given twice, or more of them.
 use nearmiss::{
-    Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Evidence, GraphOptions, PointCloud,
-    Pose, Reason, Scan, Semantics, Verdict, collide_with,
+    BuildOptions, CollideOptions, CollidePlan, Evidence, GraphOptions, Pair, PointCloud, Pose, Reason, Scan,
+    Scratch, Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -27,7 +27,7 @@ fn verdicts_outside_the_band_do_not_change() {
     let build = |points: &[[f64; 3]]| {
         Scan::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
     };
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let (mut asked, mut thin, mut ambiguous) = (0, 0, 0);
     for (name, motion) in motions() {
         let moved: Vec<Scan> = (set.shapes.iter())
@@ -39,7 +39,7 @@ fn verdicts_outside_the_band_do_not_change() {
             let plan = CollidePlan::new(&CollideOptions::default(), a, b).unwrap();
             let (pose_a, pose_b) = (pair.pose_a.after(&back), pair.pose_b.after(&back));
             let (va, vb) = (a.at(&pose_a), b.at(&pose_b));
-            let verdict = collide_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
+            let verdict = Pair::new(va, vb).collide(&plan, &mut scratch).verdict;
             thin += usize::from(pair.thin);
             asked += 1;
             if pair.thin && verdict == Verdict::Undecided(Reason::Ambiguous) {
@@ -66,7 +66,7 @@ fn build(points: &[[f64; 3]]) -> Scan {
 fn ask(a: &Scan, b: &Scan, poses: [Pose; 2], options: CollideOptions) -> Verdict {
     let plan = CollidePlan::new(&options, a, b).unwrap();
     let (a, b) = (a.at(&poses[0]), b.at(&poses[1]));
-    collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default()).verdict
+    Pair::new(a, b).collide(&plan, &mut Scratch::default()).verdict
 }
 
 fn kind(verdict: &Verdict) -> &'static str {

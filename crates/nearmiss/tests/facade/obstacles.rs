@@ -1,9 +1,8 @@
 //! The obstacle of a scan: what is certified, how far the band goes, and how distances bracket, against brute
 //! force.
 use nearmiss::{
-    Answer, Budget, BuildOptions, CollideOptions, CollidePlan, CollideScratch, Detail, Distance,
-    DistanceOptions, DistancePlan, Evidence, PointCloud, PointKind, Pose, Scan, ScanView, Verdict,
-    collide_with, distance,
+    Answer, BuildOptions, CollideOptions, CollidePlan, Detail, Distance, DistanceOptions, DistancePlan,
+    Evidence, Pair, Placed, PointCloud, PointKind, Pose, Scan, Scratch, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::scanner::{self, Frame};
@@ -14,20 +13,20 @@ fn scan(points: &[[f64; 3]]) -> Scan {
     Scan::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
-fn ask(a: &ScanView<'_>, b: &ScanView<'_>, detail: Detail) -> Answer {
+fn ask(a: &Placed<'_>, b: &Placed<'_>, detail: Detail) -> Answer {
     let options = CollideOptions::default().with_evidence(Evidence::Certified).with_detail(detail);
     let plan = CollidePlan::new(&options, a.scan(), b.scan()).unwrap();
-    collide_with(a, b, &plan, &Budget::UNLIMITED, &mut CollideScratch::default())
+    Pair::new(*a, *b).collide(&plan, &mut Scratch::default())
 }
 
-fn how_far(a: &ScanView<'_>, b: &ScanView<'_>) -> Distance {
+fn how_far(a: &Placed<'_>, b: &Placed<'_>) -> Distance {
     let plan = DistancePlan::new(&DistanceOptions::default(), a.scan(), b.scan()).unwrap();
-    distance(a, b, &plan, &Budget::UNLIMITED)
+    Pair::new(*a, *b).distance(&plan, &mut Scratch::default())
 }
 
 /// The points of a scan in the world, each with the radius of its ball and the radius within which its part
 /// of the obstacle lies: from the definition in `docs/theory/obstacle.md` alone.
-fn matter(view: &ScanView<'_>) -> Vec<([f64; 3], f64, f64)> {
+fn matter(view: &Placed<'_>) -> Vec<([f64; 3], f64, f64)> {
     let (slices, scale) = (view.scan().slices(), view.placed().scale());
     let part = |i: usize| {
         let (radius, reach) = (f64::from(slices.radii[i]), f64::from(slices.reach));
@@ -47,7 +46,7 @@ fn matter(view: &ScanView<'_>) -> Vec<([f64; 3], f64, f64)> {
 
 /// Bounds of the distance of two obstacles by all pairs of points: by balls from above, and by what holds
 /// each part from below. And the distance of the nearest points.
-fn brute_force(a: &ScanView<'_>, b: &ScanView<'_>) -> [f64; 3] {
+fn brute_force(a: &Placed<'_>, b: &Placed<'_>) -> [f64; 3] {
     let (of_a, of_b) = (matter(a), matter(b));
     let mut bounds = [f64::INFINITY; 3];
     for (p, ball_p, within_p) in &of_a {

@@ -1,7 +1,9 @@
 //! A saved scan is the scan, and a file of an earlier release opens or is refused by name.
 use nearmiss::graph::ClosePairs;
 use nearmiss::store::Fault;
-use nearmiss::{BuildOptions, Check, GraphOptions, Paths, PointCloud, Pose, Scan, Status, SurfaceGraph};
+use nearmiss::{
+    BuildOptions, Check, GraphOptions, Pair, Paths, PointCloud, Pose, Scan, Scratch, Status, SurfaceGraph,
+};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 fn small() -> Scan {
@@ -124,7 +126,7 @@ fn normals_are_turned_outwards_to_the_scanner_or_as_given() {
         let p = closed.positions()[i].map(f64::from);
         for share in [0.95, 1.03] {
             let x = p.map(|c| c * share);
-            for at in [view.evaluate_with(x, &mut scratch), view.evaluate_by(&kernel, x, &mut geodesic)] {
+            for at in [view.evaluate(x, &mut scratch), view.evaluate_by(&kernel, x, &mut geodesic)] {
                 // Beside a gap between samples there is no surface.
                 if at.status == Status::Ok {
                     assert_eq!(at.f > 0.0, share < 1.0, "positive within: {at:?}");
@@ -197,7 +199,7 @@ fn absurd_numbers_do_not_panic() {
                 nearmiss::CollidePlan::new(&nearmiss::CollideOptions::default(), &absurd, &scan).unwrap();
             let view = absurd.at(&Pose::from_translation([0.3, 0.1, 0.0]));
             for (a, b) in [(&view, &sound), (&sound, &view), (&view, &view)] {
-                let answer = nearmiss::collide(a, b, &plan, &nearmiss::Budget::UNLIMITED);
+                let answer = Pair::new(*a, *b).collide(&plan, &mut Scratch::default());
                 assert!(answer.statistics.node_pairs < 10_000, "{tags:?} {value}: {:?}", answer.statistics);
             }
         }

@@ -5,8 +5,8 @@ use nearmiss_surface::{Evaluation, Status, step_onto_both};
 
 use super::line::{Curve, CurveEnd};
 use super::trail::{PARALLEL, Place, Trail};
-use crate::budget::Meter;
-use crate::view::{ScanView, ViewScratch};
+use crate::pair::meter::Meter;
+use crate::pair::placed::{Placed, ViewScratch};
 
 /// The longest step in sampling radii: no further than the points about a place know of.
 pub(super) const LONGEST: f64 = 2.0;
@@ -62,7 +62,7 @@ pub(super) const SAME_TURN: f64 = 0.1;
 /// Follows curves, and leaves its trail.
 #[derive(Debug)]
 pub(super) struct Follower<'a> {
-    pub(super) views: [&'a ScanView<'a>; 2],
+    pub(super) views: [&'a Placed<'a>; 2],
     pub(super) gathers: &'a mut [ViewScratch; 2],
     /// Points near which either function was evaluated last.
     pub(super) nearest: [usize; 2],

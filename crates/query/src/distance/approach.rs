@@ -7,8 +7,8 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Projection, Status, project};
 
-use crate::budget::Meter;
-use crate::view::{ScanView, ViewScratch};
+use crate::pair::meter::Meter;
+use crate::pair::placed::{Placed, ViewScratch};
 
 /// Steps of either point; each costs two or three evaluations.
 const ROUNDS: u32 = 8;
@@ -29,7 +29,7 @@ pub(crate) struct Feet {
 /// Two surfaces about two of their samples.
 #[derive(Debug)]
 pub(crate) struct Approach<'a, 's> {
-    pub(crate) views: [&'a ScanView<'a>; 2],
+    pub(crate) views: [&'a Placed<'a>; 2],
     pub(crate) samples: [usize; 2],
     pub(crate) gathers: &'s mut [ViewScratch; 2],
     pub(crate) meter: &'s mut Meter,

@@ -7,8 +7,8 @@ use std::collections::BinaryHeap;
 use nearmiss_hierarchy::{NodePair, Part};
 use nearmiss_lanes::order::{ascending, from_ascending};
 
-use crate::bounds::{Limits, Motion};
-use crate::posed::Posed;
+use crate::contact::bounds::{Limits, Motion};
+use crate::pair::scan_pair::ScanPair;
 
 /// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in
 /// them is at least. Ordered so that the nearest is greatest, of equally near ones that of the nearest boxes,
@@ -129,7 +129,7 @@ impl<'s> Search<'s> {
 
     /// Splits the next pair of nodes; a pair of leaves whose points may be nearer than those found so far is
     /// taken off. None when the search [is over](Self::is_over), too.
-    pub(crate) fn step(&mut self, pair: &mut Posed<'_>, motion: &Motion) -> Option<NodePair> {
+    pub(crate) fn step(&mut self, pair: &mut ScanPair<'_>, motion: &Motion) -> Option<NodePair> {
         self.steps = self.steps.saturating_add(1);
         let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
         let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
@@ -194,7 +194,7 @@ impl<'s> Search<'s> {
 /// the centres of the scans. A lesser bound will do that is no less than `enough`.
 #[inline]
 fn bound_of_leaves(
-    pair: &Posed<'_>,
+    pair: &ScanPair<'_>,
     motion: &Motion,
     leaves: NodePair,
     by_enclosures: f32,

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Detail, Method, Sampling, ScanView,
-    Semantics, Verdict, collide, collide_all,
+    Budget, CollideOptions, CollidePlan, Contacts, Detail, Method, Pair, Placed, Sampling, Scratch,
+    Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle;
@@ -35,15 +35,15 @@ fn found(contacts: &Contacts, scans: [&PointHierarchy; 2]) -> Vec<[usize; 2]> {
 }
 
 /// The pairs of leaves of which trusted discs surely cross, and those of which some may.
-fn crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> [BTreeSet<[usize; 2]>; 2] {
-    let disc = |view: &ScanView<'_>, i: usize| oracle::Disc {
+fn crossing(a: &Placed<'_>, b: &Placed<'_>) -> [BTreeSet<[usize; 2]>; 2] {
+    let disc = |view: &Placed<'_>, i: usize| oracle::Disc {
         centre: view.point(i),
         normal: view.placed().rotate(view.scan().normals()[i].map(f64::from)),
         radius: f64::from(view.scan().discs()[i]) * view.placed().scale(),
     };
     let trusted =
-        |view: &ScanView<'_>, i: usize| matches!(view.scan().kind(i), PointKind::Sheet | PointKind::Edge);
-    let radius = |view: &ScanView<'_>, i: usize| f64::from(view.scan().radii()[i]) * view.placed().scale();
+        |view: &Placed<'_>, i: usize| matches!(view.scan().kind(i), PointKind::Sheet | PointKind::Edge);
+    let radius = |view: &Placed<'_>, i: usize| f64::from(view.scan().radii()[i]) * view.placed().scale();
     let (leaves_a, leaves_b) = (leaves(a.scan()), leaves(b.scan()));
     let [mut surely, mut maybe] = [BTreeSet::new(), BTreeSet::new()];
     for i in 0..a.scan().len() {
@@ -68,7 +68,7 @@ fn crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> [BTreeSet<[usize; 2]>; 2] {
 #[test]
 fn one_contact_of_every_pair_of_leaves_whose_discs_cross() {
     let mut rng = arbitrary::rng(31);
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let (mut contacts, mut pairs, mut several) = (Contacts::default(), 0, 0);
     let kinds =
         [CloudKind::Sphere, CloudKind::Random, CloudKind::Lattice, CloudKind::Coplanar, CloudKind::Outlier];
@@ -79,15 +79,15 @@ fn one_contact_of_every_pair_of_leaves_whose_discs_cross() {
         for _ in 0..4 {
             let spread = arbitrary::point_in(&mut rng, 1.5 * size);
             let pose = arbitrary::rotation(&mut rng).with_translation(spread);
-            let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
+            let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose));
             let [surely, maybe] = crossing(&va, &vb);
             for detail in [Detail::Verdict, Detail::Witness] {
                 let options =
                     CollideOptions::default().with_semantics(Semantics::Surface).with_detail(detail);
                 let plan = CollidePlan::new(&options, &a, &b).unwrap();
-                let answer = collide_all(&va, &vb, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+                let answer = Pair::new(va, vb).contacts(&mut contacts).collide(&plan, &mut scratch);
                 assert!(contacts.complete, "without a budget");
-                let first = collide(&va, &vb, &plan, &Budget::UNLIMITED).verdict;
+                let first = Pair::new(va, vb).collide(&plan, &mut Scratch::default()).verdict;
                 match first {
                     Verdict::Intersecting { contact, .. } if detail == Detail::Verdict => {
                         assert!(contacts.contacts.contains(&contact), "{kind:?} {n}: one of them");
@@ -116,9 +116,9 @@ fn one_contact_of_every_pair_of_leaves_with_near_points() {
         prepared(&arbitrary::cloud(CloudKind::Sphere, 250, 1)),
         prepared(&arbitrary::cloud(CloudKind::Random, 200, 2)),
     );
-    let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &Pose::IDENTITY));
+    let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &Pose::IDENTITY));
     let (leaves_a, leaves_b) = (leaves(&a), leaves(&b));
-    let (mut contacts, mut scratch) = (Contacts::default(), CollideScratch::default());
+    let (mut contacts, mut scratch) = (Contacts::default(), Scratch::default());
     for share in [0.01, 0.1, 0.3] {
         let radius = share * a.bounds().half_extents()[0];
         let mut expected = BTreeSet::new();
@@ -132,7 +132,7 @@ fn one_contact_of_every_pair_of_leaves_with_near_points() {
         }
         let options = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
         let plan = CollidePlan::new(&options, &a, &b).unwrap();
-        collide_all(&va, &vb, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+        Pair::new(va, vb).contacts(&mut contacts).collide(&plan, &mut scratch);
         let list = found(&contacts, [&a, &b]);
         assert_eq!(list.len(), expected.len(), "one of each pair");
         assert_eq!(list.into_iter().collect::<BTreeSet<_>>(), expected, "within {radius}");
@@ -144,23 +144,23 @@ fn a_budget_leaves_the_first_contacts() {
     let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
     let size = sphere.bounds().half_extents()[0];
     let pose = Pose::from_translation([size, 0.1 * size, 0.0]);
-    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+    let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
     let plan = CollidePlan::new(
         &CollideOptions::default().with_order(nearmiss_query::Order::DepthFirst),
         &sphere,
         &sphere,
     )
     .unwrap();
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut all = Contacts::default();
-    let answer = collide_all(&a, &b, &plan, &Budget::UNLIMITED, &mut all, &mut scratch);
+    let answer = Pair::new(a, b).contacts(&mut all).collide(&plan, &mut scratch);
     let whole = answer.statistics.evaluations + answer.statistics.node_pairs;
     assert!(all.complete && all.contacts.len() > 50, "{}", all.contacts.len());
     let mut some = Contacts::default();
     let mut counts = BTreeSet::new();
     for share in [0, 1, 2, 3, 5, 8, 10] {
         let budget = Budget::default().with_work(whole * share / 10 + 1);
-        let answer = collide_all(&a, &b, &plan, &budget, &mut some, &mut scratch);
+        let answer = Pair::new(a, b).within(&budget).contacts(&mut some).collide(&plan, &mut scratch);
         assert_eq!(some.complete, share == 10, "{share} tenths of the work");
         assert_eq!(some.contacts, all.contacts[..some.contacts.len()], "{share} tenths: the first of all");
         assert_eq!(answer.verdict.is_intersecting(), !some.contacts.is_empty());
@@ -174,12 +174,12 @@ fn test_points_and_margins_find_all_along_a_circle() {
     let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
     let size = sphere.bounds().half_extents()[0];
     let pose = Pose::from_translation([size, 0.0, 0.0]);
-    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
-    let (mut contacts, mut scratch) = (Contacts::default(), CollideScratch::default());
+    let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
+    let (mut contacts, mut scratch) = (Contacts::default(), Scratch::default());
     let sampling = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
     for options in [sampling, CollideOptions::default().with_margin(0.05 * size)] {
         let plan = CollidePlan::new(&options, &sphere, &sphere).unwrap();
-        let answer = collide_all(&a, &b, &plan, &Budget::UNLIMITED, &mut contacts, &mut scratch);
+        let answer = Pair::new(a, b).contacts(&mut contacts).collide(&plan, &mut scratch);
         assert!(matches!(answer.verdict, Verdict::Intersecting { .. }), "{answer:?}");
         let set: BTreeSet<_> = found(&contacts, [&sphere; 2]).into_iter().collect();
         assert_eq!(set.len(), contacts.contacts.len(), "one of each pair");

@@ -8,9 +8,8 @@ use std::time::Duration;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Deadline, Detail, Evidence, Order, Reason,
-    ScanView, Semantics, Until, Verdict, answer_each, collide, collide_many, collide_many_with,
-    collide_poses, collide_poses_with,
+    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Deadline, Detail, Evidence, Order, Pair,
+    Placed, Reason, Scratch, Semantics, Until, Verdict, each,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use rayon::ThreadPool;
@@ -30,13 +29,33 @@ fn poses(count: usize, spread: f64, seed: u64) -> Vec<[Pose; 2]> {
     (0..count).map(|i| [0.2, spread].map(|s| arbitrary::pose(rng, s).with_scale(scale(i)))).collect()
 }
 
+/// A scan and itself in pairs of poses.
+fn pairs<'a>(scan: &'a PointHierarchy, poses: &[[Pose; 2]]) -> Vec<Pair<'a>> {
+    poses.iter().map(|[p, q]| Pair::new(Placed::new(scan, p), Placed::new(scan, q))).collect()
+}
+
 fn plan(options: CollideOptions, scan: &PointHierarchy) -> CollidePlan {
     CollidePlan::new(&options, scan, scan).unwrap()
 }
 
 /// One after the other, a scratch each.
-fn singly(questions: &[[ScanView<'_>; 2]], plan: &CollidePlan, budget: &Budget) -> Vec<Answer> {
-    questions.iter().map(|[a, b]| collide(a, b, plan, budget)).collect()
+fn singly(pairs: &[Pair<'_>], plan: &CollidePlan) -> Vec<Answer> {
+    pairs.iter().map(|pair| pair.collide(plan, &mut Scratch::default())).collect()
+}
+
+/// All at once.
+fn batch(
+    pairs: &[Pair<'_>],
+    plan: &CollidePlan,
+    deadline: Option<Deadline>,
+    until: Until,
+    scratch: &mut BatchScratch,
+) -> Vec<Answer> {
+    let mut answers = vec![Answer::UNASKED; pairs.len()];
+    let told =
+        each(&mut answers, deadline, scratch, |i, scratch| until.after(pairs[i].collide(plan, scratch)));
+    answers.truncate(told);
+    answers
 }
 
 fn options() -> [CollideOptions; 5] {
@@ -61,37 +80,24 @@ fn a_batch_says_what_single_queries_say() {
     for options in options() {
         let plan = plan(options, &scans[0]);
         for budget in &budgets {
-            // Of many scans.
-            let questions: Vec<[ScanView<'_>; 2]> = poses
-                .iter()
-                .enumerate()
-                .map(|(i, [p, q])| [ScanView::new(&scans[i % 4], p), ScanView::new(&scans[i / 4 % 4], q)])
-                .collect();
-            let expected = singly(&questions, &plan, budget);
+            let pair = |(i, [p, q]): (usize, &[Pose; 2])| {
+                let [a, b] = [Placed::new(&scans[i % 4], p), Placed::new(&scans[i / 4 % 4], q)];
+                Pair::new(a, b).within(budget)
+            };
+            let pairs: Vec<Pair<'_>> = poses.iter().enumerate().map(pair).collect();
+            let expected = singly(&pairs, &plan);
             for pool in pools() {
-                let told = pool.install(|| {
-                    collide_many_with(&questions, &plan, budget, Until::All, &mut scratch).to_vec()
-                });
+                let told = pool.install(|| batch(&pairs, &plan, None, Until::All, &mut scratch));
                 assert_eq!(told, expected, "{} threads, {options:?}, {budget:?}", pool.current_num_threads());
             }
-            assert_eq!(collide_many(&questions, &plan, budget, Until::All), expected, "with a new scratch");
+            let fresh = batch(&pairs, &plan, None, Until::All, &mut BatchScratch::default());
+            assert_eq!(fresh, expected, "with a new scratch");
             for answer in &expected {
                 kinds[match answer.verdict {
                     Verdict::Intersecting { .. } => 0,
                     Verdict::Separated { .. } => 1,
                     Verdict::Undecided(_) => 2,
                 }] += 1;
-            }
-            // Of one pair.
-            let [a, b] = [&scans[0], &scans[1]];
-            let questions: Vec<_> =
-                poses.iter().map(|[p, q]| [ScanView::new(a, p), ScanView::new(b, q)]).collect();
-            let expected = singly(&questions, &plan, budget);
-            for pool in pools() {
-                let told = pool.install(|| {
-                    collide_poses_with([a, b], &poses, &plan, budget, Until::All, &mut scratch).to_vec()
-                });
-                assert_eq!(told, expected, "{} threads, {options:?}, {budget:?}", pool.current_num_threads());
             }
         }
     }
@@ -108,15 +114,12 @@ fn until_the_first_hit_answers_end_with_it() {
     for hits in [&[][..], &[0], &[999], &[17, 18, 600], &[15], &[16], &[500, 501, 502], &[998, 3]] {
         let mut poses = vec![apart; 1000];
         hits.iter().for_each(|&i| poses[i] = together);
-        let whole = collide_poses([&scan, &scan], &poses, &plan, &Budget::UNLIMITED, Until::All);
+        let pairs = pairs(&scan, &poses);
+        let whole = batch(&pairs, &plan, None, Until::All, &mut scratch);
         let count = hits.iter().min().map_or(1000, |first| first + 1);
         for pool in pools() {
             for _ in 0..5 {
-                let told = pool.install(|| {
-                    let until = Until::First;
-                    collide_poses_with([&scan, &scan], &poses, &plan, &Budget::UNLIMITED, until, &mut scratch)
-                        .to_vec()
-                });
+                let told = pool.install(|| batch(&pairs, &plan, None, Until::First, &mut scratch));
                 assert_eq!(told, whole[..count], "{hits:?}, {} threads", pool.current_num_threads());
             }
         }
@@ -136,7 +139,7 @@ fn little_is_asked_after_the_first_hit() {
                 if i >= end { ControlFlow::Break(2 * i) } else { ControlFlow::Continue(2 * i) }
             };
             let scratch = &mut BatchScratch::default();
-            let told = pool.install(|| answer_each(&mut answers, None, ask, scratch));
+            let told = pool.install(|| each(&mut answers, None, scratch, ask));
             assert_eq!(told, end + 1);
             assert!(answers[..told].iter().enumerate().all(|(i, &answer)| answer == 2 * i), "{end}");
             let asked = asked.into_inner();
@@ -163,7 +166,7 @@ fn of_two_hits_the_lower_ends_it_whichever_is_later() {
             ControlFlow::Break(i)
         };
         let mut answers = vec![0; 1000];
-        let told = pool.install(|| answer_each(&mut answers, None, ask, &mut BatchScratch::default()));
+        let told = pool.install(|| each(&mut answers, None, &mut BatchScratch::default(), ask));
         assert_eq!(told, low + 1, "{later} is found later");
     }
 }
@@ -178,7 +181,7 @@ fn every_question_is_asked_once() {
                 times[i].fetch_add(1, Ordering::Relaxed);
                 ControlFlow::Continue(i + 1)
             };
-            let told = pool.install(|| answer_each(&mut answers, None, ask, &mut BatchScratch::default()));
+            let told = pool.install(|| each(&mut answers, None, &mut BatchScratch::default(), ask));
             assert_eq!(told, count);
             assert!(answers.iter().copied().eq(1..=count), "{count}: in place");
             assert!(times.into_iter().all(|n| n.into_inner() == 1), "{count}: once each");
@@ -191,6 +194,7 @@ fn a_deadline_spans_the_batch() {
     let scan = prepared(CloudKind::Sphere, 2000, 1);
     let plan = plan(CollideOptions::default().with_order(Order::DepthFirst), &scan);
     let poses = poses(100_000, 2.0, 3);
+    let pairs = pairs(&scan, &poses);
     let unasked = |answer: &Answer| answer.statistics.node_pairs == 0;
     let mut scratch = BatchScratch::default();
     for pool in pools() {
@@ -198,7 +202,8 @@ fn a_deadline_spans_the_batch() {
             let told = pool.install(|| {
                 let deadline = Deadline::within(Duration::from_micros(micros));
                 let budget = Budget::UNLIMITED.with_deadline(deadline);
-                collide_poses_with([&scan, &scan], &poses, &plan, &budget, Until::All, &mut scratch)
+                let pairs: Vec<_> = pairs.iter().map(|pair| pair.within(&budget)).collect();
+                batch(&pairs, &plan, Some(deadline), Until::All, &mut scratch)
             });
             assert_eq!(told.len(), poses.len(), "every question has an answer");
             let asked = told.iter().position(unasked).unwrap();
@@ -212,10 +217,9 @@ fn a_deadline_spans_the_batch() {
                 "no verdict without a look"
             );
             // What was answered in time is what it always is; the others were under way.
-            let whole = told[..asked].iter().zip(&poses).filter(|(answer, poses)| {
-                let [a, b] = poses.map(|pose| ScanView::new(&scan, &pose));
-                **answer == collide(&a, &b, &plan, &Budget::UNLIMITED)
-            });
+            let whole = told[..asked].iter().zip(&pairs);
+            let whole =
+                whole.filter(|(answer, pair)| **answer == pair.collide(&plan, &mut Scratch::default()));
             let cut_short = asked - whole.count();
             assert!(cut_short <= 16 * pool.current_num_threads(), "{cut_short} of {asked} cut short");
         }

@@ -2,8 +2,8 @@
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Method, Order, PairHint,
-    Reason, Sampling, ScanView, Semantics, Verdict, collide, collide_hinted,
+    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, Method, Order, Pair, PairHint, Placed,
+    Reason, Sampling, Scratch, Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -64,19 +64,12 @@ fn hints_change_no_verdict() {
         for options in questions {
             let plan = CollidePlan::new(&options, &a, &b).unwrap();
             let mut hint = PairHint::default();
-            let mut scratch = CollideScratch::default();
+            let mut scratch = Scratch::default();
             for step in [0.02 * r, 0.1 * r, r, 0.0, 8.0 * r] {
                 for pose in walk(&mut rng, 1.6 * size, step, 60) {
-                    let views = [ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose)];
-                    let cold = collide(&views[0], &views[1], &plan, &Budget::UNLIMITED);
-                    let warm = collide_hinted(
-                        &views[0],
-                        &views[1],
-                        &plan,
-                        &Budget::UNLIMITED,
-                        &mut hint,
-                        &mut scratch,
-                    );
+                    let views = [Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose)];
+                    let cold = Pair::new(views[0], views[1]).collide(&plan, &mut Scratch::default());
+                    let warm = Pair::new(views[0], views[1]).hinted(&mut hint).collide(&plan, &mut scratch);
                     assert_eq!(
                         kind(&cold.verdict).0,
                         kind(&warm.verdict).0,
@@ -120,8 +113,8 @@ fn hints_change_no_verdict() {
 }
 
 /// The least distance of any two points.
-fn least_distance([a, b]: &[ScanView<'_>; 2]) -> f64 {
-    let points = |view: &ScanView<'_>| (0..view.scan().len()).map(|i| view.point(i)).collect::<Vec<_>>();
+fn least_distance([a, b]: &[Placed<'_>; 2]) -> f64 {
+    let points = |view: &Placed<'_>| (0..view.scan().len()).map(|i| view.point(i)).collect::<Vec<_>>();
     let (of_a, of_b) = (points(a), points(b));
     let square = |p: &[f64; 3], q: &[f64; 3]| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>();
     of_a.iter().flat_map(|p| of_b.iter().map(move |q| square(p, q))).fold(f64::INFINITY, f64::min).sqrt()
@@ -135,7 +128,7 @@ fn a_hint_for_something_else_is_none() {
         .collect();
     let size = scans[0].bounds().half_extents()[0];
     let mut hint = PairHint::default();
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut hits = 0;
     for round in 0..600 {
         let (a, b) = (&scans[round % 4], &scans[(round / 3) % 4]);
@@ -145,10 +138,9 @@ fn a_hint_for_something_else_is_none() {
         let shift = arbitrary::point_in(&mut rng, 2.0 * size);
         let scale = [1.0, 1.01][(round / 5) % 2];
         let (pose_a, pose_b) = (Pose::IDENTITY.with_scale(scale), Pose::from_translation(shift));
-        let views = [ScanView::new(a, &pose_a), ScanView::new(b, &pose_b)];
-        let cold = collide(&views[0], &views[1], &plan, &Budget::UNLIMITED).verdict;
-        let warm =
-            collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch).verdict;
+        let views = [Placed::new(a, &pose_a), Placed::new(b, &pose_b)];
+        let cold = Pair::new(views[0], views[1]).collide(&plan, &mut Scratch::default()).verdict;
+        let warm = Pair::new(views[0], views[1]).hinted(&mut hint).collide(&plan, &mut scratch).verdict;
         assert_eq!(kind(&cold).0, kind(&warm).0, "round {round}");
         hits += usize::from(cold.is_intersecting());
     }
@@ -166,16 +158,18 @@ fn small_steps_cost_less_than_half() {
         let (mut cold, mut warm) = (0, 0);
         for _ in 0..20 {
             let mut hint = PairHint::default();
-            let mut scratch = CollideScratch::default();
+            let mut scratch = Scratch::default();
             let start = arbitrary::unit_vector(&mut rng);
             let step = 0.1 * scan.sampling_radius();
             for i in 0..400_u32 {
                 let away = 2.0 * size + step * (f64::from(i) - 200.0);
                 let pose = Pose::from_translation(start.map(|x| x * away));
-                let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
-                cold += collide(&views[0], &views[1], &plan, &Budget::UNLIMITED).statistics.node_pairs;
-                let answer =
-                    collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch);
+                let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose)];
+                cold += Pair::new(views[0], views[1])
+                    .collide(&plan, &mut Scratch::default())
+                    .statistics
+                    .node_pairs;
+                let answer = Pair::new(views[0], views[1]).hinted(&mut hint).collide(&plan, &mut scratch);
                 warm += answer.statistics.node_pairs;
             }
         }
@@ -188,13 +182,13 @@ fn a_copy_of_a_hint_knows_the_same() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 1000, 3));
     let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan).unwrap();
     let mut hint = PairHint::default();
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     for i in 0..50_u32 {
         let pose = Pose::from_translation([2.2 - 0.01 * f64::from(i), 0.1, 0.0]);
-        let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+        let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose)];
         let mut copy = hint.clone();
-        let one = collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut hint, &mut scratch);
-        let other = collide_hinted(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut copy, &mut scratch);
+        let one = Pair::new(views[0], views[1]).hinted(&mut hint).collide(&plan, &mut scratch);
+        let other = Pair::new(views[0], views[1]).hinted(&mut copy).collide(&plan, &mut scratch);
         assert_eq!(one, other, "step {i}");
     }
 }
@@ -218,9 +212,9 @@ fn both(
     hint: &mut PairHint,
 ) -> [Answer; 2] {
     let plan = CollidePlan::new(options, scans[0], scans[1]).unwrap();
-    let [a, b] = [0, 1].map(|k: usize| ScanView::new(scans[k], &poses[k]));
-    let cold = collide(&a, &b, &plan, budget);
-    [cold, collide_hinted(&a, &b, &plan, budget, hint, &mut CollideScratch::default())]
+    let [a, b] = [0, 1].map(|k: usize| Placed::new(scans[k], &poses[k]));
+    let cold = Pair::new(a, b).within(budget).collide(&plan, &mut Scratch::default());
+    [cold, Pair::new(a, b).within(budget).hinted(hint).collide(&plan, &mut Scratch::default())]
 }
 
 fn lifted(height: f64) -> [Pose; 2] {

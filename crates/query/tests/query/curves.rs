@@ -1,10 +1,10 @@
 //! Curves against those known exactly: nothing missing, nothing made up, loops closed, ends at borders.
-use crate::cut::{assert_whole, draw, fine, hausdorff, nearest_true, scans, to_found, to_segment};
+use crate::cut::{assert_whole, curves, draw, fine, hausdorff, nearest_true, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, CurveEnd, CurveOptions, CurvePlan,
-    CurveScratch, Curves, PlanError, ScanView, Semantics, ViewScratch, collide_all, curves, curves_with,
+    Budget, CollideOptions, CollidePlan, Contacts, CurveEnd, CurveOptions, CurvePlan, Curves, Pair, Placed,
+    PlanError, Scratch, Semantics,
 };
 use nearmiss_surface::meet;
 use nearmiss_testdata::arbitrary;
@@ -29,8 +29,8 @@ fn clean_cuts_are_found_whole() {
             let sampling = Sampling { spacing: fine(&cut), noise: 0.0, order, seed: 3 };
             let [a, b] = scans(&cut, [sampling; 2]);
             let found = draw(
-                &ScanView::new(&a, &Pose::IDENTITY),
-                &ScanView::new(&b, &cut.pose_b),
+                &Placed::new(&a, &Pose::IDENTITY),
+                &Placed::new(&b, &cut.pose_b),
                 CurveOptions::default(),
             );
             let radii = [a.sampling_radius(), b.sampling_radius()];
@@ -83,7 +83,7 @@ fn poses_swaps_and_densities_change_little() {
         let world = arbitrary::rotation(&mut rng)
             .with_translation(arbitrary::point_in(&mut rng, shift))
             .with_scale(scale);
-        let views = [ScanView::new(a, &world), ScanView::new(b, &world.after(&cut.pose_b))];
+        let views = [Placed::new(a, &world), Placed::new(b, &world.after(&cut.pose_b))];
         let found = draw(&views[0], &views[1], CurveOptions::default());
         // In the frame of a: the same shape.
         let mut home = found.clone();
@@ -113,7 +113,7 @@ fn circles_are_closed_in_every_pose_and_no_chord_is_walked_twice() {
     let ball = build(sphere(1.0), Order::Regular, 0);
     let plates: Vec<_> = (0..4).map(|seed| build(patch(3.2, 3.2), Order::Random, seed)).collect();
     let r = ball.sampling_radius();
-    let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
+    let (mut found, mut scratch) = (Curves::default(), Scratch::default());
     let mut short_edges = 0;
     for round in 0..6000 {
         let plate = &plates[round % plates.len()];
@@ -121,12 +121,12 @@ fn circles_are_closed_in_every_pose_and_no_chord_is_walked_twice() {
         let pose = arbitrary::rotation(&mut rng);
         // The plate's normal is its third axis.
         let pose = pose.with_translation(pose.rotate([0.0, 0.0, d]));
-        let views = [ScanView::new(&ball, &Pose::IDENTITY), ScanView::new(plate, &pose)];
+        let views = [Placed::new(&ball, &Pose::IDENTITY), Placed::new(plate, &pose)];
         let spacing = [None, Some(0.5 * r), Some(1.1 * r)][round % 3];
         let mut options = CurveOptions::default();
         options.spacing = spacing;
         let plan = CurvePlan::new(&options, &ball, plate).unwrap();
-        curves_with(&views[0], &views[1], &plan, &Budget::UNLIMITED, &mut found, &mut scratch);
+        Pair::new(views[0], views[1]).curves(&plan, &mut found, &mut scratch);
         assert_eq!(found.curves.len(), 1, "round {round}: {:?}", found.curves);
         assert_eq!(found.curves[0].ends, None, "round {round}: {:?}", found.curves);
 
@@ -161,7 +161,7 @@ fn spacing_and_tolerance_are_kept() {
     let cut = cuts::torus_and_upright(1.0, 0.5, 0.3);
     let sampling = Sampling { spacing: 2.0 * fine(&cut), noise: 0.0, order: Order::Random, seed: 3 };
     let [a, b] = scans(&cut, [sampling; 2]);
-    let views = [ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &cut.pose_b)];
+    let views = [Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &cut.pose_b)];
     let r = a.sampling_radius().min(b.sampling_radius());
     let mut counts = Vec::new();
     for (spacing, tolerance) in [(0.2, 1e-2), (1.0, 1e-4), (5.0, 1e-3), (100.0, 1e-3)] {
@@ -192,11 +192,8 @@ fn a_figure_of_eight_is_followed_to_where_it_crosses_itself() {
     for (seed, share) in [(0, 1.0), (1, 0.93), (2, 1.1)] {
         let sampling = Sampling::clean(share * fine(&cut));
         let [a, b] = scans(&cut, [sampling; 2]);
-        let found = draw(
-            &ScanView::new(&a, &Pose::IDENTITY),
-            &ScanView::new(&b, &cut.pose_b),
-            CurveOptions::default(),
-        );
+        let found =
+            draw(&Placed::new(&a, &Pose::IDENTITY), &Placed::new(&b, &cut.pose_b), CurveOptions::default());
         let r = a.sampling_radius();
         // Within some radii of the crossing a shift of h²H/2 makes other curves of it; beyond they are these.
         let crossing = [0.0, 0.5, 0.0];
@@ -225,7 +222,7 @@ fn surfaces_that_coincide_touch_in_points() {
     let points = sphere(1.0).sample(Sampling::clean(0.1)).points;
     let scan = PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
         .unwrap();
-    let view = ScanView::new(&scan, &Pose::IDENTITY);
+    let view = Placed::new(&scan, &Pose::IDENTITY);
     let found = draw(&view, &view, CurveOptions::default());
     assert!(found.curves.len() > 50, "{}", found.curves.len());
     for curve in &found.curves {
@@ -244,11 +241,8 @@ fn noise_leaves_most_of_a_curve() {
     for (noise, allowed) in [(0.05, 0.2), (0.15, 0.5)] {
         let sampling = |seed| Sampling { spacing: 0.03, noise, order: Order::Random, seed };
         let [a, b] = scans(&cut, [sampling(1), sampling(2)]);
-        let found = draw(
-            &ScanView::new(&a, &Pose::IDENTITY),
-            &ScanView::new(&b, &cut.pose_b),
-            CurveOptions::default(),
-        );
+        let found =
+            draw(&Placed::new(&a, &Pose::IDENTITY), &Placed::new(&b, &cut.pose_b), CurveOptions::default());
         let radii = [a.sampling_radius(), b.sampling_radius()];
         assert_whole(&found, &cut, &Pose::IDENTITY, radii, allowed);
     }
@@ -258,21 +252,21 @@ fn noise_leaves_most_of_a_curve() {
 fn a_budget_leaves_what_was_found() {
     let cut = cuts::torus_and_level(1.0, 0.6, 0.2);
     let [a, b] = scans(&cut, [Sampling::clean(0.03); 2]);
-    let views = [ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &cut.pose_b)];
+    let views = [Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &cut.pose_b)];
     let plan = CurvePlan::new(&CurveOptions::default(), &a, &b).unwrap();
-    let whole = curves(&views[0], &views[1], &plan, &Budget::UNLIMITED);
+    let whole = curves(Pair::new(views[0], views[1]), &plan);
     assert!(whole.complete && whole.curves.len() == 2, "{:?}", whole.curves);
     let units = |found: &Curves| found.statistics.evaluations + found.statistics.node_pairs;
-    let (mut found, mut scratch) = (Curves::default(), CurveScratch::default());
+    let (mut found, mut scratch) = (Curves::default(), Scratch::default());
     let mut partial = 0;
     for share in 0..=20 {
         // Finding contacts takes most of it.
         let work = units(&whole) - whole.statistics.evaluations * (20 - share) / 20 + share / 20;
         let budget = Budget::default().with_work(work);
-        curves_with(&views[0], &views[1], &plan, &budget, &mut found, &mut scratch);
+        Pair::new(views[0], views[1]).within(&budget).curves(&plan, &mut found, &mut scratch);
         assert_eq!(found.complete, share == 20, "{share} twentieths of the work");
         assert!(units(&found) <= work + 4, "{} of {work} units", units(&found));
-        assert_eq!(found, curves(&views[0], &views[1], &plan, &budget), "the same twice");
+        assert_eq!(found, curves(Pair::new(views[0], views[1]).within(&budget), &plan), "the same twice");
         let cut_short =
             |c: &nearmiss_query::Curve| c.ends.is_some_and(|ends| ends.contains(&CurveEnd::Budget));
         assert!(found.curves.iter().all(|c| c.is_closed() || cut_short(c)), "{:?}", found.curves);
@@ -284,19 +278,16 @@ fn a_budget_leaves_what_was_found() {
     assert!(partial > 5, "{partial} with some of the curve");
     assert_eq!(found, whole);
     let past = nearmiss_query::Deadline::within(std::time::Duration::ZERO);
-    curves_with(
-        &views[0],
-        &views[1],
+    Pair::new(views[0], views[1]).within(&Budget::default().with_deadline(past)).curves(
         &plan,
-        &Budget::default().with_deadline(past),
         &mut found,
         &mut scratch,
     );
     assert!(!found.complete && found.points.is_empty());
-    let nowhere = ScanView::new(&b, &Pose::from_translation([f64::NAN; 3]));
-    assert!(!curves(&views[0], &nowhere, &plan, &Budget::UNLIMITED).complete, "no pose");
-    let away = ScanView::new(&b, &Pose::from_translation([0.0, 0.0, 9.0]));
-    let none = curves(&views[0], &away, &plan, &Budget::UNLIMITED);
+    let nowhere = Placed::new(&b, &Pose::from_translation([f64::NAN; 3]));
+    assert!(!curves(Pair::new(views[0], nowhere), &plan).complete, "no pose");
+    let away = Placed::new(&b, &Pose::from_translation([0.0, 0.0, 9.0]));
+    let none = curves(Pair::new(views[0], away), &plan);
     assert!(none.complete && none.curves.is_empty());
 }
 
@@ -312,25 +303,17 @@ fn nothing_that_newton_finds_from_any_crossing_is_missing() {
     let (mut asked, mut ends) = (0, 0);
     for _ in 0..60 {
         let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.8 * size));
-        let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+        let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose)];
         let found = draw(&views[0], &views[1], CurveOptions::default());
         let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
         let plan = CollidePlan::new(&surfaces, &scan, &scan).unwrap();
         let mut contacts = Contacts::default();
-        collide_all(
-            &views[0],
-            &views[1],
-            &plan,
-            &Budget::UNLIMITED,
-            &mut contacts,
-            &mut CollideScratch::default(),
-        );
-        let mut scratch = [ViewScratch::default(), ViewScratch::default()];
+        Pair::new(views[0], views[1]).contacts(&mut contacts).collide(&plan, &mut Scratch::default());
+        let mut scratch = [Scratch::default(), Scratch::default()];
         let [of_a, of_b] = &mut scratch;
         for contact in &contacts.contacts {
-            let meeting = meet(contact.point, |x| {
-                Some([views[0].evaluate_with(x, of_a), views[1].evaluate_with(x, of_b)])
-            });
+            let meeting =
+                meet(contact.point, |x| Some([views[0].evaluate(x, of_a), views[1].evaluate(x, of_b)]));
             let meeting = meeting.unwrap();
             if meeting.verified {
                 let off = to_found(meeting.point, &found) / r;
@@ -339,7 +322,7 @@ fn nothing_that_newton_finds_from_any_crossing_is_missing() {
             }
         }
         for &x in &found.points {
-            let off = [views[0].evaluate_with(x, of_a), views[1].evaluate_with(x, of_b)].map(|at| at.f.abs());
+            let off = [views[0].evaluate(x, of_a), views[1].evaluate(x, of_b)].map(|at| at.f.abs());
             assert!(
                 off[0].max(off[1]) <= found.max_residual * (1.0 + 1e-9),
                 "{off:?} of {}",

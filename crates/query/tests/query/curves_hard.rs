@@ -3,7 +3,7 @@
 use crate::cut::{assert_whole, draw, fine, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::{CurveEnd, CurveOptions, Curves, ScanView};
+use nearmiss_query::{CurveEnd, CurveOptions, Curves, Placed};
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::cuts;
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
@@ -16,7 +16,7 @@ fn tori_through_each_other_are_found_whole() {
         let [a, b] = scans(&cut, [Sampling::clean(fine(&cut)); 2]);
         let radii = [a.sampling_radius(), b.sampling_radius()];
         assert!(cut.curvature() * radii[0].max(radii[1]) < 0.021, "{}: H r is small", cut.name);
-        let views = [ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &cut.pose_b)];
+        let views = [Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &cut.pose_b)];
         let found = draw(&views[0], &views[1], CurveOptions::default());
         assert_whole(&found, &cut, &Pose::IDENTITY, radii, 0.05);
         assert!(found.max_residual <= 1e-3 * radii[0].min(radii[1]), "{}: {}", cut.name, found.max_residual);
@@ -45,7 +45,7 @@ fn a_ball_that_grazes_leaves_a_loop_or_a_point_or_nothing() {
     let r = ball.sampling_radius();
     // Zero sets of balls are h²H/2 within.
     let radius = 1.0 - 0.5 * (0.99 * r).powi(2);
-    let view = ScanView::new(&ball, &Pose::IDENTITY);
+    let view = Placed::new(&ball, &Pose::IDENTITY);
     for other in [&plane, &above] {
         let is_plane = std::ptr::eq(other, &raw const plane);
         // Where both surfaces meet on the axis and how far from it, one being so deep in the other.
@@ -56,7 +56,7 @@ fn a_ball_that_grazes_leaves_a_loop_or_a_point_or_nothing() {
                 (2.0 * radius - depth, radius - 0.5 * depth)
             };
             let pose = Pose::from_translation([0.0, 0.0, pose]);
-            let found = draw(&view, &ScanView::new(other, &pose), CurveOptions::default());
+            let found = draw(&view, &Placed::new(other, &pose), CurveOptions::default());
             assert!(found.max_residual <= 1e-3 * r, "{} r off", found.max_residual / r);
             (found, [0.0, 0.0, height], (radius * radius - height * height).max(0.0).sqrt())
         };
@@ -89,10 +89,10 @@ fn sheets_that_are_nearly_parallel_cross_in_a_line_or_touch_in_points() {
     const SPACING: f64 = 0.02;
     let sheet = prepared(&patch(1.0, 1.0), SPACING, |_| true);
     let r = sheet.sampling_radius();
-    let view = ScanView::new(&sheet, &Pose::IDENTITY);
+    let view = Placed::new(&sheet, &Pose::IDENTITY);
     let drawn = |angle: f64, height: f64| {
         let pose = Pose::from_axis_angle([1.0, 0.0, 0.0], angle).with_translation([0.0, 0.0, height]);
-        draw(&view, &ScanView::new(&sheet, &pose), CurveOptions::default())
+        draw(&view, &Placed::new(&sheet, &pose), CurveOptions::default())
     };
     for angle in [0.3, 0.1, 0.05, 0.02] {
         let found = drawn(angle, 0.0);
@@ -129,7 +129,7 @@ fn chords_keep_to_what_shorter_ones_show() {
     let mut off = Vec::new();
     for _ in 0..40 {
         let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.5 * size));
-        let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+        let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose)];
         let found = draw(&views[0], &views[1], CurveOptions::default());
         let fine = draw(&views[0], &views[1], CurveOptions::default().with_spacing(0.2 * r));
         for [i, j] in found.curves.iter().flat_map(nearmiss_query::Curve::edges) {

@@ -3,9 +3,16 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::{Budget, CurveOptions, CurvePlan, Curves, ScanView, curves};
+use nearmiss_query::{CurveOptions, CurvePlan, Curves, Pair, Placed, Scratch};
 use nearmiss_testdata::cuts::Cut;
 use nearmiss_testdata::shapes::{Form, Sampling};
+
+/// The curves of a pair.
+pub(crate) fn curves(pair: Pair<'_>, plan: &CurvePlan) -> Curves {
+    let mut found = Curves::default();
+    pair.curves(plan, &mut found, &mut Scratch::default());
+    found
+}
 
 /// Samples of `form` near enough to the other surface to matter to the curve.
 pub(crate) fn prepared(form: &Form, sampling: Sampling, other: impl Fn([f64; 3]) -> f64) -> PointHierarchy {
@@ -21,9 +28,9 @@ pub(crate) fn scans(cut: &Cut, samplings: [Sampling; 2]) -> [PointHierarchy; 2] 
     [prepared(&cut.a, samplings[0], of_b), prepared(&cut.b, samplings[1], of_a)]
 }
 
-pub(crate) fn draw(a: &ScanView<'_>, b: &ScanView<'_>, options: CurveOptions) -> Curves {
+pub(crate) fn draw(a: &Placed<'_>, b: &Placed<'_>, options: CurveOptions) -> Curves {
     let plan = CurvePlan::new(&options, a.scan(), b.scan()).unwrap();
-    let found = curves(a, b, &plan, &Budget::UNLIMITED);
+    let found = curves(Pair::new(*a, *b), &plan);
     assert!(found.complete, "without a budget");
     found
 }

@@ -4,8 +4,8 @@ use std::time::Duration;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Budget, Deadline, Distance, DistanceOptions, DistancePlan, DistanceScratch, Evidence, PlanError,
-    ScanView, Semantics, distance, distance_with,
+    Budget, Deadline, Distance, DistanceOptions, DistancePlan, Evidence, Pair, Placed, PlanError, Scratch,
+    Semantics,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -19,8 +19,8 @@ fn plan(semantics: Semantics, a: &PointHierarchy, b: &PointHierarchy) -> Distanc
 }
 
 /// The least distance of any two points, one by one.
-fn brute(a: &ScanView<'_>, b: &ScanView<'_>) -> f64 {
-    let points = |view: &ScanView<'_>| (0..view.scan().len()).map(|i| view.point(i)).collect::<Vec<_>>();
+fn brute(a: &Placed<'_>, b: &Placed<'_>) -> f64 {
+    let points = |view: &Placed<'_>| (0..view.scan().len()).map(|i| view.point(i)).collect::<Vec<_>>();
     let (of_a, of_b) = (points(a), points(b));
     let distances = of_a
         .iter()
@@ -43,15 +43,15 @@ fn points_are_as_far_apart_as_brute_force_says() {
         let b = prepared(&arbitrary::cloud(*kind, [200, 40, 700][(n / 3 % 3) as usize], n + 100), 16);
         let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
         let plan = plan(Semantics::Thickened(0.0), &a, &b);
-        let mut scratch = DistanceScratch::default();
+        let mut scratch = Scratch::default();
         for (round, away) in [0.5, 3.0, 30.0, 1e6].into_iter().enumerate() {
             for scale in [1.0, 1e-3, 1e6] {
                 let shift = arbitrary::unit_vector(&mut rng).map(|x| x * away * size);
                 let pose_b = arbitrary::rotation(&mut rng).with_scale(scale).with_translation(shift);
                 let shift = arbitrary::point_in(&mut rng, 10.0 * size);
                 let pose_a = arbitrary::rotation(&mut rng).with_translation(shift);
-                let (va, vb) = (ScanView::new(&a, &pose_a), ScanView::new(&b, &pose_b));
-                let found = distance_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch);
+                let (va, vb) = (Placed::new(&a, &pose_a), Placed::new(&b, &pose_b));
+                let found = Pair::new(va, vb).distance(&plan, &mut scratch);
                 let expected = brute(&va, &vb);
                 let what = format!("{kind:?} {n}, {away} away, times {scale}: {found:?}");
                 assert!((found.upper - expected).abs() <= 1e-15 * expected, "{what} for {expected}");
@@ -69,8 +69,8 @@ fn coincident_and_single_points_have_distances() {
     let points = arbitrary::cloud(CloudKind::Random, 100, 5);
     let scan = prepared(&points, 16);
     let exact = plan(Semantics::Thickened(0.0), &scan, &scan);
-    let here = ScanView::new(&scan, &Pose::IDENTITY);
-    let found = distance(&here, &here, &exact, &Budget::UNLIMITED);
+    let here = Placed::new(&scan, &Pose::IDENTITY);
+    let found = Pair::new(here, here).distance(&exact, &mut Scratch::default());
     assert_eq!(found.upper.to_bits(), 0.0_f64.to_bits(), "the very same points: {found:?}");
     assert_eq!(found.sources[0], found.sources[1]);
 
@@ -79,12 +79,12 @@ fn coincident_and_single_points_have_distances() {
     let dot = prepared(&(0..8).map(corner).collect::<Vec<_>>(), 16);
     let exact = plan(Semantics::Thickened(0.25), &scan, &dot);
     let there = Pose::from_translation([3.0, 4.0, 12.0]);
-    let view = ScanView::new(&dot, &there);
-    let found = distance(&here, &view, &exact, &Budget::UNLIMITED);
+    let view = Placed::new(&dot, &there);
+    let found = Pair::new(here, view).distance(&exact, &mut Scratch::default());
     let expected = brute(&here, &view) - 0.5;
     assert!((found.upper - expected).abs() < 1e-12 && found.complete, "{found:?} for {expected}");
     let thick = plan(Semantics::Thickened(20.0), &scan, &dot);
-    let found = distance(&here, &view, &thick, &Budget::UNLIMITED);
+    let found = Pair::new(here, view).distance(&thick, &mut Scratch::default());
     assert_eq!((found.lower.to_bits(), found.upper.to_bits()), (0, 0), "balls that overlap: {found:?}");
 }
 
@@ -114,15 +114,15 @@ fn spheres_are_as_far_apart_as_they_are() {
     let inside = bias(&a) + bias(&b);
     assert!(inside > 0.0 && inside < 0.1 * r, "the bias is small: {inside}");
     let mut rng = arbitrary::rng(72);
-    let mut scratch = DistanceScratch::default();
+    let mut scratch = Scratch::default();
     for gap in [0.02, 0.1, 0.3, 1.0, 10.0, 1e4] {
         let mut widest: f64 = 0.0;
         for _ in 0..12 {
             let shift = arbitrary::unit_vector(&mut rng).map(|x| x * (2.0 + gap));
             let pose = arbitrary::rotation(&mut rng).with_translation(shift);
-            let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
+            let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose));
             let truth = gap + inside;
-            let found = distance_with(&va, &vb, &plan, &Budget::UNLIMITED, &mut scratch);
+            let found = Pair::new(va, vb).distance(&plan, &mut scratch);
             assert!(found.complete && found.evidence == Evidence::Certified, "{gap}: {found:?}");
             assert!(found.lower <= truth + 1e-6 * gap, "{gap}: {found:?}");
             // Both feet approach each other to a thousandth of r or so; the surface is round to a hundredth.
@@ -144,7 +144,7 @@ fn whenever_a_budget_ends_it_the_distance_is_between_the_bounds() {
         for gap in [0.05, 0.5, 4.0] {
             let shift = arbitrary::unit_vector(&mut rng).map(|x| x * (2.0 + gap));
             let pose = arbitrary::rotation(&mut rng).with_translation(shift);
-            let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
+            let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose));
             let truth = match semantics {
                 Semantics::Surface => gap + inside,
                 _ => brute(&va, &vb) - 0.02,
@@ -152,8 +152,12 @@ fn whenever_a_budget_ends_it_the_distance_is_between_the_bounds() {
             let mut last: Option<Distance> = None;
             for doubled in 0..16_u32 {
                 let work = if doubled == 0 { 0 } else { 1 << (doubled - 1) };
-                let found = distance(&va, &vb, &plan, &Budget::UNLIMITED.with_work(work));
-                let again = distance(&va, &vb, &plan, &Budget::UNLIMITED.with_work(work));
+                let found = Pair::new(va, vb)
+                    .within(&Budget::UNLIMITED.with_work(work))
+                    .distance(&plan, &mut Scratch::default());
+                let again = Pair::new(va, vb)
+                    .within(&Budget::UNLIMITED.with_work(work))
+                    .distance(&plan, &mut Scratch::default());
                 assert_eq!(found, again, "the same work, the same answer");
                 let what = format!("{semantics:?}, gap {gap}, work {work}: {found:?}");
                 assert!(found.lower <= truth * (1.0 + 1e-12), "{what} for {truth}");
@@ -168,11 +172,11 @@ fn whenever_a_budget_ends_it_the_distance_is_between_the_bounds() {
                 last = Some(found);
             }
             assert!(last.unwrap().complete, "the last sufficed: {last:?}");
-            let unlimited = distance(&va, &vb, &plan, &Budget::UNLIMITED);
+            let unlimited = Pair::new(va, vb).distance(&plan, &mut Scratch::default());
             let last = last.unwrap();
             assert_eq!((unlimited.lower, unlimited.upper), (last.lower, last.upper), "as without a budget");
             let deadline = Budget::UNLIMITED.with_deadline(Deadline::within(Duration::ZERO));
-            let none = distance(&va, &vb, &plan, &deadline);
+            let none = Pair::new(va, vb).within(&deadline).distance(&plan, &mut Scratch::default());
             assert!(!none.complete && none.lower <= truth && none.upper >= truth, "{none:?}");
         }
     }
@@ -186,9 +190,9 @@ fn what_touches_is_at_distance_zero() {
     for depth in [0.05, 0.3, 1.0, 1.7] {
         let shift = arbitrary::unit_vector(&mut rng).map(|x| x * (2.0 - depth));
         let pose = arbitrary::rotation(&mut rng).with_translation(shift);
-        let (va, vb) = (ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose));
+        let (va, vb) = (Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose));
         for budget in [Budget::UNLIMITED, Budget::UNLIMITED.with_work(100_000)] {
-            let found = distance(&va, &vb, &plan, &budget);
+            let found = Pair::new(va, vb).within(&budget).distance(&plan, &mut Scratch::default());
             assert_eq!((found.lower, found.upper), (0.0, 0.0), "{depth}: {found:?}");
             assert!(found.complete && found.evidence == Evidence::Certified, "{depth}: {found:?}");
             let off = found.points[0].iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0;
@@ -197,8 +201,8 @@ fn what_touches_is_at_distance_zero() {
     }
     // One within the other does not touch it.
     let within = Pose::IDENTITY.with_scale(0.2);
-    let (va, vb) = (ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &within));
-    let found = distance(&va, &vb, &plan, &Budget::UNLIMITED);
+    let (va, vb) = (Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &within));
+    let found = Pair::new(va, vb).distance(&plan, &mut Scratch::default());
     assert!((found.upper - 0.8).abs() < 0.01 && found.lower > 0.2, "{found:?}");
 }
 
@@ -208,8 +212,8 @@ fn wrong_questions_and_poses_are_told() {
     let thick = |radius| DistanceOptions::default().with_semantics(Semantics::Thickened(radius));
     assert!(matches!(DistancePlan::new(&thick(-1.0), &scan, &scan), Err(PlanError::Radius(_))));
     let plan = plan(Semantics::Surface, &scan, &scan);
-    let here = ScanView::new(&scan, &Pose::IDENTITY);
-    let nowhere = ScanView::new(&scan, &Pose::from_translation([f64::NAN, 0.0, 0.0]));
-    let found = distance(&here, &nowhere, &plan, &Budget::UNLIMITED);
+    let here = Placed::new(&scan, &Pose::IDENTITY);
+    let nowhere = Placed::new(&scan, &Pose::from_translation([f64::NAN, 0.0, 0.0]));
+    let found = Pair::new(here, nowhere).distance(&plan, &mut Scratch::default());
     assert_eq!((found.lower, found.upper, found.complete), (0.0, f64::INFINITY, false), "{found:?}");
 }

@@ -3,7 +3,7 @@
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_graph::{GraphOptions, Samples, Sides, SurfaceGraph};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::ScanView;
+use nearmiss_query::Placed;
 
 /// A tree over points, its normals turned to one side, and their graph.
 pub(crate) struct Scan {
@@ -26,7 +26,7 @@ impl Scan {
         Self { tree, graph }
     }
 
-    pub(crate) fn at(&self, pose: &Pose) -> ScanView<'_> {
-        ScanView::new(&self.tree, pose).with_graph(&self.graph)
+    pub(crate) fn at(&self, pose: &Pose) -> Placed<'_> {
+        Placed::new(&self.tree, pose).with_graph(&self.graph)
     }
 }

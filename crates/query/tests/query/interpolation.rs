@@ -3,9 +3,8 @@ use crate::graphed::Scan;
 use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::BuildOptions;
 use nearmiss_query::{
-    Answer, Brackets, Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Detail, Evidence,
-    Interpolation, Method, PlanError, Reason, Refinement, ScanView, Semantics, Surfels, Verdict, collide,
-    collide_all, collide_with,
+    Answer, Brackets, Budget, CollideOptions, CollidePlan, Contacts, Detail, Evidence, Interpolation, Method,
+    Pair, Placed, PlanError, Reason, Refinement, Scratch, Semantics, Surfels, Verdict,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -32,14 +31,14 @@ fn flat() -> Interpolation {
     Interpolation::default().with_flat(true)
 }
 
-fn ask(a: &ScanView<'_>, b: &ScanView<'_>, options: &CollideOptions, scratch: &mut CollideScratch) -> Answer {
+fn ask(a: &Placed<'_>, b: &Placed<'_>, options: &CollideOptions, scratch: &mut Scratch) -> Answer {
     let plan = CollidePlan::new(options, a.scan(), b.scan()).unwrap();
-    collide_with(a, b, &plan, &Budget::UNLIMITED, scratch)
+    Pair::new(*a, *b).collide(&plan, scratch)
 }
 
 #[test]
 fn no_verdict_is_wrong_outside_the_band() {
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let (mut judged, mut meeting, mut missed) = (0, 0, [0; 2]);
     for seed in [1, 2] {
         let set = analytic_set(seed, &SetOptions { repeats: 1, ..SetOptions::default() });
@@ -80,7 +79,7 @@ fn no_verdict_is_wrong_outside_the_band() {
 #[test]
 fn parts_thinner_than_the_edges_of_a_are_found() {
     let coarse = scan_of(patch(4.0, 4.0), 0.2, 0.0);
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut rng = arbitrary::rng(5);
     for form in [cuboid([0.06, 0.06, 3.0]), cuboid([0.06, 1.0, 1.0]), avatar(2.0, 0.05)] {
         let name = form.name;
@@ -105,7 +104,7 @@ fn all_contacts_lie_on_both_spheres_however_they_are_refined() {
     let r = ball.tree.sampling_radius();
     let pose = Pose::from_axis_angle([0.3, 1.0, 0.2], 0.8).with_translation([1.2, 0.0, 0.0]);
     let (a, b) = (ball.at(&Pose::IDENTITY), ball.at(&pose));
-    let (mut all, mut scratch) = (Contacts::default(), CollideScratch::default());
+    let (mut all, mut scratch) = (Contacts::default(), Scratch::default());
     let off = |[x, y, z]: [f64; 3]| {
         let from = |x: f64| (x.hypot(y).hypot(z) - 1.0).abs();
         from(x).max(from(x - 1.2))
@@ -126,7 +125,7 @@ fn all_contacts_lie_on_both_spheres_however_they_are_refined() {
                 .with_brackets(brackets)
                 .with_refinement(refinement);
             let plan = CollidePlan::new(&options(search), &ball.tree, &ball.tree).unwrap();
-            let answer = collide_all(&a, &b, &plan, &Budget::UNLIMITED, &mut all, &mut scratch);
+            let answer = Pair::new(a, b).contacts(&mut all).collide(&plan, &mut scratch);
             let found = &all.contacts;
             assert!(all.complete && found.len() >= least, "{} contacts, {search:?}", found.len());
             assert!(answer.statistics.evaluations > 0 && answer.statistics.neighbour_steps > 0);
@@ -177,7 +176,7 @@ fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
         let (a, b) = (slit.at(&Pose::IDENTITY), blade.at(&pose));
         for seed in 0..40 {
             let few = flat().with_approaches(0).with_surfels(Surfels::Count(2)).with_seed(seed);
-            let answer = ask(&a, &b, &options(few), &mut CollideScratch::default());
+            let answer = ask(&a, &b, &options(few), &mut Scratch::default());
             asked += 1;
             if let Verdict::Intersecting { contact, .. } = answer.verdict {
                 assert!((contact.point[0] - tip[0] + 0.3).abs() < 0.3, "{contact:?} for {tip:?}");
@@ -201,13 +200,13 @@ fn where_sides_are_unknown_discs_tell() {
     let inwards: Vec<[f32; 3]> = points.iter().map(|p| single(p.map(|x| -x))).collect();
     let plain = scan(&points);
     let scans = [with_normals(&points, &random), with_normals(&points, &inwards)];
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     for (away, meets) in [(1.2, true), (1.9, true), (2.2, false), (0.3, true)] {
         let pose = Pose::from_axis_angle([1.0, 0.4, 0.0], 0.5).with_translation([0.0, away, 0.0]);
         for search in [Interpolation::default(), flat()] {
             let options = options(search);
             let a = plain.at(&Pose::IDENTITY);
-            let bare = ScanView::new(&plain.tree, &pose);
+            let bare = Placed::new(&plain.tree, &pose);
             for b in [scans[0].at(&pose), scans[1].at(&pose), bare] {
                 let answer = ask(&a, &b, &options, &mut scratch);
                 assert_eq!(answer.verdict.is_intersecting(), meets, "{away}, {search:?}: {answer:?}");
@@ -259,7 +258,8 @@ fn what_cannot_be_searched_is_refused() {
     for search in ends {
         let options = options(search.with_flat(true));
         let plan = CollidePlan::new(&options, &scan.tree, &scan.tree).unwrap();
-        let answer = collide(&scan.at(&Pose::IDENTITY), &scan.at(&pose), &plan, &Budget::UNLIMITED);
+        let answer =
+            Pair::new(scan.at(&Pose::IDENTITY), scan.at(&pose)).collide(&plan, &mut Scratch::default());
         assert!(answer.verdict.is_intersecting(), "{search:?}: {answer:?}");
     }
 }
@@ -269,7 +269,7 @@ fn seeds_decide_and_scratch_does_not() {
     let ball = scan_of(sphere(1.0), 0.04, 0.05);
     let torus = scan_of(torus(1.0, 0.3), 0.06, 0.1);
     let mut rng = arbitrary::rng(11);
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let (mut differ, mut asked) = (0, 0);
     for round in 0..24_u64 {
         let scale = [1.0, 1e6, 1e-6][(round % 3) as usize];
@@ -287,7 +287,7 @@ fn seeds_decide_and_scratch_does_not() {
             for search in [Interpolation::default(), flat(), flat().with_brackets(Brackets::Annulus)] {
                 let one = options(search.with_seed(round));
                 let used = ask(&a, &b, &one, &mut scratch);
-                let fresh = ask(&a, &b, &one, &mut CollideScratch::default());
+                let fresh = ask(&a, &b, &one, &mut Scratch::default());
                 assert_eq!(used, fresh, "{search:?}");
                 let by_discs = ask(&a, &b, &CollideOptions::default(), &mut scratch);
                 if !search.flat {
@@ -315,7 +315,7 @@ fn seeds_decide_and_scratch_does_not() {
 #[test]
 fn budgets_end_searches() {
     let ball = scan_of(sphere(1.0), 0.04, 0.0);
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut all = Contacts::default();
     let (mut ended, mut found) = (0, 0);
     for (away, meets) in [(1.0, true), (2.02, false), (1.97, true)] {
@@ -325,8 +325,12 @@ fn budgets_end_searches() {
             let plan = CollidePlan::new(&options(search), &ball.tree, &ball.tree).unwrap();
             for work in [0, 1, 3, 20, 100, 400, 5000, 1_000_000] {
                 let budget = Budget::UNLIMITED.with_work(work);
-                let answer = collide_with(&a, &b, &plan, &budget, &mut scratch);
-                assert_eq!(answer, collide(&a, &b, &plan, &budget), "reproducible");
+                let answer = Pair::new(a, b).within(&budget).collide(&plan, &mut scratch);
+                assert_eq!(
+                    answer,
+                    Pair::new(a, b).within(&budget).collide(&plan, &mut Scratch::default()),
+                    "reproducible"
+                );
                 let spent = answer.statistics.evaluations + answer.statistics.node_pairs;
                 assert!(spent <= work + 8, "{spent} of {work}, {search:?}");
                 match answer.verdict {
@@ -340,7 +344,7 @@ fn budgets_end_searches() {
                     }
                     verdict => assert!(!meets && verdict.is_separated(), "{answer:?}"),
                 }
-                collide_all(&a, &b, &plan, &budget, &mut all, &mut scratch);
+                Pair::new(a, b).within(&budget).contacts(&mut all).collide(&plan, &mut scratch);
                 assert!(work > 100 || !all.complete, "{work}");
             }
         }
@@ -357,7 +361,7 @@ fn certificates_are_those_of_volumes() {
         let (a, b) = (ball.at(&Pose::IDENTITY), ball.at(&pose));
         for search in [Interpolation::default(), flat()] {
             let wanted = options(search).with_evidence(Evidence::Certified);
-            let verdict = ask(&a, &b, &wanted, &mut CollideScratch::default()).verdict;
+            let verdict = ask(&a, &b, &wanted, &mut Scratch::default()).verdict;
             let Verdict::Separated { gap, evidence } = verdict else { panic!("{verdict:?}") };
             assert_eq!(evidence == Evidence::Certified, proven && !search.flat, "{away}, {search:?}");
             assert!(gap <= away - 2.0 + 1e-9, "{gap}");

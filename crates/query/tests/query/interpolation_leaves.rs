@@ -6,8 +6,7 @@ use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::BuildOptions;
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Contacts, Detail, Interpolation, Method, ScanView,
-    collide_all,
+    CollideOptions, CollidePlan, Contacts, Detail, Interpolation, Method, Pair, Placed, Scratch,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::oracle::{self, SurfaceTwin};
@@ -21,12 +20,12 @@ fn scan(form: Form, spacing: f64, noise: f64) -> Scan {
 
 /// The surface of a scan by sums over all its points, in the world.
 struct Twin<'a> {
-    view: ScanView<'a>,
+    view: Placed<'a>,
     surface: SurfaceTwin,
 }
 
 impl<'a> Twin<'a> {
-    fn new(view: ScanView<'a>) -> Self {
+    fn new(view: Placed<'a>) -> Self {
         let scan = view.scan();
         let points: Vec<[f64; 3]> = scan.positions().iter().map(|p| p.map(f64::from)).collect();
         let radii: Vec<f64> = scan.radii().iter().map(|&r| f64::from(r)).collect();
@@ -57,7 +56,7 @@ impl<'a> Twin<'a> {
 }
 
 /// The leaf of every stored point.
-fn leaves(view: &ScanView<'_>) -> Vec<usize> {
+fn leaves(view: &Placed<'_>) -> Vec<usize> {
     let mut of = vec![0; view.scan().len()];
     let topology = view.scan().topology();
     for leaf in 0..topology.leaves() {
@@ -80,8 +79,8 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
         .with_method(Method::Interpolation(Interpolation::default()))
         .with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&options, a.scan(), b.scan()).unwrap();
-    let (mut all, mut scratch) = (Contacts::default(), CollideScratch::default());
-    let answer = collide_all(&a, &b, &plan, &Budget::UNLIMITED, &mut all, &mut scratch);
+    let (mut all, mut scratch) = (Contacts::default(), Scratch::default());
+    let answer = Pair::new(a, b).contacts(&mut all).collide(&plan, &mut scratch);
 
     // Contacts on an edge, which discs do not give, lie where f of b vanishes, near points of both.
     let leaf = leaves(&a);

@@ -3,8 +3,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, PointId, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_query::{
-    Budget, CollideOptions, CollidePlan, CollideScratch, Detail, ManifoldPoint, ScanView, Semantics, Verdict,
-    collide_with,
+    Budget, CollideOptions, CollidePlan, ManifoldPoint, Pair, Placed, Scratch, Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::shapes::{Form, Sampling, cuboid, patch, shells, sphere};
@@ -23,11 +22,11 @@ fn asked(
     poses: [Pose; 2],
     options: &CollideOptions,
 ) -> (Verdict, Vec<ManifoldPoint>) {
-    let plan = CollidePlan::new(&options.with_detail(Detail::Manifold), scans[0], scans[1]).unwrap();
-    let [a, b] = [0, 1].map(|k: usize| ScanView::new(scans[k], &poses[k]));
-    let mut scratch = CollideScratch::default();
-    let verdict = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch).verdict;
-    (verdict, scratch.manifold().to_vec())
+    let plan = CollidePlan::new(options, scans[0], scans[1]).unwrap();
+    let [a, b] = [0, 1].map(|k: usize| Placed::new(scans[k], &poses[k]));
+    let mut places = Vec::new();
+    let answer = Pair::new(a, b).manifold(&mut places).collide(&plan, &mut Scratch::default());
+    (answer.verdict, places)
 }
 
 fn lifted(height: f64) -> Pose {
@@ -131,7 +130,7 @@ fn within_a_margin_gaps_are_positive() {
 }
 
 /// Every point of either scan with the nearest of the other, from the definition, as (of b, i, j).
-fn neighbours(views: &[ScanView<'_>; 2]) -> Vec<(bool, usize, usize)> {
+fn neighbours(views: &[Placed<'_>; 2]) -> Vec<(bool, usize, usize)> {
     let points = [0, 1].map(|k: usize| -> Vec<Vector3<f64>> {
         (0..views[k].scan().len()).map(|i| views[k].point(i).into()).collect()
     });
@@ -166,7 +165,7 @@ fn nothing_deeper_is_left_out() {
             continue;
         };
         met[usize::from(balls)] += 1;
-        let views = [ScanView::new(&scans[0], &poses[0]), ScanView::new(&scans[1], &poses[1])];
+        let views = [Placed::new(&scans[0], &poses[0]), Placed::new(&scans[1], &poses[1])];
         let heights = neighbours(&views).into_iter().filter_map(|(of_b, i, j)| {
             let between = Vector3::from(views[0].point(i)) - Vector3::from(views[1].point(j));
             if balls {
@@ -201,14 +200,13 @@ fn nothing_deeper_is_left_out() {
 #[test]
 fn a_budget_leaves_at_least_the_contact() {
     let (ball, floor) = (sampled(sphere(1.0), 0.05), sampled(patch(4.0, 4.0), 0.05));
-    let options = CollideOptions::default().with_detail(Detail::Manifold);
-    let plan = CollidePlan::new(&options, &ball, &floor).unwrap();
-    let (a, b) = (ScanView::new(&ball, &lifted(0.97)), ScanView::new(&floor, &Pose::IDENTITY));
-    let mut scratch = CollideScratch::default();
+    let plan = CollidePlan::new(&CollideOptions::default(), &ball, &floor).unwrap();
+    let (a, b) = (Placed::new(&ball, &lifted(0.97)), Placed::new(&floor, &Pose::IDENTITY));
+    let (mut scratch, mut places) = (Scratch::default(), Vec::new());
     let mut counts = Vec::new();
     for work in [64, 128, 256, 512, 1024, 4096] {
-        let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED.with_work(work), &mut scratch);
-        let places = scratch.manifold();
+        let pair = Pair::new(a, b).within(&Budget::UNLIMITED.with_work(work));
+        let answer = pair.manifold(&mut places).collide(&plan, &mut scratch);
         assert_eq!(answer.verdict.is_intersecting(), !places.is_empty(), "{work}");
         if let Verdict::Intersecting { contact, .. } = answer.verdict {
             let [PointId(_), PointId(_)] = contact.sources;

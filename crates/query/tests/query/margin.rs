@@ -2,7 +2,7 @@
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, ScanView, Semantics, Verdict, collide,
+    Answer, CollideOptions, CollidePlan, Detail, Evidence, Pair, Placed, Scratch, Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle;
@@ -13,12 +13,12 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &leaf).unwrap()
 }
 
-fn ask(a: &ScanView<'_>, b: &ScanView<'_>, options: CollideOptions) -> Answer {
+fn ask(a: &Placed<'_>, b: &Placed<'_>, options: CollideOptions) -> Answer {
     let plan = CollidePlan::new(&options, a.scan(), b.scan()).unwrap();
-    collide(a, b, &plan, &Budget::UNLIMITED)
+    Pair::new(*a, *b).collide(&plan, &mut Scratch::default())
 }
 
-fn in_world(view: &ScanView<'_>) -> Vec<[f64; 3]> {
+fn in_world(view: &Placed<'_>) -> Vec<[f64; 3]> {
     (0..view.scan().len()).map(|i| view.point(i)).collect()
 }
 
@@ -38,7 +38,7 @@ fn points_within_the_margin_are_never_separated() {
             let pose_b = arbitrary::rotation(&mut rng)
                 .with_translation(arbitrary::point_in(&mut rng, 3.5 * size))
                 .with_scale([1.0, 0.5, 3.0][round % 3]);
-            let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose_b));
+            let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose_b));
             let same = Pose::IDENTITY;
             let nearest = oracle::least_distance(&in_world(&va), &same, &in_world(&vb), &same).unwrap();
             for factor in [0.01, 0.7, 0.999_999, 1.000_001, 1.3, 20.0] {
@@ -85,7 +85,7 @@ fn spheres_meet_within_a_margin_of_their_distance() {
             let direction = arbitrary::unit_vector(&mut rng);
             let gap = r * (2.0 + 5.0 * arbitrary::point_in(&mut rng, 1.0)[0].abs());
             let pose = arbitrary::rotation(&mut rng).with_translation(direction.map(|c| c * (2.0 + gap)));
-            let (va, vb) = (ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose));
+            let (va, vb) = (Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose));
             for (margin, meets) in [(gap + r, true), (gap - r, false)] {
                 let options = CollideOptions::default().with_margin(margin);
                 let verdict = ask(&va, &vb, options).verdict;

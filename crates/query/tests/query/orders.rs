@@ -4,8 +4,8 @@ use std::time::Duration;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evidence, Method, Order, Pacer,
-    PlanError, Reason, Sampling, ScanView, Semantics, Verdict, collide, collide_paced, collide_with,
+    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, Method, Order, Pacer, Pair, Placed,
+    PlanError, Reason, Sampling, Scratch, Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -28,7 +28,9 @@ fn ask(
     budget: &Budget,
 ) -> Answer {
     let plan = CollidePlan::new(options, a, b).unwrap();
-    collide(&ScanView::new(a, &Pose::IDENTITY), &ScanView::new(b, pose), &plan, budget)
+    Pair::new(Placed::new(a, &Pose::IDENTITY), Placed::new(b, pose))
+        .within(budget)
+        .collide(&plan, &mut Scratch::default())
 }
 
 fn kind(verdict: &Verdict) -> u8 {
@@ -84,18 +86,19 @@ fn orders_and_coverings_change_no_verdict() {
 fn work_budgets_are_reproducible_in_every_order() {
     let scan = sphere(3000);
     let mut rng = arbitrary::rng(9);
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut unfinished = 0;
     for _ in 0..40 {
         let pose = Pose::from_translation(arbitrary::unit_vector(&mut rng).map(|x| 1.98 * x));
         for order in ORDERS {
             let options = CollideOptions::default().with_order(order);
             let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
-            let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &pose)];
+            let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &pose)];
             for work in [0, 1, 7, 60, 500] {
                 let budget = Budget::UNLIMITED.with_work(work);
-                let fresh = collide(&views[0], &views[1], &plan, &budget);
-                let used = collide_with(&views[0], &views[1], &plan, &budget, &mut scratch);
+                let fresh =
+                    Pair::new(views[0], views[1]).within(&budget).collide(&plan, &mut Scratch::default());
+                let used = Pair::new(views[0], views[1]).within(&budget).collide(&plan, &mut scratch);
                 assert_eq!(fresh, used, "{order:?} {work}");
                 let spent = fresh.statistics.evaluations + fresh.statistics.node_pairs;
                 assert!(spent <= work + 40, "{spent} of {work}");
@@ -240,7 +243,7 @@ fn paces_that_are_none_are_mended() {
     let options = CollideOptions::default().with_method(Method::Sampling(Sampling::default()));
     let plan = CollidePlan::new(&options, &scan, &scan).unwrap();
     let apart = Pose::from_translation([2.0 + 2.0 * r, 0.0, 0.0]);
-    let views = [ScanView::new(&scan, &Pose::IDENTITY), ScanView::new(&scan, &apart)];
+    let views = [Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &apart)];
     let plain = Sampling::default();
     for target in [Duration::ZERO, Duration::from_secs(1), Duration::MAX] {
         for test_points in [0, 128, u32::MAX] {
@@ -251,13 +254,10 @@ fn paces_that_are_none_are_mended() {
                     if pacer.sampling().test_points > 1000 && !target.is_zero() {
                         break;
                     }
-                    let answer = collide_paced(
-                        &views[0],
-                        &views[1],
-                        &plan,
-                        &mut pacer,
-                        &mut CollideScratch::default(),
-                    );
+                    let pair = Pair::new(views[0], views[1]);
+                    let answer = pacer.pace(&plan, |plan, budget| {
+                        pair.within(budget).collide(plan, &mut Scratch::default())
+                    });
                     assert!(!answer.verdict.is_intersecting(), "{target:?} {sampling:?} {answer:?}");
                 }
                 let Sampling { test_points, tolerance, .. } = pacer.sampling();

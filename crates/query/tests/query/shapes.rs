@@ -1,7 +1,7 @@
 //! Shapes against brute force: every point, by formulas of its own.
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::{ScanView, Shape, ShapeIndex};
+use nearmiss_query::{Placed, Shape, ShapeIndex};
 use nearmiss_testdata::arbitrary::{self, CloudKind, point_in, rotation, unit_vector};
 use rand::RngExt;
 
@@ -52,8 +52,8 @@ fn shapes_touch_what_brute_force_says_and_the_nearest_point_is_nearest() {
         let middle = scan.bounds().centre();
         let scale = [1.0, 1e-3, 1e4][(n % 3) as usize];
         let pose = rotation(&mut rng).with_scale(scale).with_translation(point_in(&mut rng, 3.0 * size));
-        let (index, view) = (ShapeIndex::new(&scan), ScanView::new(&scan, &pose));
-        let placed = index.at(&pose);
+        let (index, view) = (ShapeIndex::new(&scan), Placed::new(&scan, &pose));
+        let placed = view.with_shapes(&index);
         for round in 0..60_usize {
             // About a point, or anywhere near.
             let about = view.point(rng.random_range(0..scan.len()));
@@ -117,7 +117,7 @@ fn shapes_touch_what_brute_force_says_and_the_nearest_point_is_nearest() {
 fn many_shapes_are_answered_as_one_by_one_on_any_number_of_threads() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 4000, 3), 16);
     let index = ShapeIndex::new(&scan);
-    let placed = index.at(&Pose::from_translation([0.5, 0.0, 0.0]));
+    let placed = Placed::new(&scan, &Pose::from_translation([0.5, 0.0, 0.0])).with_shapes(&index);
     let mut rng = arbitrary::rng(92);
     let shapes: Vec<Shape> =
         (0..5000).map(|_| Shape::Sphere { centre: point_in(&mut rng, 1.5), radius: 0.1 }).collect();
@@ -136,7 +136,8 @@ fn many_shapes_are_answered_as_one_by_one_on_any_number_of_threads() {
 fn what_is_no_shape_touches_nothing_and_what_is_endless_everything() {
     let scan = prepared(&arbitrary::cloud(CloudKind::Random, 200, 4), 16);
     let index = ShapeIndex::new(&scan);
-    let (placed, view) = (index.at(&Pose::IDENTITY), ScanView::new(&scan, &Pose::IDENTITY));
+    let view = Placed::new(&scan, &Pose::IDENTITY);
+    let placed = view.with_shapes(&index);
     let sphere = |centre: [f64; 3], radius: f64| Shape::Sphere { centre, radius };
     for shape in [
         sphere([0.0; 3], -1.0),

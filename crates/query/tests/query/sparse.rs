@@ -2,17 +2,17 @@
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
-use nearmiss_query::{Budget, CollideOptions, CollidePlan, Reason, ScanView, Semantics, Verdict, collide};
+use nearmiss_query::{CollideOptions, CollidePlan, Pair, Placed, Reason, Scratch, Semantics, Verdict};
 use nearmiss_testdata::{arbitrary, oracle};
 
 fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
-fn ask(a: &ScanView<'_>, b: &ScanView<'_>) -> Verdict {
+fn ask(a: &Placed<'_>, b: &Placed<'_>) -> Verdict {
     let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
     let plan = CollidePlan::new(&surfaces, a.scan(), b.scan()).unwrap();
-    collide(a, b, &plan, &Budget::UNLIMITED).verdict
+    Pair::new(*a, *b).collide(&plan, &mut Scratch::default()).verdict
 }
 
 /// A patch with a wire over it and a lone point above that.
@@ -27,8 +27,8 @@ fn scene(seed: u64) -> Vec<[f64; 3]> {
 
 /// Places where a point with a ball comes near: the least of distance over reach, of balls and of the points'
 /// discs.
-fn nearest_ball(a: &ScanView<'_>, b: &ScanView<'_>) -> f64 {
-    let all = |view: &ScanView<'_>| -> Vec<(oracle::Disc, f64)> {
+fn nearest_ball(a: &Placed<'_>, b: &Placed<'_>) -> f64 {
+    let all = |view: &Placed<'_>| -> Vec<(oracle::Disc, f64)> {
         let (scan, scale) = (view.scan(), view.placed().scale());
         let disc = |i: usize| oracle::Disc {
             centre: view.point(i),
@@ -67,7 +67,7 @@ fn who_comes_near_a_wire_or_a_lone_point_leaves_it_open() {
         let place = arbitrary::point_in(&mut rng, 1.2);
         let pose = arbitrary::rotation(&mut rng).with_scale(0.3);
         let pose = pose.with_translation([place[0], place[1], 1.2 + place[2]]);
-        let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&probe, &pose));
+        let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&probe, &pose));
         for verdict in [ask(&va, &vb), ask(&vb, &va)] {
             if verdict.is_intersecting() {
                 continue;

@@ -2,8 +2,8 @@
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_query::{
-    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, Order, Reason, ScanView, Semantics,
-    Verdict, collide,
+    Answer, Budget, CollideOptions, CollidePlan, Detail, Evidence, Order, Pair, Placed, Reason, Scratch,
+    Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::oracle;
@@ -14,9 +14,9 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &leaf).unwrap()
 }
 
-fn ask(a: &ScanView<'_>, b: &ScanView<'_>, options: CollideOptions, budget: &Budget) -> Answer {
+fn ask(a: &Placed<'_>, b: &Placed<'_>, options: CollideOptions, budget: &Budget) -> Answer {
     let plan = CollidePlan::new(&options, a.scan(), b.scan()).unwrap();
-    collide(a, b, &plan, budget)
+    Pair::new(*a, *b).within(budget).collide(&plan, &mut Scratch::default())
 }
 
 const SHAPES: [CloudKind; 8] = [
@@ -32,8 +32,8 @@ const SHAPES: [CloudKind; 8] = [
 
 /// The greatest slack of any two trusted discs in the world, in shares of their radii, and whether any
 /// doubtful ones cross.
-fn best_crossing(a: &ScanView<'_>, b: &ScanView<'_>) -> (f64, bool) {
-    let discs = |view: &ScanView<'_>| -> Vec<(oracle::Disc, bool, f64)> {
+fn best_crossing(a: &Placed<'_>, b: &Placed<'_>) -> (f64, bool) {
+    let discs = |view: &Placed<'_>| -> Vec<(oracle::Disc, bool, f64)> {
         let scan = view.scan();
         (0..scan.len())
             .map(|i| {
@@ -119,7 +119,7 @@ fn surfaces_meet_where_some_discs_cross() {
         for _ in 0..4 {
             let spread = arbitrary::point_in(&mut rng, 2.2 * size);
             let pose = arbitrary::rotation(&mut rng).with_translation(spread);
-            let (va, vb) = (ScanView::new(&a, &Pose::IDENTITY), ScanView::new(&b, &pose));
+            let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose));
             let (slack, doubtful) = best_crossing(&va, &vb);
             let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
             let options = surfaces.with_detail(Detail::Verdict);
@@ -157,7 +157,7 @@ fn thickened_equals_brute_force() {
             let pose_a =
                 arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.1 * size));
             let nearest = oracle::least_distance(&points_a, &pose_a, &points_b, &pose_b).unwrap();
-            let (va, vb) = (ScanView::new(&a, &pose_a), ScanView::new(&b, &pose_b));
+            let (va, vb) = (Placed::new(&a, &pose_a), Placed::new(&b, &pose_b));
             for factor in [0.0, 0.3, 0.499_999, 0.500_001, 0.7, 5.0] {
                 let radius = factor * nearest.distance;
                 let options = CollideOptions::default().with_semantics(Semantics::Thickened(radius));
@@ -196,13 +196,13 @@ fn a_witness_lies_on_both_surfaces() {
         let direction = arbitrary::unit_vector(&mut rng);
         let shift = direction.map(|x| 1.2 * size * x);
         let pose = arbitrary::rotation(&mut rng).with_translation(shift);
-        let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+        let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
         let answer = ask(&a, &b, CollideOptions::default(), &Budget::UNLIMITED);
         let Verdict::Intersecting { contact, evidence } = answer.verdict else { panic!("spheres meet") };
         if evidence == Evidence::Certified {
             certified += 1;
             for view in [&a, &b] {
-                let at = view.evaluate_with(contact.point, &mut nearmiss_query::ViewScratch::default());
+                let at = view.evaluate(contact.point, &mut Scratch::default());
                 assert!(at.f.abs() <= 1e-6 * at.bandwidth, "on the surface: {}", at.f / at.bandwidth);
             }
             assert!(answer.statistics.evaluations >= 2, "evaluations are counted");
@@ -216,7 +216,7 @@ fn a_work_budget_is_kept_and_reproducible() {
     let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
     let size = sphere.bounds().half_extents()[0];
     let pose = Pose::from_translation([1.9 * size, 0.2 * size, 0.1 * size]);
-    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+    let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
     // In one order, for another may meet another contact first.
     let options = CollideOptions::default().with_order(Order::DepthFirst);
     let unlimited = ask(&a, &b, options, &Budget::UNLIMITED);
@@ -255,7 +255,7 @@ fn grazing_sheets_touch_flat_or_not() {
     // Discs have a radius of some 0.65 · 1.41, and a twentieth of that is how near sheets touch.
     for (lift, touches) in [(0.0, true), (0.02, true), (0.04, true), (0.06, false), (0.5, false)] {
         let pose = Pose::from_translation([0.3, 0.2, lift]);
-        let (a, b) = (ScanView::new(&flat, &Pose::IDENTITY), ScanView::new(&flat, &pose));
+        let (a, b) = (Placed::new(&flat, &Pose::IDENTITY), Placed::new(&flat, &pose));
         let found = ask(&a, &b, verdict, &Budget::UNLIMITED).verdict;
         assert_eq!(found.is_intersecting(), touches, "lifted by {lift}: {found:?}");
     }
@@ -269,7 +269,7 @@ fn contacts_of_coarse_and_fine_lie_on_both() {
     let mut hits = 0;
     for round in 0..300 {
         let pose = arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 0.4));
-        let (a, b) = (ScanView::new(&coarse, &Pose::IDENTITY), ScanView::new(&fine, &pose));
+        let (a, b) = (Placed::new(&coarse, &Pose::IDENTITY), Placed::new(&fine, &pose));
         let (a, b) = if round % 2 == 0 { (a, b) } else { (b, a) };
         let options = CollideOptions::default().with_detail(Detail::Verdict);
         if let Verdict::Intersecting { contact, .. } = ask(&a, &b, options, &Budget::UNLIMITED).verdict {
@@ -298,7 +298,7 @@ fn a_pose_that_is_none_is_undecided() {
         mirrored(),
     ];
     for pose in poses {
-        let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+        let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
         for (a, b) in [(a, b), (b, a)] {
             for semantics in [Semantics::Surface, Semantics::Thickened(0.1)] {
                 let options = CollideOptions::default().with_semantics(semantics);
@@ -321,7 +321,7 @@ fn balls_that_surely_meet_are_likely_to() {
     let sphere = prepared(&arbitrary::cloud(CloudKind::Sphere, 3000, 1));
     let size = sphere.bounds().half_extents()[0];
     let pose = Pose::from_translation([3.0 * size, 0.0, 0.0]);
-    let (a, b) = (ScanView::new(&sphere, &Pose::IDENTITY), ScanView::new(&sphere, &pose));
+    let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
     let options = CollideOptions::default().with_semantics(Semantics::Thickened(5.0 * size));
     for work in [0, 1, 5] {
         let verdict = ask(&a, &b, options, &Budget::default().with_work(work)).verdict;
@@ -356,7 +356,7 @@ fn signs_of_normals_change_no_answer() {
             for _ in 0..40 {
                 let poses = [arbitrary::pose(&mut rng, size), arbitrary::pose(&mut rng, size)];
                 let [one, other] = [&plain, &turned].map(|scan| {
-                    let views = [ScanView::new(scan, &poses[0]), ScanView::new(scan, &poses[1])];
+                    let views = [Placed::new(scan, &poses[0]), Placed::new(scan, &poses[1])];
                     ask(&views[0], &views[1], options, &Budget::UNLIMITED)
                 });
                 assert_eq!(one.statistics, other.statistics, "{kind:?}");

@@ -1,16 +1,16 @@
 //! Worlds against the loop over all pairs.
 use std::sync::LazyLock;
-use std::time::Duration;
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
-    Answer, Bodies, BodyId, Budget, CollideOptions, CollidePlan, Deadline, Evidence, Reason, ScanView,
-    Semantics, Until, Verdict, World, collide,
+    Answer, Bodies, BodyId, CollideOptions, CollidePlan, Evidence, Pair, Placed, Reason, Scratch, Semantics,
+    Shape, Verdict, World,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use proptest::prelude::*;
+use rand::RngExt;
 
 fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     let cloud = PointCloud::from_positions(points).unwrap();
@@ -41,7 +41,7 @@ fn options() -> [CollideOptions; 4] {
 }
 
 /// The bodies that a world ought to hold, in the order of their ids.
-type Placed = Vec<(BodyId, usize, Pose)>;
+type Bodied = Vec<(BodyId, usize, Pose)>;
 
 /// A proper pose: b about a place in a cube, whatever the scan's own origin, a third of them far from the
 /// world's.
@@ -78,17 +78,35 @@ fn hostile_pose(seed: u64) -> Pose {
     poses[usize::try_from(seed).unwrap() % poses.len()]
 }
 
-fn answer(placed: &Placed, i: usize, j: usize, plan: &CollidePlan) -> Answer {
+fn answer(placed: &Bodied, i: usize, j: usize, plan: &CollidePlan) -> Answer {
     let view = |k: usize| {
         let (_, scan, pose) = &placed[k];
-        ScanView::new(&SCANS[*scan], pose)
+        Placed::new(&SCANS[*scan], pose)
     };
-    collide(&view(i), &view(j), plan, &Budget::UNLIMITED)
+    Pair::new(view(i), view(j)).collide(plan, &mut Scratch::default())
+}
+
+/// The near pairs of a world.
+fn near(world: &World<&PointHierarchy>, bodies: Bodies<'_>, plan: &CollidePlan) -> Vec<[BodyId; 2]> {
+    let mut pairs = Vec::new();
+    world.near_pairs(bodies, plan.reach(), &mut pairs);
+    pairs
+}
+
+/// The near pairs of a world, and whether they meet.
+fn asked(
+    world: &World<&PointHierarchy>,
+    bodies: Bodies<'_>,
+    plan: &CollidePlan,
+) -> Vec<([BodyId; 2], Answer)> {
+    let mut scratch = Scratch::default();
+    let answer = |pair| (pair, world.pair(pair).unwrap().collide(plan, &mut scratch));
+    near(world, bodies, plan).into_iter().map(answer).collect()
 }
 
 /// Holds what a world tells against the loop over all pairs. Returns how many pairs there are, and are near.
-fn check(world: &World<&'static PointHierarchy>, placed: &Placed, plan: &CollidePlan) -> [usize; 2] {
-    let told = world.collide_many(Bodies::All, |_| true, plan, &Budget::UNLIMITED, Until::All);
+fn check(world: &World<&'static PointHierarchy>, placed: &Bodied, plan: &CollidePlan) -> [usize; 2] {
+    let told = asked(world, Bodies::All, plan);
     assert!(told.is_sorted_by_key(|(pair, _)| *pair), "by ids");
     let mut remaining = told.iter();
     let mut pairs = 0;
@@ -112,15 +130,15 @@ fn check(world: &World<&'static PointHierarchy>, placed: &Placed, plan: &Collide
 
     // What is asked of some is what all say of them.
     let some: Vec<BodyId> = placed.iter().step_by(3).map(|(id, ..)| *id).collect();
-    let of_some = world.near_pairs(Bodies::These(&some), plan);
-    let all = world.near_pairs(Bodies::All, plan);
+    let of_some = near(world, Bodies::These(&some), plan);
+    let all = near(world, Bodies::All, plan);
     let expected: Vec<_> =
         all.iter().filter(|pair| pair.iter().any(|id| some.contains(id))).copied().collect();
     assert_eq!(of_some, expected, "pairs of {some:?}");
     for (id, scan, pose) in placed {
-        let with_itself = world.near(&ScanView::new(&SCANS[*scan], pose), plan);
-        let of_one: Vec<BodyId> = world
-            .near_pairs(Bodies::These(&[*id]), plan)
+        let mut with_itself = Vec::new();
+        world.near(&Placed::new(&SCANS[*scan], pose), plan.reach(), &mut with_itself);
+        let of_one: Vec<BodyId> = near(world, Bodies::These(&[*id]), plan)
             .iter()
             .map(|pair| if pair[0] == *id { pair[1] } else { pair[0] })
             .collect();
@@ -159,7 +177,7 @@ proptest! {
     ) {
         let plan = CollidePlan::new(&options()[question], &SCANS[0], &SCANS[0]).unwrap();
         let mut world = World::new();
-        let mut placed: Placed = Vec::new();
+        let mut placed: Bodied = Vec::new();
         for change in changes {
             match change {
                 Change::Insert(scan, seed) => {
@@ -178,7 +196,7 @@ proptest! {
                     let (id, scan, _) = placed.remove(which % placed.len());
                     prop_assert!(std::ptr::eq(world.remove(id).unwrap(), &SCANS[scan]));
                     prop_assert!(world.remove(id).is_none() && !world.move_to(id, &Pose::IDENTITY));
-                    prop_assert!(world.view(id).is_none());
+                    prop_assert!(world.placed(id).is_none() && world.pair([id, id]).is_none());
                 }
                 _ => {}
             }
@@ -190,7 +208,7 @@ proptest! {
 }
 
 /// A world of so many bodies in proper poses.
-fn crowd(count: u64) -> (World<&'static PointHierarchy>, Placed) {
+fn crowd(count: u64) -> (World<&'static PointHierarchy>, Bodied) {
     let mut world = World::new();
     let mut placed = Vec::new();
     for seed in 0..count {
@@ -242,7 +260,7 @@ fn boxes_are_those_of_enclosures_and_no_larger() {
     for margin in [0.0, 0.5, 100.0] {
         let options = CollideOptions::default().with_margin(margin);
         let plan = CollidePlan::new(&options, &SCANS[0], &SCANS[0]).unwrap();
-        let near = world.near_pairs(Bodies::All, &plan);
+        let near = near(&world, Bodies::All, &plan);
         let mut seen = [0, 0];
         for (j, b) in placed.iter().enumerate() {
             for a in &placed[..j] {
@@ -276,8 +294,7 @@ fn hostile_poses_are_near_everything_and_undecided() {
         let plan = CollidePlan::new(&options, &SCANS[0], &SCANS[0]).unwrap();
         check(&world, &placed, &plan);
         let none = placed[12].0;
-        let told =
-            world.collide_many(Bodies::These(&[none]), |_| true, &plan, &Budget::UNLIMITED, Until::All);
+        let told = asked(&world, Bodies::These(&[none]), &plan);
         assert_eq!(told.len(), placed.len() - 1, "with all others");
         assert!(
             told.iter().all(|(_, answer)| answer.verdict == Verdict::Undecided(Reason::Pose)),
@@ -294,19 +311,18 @@ fn hostile_poses_are_near_everything_and_undecided() {
 fn an_empty_world_and_one_of_a_single_body_say_nothing() {
     let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[0]).unwrap();
     let mut world: World<&PointHierarchy> = World::new();
-    let told = |world: &World<&PointHierarchy>| {
-        world.collide_many(Bodies::All, |_| true, &plan, &Budget::UNLIMITED, Until::All)
-    };
+    let told = |world: &World<&PointHierarchy>| asked(world, Bodies::All, &plan);
     assert_eq!((world.len(), world.is_empty(), told(&world)), (0, true, vec![]));
     let id = world.insert(&SCANS[0], &Pose::IDENTITY);
     assert_eq!((world.len(), world.is_empty(), told(&world)), (1, false, vec![]));
-    assert_eq!(world.near(&world.view(id).unwrap(), &plan), [id], "what is not in the world meets what is");
+    let mut ids = Vec::new();
+    world.near(&world.placed(id).unwrap(), plan.reach(), &mut ids);
+    assert_eq!(ids, [id], "what is not in the world meets what is");
     world.remove(id);
     let later = world.insert(&SCANS[0], &Pose::IDENTITY);
     assert!(later > id, "ids are not used again");
-    assert_eq!(world.near_pairs(Bodies::These(&[id, later]), &plan), [[id; 2]; 0]);
-    let gone = world.collide_pairs(&[[id, later]], &plan, &Budget::UNLIMITED, Until::All);
-    assert_eq!(gone[0].verdict, Verdict::Undecided(Reason::Pose));
+    assert_eq!(near(&world, Bodies::These(&[id, later]), &plan), [[id; 2]; 0]);
+    assert!(world.pair([id, later]).is_none());
 }
 
 #[test]
@@ -314,21 +330,43 @@ fn one_scan_in_one_place_many_times() {
     let plan = CollidePlan::new(&CollideOptions::default(), &SCANS[0], &SCANS[0]).unwrap();
     let mut world = World::new();
     let ids: Vec<BodyId> = (0..40).map(|_| world.insert(&SCANS[0], &Pose::IDENTITY)).collect();
-    let ask = |bodies, until| world.collide_many(bodies, |_| true, &plan, &Budget::UNLIMITED, until);
-    let told = ask(Bodies::All, Until::All);
+    let told = asked(&world, Bodies::All, &plan);
     assert_eq!(told.len(), 40 * 39 / 2);
     assert!(told.iter().all(|(_, answer)| answer.verdict.is_intersecting()));
-    assert_eq!(ask(Bodies::All, Until::First), told[..1]);
     let twice = [ids[7], ids[3], ids[7]];
-    assert_eq!(ask(Bodies::These(&twice), Until::All).len(), 39 + 38, "a pair of two of them once");
+    assert_eq!(near(&world, Bodies::These(&twice), &plan).len(), 39 + 38, "a pair of two of them once");
+}
 
-    // Neighbours in a chain belong together.
-    let apart = |[a, b]: [BodyId; 2]| b.0 - a.0 > 1;
-    let told = world.collide_many(Bodies::All, apart, &plan, &Budget::UNLIMITED, Until::All);
-    assert_eq!(told.len(), 40 * 39 / 2 - 39);
-
-    let past = Budget::UNLIMITED.with_deadline(Deadline::within(Duration::ZERO));
-    let told = world.collide_many(Bodies::All, |_| true, &plan, &past, Until::All);
-    assert_eq!(told.len(), 40 * 39 / 2, "each has an answer");
-    assert!(told.iter().all(|(_, a)| matches!(a.verdict, Verdict::Undecided(Reason::Budget { .. }))));
+#[test]
+fn bodies_left_out_for_a_shape_do_not_touch_it() {
+    let (world, placed) = crowd(200);
+    let rng = &mut arbitrary::rng(7);
+    let (mut ids, mut seen) = (Vec::new(), [0, 0]);
+    for round in 0..300 {
+        // Near a body, so that some touch.
+        let (id, ..) = placed[round % placed.len()];
+        let near = world.bounds(id).unwrap();
+        let centre = [0, 1, 2].map(|k: usize| rng.random_range(near.min[k]..=near.max[k]));
+        let size = near.half_extents()[0] * rng.random_range(0.01..0.5);
+        let end = [0, 1, 2].map(|k: usize| centre[k] + rng.random_range(-size..=size));
+        let pose = arbitrary::rotation(rng).with_translation(centre).with_scale(0.5);
+        let shape = [
+            Shape::Sphere { centre, radius: size },
+            Shape::Capsule { ends: [centre, end], radius: 0.3 * size },
+            Shape::Box { pose, half: [size, 0.5 * size, 0.1 * size] },
+        ][round % 3];
+        let reach = [0.0, size][round % 2];
+        world.near_shape(&shape, reach, &mut ids);
+        assert!(ids.is_sorted());
+        for (id, ..) in &placed {
+            let placed = world.placed(*id).unwrap();
+            let is_near = placed.nearest(&shape, reach).is_some();
+            assert!(!is_near || ids.binary_search(id).is_ok(), "{shape:?} and {id:?}");
+            seen[usize::from(is_near)] += 1;
+        }
+    }
+    assert!(seen[1] > 100 && seen[0] > seen[1], "{seen:?}");
+    let nothing = Shape::Sphere { centre: [f64::NAN; 3], radius: 1.0 };
+    world.near_shape(&nothing, 0.0, &mut ids);
+    assert_eq!(ids.len(), placed.len(), "what is nowhere is left to the narrow phase");
 }

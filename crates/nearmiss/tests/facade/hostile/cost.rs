@@ -2,8 +2,8 @@
 
 use nearmiss::store::File;
 use nearmiss::{
-    Budget, BuildOptions, Check, CollideOptions, CollidePlan, PointCloud, Pose, Reason, Scan, Semantics,
-    Verdict, collide,
+    Budget, BuildOptions, Check, CollideOptions, CollidePlan, Pair, PointCloud, Pose, Reason, Scan, Scratch,
+    Semantics, Verdict,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -39,7 +39,11 @@ fn boundless_boxes_end_a_query_undecided_unless_told_otherwise() {
         for semantics in [Semantics::Surface, Semantics::Thickened(0.01)] {
             let options = CollideOptions::default().with_semantics(semantics);
             let plan = CollidePlan::new(&options, &lying, &lying).unwrap();
-            let ask = |budget: &Budget| collide(&lying.at(&Pose::IDENTITY), &lying.at(&away), &plan, budget);
+            let ask = |budget: &Budget| {
+                Pair::new(lying.at(&Pose::IDENTITY), lying.at(&away))
+                    .within(budget)
+                    .collide(&plan, &mut Scratch::default())
+            };
             let answer = ask(&Budget::UNLIMITED);
             let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict else {
                 panic!("{answer:?}")
@@ -70,7 +74,8 @@ fn sound_scans_stay_far_below_the_limit() {
     let (a, b) = (noise(1), noise(2));
     let options = CollideOptions::default().with_semantics(Semantics::Thickened(1e-9));
     let plan = CollidePlan::new(&options, &a, &b).unwrap();
-    let answer = collide(&a.at(&Pose::IDENTITY), &b.at(&Pose::IDENTITY), &plan, &Budget::UNLIMITED);
+    let answer =
+        Pair::new(a.at(&Pose::IDENTITY), b.at(&Pose::IDENTITY)).collide(&plan, &mut Scratch::default());
     assert!(answer.verdict.is_separated(), "{answer:?}");
     let leaves = (a.topology().leaves() + b.topology().leaves()) as u64;
     assert!(answer.statistics.leaf_pairs < 128 * leaves / 6, "{:?} of {leaves} leaves", answer.statistics);

@@ -2,8 +2,8 @@
 //! saving again.
 
 use nearmiss::{
-    Answer, Budget, CollideOptions, CollidePlan, CollideScratch, Detail, Evaluation, Evidence, Pose, Reason,
-    Scan, Semantics, Verdict, collide_with,
+    Answer, CollideOptions, CollidePlan, Detail, Evaluation, Evidence, Pair, Pose, Reason, Scan, Scratch,
+    Semantics, Verdict,
 };
 
 use crate::hostile::graph::{GraphAnswers, exercise_graph};
@@ -38,7 +38,7 @@ fn poses(size: f64) -> [Pose; 4] {
 #[must_use]
 pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let size = other.bounds().half_extents().into_iter().fold(0.0, f64::max);
-    let mut scratch = CollideScratch::default();
+    let mut scratch = Scratch::default();
     let mut collide = Vec::new();
     let everything =
         (4 * scan.topology().len() * 4 * other.topology().len().max(scan.topology().len())) as u64;
@@ -56,7 +56,7 @@ pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
             for (a, b) in [(scan, other), (other, scan), (scan, scan)] {
                 let Ok(plan) = CollidePlan::new(&options, a, b) else { continue };
                 let (a, b) = (a.at(&Pose::IDENTITY), b.at(&pose));
-                let answer = collide_with(&a, &b, &plan, &Budget::UNLIMITED, &mut scratch);
+                let answer = Pair::new(a, b).collide(&plan, &mut scratch);
                 // A pair of nodes is compared once by boxes, once by enclosures.
                 assert!(answer.statistics.node_pairs <= 2 * everything + 4, "{:?}", answer.statistics);
                 if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {

@@ -1,0 +1,85 @@
+//! `Semantics::Thickened`: balls about the points, decided exactly.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{NodePair, PairVisitor};
+
+use crate::ask::answer::Contact;
+use crate::leaf::nearest_points::{PointPair, nearest};
+use crate::pair::scan_pair::ScanPair;
+
+/// The search for two points within twice the radius of each other.
+#[derive(Debug)]
+pub(crate) struct Balls<'a> {
+    pub(crate) pair: ScanPair<'a>,
+    /// 2R + margin in the world, and a little more in a's stored frame.
+    reach: f64,
+    pub(crate) reach_stored: f32,
+    /// The nearest such pair of every pair of leaves, if all are wanted.
+    pub(crate) all: Option<&'a mut Vec<Contact>>,
+    /// The first such pair, and its points.
+    pub(crate) found: Option<(Contact, [usize; 2])>,
+    /// A lower bound of the distance of all points looked at or excluded, in the world.
+    pub(crate) apart: f64,
+}
+
+impl<'a> Balls<'a> {
+    pub(crate) fn new(pair: ScanPair<'a>, reach: f64, all: Option<&'a mut Vec<Contact>>) -> Self {
+        let reach_stored = pair.stored(reach);
+        Self { pair, reach, reach_stored, all, found: None, apart: f64::INFINITY }
+    }
+
+    /// The nearest points of two leaves, which may be near enough.
+    pub(crate) fn compare(&mut self, leaves: NodePair) -> ControlFlow<()> {
+        let best = PointPair { distance: self.apart, points: [0; 2] };
+        let PointPair { distance, points } = nearest(self.pair.level, &self.pair, leaves, best);
+        if distance > self.reach {
+            self.apart = distance;
+            return ControlFlow::Continue(());
+        }
+        let contact = contact(&self.pair, points);
+        self.found.get_or_insert((contact, points));
+        let Some(all) = &mut self.all else { return ControlFlow::Break(()) };
+        all.push(contact);
+        ControlFlow::Continue(())
+    }
+}
+
+impl PairVisitor for Balls<'_> {
+    const NOTES_GAPS: bool = true;
+
+    #[inline]
+    fn least_apart(&mut self, least: f32) {
+        let bound = f64::from(least - self.pair.relative.slack()) * self.pair.views[0].placed().scale();
+        self.apart = self.apart.min(bound);
+    }
+
+    #[inline]
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.pair.meter.spent.node_pairs += u64::from(pairs);
+        self.pair.meter.go_on()
+    }
+
+    fn leaf_pair(&mut self, [a, b]: [usize; 2]) -> ControlFlow<()> {
+        let (of_a, of_b) = (self.pair.a.leaves, self.pair.b.leaves);
+        self.pair.meter.leaf_pair(of_a.points(a).len(), of_b.points(b).len());
+        self.compare(self.pair.leaves([a, b]))
+    }
+}
+
+/// Between two points.
+fn contact(pair: &ScanPair<'_>, [i, j]: [usize; 2]) -> Contact {
+    let [p, q] = [pair.views[0].point(i), pair.views[1].point(j)].map(Vector3::from);
+    Contact {
+        point: (0.5 * (p + q)).into(),
+        normals: None,
+        residual: 0.5 * (p - q).norm(),
+        sources: [pair.views[0].scan().id(i), pair.views[1].scan().id(j)],
+    }
+}
+
+/// Where two points are, if they are within `reach` of each other in the world.
+pub(crate) fn balls_meet(pair: &ScanPair<'_>, reach: f64, points: [usize; 2]) -> Option<Contact> {
+    (PointPair::new(pair, points).distance <= reach).then(|| contact(pair, points))
+}

@@ -1,0 +1,597 @@
+//! Lower bounds of how far oriented boxes in relative motion are apart, sixteen pairs at a time.
+//!
+//! Along the face normals alone boxes may come out two thirds nearer than they are: enough to tell whether
+//! they touch, too little to tell how far off they are. So a box's centre is projected onto the other box and
+//! back (Cheney & Goldstein, "Proximity maps for convex sets", Proc. AMS 10, 1959), and both are measured
+//! along the line between the two feet. Any line gives a lower bound; that between the nearest places gives
+//! the distance.
+//!
+//! Single precision cannot tell the near parts of scans from their far ones where these are a million times
+//! as far from each other as they are large. So the vector o between the centres of the two scans stays in
+//! double precision, and what is computed here is by how much a pair of boxes is nearer or further than |o|:
+//! along a unit vector u, u·o = |o| (1 − |u − o/|o||² / 2), of which the second part is small where |o| is
+//! great. Rounding is then a share of the scans' sizes, not of their distance.
+
+use std::ops::{Add, Mul};
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
+use nearmiss_geometry::{NodeId, Pose};
+use nearmiss_hierarchy::{NodeBounds, NodePair, Part, SLACK, Slices, whole};
+use nearmiss_lanes::wide::{bits, product, repeated, spread};
+
+use crate::pair::placed::Placed;
+
+/// Projections back and forth: after one of them the descent visits 0.5 % more pairs than with exact
+/// distances.
+const ROUNDS: u32 = 1;
+
+/// So many pairs of nodes are compared at once.
+pub(crate) const LANES: usize = 16;
+
+/// So many children of either node make these pairs.
+const FAN: usize = 4;
+
+/// The pairs of nodes that take the place of a pair, up to sixteen, each in a lane of its own: four children
+/// of either node, or one node and the grandchildren of the other.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pairs {
+    of_a: [NodeId; LANES],
+    of_b: [NodeId; LANES],
+    /// A lane's node of a is that with the lane's number shifted by this.
+    shift: u32,
+    /// A lane's node of b is that with these bits of the lane's number.
+    mask: usize,
+    /// The lanes that hold a pair, as bits.
+    pub(crate) lanes: u32,
+}
+
+impl Pairs {
+    /// The pair in this lane.
+    #[inline]
+    pub(crate) fn pair(&self, lane: usize) -> NodePair {
+        NodePair { a: self.of_a[(lane % LANES) >> self.shift], b: self.of_b[lane & self.mask] }
+    }
+}
+
+/// The lanes of [`Pairs`] that the first `i + 1` children of a and the first `j + 1` of b take, as bits, at
+/// `[i][j]`.
+const FAN_LANES: [[u32; FAN]; FAN] = {
+    let mut lanes = [[0; FAN]; FAN];
+    let mut i = 0;
+    while i < FAN * FAN {
+        let mut row = 0;
+        while row <= i / FAN {
+            let all_b = (1 << (i % FAN + 1)) - 1;
+            lanes[i / FAN][i % FAN] |= all_b << (FAN * row);
+            row += 1;
+        }
+        i += 1;
+    }
+    lanes
+};
+
+/// How far the nodes of [`Pairs`] are apart: by how much further, at least, than the centres of the scans, in
+/// a's stored frame; [`Motion::least`] where they may overlap, or are no numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gaps {
+    pub(crate) boxes: [f32; LANES],
+    pub(crate) enclosures: [f32; LANES],
+    /// The lanes of pairs that are nearer than either limit, as bits.
+    pub(crate) near: u32,
+}
+
+/// How near nodes are to be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    pub(crate) boxes: f32,
+    pub(crate) enclosures: f32,
+}
+
+/// Some ten roundings of double precision.
+const DOUBLE_ROUNDING: f64 = 2e-15;
+
+/// The motion of b's stored frame into a's.
+#[derive(Debug, Clone)]
+pub(crate) struct Motion {
+    level: Level,
+    rotation: [[f32; 3]; 3],
+    scale: f32,
+    /// Where a place of b lies, less o.
+    shift: [f32; 3],
+    /// From the centre of a to that of b.
+    offset: [f32; 3],
+    direction: [f32; 3],
+    distance: f64,
+    /// What rounding may add to a bound, in a's stored frame.
+    slack: f64,
+    /// Length in the world of a unit of that.
+    to_world: f64,
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
+fn single(v: Vector3<f64>) -> [f32; 3] {
+    v.map(|c| c as f32).into()
+}
+
+impl Motion {
+    /// That of two views, whose relative pose is `pose`.
+    #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
+    pub(crate) fn new(level: Level, [a, b]: [&Placed<'_>; 2], pose: &Pose) -> Self {
+        let [root_a, root_b] = [a, b].map(|view| view.scan().root_box());
+        let [ca, cb] = [root_a, root_b].map(|root| Vector3::from(root.centre.map(f64::from)));
+        let turned = pose.scale() * (pose.rotation() * cb);
+        let offset = turned + Vector3::from(pose.translation()) - ca;
+        let distance = offset.norm();
+        let extent =
+            ca.norm() + f64::from(root_a.radius()) + pose.scale() * (cb.norm() + f64::from(root_b.radius()));
+        let to_world = a.placed().scale();
+        // Places are told in the world, where both scans may be far from the origin, and rotations are such
+        // to rounding only.
+        let far: f64 = [a, b].map(|view| Vector3::from(view.placed().translation()).norm()).iter().sum();
+        let skew = [a, b].map(|view| {
+            let rotation = view.placed().rotation();
+            (rotation.tr_mul(rotation) - Matrix3::identity()).amax()
+        });
+        let of_doubles = (DOUBLE_ROUNDING + 4.0 * skew[0].max(skew[1])) * (extent + distance)
+            + DOUBLE_ROUNDING * far / to_world;
+        let row = |i: usize| single(pose.rotation().row(i).transpose());
+        Self {
+            level,
+            rotation: [row(0), row(1), row(2)],
+            scale: pose.scale() as f32,
+            shift: single(ca - turned),
+            offset: single(offset),
+            direction: single(offset / if distance > 0.0 { distance } else { 1.0 }),
+            distance,
+            slack: 2.0 * f64::from(SLACK) * extent + of_doubles,
+            to_world,
+        }
+    }
+
+    /// The instructions that bounds are computed by: none depends on it.
+    pub(crate) fn level(&self) -> Level {
+        self.level
+    }
+
+    /// What a bound in a's stored frame proves of a distance in the world.
+    pub(crate) fn proven(&self, bound: f64) -> f64 {
+        ((bound - self.slack) * self.to_world * (1.0 - 4.0 * DOUBLE_ROUNDING)).max(0.0)
+    }
+
+    /// A bound in a's stored frame such that nothing is nearer than `distance` in the world to which a
+    /// greater one belongs.
+    pub(crate) fn bound_of(&self, distance: f64) -> f64 {
+        distance / self.to_world * (1.0 + 4.0 * DOUBLE_ROUNDING) + self.slack
+    }
+
+    /// The bound, in a's stored frame, of what is so much further away than the centres of the scans are. Not
+    /// negative.
+    pub(crate) fn bound(&self, beyond: f32) -> f64 {
+        let own = self.distance + f64::from(beyond);
+        if own > 0.0 { own } else { 0.0 }
+    }
+
+    /// So much further away than the centres of the scans is what has this [`Self::bound`], or a little more.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+    pub(crate) fn beyond(&self, bound: f64) -> f32 {
+        ((bound - self.distance) as f32).next_up().next_up()
+    }
+
+    /// The gap, in a's stored frame, of what is so much further away than the centres of the scans are: what
+    /// the world sees of it is at least this less `slack`.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn gap(&self, beyond: f32, slack: f32) -> f32 {
+        ((self.distance + f64::from(beyond) - self.slack + f64::from(slack)) as f32).next_down()
+    }
+
+    /// So much further away than the centres of the scans is what has this [`Self::gap`], or a little more.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+    pub(crate) fn beyond_gap(&self, gap: f32, slack: f32) -> f32 {
+        ((f64::from(gap) + self.slack - f64::from(slack) - self.distance) as f32).next_up().next_up()
+    }
+
+    /// So much further away than the centres of the scans, or a little less, is what is no nearer than this
+    /// `bound`.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn no_nearer(&self, bound: f64) -> f32 {
+        ((bound - self.distance) as f32).next_down().next_down().max(self.least())
+    }
+
+    /// The least that nodes are [apart](Self::gaps): its bound is 0.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn least(&self) -> f32 {
+        (-self.distance as f32).next_down().next_down()
+    }
+
+    /// The pairs that take the place of a pair of nodes, and their gaps.
+    #[inline]
+    pub(crate) fn split(
+        &self,
+        ([of_a, of_b], part): ([&Slices<'_>; 2], Part),
+        pair: NodePair,
+        limits: Limits,
+    ) -> (Pairs, Gaps) {
+        let ([of_a, of_b], NodePair { a, b }) = ([&of_a.tree, &of_b.tree], pair);
+        let leaves = [of_a.topology().is_leaf(a), of_b.topology().is_leaf(b)];
+        let whole = whole([of_a, of_b], pair, leaves, self.scale);
+        let (pairs, mut gaps) = dispatch!(self.level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let (alone_a, alone_b) = ([a; LANES], [b; LANES]);
+                let (pairs, bounds_a, bounds_b) = match whole {
+                    [true, true] => (
+                        Pairs { of_a: alone_a, of_b: alone_b, shift: 0, mask: 0, lanes: 1 },
+                        alone(simd, &of_a.bounds_of(part, a)),
+                        alone(simd, &self.moved(&of_b.bounds_of(part, b))),
+                    ),
+                    [true, false] => {
+                        let below = of_b.topology().grandchildren(b);
+                        let bounds = of_b.bounds_of_grandchildren(simd, part, &below);
+                        (
+                            Pairs { of_a: alone_a, of_b: below.ids, shift: 0, mask: LANES - 1, lanes: below.lanes },
+                            alone(simd, &of_a.bounds_of(part, a)),
+                            self.moved(&bounds),
+                        )
+                    }
+                    [false, true] => {
+                        let below = of_a.topology().grandchildren(a);
+                        (
+                            Pairs { of_a: below.ids, of_b: alone_b, shift: 0, mask: 0, lanes: below.lanes },
+                            of_a.bounds_of_grandchildren(simd, part, &below),
+                            alone(simd, &self.moved(&of_b.bounds_of(part, b))),
+                        )
+                    }
+                    [false, false] => {
+                        let (below_a, below_b) = (of_a.topology().children(a), of_b.topology().children(b));
+                        let (mut ids_a, mut ids_b) = (alone_a, alone_b);
+                        ids_a[..FAN].copy_from_slice(&below_a.lanes());
+                        ids_b[..FAN].copy_from_slice(&below_b.lanes());
+                        let lanes = FAN_LANES[below_a.len() - 1][below_b.len() - 1];
+                        let a = of_a.bounds_of_children(simd, part, a);
+                        let b = of_b.bounds_of_children(simd, part, b);
+                        (
+                            Pairs { of_a: ids_a, of_b: ids_b, shift: 2, mask: FAN - 1, lanes },
+                            each_spread(&a),
+                            all_repeated(&self.moved(&b)),
+                        )
+                    }
+                };
+                (pairs, self.gaps(simd, &bounds_a, &bounds_b, limits))
+            },
+        ));
+        gaps.near &= pairs.lanes;
+        (pairs, gaps)
+    }
+
+    /// Bounds of b in a's stored frame, their centres less o.
+    #[inline(always)]
+    fn moved<V: Copy + Add<Output = V> + Mul<f32, Output = V> + Add<f32, Output = V>>(
+        &self,
+        bounds: &NodeBounds<V>,
+    ) -> NodeBounds<V> {
+        let [x, y, z] = self.scaled(self.turned(&bounds.centre));
+        NodeBounds {
+            centre: [x + self.shift[0], y + self.shift[1], z + self.shift[2]],
+            half: self.scaled(bounds.half),
+            axes: [self.turned(&bounds.axes[0]), self.turned(&bounds.axes[1]), self.turned(&bounds.axes[2])],
+            low: self.scaled(bounds.low),
+            high: self.scaled(bounds.high),
+        }
+    }
+
+    #[inline(always)]
+    fn scaled<V: Mul<f32, Output = V>>(&self, [x, y, z]: [V; 3]) -> [V; 3] {
+        [x * self.scale, y * self.scale, z * self.scale]
+    }
+
+    #[inline(always)]
+    fn turned<V: Copy + Add<Output = V> + Mul<f32, Output = V>>(&self, v: &[V; 3]) -> [V; 3] {
+        let [x, y, z] = self.rotation;
+        [
+            v[0] * x[0] + v[1] * x[1] + v[2] * x[2],
+            v[0] * y[0] + v[1] * y[1] + v[2] * y[2],
+            v[0] * z[0] + v[1] * z[1] + v[2] * z[2],
+        ]
+    }
+
+    /// The gaps of nodes of a and of [moved](Self::moved) nodes of b, lane by lane.
+    #[inline(always)]
+    fn gaps<S: Simd>(
+        &self,
+        simd: S,
+        a: &NodeBounds<f32x16<S>>,
+        b: &NodeBounds<f32x16<S>>,
+        limits: Limits,
+    ) -> Gaps {
+        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let (mut between, mut off) = ([zero; 3], [zero; 3]);
+        for k in 0..3 {
+            between[k] = b.centre[k] - a.centre[k];
+            off[k] = between[k] + self.offset[k];
+        }
+        // All that feet need in terms of the axes: their cosines, and how far apart the centres are along
+        // them.
+        let mut cosines = [[zero; 3]; 3];
+        let (mut along_a, mut along_b) = ([zero; 3], [zero; 3]);
+        for i in 0..3 {
+            along_a[i] = product(a.axes[i], off);
+            along_b[i] = product(b.axes[i], off);
+            for j in 0..3 {
+                cosines[i][j] = product(a.axes[i], b.axes[j]);
+            }
+        }
+        // From the centre of b on.
+        let mut seen = along_a;
+        let mut foot_a = within(&seen, &a.half);
+        for _ in 0..ROUNDS {
+            let mut place = along_b;
+            for j in 0..3 {
+                place[j] = cosines[0][j] * foot_a[0] + cosines[1][j] * foot_a[1] + cosines[2][j] * foot_a[2]
+                    - place[j];
+            }
+            let foot_b = within(&place, &b.half);
+            for i in 0..3 {
+                seen[i] = along_a[i] + product(cosines[i], foot_b);
+            }
+            foot_a = within(&seen, &a.half);
+        }
+        let mut line = [zero; 3];
+        for i in 0..3 {
+            let apart = seen[i] - foot_a[i];
+            for k in 0..3 {
+                line[k] += a.axes[i][k] * apart;
+            }
+        }
+        let per_length = one / product(line, line).sqrt();
+        for k in 0..3 {
+            line[k] *= per_length;
+        }
+        let turn = [line[0] - self.direction[0], line[1] - self.direction[1], line[2] - self.direction[2]];
+        #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
+        let mut boxes = product(line, between) - product(turn, turn) * (0.5 * self.distance) as f32;
+        // Any line bounds: that of the boxes is nearly that of the enclosures.
+        let mut growth = zero;
+        for k in 0..3 {
+            let (along_a, along_b) = (product(a.axes[k], line), product(b.axes[k], line));
+            boxes -= a.half[k] * along_a.abs();
+            boxes -= b.half[k] * along_b.abs();
+            // Towards each other: along the line for a, against it for b.
+            let towards_b = simd.select_f32x16(along_a.simd_gt(0.0), a.high[k], a.low[k]);
+            let towards_a = simd.select_f32x16(along_b.simd_gt(0.0), b.low[k], b.high[k]);
+            growth += towards_b * along_a.abs() + towards_a * along_b.abs();
+        }
+        let (least, enclosures) = (f32x16::splat(simd, self.least()), boxes - growth);
+        let boxes = simd.select_f32x16(boxes.simd_gt(least), boxes, least);
+        let enclosures = simd.select_f32x16(enclosures.simd_gt(least), enclosures, least);
+        let near: mask32x16<S> = boxes.simd_lt(limits.boxes) | enclosures.simd_lt(limits.enclosures);
+        Gaps { boxes: boxes.to_array(), enclosures: enclosures.to_array(), near: bits(near) }
+    }
+}
+
+/// The first of four in four lanes, then the second, and so on.
+#[inline(always)]
+fn each_spread<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
+    four.map(
+        #[inline(always)]
+        |four| spread(four),
+    )
+}
+
+/// The four one after the other, four times.
+#[inline(always)]
+fn all_repeated<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
+    four.map(
+        #[inline(always)]
+        |four| repeated(four),
+    )
+}
+
+/// The one in all lanes.
+#[inline(always)]
+fn alone<S: Simd>(simd: S, one: &NodeBounds<f32>) -> NodeBounds<f32x16<S>> {
+    one.map(
+        #[inline(always)]
+        |one| f32x16::splat(simd, one),
+    )
+}
+
+/// The place of a box nearest to `place`, both along its axes.
+#[inline(always)]
+fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [
+        place[0].min(half[0]).max(-half[0]),
+        place[1].min(half[1]).max(-half[1]),
+        place[2].min(half[2]).max(-half[2]),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use nearmiss_geometry::PointCloud;
+    use nearmiss_hierarchy::{BuildOptions, Growth, OrientedBox, PointHierarchy};
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
+    use nearmiss_testdata::instructions::levels;
+    use rand::RngExt;
+
+    use super::*;
+
+    /// The distance of two boxes: projections to and fro, ten thousand at most.
+    fn distance(a: &OrientedBox, b: &OrientedBox, pose: &Pose) -> f64 {
+        let onto = |of: &OrientedBox, p: [f64; 3]| {
+            let centre = Vector3::from(of.centre.map(f64::from));
+            let away = Vector3::from(p) - centre;
+            let mut foot = centre;
+            for k in 0..3 {
+                let (axis, half) = (Vector3::from(of.axes[k].map(f64::from)), f64::from(of.half[k]));
+                foot += axis * away.dot(&axis).clamp(-half, half);
+            }
+            <[f64; 3]>::from(foot)
+        };
+        let (mut x, mut last) = (a.centre.map(f64::from), f64::INFINITY);
+        for _ in 0..10_000 {
+            let y = pose.apply(onto(b, pose.apply_inverse(x)));
+            x = onto(a, y);
+            let distance = (Vector3::from(x) - Vector3::from(y)).norm();
+            if distance > last - 1e-9 {
+                break;
+            }
+            last = distance;
+        }
+        last
+    }
+
+    /// Growth by these lengths, rounded down: the upper halves of single-precision numbers.
+    fn growth(lengths: [f32; 6]) -> Growth {
+        bytemuck::cast(lengths.map(|length| u16::try_from(length.to_bits() >> 16).unwrap()))
+    }
+
+    /// Four boxes and what they grow by, a lane each.
+    fn four<S: Simd>(simd: S, boxes: &[OrientedBox; FAN], growths: &[Growth; FAN]) -> NodeBounds<f32x4<S>> {
+        let lanes = |of: &dyn Fn(usize) -> f32| f32x4::load_array(simd, [of(0), of(1), of(2), of(3)]);
+        let length = |lane: usize, k: usize| {
+            let halves: [u16; 6] = bytemuck::cast(growths[lane]);
+            f32::from_bits(u32::from(halves[k]) << 16)
+        };
+        NodeBounds {
+            centre: [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].centre[k])),
+            half: [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].half[k])),
+            axes: [0, 1, 2].map(|i| [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].axes[i][k]))),
+            low: [0, 1, 2].map(|k| lanes(&|lane| length(lane, k))),
+            high: [0, 1, 2].map(|k| lanes(&|lane| length(lane, 3 + k))),
+        }
+    }
+
+    /// The motion by `pose` between scans about their origins that reach as far as 4.
+    fn motion(level: Level, pose: &Pose) -> Motion {
+        let offset = Vector3::from(pose.translation());
+        let row = |i: usize| single(pose.rotation().row(i).transpose());
+        Motion {
+            level,
+            rotation: [row(0), row(1), row(2)],
+            scale: single([pose.scale(); 3].into())[0],
+            shift: [0.0; 3],
+            offset: single(offset),
+            direction: single(offset / offset.norm()),
+            distance: offset.norm(),
+            slack: 2.0 * f64::from(SLACK) * (4.0 + 4.0 * pose.scale()),
+            to_world: 1.0,
+        }
+    }
+
+    #[test]
+    fn bounds_are_below_distances_and_near_them_by_any_instructions() {
+        let rng = &mut rng(81);
+        let mut far = [(0.0, 0.0); 2];
+        for round in 0..600 {
+            let away = [2.0, 4.0, 20.0, 1e7][round % 4];
+            let pose = rotation(rng).with_scale([1.0, 0.3][round % 2]).with_translation(point_in(rng, away));
+            let mut boxes = || {
+                [0; FAN].map(|_| {
+                    let turn = rotation(rng);
+                    let axis = |k: usize| single(turn.rotation().column(k).into_owned());
+                    let flat = [1.0, 0.05][rng.random_range(0..2)];
+                    let half = [rng.random_range(0.1..1.0), 0.3, 0.2 * flat];
+                    OrientedBox {
+                        centre: single(point_in(rng, 1.5).into()),
+                        half: single(half.into()),
+                        axes: [axis(0), axis(1), axis(2)],
+                        reach: 0.1,
+                    }
+                })
+            };
+            let (a, b) = (boxes(), boxes());
+            let mut growths = || [0; FAN].map(|_| growth([0; 6].map(|_| rng.random_range(0.0..0.2))));
+            let (more_a, more_b) = (growths(), growths());
+            let limits = Limits { boxes: 0.1, enclosures: -0.2 };
+            let found = levels().into_iter().map(|level| {
+                let motion = motion(level, &pose);
+                let gaps = dispatch!(level, simd => {
+                    let (a, b) = (four(simd, &a, &more_a), four(simd, &b, &more_b));
+                    motion.gaps(simd, &each_spread(&a), &all_repeated(&motion.moved(&b)), limits)
+                });
+                (gaps, motion)
+            });
+            let found: Vec<_> = found.collect();
+            let (gaps, motion) = &found[0];
+            assert!(found.iter().all(|other| other.0 == *gaps), "every level: {found:?}");
+            for lane in 0..LANES {
+                let (boxes, enclosures) = (gaps.boxes[lane], gaps.enclosures[lane]);
+                let is_near = boxes < limits.boxes || enclosures < limits.enclosures;
+                assert_eq!(gaps.near >> lane & 1 == 1, is_near, "round {round}, lane {lane}");
+                let (i, j) = (lane / FAN, lane % FAN);
+                let grown = distance(&more_a[i].of(&a[i]), &more_b[j].of(&b[j]), &pose);
+                let own = distance(&a[i], &b[j], &pose);
+                for ((gap, expected), far) in [(boxes, own), (enclosures, grown)].into_iter().zip(&mut far) {
+                    let bound = motion.bound(gap);
+                    let what = format!("{bound} for {expected}, round {round}, lane {lane}");
+                    assert!(bound <= expected + motion.slack, "{what}");
+                    if expected > 0.01 {
+                        *far = (far.0 + 1.0, far.1 + bound / expected);
+                    }
+                }
+            }
+        }
+        let [boxes, enclosures] = far.map(|(count, share)| (count, share / count));
+        assert!(boxes.0 > 5000.0 && boxes.1 > 0.97, "{boxes:?}");
+        assert!(enclosures.0 > 5000.0 && enclosures.1 > 0.9, "{enclosures:?}");
+    }
+
+    /// A scan of so many points in a slab of this size.
+    fn scan(rng: &mut impl rand::Rng, count: usize, size: f64) -> PointHierarchy {
+        let points: Vec<_> =
+            (0..count).map(|_| point_in(rng, size)).map(|[x, y, z]| [x, y, 0.1 * z]).collect();
+        PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
+            .unwrap()
+    }
+
+    #[test]
+    fn pairs_that_take_the_place_of_a_pair_hold_its_points_once_and_have_the_gaps_of_each_by_itself() {
+        let rng = &mut rng(82);
+        let mut kinds = [0; 3];
+        for (count, size) in [([900, 700], 1.0), ([1500, 40], 1.0), ([60, 1100], 0.3), ([17, 900], 4.0)] {
+            let scans = [scan(rng, count[0], 1.0), scan(rng, count[1], size)];
+            let pose = rotation(rng).with_scale(0.7).with_translation(point_in(rng, 3.0));
+            let [a, b] = [scans[0].slices(), scans[1].slices()];
+            let points = |pair: NodePair| {
+                let [a, b] = [(&a, pair.a), (&b, pair.b)].map(|(scan, node)| {
+                    let points = scan.tree.topology().points(node);
+                    (points.start, points.end)
+                });
+                (a, b)
+            };
+            let product = |((a, b), (c, d)): ((usize, usize), (usize, usize))| (b - a) * (d - c);
+            for level in levels() {
+                let motion = motion(level, &pose);
+                let infinite = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
+                let mut open = vec![NodePair::ROOTS];
+                while let Some(pair) = open.pop() {
+                    let (pairs, gaps) = motion.split(([&a, &b], Part::Obstacle), pair, infinite);
+                    assert_eq!(gaps.near, pairs.lanes);
+                    let lanes = (0..LANES).filter(|lane| pairs.lanes >> lane & 1 != 0);
+                    let below: Vec<_> = lanes.map(|lane| (lane, pairs.pair(lane))).collect();
+                    let sum: usize = below.iter().map(|below| product(points(below.1))).sum();
+                    assert_eq!(sum, product(points(pair)), "{pair:?}");
+                    for (lane, below) in below {
+                        let own = dispatch!(level, simd => {
+                            let a = alone(simd, &a.tree.bounds_of(Part::Obstacle, below.a));
+                            let b = motion.moved(&b.tree.bounds_of(Part::Obstacle, below.b));
+                            motion.gaps(simd, &a, &alone(simd, &b), infinite)
+                        });
+                        assert_eq!(own.boxes[0], gaps.boxes[lane], "{below:?}, {level:?}");
+                        assert_eq!(own.enclosures[0], gaps.enclosures[lane], "{below:?}, {level:?}");
+                        if below != pair && rng.random_bool(0.05) {
+                            open.push(below);
+                        }
+                    }
+                    kinds[match pairs.mask {
+                        0 => 0,
+                        mask => usize::from(mask == FAN - 1) + 1,
+                    }] += 1;
+                }
+            }
+        }
+        assert!(kinds.iter().all(|&count| count > 3), "{kinds:?}");
+    }
+}

@@ -1,0 +1,396 @@
+//! Do two scans meet?
+//!
+//! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
+//! children of both, or of the much larger one; the deepest overlap first, after nothing that of all that is
+//! left. Where nothing meets, and a certificate is wanted, pairs of enclosures are compared likewise.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use fearless_simd::Level;
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::{Heap, NodePair, Plunging, Stack, descend};
+
+use crate::ask::answer::{Answer, Contact, Contacts, Evidence, ManifoldPoint, Reason, Statistics, Verdict};
+use crate::ask::budget::Budget;
+use crate::ask::options::{CollideOptions, CollidePlan, Detail, Order, Semantics};
+use crate::contact::balls::{Balls, balls_meet};
+use crate::contact::certificate::{Bound, Certifier, Proof, ProofScratch};
+use crate::contact::hint::{Known, PairHint};
+use crate::contact::manifold::{self, ManifoldScratch};
+use crate::contact::search::{Closer, Plain, Surfaces, Workspace};
+use crate::pair::likelihood::likelihood;
+use crate::pair::meter::Meter;
+use crate::pair::placed::{Placed, ViewScratch};
+use crate::pair::scan_pair::{ScanPair, relative};
+
+/// What is asked about two scans.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Asked<'q> {
+    pub(crate) scans: [&'q Placed<'q>; 2],
+    pub(crate) plan: &'q CollidePlan,
+    pub(crate) budget: &'q Budget,
+}
+
+/// What is written beside an answer.
+#[derive(Debug, Default)]
+pub(crate) struct Outputs<'q> {
+    pub(crate) hint: Option<&'q mut PairHint>,
+    pub(crate) manifold: Option<&'q mut Vec<ManifoldPoint>>,
+    pub(crate) contacts: Option<&'q mut Contacts>,
+    pub(crate) proof: Option<&'q mut Proof>,
+}
+
+/// Reused between queries.
+#[derive(Debug, Clone)]
+pub(crate) struct ContactScratch {
+    /// The instructions by which lanes are worked on.
+    pub(crate) level: Level,
+    pub(crate) longest_stretch: Duration,
+    pub(crate) gathers: [ViewScratch; 2],
+    frontiers: Frontiers,
+    excluded: Vec<Bound>,
+    compared: Vec<NodePair>,
+    proven: Vec<Bound>,
+    proof: ProofScratch,
+    manifold: ManifoldScratch,
+}
+
+impl ContactScratch {
+    pub(crate) fn new(level: Level) -> Self {
+        Self {
+            level,
+            longest_stretch: Duration::ZERO,
+            gathers: Default::default(),
+            frontiers: Frontiers::default(),
+            excluded: Vec::new(),
+            compared: Vec::new(),
+            proven: Vec::new(),
+            proof: ProofScratch::default(),
+            manifold: ManifoldScratch::default(),
+        }
+    }
+}
+
+/// The pairs of nodes still to be looked at, by how a search goes on.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Frontiers {
+    /// Depth first.
+    pub(crate) stack: Stack,
+    /// The most urgent first.
+    pub(crate) heap: Heap,
+}
+
+impl Frontiers {
+    fn clear(&mut self) {
+        self.stack.clear();
+        self.heap.clear();
+    }
+
+    /// What is still there. A search goes on from a front depth first, whatever its order.
+    fn open(&self) -> impl Iterator<Item = NodePair> {
+        self.stack.iter().chain(self.heap.iter())
+    }
+}
+
+/// The answer to a question, with the outputs that are wanted beside it.
+pub(crate) fn collide(asked: Asked<'_>, scratch: &mut ContactScratch, outputs: Outputs<'_>) -> Answer {
+    let by_overlap = asked.plan.options().order.map_or(asked.budget.may_end(), |by| by != Order::DepthFirst);
+    collide_by(asked, 0, scratch, outputs, |search, frontiers| from_the_roots(search, by_overlap, frontiers))
+}
+
+/// The same where `look` compares the surfaces, from the roots on, and leaf pairs cost so many evaluations.
+pub(crate) fn collide_by<'q>(
+    asked: Asked<'q>,
+    evaluations: u64,
+    scratch: &mut ContactScratch,
+    mut outputs: Outputs<'_>,
+    look: impl FnOnce(&mut Surfaces<'_>, &mut Frontiers) -> ControlFlow<()>,
+) -> Answer {
+    if let Some(points) = &mut outputs.manifold {
+        points.clear();
+    }
+    if let Some(contacts) = &mut outputs.contacts {
+        contacts.contacts.clear();
+        contacts.complete = false;
+    }
+    if let Some(proof) = &mut outputs.proof {
+        proof.pairs.clear();
+    }
+    let Asked { scans: [a, b], plan, budget } = asked;
+    let options = plan.options();
+    let meter = Meter::new(budget, [a, b], evaluations);
+    let (pose, relative) = match relative(a, b, plan) {
+        Ok(motion) => motion,
+        Err(early) => return without_a_search(asked, early, meter.spent, outputs),
+    };
+    let by = (scratch.level, options.semantics.part());
+    let slices = [a.scan().slices(), b.scan().slices()];
+    let pair = ScanPair::new([a, b], slices.each_ref(), relative, meter, by);
+    let manifold = outputs.manifold.take();
+    let answer = decide(pair, &pose, asked, scratch, outputs, look);
+    match (answer.verdict, manifold) {
+        (Verdict::Intersecting { contact, .. }, Some(points)) => {
+            let meter = Meter::new(budget, [a, b], evaluations).after(answer.statistics);
+            let mut pair = ScanPair::new([a, b], slices.each_ref(), relative, meter, by);
+            manifold::gather(&mut pair, options, &contact, &mut scratch.manifold, points);
+            Answer { statistics: pair.meter.spent, ..answer }
+        }
+        _ => answer,
+    }
+}
+
+/// The answer for balls about the scans that are `distance` apart, or for poses that are none.
+fn without_a_search(
+    asked: Asked<'_>,
+    distance: Option<f64>,
+    spent: Statistics,
+    outputs: Outputs<'_>,
+) -> Answer {
+    let statistics = Statistics { node_pairs: 1, ..spent };
+    let Some(distance) = distance else {
+        let verdict = Verdict::Undecided(Reason::Pose);
+        return Answer { verdict, band: f64::INFINITY, distance_estimate: None, statistics };
+    };
+    if let Some(contacts) = outputs.contacts {
+        contacts.complete = true;
+    }
+    let verdict = apart(asked.plan.options(), distance, true);
+    if let Some(proof) = outputs.proof.filter(|_| asked.plan.options().certifies()) {
+        proof.pairs.push((NodePair::ROOTS, distance));
+    }
+    let reach = |view: &Placed<'_>| f64::from(view.scan().root_box().reach) * view.placed().scale();
+    let band = asked.scans.map(reach).into_iter().fold(0.0, f64::max);
+    Answer { verdict, band, distance_estimate: None, statistics }
+}
+
+/// What is known from before, and then what there is to see.
+fn decide(
+    pair: ScanPair<'_>,
+    pose: &Pose,
+    asked: Asked<'_>,
+    scratch: &mut ContactScratch,
+    outputs: Outputs<'_>,
+    look: impl FnOnce(&mut Surfaces<'_>, &mut Frontiers) -> ControlFlow<()>,
+) -> Answer {
+    let (plan, options) = (asked.plan, asked.plan.options());
+    let mut known = outputs.hint.map(|hint| hint.recall(&pair, options));
+    let early = known.as_mut().and_then(|known| {
+        if outputs.contacts.is_none()
+            && let Some(met) = known.met(&pair)
+            && let Some((contact, evidence)) = still_meet(&pair, plan, met)
+        {
+            known.still_met(*pose);
+            return Some((Verdict::Intersecting { contact, evidence }, pair.band(met)));
+        }
+        known.come_to(*pose, &pair);
+        // What was proven on the way has no list of pairs.
+        let distance = known.distance(&pair, plan.reach()).filter(|_| outputs.proof.is_none())?;
+        Some((apart(options, distance, true), pair.band_of(NodePair::ROOTS)))
+    });
+    if let Some((verdict, band)) = early {
+        if let Some(contacts) = outputs.contacts {
+            contacts.complete = true;
+        }
+        return Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent };
+    }
+    match options.semantics {
+        Semantics::Obstacle | Semantics::Surface => {
+            let beside = (known, outputs.proof, outputs.contacts);
+            surfaces((pair, pose), options, scratch, beside, look)
+        }
+        Semantics::Thickened(_) => balls(pair, plan, scratch, (known, outputs.contacts)),
+    }
+}
+
+/// What is seen of a contact at the points of another.
+fn still_meet(pair: &ScanPair<'_>, plan: &CollidePlan, [i, j]: [usize; 2]) -> Option<(Contact, Evidence)> {
+    match plan.options().semantics {
+        Semantics::Thickened(_) => {
+            balls_meet(pair, plan.reach(), [i, j]).map(|contact| (contact, Evidence::Certified))
+        }
+        Semantics::Obstacle if !pair.are_sheets([i, j]) => pair.ball_contact([i, j], plan.reach()),
+        // A witness takes a search of its own.
+        _ if plan.options().detail == Detail::Witness => None,
+        _ => pair.crosses([i, j]).then(|| (pair.shared_chord(i, j), Evidence::Estimated)),
+    }
+}
+
+/// Pairs of tangent discs, then, if they are apart and a certificate is wanted, pairs of enclosures.
+fn surfaces(
+    (pair, pose): (ScanPair<'_>, &Pose),
+    options: &CollideOptions,
+    scratch: &mut ContactScratch,
+    (mut known, proof, contacts): (Option<&mut Known>, Option<&mut Proof>, Option<&mut Contacts>),
+    look: impl FnOnce(&mut Surfaces<'_>, &mut Frontiers) -> ControlFlow<()>,
+) -> Answer {
+    let ContactScratch { frontiers, gathers, excluded, compared, proven, proof: open, .. } = scratch;
+    let reach = pair.stored(options.margin);
+    let mut certifier = Certifier::new(pair, reach, proven);
+    // Enclosures hold the boxes: what they part has no contact.
+    if let Some(known) = known.as_mut().filter(|_| proof.is_none())
+        && let Some(distance) = known.prove_again(pose, &mut certifier, (&mut *compared, &mut *open))
+    {
+        if let Some(contacts) = contacts {
+            contacts.complete = true;
+        }
+        let (verdict, statistics) = (apart(options, distance, true), certifier.pair.meter.spent);
+        scratch.longest_stretch = certifier.pair.meter.longest_stretch;
+        let band = certifier.pair.band_of(NodePair::ROOTS);
+        return Answer { verdict, band, distance_estimate: None, statistics };
+    }
+    let Certifier { pair, proven, .. } = certifier;
+    let is_slow = known.as_ref().is_some_and(|known| known.keeps_front(&pair));
+    let (all, complete) = contacts.map(Contacts::parts).unzip();
+    let mut search = Surfaces::new(pair, options, is_slow, Workspace { gathers, excluded, compared, all });
+    frontiers.clear();
+    let ended = from_before(&mut search, options, known.as_deref_mut(), frontiers, look).is_break();
+    if let Some(complete) = complete {
+        *complete = !ended;
+    }
+    let parted = !ended && search.found.is_none();
+    let Surfaces { pair, found, doubt, excluded, compared, met, .. } = search;
+    let mut certifier = Certifier::new(pair, reach, proven);
+    let mut band =
+        met.map_or_else(|| certifier.pair.band_of(NodePair::ROOTS), |met| certifier.pair.band(met));
+    let verdict = match (found, doubt) {
+        (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
+        _ if ended => {
+            let likelihood = likelihood(&certifier.pair, reach, frontiers.open());
+            Verdict::Undecided(Reason::Budget { likelihood })
+        }
+        (None, Some(reason)) => Verdict::Undecided(reason),
+        _ if !options.certifies() => apart(options, 0.0, false),
+        _ if known.as_ref().is_some_and(|known| known.is_doubtful()) => apart(options, 0.0, false),
+        _ => {
+            let proven = certifier.prove(pose, compared, open, (proof, known.is_some()));
+            if let Some((distance, near)) = proven {
+                band = near;
+                if let Some(known) = &mut known {
+                    known.proven(distance, certifier.proven, &certifier.pair);
+                }
+            }
+            apart(options, proven.map_or(0.0, |(distance, _)| distance), proven.is_some())
+        }
+    };
+    if let Some(known) = known
+        && !is_certified(&verdict)
+    {
+        if parted && is_slow {
+            let slack = certifier.pair.relative.slack();
+            known.parted((excluded, compared), slack, options.certifies(), certifier.doubtful);
+        } else {
+            known.forget(met);
+        }
+    }
+    scratch.longest_stretch = certifier.pair.meter.longest_stretch;
+    Answer { verdict, band, distance_estimate: None, statistics: certifier.pair.meter.spent }
+}
+
+/// Looks for a contact: where there was one, then from what kept the scans apart, or else `look`s.
+fn from_before(
+    search: &mut Surfaces<'_>,
+    options: &CollideOptions,
+    known: Option<&mut Known>,
+    frontiers: &mut Frontiers,
+    look: impl FnOnce(&mut Surfaces<'_>, &mut Frontiers) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let Some(known) = known else { return look(search, frontiers) };
+    // All contacts are those of a search from the roots, in its order.
+    if search.all.is_none() {
+        if let Some(points) = known.met(&search.pair) {
+            let leaves = search.pair.numbers(search.pair.leaves_of(points));
+            search.leaf_pair(leaves)?;
+            search.compared.clear();
+        }
+        if known.has_front(&search.pair, search.reach, options.certifies()) {
+            return known.look_again(search, &mut frontiers.stack);
+        }
+    }
+    known.forget(None);
+    look(search, frontiers)
+}
+
+/// Looks for a contact from the pair of the roots on.
+fn from_the_roots(
+    search: &mut Surfaces<'_>,
+    by_overlap: bool,
+    Frontiers { stack, heap }: &mut Frontiers,
+) -> ControlFlow<()> {
+    let (relative, level) = (search.pair.relative, search.pair.level);
+    let trees = search.pair.trees(&relative, search.reach);
+    match (by_overlap, search.notes) {
+        (false, false) if search.wants_any() => {
+            descend(trees, level, &mut Plunging::new(stack), &mut Plain(search))
+        }
+        (false, false) => descend(trees, level, stack, &mut Plain(search)),
+        (false, true) => descend(trees, level, stack, &mut Closer(search)),
+        (true, false) => descend(trees, level, heap, &mut Plain(search)),
+        (true, true) => descend(trees, level, heap, &mut Closer(search)),
+    }
+}
+
+/// Pairs of points.
+fn balls(
+    pair: ScanPair<'_>,
+    plan: &CollidePlan,
+    scratch: &mut ContactScratch,
+    (mut known, contacts): (Option<&mut Known>, Option<&mut Contacts>),
+) -> Answer {
+    let (all, complete) = contacts.map(Contacts::parts).unzip();
+    let mut search = Balls::new(pair, plan.reach(), all);
+    let Frontiers { stack, .. } = &mut scratch.frontiers;
+    stack.clear();
+    let again = known.as_ref().and_then(|known| known.met(&search.pair)).filter(|_| search.all.is_none());
+    let mut ended = again.is_some_and(|points| search.compare(search.pair.leaves_of(points)).is_break());
+    if !ended {
+        search.apart = f64::INFINITY;
+        let (relative, level) = (search.pair.relative, search.pair.level);
+        let trees = search.pair.trees(&relative, search.reach_stored);
+        let flow = if search.all.is_none() {
+            descend(trees, level, &mut Plunging::new(stack), &mut search)
+        } else {
+            descend(trees, level, stack, &mut search)
+        };
+        ended = flow.is_break();
+    }
+    if let Some(complete) = complete {
+        *complete = !ended;
+    }
+    let verdict = match search.found {
+        Some((contact, _)) => Verdict::Intersecting { contact, evidence: Evidence::Certified },
+        None if ended => {
+            let likelihood = likelihood(&search.pair, search.reach_stored, stack.iter());
+            Verdict::Undecided(Reason::Budget { likelihood })
+        }
+        None => apart(plan.options(), search.apart, true),
+    };
+    if let Some(known) = &mut known {
+        known.forget(search.found.map(|(_, points)| points));
+        if verdict.is_separated() {
+            known.clear_to(search.apart, &search.pair);
+        }
+    }
+    scratch.longest_stretch = search.pair.meter.longest_stretch;
+    let band = search
+        .found
+        .map_or_else(|| search.pair.band_of(NodePair::ROOTS), |(_, points)| search.pair.band(points));
+    Answer { verdict, band, distance_estimate: None, statistics: search.pair.meter.spent }
+}
+
+/// Apart, by at least `distance` between surfaces or points if that is `proven`.
+fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
+    match options.semantics {
+        Semantics::Thickened(radius) => {
+            Verdict::Separated { gap: (distance - 2.0 * radius).max(0.0), evidence: Evidence::Certified }
+        }
+        _ if proven && options.certifies() => {
+            Verdict::Separated { gap: distance.max(0.0), evidence: Evidence::Certified }
+        }
+        _ => Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated },
+    }
+}
+
+fn is_certified(verdict: &Verdict) -> bool {
+    matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
+}

@@ -1,0 +1,8 @@
+//! The points of two leaves against each other.
+
+pub(crate) mod ball_pair;
+pub(crate) mod crossing;
+pub(crate) mod disc_pair;
+pub(crate) mod nearest_points;
+pub(crate) mod point_gap;
+pub(crate) mod surfel_pair;

@@ -1,0 +1,189 @@
+//! The balls that stand in an obstacle for points that sample no sheet, against balls and against discs.
+//!
+//! Where a leaf of balls is near another leaf, each of its points that reaches the other's box is held
+//! against sixteen points there at a time. Whether a ball meets a ball is a matter of arithmetic; whether it
+//! meets a sheet is one too where it holds a point of that sheet, and to first order where it meets a disc.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{LeafBlock, Part, Slices};
+use nearmiss_lanes::wide::{bits, load};
+
+use crate::ask::answer::{Contact, Evidence};
+use crate::leaf::surfel_pair::near_box;
+use crate::pair::scan_pair::ScanPair;
+
+const WIDTH: usize = LeafBlock::WIDTH;
+
+/// What of a place may meet it: up to sixteen points of a leaf, in their scan's stored frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Targets<'a> {
+    block: &'a LeafBlock,
+    positions: [[f32; WIDTH]; 3],
+    /// The radii of balls; zero for discs.
+    balls: [f32; WIDTH],
+    /// The lanes of discs, as bits.
+    discs: u32,
+    /// All lanes that count.
+    lanes: u32,
+}
+
+impl<'a> Targets<'a> {
+    pub(crate) fn new(scan: &Slices<'_>, (block, first, count): (&'a LeafBlock, usize, usize)) -> Self {
+        let (mut positions, mut balls, mut discs) = ([[0.0; WIDTH]; 3], [0.0; WIDTH], 0);
+        for lane in 0..count {
+            let p = scan.position(first + lane);
+            for k in 0..3 {
+                positions[k][lane] = p[k];
+            }
+            balls[lane] = scan.obstacle_ball(first + lane);
+            discs |= u32::from(scan.is_on_sheet(first + lane)) << lane;
+        }
+        Self { block, positions, balls, discs, lanes: (1 << count) - 1 }
+    }
+
+    /// The discs alone.
+    pub(crate) fn discs(self) -> Self {
+        Self { lanes: self.discs, ..self }
+    }
+
+    /// The lanes of points no further from `x` than `radius`, beside their own discs and balls, as bits.
+    pub(crate) fn within(&self, level: Level, x: [f32; 3], radius: f32) -> u32 {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.within_by(simd, x, radius),
+        ))
+    }
+
+    #[inline(always)]
+    fn within_by<S: Simd>(&self, simd: S, x: [f32; 3], radius: f32) -> u32 {
+        let [px, py, pz] = &self.positions;
+        let d = [
+            f32x16::load_array_ref(simd, px) - x[0],
+            f32x16::load_array_ref(simd, py) - x[1],
+            f32x16::load_array_ref(simd, pz) - x[2],
+        ];
+        let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        let reach = f32x16::load_array_ref(simd, &self.balls) + radius;
+        let of_balls: mask32x16<S> = d_sq.simd_le(reach * reach);
+        let mut near = of_balls.to_bitmask() & !u64::from(self.discs);
+        if self.discs != 0 {
+            let zero = f32x16::splat(simd, 0.0);
+            let [nx, ny, nz] = self.block.normals(simd);
+            let height = d[0] * nx + d[1] * ny + d[2] * nz;
+            let beside = (d_sq - height * height).max(zero).sqrt() - self.block.discs(simd);
+            let beside = beside.max(zero);
+            let of_discs: mask32x16<S> = (height * height + beside * beside).simd_le(radius * radius);
+            near |= of_discs.to_bitmask() & u64::from(self.discs);
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
+        let bits = near as u32;
+        bits & self.lanes
+    }
+}
+
+/// The points of a block, and the radii of their balls: 0 of those on sheets.
+#[inline(always)]
+fn balls<S: Simd>(simd: S, scan: &Slices<'_>, block: usize) -> ([f32x16<S>; 3], f32x16<S>) {
+    let balls = f32x16::load_array_ref(simd, &scan.obstacle_balls(block));
+    (load(simd, &scan.blocks[block].position), balls)
+}
+
+impl ScanPair<'_> {
+    /// Returns `true` if both points stand in their obstacles by sheets.
+    #[inline]
+    pub(crate) fn are_sheets(&self, [i, j]: [usize; 2]) -> bool {
+        self.a.is_on_sheet(i) && self.b.is_on_sheet(j)
+    }
+
+    /// Returns `true` if it is asked about obstacles, and either point stands there as a ball.
+    #[inline]
+    pub(crate) fn is_of_balls(&self, points: [usize; 2]) -> bool {
+        self.part == Part::Obstacle && !self.are_sheets(points)
+    }
+
+    /// The radii, in the world, of the balls of points `i` and `j`; zero where they are on sheets.
+    pub(crate) fn balls(&self, [i, j]: [usize; 2]) -> [f64; 2] {
+        let [sa, sb] = self.views.map(|view| view.placed().scale());
+        [f64::from(self.a.obstacle_ball(i)) * sa, f64::from(self.b.obstacle_ball(j)) * sb]
+    }
+
+    /// The lanes of a block of a whose balls come within `reach`, in a's frame, of the box of a leaf of b, as
+    /// bits.
+    #[inline]
+    pub(crate) fn balls_of_a(&self, level: Level, block: usize, leaf: &LeafBlock, reach: f32) -> u32 {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let (centres, balls) = balls(simd, self.a, block);
+                let centres = self.relative.points_back(&centres);
+                let zero = f32x16::splat(simd, 0.0);
+                let radii = (balls + reach) * self.relative.scale_back();
+                near_box(simd, leaf, &centres, radii) & bits(balls.simd_gt(zero))
+            },
+        ))
+    }
+
+    /// The same of a block of b and a leaf of a; `reach` in a's frame.
+    #[inline]
+    pub(crate) fn balls_of_b(&self, level: Level, block: usize, leaf: &LeafBlock, reach: f32) -> u32 {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                let (centres, balls) = balls(simd, self.b, block);
+                let centres = self.relative.points(&centres);
+                let zero = f32x16::splat(simd, 0.0);
+                let radii = balls * self.relative.scale() + reach;
+                near_box(simd, leaf, &centres, radii) & bits(balls.simd_gt(zero))
+            },
+        ))
+    }
+
+    /// The contact of a ball, of point `i` or `j` or both, with what the other stands for, if these are no
+    /// further apart than `margin` in the world.
+    ///
+    /// Certified where a ball meets a ball or holds a measured point, estimated where it meets a tangent
+    /// disc.
+    pub(crate) fn ball_contact(&self, [i, j]: [usize; 2], margin: f64) -> Option<(Contact, Evidence)> {
+        let [p, q] = [self.views[0].point(i), self.views[1].point(j)].map(Vector3::from);
+        let [ra, rb] = self.balls([i, j]);
+        let (distance, most) = ((p - q).norm(), ra + rb + margin);
+        let sources = [self.views[0].scan().id(i), self.views[1].scan().id(j)];
+        let contact = |point: Vector3<f64>, apart: f64| Contact {
+            point: point.into(),
+            normals: None,
+            residual: 0.5 * apart,
+            sources,
+        };
+        if distance <= most {
+            let share = if most > 0.0 { (ra + 0.5 * margin) / most } else { 0.5 };
+            return Some((contact(p + (q - p) * share, distance), Evidence::Certified));
+        }
+        let (centre, side, k) = if ra > 0.0 && rb == 0.0 {
+            (p, 1, j)
+        } else if rb > 0.0 && ra == 0.0 {
+            (q, 0, i)
+        } else {
+            return None;
+        };
+        let foot = self.nearest_of_disc(side, k, centre);
+        let distance = (foot - centre).norm();
+        (distance <= most).then(|| {
+            let way = if distance > 0.0 { (ra + rb + 0.5 * margin).min(distance) / distance } else { 0.0 };
+            (contact(centre + (foot - centre) * way, distance), Evidence::Estimated)
+        })
+    }
+
+    /// The place of the tangent disc of point `k` of a scan that is the nearest to `x`, in the world.
+    fn nearest_of_disc(&self, side: usize, k: usize, x: Vector3<f64>) -> Vector3<f64> {
+        let (view, scan) = (self.views[side], [self.a, self.b][side]);
+        let centre = Vector3::from(view.point(k));
+        let normal = Vector3::from(view.placed().rotate(scan.normals[k].map(f64::from)));
+        let radius = f64::from(scan.discs[k]) * view.placed().scale();
+        let away = x - centre;
+        let across = away - normal * normal.dot(&away);
+        let length = across.norm();
+        centre + if length > radius { across * (radius / length) } else { across }
+    }
+}

@@ -1,0 +1,108 @@
+//! A point of either scan: their tangent discs, whether these cross so that it says something, and where.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{Part, PointKind};
+
+use crate::ask::answer::{Contact, Reason};
+use crate::leaf::crossing::Disc;
+use crate::leaf::surfel_pair::{Discs, LeafPair};
+use crate::pair::scan_pair::ScanPair;
+
+/// As near each other as discs are wide, in the lesser local radius, points say enough by themselves, however
+/// their discs lie.
+const NEAR: f32 = 0.65;
+
+/// Where surfaces cross, samples of either are within some 0.6 local radii of the place, and nearer than this
+/// to each other, in the greater radius. Discs reach up to 1.3; those that stand upright, as noise on thin
+/// plates makes them, would bridge a gap of that width.
+pub(crate) const FAR: f32 = 0.9;
+
+impl ScanPair<'_> {
+    pub(crate) fn disc_a(&self, i: usize) -> Disc {
+        Disc { centre: self.a.position(i), normal: self.a.normals[i], radius: self.a.discs[i] }
+    }
+
+    pub(crate) fn disc_b(&self, j: usize) -> Disc {
+        Disc {
+            centre: self.relative.point(self.b.position(j)),
+            normal: self.relative.direction(self.b.normals[j]),
+            radius: self.b.discs[j] * self.relative.scale(),
+        }
+    }
+
+    /// Why a crossing of the discs of points `i` and `j` says little, if it does.
+    /// Discs of sheets, of which alone an obstacle has some, are beyond doubt.
+    pub(crate) fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
+        if self.part == Part::Obstacle {
+            return None;
+        }
+        match self.views[0].scan().kind(i).max(self.views[1].scan().kind(j)) {
+            PointKind::Sheet | PointKind::Edge => None,
+            kind if kind.is_sparse() => Some(Reason::Undersampled),
+            _ => {
+                let (distance, [ra, rb]) = self.points(i, j);
+                (distance > NEAR * ra.min(rb)).then_some(Reason::Ambiguous)
+            }
+        }
+    }
+
+    /// The distance of two points, and their local radii, in a's stored frame.
+    pub(crate) fn points(&self, i: usize, j: usize) -> (f32, [f32; 2]) {
+        let q = self.relative.point(self.b.position(j));
+        let distance = (Vector3::from(self.a.position(i)) - Vector3::from(q)).norm();
+        (distance, [self.a.radii[i], self.b.radii[j] * self.relative.scale()])
+    }
+
+    /// The middle of what the chords of two crossing discs share, in the world.
+    pub(crate) fn shared_chord(&self, i: usize, j: usize) -> Contact {
+        let [va, vb] = self.views;
+        let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
+        let na = Vector3::from(va.placed().rotate(self.a.normals[i].map(f64::from)));
+        let nb = Vector3::from(vb.placed().rotate(self.b.normals[j].map(f64::from)));
+        let middle = 0.5 * (pa + pb);
+        let (fa, fb) = (na.dot(&(pa - middle)), nb.dot(&(pb - middle)));
+        let c = na.dot(&nb);
+        let gram = 1.0 - c * c;
+        let step = if gram < 1e-3 {
+            0.5 * (fa * na + fb * nb)
+        } else {
+            ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
+        };
+        let radii = [
+            f64::from(self.a.discs[i]) * va.placed().scale(),
+            f64::from(self.b.discs[j]) * vb.placed().scale(),
+        ];
+        let place = middle + step;
+        // Along the common line each chord is an interval; for parallel planes the place is as good as any.
+        let along = na.cross(&nb).try_normalize(0.03).map_or_else(Vector3::zeros, |line| {
+            let chord = |p: Vector3<f64>, radius: f64| {
+                let t = line.dot(&(p - place));
+                let half = (radius * radius - (p - place - t * line).norm_squared()).max(0.0).sqrt();
+                (t - half, t + half)
+            };
+            let ((a0, a1), (b0, b1)) = (chord(pa, radii[0]), chord(pb, radii[1]));
+            line * (0.5 * (a0.max(b0) + a1.min(b1)))
+        });
+        Contact {
+            point: (place + along).into(),
+            normals: Some([na.into(), nb.into()]),
+            residual: nb.dot(&(pa - pb)).abs().max(na.dot(&(pa - pb)).abs()),
+            sources: [va.scan().id(i), vb.scan().id(j)],
+        }
+    }
+
+    /// Whether the discs of points `i` and `j` cross, as when leaves are compared, so that it says something.
+    /// Of a sparse leaf it takes more to say.
+    pub(crate) fn crosses(&self, [i, j]: [usize; 2]) -> bool {
+        let (a, b) = (&self.a.leaves, &self.b.leaves);
+        let is_sparse = || a.is_sparse(a.leaf_of(i)) || b.is_sparse(b.leaf_of(j));
+        if self.part == Part::Surface && is_sparse() {
+            return false;
+        }
+        let ((discs_a, lane_a), (discs_b, lane_b)) = (Discs::about(a, i), Discs::about(b, j));
+        let (relative, reach) = (&self.relative, self.relative.slack());
+        let test = LeafPair { a: discs_a, b: discs_b, balls: None, reach, relative };
+        let (distance, [ra, rb]) = self.points(i, j);
+        test.cross_alone(lane_a, lane_b) && distance <= FAR * ra.max(rb) && self.doubt_about(i, j).is_none()
+    }
+}

@@ -1,0 +1,135 @@
+//! The two nearest points of two leaves: sixteen of b side by side, in single precision, for each of a that
+//! may be near; those that come out nearest are measured in double precision, in the world, as brute force
+//! would.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::{NodePair, Part};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::wide::{bits, blocks_of, lanes_of};
+
+use crate::pair::scan_pair::ScanPair;
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// Two points, and how far apart they are in the world: of obstacles less the balls that stand for them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PointPair {
+    pub(crate) distance: f64,
+    /// Stored points of a and b.
+    pub(crate) points: [usize; 2],
+}
+
+impl PointPair {
+    pub(crate) fn new(pair: &ScanPair<'_>, points: [usize; 2]) -> Self {
+        let [p, q] = [0, 1].map(|k| Vector3::from(pair.views[k].point(points[k])));
+        let balls = if pair.is_of_balls(points) { pair.balls(points).iter().sum() } else { 0.0 };
+        Self { distance: (p - q).norm() - balls, points }
+    }
+}
+
+/// Returns `true` if balls stand for some points of either leaf.
+#[inline(always)]
+fn has_balls(pair: &ScanPair<'_>, [a, b]: [usize; 2]) -> bool {
+    pair.part == Part::Obstacle && (pair.a.leaves.has_balls(a) || pair.b.leaves.has_balls(b))
+}
+
+/// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that
+/// is found.
+pub(crate) fn nearest(level: Level, pair: &ScanPair<'_>, leaves: NodePair, best: PointPair) -> PointPair {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || nearest_by(simd, pair, leaves, best),
+    ))
+}
+
+#[inline(always)]
+fn nearest_by<S: Simd>(simd: S, pair: &ScanPair<'_>, leaves: NodePair, mut best: PointPair) -> PointPair {
+    let [leaf_a, leaf_b] = pair.numbers(leaves);
+    let (points_a, points_b) = (pair.a.leaves.points(leaf_a), pair.b.leaves.points(leaf_b));
+    let bounds = &pair.b.tree.bounds(leaves.b);
+    let zero = f32x16::simd_from(simd, 0.0);
+    let mut reach = reach_of(pair, best.distance);
+    let has_balls = has_balls(pair, [leaf_a, leaf_b]);
+    for block_a in blocks_of(&points_a) {
+        let [x, y, z] = &pair.a.blocks[block_a].position;
+        let own = [
+            f32x16::load_array_ref(simd, x),
+            f32x16::load_array_ref(simd, y),
+            f32x16::load_array_ref(simd, z),
+        ];
+        let centres = pair.relative.points_back(&own);
+        let places = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
+        // How far each is from the box of b.
+        let d = [centres[0] - bounds.centre[0], centres[1] - bounds.centre[1], centres[2] - bounds.centre[2]];
+        let mut off_sq = zero;
+        for k in 0..3 {
+            let [x, y, z] = bounds.axes[k];
+            let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(zero);
+            off_sq += beyond * beyond;
+        }
+        let balls_a = if has_balls { pair.a.obstacle_balls(block_a) } else { [0.0; WIDTH] };
+        let balls_a = f32x16::load_array_ref(simd, &balls_a) * pair.relative.scale_back();
+        let mut left = lanes_of(block_a, &points_a);
+        loop {
+            let most = balls_a + reach;
+            let near: mask32x16<S> = off_sq.simd_le(most * most);
+            left &= bits(near);
+            if left == 0 {
+                break;
+            }
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            for block_b in blocks_of(&points_b) {
+                let [x, y, z] = &pair.b.blocks[block_b].position;
+                let d = [
+                    f32x16::load_array_ref(simd, x) - places[0][lane],
+                    f32x16::load_array_ref(simd, y) - places[1][lane],
+                    f32x16::load_array_ref(simd, z) - places[2][lane],
+                ];
+                let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+                let balls_b = if has_balls { pair.b.obstacle_balls(block_b) } else { [0.0; WIDTH] };
+                let both = f32x16::load_array_ref(simd, &balls_b) + balls_a.to_array()[lane];
+                let mut left_b = lanes_of(block_b, &points_b);
+                loop {
+                    let most = both + reach;
+                    let near: mask32x16<S> = d_sq.simd_le(most * most);
+                    left_b &= bits(near);
+                    if left_b == 0 {
+                        break;
+                    }
+                    let other = least(&d_sq.to_array(), left_b);
+                    left_b &= !(1 << other);
+                    let points = [block_a * WIDTH + lane, block_b * WIDTH + other];
+                    let own = PointPair::new(pair, points);
+                    if own.distance < best.distance {
+                        best = own;
+                        reach = reach_of(pair, best.distance);
+                    }
+                }
+            }
+        }
+    }
+    best
+}
+
+/// How far apart, in b's stored frame, points may come out that are no further apart than `distance`, beside
+/// their balls.
+#[inline(always)]
+fn reach_of(pair: &ScanPair<'_>, distance: f64) -> f32 {
+    let stored = pair.stored(distance.max(0.0)) + 3.0 * pair.relative.slack();
+    stored * pair.relative.scale_back() * (1.0 + 2e-6)
+}
+
+/// The lane of the least of those in `lanes`, of which there are some; the first of equals.
+#[inline(always)]
+fn least(values: &[f32; WIDTH], lanes: u32) -> usize {
+    let mut least = lanes.trailing_zeros() as usize;
+    for (lane, value) in values.iter().enumerate() {
+        if lanes >> lane & 1 != 0 && *value < values[least] {
+            least = lane;
+        }
+    }
+    least
+}

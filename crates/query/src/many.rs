@@ -1,0 +1,4 @@
+//! Many questions and many scans.
+
+pub(crate) mod batch;
+pub(crate) mod world;

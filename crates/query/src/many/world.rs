@@ -1,0 +1,344 @@
+//! Many scans in one world, and which of them may meet.
+//!
+//! An R*-tree (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree: an efficient and robust access method for
+//! points and rectangles", SIGMOD 1990; the crate `rstar`) over boxes of the world leaves out the pairs that
+//! are further apart than a question reaches.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_geometry::{Aabb, NodeId, Pose};
+use nearmiss_hierarchy::{Part, SLACK};
+use rstar::{AABB, ParentNode, RTree, RTreeNode, RTreeObject};
+use serde::{Deserialize, Serialize};
+
+use crate::pair::placed::Placed;
+use crate::pair::prepared::Prepared;
+use crate::question::Pair;
+use crate::shape::Shape;
+
+/// A placed scan of a [`World`]. Never used again, whatever is removed; later ones are greater.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct BodyId(pub u64);
+
+/// Which bodies to ask about.
+#[derive(Debug, Clone, Copy)]
+pub enum Bodies<'a> {
+    /// All: every pair.
+    All,
+    /// These, which may have moved since the last time: pairs with one of them, each once.
+    These(&'a [BodyId]),
+}
+
+/// Placed scans, each a *body* with an id.
+///
+/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its graph and kernel
+/// come along. One scan may be placed many times.
+///
+/// ```
+/// use nearmiss_geometry::{PointCloud, Pose};
+/// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+/// use nearmiss_query::{Bodies, CollideOptions, CollidePlan, Scratch, World};
+///
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let square = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let plan = CollidePlan::new(&CollideOptions::default(), &square, &square)?;
+///
+/// let mut world = World::new();
+/// let floor = world.insert(&square, &Pose::IDENTITY);
+/// let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], 1.5);
+/// let door = world.insert(&square, &upright.with_translation([0.3, 0.5, -0.4]));
+/// let hinge = world.insert(&square, &upright.with_translation([0.4, 0.4, -0.4]));
+///
+/// // The door and its hinge belong together.
+/// let mut pairs = Vec::new();
+/// world.near_pairs(Bodies::All, plan.reach(), &mut pairs);
+/// pairs.retain(|&pair| pair != [door, hinge]);
+/// let mut scratch = Scratch::default();
+/// let mut touches = |world: &World<_>, pair| {
+///     let pair = world.pair(pair).expect("both bodies are there");
+///     pair.collide(&plan, &mut scratch).verdict.is_intersecting()
+/// };
+/// let touching: Vec<_> = pairs.iter().copied().filter(|&pair| touches(&world, pair)).collect();
+/// assert_eq!(touching, [[floor, door], [floor, hinge]]);
+///
+/// // Of a body that moved, only its own pairs are asked for.
+/// world.move_to(door, &upright.with_translation([0.3, 0.5, 0.1]));
+/// world.near_pairs(Bodies::These(&[door]), plan.reach(), &mut pairs);
+/// assert!(pairs.iter().all(|&pair| pair[0] != floor || !touches(&world, pair)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct World<S> {
+    bodies: BTreeMap<BodyId, Body<S>>,
+    /// The boxes of the bodies that have one.
+    tree: RTree<Leaf>,
+    /// The others, which are near everything.
+    unbounded: BTreeSet<BodyId>,
+    next: u64,
+}
+
+#[derive(Debug, Clone)]
+struct Body<S> {
+    scan: S,
+    pose: Pose,
+    bounds: Option<Aabb>,
+}
+
+impl<S: Prepared> Body<S> {
+    fn new(scan: S, pose: &Pose) -> Self {
+        let bounds = bounds(&scan.at(pose));
+        Self { scan, pose: *pose, bounds }
+    }
+
+    fn placed(&self) -> Placed<'_> {
+        self.scan.at(&self.pose)
+    }
+}
+
+/// What the tree holds of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Leaf {
+    id: BodyId,
+    bounds: Envelope,
+}
+
+/// A box as the tree wants it.
+type Envelope = AABB<[f64; 3]>;
+
+impl Leaf {
+    fn new(id: BodyId, bounds: &Aabb) -> Self {
+        Self { id, bounds: AABB::from_corners(bounds.min, bounds.max) }
+    }
+}
+
+impl RTreeObject for Leaf {
+    type Envelope = Envelope;
+
+    #[inline]
+    fn envelope(&self) -> Envelope {
+        self.bounds
+    }
+}
+
+impl<S> Default for World<S> {
+    fn default() -> Self {
+        Self { bodies: BTreeMap::new(), tree: RTree::new(), unbounded: BTreeSet::new(), next: 0 }
+    }
+}
+
+impl<S: Prepared> World<S> {
+    /// A world without bodies.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Places `scan` in `pose`, which leads from the frame of its input to the world. O(log n).
+    pub fn insert(&mut self, scan: S, pose: &Pose) -> BodyId {
+        let id = BodyId(self.next);
+        self.next += 1;
+        self.place(id, Body::new(scan, pose));
+        id
+    }
+
+    /// Takes a body out; `None` where there is none of this id. O(log n).
+    pub fn remove(&mut self, id: BodyId) -> Option<S> {
+        let body = self.bodies.remove(&id)?;
+        match body.bounds {
+            Some(bounds) => _ = self.tree.remove(&Leaf::new(id, &bounds)),
+            None => _ = self.unbounded.remove(&id),
+        }
+        Some(body.scan)
+    }
+
+    /// Moves a body; returns whether there is one of this id. O(log n).
+    pub fn move_to(&mut self, id: BodyId, pose: &Pose) -> bool {
+        let scan = self.remove(id);
+        scan.map(|scan| self.place(id, Body::new(scan, pose))).is_some()
+    }
+
+    fn place(&mut self, id: BodyId, body: Body<S>) {
+        match body.bounds {
+            Some(bounds) => self.tree.insert(Leaf::new(id, &bounds)),
+            None => _ = self.unbounded.insert(id),
+        }
+        self.bodies.insert(id, body);
+    }
+
+    /// Number of bodies.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.bodies.is_empty()
+    }
+
+    /// The bodies, in the order in which they were inserted.
+    #[must_use]
+    pub fn ids(&self) -> impl ExactSizeIterator<Item = BodyId> {
+        self.bodies.keys().copied()
+    }
+
+    /// A body as a placed scan, or `None` if there is no body of this id.
+    #[must_use]
+    pub fn placed(&self, id: BodyId) -> Option<Placed<'_>> {
+        self.bodies.get(&id).map(Body::placed)
+    }
+
+    /// A pair of bodies, or `None` if one of them does not exist.
+    #[must_use]
+    pub fn pair(&self, [a, b]: [BodyId; 2]) -> Option<Pair<'_>> {
+        Some(Pair::new(self.placed(a)?, self.placed(b)?))
+    }
+
+    /// The box of the world about a body that the broad phase goes by; none of one that it takes for
+    /// boundless.
+    #[must_use]
+    pub fn bounds(&self, id: BodyId) -> Option<Aabb> {
+        self.bodies.get(&id).and_then(|body| body.bounds)
+    }
+
+    /// The broad phase: writes the pairs whose bounding boxes come within `reach` of each other to `pairs`,
+    /// lesser id first, in ascending order.
+    ///
+    /// All other pairs are separated by more than `reach`; pass
+    /// [`CollidePlan::reach`](crate::CollidePlan::reach) for a collision query. A body with an invalid pose
+    /// ([`Reason::Pose`](crate::Reason::Pose)), or at the limits of double precision, is near every other
+    /// body.
+    ///
+    /// Takes about 0.5 µs per body where each is near twelve others, on one thread. Does not allocate once
+    /// `pairs` is warm.
+    pub fn near_pairs(&self, bodies: Bodies<'_>, reach: f64, pairs: &mut Vec<[BodyId; 2]>) {
+        pairs.clear();
+        match bodies {
+            Bodies::All => {
+                let mut visit = |a: BodyId, b: BodyId| pairs.push([a.min(b), a.max(b)]);
+                visit_pairs(self.tree.root(), widened(reach), &mut visit);
+                for &id in &self.unbounded {
+                    self.bodies.keys().filter(|&&other| other != id).for_each(|&other| visit(id, other));
+                }
+            }
+            Bodies::These(ids) => {
+                for &id in ids {
+                    let Some(body) = self.bodies.get(&id) else { continue };
+                    self.visit_near(body.bounds, reach, |other| {
+                        if other != id {
+                            pairs.push([id.min(other), id.max(other)]);
+                        }
+                    });
+                }
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+    }
+
+    /// Writes the bodies whose bounding boxes come within `reach` of `scan` to `ids`, in ascending order.
+    /// `scan` need not be a body of this world.
+    pub fn near(&self, scan: &Placed<'_>, reach: f64, ids: &mut Vec<BodyId>) {
+        self.near_bounds(bounds(scan), reach, ids);
+    }
+
+    /// Writes the bodies whose bounding boxes come within `reach` of `shape` to `ids`, in ascending order. No
+    /// other body [touches](Placed::touches) the shape.
+    pub fn near_shape(&self, shape: &Shape, reach: f64, ids: &mut Vec<BodyId>) {
+        let bounds = shape.bounds().filter(|b| b.min.iter().chain(&b.max).all(|x| x.abs() <= FARTHEST));
+        self.near_bounds(bounds, reach, ids);
+    }
+
+    fn near_bounds(&self, bounds: Option<Aabb>, reach: f64, ids: &mut Vec<BodyId>) {
+        ids.clear();
+        self.visit_near(bounds, reach, |id| ids.push(id));
+        ids.sort_unstable();
+    }
+
+    fn visit_near(&self, bounds: Option<Aabb>, reach: f64, mut visit: impl FnMut(BodyId)) {
+        let Some(bounds) = bounds else { return self.bodies.keys().copied().for_each(visit) };
+        let reach = widened(reach);
+        let [min, max] = [bounds.min.map(|x| x - reach), bounds.max.map(|x| x + reach)];
+        let near = self.tree.locate_in_envelope_intersecting(AABB::from_corners(min, max));
+        near.for_each(|leaf| visit(leaf.id));
+        self.unbounded.iter().copied().for_each(visit);
+    }
+}
+
+/// How near boxes must come: single queries take a little more than their reach for near.
+fn widened(reach: f64) -> f64 {
+    reach * (1.0 + 1e-4)
+}
+
+/// Visits each pair of leaves below `node` whose boxes come within `reach`, once.
+fn visit_pairs(node: &ParentNode<Leaf>, reach: f64, visit: &mut impl FnMut(BodyId, BodyId)) {
+    for (i, a) in node.children().iter().enumerate() {
+        if let RTreeNode::Parent(a) = a {
+            visit_pairs(a, reach, visit);
+        }
+        node.children()[..i].iter().for_each(|b| visit_across(a, b, reach, visit));
+    }
+}
+
+/// Visits each pair of a leaf below `a` and one below `b` whose boxes come within `reach`.
+fn visit_across(
+    a: &RTreeNode<Leaf>,
+    b: &RTreeNode<Leaf>,
+    reach: f64,
+    visit: &mut impl FnMut(BodyId, BodyId),
+) {
+    if !are_near(&a.envelope(), &b.envelope(), reach) {
+        return;
+    }
+    match (a, b) {
+        (RTreeNode::Leaf(a), RTreeNode::Leaf(b)) => visit(a.id, b.id),
+        // In turn, for what is split comes second next time.
+        (RTreeNode::Parent(a), _) => a.children().iter().for_each(|a| visit_across(b, a, reach, visit)),
+        (_, RTreeNode::Parent(b)) => b.children().iter().for_each(|b| visit_across(a, b, reach, visit)),
+    }
+}
+
+#[inline]
+fn are_near(a: &Envelope, b: &Envelope, reach: f64) -> bool {
+    let (low_a, high_a, low_b, high_b) = (a.lower(), a.upper(), b.lower(), b.upper());
+    (0..3).all(|k| low_a[k] <= high_b[k] + reach && low_b[k] <= high_a[k] + reach)
+}
+
+/// What double precision loses of a place far from the origin of the world: twice what a query allows for.
+const DOUBLE_ROUNDING: f64 = 4e-15;
+
+/// Further out, volumes of boxes leave the range of double precision.
+const FARTHEST: f64 = 1e100;
+
+/// Scans whose stored frames are larger or smaller by more than this are bounded by nothing: then the others
+/// differ by no more than single queries allow, 2⁶⁰.
+const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
+
+/// A box of the world about all that a query looks at of a scan; half of the rounding that it allows for
+/// included. None of a scan in a pose that is none, or that is extreme.
+fn bounds(view: &Placed<'_>) -> Option<Aabb> {
+    let root = view.scan().tree().enclosure(Part::Surface, NodeId::ROOT);
+    let placed = view.placed();
+    let scale = placed.scale();
+    let centre = placed.apply(root.centre.map(f64::from));
+    let edges = [0, 1, 2].map(|j: usize| {
+        let half = f64::from(root.half[j]) * scale;
+        placed.rotate(root.axes[j].map(f64::from)).map(|x| (x * half).abs())
+    });
+    // A query in single precision allows for SLACK times the coordinates of either scan about the other's
+    // origin: for two whose boxes touch, at most twice the distances of both centres from their origins, and
+    // four radii of each.
+    let own = Vector3::from(root.centre.map(f64::from)).norm();
+    let single = f64::from(SLACK) * (2.0 * own + 4.0 * f64::from(root.radius())) * scale;
+    let far = Vector3::from(placed.translation()).norm() + Vector3::from(centre).norm();
+    let more = single + DOUBLE_ROUNDING * far;
+    let half = [0, 1, 2].map(|k: usize| edges.iter().map(|edge| edge[k]).sum::<f64>() + more);
+    let bounds =
+        Aabb { min: [0, 1, 2].map(|k| centre[k] - half[k]), max: [0, 1, 2].map(|k| centre[k] + half[k]) };
+    let is_finite = bounds.min.iter().chain(&bounds.max).all(|x| x.abs() <= FARTHEST);
+    let is_moderate = (1.0 / GREATEST_SCALE..=GREATEST_SCALE).contains(&scale);
+    (is_finite && is_moderate && view.is_proper()).then_some(bounds)
+}

@@ -1,0 +1,242 @@
+//! A prepared scan somewhere in the world.
+
+use nearmiss_geometry::Pose;
+use nearmiss_graph::{GeodesicKernel, KernelScratch, Samples, SurfaceGraph};
+use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, Slices};
+use nearmiss_index::PointBlock;
+use nearmiss_surface::{Evaluation, Metric};
+
+use crate::pair::shape_index::ShapeIndex;
+
+/// Memory for evaluations of f, used again by the next; never influences a result.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ViewScratch {
+    pub(crate) gather: GatherScratch,
+    kernel: KernelScratch,
+}
+
+/// A prepared scan in a pose. Takes some nanoseconds to make or copy.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed<'a> {
+    scan: &'a PointHierarchy,
+    graph: Option<&'a SurfaceGraph>,
+    shapes: Option<&'a ShapeIndex>,
+    /// Stored frame → world.
+    placed: Pose,
+}
+
+impl<'a> Placed<'a> {
+    /// Places `scan` at `pose`, which maps the frame of the scan's input to the world. The scale of the pose
+    /// applies to every length of the scan, such as radii and bandwidths.
+    ///
+    /// A scan of the [geodesic metric](PointHierarchy::metric) needs [its graph](Self::with_graph) as well;
+    /// without it, no contact is verified.
+    #[inline]
+    #[must_use]
+    pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
+        let frame = scan.frame();
+        // As `after` the pose of the frame, which has no rotation.
+        let placed = pose.with_scale(pose.scale() * frame.scale).with_translation(pose.apply(frame.origin));
+        Self { scan, graph: None, shapes: None, placed }
+    }
+
+    /// The same placed scan with its graph, for the geodesic kernel and for searches along the graph.
+    #[inline]
+    #[must_use]
+    pub fn with_graph(self, graph: &'a SurfaceGraph) -> Self {
+        Self { graph: Some(graph), ..self }
+    }
+
+    /// The same placed scan with its shape index. An index of another scan is ignored.
+    #[inline]
+    #[must_use]
+    pub fn with_shapes(self, shapes: &'a ShapeIndex) -> Self {
+        Self { shapes: Some(shapes).filter(|shapes| shapes.is_of(self.scan)), ..self }
+    }
+
+    /// The graph, if there is one.
+    #[must_use]
+    pub fn graph(&self) -> Option<&'a SurfaceGraph> {
+        self.graph
+    }
+
+    /// The shape index, if there is one.
+    #[must_use]
+    pub fn shapes(&self) -> Option<&'a ShapeIndex> {
+        self.shapes
+    }
+
+    /// f with distances along the graph (Klein & Zachmann 2005, eq. 5) in the frame of the stored positions;
+    /// `None` without a graph that has a map of close pairs.
+    #[must_use]
+    pub fn geodesic_kernel(&self) -> Option<GeodesicKernel<'a>> {
+        let scan = self.scan;
+        let samples = Samples { plan: scan.plan(), positions: scan.positions(), radii: scan.radii() };
+        self.graph?.kernel(samples)
+    }
+
+    /// The kernel of the scan's metric, where that is no sum over straight distances.
+    fn kernel(&self) -> Option<GeodesicKernel<'a>> {
+        match self.scan.metric() {
+            Metric::Euclidean => None,
+            Metric::Geodesic => self.geodesic_kernel(),
+        }
+    }
+
+    /// The scan.
+    #[must_use]
+    pub fn scan(&self) -> &'a PointHierarchy {
+        self.scan
+    }
+
+    /// The scan's sampling radius in the world.
+    #[must_use]
+    pub fn sampling_radius(&self) -> f64 {
+        self.scan.sampling_radius() / self.scan.frame().scale * self.placed.scale()
+    }
+
+    /// The pose of the scan's stored frame.
+    #[must_use]
+    pub fn placed(&self) -> &Pose {
+        &self.placed
+    }
+
+    /// Returns `true` if the pose is finite, its linear part a rotation with a positive scale: products of
+    /// many poses may not be.
+    pub(crate) fn is_proper(&self) -> bool {
+        let (pose, rotation) = (&self.placed, self.placed.rotation());
+        let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];
+        let off = [
+            u.norm_squared() - 1.0,
+            v.norm_squared() - 1.0,
+            w.norm_squared() - 1.0,
+            u.dot(&v),
+            v.dot(&w),
+            w.dot(&u),
+        ];
+        // Nothing branches on one of them; a sum with what is no number is none.
+        let off: f64 = off.iter().map(|x| x.abs()).sum();
+        let far: f64 = pose.translation().iter().map(|x| x.abs()).sum();
+        off <= MOST_OFF && u.cross(&v).dot(&w) > 0.0 && far < f64::INFINITY && pose.scale() > 0.0
+    }
+
+    /// Returns `true` if `x`, a place of the implicit surface in the world near the stored point `i`, belongs
+    /// to the obstacle: it lies in the cell of its nearest stored point, which samples a sheet
+    /// (`docs/theory/obstacle.md`).
+    pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
+        let x = self.placed.apply_inverse(x);
+        let nearest = self.scan.nearest_point_near(i, x) as usize;
+        let slices = self.scan.slices();
+        let (position, Slices { normals, radii, .. }) = (slices.position(nearest), slices);
+        let away = [0, 1, 2].map(|k| x[k] - f64::from(position[k]));
+        let height: f64 = (0..3).map(|k| away[k] * f64::from(normals[nearest][k])).sum();
+        let distance_sq: f64 = away.iter().map(|d| d * d).sum();
+        let most = f64::from(slices.cell_radius(nearest));
+        slices.is_on_sheet(nearest)
+            && height.abs() <= f64::from(SLAB * radii[nearest])
+            && distance_sq <= most * most
+    }
+
+    /// The `i`-th stored point in the world.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[must_use]
+    pub fn point(&self, i: usize) -> [f64; 3] {
+        self.placed.apply(PointBlock::position_in(self.scan.blocks(), i).map(f64::from))
+    }
+
+    /// Returns `true` if f can be evaluated by the metric of the scan: only then its zeros verify what discs
+    /// say.
+    pub(crate) fn verifies(&self) -> bool {
+        self.scan.metric() == Metric::Euclidean || self.kernel().is_some()
+    }
+
+    /// See [`Placed::evaluate`].
+    pub(crate) fn evaluate_with(&self, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
+        match self.kernel() {
+            None => self.in_world(
+                self.scan.evaluate_oriented_with(self.placed.apply_inverse(x), &mut scratch.gather),
+            ),
+            Some(kernel) => self.evaluate_by(&kernel, x, &mut scratch.kernel),
+        }
+    }
+
+    /// f at `x` with distances along the graph of this scan, that of `kernel`, whatever the metric of the
+    /// scan; outside further than the greatest horizon from all points. The sign is that of the nearest
+    /// point's normal (Klein & Zachmann 2005, §3.2).
+    pub fn evaluate_by(
+        &self,
+        kernel: &GeodesicKernel<'_>,
+        x: [f64; 3],
+        scratch: &mut KernelScratch,
+    ) -> Evaluation {
+        self.evaluate_by_near(kernel, 0, x, scratch)
+    }
+
+    fn evaluate_by_near(
+        &self,
+        kernel: &GeodesicKernel<'_>,
+        i: usize,
+        x: [f64; 3],
+        scratch: &mut KernelScratch,
+    ) -> Evaluation {
+        let x = self.placed.apply_inverse(x);
+        let nearest = self.scan.nearest_point_near(i, x);
+        let at = kernel.evaluate(x, nearest, scratch);
+        let at = if self.scan.is_oriented() {
+            at.turned_to(self.scan.normals()[nearest as usize].map(f64::from), 1.0)
+        } else {
+            at
+        };
+        self.in_world(at)
+    }
+
+    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`, on the side of whose normal
+    /// n is.
+    pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
+        match self.kernel() {
+            None => {
+                let at = self.scan.evaluate_near(i, self.placed.apply_inverse(x), &mut scratch.gather);
+                self.in_world(at.turned_to(self.scan.normals()[i].map(f64::from), 0.0))
+            }
+            Some(kernel) => self.evaluate_by_near(&kernel, i, x, &mut scratch.kernel),
+        }
+    }
+
+    /// f at `x` but for its sign, as [`Self::evaluate_with`]; faster where the last place that was asked
+    /// about with this scratch is near. `nearest` is the point nearest to that, or any, and then that nearest
+    /// to `x` if the kernel needs it.
+    pub(crate) fn evaluate_onward(
+        &self,
+        x: [f64; 3],
+        nearest: &mut usize,
+        scratch: &mut ViewScratch,
+    ) -> Evaluation {
+        let x = self.placed.apply_inverse(x);
+        self.in_world(match self.kernel() {
+            None => self.scan.evaluate_onward(x, &mut scratch.gather),
+            Some(kernel) => {
+                let found = self.scan.nearest_point_near(*nearest, x);
+                *nearest = found as usize;
+                kernel.evaluate(x, found, &mut scratch.kernel)
+            }
+        })
+    }
+
+    /// What holds in the stored frame, in the world.
+    pub(crate) fn in_world(&self, at: Evaluation) -> Evaluation {
+        let scale = self.placed.scale();
+        Evaluation {
+            f: at.f * scale,
+            normal: self.placed.rotate(at.normal),
+            centroid: self.placed.apply(at.centroid),
+            bandwidth: at.bandwidth * scale,
+            eigenvalues: at.eigenvalues.map(|l| l * scale * scale),
+            ..at
+        }
+    }
+}
+
+/// A rotation is one to so much, in the sum of what six products of its columns are off.
+const MOST_OFF: f64 = 6e-9;

@@ -1,0 +1,47 @@
+//! The trait of prepared scans.
+
+use std::rc::Rc;
+use std::sync::Arc;
+
+use nearmiss_geometry::Pose;
+use nearmiss_hierarchy::PointHierarchy;
+
+use crate::pair::placed::Placed;
+
+/// A prepared scan, however it is held: `nearmiss::Scan`, [`PointHierarchy`], or a reference, `Arc`, `Rc` or
+/// `Box` of one.
+pub trait Prepared {
+    /// Places the scan at `pose`, which maps the frame of its input to the world, with its graph and its
+    /// shape index if it has them.
+    fn at(&self, pose: &Pose) -> Placed<'_>;
+}
+
+impl Prepared for PointHierarchy {
+    fn at(&self, pose: &Pose) -> Placed<'_> {
+        Placed::new(self, pose)
+    }
+}
+
+impl<S: Prepared + ?Sized> Prepared for &S {
+    fn at(&self, pose: &Pose) -> Placed<'_> {
+        (**self).at(pose)
+    }
+}
+
+impl<S: Prepared + ?Sized> Prepared for Arc<S> {
+    fn at(&self, pose: &Pose) -> Placed<'_> {
+        (**self).at(pose)
+    }
+}
+
+impl<S: Prepared + ?Sized> Prepared for Rc<S> {
+    fn at(&self, pose: &Pose) -> Placed<'_> {
+        (**self).at(pose)
+    }
+}
+
+impl<S: Prepared + ?Sized> Prepared for Box<S> {
+    fn at(&self, pose: &Pose) -> Placed<'_> {
+        (**self).at(pose)
+    }
+}

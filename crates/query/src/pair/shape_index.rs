@@ -1,0 +1,43 @@
+//! An index of the points of a scan, for many shapes.
+
+use fearless_simd::Level;
+use nearmiss_hierarchy::PointHierarchy;
+use nearmiss_index::{BlockBoxes, BlockTree, Cells};
+
+/// An index of the points of a scan, for thousands of shapes. Give it to a placed scan with
+/// [`Placed::with_shapes`](crate::Placed::with_shapes).
+///
+/// The index borrows nothing, so it can be stored beside its scan. Building it is O(n): some milliseconds and
+/// 2 MB for 100,000 points.
+#[derive(Debug, Clone)]
+pub struct ShapeIndex {
+    /// The [identity](nearmiss_hierarchy::Outline) of the scan.
+    scan: u64,
+    boxes: BlockBoxes,
+    pub(crate) cells: Cells,
+    pub(crate) level: Level,
+}
+
+impl ShapeIndex {
+    /// The index of `scan`.
+    #[must_use]
+    pub fn new(scan: &PointHierarchy) -> Self {
+        let boxes = BlockBoxes::new(scan.blocks(), scan.len());
+        let level = Level::new();
+        let cells = boxes.over(scan.blocks()).cells(level);
+        Self { scan: scan.outline().identity, boxes, cells, level }
+    }
+
+    /// Returns `true` if the index is of `scan`.
+    #[inline]
+    #[must_use]
+    pub fn is_of(&self, scan: &PointHierarchy) -> bool {
+        self.scan == scan.outline().identity && self.boxes.len() == scan.len()
+    }
+
+    /// The tree over the points of `scan`, whose index this is.
+    #[inline]
+    pub(crate) fn tree<'a>(&'a self, scan: &'a PointHierarchy) -> BlockTree<'a> {
+        self.boxes.over(scan.blocks())
+    }
+}

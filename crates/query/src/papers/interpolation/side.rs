@@ -1,0 +1,59 @@
+//! On which side of b a place is, and how far from it.
+//!
+//! S1 lets f_B say that everywhere, its sign turned to the normal of the nearest point. Ours ends at the
+//! horizon; beyond, the nearest point says both, as in Hoppe et al. 1992.
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_surface::Status;
+
+use super::sides::{CERTAIN, Side};
+use crate::papers::Papers;
+
+impl Papers<'_, '_> {
+    /// The side of a place in the world; fast if b has the point `hint` near there.
+    pub(crate) fn side_at(&mut self, x: [f64; 3], hint: u32) -> Side {
+        let [_, vb] = self.search.pair.views;
+        let local = vb.placed().apply_inverse(x);
+        // Beyond all horizons the side is all that counts.
+        let reach = f64::from(vb.scan().plan().horizon(self.search.pair.b.sampling_radius));
+        let (near, steps) = vb.scan().nearest_point_within(hint as usize, local, reach);
+        let meter = &mut self.search.pair.meter;
+        meter.spent.neighbour_steps += u64::from(steps);
+        meter.spent.evaluations += 1;
+        let j = near as usize;
+        let towards = Vector3::from(vb.point(j)) - Vector3::from(x);
+        let away = towards.norm();
+        let radius = self.search.pair.b.radii[j];
+        let horizon = f64::from(vb.scan().plan().horizon(radius)) * vb.placed().scale();
+        let sure = vb.graph().is_some_and(|graph| graph.confidence()[j] >= CERTAIN);
+        let is_known = sure && vb.scan().is_oriented();
+        if away < horizon {
+            let at = vb.evaluate_near(j, x, &mut self.search.gathers[1]);
+            if at.status == Status::Ok {
+                return Side { distance: -at.f, near, away, is_known };
+            }
+        }
+        let normal = Vector3::from(self.search.pair.b.normals[j].map(f64::from));
+        let normal = Vector3::from(vb.placed().rotate(normal.into()));
+        let distance = if normal.dot(&towards) > 0.0 { -away } else { away };
+        Side { distance, near, away, is_known }
+    }
+
+    /// The side of a point of a.
+    pub(crate) fn side(&mut self, i: u32, hint: u32) -> Side {
+        let [va, _] = self.search.pair.views;
+        self.side_at(va.point(i as usize), hint)
+    }
+
+    /// The same, remembered for a while.
+    pub(crate) fn side_again(&mut self, i: u32, hint: u32) -> Side {
+        match *self.scratch.interpolation.sides.slot(i) {
+            Some((point, side)) if point == i => side,
+            _ => {
+                let side = self.side(i, hint);
+                *self.scratch.interpolation.sides.slot(i) = Some((i, side));
+                side
+            }
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! A resolution of the search: nodes that are fine enough answer by their samples (S0 §1).
+//!
+//! A node's sample points stand for all below it: the balls about them that cover its tangent discs (S0
+//! Definition 4). Where no two balls overlap no discs cross; where two do, the surfaces come within the sum
+//! of four radii of each other.
+
+use std::ops::ControlFlow;
+
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_hierarchy::NodePair;
+
+use crate::ask::answer::Contact;
+use crate::papers::Papers;
+
+impl Papers<'_, '_> {
+    /// Which nodes of a pair are not to be looked at more finely.
+    pub(crate) fn nodes_are_fine(&self, pair: NodePair) -> [bool; 2] {
+        let a = self.search.pair.a.sampling_radius_of(pair.a.index());
+        let b = self.search.pair.b.sampling_radius_of(pair.b.index()) * self.search.pair.relative.scale();
+        [a <= self.resolution, b <= self.resolution]
+    }
+
+    /// The samples of two nodes, of which not both are leaves.
+    pub(crate) fn samples_meet(&mut self, pair: NodePair) -> ControlFlow<()> {
+        let (a, b) = (self.search.pair.a, self.search.pair.b);
+        let relative = self.search.pair.relative;
+        let [samples_a, samples_b] = [a.samples(pair.a.index()), b.samples(pair.b.index())];
+        self.search.pair.meter.leaf_pair(samples_a.len(), samples_b.len());
+        let radius_a = a.sampling_radius_of(pair.a.index());
+        let radius_b = b.sampling_radius_of(pair.b.index()) * relative.scale();
+        let reach = radius_a + radius_b + self.search.reach + relative.slack();
+        for j in samples_b.iter() {
+            let q = Vector3::from(relative.point(b.position(j)));
+            for i in samples_a.iter() {
+                let p = Vector3::from(a.position(i));
+                // What is no number is near.
+                if (p - q).norm() > reach {
+                    continue;
+                }
+                let [va, vb] = self.search.pair.views;
+                let between = p + (q - p) * (radius_a / (radius_a + radius_b).max(f32::MIN_POSITIVE));
+                let scale = va.placed().scale();
+                let contact = Contact {
+                    point: va.placed().apply(between.map(f64::from).into()),
+                    normals: Some([
+                        va.placed().rotate(a.normals[i].map(f64::from)),
+                        vb.placed().rotate(b.normals[j].map(f64::from)),
+                    ]),
+                    residual: f64::from(radius_a.max(radius_b)) * scale,
+                    sources: [va.scan().id(i), vb.scan().id(j)],
+                };
+                return self.search.record(contact, None);
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}

@@ -1,0 +1,286 @@
+//! A pair of placed scans and the questions about it.
+
+use std::time::Duration;
+
+use fearless_simd::Level;
+use nearmiss_surface::Evaluation;
+
+use crate::ask::answer::{Answer, Contacts, ManifoldPoint};
+use crate::ask::budget::Budget;
+use crate::ask::options::CollidePlan;
+use crate::contact::certificate::Proof;
+use crate::contact::collide::{Asked, ContactScratch, Outputs};
+use crate::contact::hint::PairHint;
+use crate::curve::{CurvePlan, CurveScratch, Curves};
+use crate::distance::{Distance, DistancePlan};
+use crate::pair::placed::Placed;
+use crate::papers::PapersScratch;
+
+/// Working memory of queries, one per thread. Reuse it: a query does not allocate once its scratch is warm.
+///
+/// A scratch serves every kind of question about any scans. It holds no answers and never changes one.
+#[derive(Debug, Clone)]
+pub struct Scratch {
+    contact: ContactScratch,
+    papers: PapersScratch,
+    distance: crate::distance::Frontier,
+    curve: CurveScratch,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::by_level(Level::new())
+    }
+}
+
+impl Scratch {
+    /// A scratch whose queries run with the SIMD instructions of `level` instead of the best available ones,
+    /// for comparisons. Answers do not depend on it.
+    #[must_use]
+    pub fn by_level(level: Level) -> Self {
+        Self {
+            contact: ContactScratch::new(level),
+            papers: PapersScratch::default(),
+            distance: crate::distance::Frontier::default(),
+            curve: CurveScratch::default(),
+        }
+    }
+
+    /// The longest interval between two looks at the clock in the last collision query with a deadline; zero
+    /// without a deadline. A query overruns its deadline by about this much at most.
+    #[must_use]
+    pub fn longest_stretch(&self) -> Duration {
+        self.contact.longest_stretch
+    }
+}
+
+impl Placed<'_> {
+    /// Evaluates the implicit function at `x`, all in world coordinates, with the kernel of the scan's
+    /// [metric](nearmiss_hierarchy::PointHierarchy::metric). The signs of f and of the normal follow the
+    /// oriented normals if the scan has them.
+    pub fn evaluate(&self, x: [f64; 3], scratch: &mut Scratch) -> Evaluation {
+        let [gather, _] = &mut scratch.contact.gathers;
+        self.evaluate_with(x, gather)
+    }
+}
+
+/// Two placed scans and the budget of each question about them.
+///
+/// The questions are methods: [`collide`](Self::collide), [`distance`](Self::distance) and
+/// [`curves`](Self::curves). A collision query can produce more than its answer: request a
+/// [`manifold`](Self::manifold), all [`contacts`](Self::contacts) or a [`proof`](Self::proof), and reuse what
+/// the last query found ([`hinted`](Self::hinted)), in any combination.
+///
+/// ```
+/// use nearmiss_geometry::{PointCloud, Pose};
+/// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+/// use nearmiss_query::{
+///     CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Pair, PairHint, Prepared, Scratch,
+/// };
+///
+/// let points: Vec<[f32; 3]> =
+///     (0..2500_u16).map(|i| [f32::from(i % 50) * 0.02, f32::from(i / 50) * 0.02, 0.0]).collect();
+/// let square = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
+/// let plan = CollidePlan::new(&CollideOptions::default(), &square, &square)?;
+/// let (mut scratch, mut hint, mut manifold) = (Scratch::default(), PairHint::default(), Vec::new());
+///
+/// // An upright square is lowered onto a lying one.
+/// let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], 1.5);
+/// let lowered = |step: i32| {
+///     let pose = upright.with_translation([0.3, 0.5, 0.06 - 0.01 * f64::from(step)]);
+///     Pair::new(square.at(&Pose::IDENTITY), square.at(&pose))
+/// };
+/// let steps_until = (0..20).take_while(|&step| {
+///     let answer = lowered(step).hinted(&mut hint).manifold(&mut manifold).collide(&plan, &mut scratch);
+///     answer.verdict.is_separated()
+/// });
+/// let touches_at = steps_until.count();
+/// assert_eq!(touches_at, 5);
+/// assert!(manifold.len() > 1, "it touches along an edge");
+///
+/// let plan = DistancePlan::new(&DistanceOptions::default(), &square, &square)?;
+/// let distance = lowered(0).distance(&plan, &mut scratch);
+/// assert!(distance.lower <= 0.06 && 0.04 <= distance.upper);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Pair<'a> {
+    scans: [Placed<'a>; 2],
+    budget: Budget,
+}
+
+impl<'a> Pair<'a> {
+    /// A pair with an unlimited budget.
+    #[inline]
+    #[must_use]
+    pub fn new(a: Placed<'a>, b: Placed<'a>) -> Self {
+        Self { scans: [a, b], budget: Budget::UNLIMITED }
+    }
+
+    /// The same pair with this budget for each question.
+    #[inline]
+    #[must_use]
+    pub fn within(self, budget: &Budget) -> Self {
+        Self { budget: *budget, ..self }
+    }
+
+    /// Both scans.
+    #[must_use]
+    pub fn scans(&self) -> &[Placed<'a>; 2] {
+        &self.scans
+    }
+
+    /// Decides whether the scans meet, with the meaning of `plan`.
+    ///
+    /// Does not allocate once `scratch` is warm. Deterministic: a question without a deadline always has the
+    /// same answer.
+    #[inline]
+    pub fn collide(&self, plan: &CollidePlan, scratch: &mut Scratch) -> Answer {
+        self.question().collide(plan, scratch)
+    }
+
+    /// A question that starts from what the last one found; see [`Question::hinted`].
+    #[inline]
+    #[must_use]
+    pub fn hinted<'q>(&'q self, hint: &'q mut PairHint) -> Question<'q> {
+        self.question().hinted(hint)
+    }
+
+    /// A question that also produces a contact manifold; see [`Question::manifold`].
+    #[inline]
+    #[must_use]
+    pub fn manifold<'q>(&'q self, points: &'q mut Vec<ManifoldPoint>) -> Question<'q> {
+        self.question().manifold(points)
+    }
+
+    /// A question that also produces all contacts; see [`Question::contacts`].
+    #[inline]
+    #[must_use]
+    pub fn contacts<'q>(&'q self, contacts: &'q mut Contacts) -> Question<'q> {
+        self.question().contacts(contacts)
+    }
+
+    /// A question that also produces a proof of separation; see [`Question::proof`].
+    #[inline]
+    #[must_use]
+    pub fn proof<'q>(&'q self, proof: &'q mut Proof) -> Question<'q> {
+        self.question().proof(proof)
+    }
+
+    /// Bounds the distance of the scans: lower ≤ distance ≤ upper. Both bounds are valid whenever the budget
+    /// ends the search.
+    ///
+    /// With [`Semantics::Thickened`](crate::Semantics::Thickened) the distance is that of the two nearest
+    /// points less both radii, and both bounds equal it once the search is complete. With surfaces, `lower`
+    /// is proven by enclosures (docs/theory/certificates.md): it is a few sampling radii less than the
+    /// distance, and 0 for scans of the geodesic metric. `upper` is the distance of two points on the
+    /// surfaces near the two nearest samples. Surfaces that [`collide`](Self::collide) have distance 0.
+    ///
+    /// Ignores the resolution of the budget. Does not allocate once `scratch` is warm. Takes 0.1 to 0.2 ms
+    /// for separated scans of 100,000 points and 10 µs for surfaces that meet (benches/record). Thickened
+    /// scans that interpenetrate cost a comparison of every pair of leaves that overlap.
+    pub fn distance(&self, plan: &DistancePlan, scratch: &mut Scratch) -> Distance {
+        crate::distance::distance(
+            self.scans.each_ref(),
+            plan,
+            &self.budget,
+            &mut scratch.distance,
+            &mut scratch.contact,
+        )
+    }
+
+    /// Traces the curves in which the two surfaces intersect and writes them to `found`, as far as the budget
+    /// lasts.
+    ///
+    /// At each point both |f| are within the tolerance. A chord deviates from its curve by at most a fortieth
+    /// of the spacing, or of two sampling radii if that is less: 0.05 radii by default where curves are as
+    /// smooth as arcs; on a rough scan one chord in a hundred deviates by 0.06 to 0.16. The curve of the true
+    /// surfaces may be off by the bias of both surfaces, h²H/2 each, over the sine of their angle.
+    ///
+    /// Every curve is found on which the discs of two leaves cross. A curve shorter than a leaf and nearer to
+    /// another one than a sampling radius may be taken for that. Swapped scans give the same curves with
+    /// other points on them. Scans of the geodesic metric need [their graph](Placed::with_graph).
+    ///
+    /// Costs as much as [all contacts](Self::contacts) and three pairs of evaluations per sampling radius of
+    /// length. Does not allocate once `found` and `scratch` are warm.
+    pub fn curves(&self, plan: &CurvePlan, found: &mut Curves, scratch: &mut Scratch) {
+        let beside = (&mut scratch.contact, &mut scratch.curve);
+        crate::curve::curves(self.scans.each_ref(), plan, &self.budget, found, beside);
+    }
+
+    /// A question about the pair, to be given outputs one by one.
+    #[inline]
+    #[must_use]
+    pub fn question(&self) -> Question<'_> {
+        Question { pair: self, outputs: Outputs::default() }
+    }
+}
+
+/// A collision query under construction: a pair and the outputs wanted beside the answer.
+#[derive(Debug)]
+pub struct Question<'q> {
+    pair: &'q Pair<'q>,
+    outputs: Outputs<'q>,
+}
+
+impl<'q> Question<'q> {
+    /// Starts from `hint`, which remembers where the scans met or what separated them, and updates it.
+    ///
+    /// A hint pays off when poses change little between queries: a step of a tenth of a sampling radius takes
+    /// a fraction of a query. It never changes a verdict, except one that a budget cuts short. Evidence may
+    /// differ: a certified gap may be smaller than without a hint, and about one separation in a thousand is
+    /// certified with a hint and estimated without, or the reverse.
+    ///
+    /// Combined with [all contacts](Self::contacts), a hint speeds up separations alone; combined with a
+    /// [proof](Self::proof), contacts alone. The methods of the papers ignore hints
+    /// ([`Method::Sampling`](crate::Method), [`Method::Interpolation`](crate::Method), orders by sides,
+    /// coverings, resolutions).
+    #[inline]
+    #[must_use]
+    pub fn hinted(mut self, hint: &'q mut PairHint) -> Self {
+        self.outputs.hint = Some(hint);
+        self
+    }
+
+    /// Writes up to eight contact points to `points`, for a physics solver: the deepest first, then always
+    /// the one furthest from all before it. Leaves `points` empty unless the scans meet.
+    #[inline]
+    #[must_use]
+    pub fn manifold(mut self, points: &'q mut Vec<ManifoldPoint>) -> Self {
+        self.outputs.manifold = Some(points);
+        self
+    }
+
+    /// Continues after the first contact and writes one contact per pair of intersecting leaves to
+    /// `contacts`, to first order. The contact of the answer is the first certified one of the first few, or
+    /// else the first. Without this output, a query stops at any contact and may report another one.
+    ///
+    /// Costs a descent to all intersecting leaves. Does not allocate once `contacts` is warm.
+    #[inline]
+    #[must_use]
+    pub fn contacts(mut self, contacts: &'q mut Contacts) -> Self {
+        self.outputs.contacts = Some(contacts);
+        self
+    }
+
+    /// Writes the node pairs that prove a certified separation of surfaces or obstacles to `proof`. Leaves it
+    /// empty after any other answer.
+    #[inline]
+    #[must_use]
+    pub fn proof(mut self, proof: &'q mut Proof) -> Self {
+        self.outputs.proof = Some(proof);
+        self
+    }
+
+    /// Decides whether the scans meet; see [`Pair::collide`].
+    pub fn collide(self, plan: &CollidePlan, scratch: &mut Scratch) -> Answer {
+        let Self { pair: Pair { scans, budget }, outputs } = self;
+        let asked = Asked { scans: scans.each_ref(), plan, budget };
+        let Scratch { contact, papers, .. } = scratch;
+        if plan.is_of_papers(budget) {
+            crate::papers::collide(asked, (contact, papers), outputs)
+        } else {
+            crate::contact::collide::collide(asked, contact, outputs)
+        }
+    }
+}
