@@ -14,6 +14,7 @@ mod interpolation_leaves;
 mod manifold;
 mod margin;
 mod orders;
+mod outputs;
 mod shapes;
 mod sparse;
 mod twin;
