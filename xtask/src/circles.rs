@@ -1,8 +1,9 @@
-//! Circles of the files of a crate: each uses the next, and the last the first.
+//! Circles of the files of a crate, and of its folders: each uses the next, and the last the first. Folders
+//! without circles have an order in which each uses those below it alone.
 //!
 //! A file uses another if it names something of it, by `use` or by a path that starts with `crate`, `self`,
 //! `super` or a module of its own. What a file makes public of its own modules (`pub use`) is no use. Tests
-//! within a file do not count.
+//! within a file, and files `tests.rs`, do not count.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -37,14 +38,29 @@ fn circles_among(files: &BTreeMap<Module, syn::File>) -> Vec<String> {
     let known: Vec<&Module> = files.keys().collect();
     let root = Module::new();
     let names = files.get(&root).map(|file| exported(file, &known)).unwrap_or_default();
-    let mut graph = DiGraph::<&Module, ()>::new();
-    let nodes: BTreeMap<&Module, _> = known.iter().map(|module| (*module, graph.add_node(*module))).collect();
+    let mut arrows = Vec::new();
     for (module, file) in files.iter().filter(|(module, _)| !module.is_empty()) {
         let mut uses = Uses { module, known: &known, names: &names, found: Vec::new() };
         uses.visit_file(file);
-        for used in uses.found.iter().filter(|used| !used.is_empty() && *used != module) {
-            graph.update_edge(nodes[module], nodes[used], ());
-        }
+        let used = uses.found.into_iter().filter(|used| !used.is_empty());
+        arrows.extend(used.map(|used| (module.clone(), used)));
+    }
+    let of_files = circles_of(&arrows);
+    if !of_files.is_empty() {
+        return of_files;
+    }
+    let folder = |module: Module| module.into_iter().take(1).collect::<Module>();
+    let between: Vec<_> = arrows.into_iter().map(|(from, to)| (folder(from), folder(to))).collect();
+    circles_of(&between).into_iter().map(|circle| format!("folders {circle}")).collect()
+}
+
+/// A line for each circle of these arrows.
+fn circles_of(arrows: &[(Module, Module)]) -> Vec<String> {
+    let mut graph = DiGraph::<&Module, ()>::new();
+    let mut nodes = BTreeMap::new();
+    for (from, to) in arrows.iter().filter(|(from, to)| from != to) {
+        let [from, to] = [from, to].map(|end| *nodes.entry(end).or_insert_with(|| graph.add_node(end)));
+        graph.update_edge(from, to, ());
     }
     let circles = tarjan_scc(&graph).into_iter().filter(|circle| circle.len() > 1);
     let told = circles.map(|circle| {
@@ -59,7 +75,10 @@ fn circles_among(files: &BTreeMap<Module, syn::File>) -> Vec<String> {
 fn collect(folder: &Path, module: &Module, files: &mut BTreeMap<Module, PathBuf>) -> Outcome {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        let Some(stem) = path.file_stem().and_then(|stem| stem.to_str()) else { continue };
+        let Some(stem) = path.file_stem().and_then(|stem| stem.to_str()).filter(|stem| *stem != "tests")
+        else {
+            continue;
+        };
         let own = if module.is_empty() && (stem == "lib" || stem == "main") {
             Module::new()
         } else {
@@ -222,6 +241,19 @@ mod tests {
         assert_eq!(told(&[root, ("a", "mod c; use c::C; pub struct A;"), child]).len(), 1);
         assert_eq!(told(&[root, ("a", "mod c; pub struct A(c::C);"), child]).len(), 1);
         assert!(told(&[root, ("a", "mod c; pub use c::C; pub struct A;"), child]).is_empty());
+    }
+
+    #[test]
+    fn folders_make_circles_where_their_files_do_not() {
+        let root = ("", "mod a; mod b;");
+        let upper = ("a::x", "use crate::b::y::Y; pub struct X;");
+        let lower = ("b::y", "pub struct Y;");
+        let back = ("b::z", "use crate::a::w::W;");
+        let files =
+            [root, ("a", "mod x; mod w;"), ("a::w", "pub struct W;"), upper, ("b", "mod y; mod z;"), lower];
+        assert!(told(&files).is_empty());
+        let circle = ["folders a, b use each other in a circle; move what they share below them"];
+        assert_eq!(told(&[&files[..], &[back]].concat()), circle);
     }
 
     #[test]

@@ -11,10 +11,10 @@ use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::wide::{bits, repeated, spread};
 
-use crate::boxes::Relative;
-use crate::lanes::{Boxes, along_normals};
-use crate::topology::{FAN, NodePair};
-use crate::tree::{LANES, Lanes, Siblings, Tree, lanes_of, whole};
+use crate::bounds::boxes::Relative;
+use crate::bounds::lanes::{Boxes, along_normals};
+use crate::tree::topology::{FAN, NodePair};
+use crate::tree::wide::{LANES, Lanes, Siblings, Tree, lanes_of, whole};
 
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
 pub use single::PlaceVisitor;

@@ -7,7 +7,7 @@ use fearless_simd::{Simd, f32x16, mask32x16};
 use nearmiss_lanes::order::Near;
 use nearmiss_lanes::wide::bits;
 
-use crate::topology::NodePair;
+use crate::tree::topology::NodePair;
 
 /// A pair whose boxes are near each other.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,8 +6,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, mask32x4};
 use nearmiss_geometry::NodeId;
 
-use crate::topology::{FAN, TREE_STACK};
-use crate::tree::{Tree, lanes_of};
+use crate::tree::topology::{FAN, TREE_STACK};
+use crate::tree::wide::{Tree, lanes_of};
 
 /// What a descent towards a place does with what it finds. Distances are squares in single precision.
 pub trait PlaceVisitor {

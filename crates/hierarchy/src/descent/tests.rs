@@ -6,10 +6,10 @@ use nearmiss_testdata::arbitrary::{point_in, rng, unit_vector};
 use nearmiss_testdata::instructions::levels;
 
 use super::*;
-use crate::build::PointHierarchy;
-use crate::options::BuildOptions;
-use crate::part::Part;
-use crate::topology::Grandchildren;
+use crate::bounds::part::Part;
+use crate::scan::build::PointHierarchy;
+use crate::scan::options::BuildOptions;
+use crate::tree::topology::Grandchildren;
 
 /// A blob, a sheet or a line of so many points.
 fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) -> PointHierarchy {

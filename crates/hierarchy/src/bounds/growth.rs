@@ -1,0 +1,110 @@
+//! How much larger an enclosure is than the box of its node: both have the same axes, so six lengths say it.
+//!
+//! Kept short, for a certificate looks at many enclosures whose boxes it has looked at before: single
+//! precision without the lower half of its digits, rounded up.
+
+use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
+
+use crate::bounds::boxes::{OrientedBox, ROUNDING};
+
+/// By how much an enclosure sticks out of the box of its node, along either side of each axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable, Serialize, Deserialize)]
+#[repr(C)]
+pub struct Growth {
+    /// Against the axes: the upper halves of single-precision numbers.
+    low: [u16; 3],
+    /// Along the axes.
+    high: [u16; 3],
+}
+
+/// The upper half of a length that is no shorter; boundless for what is no number.
+fn up(length: f32) -> u16 {
+    let bits = if length <= f32::MAX { length.max(0.0).to_bits() } else { f32::INFINITY.to_bits() };
+    u16::try_from(bits.saturating_add(0xffff) >> 16).unwrap_or(BOUNDLESS).min(BOUNDLESS)
+}
+
+/// Infinity: a box that grows so much is apart from nothing.
+const BOUNDLESS: u16 = 0x7f80;
+
+#[inline]
+fn length(half: u16) -> f32 {
+    f32::from_bits(u32::from(half) << 16)
+}
+
+impl Growth {
+    /// What `bounds` must grow by to contain these intervals along its axes.
+    pub(crate) fn new(bounds: &OrientedBox, low: [f32; 3], high: [f32; 3]) -> Self {
+        let own = bounds.along(&bounds.axes);
+        let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
+        let more = ROUNDING * far;
+        // Not `max`, which would make nothing of what is no number.
+        let side = |beyond: f32| up(if beyond < 0.0 { more } else { beyond + more });
+        let in_order = |k: usize, beyond: f32| if low[k] <= high[k] { beyond } else { f32::NAN };
+        Self {
+            low: [0, 1, 2].map(|k| side(in_order(k, own[k][0] - low[k]))),
+            high: [0, 1, 2].map(|k| side(in_order(k, high[k] - own[k][1]))),
+        }
+    }
+
+    /// `bounds` grown.
+    #[inline]
+    #[must_use]
+    pub fn of(&self, bounds: &OrientedBox) -> OrientedBox {
+        let mut grown = *bounds;
+        let (low, high) = self.lengths();
+        for k in 0..3 {
+            let shift = 0.5 * (high[k] - low[k]);
+            for i in 0..3 {
+                grown.centre[i] += shift * bounds.axes[k][i];
+            }
+            grown.half[k] += 0.5 * (high[k] + low[k]);
+        }
+        grown
+    }
+
+    /// By how much the enclosure reaches further against the axes, and along them.
+    #[inline]
+    pub(crate) fn lengths(&self) -> ([f32; 3], [f32; 3]) {
+        (self.low.map(length), self.high.map(length))
+    }
+
+    /// Against the first axis and the second, against the third and along the first, along the second and the
+    /// third: of each pair the first in the lower half.
+    #[inline]
+    pub(crate) fn pairs(&self) -> [u32; 3] {
+        let ([a, b, c], [d, e, f]) = (self.low, self.high);
+        [[a, b], [c, d], [e, f]].map(|[first, second]| u32::from(second) << 16 | u32::from(first))
+    }
+
+    /// That of [`Self::pairs`].
+    #[inline]
+    #[expect(clippy::cast_possible_truncation, reason = "halves of the number")]
+    pub(crate) fn from_pairs(pairs: [u32; 3]) -> Self {
+        let [[a, b], [c, d], [e, f]] = pairs.map(|pair| [pair as u16, (pair >> 16) as u16]);
+        Self { low: [a, b, c], high: [d, e, f] }
+    }
+
+    /// Whether all lengths are lengths, if boundless ones.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.low.iter().chain(&self.high).all(|&half| half <= BOUNDLESS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_rounded_up_by_less_than_a_hundredth() {
+        for x in [0.0, 1e-30, 1.0, 1.003, 0.333_333, 7.5e8, f32::MAX] {
+            let kept = length(up(x));
+            assert!(kept >= x && (kept <= 1.008 * x || kept.is_infinite()), "{x} is kept as {kept}");
+        }
+        assert_eq!(up(f32::INFINITY), BOUNDLESS);
+        assert_eq!(up(f32::NAN), BOUNDLESS, "never less than it may be");
+        assert!(!Growth { low: [BOUNDLESS + 1, 0, 0], high: [0; 3] }.is_sound(), "no number");
+        assert!(!Growth { low: [0; 3], high: [0x8001, 0, 0] }.is_sound(), "less than nothing");
+        assert!(Growth { low: [up(0.5); 3], high: [up(3e9); 3] }.is_sound());
+    }
+}

@@ -1,0 +1,85 @@
+//! What must hold of a hierarchy. What queries rely on for safety and for a bounded cost is checked whenever
+//! one is loaded, what their answers rely on too when the whole file is compared with its checksums
+//! ([`Check`](nearmiss_store::Check)), and all of it by [`PointHierarchy::sanity_check`].
+
+mod flaw;
+mod leaves;
+#[cfg(test)]
+mod lies;
+mod lists;
+mod metadata;
+mod nodes;
+mod points;
+mod samples;
+
+use nearmiss_geometry::NodeId;
+use nearmiss_geometry::nalgebra::Vector3;
+
+pub use flaw::Flaw;
+pub(crate) use metadata::checked_topology;
+
+use crate::scan::build::PointHierarchy;
+
+impl PointHierarchy {
+    /// What queries need to stay within their arrays and to end: lengths, and the metadata. O(1).
+    pub(crate) fn check_structure(&self) -> Result<(), Flaw> {
+        self.check_lengths()?;
+        self.check_metadata()
+    }
+
+    /// What their answers need besides, given the structure: each box lies within its parent's, every number
+    /// of every point is one that a build writes, and lies within what its leaf says, and what follows from
+    /// points is what is stored. One pass over the whole.
+    pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
+        nodes::check(self)?;
+        points::check(self)?;
+        leaves::check(self)?;
+        samples::check(self)?;
+        lists::check(self)?;
+        self.check_summary()
+    }
+
+    /// Checks every invariant: what a load checks, that each box of each node holds the discs of all points
+    /// under it, that neighbour lists are complete, and that no point of the input is stored twice. O(n log
+    /// n); for tests.
+    ///
+    /// # Errors
+    /// Names the first that does not hold.
+    pub fn sanity_check(&self) -> Result<(), Flaw> {
+        let wrong = |what, index| Err(Flaw::Value { what, index });
+        self.check_structure()?;
+        self.check_contents()?;
+        let tree = self.tree();
+        for id in self.topology.ids() {
+            let bounds = tree.bounds(id);
+            for i in self.topology.points(id) {
+                if bounds.reach < self.radii[i] {
+                    return wrong("the reach of node", id.index());
+                }
+                if !self.box_holds(id, i) {
+                    return wrong("the box of node", id.index());
+                }
+            }
+        }
+        lists::check_complete(self)?;
+        let mut sources: Vec<u32> = self.source.to_vec();
+        sources.sort_unstable();
+        match sources.windows(2).find(|two| two[0] == two[1]) {
+            Some(two) => wrong("the place in the input, stored twice,", two[0] as usize),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether the box of node `id` holds the disc and the ball of point `i`.
+    fn box_holds(&self, id: NodeId, i: usize) -> bool {
+        let bounds = self.tree().bounds(id);
+        let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+        let d = double(self.positions()[i]) - double(bounds.centre);
+        let ball = f64::from(self.slices().ball(i).max(self.slices().obstacle_ball(i)));
+        (0..3).all(|k| {
+            let axis = double(bounds.axes[k]);
+            let spread = f64::from(self.discs[i]) * double(self.normals[i]).cross(&axis).norm();
+            d.dot(&axis).abs() + spread.max(ball) <= f64::from(bounds.half[k])
+        })
+    }
+}

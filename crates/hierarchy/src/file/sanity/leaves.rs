@@ -1,0 +1,28 @@
+//! What leaves are compared by: one that is not made of its points sees contacts where there are none.
+
+use bytemuck::bytes_of;
+use nearmiss_lanes::parallel::ranges;
+
+use super::flaw::Flaw;
+use crate::scan::build::PointHierarchy;
+
+/// Checks that the blocks and marks of all leaves are those of their points.
+pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
+    let (topology, parts) = (scan.topology(), scan.leaf_parts());
+    let blocks_a_leaf = scan.leaf_blocks.len() / topology.leaves();
+    let (stored, marks) = (&*scan.leaf_blocks, &*scan.marks);
+    let wrong = ranges(topology.leaves(), |mut leaves| {
+        leaves.find(|&leaf| {
+            let bounds = scan.tree().bounds(topology.leaf(leaf));
+            let is_other = |number: usize| {
+                bytes_of(&stored[number]) != bytes_of(&parts.block(topology, number, &bounds))
+            };
+            let mut blocks = leaf * blocks_a_leaf..(leaf + 1) * blocks_a_leaf;
+            blocks.any(is_other) || marks[leaf] != parts.marks(topology, leaf, &bounds)
+        })
+    });
+    match wrong.into_iter().flatten().next() {
+        Some(index) => Err(Flaw::Value { what: "the block of leaf", index }),
+        None => Ok(()),
+    }
+}

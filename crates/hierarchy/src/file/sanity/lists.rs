@@ -1,0 +1,81 @@
+//! Blocks, the balls about them, and neighbour lists: one that lies makes f what it is not.
+
+use nearmiss_index::{Level, PointBlock};
+
+use super::flaw::Flaw;
+use crate::point::gather::NeighbourList;
+use crate::point::neighbours::MOST_LISTED;
+use crate::scan::build::PointHierarchy;
+
+fn first_wrong(what: &'static str, index: Option<usize>) -> Result<(), Flaw> {
+    index.map_or(Ok(()), |index| Err(Flaw::Value { what, index }))
+}
+
+/// Checks that every list is there, and none so long that an evaluation would take its time.
+fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
+    let is_there = |list: &NeighbourList| {
+        let (first, count) = (list.first as usize, list.count as usize);
+        count <= MOST_LISTED && first <= listed && count <= listed - first && list.within.is_finite()
+    };
+    first_wrong("the neighbour list of block", lists.iter().position(|list| !is_there(list)))
+}
+
+/// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that
+/// lists ascend and name groups.
+pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
+    check_ranges(&scan.lists, scan.listed.len())?;
+    let blocks = scan.plan.blocks(scan.positions(), &scan.radii);
+    let differs = blocks.zip(&scan.blocks).position(|(expected, found)| expected != *found);
+    first_wrong("the copy of the points of block", differs)?;
+    let left_out = scan.blocks.iter().enumerate().position(|(number, block)| {
+        let group = &scan.groups[number / PointBlock::WIDTH];
+        let lane = number % PointBlock::WIDTH;
+        let ([cx, cy, cz], radius) = (group.position.map(|c| c[lane]), group.horizon[lane]);
+        let PointBlock { position: [x, y, z], horizon, .. } = block;
+        let mut held = [0_u32; PointBlock::WIDTH];
+        for i in 0..PointBlock::WIDTH {
+            let (dx, dy, dz) = (x[i] - cx, y[i] - cy, z[i] - cz);
+            let room = radius - horizon[i];
+            // Where there is no point, nothing is heard.
+            let empty = horizon[i] <= 0.0;
+            let within = (room >= 0.0) & (dx * dx + dy * dy + dz * dz <= room * room);
+            held[i] = u32::from(empty | within);
+        }
+        !(radius.is_finite() && held.iter().all(|&held| held != 0))
+    });
+    first_wrong("the ball about block", left_out)?;
+    let count = scan.groups.len();
+    let wrong = scan.lists.iter().position(|list| {
+        let entries = scan.listed.get(list.first as usize..).and_then(|rest| rest.get(..list.count as usize));
+        let ascend = |entries: &[u32]| {
+            entries.windows(2).all(|two| two[0] < two[1])
+                && entries.last().is_none_or(|&b| (b as usize) < count)
+        };
+        !entries.is_some_and(ascend)
+    });
+    first_wrong("the neighbour list of block", wrong)
+}
+
+/// Checks that no list leaves out a group of which a point is heard where the list is said to be complete.
+pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
+    let mut found = Vec::new();
+    let incomplete = (0..scan.blocks.len()).position(|block| {
+        let index = scan.index();
+        let (Some((within, list)), Some([cx, cy, cz])) = (scan.neighbours(block), index.middle(block)) else {
+            return false;
+        };
+        index.collect(Level::new(), [cx, cy, cz], within, &mut found);
+        let is_heard = |PointBlock { position: [x, y, z], horizon, .. }: &PointBlock| {
+            (0..PointBlock::WIDTH).any(|i| {
+                let d = [x[i] - cx, y[i] - cy, z[i] - cz];
+                d.map(|d| f64::from(d).powi(2)).iter().sum::<f64>().sqrt() < f64::from(horizon[i] + within)
+            })
+        };
+        let blocks = |group: u32| {
+            let first = group as usize * PointBlock::WIDTH;
+            &scan.blocks[first..(first + PointBlock::WIDTH).min(scan.blocks.len())]
+        };
+        found.iter().any(|&group| list.binary_search(&group).is_err() && blocks(group).iter().any(is_heard))
+    });
+    first_wrong("the neighbour list of block", incomplete)
+}

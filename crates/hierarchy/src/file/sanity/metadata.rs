@@ -1,0 +1,134 @@
+//! The numbers about a whole scan: how many entries its arrays have, and what the metadata say.
+
+use nearmiss_geometry::{Aabb, Dropped, Frame};
+use nearmiss_index::PointBlock;
+
+use super::flaw::{FARTHEST, Flaw};
+use super::nodes::is_in_range;
+use crate::patch::samples::SAMPLES;
+use crate::point::leaf_block::LeafParts;
+use crate::scan::build::PointHierarchy;
+use crate::scan::options::RADIUS_NEIGHBOURS;
+use crate::scan::sampling::sampling_rank;
+use crate::tree::topology::Topology;
+
+/// The nodes over so many points.
+///
+/// # Errors
+/// Names the number that no build writes.
+pub(crate) fn checked_topology(points: usize, leaf_size: u32, dense: u32) -> Result<Topology, Flaw> {
+    let wrong = |what| Err(Flaw::Metadata { what });
+    let Some(count) = u32::try_from(points).ok().filter(|&count| count > 0) else {
+        return wrong("the number of points");
+    };
+    if !(4..=64).contains(&leaf_size) {
+        return wrong("the number of points of a leaf");
+    }
+    if dense > count || (dense < count && !dense.is_multiple_of(leaf_size)) {
+        return wrong("the number of points that are not sparse");
+    }
+    Ok(Topology::new(count, leaf_size))
+}
+
+impl PointHierarchy {
+    pub(super) fn check_lengths(&self) -> Result<(), Flaw> {
+        let points = self.len();
+        let (leaves, inner) = (self.topology.leaves(), self.topology.inner());
+        let blocks = points.div_ceil(PointBlock::WIDTH);
+        let expected = [
+            ("normals", self.normals.len(), points),
+            ("radii", self.radii.len(), points),
+            ("discs", self.discs.len(), points),
+            ("kinds", self.kinds.len(), points),
+            ("source", self.source.len(), points),
+            ("boxes", self.siblings.len(), inner),
+            ("growths", self.growths[0].len(), inner),
+            ("growths of the obstacle", self.growths[1].len(), inner),
+            ("leaves", self.leaf_blocks.len(), leaves * LeafParts::blocks_a_leaf(&self.topology)),
+            ("marks", self.marks.len(), leaves),
+            ("blocks", self.blocks.len(), blocks),
+            ("samples", self.sample_lists.len(), inner.saturating_mul(self.samples_a_node as usize)),
+            ("coverings", self.coverings.len(), self.topology.len()),
+            ("groups", self.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
+            ("lists", self.lists.len(), blocks),
+        ];
+        match expected.into_iter().find(|(_, found, expected)| found != expected) {
+            Some((array, found, expected)) => Err(Flaw::Length { array, found, expected }),
+            None => Ok(()),
+        }
+    }
+
+    /// What the metadata say, as far as it shows without the points.
+    pub(super) fn check_metadata(&self) -> Result<(), Flaw> {
+        let wrong = |what| Err(Flaw::Metadata { what });
+        let Frame { origin, scale } = self.frame;
+        // Then nothing overflows on its way to the caller's frame and back.
+        let turns_back = scale > 0.0 && scale.is_normal() && scale.recip().is_normal();
+        if !(turns_back && origin.iter().all(|x| x.is_finite())) {
+            return wrong("the frame of the stored positions");
+        }
+        let Aabb { min, max } = self.bounds;
+        if !(0..3).all(|k| min[k].is_finite() && max[k].is_finite() && min[k] <= max[k]) {
+            return wrong("the box of bounds");
+        }
+        if !(self.step >= 0.0 && self.step.is_finite()) {
+            return wrong("what rounding cost");
+        }
+        if !(self.sampling_radius > 0.0 && self.sampling_radius <= FARTHEST) {
+            return wrong("the sampling radius");
+        }
+        if !(self.reach > 0.0 && self.reach <= FARTHEST) {
+            return wrong("the reach");
+        }
+        if !is_in_range(&self.root.bounds) {
+            return wrong("the box of the root");
+        }
+        if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
+            return wrong("the number of neighbours for a radius");
+        }
+        if !SAMPLES.contains(&self.samples_a_node) {
+            return wrong("the number of samples of a node");
+        }
+        if u32::try_from(self.given()).is_err() {
+            return wrong("the number of dropped points");
+        }
+        Ok(())
+    }
+
+    /// How many points the input had: sources lie below it.
+    pub(super) fn given(&self) -> usize {
+        let Dropped { not_finite, duplicate, filtered } = self.dropped;
+        let dropped = not_finite.saturating_add(duplicate).saturating_add(filtered);
+        dropped.saturating_add(self.len())
+    }
+
+    /// What the metadata say, against the points, which are sound.
+    pub(super) fn check_summary(&self) -> Result<(), Flaw> {
+        let [mut low, mut high] = [self.positions()[0]; 2];
+        for p in self.positions() {
+            for k in 0..3 {
+                low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+                high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+            }
+        }
+        // The way to the caller's frame keeps the order, rounding included.
+        if (self.frame.to_world(low), self.frame.to_world(high)) != (self.bounds.min, self.bounds.max) {
+            return Err(Flaw::Metadata { what: "the box of bounds" });
+        }
+        let (mut less, mut more) = (0_u32, 0_u32);
+        for &r in &self.radii {
+            less += u32::from(r < self.sampling_radius);
+            more += u32::from(r > self.sampling_radius);
+        }
+        let (less, more) = (less as usize, more as usize);
+        let rank = sampling_rank(self.len());
+        if less > rank || more > self.len() - 1 - rank {
+            return Err(Flaw::Metadata { what: "the sampling radius" });
+        }
+        // As text, so that what is no number equals itself.
+        if format!("{:?}", self.outlined()) != format!("{:?}", self.outline) {
+            return Err(Flaw::Metadata { what: "the outline of the scan" });
+        }
+        Ok(())
+    }
+}

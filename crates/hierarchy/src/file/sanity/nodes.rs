@@ -1,0 +1,112 @@
+//! The boxes: one that is none, or that leaves its parent's, makes a query look everywhere or miss a contact.
+
+use bytemuck::{bytes_of, cast_ref};
+use nearmiss_geometry::NodeId;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::ranges;
+use nearmiss_lanes::vector::{dot, sub};
+
+use super::flaw::{FARTHEST, Flaw};
+use crate::bounds::boxes::OrientedBox;
+use crate::bounds::growth::Growth;
+use crate::scan::build::PointHierarchy;
+use crate::tree::wide::Siblings;
+
+/// Axes are unit and at right angles to rounding; this is far from rounding and far from a box that lies.
+const ASKEW: f32 = 1e-3;
+
+/// What rounding may make a child stick out of its parent, relative to their coordinates: both boxes were
+/// grown by 2e-6 of their own, and the comparison rounds as much again.
+const STICKS_OUT: f32 = 8e-6;
+
+/// Numbers of a box.
+const NUMBERS: usize = size_of::<OrientedBox>() / size_of::<f32>();
+
+/// For each number of a box the bits that count, all or all but the sign, and the greatest value they may
+/// have. Finite numbers without their sign are ordered like their bits, and what is not finite is above them
+/// all.
+const RANGES: [(u32, u32); NUMBERS] = {
+    let mut ranges = [(u32::MAX, FARTHEST.to_bits()); NUMBERS];
+    let mut i = 0;
+    while i < 15 {
+        match i {
+            0..3 => ranges[i].0 = i32::MAX.cast_unsigned(),
+            3..6 => {}
+            _ => ranges[i] = (i32::MAX.cast_unsigned(), (1.0 + ASKEW).to_bits()),
+        }
+        i += 1;
+    }
+    ranges
+};
+
+/// Returns `true` if the numbers of a box lie in their ranges: the middle, half edges, axes, reach.
+pub(super) fn is_in_range(bounds: &OrientedBox) -> bool {
+    let bits: &[u32; NUMBERS] = cast_ref(bounds);
+    let mut beyond = 0;
+    for (x, (mask, most)) in bits.iter().zip(RANGES) {
+        beyond |= u32::from(x & mask > most);
+    }
+    beyond == 0
+}
+
+/// Checks the boxes and enclosures of all nodes: their numbers lie in their ranges, axes form a frame, each
+/// box lies within its parent's, and where there is no child nothing is said.
+pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
+    let (topology, tree) = (scan.topology(), scan.tree());
+    let wrong = |what, id: NodeId| Err(Flaw::Value { what, index: id.index() });
+    let is_sound = |bounds: &OrientedBox| is_in_range(bounds) && is_frame(&bounds.axes);
+    if !is_sound(&scan.root.bounds) {
+        return wrong("the box of node", NodeId::ROOT);
+    }
+    let found = ranges(topology.inner(), |parents| {
+        for parent in parents {
+            let (id, siblings) = (NodeId(id32(parent)), &tree.siblings[parent]);
+            let own = tree.bounds(id);
+            let children = topology.children(id);
+            let mut again = Siblings::NONE;
+            for (lane, child) in children.iter().enumerate() {
+                let bounds = siblings.get(lane);
+                again.set(lane, &bounds);
+                if !(is_sound(&bounds) && lies_within(&bounds, &own)) {
+                    return wrong("the box of node", child);
+                }
+                let growths = tree.growths.map(|of| of[parent].get(lane));
+                if !growths.iter().all(Growth::is_sound) {
+                    return wrong("the enclosure of node", child);
+                }
+            }
+            if bytes_of(&again) != bytes_of(siblings) {
+                return wrong("the boxes of the children of node", id);
+            }
+        }
+        Ok(())
+    });
+    found.into_iter().collect()
+}
+
+/// Whether three vectors are unit and at right angles. Written so that what is no number fails.
+#[inline]
+fn is_frame(&[x, y, z]: &[[f32; 3]; 3]) -> bool {
+    let is_unit = |axis: [f32; 3]| (dot(axis, axis) - 1.0).abs() <= ASKEW;
+    let is_right = |a: [f32; 3], b: [f32; 3]| dot(a, b).abs() <= ASKEW;
+    is_unit(x) & is_unit(y) & is_unit(z) & is_right(x, y) & is_right(x, z) & is_right(y, z)
+}
+
+/// Whether `child` may be the box of a node under that of `parent`: along each of its own axes it is no
+/// longer than the discs it is about, which the parent's box holds, and no point below it reaches further.
+#[inline]
+fn lies_within(child: &OrientedBox, parent: &OrientedBox) -> bool {
+    let d = sub(child.centre, parent.centre);
+    let size = |v: [f32; 3]| v[0].abs() + v[1].abs() + v[2].abs();
+    let slack = STICKS_OUT * (size(parent.centre) + size(parent.half));
+    let mut inside = child.reach <= parent.reach;
+    for k in 0..3 {
+        let u = child.axes[k];
+        let mut room = slack;
+        for j in 0..3 {
+            room += parent.half[j] * dot(parent.axes[j], u).abs();
+        }
+        inside &= dot(d, u).abs() + child.half[k] <= room;
+    }
+    inside
+}

@@ -1,0 +1,9 @@
+//! What is known of the points of a node: tangent discs, samples, coverings, enclosures.
+
+pub(crate) mod centres;
+pub(crate) mod classes;
+pub(crate) mod covering;
+pub(crate) mod enclosure;
+pub(crate) mod extents;
+pub(crate) mod samples;
+pub(crate) mod surfels;

@@ -1,0 +1,410 @@
+//! Enclosures: boxes that provably contain the surface.
+//!
+//! A surface point x belongs to the leaf of its nearest cloud point p. With J the points whose horizon
+//! reaches x, three facts bound where it can be (docs/theory/certificates.md has the argument step by step):
+//!
+//! 1. a(x) is in the hull of J and ‖x − a(x)‖ ≤ 0.56 h(x), so x is in the hull of J grown by 0.56 of J's
+//!    greatest h;
+//! 2. x is in the inner half of the horizon of one of J, and p is not further from x than that: x is within
+//!    half the greatest horizon of those that reach p;
+//! 3. x is on p's side of the plane half-way between p and any other point.
+//!
+//! None of them uses f(x) = 0: every x of status ok is enclosed.
+//!
+//! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a cylinder about
+//! its normal, and the leaf's part is in the box about these as well; whichever is less counts. The enclosure
+//! of an inner node is the least box along its own axes about those of its leaves. The paper's claim that x
+//! is in the hull of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
+
+use std::ops::Range;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::vector::{cross, tangents};
+use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load, product, seen_from};
+use nearmiss_surface::BORDER;
+
+use crate::bounds::boxes::OrientedBox;
+use crate::bounds::growth::Growth;
+use crate::point::gather::Index;
+use crate::point::neighbours::Locality;
+use crate::tree::topology::Topology;
+
+/// Sectors of a tangent plane in which a cell is bounded one by one.
+const SECTORS: usize = 16;
+
+/// Unit vectors between the sectors, 22.5 degrees apart.
+const RAYS: [[f32; SECTORS]; 2] = {
+    const A: f32 = 0.923_879_5;
+    const B: f32 = 0.707_106_77;
+    const C: f32 = 0.382_683_43;
+    [
+        [1.0, A, B, C, 0.0, -C, -B, -A, -1.0, -A, -B, -C, 0.0, C, B, A],
+        [0.0, C, B, A, 1.0, A, B, C, 0.0, -C, -B, -A, -1.0, -A, -B, -C],
+    ]
+};
+
+/// At the place of each ray the next.
+const NEXT_RAYS: [[f32; SECTORS]; 2] = {
+    let mut next = RAYS;
+    let mut k = 0;
+    while k < SECTORS {
+        (next[0][k], next[1][k]) = (RAYS[0][(k + 1) % SECTORS], RAYS[1][(k + 1) % SECTORS]);
+        k += 1;
+    }
+    next
+};
+
+/// Neighbours further than this many local radii bound a cell only beside holes; what is missed there makes
+/// it wider, never wrong.
+const NEIGHBOURS: f32 = 1.75;
+
+/// What single precision may cost here, relatively: some hundred roundings in differences of nearby numbers.
+const GROWN: f32 = 1.0 + 1e-4;
+
+/// Points that are worked on together.
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// What may reach a leaf's part of the surface, relative to a point of the leaf, in lanes.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Surroundings {
+    origin: [f32; 3],
+    blocks: Vec<PointBlock>,
+    /// How far a surface point can be from its nearest point: fact 2.
+    reach: f32,
+    /// 0.56 h over the horizon.
+    border: f32,
+}
+
+impl Surroundings {
+    /// Those of a leaf with a point `origin`.
+    #[inline(always)]
+    pub(crate) fn fill(&mut self, index: &Index<'_>, origin: [f32; 3], locality: &Locality) {
+        self.origin = origin;
+        self.reach = locality.reach * GROWN;
+        #[expect(clippy::cast_possible_truncation, reason = "a constant")]
+        let border = BORDER as f32 * GROWN;
+        self.border = border * index.plan.bandwidth(1.0) / index.plan.horizon(1.0);
+        self.blocks.clear();
+        for &id in &locality.blocks {
+            let mut block = index.blocks[id as usize];
+            for k in 0..3 {
+                block.position[k].iter_mut().for_each(|x| *x -= origin[k]);
+            }
+            block.horizon.iter_mut().for_each(|h| *h *= GROWN);
+            self.blocks.push(block);
+        }
+    }
+
+    /// Where the surface points nearest to the point `p` can be, whose neighbours are in the blocks `near`.
+    #[inline(always)]
+    pub(crate) fn cell<'a, S: Simd>(
+        &self,
+        simd: S,
+        p: [f32; 3],
+        normal: [f32; 3],
+        radius: f32,
+        near: impl Iterator<Item = &'a PointBlock>,
+    ) -> Cell {
+        let (u, v) = tangents(normal);
+        let reach = self.reach;
+        let (low, high) = self.heights(simd, sub(p, self.origin), normal, reach);
+        let mut cell = Cell { across: reach, low: low.max(-reach), high: high.min(reach) };
+        let frame = [u, v, normal];
+        cell.across = across(simd, p, frame, &cell, NEIGHBOURS * radius, near).min(reach);
+        cell
+    }
+
+    /// Fact 1 along the normal of `p`: the least and greatest height of a surface point within `reach` of it.
+    #[inline(always)]
+    fn heights<S: Simd>(&self, simd: S, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut low, mut high, mut most) = (zero, zero, zero);
+        for block in &self.blocks {
+            let d = seen_from(simd, &block.position, p);
+            let horizon = f32x16::load_array_ref(simd, &block.horizon);
+            let within = horizon + reach;
+            let reaches: mask32x16<S> = product(d, d).simd_lt(within * within);
+            let height = simd.select_f32x16(reaches, along(d, normal), zero);
+            let heard = simd.select_f32x16(reaches, horizon, zero);
+            (low, high, most) = (height.min(low), height.max(high), heard.max(most));
+        }
+        let margin = self.border * greatest(most, 0.0);
+        (least(low, 0.0) - margin, greatest(high, 0.0) + margin)
+    }
+}
+
+/// Fact 3: how far from its axis a surface point in the cell of `p` can be. Of the points in the blocks
+/// `near` those `within` some distance of it are looked at; the last axis is the normal.
+#[inline(always)]
+fn across<'a, S: Simd>(
+    simd: S,
+    p: [f32; 3],
+    axes: [[f32; 3]; 3],
+    cell: &Cell,
+    within: f32,
+    near: impl Iterator<Item = &'a PointBlock>,
+) -> f32 {
+    // Per sector the greatest reciprocal of a bound.
+    let mut closed = f32x16::splat(simd, 0.0);
+    for block in near {
+        let d = seen_from(simd, &block.position, p);
+        let d_sq = product(d, d);
+        let counts: mask32x16<S> = d_sq.simd_gt(0.0) & d_sq.simd_le(within * within);
+        if !counts.any_true() {
+            continue;
+        }
+        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal of a neighbour q, and any height
+        // z.
+        let height = along(d, axes[2]);
+        let bound = d_sq * 0.5 + (-(height * cell.low)).max(-(height * cell.high)).max(0.0);
+        let (x, y) = ((along(d, axes[0]) / bound).to_array(), (along(d, axes[1]) / bound).to_array());
+        let counts: mask32x16<S> = counts & bound.simd_ge(f32::MIN_POSITIVE);
+        let mut bits = counts.to_bitmask();
+        while bits != 0 {
+            let i = bits.trailing_zeros() as usize % WIDTH;
+            bits &= bits - 1;
+            // What holds at both rays of a sector holds between them.
+            let (side, next) = (rays(simd, &RAYS, x[i], y[i]), rays(simd, &NEXT_RAYS, x[i], y[i]));
+            let is_less: mask32x16<S> = side.simd_lt(next);
+            let least = simd.select_f32x16(is_less, side, next);
+            // What is no number, or a zero of either sign, leaves a sector open.
+            let is_more: mask32x16<S> = least.simd_gt(closed);
+            closed = simd.select_f32x16(is_more, least, closed);
+        }
+    }
+    let least = least(closed, f32::INFINITY);
+    if least > 0.0 { GROWN / least } else { f32::INFINITY }
+}
+
+/// How far a vector goes along each of some rays.
+#[inline(always)]
+fn rays<S: Simd>(simd: S, rays: &[[f32; SECTORS]; 2], x: f32, y: f32) -> f32x16<S> {
+    f32x16::load_array_ref(simd, &rays[0]) * x + f32x16::load_array_ref(simd, &rays[1]) * y
+}
+
+/// Where the surface points nearest to a point can be: a cylinder about its normal.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Cell {
+    /// Radius.
+    pub(crate) across: f32,
+    /// Least (not positive) and greatest (not negative) height along the normal.
+    low: f32,
+    high: f32,
+}
+
+impl Cell {
+    /// The part of it no further than `across` from the axis and `height` from the plane.
+    pub(crate) fn within(&self, across: f32, height: f32) -> Self {
+        Self { across: self.across.min(across), low: self.low.max(-height), high: self.high.min(height) }
+    }
+
+    /// The greatest height to either side.
+    pub(crate) fn height(&self) -> f32 {
+        self.high.max(-self.low)
+    }
+}
+
+/// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeafBounds {
+    axes: [[f32; 3]; 3],
+    origin: [f32; 3],
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl LeafBounds {
+    /// Facts 1 and 2 for a leaf with these points and box.
+    #[inline(always)]
+    pub(crate) fn new<S: Simd>(
+        simd: S,
+        points: &[[f32; 3]],
+        about: &OrientedBox,
+        surroundings: &Surroundings,
+    ) -> Self {
+        let (axes, origin, reach) = (about.axes, points[0], surroundings.reach);
+        let (mut own_low, mut own_high) = ([0.0_f32; 3], [0.0_f32; 3]);
+        for p in points {
+            for k in 0..3 {
+                let c = dot(axes[k], sub(*p, origin));
+                (own_low[k], own_high[k]) = (own_low[k].min(c), own_high[k].max(c));
+            }
+        }
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut low, mut high, mut most) = ([zero; 3], [zero; 3], zero);
+        for block in &surroundings.blocks {
+            let d = load(simd, &block.position);
+            let (mut at, mut far) = ([zero; 3], [zero; 3]);
+            for k in 0..3 {
+                at[k] = along(d, axes[k]);
+                far[k] = (-(at[k] - own_low[k])).max(at[k] - own_high[k]).max(zero);
+            }
+            let horizon = f32x16::load_array_ref(simd, &block.horizon);
+            let within = horizon + reach;
+            let is_near: mask32x16<S> = product(far, far).simd_lt(within * within);
+            for k in 0..3 {
+                low[k] = simd.select_f32x16(is_near, at[k].min(low[k]), low[k]);
+                high[k] = simd.select_f32x16(is_near, at[k].max(high[k]), high[k]);
+            }
+            most = simd.select_f32x16(is_near, horizon.max(most), most);
+        }
+        let margin = surroundings.border * greatest(most, 0.0);
+        let mut bounds = Self { axes, origin, low: own_low, high: own_high };
+        for k in 0..3 {
+            bounds.low[k] = (least(low[k], own_low[k]) - margin).max(own_low[k] - reach);
+            bounds.high[k] = (greatest(high[k], own_high[k]) + margin).min(own_high[k] + reach);
+        }
+        bounds
+    }
+
+    /// Begins to bound the leaf by its points' cells.
+    pub(crate) fn cells(&self) -> Cells {
+        Cells { leaf: *self, low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] }
+    }
+
+    /// The same axes without an extent: what is enclosed lies in the box already.
+    pub(crate) fn empty(&self) -> Self {
+        Self { low: [0.0; 3], high: [0.0; 3], ..*self }
+    }
+
+    /// What `bounds`, a box of the same axes, must grow by.
+    fn growth(&self, bounds: &OrientedBox) -> Growth {
+        let at = self.axes.map(|axis| dot(axis, self.origin));
+        Growth::new(
+            bounds,
+            [0, 1, 2].map(|k| at[k] + self.low[k] * GROWN),
+            [0, 1, 2].map(|k| at[k] + self.high[k] * GROWN),
+        )
+    }
+}
+
+/// The extents of the cells of a leaf's points.
+#[derive(Debug)]
+pub(crate) struct Cells {
+    leaf: LeafBounds,
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl Cells {
+    /// Includes the cell of the point `p` with this normal.
+    pub(crate) fn include(&mut self, p: [f32; 3], normal: [f32; 3], cell: &Cell) {
+        let d = sub(p, self.leaf.origin);
+        for k in 0..3 {
+            let axis = self.leaf.axes[k];
+            let spread = cross(axis, normal);
+            let spread = cell.across * dot(spread, spread).sqrt();
+            let cosine = dot(axis, normal);
+            let (a, b) = (cosine * cell.low, cosine * cell.high);
+            let c = dot(axis, d);
+            self.low[k] = self.low[k].min(c - spread + a.min(b));
+            self.high[k] = self.high[k].max(c + spread + a.max(b));
+        }
+    }
+
+    /// The bounds of the leaf with the cells of all its points included.
+    pub(crate) fn close(self) -> LeafBounds {
+        let Self { mut leaf, low, high } = self;
+        for k in 0..3 {
+            // Nothing but numbers in order may take anything off.
+            if low[k] <= high[k] {
+                leaf.low[k] = leaf.low[k].max(low[k]);
+                leaf.high[k] = leaf.high[k].min(high[k]);
+            }
+        }
+        leaf
+    }
+}
+
+/// What the boxes about the discs of all nodes must grow by to be enclosures, given the bounds of the leaves
+/// in order.
+pub(crate) fn growths(topology: &Topology, boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<Growth> {
+    let leaf_boxes = &boxes[topology.inner()..];
+    let of_leaves: Vec<(Growth, OrientedBox)> = leaf_boxes
+        .iter()
+        .zip(leaves)
+        .map(|(bounds, leaf)| {
+            let growth = leaf.growth(bounds);
+            (growth, growth.of(bounds))
+        })
+        .collect();
+    let blocks: Vec<BoxBlock> = of_leaves.chunks(WIDTH).map(BoxBlock::of).collect();
+    let level = Level::new();
+    map(topology.len(), |id| {
+        let id = NodeId(id32(id));
+        let range = topology.leaves_under(id);
+        if topology.is_leaf(id) {
+            return of_leaves[range.start].0;
+        }
+        let bounds = &boxes[id.index()];
+        let [low, high] = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || extents(simd, &blocks, &range, &bounds.axes),
+        ));
+        Growth::new(bounds, low, high)
+    })
+}
+
+/// Boxes side by side.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct BoxBlock {
+    centre: [[f32; WIDTH]; 3],
+    half: [[f32; WIDTH]; 3],
+    axes: [[[f32; WIDTH]; 3]; 3],
+}
+
+impl BoxBlock {
+    fn of(boxes: &[(Growth, OrientedBox)]) -> Self {
+        let zero = [[0.0; WIDTH]; 3];
+        let mut block = Self { centre: zero, half: zero, axes: [zero; 3] };
+        for (lane, (_, bounds)) in boxes.iter().enumerate() {
+            for k in 0..3 {
+                block.centre[k][lane] = bounds.centre[k];
+                block.half[k][lane] = bounds.half[k];
+                for j in 0..3 {
+                    block.axes[k][j][lane] = bounds.axes[k][j];
+                }
+            }
+        }
+        block
+    }
+}
+
+/// How far these of the boxes reach along some axes, either way: what is [`OrientedBox::along`] of one.
+#[inline(always)]
+fn extents<S: Simd>(
+    simd: S,
+    blocks: &[BoxBlock],
+    range: &Range<usize>,
+    axes: &[[f32; 3]; 3],
+) -> [[f32; 3]; 2] {
+    let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
+    let (mut low, mut high) = ([most; 3], [none; 3]);
+    for number in range.start / WIDTH..range.end.div_ceil(WIDTH) {
+        let block = &blocks[number];
+        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, range)));
+        for k in 0..3 {
+            let middle = along(load(simd, &block.centre), axes[k]);
+            let mut spread = f32x16::splat(simd, 0.0);
+            for j in 0..3 {
+                let cosine = along(load(simd, &block.axes[j]), axes[k]).abs();
+                spread += f32x16::load_array_ref(simd, &block.half[j]) * cosine;
+            }
+            low[k] = low[k].min(simd.select_f32x16(inside, middle - spread, most));
+            high[k] = high[k].max(simd.select_f32x16(inside, middle + spread, none));
+        }
+    }
+    let mut bounds = [[0.0; 3]; 2];
+    for k in 0..3 {
+        bounds[0][k] = least(low[k], f32::INFINITY);
+        bounds[1][k] = greatest(high[k], f32::NEG_INFINITY);
+    }
+    bounds
+}

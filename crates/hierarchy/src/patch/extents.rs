@@ -1,0 +1,111 @@
+//! Boxes about the discs of all nodes, sixteen discs at a time.
+
+use std::ops::Range;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
+
+use crate::bounds::boxes::OrientedBox;
+use crate::point::kind::THICKNESS;
+use crate::tree::topology::Topology;
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// Discs side by side.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct DiscBlock {
+    position: [[f32; WIDTH]; 3],
+    normal: [[f32; WIDTH]; 3],
+    disc: [f32; WIDTH],
+    ball: [f32; WIDTH],
+}
+
+/// The discs of all points, and the balls about those that have one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Discs<'a> {
+    pub(crate) positions: &'a [[f32; 3]],
+    pub(crate) normals: &'a [[f32; 3]],
+    pub(crate) discs: &'a [f32],
+    pub(crate) balls: &'a [f32],
+}
+
+/// For each node the least box along the axes of that `about` it that contains the discs of its points with
+/// their thickness, and their balls. O(n log n).
+pub(crate) fn boxes_of_discs(
+    topology: &Topology,
+    about: &[OrientedBox],
+    discs: &Discs<'_>,
+) -> Vec<OrientedBox> {
+    let blocks = discs.blocks();
+    let level = Level::new();
+    map(topology.len(), |id| {
+        let about = &about[id];
+        let [low, high] = dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || extents(simd, &blocks, topology.points(NodeId(id32(id))), &about.axes),
+        ));
+        OrientedBox::spanned(about.axes, low, high, about.reach)
+    })
+}
+
+impl Discs<'_> {
+    fn blocks(&self) -> Vec<DiscBlock> {
+        map(self.positions.len().div_ceil(WIDTH), |number| self.block(number))
+    }
+
+    fn block(&self, number: usize) -> DiscBlock {
+        let zero = [0.0; WIDTH];
+        let mut block = DiscBlock { position: [zero; 3], normal: [zero; 3], disc: zero, ball: zero };
+        let first = number * WIDTH;
+        for i in first..(first + WIDTH).min(self.positions.len()) {
+            for k in 0..3 {
+                block.position[k][i - first] = self.positions[i][k];
+                block.normal[k][i - first] = self.normals[i][k];
+            }
+            block.disc[i - first] = self.discs[i];
+            block.ball[i - first] = self.balls[i];
+        }
+        block
+    }
+}
+
+/// How far these of the discs reach along some axes, either way.
+#[inline(always)]
+fn extents<S: Simd>(
+    simd: S,
+    blocks: &[DiscBlock],
+    points: Range<usize>,
+    axes: &[[f32; 3]; 3],
+) -> [[f32; 3]; 2] {
+    let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
+    let (mut low, mut high) = ([most; 3], [none; 3]);
+    for number in points.start / WIDTH..points.end.div_ceil(WIDTH) {
+        let block = &blocks[number];
+        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, &points)));
+        let (position, normal) = (load(simd, &block.position), load(simd, &block.normal));
+        let (disc, ball) =
+            (f32x16::load_array_ref(simd, &block.disc), f32x16::load_array_ref(simd, &block.ball));
+        for k in 0..3 {
+            // ‖n × axis‖, without the cancellation of √(1 − (n·axis)²).
+            let [ax, ay, az] = axes[k];
+            let [x, y, z] = normal;
+            let (x, y, z) = (z * ay - y * az, x * az - z * ax, y * ax - x * ay);
+            let spread = (disc * ((x * x + y * y + z * z).sqrt() + THICKNESS)).max(ball);
+            let middle = along(position, axes[k]);
+            low[k] = low[k].min(simd.select_f32x16(inside, middle - spread, most));
+            high[k] = high[k].max(simd.select_f32x16(inside, middle + spread, none));
+        }
+    }
+    let mut bounds = [[0.0; 3]; 2];
+    for k in 0..3 {
+        bounds[0][k] = least(low[k], f32::INFINITY);
+        bounds[1][k] = greatest(high[k], f32::NEG_INFINITY);
+    }
+    bounds
+}

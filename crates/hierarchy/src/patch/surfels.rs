@@ -1,0 +1,392 @@
+//! Tangent discs ("surfels"): what each point says of the surface to first order.
+//!
+//! A point's normal is that of the weighted least-squares fit at the point itself. Its disc is as wide as it
+//! must be for the discs of neighbours to close the surface, and narrower at a border, which shows as a wide
+//! sector of the tangent plane without a neighbour: the discs of two scans whose borders face each other a
+//! sampling radius apart must not meet.
+
+use std::ops::Range;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
+use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::vector::{dot, sub, tangents};
+use nearmiss_lanes::wide::{along, product, seen_from};
+use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Status, symmetric_eigen};
+
+use crate::bounds::boxes::OrientedBox;
+use crate::patch::covering::Solid;
+use crate::patch::enclosure::{Cell, LeafBounds, Surroundings};
+use crate::point::gather::Index;
+use crate::point::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
+use crate::point::neighbours::Locality;
+use crate::point::spacing::{Look, Spacing};
+
+/// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a
+/// square lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
+const DISC: f32 = 0.65;
+
+/// Disc radius over local sampling radius at a border. Local radii grow there, to some 1.3 times those
+/// inside, and two discs must not bridge a sampling radius.
+const DISC_AT_BORDER: f32 = 0.35;
+
+/// Sectors into which the tangent plane is divided, equal on a diamond: of 11 to 18 degrees.
+const SECTORS: u32 = 24;
+
+/// So many empty sectors side by side occur in the interior, even of random samples.
+const INTERIOR_GAP: u32 = 6;
+
+/// So many mean a border: about 135 degrees. A straight one leaves 180, a right-angled notch 90.
+const BORDER_GAP: u32 = 9;
+
+/// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
+const LINE: f64 = 0.05;
+
+/// The surface at a point to first order, and the point's class.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Fit {
+    pub(crate) normal: [f32; 3],
+    pub(crate) kind: PointKind,
+}
+
+/// A point's disc.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Surfel {
+    pub(crate) normal: [f32; 3],
+    pub(crate) disc: f32,
+    pub(crate) kind: PointKind,
+    /// Where the surface nearest to the point is.
+    pub(crate) cell: Cell,
+}
+
+/// The discs of all points as arrays, and the bounds of all leaves.
+#[derive(Debug)]
+pub(crate) struct Surfels {
+    pub(crate) normals: Vec<[f32; 3]>,
+    pub(crate) discs: Vec<f32>,
+    pub(crate) kinds: Vec<u8>,
+    /// The radius of each point's ball: the greater of [`Slices::ball`](crate::Slices::ball) and
+    /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball).
+    pub(crate) balls: Vec<f32>,
+    /// About the disc and the ball of each point.
+    pub(crate) flat: Vec<Solid>,
+    /// About its cell as well.
+    pub(crate) cells: Vec<Solid>,
+    pub(crate) leaves: Vec<LeafBounds>,
+    /// Bounds of the leaves' parts of the obstacle.
+    pub(crate) obstacles: Vec<LeafBounds>,
+}
+
+impl Surfels {
+    fn with_capacity(points: usize) -> Self {
+        Self {
+            normals: Vec::with_capacity(points),
+            discs: Vec::with_capacity(points),
+            kinds: Vec::with_capacity(points),
+            balls: Vec::with_capacity(points),
+            flat: Vec::with_capacity(points),
+            cells: Vec::with_capacity(points),
+            leaves: Vec::new(),
+            obstacles: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, surfel: &Surfel, ball: f32) {
+        let solid = Solid::of_disc(surfel.disc, ball);
+        self.normals.push(surfel.normal);
+        self.discs.push(surfel.disc);
+        self.kinds.push(surfel.kind.code());
+        self.balls.push(ball);
+        self.flat.push(solid);
+        self.cells.push(Solid::of_cell(&surfel.cell, solid));
+    }
+}
+
+/// Reused from leaf to leaf.
+#[derive(Debug, Default)]
+struct LeafScratch {
+    locality: Locality,
+    surroundings: Surroundings,
+    /// The blocks that are heard at a point.
+    near: Vec<u32>,
+    halves: Vec<HalfBlock>,
+    fits: Vec<Moments>,
+}
+
+/// What is known of all points before their discs, in order.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Known<'a> {
+    pub(crate) positions: &'a [[f32; 3]],
+    pub(crate) radii: &'a [f32],
+    /// The scan's sampling radius.
+    pub(crate) ordinary: f32,
+    /// The scan's reach.
+    pub(crate) reach: f32,
+    /// Sparse points come from here on.
+    pub(crate) dense: usize,
+}
+
+/// The surface at every point, and the class that follows from it. O(n).
+pub(crate) fn fits(
+    index: &Index<'_>,
+    positions: &[[f32; 3]],
+    (radii, spacings): (&[f32], &[Spacing]),
+) -> Vec<Fit> {
+    let leaves = leaves(index);
+    let level = Level::new();
+    let parts = chunks(&leaves, |leaves| {
+        let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
+        for (points, about) in leaves {
+            let spacings = &spacings[points.clone()];
+            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
+            dispatch!(level, simd => leaf.fit(simd, index, &mut scratch, |at, i| {
+                fits.push(fitted(&at, spacings[i].look));
+            }));
+        }
+        fits
+    });
+    parts.concat()
+}
+
+/// The ranges of points of all leaves, and the boxes about them.
+fn leaves(index: &Index<'_>) -> Vec<(Range<usize>, OrientedBox)> {
+    let topology = index.tree.topology;
+    let leaf = |number| (topology.points_of_leaf(number), index.tree.bounds(topology.leaf(number)));
+    (0..topology.leaves()).map(leaf).collect()
+}
+
+/// The discs of all points and the bounds of all leaves, in order.
+pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Surfels {
+    let leaves = leaves(index);
+    let level = Level::new();
+    let parts = chunks(&leaves, |leaves| {
+        let (mut scratch, mut surfels) = (LeafScratch::default(), Vec::new());
+        let bounds = leaves
+            .iter()
+            .map(|(points, about)| {
+                let Known { positions, radii, reach, dense, .. } = *known;
+                let leaf =
+                    Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
+                let is_dense = points.start < dense;
+                let fits = &fits[points.clone()];
+                dispatch!(level, simd => {
+                    leaf.look_about(simd, index, (fits, reach, is_dense), &mut scratch, &mut surfels)
+                })
+            })
+            .collect::<Vec<_>>();
+        (surfels, bounds)
+    });
+    let mut all = Surfels::with_capacity(known.positions.len());
+    let mut radii = known.radii.iter().enumerate();
+    for (surfels, bounds) in parts {
+        for (surfel, (i, &radius)) in surfels.iter().zip(&mut radii) {
+            let own = obstacle_ball(i, known.dense, surfel.kind, radius);
+            let ball = ball(surfel.kind, radius, known.ordinary);
+            all.push(&Surfel { disc: surfel.disc_within(ball), ..*surfel }, ball.max(own));
+        }
+        for [surface, obstacle] in bounds {
+            all.leaves.push(surface);
+            all.obstacles.push(obstacle);
+        }
+    }
+    all
+}
+
+/// The points of a leaf, and the box about them.
+#[derive(Debug, Clone, Copy)]
+struct Leaf<'a> {
+    positions: &'a [[f32; 3]],
+    radii: &'a [f32],
+    about: &'a OrientedBox,
+}
+
+impl Leaf<'_> {
+    /// The surface at every point.
+    #[inline(always)]
+    fn fit<S: Simd>(
+        &self,
+        simd: S,
+        index: &Index<'_>,
+        scratch: &mut LeafScratch,
+        mut found: impl FnMut(Evaluation, usize),
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let LeafScratch { locality, near, halves, fits, .. } = scratch;
+                let middle = self.about.centre;
+                let own = self.positions.iter().map(|p| sub(*p, middle)).map(|d| dot(d, d));
+                let own = own.fold(0.0, f32::max).sqrt();
+                index.collect_by(simd, middle, own, &mut locality.groups);
+                fits.clear();
+                for p in self.positions {
+                    let x = Centre::new(p.map(f64::from));
+                    fits.push(index.moments(simd, &x, &locality.groups, near, halves));
+                }
+                Moments::evaluate_all(simd, index.plan, self.positions, fits, |i, at| found(at, i));
+            },
+        );
+    }
+
+    /// The discs of the points, narrowed at borders, and bounds of their part of the surface and of the
+    /// obstacle.
+    #[inline(always)]
+    fn look_about<S: Simd>(
+        &self,
+        simd: S,
+        index: &Index<'_>,
+        (fits, reach, is_dense): (&[Fit], f32, bool),
+        scratch: &mut LeafScratch,
+        surfels: &mut Vec<Surfel>,
+    ) -> [LeafBounds; 2] {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let LeafScratch { locality, surroundings, near, .. } = scratch;
+                // Radii grow by at most 0.3 per length, and few as fast.
+                locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
+                surroundings.fill(index, self.positions[0], locality);
+                let bounds = LeafBounds::new(simd, self.positions, self.about, surroundings);
+                let (mut cells, mut obstacle) = (bounds.cells(), bounds.cells());
+                let mut has_cells = false;
+                for ((p, &radius), fit) in self.positions.iter().zip(self.radii).zip(fits) {
+                    let near = index.heard(simd, &locality.groups, *p, 0.0, near);
+                    let blocks = || near.iter().map(|&block| &index.blocks[block as usize]);
+                    let gap = widest_gap(simd, *p, fit.normal, blocks());
+                    let cell = surroundings.cell(simd, *p, fit.normal, radius, blocks());
+                    cells.include(*p, fit.normal, &cell);
+                    if is_dense && fit.kind.is_sheet() {
+                        has_cells = true;
+                        obstacle.include(
+                            *p,
+                            fit.normal,
+                            &cell.within(cell_radius(radius, reach), SLAB * radius),
+                        );
+                    }
+                    surfels.push(Surfel { cell, ..surfel(fit, radius, reach, gap) });
+                }
+                let obstacle = if has_cells { obstacle.close() } else { bounds.empty() };
+                [cells.close(), obstacle]
+            },
+        )
+    }
+}
+
+impl Surfel {
+    /// The radius of the disc; about a sparse point no more than that of its `ball`.
+    pub(crate) fn disc_within(&self, ball: f32) -> f32 {
+        if self.kind.is_sparse() { self.disc.min(ball) } else { self.disc }
+    }
+}
+
+/// The disc of a point with this many empty sectors about it.
+fn surfel(fit: &Fit, radius: f32, reach: f32, gap: u32) -> Surfel {
+    // What is further than half the reach from all points is a hole.
+    let disc = (radius * disc(gap)).min(0.5 * reach);
+    Surfel { normal: fit.normal, disc, kind: fit.kind, cell: Cell::default() }
+}
+
+/// What f at a point says of it.
+pub(crate) fn fitted(at: &Evaluation, look: Look) -> Fit {
+    #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
+    let normal = at.normal.map(|c| c as f32);
+    Fit { normal, kind: kind(at, look) }
+}
+
+/// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose
+/// support radii reach `p`.
+pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], (radius, reach): (f32, f32), near: &[PointBlock]) -> Surfel {
+    let gap = dispatch!(Level::new(), simd => simd.vectorize(
+        #[inline(always)]
+        || widest_gap(simd, p, fit.normal, near.iter()),
+    ));
+    surfel(fit, radius, reach, gap)
+}
+
+/// The radius of a disc over the local sampling radius, given how many sectors beside each other are empty.
+fn disc(gap: u32) -> f32 {
+    let gap = gap.clamp(INTERIOR_GAP, BORDER_GAP) - INTERIOR_GAP;
+    #[expect(clippy::cast_precision_loss, reason = "a small number")]
+    let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
+    DISC - (DISC - DISC_AT_BORDER) * border
+}
+
+/// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at
+/// `p`; such points are in the blocks `near`.
+#[inline(always)]
+fn widest_gap<'a, S: Simd>(
+    simd: S,
+    p: [f32; 3],
+    normal: [f32; 3],
+    near: impl Iterator<Item = &'a PointBlock>,
+) -> u32 {
+    let (u, v) = tangents(normal);
+    let mut taken = i32x16::splat(simd, 0);
+    for block in near {
+        let d = seen_from(simd, &block.position, p);
+        let (x, y) = (along(d, u), along(d, v));
+        let length = x.abs() + y.abs();
+        // The angle of the diamond |x| + |y| = 1, 0 to 4: a quarter turn each 1, without trigonometry.
+        let share = x / length;
+        let quarter = simd.select_f32x16(y.simd_ge(0.0), -(share - 1.0), share + 3.0);
+        let turn = quarter * (SECTORS as f32 / 4.0);
+        let sector = simd.select_f32x16(turn.simd_lt(SECTORS as f32), turn, f32x16::splat(simd, 0.0));
+        let horizon = f32x16::load_array_ref(simd, &block.horizon);
+        let counts: mask32x16<S> = product(d, d).simd_lt(horizon * horizon) & length.simd_gt(0.0);
+        taken |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
+    }
+    let taken = taken.to_array().into_iter().fold(0, |all, bits| all | u64::from(bits.cast_unsigned()));
+    // Twice round, so that a run across the start counts whole.
+    let round = taken | taken << SECTORS;
+    // Runs of k are left where k − 1 more follow.
+    let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
+    while runs != 0 {
+        runs &= runs >> 1;
+        widest += 1;
+    }
+    widest.min(SECTORS)
+}
+
+/// The bit of each number from 0 to 30, rounded down: two to its power, made as a floating-point number.
+#[inline(always)]
+fn bit<S: Simd>(number: f32x16<S>) -> i32x16<S> {
+    const ONE: i32 = 127;
+    const DIGITS: u32 = 23;
+    let exponent = i32x16::truncate_from(number) + ONE;
+    let power: f32x16<S> = (exponent << DIGITS).bitcast();
+    i32x16::truncate_from(power)
+}
+
+fn kind(at: &Evaluation, look: Look) -> PointKind {
+    let [_, l2, l3] = at.eigenvalues;
+    match at.status {
+        Status::Outside => PointKind::Stray,
+        _ if look == Look::Line || l2 < LINE * l3 => PointKind::Line,
+        _ if look == Look::Sparse => PointKind::Sparse,
+        Status::Ok => PointKind::Sheet,
+        Status::Border => PointKind::Edge,
+        _ => PointKind::Noisy,
+    }
+}
+
+/// Turns a leaf's `normals` to one side: that of their main axis, whose largest component is positive.
+pub(crate) fn align(normals: &mut [[f32; 3]]) {
+    let mut s = [0.0_f64; 6];
+    for n in &*normals {
+        let [x, y, z] = n.map(f64::from);
+        for (sum, v) in s.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
+            *sum += v;
+        }
+    }
+    let main = Vector3::from(symmetric_eigen(s).vectors[2]);
+    let largest = main.iter().fold(0.0_f64, |m, x| if x.abs() > m.abs() { *x } else { m });
+    #[expect(clippy::cast_possible_truncation, reason = "as normals are stored")]
+    let axis: [f32; 3] = (main * largest.signum()).map(|c| c as f32).into();
+    for n in normals {
+        if dot(*n, axis) < 0.0 {
+            *n = n.map(|x| -x);
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! What is known of each point: spacing, kind, support, leaf records.
+
+pub(crate) mod gather;
+pub(crate) mod kind;
+pub(crate) mod leaf_block;
+pub(crate) mod neighbours;
+pub(crate) mod spacing;

@@ -1,0 +1,375 @@
+//! Local sampling radii.
+//!
+//! A point's spacing is the distance to its K-th nearest neighbour, with K growing up to 256 while those
+//! neighbours look like a line, as the returns of one LiDAR ring do. It is then made smooth, `r_i := min_j
+//! (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region; lines without another
+//! beside them and bends in rings, whose distances say nothing of a surface, are no such j.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use fearless_simd::{Level, Simd, dispatch};
+use nearmiss_index::{BlockTree, Nearest, PointBlock};
+use nearmiss_lanes::parallel::{chunks, map_all};
+use nearmiss_surface::symmetric_eigen;
+
+use crate::tree::topology::Topology;
+
+const WIDTH: usize = PointBlock::WIDTH;
+
+/// How many neighbours are looked at where the first look like a line; doubled while they all do.
+const LINE_NEIGHBOURS: usize = 32;
+
+/// Points along a ring may be so many times nearer than the next ring is, twice over: 256 neighbours reach a
+/// ring a hundred spacings away, as sixteen beams 2° apart, 0.2° along, leave it on a floor met at a slope of
+/// one in ten. What is alone for longer is a wire, or stands for itself.
+const MOST_NEIGHBOURS: usize = 256;
+
+/// λ2 < 0.05 λ3 is what a line of points with noise looks like.
+const LINE: f64 = 0.05;
+
+/// How fast radii may grow with distance. 0.3 lets them double over some three spacings.
+const GROWTH: f32 = 0.3;
+
+/// A spacing, and what the neighbours looked like.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Spacing {
+    pub(crate) radius: f32,
+    /// The distance of the K-th neighbour, which is less than the radius along a ring.
+    plain: f32,
+    pub(crate) look: Look,
+}
+
+/// What the neighbours of a point look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Look {
+    /// The first K spread over an area.
+    #[default]
+    Area,
+    /// The first K are a line, more of them are not: a ring among others.
+    Ring,
+    /// A line as far as was looked.
+    Line,
+    /// The first K spread, but only because a ring bends there or is jagged: most points about see a ring.
+    Bend,
+    /// The spacing exceeds the reach of the scan.
+    Sparse,
+}
+
+/// The spacing of every one of the distinct `points`, those of the `tree`.
+pub(crate) fn spacings(points: &[[f32; 3]], tree: &BlockTree<'_>, neighbours: usize) -> Vec<Spacing> {
+    let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
+    let mut spacings = Vec::with_capacity(points.len());
+    spacings.extend(
+        chunks(&numbers, |blocks| {
+            let (mut search, mut spacings) = (Search::new(tree, points), Vec::new());
+            for &block in blocks {
+                search.start(block);
+                let plain = search.plain(neighbours);
+                let first = block * WIDTH;
+                let points = first..(first + WIDTH).min(points.len());
+                spacings.extend(points.map(|i| {
+                    if plain >> (i % WIDTH) & 1 == 1 {
+                        search.area(i, neighbours)
+                    } else {
+                        search.spacing(i, neighbours)
+                    }
+                }));
+            }
+            spacings
+        })
+        .into_iter()
+        .flatten(),
+    );
+
+    let numbers: Vec<usize> = numbers
+        .into_iter()
+        .zip(spacings.chunks(WIDTH))
+        .filter_map(|(block, spacings)| spacings.iter().any(|s| s.look != Look::Area).then_some(block))
+        .collect();
+    if numbers.is_empty() {
+        return spacings;
+    }
+    let votes: Vec<AtomicU32> = spacings.iter().map(|_| 0.into()).collect();
+    // A sum does not depend on its order.
+    chunks(&numbers, |blocks| {
+        let mut search = Search::new(tree, points);
+        for &block in blocks {
+            search.start(block);
+            let first = block * WIDTH;
+            let points = first..(first + WIDTH).min(points.len());
+            for i in points.filter(|&i| spacings[i].look != Look::Area) {
+                search.look(i, neighbours);
+                for &(_, j) in &search.near {
+                    votes[j].fetch_add(1, Ordering::Relaxed);
+                }
+            }
+        }
+    });
+    for (spacing, votes) in spacings.iter_mut().zip(votes) {
+        if spacing.look == Look::Area && 2 * votes.into_inner() as usize >= neighbours {
+            spacing.look = Look::Bend;
+        }
+    }
+    spacings
+}
+
+/// A search for the neighbours of the points of a block.
+struct Search<'a> {
+    tree: &'a BlockTree<'a>,
+    points: &'a [[f32; 3]],
+    level: Level,
+    block: usize,
+    found: Nearest,
+    /// How many neighbours of each point of the block `found` has.
+    count: usize,
+    /// Squared distance and index of a point itself and of its nearest others, by distance, then index.
+    near: Vec<(f64, usize)>,
+}
+
+impl<'a> Search<'a> {
+    fn new(tree: &'a BlockTree<'a>, points: &'a [[f32; 3]]) -> Self {
+        let (found, near) = (Nearest::default(), Vec::new());
+        Self { tree, points, level: Level::new(), block: 0, found, count: 0, near }
+    }
+
+    /// Turns to a block.
+    fn start(&mut self, block: usize) {
+        (self.block, self.count) = (block, 0);
+    }
+
+    /// The points of the block that surely see an area, as bits: those of which [`Self::spacing`] says so at
+    /// once. All are looked at together.
+    fn plain(&mut self, neighbours: usize) -> u64 {
+        self.tree.nearest(self.level, self.block, neighbours, &mut self.found);
+        self.count = neighbours;
+        dispatch!(self.level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.surely_areas(neighbours)
+        ))
+    }
+
+    #[inline(always)]
+    fn surely_areas(&self, neighbours: usize) -> u64 {
+        let own = &self.tree.blocks()[self.block].position;
+        let mut sums = [[0.0_f64; WIDTH]; 9];
+        let mut plain = u64::MAX;
+        for rank in 0..neighbours {
+            let mut d = [[0.0_f64; WIDTH]; 3];
+            for lane in 0..WIDTH {
+                match self.found.ranked(lane, rank) {
+                    Some(near) => {
+                        let p = self.points[near.id as usize];
+                        for k in 0..3 {
+                            d[k][lane] = f64::from(p[k] - own[k][lane]);
+                        }
+                    }
+                    None => plain &= !(1 << lane),
+                }
+            }
+            let [x, y, z] = &d;
+            for i in 0..WIDTH {
+                let (x, y, z) = (x[i], y[i], z[i]);
+                let products = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+                for k in 0..9 {
+                    sums[k][i] += products[k];
+                }
+            }
+        }
+        for lane in 0..WIDTH {
+            let mut of = [0.0; 9];
+            for k in 0..9 {
+                of[k] = sums[k][lane];
+            }
+            let is_line = Sums { count: neighbours + 1, of }.is_surely_line();
+            plain &= !(u64::from(is_line != Some(false)) << lane);
+        }
+        plain
+    }
+
+    /// The spacing of point `i` of the block, which sees an area.
+    fn area(&self, i: usize, neighbours: usize) -> Spacing {
+        let last = self.found.ranked(i % WIDTH, neighbours - 1);
+        let radius = last.map_or(0.0, |last| length(&self.exact(i, last.id as usize)));
+        Spacing { radius, plain: radius, look: Look::Area }
+    }
+
+    /// The squared distance of point `j` from point `i` in double precision, and its index.
+    fn exact(&self, i: usize, j: usize) -> (f64, usize) {
+        let d = [0, 1, 2].map(|k| f64::from(self.points[j][k]) - f64::from(self.points[i][k]));
+        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
+    }
+
+    /// Makes `near` hold point `i` of the block and the nearest `count` others. Those of the whole block are
+    /// found at once.
+    fn look(&mut self, i: usize, count: usize) {
+        if count > self.count {
+            self.tree.nearest(self.level, self.block, count, &mut self.found);
+            self.count = count;
+        }
+        let mut near = std::mem::take(&mut self.near);
+        near.clear();
+        near.push((0.0, i));
+        near.extend(self.found.of(i % WIDTH).take(count).map(|n| self.exact(i, n.id as usize)));
+        self.near = near;
+    }
+
+    /// The spacing of point `i` of the block: as many neighbours are looked at as are needed.
+    fn spacing(&mut self, i: usize, neighbours: usize) -> Spacing {
+        self.look(i, neighbours);
+        let radius = self.near.last().map_or(0.0, length);
+        let mut sums = Sums::default();
+        self.near.iter().for_each(|n| sums.add(self.points, i, n.1));
+        if self.near.len() <= neighbours || !sums.is_line() {
+            return Spacing { radius, plain: radius, look: Look::Area };
+        }
+        let mut count = LINE_NEIGHBOURS;
+        while sums.count < MOST_NEIGHBOURS {
+            let known = self.near.len();
+            self.look(i, count);
+            for k in known..self.near.len() {
+                sums.add(self.points, i, self.near[k].1);
+                if !sums.is_line() && sums.lies_across(self.points, &self.near[..=k]) {
+                    return Spacing { radius: length(&self.near[k]), plain: radius, look: Look::Ring };
+                }
+            }
+            if self.near.len() <= count {
+                break;
+            }
+            count *= 2;
+        }
+        Spacing { radius, plain: radius, look: Look::Line }
+    }
+}
+
+/// The distance of a neighbour: at least 1e-18, whose square single precision still holds.
+#[expect(clippy::cast_possible_truncation, reason = "radii are stored in single precision")]
+fn length(near: &(f64, usize)) -> f32 {
+    near.0.sqrt().max(1e-18) as f32
+}
+
+/// Sums over some points, relative to one of them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    count: usize,
+    /// x y z xx xy xz yy yz zz.
+    of: [f64; 9],
+}
+
+impl Sums {
+    /// Adds point `i`, relative to point `origin`.
+    fn add(&mut self, points: &[[f32; 3]], origin: usize, i: usize) {
+        let [x, y, z] = [0, 1, 2].map(|k| f64::from(points[i][k] - points[origin][k]));
+        for (sum, v) in self.of.iter_mut().zip([x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]) {
+            *sum += v;
+        }
+        self.count += 1;
+    }
+
+    /// The covariance about their mean as xx xy xz yy yz zz.
+    #[inline(always)]
+    fn covariance(&self) -> [f64; 6] {
+        #[expect(clippy::cast_precision_loss, reason = "at most 257")]
+        let n = self.count as f64;
+        let [x, y, z, xx, xy, xz, yy, yz, zz] = self.of.map(|sum| sum / n);
+        [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
+    }
+
+    /// Whether any of the points `near` lies more across the main direction than along it, seen from the
+    /// first: an arc grows wide too, but the next ring alone has points beside it.
+    fn lies_across(&self, points: &[[f32; 3]], near: &[(f64, usize)]) -> bool {
+        let main = symmetric_eigen(self.covariance()).vectors[2];
+        let origin = points[near[0].1];
+        near.iter().any(|&(d_sq, i)| {
+            let along: f64 = (0..3).map(|k| main[k] * f64::from(points[i][k] - origin[k])).sum();
+            2.0 * along * along < d_sq
+        })
+    }
+
+    /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
+    fn is_line(&self) -> bool {
+        self.is_surely_line().unwrap_or_else(|| {
+            let [_, l2, l3] = symmetric_eigen(self.covariance()).values;
+            l2 < LINE * l3
+        })
+    }
+
+    /// The same where it is decided without a solve, as most neighbourhoods are.
+    #[inline(always)]
+    fn is_surely_line(&self) -> Option<bool> {
+        let c = self.covariance();
+        // The sum of the principal minors is λ1λ2 + λ3(λ1 + λ2). For a line it is less than
+        // (0.05² + 2·0.05) λ3², for anything else at least 0.05/1.05² of the trace's square.
+        let minors = c[0] * c[3] - c[1] * c[1] + c[0] * c[5] - c[2] * c[2] + c[3] * c[5] - c[4] * c[4];
+        let trace_sq = (c[0] + c[3] + c[5]).powi(2);
+        if minors > (LINE * LINE + 2.0 * LINE) * trace_sq * (1.0 + 1e-9) {
+            return Some(false);
+        }
+        (minors < LINE / (1.0 + LINE).powi(2) * trace_sq * (1.0 - 1e-9)).then_some(true)
+    }
+}
+
+/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines and bends.
+pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
+    // How near points are along a line says nothing of the surface about it.
+    let tips = map_all(spacings, |s| match s.look {
+        Look::Area | Look::Ring => s.radius,
+        Look::Line | Look::Bend | Look::Sparse => f32::INFINITY,
+    });
+    let (cones, level) = (tree.cones(&tips, GROWTH), Level::new());
+    let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
+    let smoothed = chunks(&numbers, |blocks| {
+        let mut radii = Vec::with_capacity(blocks.len() * WIDTH);
+        for &block in blocks {
+            let first = block * WIDTH;
+            let own = &spacings[first..(first + WIDTH).min(spacings.len())];
+            let mut heights = [0.0; WIDTH];
+            for (height, own) in heights.iter_mut().zip(own) {
+                *height = if own.look == Look::Bend { f32::MAX } else { own.radius };
+            }
+            let lowest = cones.below(level, block, &heights);
+            let radius = |(own, lowest): (&Spacing, f32)| if lowest < f32::MAX { lowest } else { own.radius };
+            radii.extend(own.iter().zip(lowest).map(radius));
+        }
+        radii
+    });
+    smoothed.concat()
+}
+
+/// Limits `radii`, the smoothed `spacings`, to `reach`. A ring whose next ring is further away than that is a
+/// line, with its K-th neighbour's distance; any other point with a greater spacing is [`Look::Sparse`].
+///
+/// The least of the spacings about a point and the reach is the least of the limited spacings about it, so
+/// this equals a limit before smoothing.
+pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
+    for (spacing, radius) in spacings.iter_mut().zip(radii) {
+        if spacing.radius > reach {
+            if spacing.look == Look::Ring {
+                spacing.look = Look::Line;
+                *radius = radius.min(spacing.plain);
+            } else if spacing.look != Look::Line {
+                spacing.look = Look::Sparse;
+            }
+        }
+        *radius = radius.min(reach);
+    }
+}
+
+/// A value of each node, in the order of their ids: of leaves from their points, of others from those of
+/// their children.
+pub(crate) fn fold_nodes<T: Copy + Default>(
+    topology: &Topology,
+    leaf: impl Fn(std::ops::Range<usize>) -> T,
+    join: impl Fn(T, T) -> T,
+) -> Vec<T> {
+    let mut values = vec![T::default(); topology.len()];
+    // Children come after their parent.
+    for id in topology.ids().rev() {
+        values[id.index()] = if topology.is_leaf(id) {
+            leaf(topology.points(id))
+        } else {
+            let children = topology.children(id).iter().map(|child| values[child.index()]);
+            children.reduce(&join).unwrap_or_default()
+        };
+    }
+    values
+}

@@ -1,0 +1,14 @@
+//! A prepared scan: how it is built, and what it answers alone.
+
+pub(crate) mod apart;
+pub(crate) mod build;
+pub(crate) mod evaluate;
+pub(crate) mod levels;
+pub(crate) mod nearest;
+pub(crate) mod options;
+pub(crate) mod ordered;
+pub(crate) mod outline;
+pub(crate) mod refit;
+pub(crate) mod sampling;
+pub(crate) mod slices;
+pub(crate) mod survey;

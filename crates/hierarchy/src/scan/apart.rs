@@ -1,0 +1,83 @@
+//! Whether the coverings of two nodes are apart (Klein & Zachmann 2004, §5.1).
+
+use nearmiss_geometry::NodeId;
+
+use crate::bounds::boxes::{OrientedBox, Relative};
+use crate::bounds::part::Part;
+use crate::patch::centres::Centres;
+use crate::scan::slices::Slices;
+use crate::tree::topology::NodePair;
+
+/// What motion and arithmetic may do to the distance of two places, in units of [`Relative::slack`], each of
+/// which bounds a coordinate: √3 for either of two places in motion, as much again for the distance itself
+/// and for the radii.
+const ROUNDINGS: f32 = 8.0;
+
+/// What of two nodes is to be apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Tangent discs with their thickness, and the balls of sparse points: what leaf tests look at.
+    Discs,
+    /// The surface as well: what certificates speak of.
+    Surface,
+}
+
+/// Whether what two nodes have is further apart than `reach`, as far as their coverings show: `motion` takes
+/// the frame of `b` into that of `a`, in which `reach` is given.
+///
+/// As in the paper, balls that are further than that from the volume of the other node are dropped first: its
+/// box for discs, its [enclosure](Slices::enclosure) for the surface. Rounding is included: what is excluded
+/// has nothing within `reach` of each other. Compares each ball of one that is left with sixteen of the other
+/// at a time; does not allocate.
+///
+/// # Panics
+/// When there are no such nodes.
+#[must_use]
+pub fn apart(
+    a: &Slices<'_>,
+    b: &Slices<'_>,
+    pair: NodePair,
+    motion: &Relative,
+    reach: f32,
+    extent: Extent,
+) -> bool {
+    let (node_a, node_b) = (pair.a.index(), pair.b.index());
+    let (radius_a, bounds_a) = extent.of(a, pair.a);
+    let (radius_b, bounds_b) = extent.of(b, pair.b);
+    let radius_b = radius_b * motion.scale();
+    let reach = reach + ROUNDINGS * motion.slack();
+    let of_a = a.samples(node_a).iter().map(|i| a.position(i));
+    let near_a = within(of_a, &motion.moved(&bounds_b), radius_a + reach);
+    let of_b = b.samples(node_b).iter().map(|i| motion.point(b.position(i)));
+    let near_b = within(of_b, &bounds_a, radius_b + reach);
+    let least = radius_a + radius_b + reach;
+    let (few, many) = if near_a.len() < near_b.len() { (&near_a, &near_b) } else { (&near_b, &near_a) };
+    few.iter().all(|p| many.nearest_sq(p) > least * least)
+}
+
+impl Extent {
+    /// The radius of a node's balls, and its volume.
+    #[inline]
+    fn of(self, slices: &Slices<'_>, node: NodeId) -> (f32, OrientedBox) {
+        match self {
+            Self::Discs => (slices.sampling_radius_of(node.index()), slices.tree.bounds(node)),
+            Self::Surface => {
+                (slices.covering_radius(node.index()), slices.tree.enclosure(Part::Surface, node))
+            }
+        }
+    }
+}
+
+/// Those of `places` that are not further than `distance` from the box.
+#[inline]
+fn within(places: impl Iterator<Item = [f32; 3]>, bounds: &OrientedBox, distance: f32) -> Centres {
+    let mut near = Centres::default();
+    for p in places {
+        // What is no number is near.
+        if bounds.distance_sq(p) > distance * distance {
+            continue;
+        }
+        near.push(p);
+    }
+    near
+}

@@ -1,0 +1,482 @@
+//! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
+
+use std::sync::{Arc, OnceLock};
+
+use bytemuck::bytes_of;
+use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
+use nearmiss_index::PointBlock;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::{map, on_threads};
+use nearmiss_lanes::vector::dot;
+use nearmiss_store::Array;
+use nearmiss_surface::{Metric, SurfacePlan};
+use xxhash_rust::xxh3::Xxh3;
+
+use crate::bounds::boxes::OrientedBox;
+use crate::bounds::growth::Growth;
+use crate::bounds::part::Part;
+use crate::patch::covering::{Covering, Ground, coverings};
+use crate::patch::enclosure::growths;
+use crate::patch::extents::{Discs, boxes_of_discs};
+use crate::patch::samples::{lists, samples};
+use crate::patch::surfels::{Known, Surfels, align, surfels};
+use crate::point::gather::{Index, NeighbourList};
+use crate::point::kind::PointKind;
+use crate::point::leaf_block::{LeafBlock, LeafParts, Leaves};
+use crate::point::neighbours::neighbours;
+use crate::scan::options::{BuildError, BuildOptions};
+use crate::scan::ordered::Ordered;
+use crate::scan::outline::{Ball, Outline};
+use crate::scan::sampling::Sampling;
+use crate::scan::slices::Slices;
+use crate::tree::topology::Topology;
+use crate::tree::wide::{Bare, Growths, Root, Siblings, Tree, growths_of_siblings, siblings};
+
+/// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
+///
+/// All lengths and directions are in the frame of the stored positions ([`PointHierarchy::frame`]). Arrays
+/// stand apart from each other, so that a moving scan can replace its bounds and keep its topology.
+#[derive(Debug, Clone)]
+pub struct PointHierarchy {
+    pub(crate) frame: Frame,
+    pub(crate) bounds: Aabb,
+    pub(crate) dropped: Dropped,
+    pub(crate) step: f64,
+    pub(crate) sampling_radius: f32,
+    pub(crate) reach: f32,
+    pub(crate) dense: u32,
+    pub(crate) leaf_size: u32,
+    pub(crate) radius_neighbours: u32,
+    pub(crate) samples_a_node: u32,
+    pub(crate) is_oriented: bool,
+    pub(crate) metric: Metric,
+    pub(crate) plan: SurfacePlan,
+    /// One by one, where they were wanted; they stand in blocks.
+    pub(crate) positions: OnceLock<Arc<Vec<[f32; 3]>>>,
+    pub(crate) normals: Array<[f32; 3]>,
+    pub(crate) radii: Array<f32>,
+    pub(crate) discs: Array<f32>,
+    pub(crate) kinds: Array<u8>,
+    pub(crate) source: Array<u32>,
+    pub(crate) topology: Topology,
+    pub(crate) root: Root,
+    pub(crate) siblings: Array<Siblings>,
+    /// By [`Part`].
+    pub(crate) growths: [Array<Growths>; 2],
+    pub(crate) leaf_blocks: Array<LeafBlock>,
+    /// The marks of each leaf: whether it holds sparse points or balls, and whether it is loose.
+    pub(crate) marks: Array<u8>,
+    pub(crate) outline: Outline,
+    pub(crate) sample_lists: Array<u32>,
+    pub(crate) coverings: Array<Covering>,
+    pub(crate) blocks: Array<PointBlock>,
+    pub(crate) groups: Array<PointBlock>,
+    pub(crate) lists: Array<NeighbourList>,
+    pub(crate) listed: Array<u32>,
+}
+
+impl PointHierarchy {
+    /// Prepares `cloud`. O(n log n), on all cores unless told otherwise; the result does not depend on them.
+    ///
+    /// # Errors
+    /// Names the option that is out of range.
+    pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
+        options.check()?;
+        on_threads(options.threads, || build(cloud, options)).or(Err(BuildError::Threads(options.threads)))?
+    }
+
+    /// The arrays that a query reads.
+    #[inline]
+    #[must_use]
+    pub fn slices(&self) -> Slices<'_> {
+        Slices {
+            normals: &self.normals,
+            radii: &self.radii,
+            discs: &self.discs,
+            kinds: &self.kinds,
+            tree: self.tree(),
+            leaves: Leaves { topology: &self.topology, blocks: &self.leaf_blocks, marks: &self.marks },
+            outline: &self.outline,
+            blocks: &self.blocks,
+            sample_lists: &self.sample_lists,
+            coverings: &self.coverings,
+            leaf_size: self.leaf_size,
+            samples_a_node: self.samples_a_node,
+            plan: &self.plan,
+            sampling_radius: self.sampling_radius,
+            reach: self.reach,
+            dense: self.dense as usize,
+        }
+    }
+
+    /// Number of points.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "a cloud has at least eight points")]
+    pub fn len(&self) -> usize {
+        self.source.len()
+    }
+
+    /// The frame of the stored positions in the caller's.
+    #[must_use]
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Bounds of the points in the caller's frame.
+    #[must_use]
+    pub fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+
+    /// What was left out of the input.
+    #[must_use]
+    pub fn dropped(&self) -> Dropped {
+        self.dropped
+    }
+
+    /// Greatest change of a coordinate by rounding to `f32`, in the caller's units.
+    #[must_use]
+    pub fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// The 0.9-quantile of the local radii, in the caller's units.
+    #[must_use]
+    pub fn sampling_radius(&self) -> f64 {
+        f64::from(self.sampling_radius) * self.frame.scale
+    }
+
+    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and
+    /// no local radius exceeds it.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        f64::from(self.reach) * self.frame.scale
+    }
+
+    /// Share of the points that stand in the obstacle by a sheet; the others stand there as balls.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+    pub fn sheet_share(&self) -> f64 {
+        let slices = self.slices();
+        (0..self.len()).filter(|&i| slices.is_on_sheet(i)).count() as f64 / self.len() as f64
+    }
+
+    /// What defines the surface.
+    #[must_use]
+    pub fn plan(&self) -> &SurfacePlan {
+        &self.plan
+    }
+
+    /// Points of a full leaf.
+    #[must_use]
+    pub fn leaf_size(&self) -> u32 {
+        self.leaf_size
+    }
+
+    /// K of the local radii.
+    #[must_use]
+    pub fn radius_neighbours(&self) -> u32 {
+        self.radius_neighbours
+    }
+
+    /// Samples of an inner node.
+    #[must_use]
+    pub fn samples_a_node(&self) -> u32 {
+        self.samples_a_node
+    }
+
+    /// Positions in leaf order. A scan from a file makes them when they are first wanted, in O(n):
+    /// [`Slices::position`] gives one without.
+    #[must_use]
+    pub fn positions(&self) -> &[[f32; 3]] {
+        self.positions.get_or_init(|| {
+            let (blocks, points): (&[PointBlock], _) = (&self.blocks, 0..self.len());
+            Arc::new(points.map(|i| PointBlock::position_in(blocks, i)).collect())
+        })
+    }
+
+    /// Unit normals: of either sign, within a leaf all on one side, until they [are
+    /// turned](Self::turn_normals).
+    #[must_use]
+    pub fn normals(&self) -> &[[f32; 3]] {
+        &self.normals
+    }
+
+    /// Whether neighbouring normals are on the same side.
+    #[must_use]
+    pub fn is_oriented(&self) -> bool {
+        self.is_oriented
+    }
+
+    /// Turns normals round that `oriented`, which differs from them in signs alone, has the other way. So
+    /// neighbours are on the same side afterwards, as a graph over the points can tell it; f takes its sign
+    /// from them ([`Self::evaluate_oriented_with`]), and no box, nor any verdict, depends on it.
+    ///
+    /// # Panics
+    /// When there is not one for each point.
+    pub fn turn_normals(&mut self, oriented: &[[f32; 3]]) {
+        assert_eq!(oriented.len(), self.len(), "a normal a point");
+        for (normal, to) in self.normals.to_mut().iter_mut().zip(oriented) {
+            if dot(*normal, *to) < 0.0 {
+                *normal = normal.map(|c| -c);
+            }
+        }
+        self.is_oriented = true;
+        self.renew_leaves();
+    }
+
+    /// Takes these boxes of all nodes and what they must grow by, in the order of their ids, for its own, and
+    /// makes anew what follows from them and the discs.
+    pub(crate) fn bound(&mut self, boxes: &[OrientedBox], growths: Option<[&[Growth]; 2]>) {
+        let topology = self.topology;
+        self.root.bounds = boxes[NodeId::ROOT.index()];
+        self.siblings = siblings(&topology, boxes).into();
+        if let Some(growths) = growths {
+            self.root.growths = growths.map(|of| of[NodeId::ROOT.index()]);
+            self.growths = growths.map(|of| growths_of_siblings(&topology, of).into());
+        }
+        self.renew_leaves();
+        self.outline = self.outlined();
+    }
+
+    /// Makes what leaves are compared by from the points and the boxes about them.
+    fn renew_leaves(&mut self) {
+        let (tree, topology, leaves) = (self.tree(), self.topology, self.leaf_parts());
+        let bounds: Vec<OrientedBox> = map(topology.leaves(), |leaf| tree.bounds(topology.leaf(leaf)));
+        let blocks = leaves.blocks(&topology, &bounds);
+        let marks = map(topology.leaves(), |leaf| leaves.marks(&topology, leaf, &bounds[leaf]));
+        (self.leaf_blocks, self.marks) = (blocks.into(), marks.into());
+    }
+
+    /// The arrays that leaf blocks are built from.
+    pub(crate) fn leaf_parts(&self) -> LeafParts<'_> {
+        LeafParts {
+            positions: self.positions(),
+            normals: &self.normals,
+            discs: &self.discs,
+            kinds: &self.kinds,
+            dense: self.dense as usize,
+        }
+    }
+
+    /// The hash that identifies this scan, and its bounding balls.
+    pub(crate) fn outlined(&self) -> Outline {
+        let slices = self.slices();
+        let mut hash = Xxh3::new();
+        let frame = self.frame();
+        hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
+        hash.update(bytes_of(&[self.leaf_size, self.samples_a_node, self.dense]));
+        hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
+        hash.update(bytemuck::cast_slice(self.positions()));
+        hash.update(bytemuck::cast_slice(slices.discs));
+        Outline {
+            identity: hash.digest(),
+            surface: Ball::about(&slices.enclosure(0)),
+            obstacle: Ball::about(&slices.obstacle_enclosure(0)),
+            discs: Ball::about(&self.root.bounds),
+        }
+    }
+
+    /// Local sampling radii r_i.
+    #[must_use]
+    pub fn radii(&self) -> &[f32] {
+        &self.radii
+    }
+
+    /// Radii of the points' tangent discs.
+    #[must_use]
+    pub fn discs(&self) -> &[f32] {
+        &self.discs
+    }
+
+    /// What the neighbourhood of the `i`-th stored point looks like.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn kind(&self, i: usize) -> PointKind {
+        PointKind::from_code(self.kinds[i])
+    }
+
+    /// Share of the points that sample a sheet.
+    #[must_use]
+    pub fn usable(&self) -> f64 {
+        self.share(PointKind::Sheet) + self.share(PointKind::Edge)
+    }
+
+    /// Share of the points of this kind.
+    #[must_use]
+    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+    pub fn share(&self, kind: PointKind) -> f64 {
+        let count = self.kinds.iter().filter(|&&code| code == kind.code()).count();
+        count as f64 / self.len() as f64
+    }
+
+    /// For each stored point its index in the caller's input.
+    #[must_use]
+    pub fn source(&self) -> &[u32] {
+        &self.source
+    }
+
+    /// The caller's id of the `i`-th stored point.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[inline]
+    #[must_use]
+    pub fn id(&self, i: usize) -> PointId {
+        PointId(self.source[i])
+    }
+
+    /// The nodes, and the boxes about them.
+    #[must_use]
+    pub fn tree(&self) -> Tree<'_> {
+        let [surface, obstacle] = &self.growths;
+        Tree {
+            topology: &self.topology,
+            root: &self.root,
+            siblings: &self.siblings,
+            growths: [surface, obstacle],
+        }
+    }
+
+    /// The box about all points.
+    #[inline]
+    #[must_use]
+    pub fn root_box(&self) -> &OrientedBox {
+        &self.root.bounds
+    }
+
+    /// The hash that identifies this scan, and its bounding balls.
+    #[inline]
+    #[must_use]
+    pub fn outline(&self) -> &Outline {
+        &self.outline
+    }
+
+    /// Which nodes there are, and which points lie under them.
+    #[inline]
+    #[must_use]
+    pub fn topology(&self) -> &Topology {
+        &self.topology
+    }
+
+    /// A box about the discs of each node's points, and about their [balls](Slices::ball), in the order of
+    /// the nodes' ids.
+    #[must_use]
+    pub fn boxes(&self) -> impl ExactSizeIterator<Item = OrientedBox> {
+        let tree = self.tree();
+        self.topology.ids().map(move |id| tree.bounds(id))
+    }
+
+    /// A box about each node's part of the surface, proven to contain it (docs/theory/certificates.md): every
+    /// surface point whose nearest stored point is the node's.
+    #[must_use]
+    pub fn enclosures(&self) -> impl ExactSizeIterator<Item = OrientedBox> {
+        let tree = self.tree();
+        self.topology.ids().map(move |id| tree.enclosure(Part::Surface, id))
+    }
+
+    /// Bytes of all that is stored for nodes: tree, boxes, enclosures, cones, samples and coverings (S0
+    /// §6.1); what points keep, and their neighbour lists, is not counted.
+    #[must_use]
+    pub fn bytes_of_nodes(&self) -> usize {
+        size_of_val::<[_]>(&self.siblings)
+            + 2 * size_of_val::<[_]>(&self.growths[0])
+            + size_of_val::<[_]>(&self.sample_lists)
+            + size_of_val::<[_]>(&self.coverings)
+    }
+
+    /// The points in blocks: `i` stands in lane `i` % 16 of block `i` / 16.
+    #[must_use]
+    pub fn blocks(&self) -> &[PointBlock] {
+        &self.blocks
+    }
+
+    /// The balls outside of which no point of a block is heard, like points with horizons: that of block `i`
+    /// stands in lane `i` % 16 of group `i` / 16.
+    #[must_use]
+    pub fn groups(&self) -> &[PointBlock] {
+        &self.groups
+    }
+
+    /// The groups of which a point may be heard within some distance of the middle of the ball of `block`,
+    /// ascending, with that distance; `None` where they are too many, or there is no such block.
+    #[must_use]
+    pub fn neighbours(&self, block: usize) -> Option<(f32, &[u32])> {
+        let list = self.lists.get(block).filter(|list| list.within > 0.0)?;
+        let entries = self.listed.get(list.first as usize..)?.get(..list.count as usize)?;
+        Some((list.within, entries))
+    }
+}
+
+fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, BuildError> {
+    let leaf_size = options.leaf_size as usize;
+    let Ordered { topology, boxes, positions, source, fits, dense, groups, sampling } =
+        Ordered::of(cloud, options)?;
+    let Sampling { radii, sampling_radius, reach, plan, blocks, .. } = sampling;
+    let bare = Bare::new(topology, &boxes);
+    let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
+    let lists_of_blocks = neighbours(&index, &positions, &radii);
+    let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, dense };
+    let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves, obstacles } =
+        surfels(&index, &known, &fits);
+    drop(fits);
+    normals.chunks_mut(leaf_size).for_each(align);
+    let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
+    let boxes = boxes_of_discs(&topology, &boxes, &of_points);
+    drop(balls);
+    let obstacle_growths = growths(&topology, &boxes, &obstacles);
+    let growths = growths(&topology, &boxes, &leaves);
+    let sample_lists = lists(&positions, &topology, options.samples);
+    let ground = Ground {
+        topology: &topology,
+        boxes: &boxes,
+        growths: &growths,
+        positions: &positions,
+        normals: &normals,
+        radii: &radii,
+        discs: &flat,
+        cells: &cells,
+    };
+    let coverings = coverings(&ground, |id| samples(&sample_lists, &topology, id, options.samples));
+    drop((flat, cells));
+
+    let mut hierarchy = PointHierarchy {
+        frame: cloud.frame(),
+        bounds: cloud.bounds(),
+        dropped: cloud.dropped(),
+        step: cloud.step(),
+        sampling_radius,
+        reach,
+        dense: id32(dense),
+        leaf_size: options.leaf_size,
+        radius_neighbours: options.radius_neighbours,
+        samples_a_node: options.samples,
+        is_oriented: false,
+        metric: Metric::Euclidean,
+        plan,
+        positions: Arc::new(positions).into(),
+        normals: normals.into(),
+        radii: radii.into(),
+        discs: discs.into(),
+        kinds: kinds.into(),
+        source: source.into(),
+        topology,
+        root: Root::default(),
+        siblings: Array::default(),
+        growths: Default::default(),
+        leaf_blocks: Array::default(),
+        marks: Array::default(),
+        outline: Outline::default(),
+        sample_lists: sample_lists.into(),
+        coverings: coverings.into(),
+        blocks: blocks.into(),
+        groups: groups.into(),
+        lists: lists_of_blocks.lists.into(),
+        listed: lists_of_blocks.entries.into(),
+    };
+    hierarchy.bound(&boxes, Some([&growths, &obstacle_growths]));
+    Ok(hierarchy)
+}

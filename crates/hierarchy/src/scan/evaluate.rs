@@ -1,0 +1,101 @@
+//! f at a place, and the stored point nearest to it.
+
+use nearmiss_index::PointBlock;
+use nearmiss_surface::{Centre, Evaluation};
+
+use crate::point::gather::{GROUP, GatherScratch, Index};
+use crate::scan::build::PointHierarchy;
+
+impl PointHierarchy {
+    /// f at `x`, in the stored frame.
+    pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        self.index().evaluate(x, scratch)
+    }
+
+    /// As [`Self::evaluate_with`], faster where `x` is within a local radius or so of the stored point `i`:
+    /// the list of that point is looked at first.
+    pub fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        scratch.block = i / PointBlock::WIDTH;
+        self.index().evaluate(x, scratch)
+    }
+
+    /// As [`Self::evaluate_with`], faster for places along the surface, each near that which was asked about
+    /// last with this scratch: where the list used there ends, that of the nearest block it names is taken,
+    /// and where that ends too, that of the nearest point, which holds all that is heard on the surface.
+    pub fn evaluate_onward(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        let index = self.index();
+        let place = Centre::new(x).rounded();
+        if index.list(scratch.block, place, 0.0).is_none() {
+            let next = index.next_block(scratch.block, place);
+            scratch.block =
+                next.filter(|&next| index.list(next, place, 0.0).is_some()).unwrap_or_else(|| {
+                    let start = (scratch.block * PointBlock::WIDTH).min(self.len() - 1);
+                    self.nearest_point_near(start, x) as usize / PointBlock::WIDTH
+                });
+        }
+        index.evaluate(x, scratch)
+    }
+
+    /// As [`Self::evaluate_with`], with n, and so the sign of f, on the side of Σ wᵢ nᵢ, the stored normals
+    /// of the points that reach x: positive below the surface. Where these disagree, as between two sheets,
+    /// the place is ambiguous; unless they [are oriented](Self::is_oriented) all is as there.
+    pub fn evaluate_oriented_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
+        let at = self.evaluate_with(x, scratch);
+        if !self.is_oriented || at.support == 0 {
+            return at;
+        }
+        self.index().collect(scratch.level, Centre::new(x).rounded(), 0.0, &mut scratch.found);
+        let (blocks, normals): (&[PointBlock], &[[f32; 3]]) = (&self.blocks, &self.normals);
+        let (mut sum, mut total) = ([0.0; 3], 0.0);
+        for &group in &scratch.found {
+            let first = group as usize * GROUP;
+            for (i, normal) in (first..).zip(&normals[first..(first + GROUP).min(normals.len())]) {
+                let (block, lane) = (&blocks[i / PointBlock::WIDTH], i % PointBlock::WIDTH);
+                let d = [0, 1, 2].map(|k| f64::from(block.position[k][lane]) - x[k]);
+                let t = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+                    * f64::from(self.plan.decay(block.horizon[lane]));
+                if t < f64::from(self.plan.reach_sq()) {
+                    #[expect(clippy::cast_possible_truncation, reason = "weights are single precision")]
+                    let w = f64::from(self.plan.kernel().weight(t as f32));
+                    total += w;
+                    for (sum, n) in sum.iter_mut().zip(normal) {
+                        *sum += w * f64::from(*n);
+                    }
+                }
+            }
+        }
+        at.turned_to(sum, total)
+    }
+
+    /// The stored point that is nearest to `x`, in the stored frame; of equally near ones the first.
+    #[must_use]
+    pub fn nearest_point(&self, x: [f64; 3]) -> u32 {
+        self.nearest_point_near(0, x)
+    }
+
+    /// As [`Self::nearest_point`], faster where `x` is near the stored point `i`.
+    ///
+    /// # Panics
+    /// When there is no such point.
+    #[must_use]
+    pub fn nearest_point_near(&self, i: usize, x: [f64; 3]) -> u32 {
+        self.nearest_listed(i, x).unwrap_or_else(|| self.nearest_point_within(i, x, f64::INFINITY).0)
+    }
+
+    /// f at `x`, in the stored frame; allocates a scratch of its own.
+    #[must_use]
+    pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
+        self.evaluate_with(x, &mut GatherScratch::default())
+    }
+
+    pub(crate) fn index(&self) -> Index<'_> {
+        Index {
+            tree: self.tree(),
+            blocks: &self.blocks,
+            groups: &self.groups,
+            lists: &self.lists,
+            listed: &self.listed,
+            plan: &self.plan,
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! A scan's discs for another metric: what follows from f at the points is made anew.
+//!
+//! Boxes are about the new discs, and so are coverings. What was proven of the surface by straight distances
+//! is not proven again: enclosures and covering radii hold the discs, and nothing is to be certified by them.
+
+use std::ops::Range;
+
+use nearmiss_index::{BlockBoxes, PointBlock};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::vector::dot;
+use nearmiss_surface::{Evaluation, Metric};
+
+use crate::bounds::growth::Growth;
+use crate::bounds::part::Part;
+use crate::patch::classes::vote;
+use crate::patch::covering::{Ground, Solid, coverings};
+use crate::patch::extents::{Discs, boxes_of_discs};
+use crate::patch::samples::samples;
+use crate::patch::surfels::{Fit, Surfel, align, fitted, surfel_of};
+use crate::point::kind::{PointKind, ball, obstacle_ball};
+use crate::point::spacing::Look;
+use crate::scan::build::PointHierarchy;
+
+impl PointHierarchy {
+    /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about
+    /// them. Only of the Euclidean metric enclosures and covering radii are proven to contain the surface.
+    #[must_use]
+    pub fn metric(&self) -> Metric {
+        self.metric
+    }
+
+    /// Fits the surface at every point by another `metric`: `fit` gives f at a stored point, and adds the
+    /// points that are heard there to a list that is empty. Normals stay on their sides where they [are
+    /// oriented](Self::is_oriented), and what is [sparse](PointKind::is_sparse) stays so. On all cores with
+    /// the feature `rayon`; the result does not depend on them.
+    ///
+    /// # Panics
+    /// When a point is heard that is none.
+    pub fn refit<S: Default>(
+        &mut self,
+        metric: Metric,
+        fit: impl Fn(u32, &mut S, &mut Vec<u32>) -> Evaluation + Sync + Send,
+    ) {
+        let topology = self.topology;
+        let leaves: Vec<Range<usize>> =
+            (0..topology.leaves()).map(|leaf| topology.points_of_leaf(leaf)).collect();
+        let surfels = chunks(&leaves, |leaves| {
+            let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
+            let surfel = |i: usize| {
+                heard.clear();
+                let at = fit(id32(i), &mut scratch, &mut heard);
+                self.gather(&heard, &mut near);
+                self.surfel(i, &at, &near)
+            };
+            leaves.iter().cloned().flatten().map(surfel).collect::<Vec<_>>()
+        });
+        let mut surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
+        let mut fits: Vec<Fit> = surfels.iter().map(|s| Fit { normal: s.normal, kind: s.kind }).collect();
+        let neighbours = BlockBoxes::new(&self.blocks, self.len());
+        vote(&neighbours.over(&self.blocks), self.positions(), &self.radii, &mut fits);
+        let corrected: Vec<usize> = (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].kind).collect();
+        let discs = chunks(&corrected, |points| {
+            let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
+            let surfel = |&i: &usize| {
+                heard.clear();
+                fit(id32(i), &mut scratch, &mut heard);
+                self.gather(&heard, &mut near);
+                let fit = Fit { normal: self.on_its_side(i, fits[i].normal), ..fits[i] };
+                surfel_of(&fit, self.positions()[i], (self.radii[i], self.reach), &near)
+            };
+            points.iter().map(surfel).collect::<Vec<_>>()
+        });
+        for (i, disc) in corrected.into_iter().zip(discs.into_iter().flatten()) {
+            surfels[i] = disc;
+        }
+        self.metric = metric;
+        self.replace(&surfels);
+    }
+
+    /// Some points in blocks.
+    fn gather(&self, points: &[u32], blocks: &mut Vec<PointBlock>) {
+        blocks.clear();
+        for points in points.chunks(PointBlock::WIDTH) {
+            let mut block = PointBlock::EMPTY;
+            for (lane, &i) in points.iter().enumerate() {
+                let horizon = self.plan.horizon(self.radii[i as usize]);
+                self.plan.put(&mut block, lane, self.positions()[i as usize], horizon);
+            }
+            blocks.push(block);
+        }
+    }
+
+    /// The disc of point `i`, at which f is `at` and the points in `near` are heard.
+    fn surfel(&self, i: usize, at: &Evaluation, near: &[PointBlock]) -> Surfel {
+        let look = match self.kind(i) {
+            PointKind::Line => Look::Line,
+            PointKind::Sparse => Look::Sparse,
+            _ => Look::Area,
+        };
+        let fit = fitted(at, look);
+        let surfel = surfel_of(&fit, self.positions()[i], (self.radii[i], self.reach), near);
+        Surfel { normal: self.on_its_side(i, surfel.normal), ..surfel }
+    }
+
+    /// A normal of point `i`, on the side of that which it has.
+    fn on_its_side(&self, i: usize, normal: [f32; 3]) -> [f32; 3] {
+        if dot(normal, self.normals[i]) < 0.0 { normal.map(|c| -c) } else { normal }
+    }
+
+    /// Takes these discs for its own, and bounds them.
+    fn replace(&mut self, surfels: &[Surfel]) {
+        let leaf_size = self.leaf_size as usize;
+        let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
+        let disc = |(s, &r): (&Surfel, &f32)| s.disc_within(ball(s.kind, r, self.sampling_radius));
+        let discs: Vec<f32> = surfels.iter().zip(&self.radii).map(disc).collect();
+        let dense = self.dense as usize;
+        let ball = |(i, (s, &r)): (usize, (&Surfel, &f32))| {
+            ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, dense, s.kind, r))
+        };
+        let balls: Vec<f32> = surfels.iter().zip(&self.radii).enumerate().map(ball).collect();
+        if !self.is_oriented {
+            normals.chunks_mut(leaf_size).for_each(align);
+        }
+        let (topology, positions) = (self.topology, self.positions());
+        let of_points = Discs { positions, normals: &normals, discs: &discs, balls: &balls };
+        let boxes = boxes_of_discs(&topology, &self.boxes().collect::<Vec<_>>(), &of_points);
+        let growths: Vec<Growth> = topology.ids().map(|id| self.tree().growth(Part::Surface, id)).collect();
+        let flat: Vec<Solid> =
+            discs.iter().zip(&balls).map(|(&disc, &ball)| Solid::of_disc(disc, ball)).collect();
+        let ground = Ground {
+            topology: &topology,
+            boxes: &boxes,
+            growths: &growths,
+            positions,
+            normals: &normals,
+            radii: &self.radii,
+            discs: &flat,
+            cells: &flat,
+        };
+        let coverings =
+            coverings(&ground, |id| samples(&self.sample_lists, &topology, id, self.samples_a_node));
+        self.kinds = surfels.iter().map(|s| s.kind.code()).collect::<Vec<_>>().into();
+        self.normals = normals.into();
+        self.discs = discs.into();
+        self.coverings = coverings.into();
+        self.bound(&boxes, None);
+    }
+}

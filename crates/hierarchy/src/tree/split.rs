@@ -1,0 +1,259 @@
+//! The tree: top-down, each node split so that its children's boxes are small.
+//!
+//! S0 §4.2 splits to minimise the volume of the children's bounding volumes. Here the candidates are the
+//! medians along the node's three principal axes, and of those long enough to matter the one wins whose
+//! children have the least summed volume of boxes along the same axes. A patch of surface is flat, so every
+//! extent is taken larger by the mean spacing of the points; otherwise all volumes would vanish alike.
+
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, f64x2, f64x4};
+use nearmiss_geometry::NodeId;
+use nearmiss_lanes::parallel::both;
+use nearmiss_lanes::vector::dot;
+use nearmiss_lanes::wide::{along, greatest, least};
+use nearmiss_surface::symmetric_eigen;
+
+use crate::bounds::boxes::{OrientedBox, to_axes};
+use crate::tree::topology::{Half, Topology};
+
+/// A point on its way to its place.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Item {
+    pub(crate) position: [f32; 3],
+    /// Index in the cloud.
+    pub(crate) index: u32,
+}
+
+/// Below this many points a task is not worth handing to another thread.
+const TASK: usize = 4096;
+
+/// An axis shorter than this share of the longest cannot give smaller children.
+const WORTH_A_TRY: f32 = 0.5;
+
+/// Splits need no more than this many points to tell which axis is better.
+const JUDGED_BY: usize = 512;
+
+/// Orders `items` into the leaves of `topology` and returns a box about the points of each node, in the order
+/// of their ids. The first `dense` items, which fill whole leaves unless they are all, stay before the
+/// others. O(n log n).
+pub(crate) fn split(items: &mut [Item], topology: &Topology, dense: usize) -> Vec<OrientedBox> {
+    let mut boxes = vec![OrientedBox::default(); topology.len()];
+    for (id, bounds) in (Place { items, dense, half: Half::ALL }).split(topology) {
+        boxes[id.index()] = bounds;
+    }
+    boxes
+}
+
+/// The box about some points along their principal axes.
+fn about(level: Level, items: &[Item]) -> OrientedBox {
+    let axes = principal_axes(level, items);
+    let (low, high) = extents(level, items, &axes);
+    OrientedBox::spanned(axes, low, high, 0.0)
+}
+
+/// The points of some leaves.
+struct Place<'a> {
+    items: &'a mut [Item],
+    /// How many of them, the first, are dense.
+    dense: usize,
+    half: Half,
+}
+
+impl<'a> Place<'a> {
+    /// Orders them into leaves; returns the nodes that they make with their boxes.
+    fn split(self, topology: &Topology) -> Vec<(NodeId, OrientedBox)> {
+        let mut boxes = Vec::new();
+        self.split_into(topology, &mut boxes);
+        boxes
+    }
+
+    fn split_into(self, topology: &Topology, boxes: &mut Vec<(NodeId, OrientedBox)>) {
+        let bounds = about(Level::new(), self.items);
+        boxes.extend(topology.node_of(self.half).map(|id| (id, bounds)));
+        let leaves = topology.leaves_of(self.half);
+        if leaves.len() == 1 {
+            boxes.push((topology.leaf(leaves.start), bounds));
+            self.items.sort_unstable_by_key(|item| item.index);
+            return;
+        }
+        let many = self.items.len() > TASK;
+        let [left, right] = self.halve(topology, &bounds);
+        if many {
+            let (of_left, of_right) = both(|| left.split(topology), || right.split(topology));
+            boxes.extend(of_left);
+            boxes.extend(of_right);
+        } else {
+            left.split_into(topology, boxes);
+            right.split_into(topology, boxes);
+        }
+    }
+
+    /// Parts them; `bounds` is the box about them. What is dense comes first, so where there are both sorts
+    /// only one of them is parted.
+    fn halve(self, topology: &Topology, bounds: &OrientedBox) -> [Self; 2] {
+        let Place { items, dense, half } = self;
+        let ([left, right], all) = (half.halves(), items.len());
+        let count = topology.leaves_of(left).len() * topology.leaf_size();
+        let of_one_sort = if count < dense { 0..dense } else { dense..items.len() };
+        let (some, within) = (&mut items[of_one_sort.clone()], count - of_one_sort.start);
+        if within > 0 && within < some.len() {
+            let level = Level::new();
+            let own = if dense == 0 || dense == all { *bounds } else { about(level, some) };
+            let axis = best_axis(level, some, &own, within);
+            partition(some, axis, within);
+        }
+        let (of_left, of_right) = items.split_at_mut(count);
+        let dense_left = dense.min(count);
+        [
+            Self { items: of_left, dense: dense_left, half: left },
+            Self { items: of_right, dense: dense - dense_left, half: right },
+        ]
+    }
+}
+
+/// Sums of coordinates and their products are taken in so many lanes: a fixed order, whatever the machine.
+const LANES: usize = 4;
+
+/// Items that are looked at together, for the lanes of the widest registers.
+const WIDTH: usize = 16;
+
+/// Up to sixteen items; the first of all where there are fewer.
+#[inline(always)]
+fn sixteen(items: &[Item], start: usize) -> [Item; WIDTH] {
+    let mut some = [items[0]; WIDTH];
+    let rest = &items[start..];
+    match rest.first_chunk() {
+        Some(full) => some = *full,
+        None => some[..rest.len()].copy_from_slice(rest),
+    }
+    some
+}
+
+/// The coordinates of four of them.
+#[inline(always)]
+fn coordinates<S: Simd>(simd: S, items: &[Item; WIDTH], four: usize) -> [f32x4<S>; 3] {
+    let floats: &[f32] = bytemuck::cast_slice(&items[four * LANES..][..LANES]);
+    let [x, y, z, _] = f32x4::load_four_interleaved(simd, floats);
+    [x, y, z]
+}
+
+/// Principal axes of the points, the longest spread first.
+fn principal_axes(level: Level, items: &[Item]) -> [[f32; 3]; 3] {
+    let sums = dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || sums(simd, items),
+    ));
+    #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
+    let n = items.len() as f64;
+    let [x, y, z, xx, xy, xz, yy, yz, zz] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
+    let eigen = symmetric_eigen([xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]);
+    // Longest first; reversing two of three keeps the frame right-handed up to a sign, mended by the third.
+    let [short, middle, long] = eigen.vectors;
+    to_axes([long, middle, short.map(|c| -c)])
+}
+
+/// The sums of x y z xx xy xz yy yz zz of the points relative to the first, in lanes.
+#[inline(always)]
+fn sums<S: Simd>(simd: S, items: &[Item]) -> [[f64; LANES]; 9] {
+    let origin = items[0].position;
+    let mut sums = [f64x4::splat(simd, 0.0); 9];
+    let mut start = 0;
+    while start < items.len() {
+        let some = sixteen(items, start);
+        for four in 0..WIDTH / LANES {
+            let [x, y, z] = coordinates(simd, &some, four);
+            let double = |(low, high): (f64x2<S>, f64x2<S>)| low.combine(high);
+            let x = double(simd.widen_f32x4(x - origin[0]));
+            let y = double(simd.widen_f32x4(y - origin[1]));
+            let z = double(simd.widen_f32x4(z - origin[2]));
+            let products = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+            for k in 0..9 {
+                sums[k] += products[k];
+            }
+        }
+        start += WIDTH;
+    }
+    let mut lanes = [[0.0; LANES]; 9];
+    for k in 0..9 {
+        lanes[k] = sums[k].to_array();
+    }
+    lanes
+}
+
+/// Least and greatest coordinate of the points along each axis.
+fn extents(level: Level, items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
+    dispatch!(level, simd => simd.vectorize(
+        #[inline(always)]
+        || extents_by(simd, items, axes),
+    ))
+}
+
+#[inline(always)]
+fn extents_by<S: Simd>(simd: S, items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
+    let mut low = [f32x16::splat(simd, f32::INFINITY); 3];
+    let mut high = [f32x16::splat(simd, f32::NEG_INFINITY); 3];
+    let mut start = 0;
+    while start < items.len() {
+        let some = sixteen(items, start);
+        let (a, b) = (coordinates(simd, &some, 0), coordinates(simd, &some, 1));
+        let (c, d) = (coordinates(simd, &some, 2), coordinates(simd, &some, 3));
+        let mut all = [low[0]; 3];
+        for k in 0..3 {
+            all[k] = a[k].combine(b[k]).combine(c[k].combine(d[k]));
+        }
+        for k in 0..3 {
+            let at = along(all, axes[k]);
+            (low[k], high[k]) = (at.min(low[k]), at.max(high[k]));
+        }
+        start += WIDTH;
+    }
+    let (mut least_of, mut greatest_of) = ([0.0; 3], [0.0; 3]);
+    for k in 0..3 {
+        least_of[k] = least(low[k], f32::INFINITY);
+        greatest_of[k] = greatest(high[k], f32::NEG_INFINITY);
+    }
+    (least_of, greatest_of)
+}
+
+/// Moves the `left` points least along `axis` to the front; equal ones by their index.
+fn partition(items: &mut [Item], axis: [f32; 3], left: usize) {
+    let key = |item: &Item| dot(axis, item.position);
+    items.select_nth_unstable_by(left, |a, b| key(a).total_cmp(&key(b)).then(a.index.cmp(&b.index)));
+}
+
+/// The principal axis whose median split leaves the least volume, judged on an even subset.
+fn best_axis(level: Level, items: &[Item], bounds: &OrientedBox, left: usize) -> [f32; 3] {
+    let axes = &bounds.axes;
+    let worth = |k: usize| bounds.half[k] >= WORTH_A_TRY * bounds.half[0];
+    if !worth(1) && !worth(2) {
+        return axes[0];
+    }
+    let stride = items.len().div_ceil(JUDGED_BY);
+    let mut subset: Vec<Item> = items.iter().step_by(stride).copied().collect();
+    let cut = (left * subset.len() / items.len()).clamp(1, subset.len() - 1);
+    #[expect(clippy::cast_precision_loss, reason = "a rough figure")]
+    let spacing = (4.0 * bounds.half[0] * bounds.half[1] / subset.len() as f32).sqrt();
+    let mut volume = |k: usize| {
+        partition(&mut subset, axes[k], cut);
+        let (l, r) = subset.split_at(cut);
+        [l, r]
+            .into_iter()
+            .map(|half| {
+                let (low, high) = extents(level, half, axes);
+                (0..3).map(|j| high[j] - low[j] + spacing).product::<f32>()
+            })
+            .sum::<f32>()
+    };
+    let mut best = (volume(0), 0);
+    for k in 1..3 {
+        if worth(k) {
+            let v = volume(k);
+            if v < best.0 {
+                best = (v, k);
+            }
+        }
+    }
+    axes[best.1]
+}

@@ -1,0 +1,357 @@
+//! The tree as it is stored and read: the boxes of siblings side by side, and what their enclosures reach
+//! further beside them.
+
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x16, u32x4};
+use nearmiss_geometry::NodeId;
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::wide::product;
+use serde::{Deserialize, Serialize};
+
+use crate::bounds::boxes::OrientedBox;
+use crate::bounds::growth::Growth;
+use crate::bounds::part::Part;
+use crate::tree::topology::{Children, FAN, Grandchildren, NodePair, Topology};
+
+/// Pairs of children of two nodes, and grandchildren of one.
+pub(crate) const LANES: usize = FAN * FAN;
+
+/// A number of each of four siblings.
+pub(crate) type Lanes = [f32; FAN];
+
+/// The boxes of up to four children; what stands in lanes without a child says nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Siblings {
+    pub(crate) centre: [Lanes; 3],
+    pub(crate) half: [Lanes; 3],
+    pub(crate) axes: [[Lanes; 3]; 3],
+    /// The greatest local radius of the points of each.
+    pub(crate) reach: Lanes,
+}
+
+impl Siblings {
+    pub(crate) const NONE: Self = Self {
+        centre: [[0.0; FAN]; 3],
+        half: [[0.0; FAN]; 3],
+        axes: [[[0.0; FAN]; 3]; 3],
+        reach: [0.0; FAN],
+    };
+
+    pub(crate) fn set(&mut self, lane: usize, bounds: &OrientedBox) {
+        for k in 0..3 {
+            self.centre[k][lane] = bounds.centre[k];
+            self.half[k][lane] = bounds.half[k];
+            for j in 0..3 {
+                self.axes[k][j][lane] = bounds.axes[k][j];
+            }
+        }
+        self.reach[lane] = bounds.reach;
+    }
+
+    /// The box in a lane.
+    #[inline]
+    pub(crate) fn get(&self, lane: usize) -> OrientedBox {
+        let of = |rows: &[Lanes; 3]| [rows[0][lane], rows[1][lane], rows[2][lane]];
+        OrientedBox {
+            centre: of(&self.centre),
+            half: of(&self.half),
+            axes: [of(&self.axes[0]), of(&self.axes[1]), of(&self.axes[2])],
+            reach: self.reach[lane],
+        }
+    }
+
+    /// The squared distances of a place from the four boxes.
+    #[inline(always)]
+    pub(crate) fn distances_sq<S: Simd>(&self, simd: S, [x, y, z]: [f32; 3]) -> f32x4<S> {
+        let load = f32x4::load_array_ref;
+        let [cx, cy, cz] = &self.centre;
+        let d = [-(load(simd, cx) - x), -(load(simd, cy) - y), -(load(simd, cz) - z)];
+        let mut sum = f32x4::splat(simd, 0.0);
+        for ([ax, ay, az], half) in self.axes.iter().zip(&self.half) {
+            let along = product([load(simd, ax), load(simd, ay), load(simd, az)], d);
+            let beyond = (along.abs() - load(simd, half)).max(0.0);
+            sum += beyond * beyond;
+        }
+        sum
+    }
+}
+
+/// What the enclosures of up to four children reach further than their boxes, sixteen bits a length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct Growths(pub(crate) [[u32; FAN]; 3]);
+
+impl Growths {
+    fn set(&mut self, lane: usize, growth: &Growth) {
+        for (row, pair) in self.0.iter_mut().zip(growth.pairs()) {
+            row[lane] = pair;
+        }
+    }
+
+    #[inline]
+    pub(crate) fn get(&self, lane: usize) -> Growth {
+        Growth::from_pairs([self.0[0][lane], self.0[1][lane], self.0[2][lane]])
+    }
+}
+
+/// The box of the root, which has no siblings, and what its enclosures reach further, by [`Part`].
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub(crate) struct Root {
+    pub(crate) bounds: OrientedBox,
+    pub(crate) growths: [Growth; 2],
+}
+
+/// The nodes over the points of a scan, and the boxes about them.
+#[derive(Debug, Clone, Copy)]
+pub struct Tree<'a> {
+    pub(crate) topology: &'a Topology,
+    pub(crate) root: &'a Root,
+    /// The boxes of the children of each inner node.
+    pub(crate) siblings: &'a [Siblings],
+    /// What the enclosures of the same children reach further, by [`Part`].
+    pub(crate) growths: [&'a [Growths]; 2],
+}
+
+impl<'a> Tree<'a> {
+    /// Which nodes there are, and which points lie under them.
+    #[inline]
+    #[must_use]
+    pub fn topology(&self) -> &'a Topology {
+        self.topology
+    }
+
+    /// A box about the discs of a node's points, and about their balls.
+    ///
+    /// # Panics
+    /// When there is no such node, as all here.
+    #[inline]
+    #[must_use]
+    pub fn bounds(&self, id: NodeId) -> OrientedBox {
+        match self.topology.parent(id) {
+            Some((parent, lane)) => self.siblings[parent.index()].get(lane),
+            None => self.root.bounds,
+        }
+    }
+
+    /// What the box of a node must grow by to contain this part of it.
+    #[inline]
+    pub(crate) fn growth(&self, part: Part, id: NodeId) -> Growth {
+        match self.topology.parent(id) {
+            Some((parent, lane)) => self.growths[part as usize][parent.index()].get(lane),
+            None => self.root.growths[part as usize],
+        }
+    }
+
+    /// A box about a node's part of the surface or of the obstacle, proven to contain it
+    /// (`docs/theory/certificates.md`, `docs/theory/obstacle.md`). It has the axes of the node's
+    /// [box](Self::bounds), and contains it.
+    #[inline]
+    #[must_use]
+    pub fn enclosure(&self, part: Part, id: NodeId) -> OrientedBox {
+        self.growth(part, id).of(&self.bounds(id))
+    }
+
+    /// The greatest local radius of the points under a node.
+    #[inline]
+    #[must_use]
+    pub fn reach(&self, id: NodeId) -> f32 {
+        match self.topology.parent(id) {
+            Some((parent, lane)) => self.siblings[parent.index()].reach[lane],
+            None => self.root.bounds.reach,
+        }
+    }
+
+    /// Half the length of the longest child of an inner node.
+    #[inline(always)]
+    fn longest_below(&self, id: NodeId) -> f32 {
+        let [a, b, c, d] = self.siblings[id.index()].half[0];
+        let greater = |a: f32, b: f32| if a > b { a } else { b };
+        // Lanes without a child are zero.
+        greater(greater(a, b), greater(c, d))
+    }
+
+    /// Box and enclosure of this part of a node.
+    #[inline(always)]
+    #[must_use]
+    pub fn bounds_of(&self, part: Part, id: NodeId) -> NodeBounds<f32> {
+        let OrientedBox { centre, half, axes, .. } = self.bounds(id);
+        let (low, high) = self.growth(part, id).lengths();
+        NodeBounds { centre, half, axes, low, high }
+    }
+
+    /// Those of the children of an inner node; what there is in other lanes says nothing.
+    ///
+    /// # Panics
+    /// When it is no inner node, as below.
+    #[inline(always)]
+    #[must_use]
+    pub fn bounds_of_children<S: Simd>(&self, simd: S, part: Part, id: NodeId) -> NodeBounds<f32x4<S>> {
+        self.siblings(simd, part, id.index())
+    }
+
+    /// Those of the grandchildren of a node, in the same order; what there is in other lanes says nothing.
+    #[inline(always)]
+    #[must_use]
+    pub fn bounds_of_grandchildren<S: Simd>(
+        &self,
+        simd: S,
+        part: Part,
+        of: &Grandchildren,
+    ) -> NodeBounds<f32x16<S>> {
+        let [a, b, c, d] = of.parents;
+        let a = self.siblings(simd, part, a.index());
+        let b = self.siblings(simd, part, b.index());
+        let c = self.siblings(simd, part, c.index());
+        let d = self.siblings(simd, part, d.index());
+        NodeBounds {
+            centre: combined([a.centre, b.centre, c.centre, d.centre]),
+            half: combined([a.half, b.half, c.half, d.half]),
+            axes: [
+                combined([a.axes[0], b.axes[0], c.axes[0], d.axes[0]]),
+                combined([a.axes[1], b.axes[1], c.axes[1], d.axes[1]]),
+                combined([a.axes[2], b.axes[2], c.axes[2], d.axes[2]]),
+            ],
+            low: combined([a.low, b.low, c.low, d.low]),
+            high: combined([a.high, b.high, c.high, d.high]),
+        }
+    }
+
+    #[inline(always)]
+    fn siblings<S: Simd>(&self, simd: S, part: Part, of: usize) -> NodeBounds<f32x4<S>> {
+        let Siblings { centre, half, axes: [u, v, w], .. } = &self.siblings[of];
+        let Growths([first, second, third]) = &self.growths[part as usize][of];
+        let rows = |[x, y, z]: &[Lanes; 3]| -> [f32x4<S>; 3] {
+            [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
+        };
+        // Of two upper halves in a number the first is its lower one.
+        let halves = |both: &[u32; FAN]| -> (f32x4<S>, f32x4<S>) {
+            let both = u32x4::load_array_ref(simd, both);
+            ((both << 16).bitcast(), (both & 0xffff_0000).bitcast())
+        };
+        let ((lx, ly), (lz, gx), (gy, gz)) = (halves(first), halves(second), halves(third));
+        NodeBounds {
+            centre: rows(centre),
+            half: rows(half),
+            axes: [rows(u), rows(v), rows(w)],
+            low: [lx, ly, lz],
+            high: [gx, gy, gz],
+        }
+    }
+}
+
+/// The first lanes of four, as bits: those of children.
+#[inline(always)]
+pub(crate) fn lanes_of(children: Children) -> u32 {
+    (1 << children.len()) - 1
+}
+
+/// Which nodes of a pair that are not both leaves stay whole: leaves, and those that are less than half as
+/// long as the other, of which lengths are `scale` times as long. `leaves`: which are leaves.
+///
+/// # Panics
+/// When there are no such nodes.
+#[inline]
+#[must_use]
+pub fn whole([a, b]: [&Tree<'_>; 2], pair: NodePair, leaves: [bool; 2], scale: f32) -> [bool; 2] {
+    if leaves != [false; 2] {
+        return leaves;
+    }
+    let (a, b) = (a.longest_below(pair.a), b.longest_below(pair.b) * scale);
+    // Of lengths that are none both may be so; then both are split.
+    let (long_a, long_b) = (a > 2.0 * b, b > 2.0 * a);
+    [long_b && !long_a, long_a && !long_b]
+}
+
+/// Box and enclosure of a node, with `f32` for `V`; of several nodes, a lane each, with a vector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NodeBounds<V> {
+    /// The middles of the boxes.
+    pub centre: [V; 3],
+    /// Half their edge lengths.
+    pub half: [V; 3],
+    /// Unit directions of the edges.
+    pub axes: [[V; 3]; 3],
+    /// By how much the enclosures reach further against the axes; infinite where nothing bounds them.
+    pub low: [V; 3],
+    /// The same along the axes.
+    pub high: [V; 3],
+}
+
+impl<V: Copy> NodeBounds<V> {
+    /// The same bounds with each number replaced.
+    #[inline(always)]
+    #[must_use]
+    pub fn map<W>(&self, replaced: impl Fn(V) -> W) -> NodeBounds<W> {
+        let [u, v, w] = self.axes;
+        NodeBounds {
+            centre: each(self.centre, &replaced),
+            half: each(self.half, &replaced),
+            axes: [each(u, &replaced), each(v, &replaced), each(w, &replaced)],
+            low: each(self.low, &replaced),
+            high: each(self.high, &replaced),
+        }
+    }
+}
+
+#[inline(always)]
+fn each<V, W>([x, y, z]: [V; 3], replaced: &impl Fn(V) -> W) -> [W; 3] {
+    [replaced(x), replaced(y), replaced(z)]
+}
+
+/// The lanes of four after each other.
+#[inline(always)]
+fn combined<S: Simd>([a, b, c, d]: [[f32x4<S>; 3]; FAN]) -> [f32x16<S>; 3] {
+    [
+        a[0].combine(b[0]).combine(c[0].combine(d[0])),
+        a[1].combine(b[1]).combine(c[1].combine(d[1])),
+        a[2].combine(b[2]).combine(c[2].combine(d[2])),
+    ]
+}
+
+/// The tree while it is built: boxes alone.
+pub(crate) struct Bare {
+    topology: Topology,
+    root: Root,
+    siblings: Vec<Siblings>,
+}
+
+impl Bare {
+    /// With these boxes of all nodes, in the order of their ids.
+    pub(crate) fn new(topology: Topology, boxes: &[OrientedBox]) -> Self {
+        let root = Root { bounds: boxes[NodeId::ROOT.index()], growths: [Growth::default(); 2] };
+        Self { topology, root, siblings: siblings(&topology, boxes) }
+    }
+
+    pub(crate) fn tree(&self) -> Tree<'_> {
+        Tree { topology: &self.topology, root: &self.root, siblings: &self.siblings, growths: [&[]; 2] }
+    }
+}
+
+/// The boxes of all nodes, in the order of their ids, as those of siblings.
+pub(crate) fn siblings(topology: &Topology, boxes: &[OrientedBox]) -> Vec<Siblings> {
+    inner(topology, |children| {
+        let mut siblings = Siblings::NONE;
+        for (lane, id) in children.iter().enumerate() {
+            siblings.set(lane, &boxes[id.index()]);
+        }
+        siblings
+    })
+}
+
+/// The same of what enclosures reach further.
+pub(crate) fn growths_of_siblings(topology: &Topology, growths: &[Growth]) -> Vec<Growths> {
+    inner(topology, |children| {
+        let mut siblings = Growths::default();
+        for (lane, id) in children.iter().enumerate() {
+            siblings.set(lane, &growths[id.index()]);
+        }
+        siblings
+    })
+}
+
+fn inner<T: Send>(topology: &Topology, of: impl Fn(Children) -> T + Sync + Send) -> Vec<T> {
+    map(topology.inner(), |i| of(topology.children(NodeId(id32(i)))))
+}
