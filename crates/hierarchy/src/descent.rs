@@ -157,7 +157,8 @@ impl TreePair<'_> {
     ) -> ControlFlow<()> {
         let (a, b) = (self.a, self.b);
         let (mut alone_a, mut alone_b) = (Siblings::NONE, Siblings::NONE);
-        while let Some(open) = frontier.pop() {
+        let mut next = None;
+        while let Some(open) = next.take().or_else(|| frontier.pop()) {
             let pair = open.pair;
             let leaves = [a.topology.is_leaf(pair.a), b.topology.is_leaf(pair.b)];
             let fine = visitor.is_fine(pair);
@@ -183,13 +184,19 @@ impl TreePair<'_> {
                 if fine == [false; 2] { whole([a, b], pair, leaves, self.relative.scale()) } else { fine };
             let below_a = if whole_a { Side::whole(a, pair.a, &mut alone_a) } else { Side::below(a, pair.a) };
             let below_b = if whole_b { Side::whole(b, pair.b, &mut alone_b) } else { Side::below(b, pair.b) };
-            let compared = self.put_near(simd, [&below_a, &below_b], frontier, visitor);
-            visitor.compared(compared)?;
+            let compared;
+            (compared, next) = self.put_near(simd, [&below_a, &below_b], frontier, visitor);
+            let flow = visitor.compared(compared);
+            if flow.is_break() {
+                next.into_iter().for_each(|open| frontier.push(open));
+                return flow;
+            }
         }
         ControlFlow::Continue(())
     }
 
-    /// Puts the pairs that are near into the frontier; returns how many were compared.
+    /// Puts the pairs that are near into the frontier. Returns how many were compared, and the pair to look at
+    /// next unless that is the frontier's business.
     #[inline(always)]
     fn put_near<S: Simd, V: PairVisitor, F: Frontier>(
         &self,
@@ -197,20 +204,21 @@ impl TreePair<'_> {
         [a, b]: [&Side<'_>; 2],
         frontier: &mut F,
         visitor: &mut V,
-    ) -> u32 {
+    ) -> (u32, Option<Open>) {
         let there = (a.lanes * 0x1111) & EACH_IN_FOUR[b.lanes as usize % LANES];
-        let near = self.compare(simd, [a.boxes, b.boxes], there, V::NOTES_GAPS);
+        let Near { mut lanes, most, shares, gaps, apart } =
+            self.compare(simd, [a.boxes, b.boxes], there, V::NOTES_GAPS);
         let pair = |lane: u32| NodePair { a: a.id(lane % 4), b: b.id(lane / 4) };
-        let mut lanes = near.lanes;
+        let mut next = None;
         if V::NOTES_GAPS {
-            visitor.least_apart(near.apart);
+            visitor.least_apart(apart);
         }
         if V::NOTES_PAIRS {
             let mut apart = there & !lanes;
             while apart != 0 {
                 let lane = apart.trailing_zeros();
                 apart &= apart - 1;
-                visitor.apart(pair(lane), near.gaps[lane as usize % LANES]);
+                visitor.apart(pair(lane), gaps[lane as usize % LANES]);
             }
         }
         if V::LOOKS_CLOSER {
@@ -219,8 +227,8 @@ impl TreePair<'_> {
                 let lane = lanes.trailing_zeros();
                 lanes &= lanes - 1;
                 let (pair, of) = (pair(lane), lane as usize % LANES);
-                let Some(key) = visitor.urgency(pair, near.shares[of]) else {
-                    visitor.apart(pair, near.gaps[of]);
+                let Some(key) = visitor.urgency(pair, shares[of]) else {
+                    visitor.apart(pair, gaps[of]);
                     continue;
                 };
                 let mut open = Open { pair, key };
@@ -234,20 +242,20 @@ impl TreePair<'_> {
                 }
             }
             if let Some(most) = most {
-                frontier.push(most);
+                next = frontier.push_last(most);
             }
         } else if lanes == 0 {
             frontier.settle(simd);
         } else {
-            let open = |lane: u32| Open { pair: pair(lane), key: near.shares[lane as usize % LANES] };
-            lanes &= !(1 << near.most);
+            let open = |lane: u32| Open { pair: pair(lane), key: shares[lane as usize % LANES] };
+            lanes &= !(1 << most);
             while lanes != 0 {
                 frontier.push(open(lanes.trailing_zeros()));
                 lanes &= lanes - 1;
             }
-            frontier.push(open(near.most));
+            next = frontier.push_last(open(most));
         }
-        there.count_ones()
+        (there.count_ones(), next)
     }
 
     /// As [`Relative::gap`] and [`Relative::overlap`], in the same order of operations.

@@ -27,6 +27,12 @@ pub trait Frontier {
     /// The pair to look at next.
     fn pop(&mut self) -> Option<Open>;
 
+    /// Adds the most urgent of some siblings, after all others, or returns it if it comes next.
+    #[inline(always)]
+    fn push_last(&mut self, open: Open) -> Option<Open> {
+        Some(open)
+    }
+
     /// Nothing is left below the pair that was looked at last.
     #[inline(always)]
     fn settle<S: Simd>(&mut self, simd: S) {
@@ -163,5 +169,10 @@ impl Frontier for Heap {
 
     fn pop(&mut self) -> Option<Open> {
         self.pairs.pop().map(|near| Open { pair: near.item, key: near.distance })
+    }
+
+    fn push_last(&mut self, open: Open) -> Option<Open> {
+        self.push(open);
+        None
     }
 }
