@@ -158,11 +158,12 @@ impl Relative {
     #[must_use]
     pub fn points<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
         let [x, y, z] = *points;
-        let row = |k: usize| {
-            let [rx, ry, rz] = self.linear[k];
-            x * rx + y * ry + z * rz + self.translation[k]
-        };
-        [row(0), row(1), row(2)]
+        let ([rx, ry, rz], [tx, ty, tz]) = (self.linear, self.translation);
+        [
+            x * rx[0] + y * rx[1] + z * rx[2] + tx,
+            x * ry[0] + y * ry[1] + z * ry[2] + ty,
+            x * rz[0] + y * rz[1] + z * rz[2] + tz,
+        ]
     }
 
     /// A point of a's frame in b's.

@@ -305,69 +305,105 @@ impl Motion {
         b: &NodeBounds<f32x16<S>>,
         limits: Limits,
     ) -> Gaps {
-        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
-        let (mut between, mut off) = ([zero; 3], [zero; 3]);
-        for k in 0..3 {
-            between[k] = b.centre[k] - a.centre[k];
-            off[k] = between[k] + self.offset[k];
-        }
+        // Unrolled by hand: loops would keep all of it in memory.
+        let [x, y, z] = self.offset;
+        let between = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];
+        let off = [between[0] + x, between[1] + y, between[2] + z];
         // All that feet need in terms of the axes: their cosines, and how far apart the centres are along
         // them.
-        let mut cosines = [[zero; 3]; 3];
-        let (mut along_a, mut along_b) = ([zero; 3], [zero; 3]);
-        for i in 0..3 {
-            along_a[i] = product(a.axes[i], off);
-            along_b[i] = product(b.axes[i], off);
-            for j in 0..3 {
-                cosines[i][j] = product(a.axes[i], b.axes[j]);
-            }
-        }
+        let (along_a, along_b) = (in_terms_of(&a.axes, off), in_terms_of(&b.axes, off));
+        let cosines = [
+            in_terms_of(&b.axes, a.axes[0]),
+            in_terms_of(&b.axes, a.axes[1]),
+            in_terms_of(&b.axes, a.axes[2]),
+        ];
         // From the centre of b on.
         let mut seen = along_a;
         let mut foot_a = within(&seen, &a.half);
         for _ in 0..ROUNDS {
-            let mut place = along_b;
-            for j in 0..3 {
-                place[j] = cosines[0][j] * foot_a[0] + cosines[1][j] * foot_a[1] + cosines[2][j] * foot_a[2]
-                    - place[j];
-            }
-            let foot_b = within(&place, &b.half);
-            for i in 0..3 {
-                seen[i] = along_a[i] + product(cosines[i], foot_b);
-            }
+            let foot = combined(&cosines, &foot_a);
+            let place = [foot[0] - along_b[0], foot[1] - along_b[1], foot[2] - along_b[2]];
+            let foot = in_terms_of(&cosines, within(&place, &b.half));
+            seen = [along_a[0] + foot[0], along_a[1] + foot[1], along_a[2] + foot[2]];
             foot_a = within(&seen, &a.half);
         }
-        let mut line = [zero; 3];
-        for i in 0..3 {
-            let apart = seen[i] - foot_a[i];
-            for k in 0..3 {
-                line[k] += a.axes[i][k] * apart;
-            }
-        }
-        let per_length = one / product(line, line).sqrt();
-        for k in 0..3 {
-            line[k] *= per_length;
-        }
-        let turn = [line[0] - self.direction[0], line[1] - self.direction[1], line[2] - self.direction[2]];
+        let apart = [seen[0] - foot_a[0], seen[1] - foot_a[1], seen[2] - foot_a[2]];
+        let line = combined(&a.axes, &apart);
+        let per_length = f32x16::splat(simd, 1.0) / product(line, line).sqrt();
+        let line = [line[0] * per_length, line[1] * per_length, line[2] * per_length];
+        let [x, y, z] = self.direction;
+        let turn = [line[0] - x, line[1] - y, line[2] - z];
         #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
-        let mut boxes = product(line, between) - product(turn, turn) * (0.5 * self.distance) as f32;
+        let boxes = product(line, between) - product(turn, turn) * (0.5 * self.distance) as f32;
         // Any line bounds: that of the boxes is nearly that of the enclosures.
-        let mut growth = zero;
-        for k in 0..3 {
-            let (along_a, along_b) = (product(a.axes[k], line), product(b.axes[k], line));
-            boxes -= a.half[k] * along_a.abs();
-            boxes -= b.half[k] * along_b.abs();
-            // Towards each other: along the line for a, against it for b.
-            let towards_b = simd.select_f32x16(along_a.simd_gt(0.0), a.high[k], a.low[k]);
-            let towards_a = simd.select_f32x16(along_b.simd_gt(0.0), b.low[k], b.high[k]);
-            growth += towards_b * along_a.abs() + towards_a * along_b.abs();
-        }
+        let (along_a, along_b) = (in_terms_of(&a.axes, line), in_terms_of(&b.axes, line));
+        let mut reach = Reach { boxes, growth: f32x16::splat(simd, 0.0) };
+        reach.add(
+            simd,
+            [along_a[0], along_b[0]],
+            [a.half[0], b.half[0]],
+            [a.low[0], a.high[0], b.low[0], b.high[0]],
+        );
+        reach.add(
+            simd,
+            [along_a[1], along_b[1]],
+            [a.half[1], b.half[1]],
+            [a.low[1], a.high[1], b.low[1], b.high[1]],
+        );
+        reach.add(
+            simd,
+            [along_a[2], along_b[2]],
+            [a.half[2], b.half[2]],
+            [a.low[2], a.high[2], b.low[2], b.high[2]],
+        );
+        let Reach { boxes, growth } = reach;
         let (least, enclosures) = (f32x16::splat(simd, self.least()), boxes - growth);
         let boxes = simd.select_f32x16(boxes.simd_gt(least), boxes, least);
         let enclosures = simd.select_f32x16(enclosures.simd_gt(least), enclosures, least);
         let near: mask32x16<S> = boxes.simd_lt(limits.boxes) | enclosures.simd_lt(limits.enclosures);
         Gaps { boxes: boxes.to_array(), enclosures: enclosures.to_array(), near: bits(near) }
     }
+}
+
+/// What is left between two boxes, and what their enclosures take of it.
+struct Reach<S: Simd> {
+    boxes: f32x16<S>,
+    growth: f32x16<S>,
+}
+
+impl<S: Simd> Reach<S> {
+    /// Along the axes of either box with the same number: how far each goes `along` the line, with its half
+    /// edge lengths, and by how much the enclosures reach further at the lower and the upper end of each.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        simd: S,
+        along: [f32x16<S>; 2],
+        half: [f32x16<S>; 2],
+        [low_a, high_a, low_b, high_b]: [f32x16<S>; 4],
+    ) {
+        let shares = [along[0].abs(), along[1].abs()];
+        self.boxes -= half[0] * shares[0];
+        self.boxes -= half[1] * shares[1];
+        // Towards each other: along the line for a, against it for b.
+        let towards_b = simd.select_f32x16(along[0].simd_gt(0.0), high_a, low_a);
+        let towards_a = simd.select_f32x16(along[1].simd_gt(0.0), low_b, high_b);
+        self.growth += towards_b * shares[0] + towards_a * shares[1];
+    }
+}
+
+/// The components of vectors along three axes.
+#[inline(always)]
+fn in_terms_of<S: Simd>(axes: &[[f32x16<S>; 3]; 3], v: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [product(axes[0], v), product(axes[1], v), product(axes[2], v)]
+}
+
+/// The vectors with these components along three axes.
+#[inline(always)]
+fn combined<S: Simd>(axes: &[[f32x16<S>; 3]; 3], along: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    let [u, v, w] = axes;
+    let [x, y, z] = *along;
+    [u[0] * x + v[0] * y + w[0] * z, u[1] * x + v[1] * y + w[1] * z, u[2] * x + v[2] * y + w[2] * z]
 }
 
 /// The first of four in four lanes, then the second, and so on.
