@@ -14,7 +14,7 @@ use nearmiss_lanes::wide::{bits, repeated, spread};
 use crate::bounds::boxes::Relative;
 use crate::bounds::lanes::{Boxes, along_normals};
 use crate::tree::topology::{FAN, NodePair};
-use crate::tree::wide::{LANES, Lanes, Siblings, Tree, lanes_of, whole};
+use crate::tree::wide::{LANES, Lanes, Siblings, Tree, lanes_of, rows, whole};
 
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
 pub use single::PlaceVisitor;
@@ -270,15 +270,15 @@ impl TreePair<'_> {
                 each_repeated(simd, &a.axes[2]),
             ],
         };
-        let [hx, hy, hz] = four(simd, &b.half);
+        let [hx, hy, hz] = rows(simd, &b.half);
         let (relative, scale) = (self.relative, self.relative.scale());
         let boxes_b = Boxes {
-            centre: each_spread(relative.points_of_four(four(simd, &b.centre))),
+            centre: each_spread(relative.points_of_four(rows(simd, &b.centre))),
             half: each_spread([hx * scale, hy * scale, hz * scale]),
             axes: [
-                each_spread(relative.directions_of_four(four(simd, &b.axes[0]))),
-                each_spread(relative.directions_of_four(four(simd, &b.axes[1]))),
-                each_spread(relative.directions_of_four(four(simd, &b.axes[2]))),
+                each_spread(relative.directions_of_four(rows(simd, &b.axes[0]))),
+                each_spread(relative.directions_of_four(rows(simd, &b.axes[1]))),
+                each_spread(relative.directions_of_four(rows(simd, &b.axes[2]))),
             ],
         };
         let mut gap = f32x16::splat(simd, f32::MIN);
@@ -344,16 +344,9 @@ const EACH_IN_FOUR: [u32; LANES] = {
     each
 };
 
-// A closure given to the standard library would not be compiled for the instruction set.
-
 #[inline(always)]
-fn four<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> [f32x4<S>; 3] {
-    [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
-}
-
-#[inline(always)]
-fn each_repeated<S: Simd>(simd: S, rows: &[Lanes; 3]) -> [f32x16<S>; 3] {
-    let [x, y, z] = four(simd, rows);
+fn each_repeated<S: Simd>(simd: S, of: &[Lanes; 3]) -> [f32x16<S>; 3] {
+    let [x, y, z] = rows(simd, of);
     [repeated(x), repeated(y), repeated(z)]
 }
 

@@ -223,19 +223,11 @@ impl<'a> Tree<'a> {
     fn siblings<S: Simd>(&self, simd: S, part: Part, of: usize) -> NodeBounds<f32x4<S>> {
         let Siblings { centre, half, axes: [u, v, w], .. } = &self.siblings[of];
         let Growths([first, second, third]) = &self.growths[part as usize][of];
-        let rows = |[x, y, z]: &[Lanes; 3]| -> [f32x4<S>; 3] {
-            [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
-        };
-        // Of two upper halves in a number the first is its lower one.
-        let halves = |both: &[u32; FAN]| -> (f32x4<S>, f32x4<S>) {
-            let both = u32x4::load_array_ref(simd, both);
-            ((both << 16).bitcast(), (both & 0xffff_0000).bitcast())
-        };
-        let ((lx, ly), (lz, gx), (gy, gz)) = (halves(first), halves(second), halves(third));
+        let ((lx, ly), (lz, gx), (gy, gz)) = (halves(simd, first), halves(simd, second), halves(simd, third));
         NodeBounds {
-            centre: rows(centre),
-            half: rows(half),
-            axes: [rows(u), rows(v), rows(w)],
+            centre: rows(simd, centre),
+            half: rows(simd, half),
+            axes: [rows(simd, u), rows(simd, v), rows(simd, w)],
             low: [lx, ly, lz],
             high: [gx, gy, gz],
         }
@@ -263,6 +255,21 @@ pub fn whole([a, b]: [&Tree<'_>; 2], pair: NodePair, leaves: [bool; 2], scale: f
     // Of lengths that are none both may be so; then both are split.
     let (long_a, long_b) = (a > 2.0 * b, b > 2.0 * a);
     [long_b && !long_a, long_a && !long_b]
+}
+
+// Closures may be compiled apart, without the instruction set of their caller.
+
+/// Four vectors by their coordinates.
+#[inline(always)]
+pub(crate) fn rows<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> [f32x4<S>; 3] {
+    [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
+}
+
+/// The lower and the upper halves of four numbers, which are the upper halves of lengths.
+#[inline(always)]
+fn halves<S: Simd>(simd: S, both: &[u32; FAN]) -> (f32x4<S>, f32x4<S>) {
+    let both = u32x4::load_array_ref(simd, both);
+    ((both << 16).bitcast(), (both & 0xffff_0000).bitcast())
 }
 
 /// Box and enclosure of a node, with `f32` for `V`; of several nodes, a lane each, with a vector.

@@ -206,7 +206,7 @@ impl Motion {
     }
 
     /// The pairs that take the place of a pair of nodes, and their gaps.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn split(
         &self,
         ([of_a, of_b], part): ([&Slices<'_>; 2], Part),
