@@ -28,5 +28,5 @@ pub use scan::options::{BuildError, BuildOptions};
 pub use scan::outline::{Ball, Outline};
 pub use scan::slices::Slices;
 pub use scan::survey::Survey;
-pub use tree::topology::{Children, Grandchildren, MOST_LEAF_POINTS, NodePair, Topology};
+pub use tree::topology::{Children, Grandchildren, LaneNodes, MOST_LEAF_POINTS, NodePair, Topology};
 pub use tree::wide::{Growths, NodeBounds, Siblings, Tree, whole};

@@ -314,7 +314,7 @@ fn children_and_grandchildren_in_lanes_have_the_bounds_of_their_nodes() {
             }
             let children: Vec<NodeId> = topology.children(node).iter().collect();
             let grandchildren = topology.grandchildren(node);
-            let Grandchildren { ids: below, lanes, .. } = grandchildren;
+            let Grandchildren { nodes: below, lanes, .. } = grandchildren;
             let expected = |lane: usize| tree.bounds_of(Part::Surface, children[lane]);
             for level in levels() {
                 dispatch!(level, simd => {
@@ -324,14 +324,14 @@ fn children_and_grandchildren_in_lanes_have_the_bounds_of_their_nodes() {
                     }
                     let own = tree.bounds_of_grandchildren(simd, Part::Surface, &grandchildren);
                     for lane in (0..LANES).filter(|lane| lanes >> lane & 1 != 0) {
-                        let expected = tree.bounds_of(Part::Surface, below[lane]);
+                        let expected = tree.bounds_of(Part::Surface, below.id(lane));
                         assert_eq!(own.map(|row| row[lane]), expected, "{node:?}, {lane}, {level:?}");
                     }
                 });
             }
             // In the place of each child stand its own children, or a leaf itself.
             let found: Vec<NodeId> =
-                (0..LANES).filter(|lane| lanes >> lane & 1 != 0).map(|lane| below[lane]).collect();
+                (0..LANES).filter(|lane| lanes >> lane & 1 != 0).map(|lane| below.id(lane)).collect();
             let of_child = |&child: &NodeId| match topology.is_leaf(child) {
                 true => vec![child],
                 false => topology.children(child).iter().collect(),

@@ -36,11 +36,51 @@ impl NodePair {
     pub const ROOTS: Self = Self { a: NodeId::ROOT, b: NodeId::ROOT };
 }
 
+/// Nodes in sixteen lanes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LaneNodes {
+    /// The first node of each four lanes.
+    starts: [u32; FAN],
+    /// These bits of a lane's number are how far its node is from the first.
+    mask: u32,
+}
+
+impl LaneNodes {
+    /// One node in all lanes.
+    #[inline]
+    #[must_use]
+    pub const fn alone(id: NodeId) -> Self {
+        Self { starts: [id.0; FAN], mask: 0 }
+    }
+
+    /// Child k in lanes 4k to 4k + 3.
+    #[inline]
+    #[must_use]
+    pub const fn spread(children: Children) -> Self {
+        let first = children.first;
+        Self { starts: [first, first + 1, first + 2, first + 3], mask: 0 }
+    }
+
+    /// Child k in lanes k, 4 + k, 8 + k and 12 + k.
+    #[inline]
+    #[must_use]
+    pub const fn repeated(children: Children) -> Self {
+        Self { starts: [children.first; FAN], mask: 3 }
+    }
+
+    /// The node in a lane, of sixteen.
+    #[inline]
+    #[must_use]
+    pub fn id(&self, lane: usize) -> NodeId {
+        NodeId(self.starts[lane / FAN % FAN] + (id32(lane) & self.mask))
+    }
+}
+
 /// The children of the children of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grandchildren {
     /// Those of child k from lane 4k on; or child k itself in lane 5k, if children are leaves.
-    pub ids: [NodeId; FAN * FAN],
+    pub nodes: LaneNodes,
     /// The lanes that are taken, as bits.
     pub lanes: u32,
     /// Where their boxes stand: among those of the children of these nodes, four of each.
@@ -227,33 +267,29 @@ impl Topology {
     pub fn grandchildren(&self, id: NodeId) -> Grandchildren {
         /// The lanes of children that are leaves.
         const DIAGONAL: u32 = 0b1000_0100_0010_0001;
-        let Children { first, count } = self.children(id);
+        let children = self.children(id);
+        let Children { first, count } = children;
         if self.is_leaf(NodeId(first)) {
-            let mut ids = [NodeId::ROOT; FAN * FAN];
-            for k in 0..FAN {
-                ids[(FAN + 1) * k] = NodeId(first + id32(k));
-            }
-            return Grandchildren { ids, lanes: DIAGONAL & ((1 << (5 * count - 4)) - 1), parents: [id; FAN] };
+            let lanes = DIAGONAL & ((1 << (5 * count - 4)) - 1);
+            return Grandchildren { nodes: LaneNodes::repeated(children), lanes, parents: [id; FAN] };
         }
-        let mut ids = [NodeId::ROOT; FAN * FAN];
-        let mut lanes = (1 << (4 * count)) - 1;
-        if first < self.bottom {
+        let (starts, lanes) = if first < self.bottom {
             // They follow each other as their parents do.
             let next = self.children(NodeId(first)).first;
-            for (k, id) in (0_u32..).zip(&mut ids) {
-                *id = NodeId(next + k);
-            }
+            ([next, next + 4, next + 8, next + 12], (1 << (4 * count)) - 1)
         } else {
-            lanes = 0;
-            for k in 0..count {
+            let (mut starts, mut lanes) = ([first; FAN], 0);
+            for (k, start) in (0..count).zip(&mut starts) {
                 let children = self.children(NodeId(first + k));
-                ids[FAN * k as usize..][..FAN].copy_from_slice(&children.lanes());
+                *start = children.first;
                 lanes |= ((1 << children.count) - 1) << (4 * k);
             }
-        }
+            (starts, lanes)
+        };
+        let nodes = LaneNodes { starts, mask: id32(FAN) - 1 };
         let last = first + count - 1;
         let parent = |k: u32| NodeId(last.min(first + k));
-        Grandchildren { ids, lanes, parents: [parent(0), parent(1), parent(2), parent(3)] }
+        Grandchildren { nodes, lanes, parents: [parent(0), parent(1), parent(2), parent(3)] }
     }
 
     /// The parent of a node, and which of its children the node is; `None` of the root.

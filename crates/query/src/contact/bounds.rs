@@ -16,9 +16,9 @@ use std::ops::{Add, Mul};
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
+use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
-use nearmiss_geometry::{NodeId, Pose};
-use nearmiss_hierarchy::{NodeBounds, NodePair, Part, SLACK, Slices, whole};
+use nearmiss_hierarchy::{LaneNodes, NodeBounds, NodePair, Part, SLACK, Slices, whole};
 use nearmiss_lanes::wide::{bits, product, repeated, spread};
 
 use crate::pair::placed::Placed;
@@ -37,12 +37,8 @@ const FAN: usize = 4;
 /// of either node, or one node and the grandchildren of the other.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pairs {
-    of_a: [NodeId; LANES],
-    of_b: [NodeId; LANES],
-    /// A lane's node of a is that with the lane's number shifted by this.
-    shift: u32,
-    /// A lane's node of b is that with these bits of the lane's number.
-    mask: usize,
+    of_a: LaneNodes,
+    of_b: LaneNodes,
     /// The lanes that hold a pair, as bits.
     pub(crate) lanes: u32,
 }
@@ -51,7 +47,7 @@ impl Pairs {
     /// The pair in this lane.
     #[inline]
     pub(crate) fn pair(&self, lane: usize) -> NodePair {
-        NodePair { a: self.of_a[(lane % LANES) >> self.shift], b: self.of_b[lane & self.mask] }
+        NodePair { a: self.of_a.id(lane), b: self.of_b.id(lane) }
     }
 }
 
@@ -219,10 +215,10 @@ impl Motion {
         let (pairs, mut gaps) = dispatch!(self.level, simd => simd.vectorize(
             #[inline(always)]
             || {
-                let (alone_a, alone_b) = ([a; LANES], [b; LANES]);
+                let (alone_a, alone_b) = (LaneNodes::alone(a), LaneNodes::alone(b));
                 let (pairs, bounds_a, bounds_b) = match whole {
                     [true, true] => (
-                        Pairs { of_a: alone_a, of_b: alone_b, shift: 0, mask: 0, lanes: 1 },
+                        Pairs { of_a: alone_a, of_b: alone_b, lanes: 1 },
                         alone(simd, &of_a.bounds_of(part, a)),
                         alone(simd, &self.moved(&of_b.bounds_of(part, b))),
                     ),
@@ -230,7 +226,7 @@ impl Motion {
                         let below = of_b.topology().grandchildren(b);
                         let bounds = of_b.bounds_of_grandchildren(simd, part, &below);
                         (
-                            Pairs { of_a: alone_a, of_b: below.ids, shift: 0, mask: LANES - 1, lanes: below.lanes },
+                            Pairs { of_a: alone_a, of_b: below.nodes, lanes: below.lanes },
                             alone(simd, &of_a.bounds_of(part, a)),
                             self.moved(&bounds),
                         )
@@ -238,21 +234,18 @@ impl Motion {
                     [false, true] => {
                         let below = of_a.topology().grandchildren(a);
                         (
-                            Pairs { of_a: below.ids, of_b: alone_b, shift: 0, mask: 0, lanes: below.lanes },
+                            Pairs { of_a: below.nodes, of_b: alone_b, lanes: below.lanes },
                             of_a.bounds_of_grandchildren(simd, part, &below),
                             alone(simd, &self.moved(&of_b.bounds_of(part, b))),
                         )
                     }
                     [false, false] => {
                         let (below_a, below_b) = (of_a.topology().children(a), of_b.topology().children(b));
-                        let (mut ids_a, mut ids_b) = (alone_a, alone_b);
-                        ids_a[..FAN].copy_from_slice(&below_a.lanes());
-                        ids_b[..FAN].copy_from_slice(&below_b.lanes());
                         let lanes = FAN_LANES[below_a.len() - 1][below_b.len() - 1];
                         let a = of_a.bounds_of_children(simd, part, a);
                         let b = of_b.bounds_of_children(simd, part, b);
                         (
-                            Pairs { of_a: ids_a, of_b: ids_b, shift: 2, mask: FAN - 1, lanes },
+                            Pairs { of_a: LaneNodes::spread(below_a), of_b: LaneNodes::repeated(below_b), lanes },
                             each_spread(&a),
                             all_repeated(&self.moved(&b)),
                         )
@@ -621,9 +614,12 @@ mod tests {
                             open.push(below);
                         }
                     }
-                    kinds[match pairs.mask {
-                        0 => 0,
-                        mask => usize::from(mask == FAN - 1) + 1,
+                    let is_whole =
+                        [pairs.of_a == LaneNodes::alone(pair.a), pairs.of_b == LaneNodes::alone(pair.b)];
+                    kinds[match is_whole {
+                        [_, true] => 0,
+                        [false, false] => 1,
+                        [true, false] => 2,
                     }] += 1;
                 }
             }
