@@ -296,14 +296,13 @@ impl Apart<'_> {
 
     /// The answer if the surfaces meet.
     fn touch(&mut self, scratch: &mut ContactScratch) -> Option<Distance> {
-        let spent = &mut self.pair.meter.spent;
+        let meter = &mut self.pair.meter;
+        let spent = meter.spent;
         let work = self.budget.work.map(|work| work.saturating_sub(spent.evaluations + spent.node_pairs));
         let budget = Budget { work, ..*self.budget };
         let asked = Asked { scans: self.pair.views, plan: &self.plan.touching, budget: &budget };
         let answer = collide(asked, scratch, Outputs::default());
-        spent.evaluations += answer.statistics.evaluations;
-        spent.node_pairs += answer.statistics.node_pairs;
-        spent.leaf_pairs += answer.statistics.leaf_pairs;
+        meter.spend(&answer.statistics);
         let Verdict::Intersecting { contact, evidence } = answer.verdict else { return None };
         Some(Distance {
             lower: 0.0,
@@ -313,7 +312,7 @@ impl Apart<'_> {
             sources: contact.sources,
             evidence,
             complete: true,
-            statistics: *spent,
+            statistics: meter.spent,
         })
     }
 

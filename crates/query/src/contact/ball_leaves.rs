@@ -95,7 +95,7 @@ impl Surfaces<'_> {
         let centre = [self.pair.views[0].point(i), self.pair.views[1].point(j)][1 - side];
         let (view, scratch) = (self.pair.views[side], &mut self.gathers[side]);
         let foot = project(centre, |y| view.evaluate_near(k, y, scratch));
-        self.pair.meter.spent.evaluations += u64::from(foot.evaluations);
+        self.pair.meter.evaluated(u64::from(foot.evaluations));
         let apart = (Vector3::from(foot.point) - Vector3::from(centre)).norm();
         let holds = foot.converged && apart <= ra + rb + self.margin && view.is_obstacle(k, foot.point);
         holds.then_some(Contact { point: foot.point, residual: 0.5 * apart, ..*contact })

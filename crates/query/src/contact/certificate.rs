@@ -99,18 +99,18 @@ pub(crate) fn are_doubtful(pair: &ScanPair<'_>, motion: &Motion, leaves: NodePai
 }
 
 /// The search for a pair of leaves whose enclosures are not apart.
-pub(crate) struct Certifier<'a> {
-    pub(crate) pair: ScanPair<'a>,
+pub(crate) struct Certifier<'c, 'a> {
+    pub(crate) pair: &'c mut ScanPair<'a>,
     /// Enclosures must be further apart than this, in a's stored frame.
     pub(crate) reach: f32,
     /// What was proven.
-    pub(crate) proven: &'a mut Vec<Bound>,
+    pub(crate) proven: &'c mut Vec<Bound>,
     /// Leaves whose enclosures are not apart.
     pub(crate) doubtful: Option<NodePair>,
 }
 
-impl<'a> Certifier<'a> {
-    pub(crate) fn new(pair: ScanPair<'a>, reach: f32, proven: &'a mut Vec<Bound>) -> Self {
+impl<'c, 'a> Certifier<'c, 'a> {
+    pub(crate) fn new(pair: &'c mut ScanPair<'a>, reach: f32, proven: &'c mut Vec<Bound>) -> Self {
         proven.clear();
         Self { pair, reach, proven, doubtful: None }
     }
@@ -127,7 +127,7 @@ impl<'a> Certifier<'a> {
         (proof, is_hinted): (Option<&mut Proof>, bool),
     ) -> Option<(f64, f64)> {
         let motion = &Motion::new(self.pair.level, self.pair.views, pose);
-        let (pair, reach) = (&self.pair, self.reach);
+        let (pair, reach) = (&*self.pair, self.reach);
         let fails =
             |&leaves: &NodePair| !pair.are_leaves(leaves) || are_doubtful(pair, motion, leaves, reach);
         if let Some(&leaves) = compared.iter().find(|leaves| fails(leaves)) {
@@ -196,7 +196,7 @@ impl<'a> Certifier<'a> {
         if self.pair.meter.go_on().is_break() {
             return None;
         }
-        let pair = &mut self.pair;
+        let pair = &mut *self.pair;
         let enclosures = if run.lists { f32::INFINITY } else { run.beyond };
         let limits = Limits { boxes: f32::NEG_INFINITY, enclosures };
         let (pairs, gaps) = run.motion.split(([pair.a, pair.b], pair.part), next.item, limits);

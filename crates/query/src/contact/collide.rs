@@ -218,7 +218,7 @@ fn still_meet(pair: &ScanPair<'_>, plan: &CollidePlan, [i, j]: [usize; 2]) -> Op
 
 /// Pairs of tangent discs, then, if they are apart and a certificate is wanted, pairs of enclosures.
 fn surfaces(
-    (pair, pose): (ScanPair<'_>, &Pose),
+    (mut pair, pose): (ScanPair<'_>, &Pose),
     options: &CollideOptions,
     scratch: &mut ContactScratch,
     (mut known, proof, contacts): (Option<&mut Known>, Option<&mut Proof>, Option<&mut Contacts>),
@@ -226,20 +226,18 @@ fn surfaces(
 ) -> Answer {
     let ContactScratch { frontiers, gathers, excluded, compared, proven, proof: open, .. } = scratch;
     let reach = pair.stored(options.margin);
-    let mut certifier = Certifier::new(pair, reach, proven);
     // Enclosures hold the boxes: what they part has no contact.
     if let Some(known) = known.as_mut().filter(|_| proof.is_none())
-        && let Some(distance) = known.prove_again(pose, &mut certifier, (&mut *compared, &mut *open))
+        && let Some(distance) =
+            known.prove_again(pose, &mut Certifier::new(&mut pair, reach, proven), (compared, open))
     {
         if let Some(contacts) = contacts {
             contacts.complete = true;
         }
-        let (verdict, statistics) = (apart(options, distance, true), certifier.pair.meter.spent);
-        scratch.longest_stretch = certifier.pair.meter.longest_stretch;
-        let band = certifier.pair.band_of(NodePair::ROOTS);
-        return Answer { verdict, band, distance_estimate: None, statistics };
+        scratch.longest_stretch = pair.meter.longest_stretch;
+        let (verdict, band) = (apart(options, distance, true), pair.band_of(NodePair::ROOTS));
+        return Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent };
     }
-    let Certifier { pair, proven, .. } = certifier;
     let is_slow = known.as_ref().is_some_and(|known| known.keeps_front(&pair));
     let (all, complete) = contacts.map(Contacts::parts).unzip();
     let mut search = Surfaces::new(pair, options, is_slow, Workspace { gathers, excluded, compared, all });
@@ -248,28 +246,29 @@ fn surfaces(
     if let Some(complete) = complete {
         *complete = !ended;
     }
-    let parted = !ended && search.found.is_none();
-    let Surfaces { pair, found, doubt, excluded, compared, met, .. } = search;
-    let mut certifier = Certifier::new(pair, reach, proven);
-    let mut band =
-        met.map_or_else(|| certifier.pair.band_of(NodePair::ROOTS), |met| certifier.pair.band(met));
-    let verdict = match (found, doubt) {
+    let Surfaces { pair, found, doubt, excluded, compared, met, .. } = &mut search;
+    let parted = !ended && found.is_none();
+    let mut band = met.map_or_else(|| pair.band_of(NodePair::ROOTS), |met| pair.band(met));
+    let mut doubtful = None;
+    let verdict = match (*found, *doubt) {
         (Some((contact, evidence)), _) => Verdict::Intersecting { contact, evidence },
         _ if ended => {
-            let likelihood = likelihood(&certifier.pair, reach, frontiers.open());
+            let likelihood = likelihood(pair, reach, frontiers.open());
             Verdict::Undecided(Reason::Budget { likelihood })
         }
         (None, Some(reason)) => Verdict::Undecided(reason),
         _ if !options.certifies() => apart(options, 0.0, false),
         _ if known.as_ref().is_some_and(|known| known.is_doubtful()) => apart(options, 0.0, false),
         _ => {
+            let mut certifier = Certifier::new(pair, reach, proven);
             let proven = certifier.prove(pose, compared, open, (proof, known.is_some()));
             if let Some((distance, near)) = proven {
                 band = near;
                 if let Some(known) = &mut known {
-                    known.proven(distance, certifier.proven, &certifier.pair);
+                    known.proven(distance, certifier.proven, certifier.pair);
                 }
             }
+            doubtful = certifier.doubtful;
             apart(options, proven.map_or(0.0, |(distance, _)| distance), proven.is_some())
         }
     };
@@ -277,14 +276,13 @@ fn surfaces(
         && !is_certified(&verdict)
     {
         if parted && is_slow {
-            let slack = certifier.pair.relative.slack();
-            known.parted((excluded, compared), slack, options.certifies(), certifier.doubtful);
+            known.parted((excluded, compared), pair.relative.slack(), options.certifies(), doubtful);
         } else {
-            known.forget(met);
+            known.forget(*met);
         }
     }
-    scratch.longest_stretch = certifier.pair.meter.longest_stretch;
-    Answer { verdict, band, distance_estimate: None, statistics: certifier.pair.meter.spent }
+    scratch.longest_stretch = pair.meter.longest_stretch;
+    Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent }
 }
 
 /// Looks for a contact: where there was one, then from what kept the scans apart, or else `look`s.

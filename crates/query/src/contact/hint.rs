@@ -221,10 +221,10 @@ impl Known {
     pub(crate) fn prove_again(
         &mut self,
         pose: &Pose,
-        certifier: &mut Certifier<'_>,
+        certifier: &mut Certifier<'_, '_>,
         (expired, scratch): (&mut Vec<NodePair>, &mut ProofScratch),
     ) -> Option<f64> {
-        let pair = &certifier.pair;
+        let pair = &*certifier.pair;
         if !self.is_proof || !self.is_slow(pair, SLOW_PROVEN) || !self.is_there(pair) {
             return None;
         }

@@ -152,7 +152,7 @@ impl Surfaces<'_> {
             x = land(0, step(0, &x, &y));
             y = land(1, step(1, &y, &x));
         }
-        self.pair.meter.spent.evaluations += evaluations;
+        self.pair.meter.evaluated(evaluations);
         found
     }
 }

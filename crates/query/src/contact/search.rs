@@ -171,7 +171,7 @@ impl<'a> Surfaces<'a> {
             if meter.go_on().is_break() {
                 return None;
             }
-            meter.spent.evaluations += 2;
+            meter.evaluated(2);
             Some([va.evaluate_near(i, x, scratch_a), vb.evaluate_near(j, x, scratch_b)])
         })?;
         let moved = (Vector3::from(meeting.point) - Vector3::from(contact.point)).norm();

@@ -108,7 +108,7 @@ impl Follower<'_> {
         if self.meter.go_on().is_break() {
             return None;
         }
-        self.meter.spent.evaluations += 2;
+        self.meter.evaluated(2);
         let mut side = |side: usize| {
             self.views[side].evaluate_onward(x, &mut self.nearest[side], &mut self.gathers[side])
         };

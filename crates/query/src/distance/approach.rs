@@ -96,7 +96,7 @@ impl Approach<'_, '_> {
         }
         let (view, scratch) = (self.views[side], &mut self.gathers[side]);
         let foot = project(x, |y| view.evaluate_near(self.samples[side], y, scratch));
-        self.meter.spent.evaluations += u64::from(foot.evaluations);
+        self.meter.evaluated(u64::from(foot.evaluations));
         Some(foot)
     }
 }

@@ -38,6 +38,8 @@ pub(crate) struct Meter {
     leaf_work: u64,
     /// At this much work something has to be looked at.
     next_look: u64,
+    /// Below so many node pairs nothing has, if nothing else was done since this was set.
+    free_until: u64,
     /// When the clock was looked at last, and the longest time that it was not.
     looked: Option<Instant>,
     pub(crate) longest_stretch: Duration,
@@ -61,6 +63,7 @@ impl Meter {
             deadline: budget.deadline,
             leaf_work: 0,
             next_look: if budget.deadline.is_some() { 0 } else { most_work },
+            free_until: 0,
             looked: None,
             longest_stretch: Duration::ZERO,
             spent: Statistics::default(),
@@ -72,28 +75,54 @@ impl Meter {
         Self { spent, ..self }
     }
 
+    /// Counts what another search has spent.
+    pub(crate) fn spend(&mut self, spent: &Statistics) {
+        self.spent.evaluations += spent.evaluations;
+        self.spent.node_pairs += spent.node_pairs;
+        self.spent.leaf_pairs += spent.leaf_pairs;
+        self.free_until = 0;
+    }
+
     /// Counts two leaves of so many points each.
     #[inline]
     pub(crate) fn leaf_pair(&mut self, a: usize, b: usize) {
         self.spent.leaf_pairs += 1;
-        self.leaf_work += (a * b) as u64 / POINTS_A_PAIR;
+        self.leaf_work((a * b) as u64 / POINTS_A_PAIR);
+    }
+
+    /// Counts evaluations of an implicit function.
+    #[inline]
+    pub(crate) fn evaluated(&mut self, times: u64) {
+        self.spent.evaluations += times;
+        self.free_until = 0;
     }
 
     /// Counts leaf work that costs as much as so many node pairs.
     #[inline]
     pub(crate) fn leaf_work(&mut self, pairs: u64) {
         self.leaf_work += pairs;
+        self.free_until = 0;
     }
 
     /// Whether anything is left. Once nothing is, nothing ever will be.
     #[inline]
     pub(crate) fn go_on(&mut self) -> ControlFlow<()> {
+        if self.spent.node_pairs < self.free_until { ControlFlow::Continue(()) } else { self.count() }
+    }
+
+    /// Counts everything together.
+    fn count(&mut self) -> ControlFlow<()> {
         let Statistics { evaluations, node_pairs, .. } = self.spent;
-        if evaluations + node_pairs >= self.most_units {
+        let units = evaluations + node_pairs;
+        if units >= self.most_units {
             return ControlFlow::Break(());
         }
         let work = PAIRS_AN_EVALUATION * evaluations + node_pairs + self.leaf_work;
-        if work < self.next_look { ControlFlow::Continue(()) } else { self.look(work) }
+        if work >= self.next_look {
+            self.look(work)?;
+        }
+        self.free_until = node_pairs + (self.most_units - units).min(self.next_look - work);
+        ControlFlow::Continue(())
     }
 
     #[cold]

@@ -106,18 +106,13 @@ impl<'a> Placed<'a> {
     pub(crate) fn is_proper(&self) -> bool {
         let (pose, rotation) = (&self.placed, self.placed.rotation());
         let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];
-        let off = [
-            u.norm_squared() - 1.0,
-            v.norm_squared() - 1.0,
-            w.norm_squared() - 1.0,
-            u.dot(&v),
-            v.dot(&w),
-            w.dot(&u),
-        ];
-        // Nothing branches on one of them; a sum with what is no number is none.
-        let off: f64 = off.iter().map(|x| x.abs()).sum();
+        // Two unit vectors at right angles, and their cross product.
+        let (third, across) = (u.cross(&v) - w, u.dot(&v));
+        let off = (u.norm_squared() - 1.0).abs() + (v.norm_squared() - 1.0).abs() + across.abs();
+        // Nothing branches on one of them; a sum with NaN is NaN.
+        let off = off + third.x.abs() + third.y.abs() + third.z.abs();
         let far: f64 = pose.translation().iter().map(|x| x.abs()).sum();
-        off <= MOST_OFF && u.cross(&v).dot(&w) > 0.0 && far < f64::INFINITY && pose.scale() > 0.0
+        off <= MOST_OFF && far < f64::INFINITY && pose.scale() > 0.0
     }
 
     /// Returns `true` if `x`, a place of the implicit surface in the world near the stored point `i`, belongs
@@ -238,5 +233,5 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// A rotation is one to so much, in the sum of what six products of its columns are off.
+/// The sum of what the lengths, the angle and the cross product of the columns of a rotation may be off.
 const MOST_OFF: f64 = 6e-9;

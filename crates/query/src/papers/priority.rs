@@ -49,7 +49,7 @@ impl Papers<'_, '_> {
                 break;
             }
             let x = vb.placed().apply_inverse(va.point(i));
-            self.search.pair.meter.spent.evaluations += 1;
+            self.search.pair.meter.evaluated(1);
             let at = vb.scan().evaluate_node_with(pair.b.index(), x, &mut self.search.gathers[1].gather);
             if at.status == Status::Outside || at.f.abs() <= near {
                 continue;

@@ -123,12 +123,12 @@ impl Papers<'_, '_> {
         let [va, vb] = self.search.pair.views;
         let x = va.placed().apply(x.map(f64::from));
         let means = |at: &Evaluation| at.status == Status::Ok;
-        self.search.pair.meter.spent.evaluations += 1;
+        self.search.pair.meter.evaluated(1);
         let at_a = va.evaluate_near(about[0], x, &mut self.search.gathers[0]);
         if !means(&at_a) {
             return ControlFlow::Continue(());
         }
-        self.search.pair.meter.spent.evaluations += 1;
+        self.search.pair.meter.evaluated(1);
         let at_b = vb.evaluate_near(about[1], x, &mut self.search.gathers[1]);
         if !means(&at_b) {
             return ControlFlow::Continue(());

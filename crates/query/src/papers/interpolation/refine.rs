@@ -85,7 +85,7 @@ impl Papers<'_, '_> {
             };
             let x = [0, 1, 2].map(|k| contact.point[k] + radius * offset[k]);
             let meter = &mut self.search.pair.meter;
-            meter.spent.evaluations += 2;
+            meter.evaluated(2);
             let at = [
                 va.evaluate_near(i, x, &mut self.search.gathers[0]),
                 vb.evaluate_near(j, x, &mut self.search.gathers[1]),

@@ -19,7 +19,7 @@ impl Papers<'_, '_> {
         let (near, steps) = vb.scan().nearest_point_within(hint as usize, local, reach);
         let meter = &mut self.search.pair.meter;
         meter.spent.neighbour_steps += u64::from(steps);
-        meter.spent.evaluations += 1;
+        meter.evaluated(1);
         let j = near as usize;
         let towards = Vector3::from(vb.point(j)) - Vector3::from(x);
         let away = towards.norm();
