@@ -177,7 +177,7 @@ fn decide(
     let mut known = outputs.hint.map(|hint| hint.recall(&pair, options));
     let early = known.as_mut().and_then(|known| {
         if outputs.contacts.is_none()
-            && let Some(met) = known.met(&pair)
+            && let Some(met) = known.met()
             && let Some((contact, evidence)) = still_meet(&pair, plan, met)
         {
             known.still_met(*pose);
@@ -296,7 +296,7 @@ fn from_before(
     let Some(known) = known else { return look(search, frontiers) };
     // All contacts are those of a search from the roots, in its order.
     if search.all.is_none() {
-        if let Some(points) = known.met(&search.pair) {
+        if let Some(points) = known.met() {
             let leaves = search.pair.numbers(search.pair.leaves_of(points));
             search.leaf_pair(leaves)?;
             search.compared.clear();
@@ -339,7 +339,7 @@ fn balls(
     let mut search = Balls::new(pair, plan.reach(), all);
     let Frontiers { stack, .. } = &mut scratch.frontiers;
     stack.clear();
-    let again = known.as_ref().and_then(|known| known.met(&search.pair)).filter(|_| search.all.is_none());
+    let again = known.as_ref().and_then(|known| known.met()).filter(|_| search.all.is_none());
     let mut ended = again.is_some_and(|points| search.compare(search.pair.leaves_of(points)).is_break());
     if !ended {
         search.apart = f64::INFINITY;

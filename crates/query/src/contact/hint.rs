@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, descend, resume};
+use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, Topology, descend, resume};
 
 use crate::ask::options::CollideOptions;
 use crate::contact::bounds::Motion;
@@ -51,8 +51,8 @@ pub struct PairHint {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Question {
     options: CollideOptions,
-    /// Their [identities](nearmiss_hierarchy::Outline).
-    scans: [u64; 2],
+    /// Their [identities](nearmiss_hierarchy::Outline), and which nodes they have.
+    scans: [(u64, Topology); 2],
     /// Of a's stored frame in the world.
     scale: f64,
 }
@@ -94,7 +94,7 @@ impl PairHint {
     pub(crate) fn recall(&mut self, pair: &ScanPair<'_>, options: &CollideOptions) -> &mut Known {
         let question = Question {
             options: *options,
-            scans: pair.views.map(|view| view.scan().outline().identity),
+            scans: pair.views.map(|view| (view.scan().outline().identity, *view.scan().topology())),
             scale: pair.views[0].placed().scale(),
         };
         match &mut self.known {
@@ -144,10 +144,9 @@ impl Known {
         }
     }
 
-    /// The points that met last time, if there are such: files lie.
-    pub(crate) fn met(&self, pair: &ScanPair<'_>) -> Option<[usize; 2]> {
-        let met = self.met?.map(|i| i as usize);
-        (met[0] < pair.a.normals.len() && met[1] < pair.b.normals.len()).then_some(met)
+    /// The points that met last time.
+    pub(crate) fn met(&self) -> Option<[usize; 2]> {
+        self.met.map(|met| met.map(|i| i as usize))
     }
 
     /// b has come to `pose`, and the same points meet there: nothing else rests on the way.
@@ -182,7 +181,7 @@ impl Known {
             pair.are_leaves(leaves) && motion.is_some_and(|motion| are_doubtful(pair, &motion, leaves, reach))
         };
         self.is_slow(pair, SLOW)
-            && self.is_there(pair)
+            && self.is_whole
             && !self.is_proof
             && (!certifies || self.doubtful.as_ref().is_some_and(fails))
     }
@@ -190,12 +189,6 @@ impl Known {
     /// Whether a proof is known to fail, at leaves that [`Known::has_front`] has looked at.
     pub(crate) fn is_doubtful(&self) -> bool {
         self.doubtful.is_some()
-    }
-
-    /// Whether the front is whole, and of nodes that there are.
-    fn is_there(&self, pair: &ScanPair<'_>) -> bool {
-        let (a, b) = (pair.a.tree.topology(), pair.b.tree.topology());
-        self.is_whole && self.front.iter().all(|at| a.has(at.pair.a) && b.has(at.pair.b))
     }
 
     /// Goes on from the front instead of the roots.
@@ -225,7 +218,7 @@ impl Known {
         (expired, scratch): (&mut Vec<NodePair>, &mut ProofScratch),
     ) -> Option<f64> {
         let pair = &*certifier.pair;
-        if !self.is_proof || !self.is_slow(pair, SLOW_PROVEN) || !self.is_there(pair) {
+        if !self.is_proof || !self.is_slow(pair, SLOW_PROVEN) || !self.is_whole {
             return None;
         }
         expired.clear();
