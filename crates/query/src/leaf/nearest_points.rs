@@ -7,7 +7,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{NodePair, Part};
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::wide::{bits, blocks_of, lanes_of};
+use nearmiss_lanes::wide::{bits, blocks_of, lanes_of, load, squared};
 
 use crate::pair::scan_pair::ScanPair;
 
@@ -53,44 +53,42 @@ fn nearest_by<S: Simd>(simd: S, pair: &ScanPair<'_>, leaves: NodePair, mut best:
     let mut reach = reach_of(pair, best.distance);
     let has_balls = has_balls(pair, [leaf_a, leaf_b]);
     for block_a in blocks_of(&points_a) {
-        let [x, y, z] = &pair.a.blocks[block_a].position;
-        let own = [
-            f32x16::load_array_ref(simd, x),
-            f32x16::load_array_ref(simd, y),
-            f32x16::load_array_ref(simd, z),
-        ];
+        let own = load(simd, &pair.a.blocks[block_a].position);
         let centres = pair.relative.points_back(&own);
         let places = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
         // How far each is from the box of b.
         let d = [centres[0] - bounds.centre[0], centres[1] - bounds.centre[1], centres[2] - bounds.centre[2]];
-        let mut off_sq = zero;
-        for k in 0..3 {
-            let [x, y, z] = bounds.axes[k];
-            let beyond = ((d[0] * x + d[1] * y + d[2] * z).abs() - bounds.half[k]).max(zero);
-            off_sq += beyond * beyond;
-        }
+        let off = in_terms_of(&bounds.axes, &d);
+        let beyond = [
+            (off[0].abs() - bounds.half[0]).max(zero),
+            (off[1].abs() - bounds.half[1]).max(zero),
+            (off[2].abs() - bounds.half[2]).max(zero),
+        ];
+        let off_sq = squared(beyond);
         let balls_a = if has_balls { pair.a.obstacle_balls(block_a) } else { [0.0; WIDTH] };
         let balls_a = f32x16::load_array_ref(simd, &balls_a) * pair.relative.scale_back();
-        let mut left = lanes_of(block_a, &points_a);
-        loop {
-            let most = balls_a + reach;
-            let near: mask32x16<S> = off_sq.simd_le(most * most);
-            left &= bits(near);
-            if left == 0 {
-                break;
-            }
-            let lane = left.trailing_zeros() as usize;
-            left &= left - 1;
-            for block_b in blocks_of(&points_b) {
-                let [x, y, z] = &pair.b.blocks[block_b].position;
-                let d = [
-                    f32x16::load_array_ref(simd, x) - places[0][lane],
-                    f32x16::load_array_ref(simd, y) - places[1][lane],
-                    f32x16::load_array_ref(simd, z) - places[2][lane],
-                ];
-                let d_sq = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-                let balls_b = if has_balls { pair.b.obstacle_balls(block_b) } else { [0.0; WIDTH] };
-                let both = f32x16::load_array_ref(simd, &balls_b) + balls_a.to_array()[lane];
+        for block_b in blocks_of(&points_b) {
+            let mut left = lanes_of(block_a, &points_a);
+            let mut of_b = None;
+            loop {
+                let most = balls_a + reach;
+                let near: mask32x16<S> = off_sq.simd_le(most * most);
+                left &= bits(near);
+                if left == 0 {
+                    break;
+                }
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let (positions, balls_b) = *of_b.get_or_insert_with(
+                    #[inline(always)]
+                    || {
+                        let balls = if has_balls { pair.b.obstacle_balls(block_b) } else { [0.0; WIDTH] };
+                        (load(simd, &pair.b.blocks[block_b].position), f32x16::load_array_ref(simd, &balls))
+                    },
+                );
+                let [x, y, z] = positions;
+                let d_sq = squared([x - places[0][lane], y - places[1][lane], z - places[2][lane]]);
+                let both = balls_b + balls_a.to_array()[lane];
                 let mut left_b = lanes_of(block_b, &points_b);
                 loop {
                     let most = both + reach;
@@ -112,6 +110,13 @@ fn nearest_by<S: Simd>(simd: S, pair: &ScanPair<'_>, leaves: NodePair, mut best:
         }
     }
     best
+}
+
+/// The components of vectors along three axes.
+#[inline(always)]
+fn in_terms_of<S: Simd>([u, v, w]: &[[f32; 3]; 3], [x, y, z]: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    let (x, y, z) = (*x, *y, *z);
+    [x * u[0] + y * u[1] + z * u[2], x * v[0] + y * v[1] + z * v[2], x * w[0] + y * w[1] + z * w[2]]
 }
 
 /// How far apart, in b's stored frame, points may come out that are no further apart than `distance`, beside
