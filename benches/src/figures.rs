@@ -1,49 +1,40 @@
-//! What the programs that make the figures of a paper are asked for, and where these go.
+//! Options that the programs share which make the figures of a paper, and where these figures go.
 
 use std::path::PathBuf;
 
+use clap::Args;
+
 use crate::Failure;
-use crate::arguments::Arguments;
 use crate::plot::{Panel, figure};
 
-/// `-o FOLDER [--data FOLDER] [--poses N] [--seed N] [--only NUMBER] [--quick]`.
-#[derive(Debug, Clone)]
+/// Which figures are made, of what, and where they go.
+#[derive(Debug, Clone, Args)]
 pub struct FigureOptions {
-    /// The folder to write to, which is there.
+    /// The folder to write to; it is made if it is not there
+    #[arg(short = 'o', value_name = "FOLDER")]
     pub out: PathBuf,
-    /// Where objects are.
+    /// The folder of objects
+    #[arg(long, value_name = "FOLDER", env = "NEARMISS_DATA")]
     pub data: Option<PathBuf>,
-    /// How many poses at each distance.
-    pub poses: usize,
-    /// Seed of all that is random.
+    /// Poses at each distance
+    #[arg(long, value_name = "N")]
+    pub poses: Option<usize>,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// The number of one figure, of all.
+    /// Only the figure of this number
+    #[arg(long, value_name = "NUMBER")]
     pub only: Option<u32>,
-    /// A look rather than a measurement.
+    /// A look rather than a measurement
+    #[arg(long)]
     pub quick: bool,
 }
 
 impl FigureOptions {
-    /// Takes them out of what `program` was given; `poses` by default, the former number if quick. Makes the
-    /// folder.
-    ///
-    /// # Errors
-    /// When one cannot be read, there is no folder to write to, or it cannot be made.
-    pub fn take(arguments: &mut Arguments, program: &str, poses: [usize; 2]) -> Result<Self, Failure> {
-        let quick = arguments.flag("--quick");
-        let named: Option<PathBuf> = arguments.value("--data")?;
-        let out: Option<PathBuf> = arguments.value("-o")?;
-        let usage = || format!("usage: {program} -o FOLDER [--data FOLDER] [--poses N] [--only NUMBER]");
-        let options = Self {
-            out: out.ok_or_else(usage)?,
-            data: named.or_else(|| std::env::var_os("NEARMISS_DATA").map(PathBuf::from)),
-            poses: arguments.value("--poses")?.unwrap_or(poses[usize::from(!quick)]),
-            seed: arguments.value("--seed")?.unwrap_or(1),
-            only: arguments.value("--only")?,
-            quick,
-        };
-        std::fs::create_dir_all(&options.out)?;
-        Ok(options)
+    /// Poses at each distance: by default the first number if quick, otherwise the second.
+    #[must_use]
+    pub fn poses(&self, [quick, full]: [usize; 2]) -> usize {
+        self.poses.unwrap_or(if self.quick { quick } else { full })
     }
 
     /// Whether any of these figures is asked for.

@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 pub mod anjos2012;
-pub mod arguments;
 pub mod asked;
 pub mod clock;
 pub mod counting;

@@ -17,7 +17,10 @@ pub use method::{Method, Reply};
 use crate::Failure;
 use crate::object::Object;
 
-/// A rival by its name: `parry`, `trimesh` or `kiddo`; `None` if it needs a mesh and the object has none.
+/// Names of rivals.
+pub const NAMES: [&str; 3] = ["parry", "trimesh", "kiddo"];
+
+/// A rival by its name, one of [`NAMES`]; `None` if it needs a mesh and the object has none.
 ///
 /// # Errors
 /// When there is no such rival, or it refuses the object.
@@ -29,7 +32,7 @@ pub fn rival(name: &str, object: &Object) -> Result<Option<Box<dyn Method>>, Fai
         "parry" => of_mesh(|mesh| Ok(Box::new(parry::MeshTree::new(mesh)))),
         "trimesh" => of_mesh(|mesh| Ok(Box::new(trimesh::Shape::new(mesh)?))),
         "kiddo" => Ok(Some(Box::new(kiddo::PointScan::new(&object.cloud, object.r)?))),
-        _ => Err(format!("no rival {name:?}; there are parry, trimesh and kiddo").into()),
+        _ => Err(format!("expected a rival of {}, got {name:?}", NAMES.join(", ")).into()),
     }
 }
 

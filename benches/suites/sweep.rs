@@ -1,6 +1,6 @@
 //! The sweep, all distances in equal parts: the mean of an iteration is the sweep mean.
 //!
-//! The distribution by distance is the program `sweep`'s to tell; this suite is for comparing commits.
+//! The distribution by distance is `bench sweep`'s to tell; this suite is for comparing commits.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nearmiss::Pose;

@@ -6,8 +6,11 @@ use crate::repository::{Outcome, root, run_cargo};
 /// Where the objects lie that are no part of the repository, from its root.
 const OBJECTS: &str = "../shared/data";
 
+/// Programs and their words for each paper.
+const PAPERS: [[&str; 2]; 3] = [["papers", "klein2004"], ["papers", "klein2005"], ["memory", "anjos2012"]];
+
 /// Papers that can be asked for alone.
-const YEARS: [(&str, &str); 2] = [("--2005", "klein2005"), ("--2012", "anjos2012")];
+const YEARS: [(&str, [&str; 2]); 2] = [("--2005", PAPERS[1]), ("--2012", PAPERS[2])];
 
 /// Measures, with these words after the program's name; with the folder of objects, if it is there and none
 /// is named.
@@ -27,17 +30,18 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
         }
     }
     let asked = YEARS.iter().filter(|(year, _)| absolute.iter().any(|word| word == year));
-    let asked: Vec<&str> = asked.map(|(_, paper)| *paper).collect();
+    let asked: Vec<[&str; 2]> = asked.map(|(_, paper)| *paper).collect();
     absolute.retain(|word| YEARS.iter().all(|(year, _)| word != year));
     let words: Vec<&str> = absolute.iter().map(String::as_str).collect();
-    let papers = if asked.is_empty() { vec!["klein2004", "klein2005", "anjos2012"] } else { asked };
-    for (i, paper) in papers.into_iter().enumerate() {
+    let papers = if asked.is_empty() { PAPERS.to_vec() } else { asked };
+    for (i, [program, paper]) in papers.into_iter().enumerate() {
         // Numbers of figures are those of one paper.
         if i > 0 && words.contains(&"--only") {
             continue;
         }
-        let program = ["run", "--release", "--quiet", "-p", "nearmiss-benches", "--bin", paper, "--"];
-        run_cargo(&[&program, words.as_slice(), data].concat())?;
+        let command =
+            ["run", "--release", "--quiet", "-p", "nearmiss-benches", "--bin", program, "--", paper];
+        run_cargo(&[&command, words.as_slice(), data].concat())?;
     }
     Ok(())
 }

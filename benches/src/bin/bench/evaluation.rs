@@ -1,8 +1,5 @@
 //! What one evaluation of f costs: at a leaf, and anywhere, by instruction set; beside it kiddo's search for
 //! as many nearest points as are added up.
-//!
-//! `evaluation [OBJECT]… [--runs N]`; the objects are the shipped dragon's unless told otherwise.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
 use std::num::NonZero;
@@ -15,7 +12,7 @@ use nearmiss::{BuildOptions, Scan};
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
-use nearmiss_benches::{Failure, arguments::Arguments, machine};
+use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{point_in, rng};
 
 /// Places in a run.
@@ -134,16 +131,20 @@ fn measure(object: &Object, runs: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let runs = arguments.value("--runs")?.unwrap_or(21_usize).max(1);
-    let mut objects = arguments.words()?;
-    if objects.is_empty() {
-        objects = vec!["dragon-5k".into(), "dragon-23k".into()];
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(value_name = "OBJECT", default_values = ["dragon-5k", "dragon-23k"])]
+    objects: Vec<String>,
+    /// Runs, the fastest of which counts
+    #[arg(long, value_name = "N", default_value_t = 21)]
+    runs: usize,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     println!("{}", machine::description());
-    for object in &objects {
-        measure(&Object::read(object)?, runs)?;
+    for object in &arguments.objects {
+        measure(&Object::read(object)?, arguments.runs.max(1))?;
     }
     Ok(())
 }

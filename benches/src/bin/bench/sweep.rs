@@ -1,18 +1,10 @@
 //! The sweep of measured queries, ours and rivals' in the same run, as Markdown.
 //!
-//! `sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival parry|trimesh|kiddo]… [--witness]
-//! [--certified] [--levels] [--evicted] [--kernel geodesic] [--order NAME] [--seed N] [--threads N]`
-//!
-//! `--levels` asks by each instruction set there is, `--evicted` with nothing left in the caches.
-//! With the geodesic kernel the same object prepared for it is asked beside.
-//!
 //! An object is a file of points, with or without a mesh, or one that `Object::read` knows by name.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use nearmiss::{
     BuildOptions, CollideOptions, Detail, Evidence, GraphOptions, Metric, Order, PointKind, Scan,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::asked;
 use nearmiss_benches::clock::timed;
 use nearmiss_benches::object::Object;
@@ -23,54 +15,52 @@ use nearmiss_benches::sweep::{self, Track};
 use nearmiss_benches::{Failure, machine, poses};
 use nearmiss_testdata::instructions::levels;
 
-/// What was asked for.
-struct Options {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// What is measured
+    #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
+    /// Poses at each distance
+    #[arg(long, value_name = "N", default_value_t = 1000)]
     per_distance: usize,
+    /// Passes, each over poses of its own
+    #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u64,
+    /// Poses near contact
+    #[arg(long, value_name = "N", default_value_t = 1000)]
     near: usize,
+    /// A rival that is asked beside; may be given many times
+    #[arg(long = "rival", value_name = "NAME", value_parser = rivals::NAMES)]
     rivals: Vec<String>,
+    /// Ask also for a witness
+    #[arg(long)]
     witness: bool,
+    /// Ask also for certified evidence
+    #[arg(long)]
     certified: bool,
+    /// Ask also by each instruction set there is
+    #[arg(long)]
     levels: bool,
+    /// Ask also with nothing left in the caches
+    #[arg(long)]
     evicted: bool,
+    /// Which pairs of nodes are looked at first
+    #[arg(long, value_parser = asked::orders())]
     order: Option<Order>,
+    /// The kernel; with `geodesic` the same object prepared for it is asked beside
+    #[arg(long, default_value = "euclidean", value_parser = asked::kernels())]
     kernel: Metric,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Threads that prepare the scan; 0 means all
+    #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
 }
 
-impl Options {
-    fn read() -> Result<Self, Failure> {
-        let mut arguments = Arguments::of_process();
-        let options = Self {
-            per_distance: arguments.value("--per-distance")?.unwrap_or(1000),
-            passes: arguments.value("--passes")?.unwrap_or(1),
-            near: arguments.value("--near")?.unwrap_or(1000),
-            rivals: arguments.values("--rival")?,
-            witness: arguments.flag("--witness"),
-            certified: arguments.flag("--certified"),
-            levels: arguments.flag("--levels"),
-            evicted: arguments.flag("--evicted"),
-            order: asked::order(&mut arguments)?,
-            kernel: asked::kernel(&mut arguments)?,
-            seed: arguments.value("--seed")?.unwrap_or(1),
-            threads: arguments.value("--threads")?.unwrap_or(0),
-            objects: arguments.words()?,
-        };
-        if options.objects.is_empty() {
-            return Err(
-                "usage: sweep OBJECT… [--per-distance N] [--passes N] [--near N] [--rival NAME]".into()
-            );
-        }
-        Ok(options)
-    }
-}
-
-fn main() -> Result<(), Failure> {
-    let options = Options::read()?;
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}", machine::description());
-    options.objects.iter().try_for_each(|source| measure(source, &options))
+    options.objects.iter().try_for_each(|source| measure(source, options))
 }
 
 fn measure(source: &str, options: &Options) -> Result<(), Failure> {

@@ -1,9 +1,6 @@
 //! Many poses of a pair on several threads, and the broad phase of a world of many scans, as Markdown.
 //!
-//! `batch [OBJECT] [--poses N] [--bodies N] [--runs N] [--threads N]…`
-//!
 //! Times are the least of some runs.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -12,7 +9,6 @@ use nearmiss::{
     Aabb, Answer, BatchScratch, Bodies, BodyId, Budget, BuildOptions, CollideOptions, CollidePlan, Deadline,
     Detail, Pair, Pose, Scan, Scratch, World, each,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::{Sample, Summary, count};
@@ -32,30 +28,26 @@ const BODIES_A_VOLUME: f64 = 0.125;
 const SHORT_BATCH: usize = 13_000;
 const REPEATS: usize = 1000;
 
-struct Options {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// What is measured
+    #[arg(default_value = "dragon-23k")]
     object: String,
+    /// Poses of the pair
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     poses: usize,
+    /// Bodies of the world
+    #[arg(long, value_name = "N", default_value_t = 1000)]
     bodies: usize,
+    /// Runs, the fastest of which counts
+    #[arg(long, value_name = "N", default_value_t = 3)]
     runs: usize,
+    /// Numbers of threads
+    #[arg(long, value_name = "N", default_values_t = [1, 2])]
     threads: Vec<usize>,
 }
 
 impl Options {
-    fn read() -> Result<Self, Failure> {
-        let mut arguments = Arguments::of_process();
-        let mut options = Self {
-            poses: arguments.value("--poses")?.unwrap_or(1_000_000),
-            bodies: arguments.value("--bodies")?.unwrap_or(1000),
-            runs: arguments.value("--runs")?.unwrap_or(3),
-            threads: arguments.values("--threads")?,
-            object: arguments.words()?.pop().unwrap_or_else(|| "dragon-23k".into()),
-        };
-        if options.threads.is_empty() {
-            options.threads = vec![1, 2];
-        }
-        Ok(options)
-    }
-
     /// The result of the last of some runs, and the time of the fastest.
     fn fastest<T>(&self, mut work: impl FnMut() -> T) -> (T, Duration) {
         let (mut result, mut least) = timed(&mut work);
@@ -67,15 +59,14 @@ impl Options {
     }
 }
 
-fn main() -> Result<(), Failure> {
-    let options = Options::read()?;
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}", machine::description());
     let object = Object::read(&options.object)?.scaled()?;
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let plan = CollidePlan::new(&CollideOptions::default().with_detail(Detail::Verdict), &scan, &scan)?;
-    many_poses(&object.name, &scan, &plan, &options)?;
+    many_poses(&object.name, &scan, &plan, options)?;
     deadlines(&scan, &plan);
-    world(&object.name, &scan, &plan, &options)
+    world(&object.name, &scan, &plan, options)
 }
 
 /// The poses of a sweep, in a single list.

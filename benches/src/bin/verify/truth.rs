@@ -1,21 +1,16 @@
 //! Scores verdicts against exact answers.
 //!
-//! `truth CLOUD POSES.jsonl [--rival parry|trimesh] [--threads N]` and what `asked` reads: `--witness`,
-//! `--certified`, `--method`, `--order`, `--coverings`, `--work`, `--micros`, `--resolution` … Under a budget
-//! the best effort is scored.
+//! Under a budget the best effort is scored.
 //!
-//! Ends with status 1 if a verdict outside the band |gap| ≤ r is wrong or missing, or a deep separation is
+//! The check fails if a verdict outside the band |gap| ≤ r is wrong or missing, or a deep separation is
 //! certified; with `--certified`, which asks for certificates, also if fewer than 95 % of separations from 6
 //! r on are certified. A rival is judged by every pose, for a mesh knows what points do not.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
-use std::path::Path;
-use std::process::ExitCode;
+use std::path::PathBuf;
 
-use nearmiss::{BuildOptions, Evidence, GraphOptions, Scan};
+use nearmiss::{BuildOptions, GraphOptions, Scan};
 use nearmiss_benches::Failure;
-use nearmiss_benches::arguments::Arguments;
-use nearmiss_benches::asked::{self, Limits, best_effort};
+use nearmiss_benches::asked::{Asking, Limits, best_effort};
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::ours::Ours;
@@ -24,37 +19,48 @@ use nearmiss_benches::sample::{Sample, count};
 use nearmiss_benches::scorer::Score;
 use nearmiss_benches::truth::{self, Question};
 
-fn main() -> Result<ExitCode, Failure> {
-    let mut arguments = Arguments::of_process();
-    let asked = asked::options(&mut arguments)?;
-    let limits = Limits::read(&mut arguments)?;
-    let certified = asked.evidence == Evidence::Certified;
-    let threads = arguments.value("--threads")?.unwrap_or(0);
-    let rivals: Vec<String> = arguments.values("--rival")?;
-    let words = arguments.words()?;
-    let [cloud, poses] = words.as_slice() else {
-        return Err("usage: truth CLOUD POSES.jsonl [--witness] [--rival NAME] [--certified]".into());
-    };
-    let object = Object::read(cloud)?;
-    let questions = truth::read(Path::new(poses), &object.cloud.bounds())?;
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is asked about, against itself
+    cloud: String,
+    /// Poses with exact answers, a line of JSON each
+    #[arg(value_name = "POSES.jsonl")]
+    poses: PathBuf,
+    /// A rival that is scored beside; may be given many times
+    #[arg(long = "rival", value_name = "NAME", value_parser = rivals::NAMES)]
+    rivals: Vec<String>,
+    /// Threads that prepare the scan; 0 means all
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    #[command(flatten)]
+    asking: Asking,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+/// Returns whether the check passes.
+pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
+    let asked = arguments.asking.options();
+    let object = Object::read(&arguments.cloud)?;
+    let questions = truth::read(&arguments.poses, &object.cloud.bounds())?;
     println!("{}: {} points, r {:.6}, {} poses", object.name, object.cloud.len(), object.r, questions.len());
 
-    let options = BuildOptions::default().with_threads(threads);
+    let options = BuildOptions::default().with_threads(arguments.threads);
     let (scan, time) = timed(|| Scan::build(&object.cloud, &options));
     let mut scan = scan?;
     if matches!(asked.method, nearmiss::Method::Interpolation(_)) {
         scan = scan.with_graph(&object.cloud, &GraphOptions::default(), None)?;
     }
     println!("prepared in {time:.2?}, {:.2} % of the points usable", 100.0 * scan.usable());
-    let score = score(&mut Ours::new(&scan, &asked)?.with_limits(limits), &questions, object.r);
-    let mut clean = score.is_clean() && (!certified || score.is_certified_enough());
-    for name in rivals {
-        match rivals::rival(&name, &object)? {
+    let score = score(&mut Ours::new(&scan, &asked)?.with_limits(arguments.limits), &questions, object.r);
+    let mut clean = score.is_clean() && (!arguments.asking.certified || score.is_certified_enough());
+    for name in &arguments.rivals {
+        match rivals::rival(name, &object)? {
             Some(mut rival) => clean &= disagreements(rival.as_mut(), &questions, object.r) == 0,
             None => println!("{name} needs a mesh"),
         }
     }
-    Ok(if clean { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(clean)
 }
 
 fn score(ours: &mut Ours<'_>, questions: &[Question], r: f64) -> Score {

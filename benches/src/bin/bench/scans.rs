@@ -1,13 +1,10 @@
 //! How useful answers about real scans are: an object at random poses in a room, a LiDAR frame, a facade.
 //!
-//! `scans SCAN… [--object O] [--size S] [--poses N] [--seed N] [--reach L] [--listed]`
-//!
 //! The object, 1/25 of a scan's diagonal long unless told otherwise, is placed at random within the scan's
 //! bounds. Truth is the exact distance of the nearest two points. Everything is measured in *local spacings*:
 //! the greater of the distances from either of these two points to its sixth distinct neighbour in its own
 //! scan, times the pose's scale. Each pose is asked once for a verdict with certified evidence and once for
-//! the distance, in passes of their own. `--listed` names the poses that fall short.
-#![expect(clippy::print_stdout, reason = "a program for people")]
+//! the distance, in passes of their own.
 
 use std::hint::black_box;
 
@@ -15,7 +12,6 @@ use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Detail, Distance, DistanceOptions, DistancePlan, Evidence,
     Pair, PairHint, PointCloud, Pose, Scan, Scratch, Verdict,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::kiddo::PointScan;
@@ -31,33 +27,38 @@ const FAR: f64 = 6.0;
 /// The object's longest side over the scan's diagonal.
 const SHARE: f64 = 0.04;
 
-struct Options {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Scans that the object is placed in
+    #[arg(required = true, value_name = "SCAN")]
+    scans: Vec<String>,
+    /// What is placed
+    #[arg(long, value_name = "OBJECT", default_value = "bumpy:4000")]
     object: String,
+    /// The longest side that the object is scaled to; by default a 25th of the scan's diagonal
+    #[arg(long, value_name = "S")]
     size: Option<f64>,
+    /// Poses of the object
+    #[arg(long, value_name = "N", default_value_t = 150)]
     poses: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// The reach that the scan is built with; by default it is estimated
+    #[arg(long, value_name = "L")]
     reach: Option<f64>,
+    /// The length of a hinted step
+    #[arg(long, value_name = "L", default_value_t = 0.001)]
     step: f64,
+    /// Hinted steps from each pose
+    #[arg(long, value_name = "N", default_value_t = 200)]
     steps: usize,
+    /// Name the poses that fall short
+    #[arg(long)]
     listed: bool,
 }
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let options = Options {
-        object: arguments.value("--object")?.unwrap_or_else(|| "bumpy:4000".into()),
-        size: arguments.value("--size")?,
-        poses: arguments.value("--poses")?.unwrap_or(150),
-        seed: arguments.value("--seed")?.unwrap_or(1),
-        reach: arguments.value("--reach")?,
-        step: arguments.value("--step")?.unwrap_or(0.001),
-        steps: arguments.value("--steps")?.unwrap_or(200),
-        listed: arguments.flag("--listed"),
-    };
-    let scans = arguments.words()?;
-    if scans.is_empty() {
-        return Err("usage: scans SCAN… [--object O] [--size S] [--poses N] [--seed N] [--reach L]".into());
-    }
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}\n", machine::description());
     println!(
         "| scan | points | r | reach | on sheets | poses ≥ 6 spacings | certified | `lower` ≥ half the truth | \
@@ -65,7 +66,7 @@ fn main() -> Result<(), Failure> {
          µs a distance: mean, p99 | asked again: mean | ns a hinted step |"
     );
     println!("|{}", " --- |".repeat(16));
-    scans.iter().try_for_each(|scan| measure(scan, &options))
+    options.scans.iter().try_for_each(|scan| measure(scan, options))
 }
 
 /// The truth about a pose, by brute force.

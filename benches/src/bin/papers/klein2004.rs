@@ -1,11 +1,7 @@
 //! Table 1 and Figs 8–12 of Klein & Zachmann 2004 on today's machine: `klein2004.md` and SVGs in a folder.
 //!
-//! `klein2004 -o FOLDER [--data FOLDER] [--poses N] [--seed N] [--target MICROSECONDS] [--only NUMBER]
-//! [--quick]`
-//!
 //! Without the folder of objects, the dragon that comes with the tests stands in for them; the artificial
 //! models are made.
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 use std::fmt::Write;
 use std::time::Duration;
@@ -14,7 +10,6 @@ use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Detail, Method, Order, Pacer, Pair, Pose, Sampling, Scan,
     Scratch,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::figures::FigureOptions;
 use nearmiss_benches::klein2004::course::{Course, Questions};
 use nearmiss_benches::klein2004::hierarchy::{Makeup, build_seconds};
@@ -41,19 +36,18 @@ const PASSES: usize = 2;
 /// Shares of an object's points in Fig. 8.
 const SHARES: [usize; 4] = [8, 4, 2, 1];
 
-/// What was asked for.
-struct Options {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    #[command(flatten)]
     figures: FigureOptions,
-    target: Duration,
+    /// The time that a query aims at in the time-critical mode
+    #[arg(long, value_name = "MICROSECONDS", default_value_t = 200)]
+    target: u64,
 }
 
 impl Options {
-    fn read() -> Result<Self, Failure> {
-        let mut arguments = Arguments::of_process();
-        let figures = FigureOptions::take(&mut arguments, "klein2004", [40, 1000])?;
-        let target = Duration::from_micros(arguments.value("--target")?.unwrap_or(200));
-        arguments.nothing_left()?;
-        Ok(Self { figures, target })
+    fn poses(&self) -> usize {
+        self.figures.poses([40, 1000])
     }
 
     fn grid(&self) -> u32 {
@@ -61,8 +55,8 @@ impl Options {
     }
 }
 
-fn main() -> Result<(), Failure> {
-    let options = Options::read()?;
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
+    std::fs::create_dir_all(&options.figures.out)?;
     let data = options.figures.data.as_deref();
     let (all, sizes) = (objects(data)?, sizes(data)?);
     let artificial = artificial(options.grid())?;
@@ -72,7 +66,7 @@ fn main() -> Result<(), Failure> {
         table_1(&mut text, all.iter().chain(&artificial))?;
     }
     if options.figures.wants(&[8]) {
-        figure_8(&mut text, &options, all.iter().chain(&artificial))?;
+        figure_8(&mut text, options, all.iter().chain(&artificial))?;
     }
     let groups = [
         (9, "objects", &all[..]),
@@ -80,12 +74,12 @@ fn main() -> Result<(), Failure> {
         (11, "artificial models", &artificial[..]),
     ];
     for (number, what, objects) in groups.into_iter().filter(|group| options.figures.wants(&[group.0])) {
-        let courses = objects.iter().map(|object| measure(object, &options));
-        courses_of(&mut text, &options, (number, what), &courses.collect::<Result<Vec<_>, _>>()?)?;
+        let courses = objects.iter().map(|object| measure(object, options));
+        courses_of(&mut text, options, (number, what), &courses.collect::<Result<Vec<_>, _>>()?)?;
     }
     let last = all.iter().rfind(|object| object.mesh.is_some());
     if let Some(object) = last.filter(|_| options.figures.wants(&[12])) {
-        figure_12(&mut text, &options, object)?;
+        figure_12(&mut text, options, object)?;
     }
     let path = options.figures.out.join("klein2004.md");
     std::fs::write(&path, text)?;
@@ -190,14 +184,14 @@ struct Measured {
 fn measure(object: &Object, options: &Options) -> Result<Measured, Failure> {
     eprintln!("{}: {} points", object.name, object.cloud.len());
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
-    let fresh = sweep(options.figures.poses, options.figures.seed, 0);
+    let fresh = sweep(options.poses(), options.figures.seed, 0);
     let repeated = fresh.each_ref().map(|poses| poses[..poses.len().min(REPEATED)].to_vec());
     let mut mesh = object.mesh.as_ref().map(MeshTree::new);
     let questions = Questions::new(fresh, &scan, mesh.as_mut().map(|mesh| mesh as &mut dyn Rival));
     let few = Questions::new(repeated.clone(), &scan, mesh.as_mut().map(|mesh| mesh as &mut dyn Rival));
-    let ours = run(&scan, &verdict(), &questions)?;
+    let ours = course(&scan, &verdict(), &questions)?;
     let again = again_and_again(&scan, &repeated)?;
-    let papers = run(&scan, &as_in_the_paper(), &few)?;
+    let papers = course(&scan, &as_in_the_paper(), &few)?;
     Ok(Measured {
         name: format!("{}, {} points", object.name, scan.len()),
         has_mesh: mesh.is_some(),
@@ -231,7 +225,7 @@ fn as_in_the_paper() -> CollideOptions {
     verdict().with_method(Method::Sampling(Sampling::default())).with_order(Order::Sides).with_coverings(true)
 }
 
-fn run(scan: &Scan, options: &CollideOptions, questions: &Questions) -> Result<Course, Failure> {
+fn course(scan: &Scan, options: &CollideOptions, questions: &Questions) -> Result<Course, Failure> {
     let plan = CollidePlan::new(options, scan, scan)?;
     let mut scratch = Scratch::default();
     let a = scan.at(&Pose::IDENTITY);
@@ -321,17 +315,18 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
     eprintln!("Fig. 12: {}", object.name);
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let mut mesh = object.mesh.as_ref().map(MeshTree::new);
-    let poses = sweep(options.figures.poses, options.figures.seed, 1);
+    let poses = sweep(options.poses(), options.figures.seed, 1);
     let questions = Questions::new(poses, &scan, mesh.as_mut().map(|mesh| mesh as &mut dyn Rival));
     let plan = CollidePlan::new(&as_in_the_paper(), &scan, &scan)?;
-    let (mut pacer, mut scratch) = (Pacer::new(options.target), Scratch::default());
+    let target = Duration::from_micros(options.target);
+    let (mut pacer, mut scratch) = (Pacer::new(target), Scratch::default());
     let a = scan.at(&Pose::IDENTITY);
     let paced = Course::run(&questions, 1, |pose| {
         let pair = Pair::new(a, scan.at(pose));
         pacer.pace(&plan, |plan, budget| pair.within(budget).collide(plan, &mut scratch))
     });
-    let free = run(&scan, &as_in_the_paper(), &questions)?;
-    let micros = options.target.as_micros();
+    let free = course(&scan, &as_in_the_paper(), &questions)?;
+    let micros = target.as_micros();
     writeln!(
         text,
         "\n## Fig. 12: the time-critical mode, {}, t_max {micros} µs\n\n![](figure-12.svg)\n\n\
@@ -359,7 +354,7 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
     };
     // Not means: what other programs take while one waits for the clock would be in them.
     let mut times = lines(&Course::median_times);
-    let level = options.target.as_secs_f64() * 1e6;
+    let level = target.as_secs_f64() * 1e6;
     times.push(Line {
         name: "t_max".into(),
         points: vec![[0.0, level], [3.0, level]],

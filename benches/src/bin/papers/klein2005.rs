@@ -1,10 +1,6 @@
 //! Figs 7 and 9 to 11 of Klein & Zachmann 2005 on today's machine: `klein2005.md` and SVGs in a folder.
 //!
-//! `klein2005 -o FOLDER [--data FOLDER] [--poses N] [--seed N] [--points N] [--only NUMBER] [--quick]`
-//!
-//! Without the folder of objects, the dragon that comes with the tests stands in for them. `--points` is the
-//! largest cloud of Fig. 9.
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
+//! Without the folder of objects, the dragon that comes with the tests stands in for them.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -13,7 +9,6 @@ use nearmiss::{
     Answer, BuildOptions, CollideOptions, CollidePlan, Contacts, Detail, GraphOptions, Interpolation, Method,
     Pair, Pose, Sampling, Scan, Scratch, Surfels,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::figures::FigureOptions;
 use nearmiss_benches::klein2004::objects;
@@ -35,27 +30,27 @@ const SURFELS: [u32; 10] = [2, 4, 7, 12, 20, 29, 45, 80, 160, 320];
 /// Distances of Fig. 9: 0 to 1.5.
 const WITHIN: usize = 7;
 
-/// What was asked for.
-struct Options {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    #[command(flatten)]
     figures: FigureOptions,
-    /// The largest cloud of Fig. 9.
-    points: u32,
+    /// Points of the largest cloud of Fig. 9; by default 3,000,000, or 30,000 with --quick
+    #[arg(long, value_name = "N")]
+    points: Option<u32>,
 }
 
 impl Options {
-    fn read() -> Result<Self, Failure> {
-        let mut arguments = Arguments::of_process();
-        let figures = FigureOptions::take(&mut arguments, "klein2005", [10, 100])?;
-        let points = arguments.value("--points")?;
-        let points = points.unwrap_or(if figures.quick { 30_000 } else { 3_000_000 });
-        arguments.nothing_left()?;
-        Ok(Self { figures, points })
+    fn poses(&self) -> usize {
+        self.figures.poses([10, 100])
+    }
+
+    fn points(&self) -> u32 {
+        self.points.unwrap_or(if self.figures.quick { 30_000 } else { 3_000_000 })
     }
 }
 
-fn main() -> Result<(), Failure> {
-    let options = Options::read()?;
-
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
+    std::fs::create_dir_all(&options.figures.out)?;
     let mut text = format!("# Klein & Zachmann 2005, Figs 7 and 9 to 11\n\n{}\n", machine::description());
     if options.figures.wants(&[7, 10, 11]) {
         let mut asked = Vec::new();
@@ -65,14 +60,14 @@ fn main() -> Result<(), Failure> {
             asked.push((object.name.clone(), scan));
         }
         if options.figures.wants(&[7]) {
-            figure_7(&mut text, &options, &asked)?;
+            figure_7(&mut text, options, &asked)?;
         }
         if options.figures.wants(&[10, 11]) {
-            figures_10_and_11(&mut text, &options, &asked)?;
+            figures_10_and_11(&mut text, options, &asked)?;
         }
     }
     if options.figures.wants(&[9]) {
-        figure_9(&mut text, &options)?;
+        figure_9(&mut text, options)?;
     }
     let path = options.figures.out.join("klein2005.md");
     std::fs::write(&path, text)?;
@@ -199,7 +194,7 @@ fn figure_7(text: &mut String, options: &Options, asked: &[(String, Scan)]) -> R
     writeln!(text, "\n|---|{}", "--:|".repeat(SURFELS.len()))?;
     let mut lines = Vec::new();
     for (colour, (name, scan)) in asked.iter().enumerate() {
-        let poses = sweep(options.figures.poses, options.figures.seed, 0);
+        let poses = sweep(options.poses(), options.figures.seed, 0);
         let truth = truths(scan, &poses)?;
         for approaches in [false, true] {
             let what = if approaches { "with approaches" } else { "brackets" };
@@ -250,7 +245,7 @@ fn figures_10_and_11(text: &mut String, options: &Options, asked: &[(String, Sca
     text.push_str("|---|---|--:|--:|--:|--:|--:|--:|\n");
     let mut panels: [Vec<Line>; 2] = Default::default();
     for (colour, (name, scan)) in asked.iter().enumerate() {
-        let poses = sweep(options.figures.poses, options.figures.seed, 0);
+        let poses = sweep(options.poses(), options.figures.seed, 0);
         let truth = truths(scan, &poses)?;
         for (way, (what, method, part)) in ways.into_iter().enumerate() {
             eprintln!("{name}: {what}");
@@ -307,7 +302,7 @@ fn figure_9(text: &mut String, options: &Options) -> Result<(), Failure> {
     let sizes = [10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000];
     let mut lines: [Vec<[f64; 2]>; 3] = Default::default();
     let mut first: Option<[f64; 2]> = None;
-    for points in sizes.into_iter().filter(|&points| points <= options.points) {
+    for points in sizes.into_iter().filter(|&points| points <= options.points()) {
         eprintln!("{points} points");
         let cloud = nearmiss::PointCloud::from_positions(&bumpy_sphere(points))?;
         let object = Object { name: "bumpy sphere".into(), r: 1.0, cloud, mesh: None }.scaled()?;
@@ -316,7 +311,7 @@ fn figure_9(text: &mut String, options: &Options) -> Result<(), Failure> {
         let plan = CollidePlan::new(&verdict(Method::Interpolation(interpolation(29, false))), &scan, &scan)?;
         let (mut scratch, mut contacts) = (Scratch::default(), Contacts::default());
         let a = scan.at(&Pose::IDENTITY);
-        let poses = sweep(options.figures.poses, options.figures.seed, 0);
+        let poses = sweep(options.poses(), options.figures.seed, 0);
         let (mut tally, mut found) = (Tally::default(), 0);
         for pose in poses[..WITHIN].iter().flatten() {
             let b = scan.at(pose);

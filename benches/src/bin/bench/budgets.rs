@@ -1,15 +1,11 @@
 //! Budgets against wrong answers: the same leaf test in every order.
 //!
-//! `budgets OBJECT… [--near N] [--seed N]`
-//!
 //! The answer is the best effort, what is likelier where the budget ended the search; it is held against the
 //! meshes, or, where an object has none, against the search to the end. Poses are within 10 r of first touch.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::time::Duration;
 
 use nearmiss::{BuildOptions, CollideOptions, Detail, Pose, Scan};
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::asked::{Limits, ORDERS, best_effort};
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
@@ -24,19 +20,25 @@ const WORK: [u64; 9] = [1, 4, 16, 32, 64, 128, 256, 1024, 4096];
 /// Times, in microseconds.
 const MICROS: [u64; 9] = [1, 2, 4, 8, 16, 32, 100, 400, 1600];
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let near = arguments.value("--near")?.unwrap_or(1000);
-    let seed = arguments.value("--seed")?.unwrap_or(3);
-    let objects = arguments.words()?;
-    if objects.is_empty() {
-        return Err("usage: budgets OBJECT… [--near N] [--seed N]".into());
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+    /// Poses near contact
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    near: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    seed: u64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     println!("{}", machine::description());
-    for source in &objects {
+    for source in &arguments.objects {
         let object = Object::read(source)?.scaled()?;
         let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
-        let questions = questions::asked(&object, &scan, near, 0, seed)?;
+        let questions = questions::asked(&object, &scan, arguments.near, 0, arguments.seed)?;
         println!(
             "## {}: {} points, {} poses near contact, {} of which meet\n",
             object.name,

@@ -1,11 +1,8 @@
 //! How late queries with a deadline come back, beside a loop that does nothing but look at the clock until
 //! then.
 //!
-//! `deadlines [OBJECT] [--queries N] [--seed N]`
-//!
 //! The spin and the queries take turns, so that both have the same machine. Only queries that a deadline
 //! ended count.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +10,6 @@ use nearmiss::{
     Budget, BuildOptions, CollideOptions, CollidePlan, Deadline, Evidence, Method, Order, Pair, Pose, Reason,
     Sampling, Scan, Scratch, Verdict,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::now;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::{count, quantile};
@@ -31,12 +27,22 @@ const STRETCHED: usize = 100;
 /// Time for either run: longer ones meet the machine in each.
 const LONG: Duration = Duration::from_millis(1);
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let queries = arguments.value("--queries")?.unwrap_or(4000);
-    let seed = arguments.value("--seed")?.unwrap_or(4);
-    let words = arguments.words()?;
-    let object = Object::read(words.first().map_or("dragon-23k", String::as_str))?.scaled()?;
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(default_value = "dragon-23k")]
+    object: String,
+    /// Queries of a row of the table
+    #[arg(long, value_name = "N", default_value_t = 4000)]
+    queries: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    seed: u64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let &Arguments { ref object, queries, seed } = arguments;
+    let object = Object::read(object)?.scaled()?;
     println!("{}", machine::description());
     println!("{}, poses near contact, {queries} queries a row\n", object.name);
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;

@@ -1,10 +1,7 @@
 //! Slice maps: points a second of building, boxes against a map, avatars stepping, slices loaded; beside them
 //! parry's voxels and a kd-tree on the same points.
 //!
-//! `slices [SCAN]… [--points N] [--pixel T] [--queries N] [--avatars N] [--passes N] [--seed N]`
-//!
-//! A scan is a file, z up, or `house` for the generated one with so many points; without any, `house`.
-#![expect(clippy::print_stdout, reason = "a program for people")]
+//! A scan is a file, z up, or `house` for the generated one.
 
 use std::hint::black_box;
 
@@ -14,7 +11,6 @@ use nearmiss::slices::{
     SlicePlan, Slide, Walker, step_each,
 };
 use nearmiss::{Aabb, PointCloud};
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
@@ -32,38 +28,41 @@ const BODY: [f64; 3] = [0.6, 0.6, 1.8];
 /// Frames of avatars that are timed.
 const FRAMES: usize = 240;
 
-struct Asked {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Asked {
+    /// What is measured
+    #[arg(value_name = "SCAN", default_values = ["house"])]
+    scans: Vec<String>,
+    /// Points of the generated house
+    #[arg(long, value_name = "N", default_value_t = 5e6)]
     points: f64,
+    /// The side of a pixel, in the units of the scan
+    #[arg(long, value_name = "T", default_value_t = 0.05)]
     pixel: f64,
+    /// Boxes that the map is asked about
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
     queries: usize,
+    /// Avatars that step
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
     avatars: usize,
+    /// Passes, the least time of which counts
+    #[arg(long, value_name = "N", default_value_t = 7)]
     passes: u32,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let asked = Asked {
-        points: arguments.value("--points")?.unwrap_or(5e6),
-        pixel: arguments.value("--pixel")?.unwrap_or(0.05),
-        queries: arguments.value("--queries")?.unwrap_or(100_000),
-        avatars: arguments.value("--avatars")?.unwrap_or(10_000),
-        passes: arguments.value("--passes")?.unwrap_or(7),
-        seed: arguments.value("--seed")?.unwrap_or(1),
-    };
-    let mut scans = arguments.words()?;
-    if scans.is_empty() {
-        scans.push("house".into());
-    }
+pub(crate) fn run(asked: &Asked) -> Result<(), Failure> {
     println!("{}", machine::description());
-    for scan in &scans {
-        let (name, cloud) = read(scan, &asked)?;
+    for scan in &asked.scans {
+        let (name, cloud) = read(scan, asked)?;
         println!("## {name}: {} points\n", cloud.len());
-        building(&cloud, &asked)?;
+        building(&cloud, asked)?;
         let map = built(&cloud, &options(0.04))?;
         floors(&cloud, &map)?;
-        boxes(&cloud, &map, &asked)?;
-        avatars(&map, &asked)?;
+        boxes(&cloud, &map, asked)?;
+        avatars(&map, asked)?;
         disk(&cloud)?;
     }
     Ok(())

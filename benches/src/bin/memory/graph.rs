@@ -1,8 +1,4 @@
 //! What proximity graphs cost, and what they look like.
-//!
-//! `graph [OBJECT] [--runs N]`; the object is `bumpy:1000000` unless told otherwise. With `--updates` instead
-//! what it costs to insert, remove and move one point among 10³ to 10⁶.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
 
@@ -12,13 +8,11 @@ use nearmiss::index::{BlockBoxes, Nearest, PointBlock};
 use nearmiss::surface::Level;
 use nearmiss::{BuildOptions, PointHierarchy};
 use nearmiss_benches::clock::timed;
-use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
-use nearmiss_benches::{Failure, arguments::Arguments, machine};
+use nearmiss_benches::{Failure, machine};
 
-#[global_allocator]
-static ALLOCATOR: Counting = Counting::new();
+use crate::ALLOCATOR;
 
 /// Prints the least time of `runs` of `work`, in nanoseconds a point.
 fn measure<T>(what: &str, points: usize, runs: usize, mut work: impl FnMut() -> T) -> T {
@@ -176,14 +170,25 @@ fn updates() -> Result<(), Failure> {
     Ok(())
 }
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let runs = arguments.value("--runs")?.unwrap_or(3_usize).max(1);
-    if arguments.flag("--updates") {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(default_value = "bumpy:1000000")]
+    object: String,
+    /// Runs, the fastest of which counts
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    runs: usize,
+    /// Measure instead what it costs to insert, move and remove one point among 10³ to 10⁶
+    #[arg(long)]
+    updates: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let runs = arguments.runs.max(1);
+    if arguments.updates {
         return updates();
     }
-    let words = arguments.words()?;
-    let object = Object::read(words.first().map_or("bumpy:1000000", String::as_str))?;
+    let object = Object::read(&arguments.object)?;
     let hierarchy = PointHierarchy::build(&object.cloud, &BuildOptions::default())?;
     let positions = hierarchy.positions();
     println!("{}\n## {}, {} points\n", machine::description(), object.name, positions.len());

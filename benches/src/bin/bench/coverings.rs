@@ -1,16 +1,12 @@
 //! What samples and sphere coverings are worth: how tight, how right, what they exclude.
 //!
-//! `coverings OBJECT… [--samples N] [--points N] [--nodes N] [--draws N] [--poses N] [--seed N]`
-//!
 //! Of each level of each object, over some of its nodes: the covering radius beside the one that the paper's
 //! growth alone ends with; the volume of the balls over that of the hulls and of the enclosures; the sampling
 //! radius as it is stored, as it is on projected surface points, and by eq. 10. Then a million (`--points`)
 //! surface points against the coverings of their leaves and all nodes above; and how many pairs of nodes,
-//! whose boxes overlap, coverings exclude. Ends with status 1 if a surface point is outside.
-#![expect(clippy::print_stdout, reason = "a program for people")]
+//! whose boxes overlap, coverings exclude. It fails if a surface point is outside.
 
 use std::hint::black_box;
-use std::process::ExitCode;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::geometry::NodeId;
@@ -21,38 +17,47 @@ use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::hulls::{Hulls, Volumes};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
-use nearmiss_benches::{Failure, arguments::Arguments, machine, poses};
+use nearmiss_benches::{Failure, machine, poses};
 use nearmiss_testdata::arbitrary::{point_in, rng};
 
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(value_name = "OBJECT", default_values = ["dragon-23k"])]
+    objects: Vec<String>,
+    #[command(flatten)]
+    effort: Effort,
+}
+
 /// How much is drawn.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, clap::Args)]
 struct Effort {
+    /// Samples of a node
+    #[arg(long, value_name = "N", default_value_t = BuildOptions::default().samples)]
     samples: u32,
+    /// Surface points that are held against the coverings
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     points: usize,
+    /// Nodes of a level that are measured
+    #[arg(long, value_name = "N", default_value_t = 24)]
     nodes: usize,
+    /// Places drawn for the volumes of a node
+    #[arg(long, value_name = "N", default_value_t = 4000)]
     draws: usize,
+    /// Poses at each distance of the sweep
+    #[arg(long, value_name = "N", default_value_t = 4)]
     poses: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
-fn main() -> Result<ExitCode, Failure> {
-    let mut arguments = Arguments::of_process();
-    let effort = Effort {
-        samples: arguments.value("--samples")?.unwrap_or(BuildOptions::default().samples),
-        points: arguments.value("--points")?.unwrap_or(1_000_000),
-        nodes: arguments.value("--nodes")?.unwrap_or(24),
-        draws: arguments.value("--draws")?.unwrap_or(4000),
-        poses: arguments.value("--poses")?.unwrap_or(4),
-        seed: arguments.value("--seed")?.unwrap_or(1),
-    };
-    let mut names = arguments.words()?;
-    if names.is_empty() {
-        names.push("dragon-23k".into());
-    }
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let effort = arguments.effort;
     println!("{}", machine::description());
     let mut outside = 0;
-    for name in names {
-        let object = Object::read(&name)?.scaled()?;
+    for name in &arguments.objects {
+        let object = Object::read(name)?.scaled()?;
         let scan = Scan::build(&object.cloud, &BuildOptions::default().with_samples(effort.samples))?;
         println!("\n## {}, {} points, {} samples a node\n", object.name, scan.len(), effort.samples);
         bytes(&scan);
@@ -61,7 +66,13 @@ fn main() -> Result<ExitCode, Failure> {
         levels(&scan, effort, &radii);
         exclusions(&object, &scan, effort)?;
     }
-    Ok(if outside == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    if outside > 0 {
+        return Err(format!(
+            "expected all surface points in the coverings, got {outside} nodes with one outside"
+        )
+        .into());
+    }
+    Ok(())
 }
 
 fn bytes(scan: &Scan) {

@@ -1,24 +1,19 @@
 //! What it costs to prepare a large scan, with rivals beside.
 //!
-//! `preparation [OBJECT] [--runs N] [--threads N]…`; the object is `bumpy:1000000` unless told otherwise.
-//!
 //! Memory is what the allocator handed out, the most that was live at once, above what was live before: the
 //! input, which is there in any case, is not counted. Pages that a mapped file needs are not the allocator's.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::path::PathBuf;
 
 use nearmiss::{BuildOptions, Check, GraphOptions, Paths, PointCloud, Scan};
 use nearmiss_benches::clock::timed;
-use nearmiss_benches::counting::Counting;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::kiddo::PointScan;
 use nearmiss_benches::rivals::parry::MeshTree;
 use nearmiss_benches::sample::{count, quantile};
-use nearmiss_benches::{Failure, arguments::Arguments, machine};
+use nearmiss_benches::{Failure, machine};
 
-#[global_allocator]
-static ALLOCATOR: Counting = Counting::new();
+use crate::ALLOCATOR;
 
 /// A file that is removed when nobody needs it any more.
 struct Scratch(PathBuf);
@@ -61,15 +56,22 @@ fn measure<T>(
     }
 }
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let runs = arguments.value("--runs")?.unwrap_or(3_usize).max(1);
-    let mut threads: Vec<usize> = arguments.values("--threads")?;
-    if threads.is_empty() {
-        threads = vec![1, 0];
-    }
-    let words = arguments.words()?;
-    let object = Object::read(words.first().map_or("bumpy:1000000", String::as_str))?;
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(default_value = "bumpy:1000000")]
+    object: String,
+    /// Runs, the median of which counts
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    runs: usize,
+    /// Numbers of threads; 0 means all
+    #[arg(long, value_name = "N", default_values_t = [1, 0])]
+    threads: Vec<usize>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let runs = arguments.runs.max(1);
+    let object = Object::read(&arguments.object)?;
     let (cloud, n) = (&object.cloud, object.cloud.len());
     println!("{}\n## {}, {n} points\n", machine::description(), object.name);
     println!("| | median ms | best ms | peak B/point | kept B/point |");
@@ -78,7 +80,7 @@ fn main() -> Result<(), Failure> {
     let positions: Vec<[f64; 3]> = (0..n).map(|i| cloud.point(i)).collect();
     measure("cloud from positions", n, runs, || Ok(PointCloud::from_positions(&positions)?))?;
     let mut scan = None;
-    for threads in threads {
+    for &threads in &arguments.threads {
         let name = if threads == 0 { "all threads".into() } else { format!("{threads} thread(s)") };
         let options = BuildOptions::default().with_threads(threads);
         drop(scan.take());

@@ -1,18 +1,14 @@
 //! Spheres, capsules and boxes against the points of a scan: nanoseconds a query, ours and rivals' on the
 //! same shapes, each asked once in a pass.
 //!
-//! `shapes OBJECT… [--count N] [--passes N] [--radius R] [--seed N]`
-//!
-//! Three sets of shapes of radius R times r: about places drawn in the bounding box, at most 3 r from a point
-//! of the surface, and at most 10 r. The rivals: a plain grid with cells of the sphere's radius, made for it,
-//! and kiddo, asked for the nearest point within the radius.
-#![expect(clippy::print_stdout, reason = "a program for people")]
+//! Three sets of shapes, whose radius is a multiple of r: about places drawn in the bounding box, at most 3 r
+//! from a point of the surface, and at most 10 r. The rivals: a plain grid with cells of the sphere's radius,
+//! made for it, and kiddo, asked for the nearest point within the radius.
 
 use std::hint::black_box;
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::{BuildOptions, Pose, Scan, Shape, ShapeIndex};
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::grid::Grid;
@@ -21,20 +17,31 @@ use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use rand::RngExt;
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let number: usize = arguments.value("--count")?.unwrap_or(200_000);
-    let passes: u32 = arguments.value("--passes")?.unwrap_or(7);
-    let radius: f64 = arguments.value("--radius")?.unwrap_or(1.0);
-    let seed: u64 = arguments.value("--seed")?.unwrap_or(1);
-    let objects = arguments.words()?;
-    if objects.is_empty() {
-        return Err("usage: shapes OBJECT… [--count N] [--passes N] [--radius R] [--seed N]".into());
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+    /// Shapes of each kind in a set
+    #[arg(long, value_name = "N", default_value_t = 200_000)]
+    count: usize,
+    /// Passes, the least time of which counts
+    #[arg(long, value_name = "N", default_value_t = 7)]
+    passes: u32,
+    /// The radius of a shape, in r
+    #[arg(long, value_name = "R", default_value_t = 1.0)]
+    radius: f64,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let &Arguments { ref objects, count, passes, radius, seed } = arguments;
     println!("{}", machine::description());
-    for source in &objects {
+    for source in objects {
         let object = Object::read(source)?.scaled()?;
-        measure(&object, (number, passes, radius * object.r, seed))?;
+        measure(&object, (count, passes, radius * object.r, seed))?;
     }
     Ok(())
 }

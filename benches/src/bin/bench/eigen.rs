@@ -1,9 +1,6 @@
 //! Solvers of the symmetric 3×3 eigenproblem: time, and errors over families of matrices, as one table.
 //!
-//! `eigen [OBJECT] [--repeats N] [--count N]`. Real neighbourhoods are those of `OBJECT`, `dragon-5k` unless
-//! told otherwise. Every repeat asks each solver once, in turn, so that what else the machine does meets all
-//! of them.
-#![expect(clippy::print_stdout, reason = "a program for people")]
+//! Every repeat asks each solver once, in turn, so that what else the machine does meets all of them.
 
 use std::hint::black_box;
 
@@ -11,7 +8,7 @@ use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::eigen::{Answer, Contender, contenders};
 use nearmiss_benches::sample::{count, quantile};
-use nearmiss_benches::{Failure, arguments::Arguments, machine};
+use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::matrices::{Family, orthogonality_error, residual};
 
 /// Problems timed together: with their answers they fit the first cache.
@@ -23,12 +20,22 @@ const PASSES: u32 = 10;
 /// Points of a real neighbourhood, its own included.
 const NEAR: usize = 20;
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let repeats = arguments.value("--repeats")?.unwrap_or(201_usize).max(1);
-    let problems = arguments.value("--count")?.unwrap_or(20_000_u32).max(1);
-    let words = arguments.words()?;
-    let object = Object::read(words.first().map_or("dragon-5k", String::as_str))?;
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// The object whose neighbourhoods are solved for
+    #[arg(default_value = "dragon-5k")]
+    object: String,
+    /// Repeats, the median of which counts
+    #[arg(long, value_name = "N", default_value_t = 201)]
+    repeats: usize,
+    /// Matrices of a family
+    #[arg(long, value_name = "N", default_value_t = 20_000)]
+    count: u32,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let (repeats, problems) = (arguments.repeats.max(1), arguments.count.max(1));
+    let object = Object::read(&arguments.object)?;
     let real = neighbourhoods(&object);
     let mut solvers = contenders();
 

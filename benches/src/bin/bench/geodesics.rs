@@ -1,9 +1,5 @@
 //! What follows from proximity graphs: oriented normals, close pairs, coarser levels, the geodesic kernel.
 //! Speed, size and accuracy.
-//!
-//! `geodesics [OBJECT]… [--runs N] [--pairs N] [--plates]`; the objects are the shipped dragon's unless told
-//! otherwise; `--plates` shows what both kernels make of two sheets instead.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
 
@@ -17,7 +13,7 @@ use nearmiss::{BuildOptions, Evaluation, PointCloud, Scan, Status, TriangleMesh}
 use nearmiss_benches::clock::{processor_time, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::count;
-use nearmiss_benches::{Failure, arguments::Arguments, machine};
+use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{point_in, rng};
 use nearmiss_testdata::oracle::{Signs, falls, winding};
 use nearmiss_testdata::shapes::{Order, Sampling, plates};
@@ -328,21 +324,29 @@ fn plates_table() -> Result<(), Failure> {
     Ok(())
 }
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let runs = arguments.value("--runs")?.unwrap_or(3_usize).max(1);
-    let pairs = arguments.value("--pairs")?.unwrap_or(200_usize).max(1);
-    let shows_plates = arguments.flag("--plates");
-    let mut objects = arguments.words()?;
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(value_name = "OBJECT", default_values = ["dragon-5k", "dragon-23k"])]
+    objects: Vec<String>,
+    /// Runs, the fastest of which counts
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    runs: usize,
+    /// Pairs of points whose distances are compared
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    pairs: usize,
+    /// Show what both kernels make of two sheets instead
+    #[arg(long)]
+    plates: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     println!("{}", machine::description());
-    if shows_plates {
+    if arguments.plates {
         return plates_table();
     }
-    if objects.is_empty() {
-        objects = vec!["dragon-5k".into(), "dragon-23k".into()];
-    }
-    for object in &objects {
-        measure(&Object::read(object)?, runs, pairs)?;
+    for object in &arguments.objects {
+        measure(&Object::read(object)?, arguments.runs.max(1), arguments.pairs.max(1))?;
     }
     Ok(())
 }

@@ -1,21 +1,15 @@
 //! Certified separations of small shapes in random poses, against the exact distance.
 //!
-//! `certificates [--poses N] [--seed N]`
-//!
 //! A ball is put at random beside a shape of each family. Its exact surface meets the shape's when the
-//! distance of its centre from the shape is at most its radius; less than that is the depth. Ends with status
-//! 1 if a separation deeper than 0.3 r is certified, or a certified gap is larger than the exact one by more
-//! than 0.3 r.
-#![expect(clippy::print_stdout, reason = "a program for people")]
-
-use std::process::ExitCode;
+//! distance of its centre from the shape is at most its radius; less than that is the depth. It fails if a
+//! separation deeper than 0.3 r is certified, or a certified gap is larger than the exact one by more than
+//! 0.3 r.
 
 use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Detail, Evidence, Pair, PointCloud, Pose, Scan, Scratch,
     Verdict,
 };
 use nearmiss_benches::Failure;
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::shapes::{Form, Sampling, Shape, bars, bowl, cuboid, patch, plates, scorer_radius};
 use nearmiss_testdata::shapes::{shells, sphere, step, torus};
@@ -52,20 +46,24 @@ fn scan(shape: &Shape) -> Result<Scan, Failure> {
     Ok(Scan::build(&PointCloud::from_positions(&shape.points)?, &BuildOptions::default())?)
 }
 
-fn main() -> Result<ExitCode, Failure> {
-    let mut arguments = Arguments::of_process();
-    let poses: usize = arguments.value("--poses")?.unwrap_or(1_000_000);
-    let seed = arguments.value("--seed")?.unwrap_or(1);
-    if let Some(word) = arguments.words()?.first() {
-        return Err(format!("what is {word:?}?").into());
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Poses of the ball, over all families
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    poses: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let forms = forms();
-    let each = poses.div_ceil(forms.len());
+    let each = arguments.poses.div_ceil(forms.len());
     let mut rows = [Row::default(); EDGES.len()];
     let asked = each * forms.len();
     let mut bad = 0;
     for (name, form) in forms {
-        bad += one_family(name, form, each, seed, &mut rows)?;
+        bad += one_family(name, form, each, arguments.seed, &mut rows)?;
     }
     println!("\n| gap / r from | hits | certified apart | estimated apart | undecided |");
     println!("| --: | --: | --: | --: | --: |");
@@ -73,7 +71,10 @@ fn main() -> Result<ExitCode, Failure> {
         println!("| {edge} | {hits} | {certified} | {estimated} | {undecided} |");
     }
     println!("\n{asked} poses; {bad} false certificates");
-    Ok(if bad == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    if bad > 0 {
+        return Err(format!("expected no false certificate, got {bad}").into());
+    }
+    Ok(())
 }
 
 /// Asks `count` poses of one family; how many certificates are false.

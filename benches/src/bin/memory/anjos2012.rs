@@ -2,10 +2,7 @@
 //! paper's figures beside, what §4 says of round columns, and how high a box fits up a real staircase:
 //! `anjos2012.md` and SVGs in a folder.
 //!
-//! `anjos2012 -o FOLDER [--data FOLDER] [--seed N] [--quick]`
-//!
 //! Without the folder of scenes a generated house stands in for them.
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -16,16 +13,13 @@ use nearmiss::Aabb;
 use nearmiss::slices::{Avatar, AvatarOptions, Back, Obstacle, Pixel, SliceOptions, SlicePlan, Up};
 use nearmiss_benches::anjos2012::steps::{PIXELS, figures_5_and_6};
 use nearmiss_benches::anjos2012::{Source, Walked, columns, headroom, made};
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
-use nearmiss_benches::counting::Counting;
 use nearmiss_benches::figures::FigureOptions;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::house::{house, triangles};
 
-#[global_allocator]
-static ALLOCATOR: Counting = Counting::new();
+use crate::ALLOCATOR;
 
 /// How many slices the paper's Fig. 5 has in memory.
 const LOADED: usize = 6;
@@ -88,22 +82,20 @@ const SCENES: [Scene; 6] = [
     },
 ];
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let options = FigureOptions::take(&mut arguments, "anjos2012", [1, 1])?;
-    arguments.nothing_left()?;
+pub(crate) fn run(options: &FigureOptions) -> Result<(), Failure> {
+    std::fs::create_dir_all(&options.out)?;
     let mut text = format!(
         "# Dos Anjos, Pereira & Oliveira 2012, Tables 1 to 3, Figs 5 and 6\n\n{}\n",
         machine::description()
     );
     let folder = options.out.join("maps");
-    tables(&mut text, &options, &folder)?;
+    tables(&mut text, options, &folder)?;
     let spacing = if options.quick { 0.05 } else { 0.02 };
     let walked = match &options.data {
         Some(data) => Walked::scan(data)?,
         None => Walked::house(spacing, options.seed)?,
     };
-    figures_5_and_6(&mut text, &options, &walked, &folder)?;
+    figures_5_and_6(&mut text, options, &walked, &folder)?;
     table_3(&mut text, &walked, &folder)?;
     columns::table(&mut text, options.seed)?;
     if options.data.is_some() {

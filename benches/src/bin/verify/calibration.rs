@@ -1,20 +1,14 @@
 //! Whether likelihoods are: how often scans meet where a budget ended the search, by decile of the likelihood
 //! that was answered.
 //!
-//! `calibration OBJECT… [--near N] [--swept N] [--seed N]` and what `asked` reads (`--order` …)
-//!
 //! An object is asked about against itself. `SCAN+OBJECT` asks about an object in a scan, a twenty-fifth of
 //! its diagonal long.
 //!
-//! Ends with status 1 if a decile with a hundred answers or more is off by more than 0.15, or the Brier score
-//! of all answers is not below that of the best constant.
-#![expect(clippy::print_stdout, reason = "a program for people")]
-
-use std::process::ExitCode;
+//! The check fails if a decile with a hundred answers or more is off by more than 0.15, or the Brier score of
+//! all answers is not below that of the best constant.
 
 use nearmiss::{BuildOptions, Pose, Reason, Scan, Verdict};
-use nearmiss_benches::arguments::Arguments;
-use nearmiss_benches::asked::{self, Limits};
+use nearmiss_benches::asked::{Asking, Limits};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::ours::Ours;
 use nearmiss_benches::sample::count;
@@ -63,16 +57,28 @@ impl Answers {
     }
 }
 
-fn main() -> Result<ExitCode, Failure> {
-    let mut arguments = Arguments::of_process();
-    let near = arguments.value("--near")?.unwrap_or(1000);
-    let swept = arguments.value("--swept")?.unwrap_or(80);
-    let seed = arguments.value("--seed")?.unwrap_or(2);
-    let options = asked::options(&mut arguments)?;
-    let objects = arguments.words()?;
-    if objects.is_empty() {
-        return Err("usage: calibration OBJECT… [--near N] [--swept N] [--order NAME]".into());
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Objects, or `SCAN+OBJECT` for an object in a scan
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+    /// Poses near contact
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    near: usize,
+    /// Poses at each distance of the sweep
+    #[arg(long, value_name = "N", default_value_t = 80)]
+    swept: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    seed: u64,
+    #[command(flatten)]
+    asking: Asking,
+}
+
+/// Returns whether the check passes.
+pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
+    let &Arguments { ref objects, near, swept, seed, asking } = arguments;
+    let options = asking.options();
     println!("{}", machine::description());
     println!(
         "order {:?}; budgets of {BUDGETS:?} units; {near} poses near contact, {swept} at each distance\n",
@@ -82,7 +88,7 @@ fn main() -> Result<ExitCode, Failure> {
     println!(
         "| object | answers | meet | Brier | constant | worst decile |\n| --- | --: | --: | --: | --: | --: |"
     );
-    for source in &objects {
+    for source in objects {
         let build = |object: &Object| Scan::build(&object.cloud, &BuildOptions::default());
         let (name, scans, questions) = if let Some((room, body)) = source.split_once('+') {
             let (room, body) = (Object::read(room)?, Object::read(body)?);
@@ -127,7 +133,7 @@ fn main() -> Result<ExitCode, Failure> {
     let constant = all.frequency();
     let good = all.worst() <= TOLERANCE && all.brier(|p| p) < all.brier(|_| constant);
     println!("\n{}", if good { "calibrated" } else { "NOT calibrated" });
-    Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(good)
 }
 
 fn row(name: &str, answers: &Answers) {

@@ -1,17 +1,13 @@
 //! How far two copies of an object are apart, over the poses of the sweep: what that costs, and what it
 //! tells. Beside it the rival: the nearest point of one copy for each point of the other, by kiddo.
 //!
-//! `distances OBJECT… [--per-distance N] [--passes N] [--rival-poses N] [--from I] [--seed N] [--threads N]`
-//!
 //! Times are the least of three askings of a pose, not one after the other.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::hint::black_box;
 
 use nearmiss::{
     BuildOptions, Distance, DistanceOptions, DistancePlan, Evidence, Pair, Pose, Scan, Scratch, Semantics,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::rivals::kiddo::PointScan;
@@ -21,31 +17,34 @@ use nearmiss_benches::{Failure, machine, poses};
 /// Times a pose is asked.
 const ASKINGS: usize = 3;
 
-struct Options {
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// What is measured
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+    /// Poses at each distance
+    #[arg(long, value_name = "N", default_value_t = 200)]
     per_distance: usize,
+    /// Passes, each over poses of its own
+    #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u64,
+    /// Poses at each distance that the rival is asked about
+    #[arg(long, value_name = "N", default_value_t = 2)]
     rival_poses: usize,
+    /// The index of the first distance
+    #[arg(long, value_name = "I", default_value_t = 0)]
     from: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Threads that prepare the scan; 0 means all
+    #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
 }
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let options = Options {
-        per_distance: arguments.value("--per-distance")?.unwrap_or(200),
-        passes: arguments.value("--passes")?.unwrap_or(1),
-        rival_poses: arguments.value("--rival-poses")?.unwrap_or(2),
-        from: arguments.value("--from")?.unwrap_or(0),
-        seed: arguments.value("--seed")?.unwrap_or(1),
-        threads: arguments.value("--threads")?.unwrap_or(0),
-    };
-    let objects = arguments.words()?;
-    if objects.is_empty() {
-        return Err("usage: distances OBJECT… [--per-distance N] [--passes N] [--rival-poses N]".into());
-    }
+pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     println!("{}", machine::description());
-    objects.iter().try_for_each(|source| measure(source, &options))
+    options.objects.iter().try_for_each(|source| measure(source, options))
 }
 
 fn measure(source: &str, options: &Options) -> Result<(), Failure> {

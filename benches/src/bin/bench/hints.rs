@@ -1,12 +1,8 @@
 //! What hints are worth: small motions near contact, each pose asked with a hint and without.
-//!
-//! `hints OBJECT… [--walks N] [--steps N] [--seed N]`
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Detail, Evidence, Pair, PairHint, Pose, Scan, Scratch,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::sample::{Sample, count};
@@ -16,18 +12,27 @@ use nearmiss_testdata::arbitrary::{rng, unit_vector};
 /// Steps of a walk, in r: shift and turn together move the furthest point about so far.
 const STEPS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 3.0];
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let walks = arguments.value("--walks")?.unwrap_or(200);
-    let steps: u32 = arguments.value("--steps")?.unwrap_or(60);
-    let seed = arguments.value("--seed")?.unwrap_or(5);
-    let objects = arguments.words()?;
-    if objects.is_empty() {
-        return Err("usage: hints OBJECT… [--walks N] [--steps N] [--seed N]".into());
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// What is measured
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+    /// Walks from poses near contact
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    walks: usize,
+    /// Steps of a walk
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    steps: u32,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    seed: u64,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let &Arguments { ref objects, walks, steps, seed } = arguments;
     println!("{}", machine::description());
     println!("{walks} walks of {steps} steps from poses within 10 r of first touch, in random directions");
-    for source in &objects {
+    for source in objects {
         let object = Object::read(source)?.scaled()?;
         let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
         let starts = poses::near(&object, walks, seed)?;

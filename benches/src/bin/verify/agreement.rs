@@ -1,16 +1,10 @@
 //! Verdicts near contact against the exact test of the mesh, for objects without a truth set.
 //!
-//! `agreement OBJECT… [--poses N] [--seed N]`
-//!
 //! A pose counts as outside the band when the mesh's answer stays the same under shifts by 1.05 r in each of
 //! 26 directions: then neither a contact nor a gap is shallower than that. Objects are scaled as in the
-//! sweep. Ends with status 1 if a verdict outside the band is wrong or missing.
-#![expect(clippy::print_stdout, reason = "a program for people")]
-
-use std::process::ExitCode;
+//! sweep. The check fails if a verdict outside the band is wrong or missing.
 
 use nearmiss::{BuildOptions, CollideOptions, CollidePlan, Pair, Pose, Scan, Scratch, Verdict};
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::object::Object;
 use nearmiss_benches::poses::{NearPose, near};
 use nearmiss_benches::rivals::{Method, rival};
@@ -19,24 +13,31 @@ use nearmiss_benches::{Failure, machine};
 /// A little more than the band, so that rounding of r decides nothing.
 const SHIFT: f64 = 1.05;
 
-fn main() -> Result<ExitCode, Failure> {
-    let mut arguments = Arguments::of_process();
-    let count = arguments.value("--poses")?.unwrap_or(1500);
-    let seed = arguments.value("--seed")?.unwrap_or(7);
-    let sources = arguments.words()?;
-    if sources.is_empty() {
-        return Err("usage: agreement OBJECT… [--poses N] [--seed N]".into());
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Objects with a mesh
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+    /// Poses near contact
+    #[arg(long, value_name = "N", default_value_t = 1500)]
+    poses: usize,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 7)]
+    seed: u64,
+}
+
+/// Returns whether the check passes.
+pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     println!("{}", machine::description());
     println!(
         "| object | points | r | outside the band | false hits | misses | undecided | inside | differ |"
     );
     println!("|---|--:|--:|--:|--:|--:|--:|--:|--:|");
     let mut faults = 0;
-    for source in sources {
-        faults += compare(&source, count, seed)?;
+    for source in &arguments.objects {
+        faults += compare(source, arguments.poses, arguments.seed)?;
     }
-    Ok(if faults == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(faults == 0)
 }
 
 /// Prints a line for one object; returns how many verdicts outside the band are wrong or missing.

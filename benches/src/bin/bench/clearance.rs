@@ -1,20 +1,17 @@
 //! The clearance of an object that moves through a scan: bounds, the nearest points, and what each answer
 //! takes.
 //!
-//! `clearance SCAN OBJECT --from X,Y,Z --to X,Y,Z [--size S] [--steps N] [--turn DEGREES] [--image OUT.svg]`
-//!
 //! The object's centre goes straight from one place to the other while it turns about a fixed axis. At each
 //! step the distance is asked with and the verdict with certified evidence, and hinted by the step before;
 //! the exact distance of the nearest points is the truth that no upper bound may exceed.
-#![expect(clippy::print_stdout, reason = "a program for people")]
 
 use std::fs;
+use std::path::PathBuf;
 
 use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, DistanceOptions, DistancePlan, Evidence, Pair, PairHint, Pose,
     Scan, Scratch, Verdict,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::plot::{self, Axis, Line, Panel};
@@ -23,21 +20,37 @@ use nearmiss_benches::sample::{Sample, count};
 use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{rng, unit_vector};
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let from = place(arguments.value("--from")?, "--from")?;
-    let to = place(arguments.value("--to")?, "--to")?;
-    let size: Option<f64> = arguments.value("--size")?;
-    let steps: usize = arguments.value("--steps")?.unwrap_or(200);
-    let turn: f64 = arguments.value("--turn")?.unwrap_or(180.0);
-    let image: Option<String> = arguments.value("--image")?;
-    let words = arguments.words()?;
-    let [scan, object] = &words[..] else {
-        return Err("usage: clearance SCAN OBJECT --from X,Y,Z --to X,Y,Z".into());
-    };
-    let (room, body) = (Object::read(scan)?, Object::read(object)?);
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// The scan that the object moves through
+    scan: String,
+    /// What moves
+    object: String,
+    /// Where the centre of the object starts
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    from: [f64; 3],
+    /// Where it ends
+    #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
+    to: [f64; 3],
+    /// The longest side that the object is scaled to; by default it keeps its own
+    #[arg(long, value_name = "S")]
+    size: Option<f64>,
+    /// Steps on the path
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    steps: usize,
+    /// By how much the object turns on the way
+    #[arg(long, value_name = "DEGREES", default_value_t = 180.0, allow_negative_numbers = true)]
+    turn: f64,
+    /// Where to write a figure
+    #[arg(long, value_name = "OUT.svg")]
+    image: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let &Arguments { from, to, steps, turn, .. } = arguments;
+    let (room, body) = (Object::read(&arguments.scan)?, Object::read(&arguments.object)?);
     let longest = 2.0 * body.cloud.bounds().half_extents().into_iter().fold(0.0, f64::max);
-    let scale = size.map_or(1.0, |size| size / longest);
+    let scale = arguments.size.map_or(1.0, |size| size / longest);
     let (axis, centre) = (unit_vector(&mut rng(3)), body.cloud.bounds().centre());
     let length = (0..3).map(|k| (to[k] - from[k]).powi(2)).sum::<f64>().sqrt();
     let path: Vec<(f64, Pose)> = (0..steps)
@@ -52,19 +65,18 @@ fn main() -> Result<(), Failure> {
     let found = Found::along(&path, &room, &body)?;
     println!("{}\n", machine::description());
     found.print(&body.name, &room.name);
-    if let Some(path) = image {
+    if let Some(path) = &arguments.image {
         fs::write(path, found.figure()?)?;
     }
     Ok(())
 }
 
-/// The three numbers that an option is followed by.
-fn place(text: Option<String>, name: &str) -> Result<[f64; 3], Failure> {
-    let text = text.ok_or_else(|| format!("{name} X,Y,Z is missing"))?;
+/// The coordinates of a place.
+fn place(text: &str) -> Result<[f64; 3], String> {
     let numbers = text.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>();
     match numbers.as_deref() {
         Ok(&[x, y, z]) => Ok([x, y, z]),
-        _ => Err(format!("expected {name} X,Y,Z, got {text:?}").into()),
+        _ => Err(format!("expected X,Y,Z, got {text:?}")),
     }
 }
 

@@ -2,16 +2,14 @@
 //! from, and the rival that follows no curve: Newton's method from every contact, which gives points in no
 //! order.
 //!
-//! `curves OBJECT OBJECT … [--shift X] [--passes N]`: pairs of objects, each scaled to a longest side of 2,
-//! the second of a pair turned a little and shifted by X along x.
-#![expect(clippy::print_stdout, reason = "a program for people")]
+//! Objects come in pairs, each scaled to a longest side of 2, the second of a pair turned a little and
+//! shifted along x.
 
 use nearmiss::surface::meet;
 use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Contacts, CurveOptions, CurvePlan, Curves, Detail, Evidence,
     Order, Pair, Placed, Pose, Scan, Scratch,
 };
-use nearmiss_benches::arguments::Arguments;
 use nearmiss_benches::clock::{nanoseconds, processor_time, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::{Failure, machine};
@@ -19,13 +17,23 @@ use nearmiss_benches::{Failure, machine};
 /// Spacings, in lesser sampling radii.
 const SPACINGS: [f64; 4] = [8.0, 2.0, 1.0, 0.25];
 
-fn main() -> Result<(), Failure> {
-    let mut arguments = Arguments::of_process();
-    let shift: f64 = arguments.value("--shift")?.unwrap_or(0.25);
-    let passes: u32 = arguments.value("--passes")?.unwrap_or(50);
-    let objects = arguments.words()?;
-    if objects.is_empty() || objects.len() % 2 == 1 {
-        return Err("usage: curves OBJECT OBJECT … [--shift X] [--passes N]".into());
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Pairs of objects
+    #[arg(required = true, value_name = "OBJECT")]
+    objects: Vec<String>,
+    /// By how much the second of a pair is shifted along x
+    #[arg(long, value_name = "X", default_value_t = 0.25, allow_negative_numbers = true)]
+    shift: f64,
+    /// Passes, the least time of which counts
+    #[arg(long, value_name = "N", default_value_t = 50)]
+    passes: u32,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let &Arguments { ref objects, shift, passes } = arguments;
+    if objects.len() % 2 == 1 {
+        return Err(format!("expected pairs of objects, got {} objects; name one more", objects.len()).into());
     }
     println!("{}", machine::description());
     println!(

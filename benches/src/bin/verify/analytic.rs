@@ -1,18 +1,13 @@
 //! Scores verdicts on the shapes with known answers, by family and noise.
 //!
-//! `analytic [--repeats N] [--seed N] [--list]` and what `asked` reads: `--witness`, `--method`, `--order` …
-//!
-//! Ends with status 1 if a verdict outside the band is wrong or missing, `Ambiguous` on thin pairs apart,
-//! which may be one in twenty of them.
-#![expect(clippy::print_stdout, reason = "a program for people")]
+//! The check fails if a verdict outside the band is wrong or missing, `Ambiguous` on thin pairs apart, which
+//! may be one in twenty of them.
 
 use std::collections::BTreeMap;
-use std::process::ExitCode;
 
 use nearmiss::{BuildOptions, CollidePlan, Pair, PointCloud, Reason, Scan, Scratch, Verdict};
 use nearmiss_benches::Failure;
-use nearmiss_benches::arguments::Arguments;
-use nearmiss_benches::asked;
+use nearmiss_benches::asked::Asking;
 use nearmiss_testdata::pairs::{self, SetOptions, analytic_set};
 
 /// One in this many thin pairs may be `Ambiguous`.
@@ -51,15 +46,25 @@ impl Row {
     }
 }
 
-fn main() -> Result<ExitCode, Failure> {
-    let mut arguments = Arguments::of_process();
-    let repeats = arguments.value("--repeats")?.unwrap_or(3);
-    let seed = arguments.value("--seed")?.unwrap_or(1);
-    let asked = asked::options(&mut arguments)?;
-    let list = arguments.flag("--list");
-    if let Some(word) = arguments.words()?.first() {
-        return Err(format!("what is {word:?}?").into());
-    }
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Repeats of every pair
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    repeats: u32,
+    /// The seed of all that is random
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// List every verdict outside the band that is wrong or missing
+    #[arg(long)]
+    list: bool,
+    #[command(flatten)]
+    asking: Asking,
+}
+
+/// Returns whether the check passes.
+pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
+    let &Arguments { repeats, seed, list, asking } = arguments;
+    let options = asking.options();
     let set = analytic_set(seed, &SetOptions { repeats, ..SetOptions::default() });
     let build = |points: &Vec<[f64; 3]>| -> Result<Scan, Failure> {
         Ok(Scan::build(&PointCloud::from_positions(points)?, &BuildOptions::default())?)
@@ -71,7 +76,7 @@ fn main() -> Result<ExitCode, Failure> {
     let mut clean = true;
     for pair in &set.pairs {
         let (a, b) = (&scans[pair.a], &scans[pair.b]);
-        let plan = CollidePlan::new(&asked, a, b)?;
+        let plan = CollidePlan::new(&options, a, b)?;
         let (va, vb) = (a.at(&pair.pose_a), b.at(&pair.pose_b));
         let verdict = Pair::new(va, vb).collide(&plan, &mut scratch).verdict;
         let row = rows.entry((pair.family, format!("{:4.2}", pair.noise))).or_default();
@@ -89,7 +94,7 @@ fn main() -> Result<ExitCode, Failure> {
         "\n{excused} of {thin} thin pairs ambiguous; {}",
         if clean { "all right" } else { "NOT all right" }
     );
-    Ok(if clean { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(clean)
 }
 
 fn print_rows(rows: &BTreeMap<(&str, String), Row>) {

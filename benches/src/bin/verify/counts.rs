@@ -1,0 +1,65 @@
+//! Counts of instructions, compared with those on record.
+
+use std::fs;
+use std::path::Path;
+
+use nearmiss_benches::Failure;
+use nearmiss_benches::guard::counts::{self, Scenario};
+
+/// Of more instructions than this share of those on record is told as a fault.
+const MOST: f64 = 1.03;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Only these scenarios
+    scenarios: Vec<String>,
+    /// Write the record anew
+    #[arg(long)]
+    record: bool,
+    /// Run these scenarios, for valgrind to count
+    #[arg(long, conflicts_with = "record", hide = true)]
+    run: bool,
+}
+
+/// Returns whether no scenario takes many more instructions than on record.
+pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
+    if arguments.run {
+        for name in &arguments.scenarios {
+            Scenario::named(name)?.run()?;
+        }
+        return Ok(true);
+    }
+    let (only, record) = (&arguments.scenarios, arguments.record);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("record/counts.csv");
+    let old = fs::read_to_string(&path).unwrap_or_default();
+    let on_record = |name: &str| {
+        let count = old.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(','));
+        count.and_then(|count| count.parse::<u64>().ok())
+    };
+    let program = std::env::current_exe()?;
+    let (mut is_clean, mut new) = (true, String::from("scenario,instructions\n"));
+    println!("| scenario | instructions | on record | ratio |\n| --- | --: | --: | --: |");
+    for (scenario, name) in Scenario::ALL {
+        if !only.is_empty() && !only.iter().any(|wanted| wanted == name) {
+            if let Some(count) = on_record(name) {
+                new += &format!("{name},{count}\n");
+            }
+            continue;
+        }
+        let count = counts::count(scenario, &program, &["counts", "--run", name])?;
+        new += &format!("{name},{count}\n");
+        match on_record(name) {
+            Some(before) => {
+                #[expect(clippy::cast_precision_loss, reason = "a ratio for people")]
+                let ratio = count as f64 / before as f64;
+                println!("| {name} | {count} | {before} | {ratio:.3} |");
+                is_clean &= ratio <= MOST;
+            }
+            None => println!("| {name} | {count} | | |"),
+        }
+    }
+    if record {
+        fs::write(&path, new)?;
+    }
+    Ok(record || is_clean)
+}
