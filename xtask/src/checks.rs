@@ -3,7 +3,7 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::repository::{Outcome, cargo, members, run_cargo};
+use crate::repository::{Outcome, cargo, members, root, run_cargo};
 use crate::tidy;
 
 type Check = fn() -> Outcome;
@@ -13,19 +13,7 @@ const CHECKS: [(&str, Check); 9] = [
     ("tidy", tidy::run),
     ("format", || run_cargo(&["fmt", "--all", "--check"])),
     ("tests", || run_cargo(&["test", "--workspace", "--quiet"])),
-    ("verify", || {
-        run_cargo(&[
-            "run",
-            "--release",
-            "--quiet",
-            "-p",
-            "nearmiss-benches",
-            "--bin",
-            "verify",
-            "--",
-            "--quick",
-        ])
-    }),
+    ("verify", verify),
     ("lints", || run_cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])),
     ("docs", docs),
     ("features", features),
@@ -63,6 +51,36 @@ pub(crate) fn run(names: &[&str]) -> Outcome {
 #[expect(clippy::disallowed_methods, reason = "a program may read the clock")]
 fn now() -> Instant {
     Instant::now()
+}
+
+/// Runs a program of the workspace with these words.
+fn run_program(package: &str, program: &str, words: &[&str]) -> Outcome {
+    run_cargo(&[&["run", "--release", "--quiet", "-p", package, "--bin", program, "--"], words].concat())
+}
+
+/// Checks what `collide --prove` wrote, as these words say.
+pub(crate) fn check_proof(words: &[&str]) -> Outcome {
+    run_program("check-proof", "check-proof", words)
+}
+
+/// Answers, counts and shapes with known answers; then the proofs of a scan near itself.
+fn verify() -> Outcome {
+    run_program("nearmiss-benches", "verify", &["--quick"])?;
+    let folder = root().join("target").join("proofs");
+    std::fs::create_dir_all(&folder)?;
+    let path = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let (scan, poses, proof) = (path("dragon.nm"), path("poses.jsonl"), path("proofs.jsonl"));
+    let cloud = root().join("testdata/data/dragon-5k.ply").to_string_lossy().into_owned();
+    for words in [
+        &["preprocess", &cloud, "-o", &scan, "--quiet"][..],
+        &["poses", &scan, &scan, "--near", "--per-distance", "200", "-o", &poses, "--quiet"],
+        &["collide", &scan, &scan, "--poses", &poses, "--prove", &proof, "--json"],
+    ] {
+        let mut command = cargo();
+        command.args(["run", "--release", "--quiet", "-p", "nearmiss-cli", "--"]).args(words);
+        crate::repository::run(command.stdout(Stdio::null()), "nearmiss")?;
+    }
+    check_proof(&[&proof, &scan, &scan, "--poses", &poses, "--points", "100000"])
 }
 
 fn docs() -> Outcome {

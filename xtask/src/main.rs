@@ -14,7 +14,6 @@
 //! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
-mod check_proof;
 mod checks;
 mod circles;
 mod demo;
@@ -65,7 +64,7 @@ fn main() -> ExitCode {
         ["demo"] => demo::run(),
         ["tidy"] => checks::run(&["tidy"]),
         ["ci"] => checks::run(&[]),
-        ["check-proof", ..] => check_proof::run(std::env::args_os().skip(1)),
+        ["check-proof", words @ ..] => checks::check_proof(words),
         ["field", ..] => field::run(std::env::args_os().skip(1)),
         ["geodesic", words @ ..] => geodesic::run(words),
         ["level", words @ ..] => level::run(words),

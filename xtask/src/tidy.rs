@@ -17,7 +17,7 @@ const COMMENT_WIDTH: usize = 110;
 const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 
 /// Which members of the workspace each crate may use; the table of ARCHITECTURE.md.
-const LAYERS: [(&str, &[&str]); 17] = [
+const LAYERS: [(&str, &[&str]); 18] = [
     ("nearmiss-geometry", &[]),
     ("nearmiss-lanes", &[]),
     ("nearmiss-index", &["nearmiss-geometry", "nearmiss-lanes"]),
@@ -66,6 +66,7 @@ const LAYERS: [(&str, &[&str]); 17] = [
     ("nearmiss-cli", &["nearmiss"]),
     ("nearmiss-testdata", &["nearmiss-geometry"]),
     ("nearmiss-benches", &["nearmiss", "nearmiss-testdata"]),
+    ("check-proof", &["nearmiss", "nearmiss-cli", "nearmiss-testdata"]),
     ("xtask", &["nearmiss", "nearmiss-cli", "nearmiss-testdata"]),
 ];
 

@@ -234,7 +234,7 @@ impl Known {
             return None;
         }
         self.add(certifier.proven.iter().map(|bound| (bound.gap, bound.pair)), slack);
-        self.distance(&certifier.pair, 0.0)
+        self.distance(certifier.pair, 0.0)
     }
 
     /// Looks at the pairs of the front whose time has come: those that are still apart wait again, the others

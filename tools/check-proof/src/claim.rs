@@ -1,11 +1,11 @@
 //! Whether what a line of a proof claims holds.
 
-use super::boxes::{Placed, distance, distance_of_balls};
-use super::cover::{Rectangle, uncovered};
-use super::placement::Placement;
-use super::proof::{Enclosure, Line, Matrix, Poses, Semantics, Verdict};
-use super::subject::Subject;
-use super::witness;
+use crate::boxes::{Placed, distance, distance_of_balls};
+use crate::cover::{Rectangle, uncovered};
+use crate::placement::Placement;
+use crate::proof::{Enclosure, Line, Matrix, Poses, Semantics, Verdict};
+use crate::subject::Subject;
+use crate::witness;
 
 /// A pose may be mended by so many sampling radii, as the command line does.
 const MENDED: f64 = 0.1;

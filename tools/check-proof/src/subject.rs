@@ -10,8 +10,8 @@ use nearmiss::geometry::NodeId;
 use nearmiss::{Bandwidth, BuildOptions, Check, Kernel, PointKind, Scan};
 use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 
-use super::proof::{Enclosure, Semantics};
-use crate::repository::Outcome;
+use crate::Outcome;
+use crate::proof::{Enclosure, Semantics};
 
 /// First bytes of a prepared scan.
 const MAGIC: &[u8] = b"\x8Enmiss";

@@ -1,4 +1,4 @@
-//! `cargo xtask check-proof`: whether what certified answers rest on holds, without the code that found them.
+//! Checks the proofs of `nearmiss collide --prove` with none of the code that found them.
 //!
 //! * Apart: the pairs of nodes cover all pairs of points, and their enclosures are apart, in interval
 //!   arithmetic; or, of obstacles, the balls about their points in which the obstacle lies.
@@ -7,6 +7,7 @@
 //! * Of each scan: a million points of its surface lie in the enclosures of the nodes of their nearest
 //!   points, and so do those in cells, and the balls, in the enclosures of the obstacle. That is a trial, not
 //!   a proof; the proofs are docs/theory/certificates.md and docs/theory/obstacle.md.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 mod boxes;
 mod claim;
@@ -24,16 +25,15 @@ mod witness;
 mod trial;
 
 use std::collections::BTreeSet;
-use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use nearmiss_cli::clap::{self, Parser};
+use clap::Parser;
 use rayon::prelude::*;
 
-use crate::repository::Outcome;
 use claim::{Checker, Finding, Kind};
 use proof::{Line, Lines, Poses};
 use subject::Subject;
@@ -47,7 +47,7 @@ const NAMED: usize = 10;
 
 /// Check what `nearmiss collide A B --prove PROOF` wrote; exit status 0 only if everything holds
 #[derive(Debug, Parser)]
-#[command(bin_name = "cargo xtask check-proof")]
+#[command(name = "check-proof")]
 struct Args {
     /// The file that `--prove` named
     proof: PathBuf,
@@ -69,16 +69,27 @@ struct Args {
     threads: usize,
 }
 
-/// Checks as `args` say, the command's own name first.
-pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> Outcome {
-    let args = Args::parse_from(args);
-    rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global()?;
-    let faults = check(&args)?;
-    if faults == 0 {
-        println!("everything holds");
-        return Ok(());
+/// What a check comes to.
+type Outcome<T = ()> = Result<T, Box<dyn std::error::Error>>;
+
+fn main() -> ExitCode {
+    match run(&Args::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
     }
-    Err(format!("{faults} violations").into())
+}
+
+fn run(args: &Args) -> Outcome {
+    rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global()?;
+    let faults = check(args)?;
+    if faults > 0 {
+        return Err(format!("{faults} violations").into());
+    }
+    println!("everything holds");
+    Ok(())
 }
 
 /// Prints what was found; returns how many faults there are.

@@ -110,7 +110,7 @@ fn bracket(value: f64, missing: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check_proof::sample::Source;
+    use crate::sample::Source;
 
     /// An integer of at most 53 bits, often a short one.
     fn integer(source: &mut Source) -> i64 {

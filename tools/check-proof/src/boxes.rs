@@ -3,8 +3,8 @@
 //! A direction is looked for in floating point, any one will do; that it parts the boxes is then shown in
 //! intervals. A box is exactly the set of `centre + Σ t_k axes_k` with `|t_k| ≤ half_k`, whatever the axes.
 
-use super::interval::{Interval, dot};
-use super::proof::{Enclosure, Matrix};
+use crate::interval::{Interval, dot};
+use crate::proof::{Enclosure, Matrix};
 
 type Vector = [f64; 3];
 
@@ -144,7 +144,7 @@ fn cross(a: Vector, b: Vector) -> Vector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check_proof::sample::Source;
+    use crate::sample::Source;
 
     const AXES: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 

@@ -9,9 +9,9 @@ use nearmiss::hierarchy::{GatherScratch, OrientedBox};
 use nearmiss::surface::project;
 use rayon::prelude::*;
 
-use super::neighbour::Neighbours;
-use super::sample::Source;
-use super::subject::Subject;
+use crate::neighbour::Neighbours;
+use crate::sample::Source;
+use crate::subject::Subject;
 
 /// Points of the surface that are looked for with one source of random numbers.
 const CHUNK: u64 = 4096;

@@ -95,7 +95,7 @@ impl Counters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check_proof::sample::Source;
+    use crate::sample::Source;
 
     fn rectangle([a0, a1, b0, b1]: [u64; 4]) -> Rectangle {
         Rectangle { a: a0..a1, b: b0..b1 }

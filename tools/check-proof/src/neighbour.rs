@@ -91,7 +91,7 @@ impl<'a> Neighbours<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check_proof::sample::Source;
+    use crate::sample::Source;
 
     #[test]
     fn agrees_with_all_points() {

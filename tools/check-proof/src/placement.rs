@@ -2,7 +2,7 @@
 
 use nearmiss::geometry::Frame;
 
-use super::proof::Matrix;
+use crate::proof::Matrix;
 
 /// What rounding may do to the turn.
 const ROUNDING: f64 = 1e-12;

@@ -4,8 +4,8 @@ use nearmiss::hierarchy::GatherScratch;
 use nearmiss::surface::project;
 use nearmiss_testdata::oracle::{BORDER, Evaluation, GAP, Status, THIN};
 
-use super::placement::Placement;
-use super::subject::Subject;
+use crate::placement::Placement;
+use crate::subject::Subject;
 
 /// |f| of a witness, in bandwidths. Its |f| in single precision is at most 1e-6.
 const ON_SURFACE: f64 = 1e-5;

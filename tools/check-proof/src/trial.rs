@@ -10,10 +10,10 @@ use std::sync::atomic::AtomicU64;
 use nearmiss::{BuildOptions, Scan};
 use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
-use super::claim::{Checker, Kind};
-use super::proof::{self, Line, Poses, Semantics, Verdict};
-use super::subject::Subject;
-use super::surface;
+use crate::claim::{Checker, Kind};
+use crate::proof::{self, Line, Poses, Semantics, Verdict};
+use crate::subject::Subject;
+use crate::surface;
 
 /// A scan, poses, and the lines that the command line wrote about them.
 struct Trial {

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::repository::Outcome;
+use crate::Outcome;
 
 /// An affine map as a row-major 4×4 matrix.
 pub(crate) type Matrix = [f64; 16];
