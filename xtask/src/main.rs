@@ -7,6 +7,7 @@
 //! * `test [tidy|format|lints|docs|features|packages|tests|verify|determinism …]` — every check, or those
 //!   named.
 //! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
+//! * `inventory [COMMIT]` — the size of the libraries, beside that of an earlier commit.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
 //! * `field` — f over a slice of a noisy scan, and how often its normal changes sides.
@@ -20,6 +21,7 @@ mod demo;
 mod field;
 mod fuzz;
 mod geodesic;
+mod inventory;
 mod level;
 mod repository;
 mod tables;
@@ -36,6 +38,8 @@ of the repository
   tidy, ci       the first of them; all of them
   geodesic [SCAN] [--from POINT] [-o FILE.png]
                  a picture of its graph, coloured by the distance from a point along it
+  inventory [COMMIT]
+                 the size of the libraries: files, lines, circles, public items, descents; beside that of a commit
   level [SCAN] [--depth L]… [-o FILE.png]
                  a picture of levels of its hierarchy: samples and the balls that cover their nodes
   check-proof PROOF A B [--poses F]
@@ -67,6 +71,7 @@ fn main() -> ExitCode {
         ["check-proof", words @ ..] => checks::check_proof(words),
         ["field", ..] => field::run(std::env::args_os().skip(1)),
         ["geodesic", words @ ..] => geodesic::run(words),
+        ["inventory", words @ ..] => inventory::run_with(words),
         ["level", words @ ..] => level::run(words),
         ["fuzz", words @ ..] => fuzz::run(words),
         ["tables", words @ ..] => tables::run(words),

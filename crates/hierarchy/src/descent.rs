@@ -195,8 +195,8 @@ impl TreePair<'_> {
         ControlFlow::Continue(())
     }
 
-    /// Puts the pairs that are near into the frontier. Returns how many were compared, and the pair to look at
-    /// next unless that is the frontier's business.
+    /// Puts the pairs that are near into the frontier. Returns how many were compared, and the pair to look
+    /// at next unless that is the frontier's business.
     #[inline(always)]
     fn put_near<S: Simd, V: PairVisitor, F: Frontier>(
         &self,
