@@ -36,7 +36,7 @@ pub trait PairVisitor {
     /// Two leaves, by their numbers, whose boxes are not apart.
     fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()>;
 
-    /// Of the pairs of boxes that were compared last those that are apart are no less so than this.
+    /// `gap` is a lower bound of the gaps of all pairs that the last comparison pruned.
     fn least_apart(&mut self, gap: f32) {
         let _ = gap;
     }
@@ -46,8 +46,9 @@ pub trait PairVisitor {
         let _ = (pair, gap);
     }
 
-    /// Which pairs come first: those for which this is least. `share` is the distance of the centres of two
-    /// boxes as a share of how far these reach. `None` where nothing below the pair can matter.
+    /// The priority of a pair, the lowest first. `share` is the distance of the two centres divided by the
+    /// sum of the half extents, the maximum over six axes: 0 for concentric boxes, 1 for boxes that just
+    /// touch. `None` prunes the pair.
     fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
         let _ = pair;
         Some(share)
@@ -82,7 +83,7 @@ pub struct TreePair<'a> {
     pub b: &'a Tree<'a>,
     /// The motion of b's frame into a's.
     pub relative: &'a Relative,
-    /// Boxes no further apart than this are near.
+    /// Boxes no further apart than this are near. Includes the slack of the motion ([`Relative::slack`]).
     pub reach: f32,
 }
 

@@ -29,13 +29,13 @@ pub(crate) enum Encoding {
     Text { number: u64, end: u8 },
 }
 
-/// How a row is read, in either encoding; what it does not hold stays as it was.
+/// Parses rows in either encoding. Slots of a row without a column keep their values.
 pub(crate) trait Rows {
-    /// Whether a line holds a row, or is there for people.
+    /// Returns `false` for blank lines and comments.
     fn is_row(&self, line: &Line<'_>) -> bool;
-    /// Reads a line.
+    /// Parses a line.
     fn line(&self, line: Line<'_>, row: &mut Row) -> Result<(), Fault>;
-    /// Reads a record; of the right length none is broken.
+    /// Parses a record. Every record of the right length is valid.
     fn record(&self, bytes: &[u8], row: &mut Row);
 }
 

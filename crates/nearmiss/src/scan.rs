@@ -62,7 +62,8 @@ const KIND: [u8; 4] = *b"SCAN";
 /// Version of the layout of a scan's sections and metadata.
 const VERSION: u32 = 9;
 
-/// Versions before this are refused by name. This one holds the tree, leaves and blocks as queries read them.
+/// The oldest layout version that is read; older files are refused by name. Raise it together with
+/// [`VERSION`] whenever a section or a field of the metadata is added or changes, and record a golden file.
 const OLDEST: u32 = 9;
 
 /// What a scan's file holds beside arrays.

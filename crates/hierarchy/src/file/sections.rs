@@ -1,4 +1,6 @@
 //! The hierarchy in a container: one section an array, the rest in the metadata.
+//!
+//! The version of this layout is `VERSION` in `nearmiss/src/scan.rs`; raise it with every change here.
 
 use std::sync::OnceLock;
 

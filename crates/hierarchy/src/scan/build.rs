@@ -51,7 +51,7 @@ pub struct PointHierarchy {
     pub(crate) is_oriented: bool,
     pub(crate) metric: Metric,
     pub(crate) plan: SurfacePlan,
-    /// One by one, where they were wanted; they stand in blocks.
+    /// Positions in leaf order, unpacked from `blocks` on first use.
     pub(crate) positions: OnceLock<Arc<Vec<[f32; 3]>>>,
     pub(crate) normals: Array<[f32; 3]>,
     pub(crate) radii: Array<f32>,
@@ -225,8 +225,9 @@ impl PointHierarchy {
         self.renew_leaves();
     }
 
-    /// Takes these boxes of all nodes and what they must grow by, in the order of their ids, for its own, and
-    /// makes anew what follows from them and the discs.
+    /// Replaces the boxes of all nodes and, if given, the enclosure growths, both in the order of the nodes'
+    /// ids; then recomputes leaf blocks, marks and outline. With `None` the old growths stay: valid only if
+    /// the enclosures are the same.
     pub(crate) fn bound(&mut self, boxes: &[OrientedBox], growths: Option<[&[Growth]; 2]>) {
         let topology = self.topology;
         self.root.bounds = boxes[NodeId::ROOT.index()];
@@ -394,8 +395,8 @@ impl PointHierarchy {
         &self.blocks
     }
 
-    /// The balls outside of which no point of a block is heard, like points with horizons: that of block `i`
-    /// stands in lane `i` % 16 of group `i` / 16.
+    /// For each block of points, a ball that contains the supports of all its points, with the ball's radius
+    /// in place of a horizon. The ball of block `i` is in lane `i` % 16 of group `i` / 16.
     #[must_use]
     pub fn groups(&self) -> &[PointBlock] {
         &self.groups

@@ -27,7 +27,7 @@ pub(crate) struct Ordered {
     pub(crate) fits: Vec<Fit>,
     /// Sparse points come from here on.
     pub(crate) dense: usize,
-    /// Of its blocks.
+    /// A bounding ball for each block of `sampling.blocks`.
     pub(crate) groups: Vec<PointBlock>,
     pub(crate) sampling: Sampling,
 }

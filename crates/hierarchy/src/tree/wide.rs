@@ -21,7 +21,7 @@ pub(crate) const LANES: usize = FAN * FAN;
 /// A number of each of four siblings.
 pub(crate) type Lanes = [f32; FAN];
 
-/// The boxes of up to four children; what stands in lanes without a child says nothing.
+/// The boxes of up to four children. Lanes without a child are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Siblings {
@@ -252,7 +252,7 @@ pub fn whole([a, b]: [&Tree<'_>; 2], pair: NodePair, leaves: [bool; 2], scale: f
         return leaves;
     }
     let (a, b) = (a.longest_below(pair.a), b.longest_below(pair.b) * scale);
-    // Of lengths that are none both may be so; then both are split.
+    // With infinite or NaN lengths neither node is kept whole.
     let (long_a, long_b) = (a > 2.0 * b, b > 2.0 * a);
     [long_b && !long_a, long_a && !long_b]
 }
