@@ -260,12 +260,15 @@ fn surfaces(
         _ if !options.certifies() => apart(options, 0.0, false),
         _ if known.as_ref().is_some_and(|known| known.is_doubtful()) => apart(options, 0.0, false),
         _ => {
+            let keeps_proof = known.as_ref().is_some_and(|known| known.keeps_proof(pair));
             let mut certifier = Certifier::new(pair, reach, proven);
-            let proven = certifier.prove(pose, compared, open, (proof, known.is_some()));
+            let proven = certifier.prove(pose, compared, open, (proof, keeps_proof));
             if let Some((distance, near)) = proven {
                 band = near;
-                if let Some(known) = &mut known {
-                    known.proven(distance, certifier.proven, certifier.pair);
+                match &mut known {
+                    Some(known) if keeps_proof => known.proven(distance, certifier.proven, certifier.pair),
+                    Some(known) => known.proven_alone(distance, certifier.pair),
+                    None => {}
                 }
             }
             doubtful = certifier.doubtful;

@@ -29,9 +29,6 @@ const MOST_EXPIRED: usize = 4;
 /// the roots, sixteen pairs at a time, is faster (benches/record).
 const SLOW: f64 = 0.2;
 
-/// The same of a front of enclosures.
-const SLOW_PROVEN: f64 = 1.0;
-
 /// A travel of more slacks than this is begun anew: gaps beside it would lose their digits.
 const LONGEST: f64 = (1_u64 << 40) as f64;
 
@@ -159,6 +156,12 @@ impl Known {
         self.met.is_none() && self.is_slow(pair, SLOW)
     }
 
+    /// Returns `true` if a proof is likely to be continued by the next query, so that its pairs are worth
+    /// their keep.
+    pub(crate) fn keeps_proof(&self, pair: &ScanPair<'_>) -> bool {
+        self.is_slow(pair, SLOW)
+    }
+
     /// Whether b moves no more than so many sampling radii.
     fn is_slow(&self, pair: &ScanPair<'_>, radii: f64) -> bool {
         let scale = f64::from(pair.relative.scale());
@@ -218,7 +221,7 @@ impl Known {
         (expired, scratch): (&mut Vec<NodePair>, &mut ProofScratch),
     ) -> Option<f64> {
         let pair = &*certifier.pair;
-        if !self.is_proof || !self.is_slow(pair, SLOW_PROVEN) || !self.is_whole {
+        if !self.is_proof || !self.is_slow(pair, SLOW) || !self.is_whole {
             return None;
         }
         expired.clear();
@@ -311,6 +314,12 @@ impl Known {
         self.forget(None);
         self.add(bounds.iter().map(|bound| (bound.gap, bound.pair)), pair.relative.slack());
         self.is_proof = true;
+        self.clear_to(distance, pair);
+    }
+
+    /// The scans are proven to be so far apart, in the world, by pairs that were not kept.
+    pub(crate) fn proven_alone(&mut self, distance: f64, pair: &ScanPair<'_>) {
+        self.forget(None);
         self.clear_to(distance, pair);
     }
 
