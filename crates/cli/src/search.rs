@@ -19,7 +19,7 @@ pub struct SearchArgs {
     /// Test points for each pair of leaves, with `--method sampling`
     #[arg(long, value_name = "N", default_value_t = Sampling::default().test_points)]
     pub test_points: u32,
-    /// What |f_A| + |f_B| of a test point must be less than, in sampling radii, with `--method sampling`
+    /// Greatest |f_A| + |f_B| of a test point that counts as contact, in sampling radii (`--method sampling`)
     #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance)]
     pub tolerance: f64,
     /// Into how many surfels the surface of a is thought to be cut where b may be, with `--method
@@ -36,7 +36,7 @@ pub struct SearchArgs {
     /// How a place on both surfaces is found, with `--method interpolation`
     #[arg(long, value_enum, default_value_t = RefinementName::Newton)]
     pub refinement: RefinementName,
-    /// What random points come from
+    /// Seed of the random points
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Which pairs of nodes are looked at first; by default depth first, or by overlap under a budget

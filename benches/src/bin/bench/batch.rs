@@ -30,7 +30,7 @@ const REPEATS: usize = 1000;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// What is measured
+    /// Object to measure: a file, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(default_value = "dragon-23k")]
     object: String,
     /// Poses of the pair

@@ -22,7 +22,7 @@ const MICROS: [u64; 9] = [1, 2, 4, 8, 16, 32, 100, 400, 1600];
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
     /// Poses near contact

@@ -24,7 +24,7 @@ use nearmiss_testdata::arbitrary::{rng, unit_vector};
 pub(crate) struct Arguments {
     /// The scan that the object moves through
     scan: String,
-    /// What moves
+    /// The object that moves
     object: String,
     /// Where the centre of the object starts
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]

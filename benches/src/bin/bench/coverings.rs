@@ -22,7 +22,7 @@ use nearmiss_testdata::arbitrary::{point_in, rng};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(value_name = "OBJECT", default_values = ["dragon-23k"])]
     objects: Vec<String>,
     #[command(flatten)]

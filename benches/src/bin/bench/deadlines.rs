@@ -29,7 +29,7 @@ const LONG: Duration = Duration::from_millis(1);
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Object to measure: a file, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(default_value = "dragon-23k")]
     object: String,
     /// Queries of a row of the table

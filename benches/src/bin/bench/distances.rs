@@ -19,7 +19,7 @@ const ASKINGS: usize = 3;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// What is measured
+    /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
     /// Poses at each distance

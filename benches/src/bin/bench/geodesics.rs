@@ -326,7 +326,7 @@ fn plates_table() -> Result<(), Failure> {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(value_name = "OBJECT", default_values = ["dragon-5k", "dragon-23k"])]
     objects: Vec<String>,
     /// Runs, the fastest of which counts

@@ -14,7 +14,7 @@ const STEPS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 3.0];
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
     /// Walks from poses near contact

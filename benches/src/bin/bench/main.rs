@@ -40,7 +40,7 @@ enum Command {
     Certificates(certificates::Arguments),
     /// The clearance of an object that moves through a scan
     Clearance(clearance::Arguments),
-    /// What samples and sphere coverings are worth: how tight, how right, what they exclude
+    /// Samples and sphere coverings: tightness, correctness, share of pruned pairs
     Coverings(coverings::Arguments),
     /// Curves of intersection of pairs of objects, by spacing
     Curves(curves::Arguments),
@@ -52,9 +52,9 @@ enum Command {
     Eigen(eigen::Arguments),
     /// One evaluation of f, at a leaf and anywhere, by instruction set
     Evaluation(evaluation::Arguments),
-    /// What follows from proximity graphs: normals, close pairs, levels, the geodesic kernel
+    /// Results of proximity graphs: normals, close pairs, levels, the geodesic kernel
     Geodesics(geodesics::Arguments),
-    /// What hints save in small motions near contact
+    /// Time that hints save in small motions near contact
     Hints(hints::Arguments),
     /// How useful answers about real scans are
     Scans(scans::Options),

@@ -32,7 +32,7 @@ pub(crate) struct Options {
     /// Scans that the object is placed in
     #[arg(required = true, value_name = "SCAN")]
     scans: Vec<String>,
-    /// What is placed
+    /// The object to place in the scans
     #[arg(long, value_name = "OBJECT", default_value = "bumpy:4000")]
     object: String,
     /// The longest side that the object is scaled to; by default a 25th of the scan's diagonal

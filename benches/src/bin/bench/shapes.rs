@@ -19,7 +19,7 @@ use rand::RngExt;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
     /// Shapes of each kind in a set

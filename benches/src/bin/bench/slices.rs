@@ -30,7 +30,7 @@ const FRAMES: usize = 240;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Asked {
-    /// What is measured
+    /// Scans to measure: files, or `house` for a generated one
     #[arg(value_name = "SCAN", default_values = ["house"])]
     scans: Vec<String>,
     /// Points of the generated house

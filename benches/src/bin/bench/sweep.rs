@@ -17,7 +17,7 @@ use nearmiss_testdata::instructions::levels;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// What is measured
+    /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
     /// Poses at each distance

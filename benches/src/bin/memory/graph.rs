@@ -82,7 +82,7 @@ fn speed(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What the graph looks like, by how it is pruned.
+/// The shape of the graph, by pruning.
 fn looks(positions: &[[f32; 3]]) -> Result<(), Failure> {
     println!("\n| pruning | degree | virtual % | components | in the largest % | border % | bytes a point |");
     println!("| --- | --: | --: | --: | --: | --: | --: |");
@@ -135,7 +135,7 @@ fn row(
     Ok(())
 }
 
-/// What one update touches and takes, on surfaces of more and more points.
+/// The time and extent of one update, on surfaces of increasing size.
 fn updates() -> Result<(), Failure> {
     println!("{}\n", machine::description());
     println!(
@@ -172,7 +172,7 @@ fn updates() -> Result<(), Failure> {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Object to measure: a file, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(default_value = "bumpy:1000000")]
     object: String,
     /// Runs, the fastest of which counts

@@ -25,9 +25,9 @@ struct Arguments {
 enum Command {
     /// Tables 1 to 3 and Figs 5 and 6 of dos Anjos et al. 2012
     Anjos2012(FigureOptions),
-    /// What proximity graphs cost, and what they look like
+    /// Proximity graphs: building time, shape, updates
     Graph(graph::Arguments),
-    /// What it costs to prepare, save and open a large scan
+    /// Preparing, saving and opening a large scan: time and memory
     Preparation(preparation::Arguments),
 }
 

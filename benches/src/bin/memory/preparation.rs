@@ -58,7 +58,7 @@ fn measure<T>(
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is measured
+    /// Object to measure: a file, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(default_value = "bumpy:1000000")]
     object: String,
     /// Runs, the median of which counts

@@ -110,7 +110,7 @@ impl<'a> Asking<'a> {
     }
 }
 
-/// What a way to ask came to over some poses.
+/// The results of one method over some poses.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     asked: usize,
@@ -172,7 +172,7 @@ impl Tally {
     }
 }
 
-/// What the traversal says of all poses.
+/// The answers of the traversal for all poses.
 fn truths(scan: &Scan, poses: &[Vec<Pose>; DISTANCES]) -> Result<[Vec<bool>; DISTANCES], Failure> {
     let mut traversal = Asking::new(scan, Method::Traversal)?;
     Ok(poses

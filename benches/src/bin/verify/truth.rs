@@ -21,7 +21,7 @@ use nearmiss_benches::truth::{self, Question};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// What is asked about, against itself
+    /// The scan, which is compared with itself
     cloud: String,
     /// Poses with exact answers, a line of JSON each
     #[arg(value_name = "POSES.jsonl")]
