@@ -118,12 +118,12 @@ impl Centre {
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Half a block, between the two steps of [`Neighbourhood::offer_all`].
+/// Half a block, between the steps of [`Neighbourhood::offer_all`].
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(64))]
 pub struct HalfBlock {
-    /// d²/h² of its points.
-    t: [f32; HALF],
+    /// d²/h² of its points, then their weights.
+    lanes: [f32; HALF],
     /// The lower half of block b is 2b, the upper one 2b + 1.
     id: u32,
 }
@@ -174,6 +174,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     pub fn offer(&mut self, simd: S, block: &PointBlock) {
         let (t, _) = self.distances(simd, block);
         let (low, high) = simd.split_f32x16(t);
+        let (low, high) = (self.weights(simd, low), self.weights(simd, high));
         self.add(simd, block, 0, low);
         self.add(simd, block, 1, high);
     }
@@ -181,9 +182,10 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what `halves` holds
     /// afterwards means nothing.
     ///
-    /// Distances come first, for all blocks. So no branch is taken by whether half a block has a point that
-    /// reaches x, which every other has not whose block's ball holds x; and a chain of operations that wait
-    /// for each other is cut in two that are shorter than what processors look ahead.
+    /// Distances come first, for all blocks, then weights, then sums. So no branch is taken by whether half a
+    /// block has a point that reaches x, which every other has not whose block's ball holds x; chains of
+    /// operations that wait for each other are shorter than what processors look ahead; and the constants of
+    /// the kernel and the sums do not compete for registers.
     #[inline(always)]
     pub fn offer_all(&mut self, simd: S, blocks: &[PointBlock], heard: &[u32], halves: &mut Vec<HalfBlock>) {
         let most = 2 * heard.len() + 1;
@@ -197,15 +199,18 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
             {
                 let (t, [any_low, any_high]) = self.distances(simd, block);
                 let (low, high) = simd.split_f32x16(t);
-                *one = HalfBlock { t: low.to_array(), id: 2 * id };
+                *one = HalfBlock { lanes: low.to_array(), id: 2 * id };
                 let next = if any_low { other } else { one };
-                *next = HalfBlock { t: high.to_array(), id: 2 * id + 1 };
+                *next = HalfBlock { lanes: high.to_array(), id: 2 * id + 1 };
                 count += usize::from(any_low) + usize::from(any_high);
             }
         }
+        for half in &mut halves[..count] {
+            half.lanes = self.weights(simd, f32x8::load_array_ref(simd, &half.lanes)).to_array();
+        }
         for half in &halves[..count] {
             if let Some(block) = blocks.get(half.id as usize / 2) {
-                self.add(simd, block, half.id as usize % 2, f32x8::load_array_ref(simd, &half.t));
+                self.add(simd, block, half.id as usize % 2, f32x8::load_array_ref(simd, &half.lanes));
             }
         }
     }
@@ -222,6 +227,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let (low, high) = simd.split_f32x16(straight);
         let nearest = self.nearest.min(low.min(high));
         let (low, high) = simd.split_f32x16(t);
+        let (low, high) = (self.weights(simd, low), self.weights(simd, high));
         self.add(simd, &block.points, 0, low);
         self.add(simd, &block.points, 1, high);
         (self.nearest, self.support) = (nearest, support);
@@ -249,9 +255,17 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         (t, [bits & 0xff != 0, bits >> HALF != 0])
     }
 
-    /// Adds the points of half a block, given their d²/h².
+    /// The weights of points with these d²/h²; zero of those that do not reach x.
     #[inline(always)]
-    fn add(&mut self, simd: S, block: &PointBlock, half: usize, t: f32x8<S>) {
+    fn weights(&mut self, simd: S, t: f32x8<S>) -> f32x8<S> {
+        let counts: mask32x8<S> = t.simd_lt(self.plan.reach_sq());
+        self.nearest = self.nearest.min(t);
+        simd.select_f32x8(counts, self.plan.kernel().weights(simd, t), f32x8::simd_from(simd, 0.0))
+    }
+
+    /// Adds the points of half a block, given their weights.
+    #[inline(always)]
+    fn add(&mut self, simd: S, block: &PointBlock, half: usize, w: f32x8<S>) {
         let load = |lanes: &[f32; WIDTH]| {
             let halves: &[[f32; HALF]; 2] = bytemuck::cast_ref(lanes);
             f32x8::load_array_ref(simd, &halves[half])
@@ -261,10 +275,6 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         let x = (load(px) - high[0]) - low[0];
         let y = (load(py) - high[1]) - low[1];
         let z = (load(pz) - high[2]) - low[2];
-        let counts: mask32x8<S> = t.simd_lt(self.plan.reach_sq());
-        let w = self.plan.kernel().weights(simd, t);
-        let w = simd.select_f32x8(counts, w, f32x8::simd_from(simd, 0.0));
-        self.nearest = self.nearest.min(t);
         let (wx, wy, wz) = (w * x, w * y, w * z);
         self.weight += w;
         self.first[0] += wx;
