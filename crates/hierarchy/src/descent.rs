@@ -1,5 +1,5 @@
-//! The descent of a pair of trees: one loop, sixteen pairs of boxes in one pass. What differs between
-//! questions is the visitor, and in which order it wants pairs.
+//! The descent of a pair of trees: one loop, sixteen pairs of nodes in one pass. What differs between
+//! questions is the visitor, how nodes are compared, and in which order pairs are looked at.
 
 mod frontier;
 mod single;
@@ -19,39 +19,18 @@ use crate::tree::wide::{LANES, Lanes, Siblings, Tree, lanes_of, rows, whole};
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
 pub use single::PlaceVisitor;
 
-/// The callbacks of a descent over pairs of nodes.
-pub trait PairVisitor {
-    /// Whether [`Self::least_apart`] is called.
-    const NOTES_GAPS: bool = false;
-
-    /// Whether [`Self::apart`] is called.
-    const NOTES_PAIRS: bool = false;
-
-    /// Whether [`Self::urgency`] is called.
-    const LOOKS_CLOSER: bool = false;
-
-    /// So many pairs of boxes were compared; may end the descent.
+/// The callbacks of every descent over pairs of nodes. `K` is the key by which pairs are ordered.
+pub trait PairVisitor<K = f32> {
+    /// So many pairs of nodes were compared; may end the descent.
     fn compared(&mut self, pairs: u32) -> ControlFlow<()>;
 
-    /// Two leaves, by their numbers, whose boxes are not apart.
-    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()>;
+    /// Two leaves, by their numbers, that were not found to be apart; `open` has their nodes.
+    fn leaf_pair(&mut self, leaves: [usize; 2], open: &Open<K>) -> ControlFlow<()>;
 
-    /// `gap` is a lower bound of the gaps of all pairs that the last comparison pruned.
-    fn least_apart(&mut self, gap: f32) {
-        let _ = gap;
-    }
-
-    /// A pair whose boxes are apart by this gap, or that [`Self::urgency`] left out.
-    fn apart(&mut self, pair: NodePair, gap: f32) {
-        let _ = (pair, gap);
-    }
-
-    /// The priority of a pair, the lowest first. `share` is the distance of the two centres divided by the
-    /// sum of the half extents, the maximum over six axes: 0 for concentric boxes, 1 for boxes that just
-    /// touch. `None` prunes the pair.
-    fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
-        let _ = pair;
-        Some(share)
+    /// Returns `true` if a pair is still to be looked at; asked when its turn has come.
+    fn is_wanted(&mut self, open: &Open<K>) -> bool {
+        let _ = open;
+        true
     }
 
     /// Returns `true` if a leaf and an inner node, whose boxes are not apart, are known to hold nothing that
@@ -74,6 +53,102 @@ pub trait PairVisitor {
     }
 }
 
+/// The callbacks of a descent that compares boxes along their face normals ([`TreePair`]).
+pub trait BoxVisitor: PairVisitor {
+    /// Whether [`Self::least_apart`] is called.
+    const NOTES_GAPS: bool = false;
+
+    /// Whether [`Self::apart`] is called.
+    const NOTES_PAIRS: bool = false;
+
+    /// Whether [`Self::urgency`] is called.
+    const LOOKS_CLOSER: bool = false;
+
+    /// `gap` is a lower bound of the gaps of all pairs that the last comparison pruned.
+    fn least_apart(&mut self, gap: f32) {
+        let _ = gap;
+    }
+
+    /// A pair whose boxes are apart by this gap, or that [`Self::urgency`] left out.
+    fn apart(&mut self, pair: NodePair, gap: f32) {
+        let _ = (pair, gap);
+    }
+
+    /// The priority of a pair, the lowest first. `share` is the distance of the two centres divided by the
+    /// sum of the half extents, the maximum over six axes: 0 for concentric boxes, 1 for boxes that just
+    /// touch. `None` prunes the pair.
+    fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
+        let _ = pair;
+        Some(share)
+    }
+}
+
+/// How the pairs that take the place of a pair of nodes are compared: sixteen in one pass.
+pub trait Comparison<V, K = f32> {
+    /// The trees of a and of b.
+    fn trees(&self) -> [&Tree<'_>; 2];
+
+    /// Length in a's frame of a unit of b's.
+    fn scale(&self) -> f32;
+
+    /// Compares the pairs below `open`, whose `whole` nodes are not split, and puts those that are near into
+    /// the frontier. Returns how many were compared, and the pair to look at next unless that is the
+    /// frontier's business.
+    fn put_near<S: Simd, F: Frontier<K>>(
+        &self,
+        simd: S,
+        open: Open<K>,
+        whole: [bool; 2],
+        frontier: &mut F,
+        visitor: &mut V,
+    ) -> (u32, Option<Open<K>>);
+}
+
+/// The most urgent of some siblings, kept back while the others are pushed.
+#[derive(Debug, Clone, Copy)]
+pub struct MostUrgent<K>(Option<Open<K>>);
+
+impl<K: PartialOrd + Copy> MostUrgent<K> {
+    /// None so far.
+    #[inline(always)]
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(None)
+    }
+
+    /// Adds a sibling.
+    #[inline(always)]
+    pub fn add<F: Frontier<K>>(&mut self, mut open: Open<K>, frontier: &mut F) {
+        if let Some(known) = &mut self.0 {
+            if open.key < known.key {
+                std::mem::swap(known, &mut open);
+            }
+            frontier.push(open);
+        } else {
+            self.0 = Some(open);
+        }
+    }
+
+    /// All have come. Returns the most urgent if it is to be looked at next; where there is none, nothing is
+    /// left below their parents.
+    #[inline(always)]
+    pub fn finish<S: Simd, F: Frontier<K>>(self, simd: S, frontier: &mut F) -> Option<Open<K>> {
+        match self.0 {
+            Some(most) => frontier.push_last(most),
+            None => {
+                frontier.settle(simd);
+                None
+            }
+        }
+    }
+}
+
+impl<K: PartialOrd + Copy> Default for MostUrgent<K> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// Two trees in relative motion, and which of their boxes are near each other.
 #[derive(Debug, Clone, Copy)]
 pub struct TreePair<'a> {
@@ -88,28 +163,77 @@ pub struct TreePair<'a> {
 }
 
 /// Visits the pairs of leaves whose boxes are near, from the pair of the roots down, until `visitor` ends it.
-pub fn descend<V: PairVisitor, F: Frontier>(
+pub fn descend<V: BoxVisitor, F: Frontier>(
     pair: TreePair<'_>,
     level: Level,
     frontier: &mut F,
     visitor: &mut V,
 ) -> ControlFlow<()> {
     frontier.push(Open { pair: NodePair::ROOTS, key: 0.0 });
-    resume(pair, level, frontier, visitor)
+    resume(&pair, level, frontier, visitor)
 }
 
-/// As [`descend`], from the pairs that the frontier holds. Where the visitor ends it, the frontier holds what
-/// is left, a pair that was not looked at to the end included.
-pub fn resume<V: PairVisitor, F: Frontier>(
-    pair: TreePair<'_>,
+/// Visits the pairs of leaves that are near by this comparison, from the pairs that the frontier holds down,
+/// until `visitor` ends it. The frontier then holds what is left, a pair that was not looked at to the end
+/// included.
+pub fn resume<K: Copy, C: Comparison<V, K>, F: Frontier<K>, V: PairVisitor<K>>(
+    comparison: &C,
     level: Level,
     frontier: &mut F,
     visitor: &mut V,
 ) -> ControlFlow<()> {
     dispatch!(level, simd => simd.vectorize(
         #[inline(always)]
-        || pair.resume_by(simd, frontier, visitor),
+        || resume_by(simd, comparison, frontier, visitor),
     ))
+}
+
+/// The loop of all questions about a pair of trees.
+#[inline(always)]
+fn resume_by<S: Simd, K: Copy, C: Comparison<V, K>, F: Frontier<K>, V: PairVisitor<K>>(
+    simd: S,
+    comparison: &C,
+    frontier: &mut F,
+    visitor: &mut V,
+) -> ControlFlow<()> {
+    let [a, b] = comparison.trees();
+    let mut next = None;
+    while let Some(open) = next.take().or_else(|| frontier.pop()) {
+        if !visitor.is_wanted(&open) {
+            continue;
+        }
+        let pair = open.pair;
+        let leaves = [a.topology.is_leaf(pair.a), b.topology.is_leaf(pair.b)];
+        let fine = visitor.is_fine(pair);
+        if (leaves[0] || fine[0]) && (leaves[1] || fine[1]) {
+            let flow = if leaves == [true; 2] {
+                let numbers = [a.topology.leaf_number(pair.a), b.topology.leaf_number(pair.b)];
+                visitor.leaf_pair(numbers, &open)
+            } else {
+                visitor.fine_pair(pair)
+            };
+            if flow.is_break() {
+                // It was not looked at to the end, so it is still open.
+                frontier.push(open);
+                return flow;
+            }
+            frontier.settle(simd);
+            continue;
+        }
+        if leaves[0] != leaves[1] && visitor.is_apart(pair) {
+            frontier.settle(simd);
+            continue;
+        }
+        let whole = if fine == [false; 2] { whole([a, b], pair, leaves, comparison.scale()) } else { fine };
+        let compared;
+        (compared, next) = comparison.put_near(simd, open, whole, frontier, visitor);
+        let flow = visitor.compared(compared);
+        if flow.is_break() {
+            next.into_iter().for_each(|open| frontier.push(open));
+            return flow;
+        }
+    }
+    ControlFlow::Continue(())
 }
 
 /// The boxes that stand for one node of a pair: those of its children, or its own.
@@ -131,10 +255,11 @@ impl<'a> Side<'a> {
 
     /// The box of a node stands among those of its siblings; that of a root is written to `alone`.
     #[inline(always)]
-    fn whole(tree: &'a Tree<'_>, id: NodeId, alone: &'a mut Siblings) -> Self {
+    fn whole(tree: &'a Tree<'_>, id: NodeId, alone: &'a mut Option<Siblings>) -> Self {
         let (boxes, lane) = if let Some((parent, lane)) = tree.topology.parent(id) {
             (&tree.siblings[parent.index()], lane)
         } else {
+            let alone = alone.insert(Siblings::NONE);
             alone.set(0, &tree.root.bounds);
             (&*alone, 0)
         };
@@ -148,64 +273,29 @@ impl<'a> Side<'a> {
     }
 }
 
-impl TreePair<'_> {
+impl<V: BoxVisitor> Comparison<V> for TreePair<'_> {
     #[inline(always)]
-    fn resume_by<S: Simd, V: PairVisitor, F: Frontier>(
-        &self,
-        simd: S,
-        frontier: &mut F,
-        visitor: &mut V,
-    ) -> ControlFlow<()> {
-        let (a, b) = (self.a, self.b);
-        let (mut alone_a, mut alone_b) = (Siblings::NONE, Siblings::NONE);
-        let mut next = None;
-        while let Some(open) = next.take().or_else(|| frontier.pop()) {
-            let pair = open.pair;
-            let leaves = [a.topology.is_leaf(pair.a), b.topology.is_leaf(pair.b)];
-            let fine = visitor.is_fine(pair);
-            if (leaves[0] || fine[0]) && (leaves[1] || fine[1]) {
-                let flow = if leaves == [true; 2] {
-                    visitor.leaf_pair([a.topology.leaf_number(pair.a), b.topology.leaf_number(pair.b)])
-                } else {
-                    visitor.fine_pair(pair)
-                };
-                if flow.is_break() {
-                    // It was not looked at to the end, so it is still open.
-                    frontier.push(open);
-                    return flow;
-                }
-                frontier.settle(simd);
-                continue;
-            }
-            if leaves[0] != leaves[1] && visitor.is_apart(pair) {
-                frontier.settle(simd);
-                continue;
-            }
-            let [whole_a, whole_b] =
-                if fine == [false; 2] { whole([a, b], pair, leaves, self.relative.scale()) } else { fine };
-            let below_a = if whole_a { Side::whole(a, pair.a, &mut alone_a) } else { Side::below(a, pair.a) };
-            let below_b = if whole_b { Side::whole(b, pair.b, &mut alone_b) } else { Side::below(b, pair.b) };
-            let compared;
-            (compared, next) = self.put_near(simd, [&below_a, &below_b], frontier, visitor);
-            let flow = visitor.compared(compared);
-            if flow.is_break() {
-                next.into_iter().for_each(|open| frontier.push(open));
-                return flow;
-            }
-        }
-        ControlFlow::Continue(())
+    fn trees(&self) -> [&Tree<'_>; 2] {
+        [self.a, self.b]
     }
 
-    /// Puts the pairs that are near into the frontier. Returns how many were compared, and the pair to look
-    /// at next unless that is the frontier's business.
     #[inline(always)]
-    fn put_near<S: Simd, V: PairVisitor, F: Frontier>(
+    fn scale(&self) -> f32 {
+        self.relative.scale()
+    }
+
+    #[inline(always)]
+    fn put_near<S: Simd, F: Frontier>(
         &self,
         simd: S,
-        [a, b]: [&Side<'_>; 2],
+        Open { pair: NodePair { a, b }, .. }: Open,
+        [whole_a, whole_b]: [bool; 2],
         frontier: &mut F,
         visitor: &mut V,
     ) -> (u32, Option<Open>) {
+        let (mut alone_a, mut alone_b) = (None, None);
+        let a = if whole_a { Side::whole(self.a, a, &mut alone_a) } else { Side::below(self.a, a) };
+        let b = if whole_b { Side::whole(self.b, b, &mut alone_b) } else { Side::below(self.b, b) };
         let there = (a.lanes * 0x1111) & EACH_IN_FOUR[b.lanes as usize % LANES];
         let Near { mut lanes, most, shares, gaps, apart } =
             self.compare(simd, [a.boxes, b.boxes], there, V::NOTES_GAPS);
@@ -223,28 +313,17 @@ impl TreePair<'_> {
             }
         }
         if V::LOOKS_CLOSER {
-            let mut most: Option<Open> = None;
+            let mut most = MostUrgent::new();
             while lanes != 0 {
                 let lane = lanes.trailing_zeros();
                 lanes &= lanes - 1;
                 let (pair, of) = (pair(lane), lane as usize % LANES);
-                let Some(key) = visitor.urgency(pair, shares[of]) else {
-                    visitor.apart(pair, gaps[of]);
-                    continue;
-                };
-                let mut open = Open { pair, key };
-                if let Some(known) = &mut most {
-                    if key < known.key {
-                        std::mem::swap(known, &mut open);
-                    }
-                    frontier.push(open);
-                } else {
-                    most = Some(open);
+                match visitor.urgency(pair, shares[of]) {
+                    Some(key) => most.add(Open { pair, key }, frontier),
+                    None => visitor.apart(pair, gaps[of]),
                 }
             }
-            if let Some(most) = most {
-                next = frontier.push_last(most);
-            }
+            next = most.finish(simd, frontier);
         } else if lanes == 0 {
             frontier.settle(simd);
         } else {
@@ -258,7 +337,9 @@ impl TreePair<'_> {
         }
         (there.count_ones(), next)
     }
+}
 
+impl TreePair<'_> {
     /// As [`Relative::gap`] and [`Relative::overlap`], in the same order of operations.
     #[inline(always)]
     fn compare<S: Simd>(&self, simd: S, [a, b]: [&Siblings; 2], there: u32, notes_gaps: bool) -> Near<S> {

@@ -13,7 +13,8 @@ pub use bounds::boxes::{OrientedBox, Relative, SLACK};
 pub use bounds::growth::Growth;
 pub use bounds::part::Part;
 pub use descent::{
-    Frontier, Heap, Open, PairVisitor, PlaceVisitor, Plunging, Stack, TreePair, descend, resume,
+    BoxVisitor, Comparison, Frontier, Heap, MostUrgent, Open, PairVisitor, PlaceVisitor, Plunging, Stack,
+    TreePair, descend, resume,
 };
 pub use file::sanity::Flaw;
 pub use file::sections::{HierarchyMeta, LoadError};

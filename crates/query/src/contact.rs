@@ -2,7 +2,6 @@
 
 pub(crate) mod ball_leaves;
 pub(crate) mod balls;
-pub(crate) mod bounds;
 pub(crate) mod certificate;
 pub(crate) mod collide;
 pub(crate) mod compare;

@@ -8,8 +8,6 @@
 mod approach;
 mod search;
 
-use std::ops::ControlFlow;
-
 use nearmiss_geometry::PointId;
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::PointHierarchy;
@@ -18,9 +16,9 @@ use nearmiss_surface::Metric;
 use crate::ask::answer::{Evidence, Statistics, Verdict};
 use crate::ask::budget::Budget;
 use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semantics};
-use crate::contact::bounds::Motion;
+use crate::pair::bounds::Motion;
 use crate::contact::collide::{Asked, ContactScratch, Outputs, collide};
-use crate::leaf::nearest_points::{PointPair, nearest};
+use crate::leaf::nearest_points::PointPair;
 use crate::pair::meter::Meter;
 use crate::pair::placed::{Placed, ViewScratch};
 use crate::pair::scan_pair::{ScanPair, relative};
@@ -154,16 +152,16 @@ pub(crate) fn distance(
         };
     };
     let (level, meter) = (contact.level, Meter::new(budget, views, 0));
-    let motion = Motion::new(level, views, &pose);
+    let motion = Motion::new(views, &pose);
     let slices = views.map(|view| view.scan().slices());
-    let part = plan.options.semantics.part();
-    let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, part));
-    let best = PointPair::new(&pair, [0, 0]);
-    let search = Apart { plan, budget, motion, pair, best };
-    match plan.options.semantics {
-        Semantics::Thickened(radius) => search.balls(radius, open),
-        Semantics::Obstacle | Semantics::Surface => search.surfaces(open, contact),
+    let semantics = plan.options.semantics;
+    let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, semantics.part()));
+    if let Semantics::Thickened(radius) = semantics {
+        return Apart { plan, budget, search: Search::new(pair, &motion, false) }.balls(radius, open);
     }
+    // By the geodesic metric enclosures prove nothing.
+    let is_bounded = plan.options.metric != Some(Metric::Geodesic);
+    Apart { plan, budget, search: Search::new(pair, &motion, is_bounded) }.surfaces(open, contact)
 }
 
 /// Beyond so many bands feet on the surfaces of obstacles are hardly nearer than the points: by a hundredth
@@ -174,67 +172,49 @@ const FAR_FEET: f64 = 6.0;
 struct Apart<'a> {
     plan: &'a DistancePlan,
     budget: &'a Budget,
-    motion: Motion,
-    pair: ScanPair<'a>,
-    /// The nearest points so far.
-    best: PointPair,
+    search: Search<'a>,
 }
 
 impl Apart<'_> {
     /// Balls of this radius about the points.
     fn balls(mut self, radius: f64, open: &mut Frontier) -> Distance {
-        let mut search = Search::new(open, false, &self.motion);
-        search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
+        self.search.near_enough = 2.0 * radius;
+        let flow = self.search.run(open);
         let beyond = |distance: f64| (distance - 2.0 * radius).max(0.0);
-        let mut flow = ControlFlow::Continue(());
-        while flow.is_continue() && !search.is_over() && beyond(self.best.distance) > 0.0 {
-            flow = self.pair.meter.go_on();
-            if flow.is_continue() {
-                self.step(&mut search);
-            }
-        }
-        let nearest = self.best.distance;
-        let lower = if flow.is_continue() {
-            nearest
-        } else {
-            self.motion.proven(search.lower(&self.motion)).min(nearest)
-        };
+        let nearest = self.search.best.distance;
+        let complete = flow.is_continue() || beyond(nearest) == 0.0;
+        let lower = if complete { nearest } else { self.search.lower(open).min(nearest) };
         Distance {
             lower: beyond(lower),
             upper: beyond(nearest),
             evidence: Evidence::Certified,
-            complete: flow.is_continue(),
+            complete,
             ..self.samples()
         }
     }
 
     fn surfaces(mut self, open: &mut Frontier, contact: &mut ContactScratch) -> Distance {
-        // By the geodesic metric enclosures prove nothing.
-        let is_bounded = self.plan.options.metric != Some(Metric::Geodesic);
-        let mut search = Search::new(open, is_bounded, &self.motion);
-        search.found_points(self.motion.bound_of(self.best.distance), &self.motion);
+        if self.of_obstacles() {
+            self.search.share = Some(1.0 - self.plan.options.relative);
+        }
         // Whether they touch costs a hundredth of the rest. A budget is spent on bounds first.
-        let mut is_asked = self.budget.work.is_none() && self.budget.deadline.is_none();
-        if is_asked && let Some(touching) = self.touch(contact) {
+        let is_asked = self.budget.work.is_none() && self.budget.deadline.is_none();
+        if (is_asked || self.search.may_touch())
+            && let Some(touching) = self.touch(contact)
+        {
             return touching;
         }
-        let flow = loop {
-            if !is_asked && (!is_bounded || self.motion.proven(search.upper(&self.motion)) <= 0.0) {
-                is_asked = true;
-                if let Some(touching) = self.touch(contact) {
-                    return touching;
-                }
+        self.search.stops_at_zero = !is_asked && !self.search.may_touch();
+        let mut flow = self.search.run(open);
+        if self.search.stops_at_zero && self.search.may_touch() {
+            if let Some(touching) = self.touch(contact) {
+                return touching;
             }
-            if search.is_over() {
-                break ControlFlow::Continue(());
-            }
-            if self.pair.meter.go_on().is_break() {
-                break ControlFlow::Break(());
-            }
-            self.step(&mut search);
-        };
-        let lower = if is_bounded { self.motion.proven(search.lower(&self.motion)) } else { 0.0 };
-        let is_worth = !self.of_obstacles() || self.best.distance <= FAR_FEET * self.band();
+            self.search.stops_at_zero = false;
+            flow = self.search.go_on(open);
+        }
+        let lower = if self.search.of_enclosures { self.search.lower(open) } else { 0.0 };
+        let is_worth = !self.of_obstacles() || self.search.best.distance <= FAR_FEET * self.band();
         let feet = if flow.is_continue() && is_worth { self.approach(&mut contact.gathers) } else { None };
         let found = Distance { lower, complete: flow.is_continue(), ..self.samples() };
         let of_points = self.of_obstacles();
@@ -248,35 +228,20 @@ impl Apart<'_> {
         Distance { lower: found.lower.min(found.upper), ..found }
     }
 
-    /// A step of a search, and a look at the points of the leaves it leads to.
-    fn step(&mut self, search: &mut Search<'_>) {
-        if let Some(leaves) = search.step(&mut self.pair, &self.motion) {
-            let [a, b] = self.pair.numbers(leaves);
-            self.pair.meter.leaf_pair(self.pair.a.leaves.points(a).len(), self.pair.b.leaves.points(b).len());
-            self.best = nearest(self.motion.level(), &self.pair, leaves, self.best);
-            search.found_points(self.motion.bound_of(self.best.distance.max(0.0)), &self.motion);
-            if self.of_obstacles() {
-                let upper = self.best.distance.max(0.0);
-                let enough = upper * (1.0 - self.plan.options.relative);
-                search.is_content_with(self.motion.bound_of(enough), &self.motion);
-            }
-        }
-    }
-
     fn of_obstacles(&self) -> bool {
         self.plan.options.semantics == Semantics::Obstacle
     }
 
     /// The greater local radius of the two nearest points, in the world.
     fn band(&self) -> f64 {
-        self.pair.band(self.best.points)
+        self.search.pair.band(self.search.best.points)
     }
 
     /// The places of the balls about the nearest points, which lie at `centres`, that are nearest to each
     /// other.
     fn places_of_balls(&self, centres: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         let [p, q] = centres.map(Vector3::from);
-        let balls = self.pair.balls(self.best.points);
+        let balls = self.search.pair.balls(self.search.best.points);
         let (way, both) = (q - p, balls[0] + balls[1]);
         let length = way.norm();
         if both == 0.0 || length == 0.0 {
@@ -290,17 +255,17 @@ impl Apart<'_> {
 
     /// Whether both feet belong to their obstacles.
     fn are_obstacle(&self, feet: &Feet) -> bool {
-        let views = self.pair.views;
-        (0..2).all(|k| views[k].is_obstacle(self.best.points[k], feet.points[k]))
+        let views = self.search.pair.views;
+        (0..2).all(|k| views[k].is_obstacle(self.search.best.points[k], feet.points[k]))
     }
 
     /// The answer if the surfaces meet.
     fn touch(&mut self, scratch: &mut ContactScratch) -> Option<Distance> {
-        let meter = &mut self.pair.meter;
+        let meter = &mut self.search.pair.meter;
         let spent = meter.spent;
         let work = self.budget.work.map(|work| work.saturating_sub(spent.evaluations + spent.node_pairs));
         let budget = Budget { work, ..*self.budget };
-        let asked = Asked { scans: self.pair.views, plan: &self.plan.touching, budget: &budget };
+        let asked = Asked { scans: self.search.pair.views, plan: &self.plan.touching, budget: &budget };
         let answer = collide(asked, scratch, Outputs::default());
         meter.spend(&answer.statistics);
         let Verdict::Intersecting { contact, evidence } = answer.verdict else { return None };
@@ -318,18 +283,18 @@ impl Apart<'_> {
 
     /// Points of the surfaces, from the nearest samples on.
     fn approach(&mut self, gathers: &mut [ViewScratch; 2]) -> Option<Feet> {
-        let [a, b] = self.pair.views;
+        let [a, b] = self.search.pair.views;
         if !(a.verifies() && b.verifies()) {
             return None;
         }
-        let meter = &mut self.pair.meter;
-        Approach { views: [a, b], samples: self.best.points, gathers, meter }.run()
+        let meter = &mut self.search.pair.meter;
+        Approach { views: [a, b], samples: self.search.best.points, gathers, meter }.run()
     }
 
     /// What the nearest points so far tell.
     fn samples(&self) -> Distance {
-        let PointPair { distance, points } = self.best;
-        let views = self.pair.views;
+        let PointPair { distance, points } = self.search.best;
+        let views = self.search.pair.views;
         let half = |k: usize| 0.5 * f64::from(views[k].scan().radii()[points[k]]) * views[k].placed().scale();
         let of_obstacles = self.of_obstacles();
         let places = [0, 1].map(|k| views[k].point(points[k]));
@@ -341,7 +306,7 @@ impl Apart<'_> {
             sources: [0, 1].map(|k| views[k].scan().id(points[k])),
             evidence: if of_obstacles { Evidence::Certified } else { Evidence::Estimated },
             complete: false,
-            statistics: self.pair.meter.spent,
+            statistics: self.search.pair.meter.spent,
         }
     }
 }

@@ -14,7 +14,7 @@ mod sampling;
 
 use std::ops::ControlFlow;
 
-use nearmiss_hierarchy::{NodePair, PairVisitor, Plunging, descend};
+use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Plunging, descend};
 
 use crate::ask::answer::{Answer, Reason};
 use crate::ask::options::{Method, Order};
@@ -106,16 +106,18 @@ impl Papers<'_, '_> {
     }
 }
 
-impl PairVisitor for Papers<'_, '_> {
+impl BoxVisitor for Papers<'_, '_> {
     const LOOKS_CLOSER: bool = true;
-
-    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
-        self.search.compared(pairs)
-    }
 
     fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
         let looks_closer = self.coverings || matches!(self.order, Order::Sides | Order::SidesByGap);
         if looks_closer { self.look_closer(pair, share) } else { Some(share) }
+    }
+}
+
+impl PairVisitor for Papers<'_, '_> {
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.search.compared(pairs)
     }
 
     fn is_apart(&mut self, pair: NodePair) -> bool {
@@ -126,9 +128,9 @@ impl PairVisitor for Papers<'_, '_> {
         if self.resolution >= 0.0 { self.nodes_are_fine(pair) } else { [false; 2] }
     }
 
-    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+    fn leaf_pair(&mut self, leaves: [usize; 2], open: &Open) -> ControlFlow<()> {
         self.search.begin_leaves(leaves);
-        let nodes = self.search.pair.leaves(leaves);
+        let nodes = open.pair;
         let tries = self.search.tries;
         match self.method {
             Method::Traversal => self.search.compare_leaves(leaves, true),

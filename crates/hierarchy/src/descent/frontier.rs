@@ -11,25 +11,35 @@ use crate::tree::topology::NodePair;
 
 /// A pair whose boxes are near each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Open {
+pub struct Open<K = f32> {
     /// The nodes.
     pub pair: NodePair,
     /// The less the more urgent: the distance of the centres as a share of how far the boxes reach, unless
     /// the visitor says otherwise.
-    pub key: f32,
+    pub key: K,
+}
+
+impl Open {
+    fn near(self) -> Near<NodePair> {
+        Near { distance: self.key, item: self.pair }
+    }
+
+    fn of(near: Near<NodePair>) -> Self {
+        Self { pair: near.item, key: near.distance }
+    }
 }
 
 /// The pairs still to be looked at.
-pub trait Frontier {
+pub trait Frontier<K = f32> {
     /// Adds a pair. Of siblings the most urgent comes last.
-    fn push(&mut self, open: Open);
+    fn push(&mut self, open: Open<K>);
 
     /// The pair to look at next.
-    fn pop(&mut self) -> Option<Open>;
+    fn pop(&mut self) -> Option<Open<K>>;
 
     /// Adds the most urgent of some siblings, after all others, or returns it if it comes next.
     #[inline(always)]
-    fn push_last(&mut self, open: Open) -> Option<Open> {
+    fn push_last(&mut self, open: Open<K>) -> Option<Open<K>> {
         Some(open)
     }
 
@@ -156,6 +166,22 @@ impl Heap {
         self.pairs.clear();
     }
 
+    /// Adds pairs, all at once.
+    pub fn extend(&mut self, pairs: impl Iterator<Item = Open>) {
+        self.pairs.extend(pairs.map(Open::near));
+    }
+
+    /// The most urgent pair.
+    #[must_use]
+    pub fn peek(&self) -> Option<Open> {
+        self.pairs.peek().copied().map(Open::of)
+    }
+
+    /// Takes all pairs out, in no order.
+    pub fn drain(&mut self) -> impl Iterator<Item = Open> {
+        self.pairs.drain().map(Open::of)
+    }
+
     /// The pairs still there, the most urgent first, and then in no order.
     pub fn iter(&self) -> impl Iterator<Item = NodePair> {
         self.pairs.iter().map(|near| near.item)
@@ -164,11 +190,11 @@ impl Heap {
 
 impl Frontier for Heap {
     fn push(&mut self, open: Open) {
-        self.pairs.push(Near { distance: open.key, item: open.pair });
+        self.pairs.push(open.near());
     }
 
     fn pop(&mut self) -> Option<Open> {
-        self.pairs.pop().map(|near| Open { pair: near.item, key: near.distance })
+        self.pairs.pop().map(Open::of)
     }
 
     fn push_last(&mut self, open: Open) -> Option<Open> {

@@ -36,7 +36,7 @@ impl PairVisitor for All {
         ControlFlow::Continue(())
     }
 
-    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+    fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open) -> ControlFlow<()> {
         if self.leaves.len() == self.most {
             return ControlFlow::Break(());
         }
@@ -44,6 +44,8 @@ impl PairVisitor for All {
         ControlFlow::Continue(())
     }
 }
+
+impl BoxVisitor for All {}
 
 /// The points of a leaf, in a's frame by `place`.
 fn points(scan: &PointHierarchy, leaf: usize, place: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<[f32; 3]> {
@@ -211,7 +213,7 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
             assert!(is_open, "round {round}: {leaf_a}, {leaf_b} is not open");
         }
         let mut rest = All { most: usize::MAX, ..All::default() };
-        assert!(resume(pair, Level::new(), stack, &mut rest).is_continue());
+        assert!(resume(&pair, Level::new(), stack, &mut rest).is_continue());
         let all: BTreeSet<[usize; 2]> = first.leaves.iter().chain(&rest.leaves).copied().collect();
         assert_eq!(all, found, "round {round}: gone on with");
         // In whatever order.

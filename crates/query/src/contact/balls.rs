@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, PairVisitor};
+use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor};
 
 use crate::ask::answer::Contact;
 use crate::leaf::nearest_points::{PointPair, nearest};
@@ -47,24 +47,26 @@ impl<'a> Balls<'a> {
 }
 
 impl PairVisitor for Balls<'_> {
-    const NOTES_GAPS: bool = true;
-
-    #[inline]
-    fn least_apart(&mut self, least: f32) {
-        let bound = f64::from(least - self.pair.relative.slack()) * self.pair.views[0].placed().scale();
-        self.apart = self.apart.min(bound);
-    }
-
     #[inline]
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.pair.meter.spent.node_pairs += u64::from(pairs);
         self.pair.meter.go_on()
     }
 
-    fn leaf_pair(&mut self, [a, b]: [usize; 2]) -> ControlFlow<()> {
+    fn leaf_pair(&mut self, [a, b]: [usize; 2], open: &Open) -> ControlFlow<()> {
         let (of_a, of_b) = (self.pair.a.leaves, self.pair.b.leaves);
         self.pair.meter.leaf_pair(of_a.points(a).len(), of_b.points(b).len());
-        self.compare(self.pair.leaves([a, b]))
+        self.compare(open.pair)
+    }
+}
+
+impl BoxVisitor for Balls<'_> {
+    const NOTES_GAPS: bool = true;
+
+    #[inline]
+    fn least_apart(&mut self, least: f32) {
+        let bound = f64::from(least - self.pair.relative.slack()) * self.pair.views[0].placed().scale();
+        self.apart = self.apart.min(bound);
     }
 }
 

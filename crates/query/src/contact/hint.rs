@@ -13,7 +13,7 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, Topology, descend, resume};
 
 use crate::ask::options::CollideOptions;
-use crate::contact::bounds::Motion;
+use crate::pair::bounds::Motion;
 use crate::contact::certificate::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::contact::search::{Closer, Surfaces};
 use crate::pair::scan_pair::ScanPair;
@@ -180,7 +180,7 @@ impl Known {
     /// again.
     pub(crate) fn has_front(&self, pair: &ScanPair<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
-            let motion = self.pose.map(|pose| Motion::new(pair.level, pair.views, &pose));
+            let motion = self.pose.map(|pose| Motion::new(pair.views, &pose));
             pair.are_leaves(leaves) && motion.is_some_and(|motion| are_doubtful(pair, &motion, leaves, reach))
         };
         self.is_slow(pair, SLOW)
@@ -209,7 +209,7 @@ impl Known {
             self.forget(None);
             return descend(trees, level, stack, &mut Closer(search));
         }
-        resume(trees, level, stack, &mut Closer(search))
+        resume(&trees, level, stack, &mut Closer(search))
     }
 
     /// Goes on from the front of a proof, if there is one: how far the scans are apart at least, if it can be

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{PairVisitor, Stack, TreePair, descend};
+use nearmiss_hierarchy::{BoxVisitor, Open, PairVisitor, Stack, TreePair, descend};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::wide::{bits, blocks_of, lanes_of, load};
 
@@ -259,7 +259,7 @@ impl PairVisitor for Near<'_, '_> {
         self.pair.meter.go_on()
     }
 
-    fn leaf_pair(&mut self, [a, b]: [usize; 2]) -> ControlFlow<()> {
+    fn leaf_pair(&mut self, [a, b]: [usize; 2], _: &Open) -> ControlFlow<()> {
         let (of_a, of_b) = (self.pair.a.leaves.points(a), self.pair.b.leaves.points(b));
         self.pair.meter.leaf_pair(of_a.len(), of_b.len());
         for block_a in blocks_of(&of_a) {
@@ -274,6 +274,8 @@ impl PairVisitor for Near<'_, '_> {
         ControlFlow::Continue(())
     }
 }
+
+impl BoxVisitor for Near<'_, '_> {}
 
 impl Near<'_, '_> {
     /// The nearest of one block for each point of the other that has one within reach.

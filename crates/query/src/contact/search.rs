@@ -10,7 +10,7 @@
 use std::ops::{ControlFlow, Range};
 
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_hierarchy::{NodePair, PairVisitor, Part};
+use nearmiss_hierarchy::{BoxVisitor, NodePair, Open, PairVisitor, Part};
 use nearmiss_surface::meet;
 
 use crate::ask::answer::{Contact, Evidence, Reason};
@@ -209,23 +209,19 @@ impl PairVisitor for Plain<'_, '_> {
         self.0.pair.gap_by_leaf(pair).is_some_and(|gap| gap > self.0.reach)
     }
 
-    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+    fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open) -> ControlFlow<()> {
         self.0.leaf_pair(leaves)
     }
 }
+
+impl BoxVisitor for Plain<'_, '_> {}
 
 /// A search that notes what it excludes.
 pub(crate) struct Closer<'s, 'a>(pub(crate) &'s mut Surfaces<'a>);
 
 impl PairVisitor for Closer<'_, '_> {
-    const NOTES_PAIRS: bool = true;
-
     fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
         self.0.compared(pairs)
-    }
-
-    fn apart(&mut self, pair: NodePair, gap: f32) {
-        self.0.exclude(pair, gap);
     }
 
     fn is_apart(&mut self, pair: NodePair) -> bool {
@@ -238,8 +234,16 @@ impl PairVisitor for Closer<'_, '_> {
         }
     }
 
-    fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
+    fn leaf_pair(&mut self, leaves: [usize; 2], _: &Open) -> ControlFlow<()> {
         self.0.leaf_pair(leaves)
+    }
+}
+
+impl BoxVisitor for Closer<'_, '_> {
+    const NOTES_PAIRS: bool = true;
+
+    fn apart(&mut self, pair: NodePair, gap: f32) {
+        self.0.exclude(pair, gap);
     }
 }
 

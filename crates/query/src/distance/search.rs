@@ -1,212 +1,246 @@
-//! The nearest pairs of leaves, by branch and bound, nearest pair of nodes first: for the nearest points by
-//! boxes, for a bound from below by enclosures, both in one descent.
+//! The nearest points of two scans, by branch and bound, nearest pair of nodes first: for the nearest points
+//! by boxes, for a bound from below by enclosures, both in one descent.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::ControlFlow;
 
-use nearmiss_hierarchy::{NodePair, Part};
+use nearmiss_hierarchy::{self as hierarchy, NodePair, PairVisitor, Part, resume};
 use nearmiss_lanes::order::{ascending, from_ascending};
 
-use crate::contact::bounds::{Limits, Motion};
+use crate::leaf::nearest_points::{PointPair, nearest};
+use crate::pair::bounds::{BoundVisitor, Limits, Motion};
 use crate::pair::scan_pair::ScanPair;
 
-/// A pair of nodes still to be looked at, and how much further away than the centres of the scans what is in
-/// them is at least. Ordered so that the nearest is greatest, of equally near ones that of the nearest boxes,
-/// then the first.
+type Open = hierarchy::Open<Nearness>;
+
+/// How much further away than the centres of the scans what is in two nodes is at least, by their enclosures
+/// and, of equally near ones, by their boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Open {
-    /// How near the enclosures are, and in the lower half the boxes, as numbers in the same order: a heap
-    /// compares often.
-    key: Reverse<u64>,
-    pair: Reverse<NodePair>,
-}
+pub(crate) struct Nearness(
+    /// The enclosures, and in the lower half the boxes, as numbers in the same order: a heap compares often.
+    u64,
+);
 
-impl Open {
+impl Nearness {
     #[inline]
-    fn new(enclosures: f32, boxes: f32, pair: NodePair) -> Self {
-        let key = u64::from(ascending(enclosures)) << 32 | u64::from(ascending(boxes));
-        Self { key: Reverse(key), pair: Reverse(pair) }
+    fn new(enclosures: f32, boxes: f32) -> Self {
+        Self(u64::from(ascending(enclosures)) << 32 | u64::from(ascending(boxes)))
     }
 
     #[inline]
-    fn enclosures(&self) -> f32 {
-        from_ascending((self.key.0 >> 32) as u32)
+    fn enclosures(self) -> f32 {
+        from_ascending((self.0 >> 32) as u32)
     }
 
     #[inline]
-    fn boxes(&self) -> f32 {
+    fn boxes(self) -> f32 {
         #[expect(clippy::cast_possible_truncation, reason = "the lower 32 bits")]
-        let bits = self.key.0 as u32;
+        let bits = self.0 as u32;
         from_ascending(bits)
     }
 }
 
-/// So many steps split the nearest pair of all, which a heap finds. Then limits are near what they will be,
+/// So many steps look at the nearest pair of all, which a heap finds. Then limits are near what they will be,
 /// and what was put off last comes next: some pairs more, but a heap takes longer than to look at those.
 const NEAREST_FIRST: u32 = 128;
 
 /// The pairs of nodes still to be looked at. Reused.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Frontier {
-    heap: BinaryHeap<Open>,
+    heap: BinaryHeap<Reverse<(Nearness, NodePair)>>,
     /// Before any in the heap.
     stack: Vec<Open>,
+    /// So many pairs were looked at.
+    steps: u32,
+    /// Whether the nearest child of the pair that is looked at comes next.
+    dives: bool,
 }
 
-/// A search through pairs of nodes.
+impl Frontier {
+    fn clear(&mut self) {
+        self.heap.clear();
+        self.stack.clear();
+        self.steps = 0;
+    }
+
+    fn iter(&self) -> impl Iterator<Item = Nearness> {
+        self.heap.iter().map(|open| open.0.0).chain(self.stack.iter().map(|open| open.key))
+    }
+}
+
+impl hierarchy::Frontier<Nearness> for Frontier {
+    #[inline]
+    fn push(&mut self, open: Open) {
+        if self.steps < NEAREST_FIRST {
+            self.heap.push(Reverse((open.key, open.pair)));
+        } else {
+            self.stack.push(open);
+        }
+    }
+
+    #[inline]
+    fn pop(&mut self) -> Option<Open> {
+        let next = |Reverse((key, pair))| Open { pair, key };
+        self.steps = self.steps.saturating_add(1);
+        if self.stack.is_empty() && self.steps > NEAREST_FIRST {
+            // A heap's array has its nearest first, more or less.
+            self.stack.extend(self.heap.drain().map(next));
+            self.stack.reverse();
+        }
+        self.dives = !self.stack.is_empty() || self.steps.is_power_of_two();
+        self.stack.pop().or_else(|| self.heap.pop().map(next))
+    }
+
+    #[inline]
+    fn push_last(&mut self, open: Open) -> Option<Open> {
+        if self.dives { self.stack.push(open) } else { self.push(open) }
+        None
+    }
+}
+
+/// A search for the nearest points of two scans.
 #[derive(Debug)]
-pub(crate) struct Search<'s> {
-    open: &'s mut Frontier,
+pub(crate) struct Search<'a> {
+    pub(crate) pair: ScanPair<'a>,
+    motion: &'a Motion,
+    /// The nearest points so far.
+    pub(crate) best: PointPair,
     /// Whether enclosures are asked about too.
-    of_surfaces: bool,
+    pub(crate) of_enclosures: bool,
     /// Nothing that is so much further away than the centres of the scans is looked at for the nearest
     /// points.
     points: f32,
     /// Nor for the bound from below: some pair of leaves whose enclosures are so near was looked at.
-    surfaces: f32,
-    /// So many pairs were split.
-    steps: u32,
+    enclosures: f32,
+    /// A bound from below that is this share of the bound from above is good enough.
+    pub(crate) share: Option<f64>,
+    /// Points so near each other are near enough.
+    pub(crate) near_enough: f64,
+    /// Whether the search stops as soon as the bound from below will be zero.
+    pub(crate) stops_at_zero: bool,
 }
 
-impl<'s> Search<'s> {
-    /// From the pair of the roots on; for the nearest points alone, or for the nearest enclosures of leaves
-    /// as well.
-    pub(crate) fn new(open: &'s mut Frontier, of_surfaces: bool, motion: &Motion) -> Self {
-        open.heap.clear();
-        open.stack.clear();
-        open.stack.push(Open::new(motion.least(), motion.least(), NodePair::ROOTS));
-        let surfaces = if of_surfaces { f32::INFINITY } else { f32::NEG_INFINITY };
-        Self { open, of_surfaces, points: f32::INFINITY, surfaces, steps: 0 }
+impl<'a> Search<'a> {
+    /// From the points of `best` on; for the nearest points alone, or for the nearest enclosures of leaves as
+    /// well.
+    pub(crate) fn new(pair: ScanPair<'a>, motion: &'a Motion, of_enclosures: bool) -> Self {
+        let enclosures = if of_enclosures { f32::INFINITY } else { f32::NEG_INFINITY };
+        let best = PointPair::new(&pair, [0, 0]);
+        let points = motion.beyond(motion.bound_of(best.distance));
+        let (share, near_enough, stops_at_zero) = (None, f64::NEG_INFINITY, false);
+        Self { pair, motion, best, of_enclosures, points, enclosures, share, near_enough, stops_at_zero }
     }
 
-    /// Points further apart than this `bound` are not looked for any more.
-    pub(crate) fn found_points(&mut self, bound: f64, motion: &Motion) {
-        self.points = motion.beyond(bound);
+    /// Looks at pairs from the roots down. Returns whether it came to its end.
+    pub(crate) fn run(&mut self, open: &mut Frontier) -> ControlFlow<()> {
+        open.clear();
+        let key = Nearness::new(self.motion.least(), self.motion.least());
+        open.stack.push(Open { pair: NodePair::ROOTS, key });
+        self.pair.meter.go_on()?;
+        self.go_on(open)
     }
 
-    /// Bounds from below beyond this `bound` are good enough: what is no nearer is not looked at for them any
-    /// more.
-    pub(crate) fn is_content_with(&mut self, bound: f64, motion: &Motion) {
-        if self.of_surfaces {
-            self.surfaces = self.surfaces.min(motion.beyond(bound));
+    /// Looks at the pairs that are open.
+    pub(crate) fn go_on(&mut self, open: &mut Frontier) -> ControlFlow<()> {
+        let (bounds, level) = (self.pair.bounds(self.motion), self.pair.level);
+        resume(&bounds, level, open, self)
+    }
+
+    /// How far surfaces are apart at least, or points where these alone are looked for, in the world. O(open
+    /// pairs).
+    pub(crate) fn lower(&self, open: &Frontier) -> f64 {
+        let known = if self.of_enclosures { self.enclosures } else { self.points };
+        self.proven(open.iter().fold(known, |least, key| least.min(key.enclosures())))
+    }
+
+    /// Whether [`Self::lower`] will be zero.
+    pub(crate) fn may_touch(&self) -> bool {
+        !self.of_enclosures || self.proven(self.enclosures) <= 0.0
+    }
+
+    fn proven(&self, beyond: f32) -> f64 {
+        self.motion.proven(self.motion.bound(beyond))
+    }
+
+    /// The points of two leaves.
+    fn compare(&mut self, leaves: NodePair, [a, b]: [usize; 2]) {
+        self.pair.meter.leaf_pair(self.pair.a.leaves.points(a).len(), self.pair.b.leaves.points(b).len());
+        self.best = nearest(self.pair.level, &self.pair, leaves, self.best);
+        let upper = self.best.distance.max(0.0);
+        self.points = self.motion.beyond(self.motion.bound_of(upper));
+        if self.of_enclosures && let Some(share) = self.share {
+            let enough = self.motion.beyond(self.motion.bound_of(upper * share));
+            self.enclosures = self.enclosures.min(enough);
         }
     }
 
-    /// How near, in a's stored frame, surfaces are at least, or points where these alone are looked for.
-    /// O(open pairs).
-    pub(crate) fn lower(&self, motion: &Motion) -> f64 {
-        let known = if self.of_surfaces { self.surfaces } else { self.points };
-        let open = self.open.heap.iter().chain(&self.open.stack);
-        motion.bound(open.fold(known, |least, open| least.min(open.enclosures())))
+    /// The greater of a bound of two leaves by enclosures and that by points, if they have one, both relative
+    /// to the centres of the scans. A lesser bound will do that is no less than needed.
+    fn bound_of_leaves(&self, leaves: NodePair, by_enclosures: f32) -> f32 {
+        if self.pair.part == Part::Surface {
+            return by_enclosures;
+        }
+        // The points of either and a box about the other are far quicker compared than all points of both.
+        let by_boxes = self.motion.no_nearer(f64::from(self.pair.gap_of_leaf_boxes(leaves)));
+        if by_boxes >= self.enclosures {
+            return by_boxes;
+        }
+        by_enclosures.max(self.motion.no_nearer(f64::from(self.pair.gap_of_leaves(leaves))))
     }
+}
 
-    /// What [`Self::lower`] will not exceed.
-    pub(crate) fn upper(&self, motion: &Motion) -> f64 {
-        motion.bound(self.surfaces)
-    }
-
-    /// Whether nothing is left to look at.
-    pub(crate) fn is_over(&mut self) -> bool {
-        let Frontier { heap, stack } = &mut *self.open;
-        let (points, surfaces) = (self.points, self.surfaces);
-        let wanted = |open: &Open| open.boxes() < points || open.enclosures() < surfaces;
-        while stack.last().is_some_and(|open| !wanted(open)) {
-            stack.pop();
-        }
-        if !stack.is_empty() {
-            return false;
-        }
-        if self.steps >= NEAREST_FIRST {
-            // A heap's array has its nearest first, more or less.
-            stack.extend(heap.drain().filter(wanted));
-            stack.reverse();
-        }
-        while heap.peek().is_some_and(|open| !wanted(open)) {
-            heap.pop();
-        }
-        stack.is_empty() && heap.is_empty()
-    }
-
-    /// Splits the next pair of nodes; a pair of leaves whose points may be nearer than those found so far is
-    /// taken off. None when the search [is over](Self::is_over), too.
-    pub(crate) fn step(&mut self, pair: &mut ScanPair<'_>, motion: &Motion) -> Option<NodePair> {
-        self.steps = self.steps.saturating_add(1);
-        let dives = !self.open.stack.is_empty() || self.steps.is_power_of_two();
-        let next = self.open.stack.pop().or_else(|| self.open.heap.pop())?;
-        let (of_enclosures, of_boxes) = (next.enclosures(), next.boxes());
-        if pair.which_are_leaves(next.pair.0) == [true; 2] {
-            let leaves = next.pair.0;
-            if of_enclosures < self.surfaces {
-                let bound = bound_of_leaves(pair, motion, leaves, of_enclosures, self.surfaces);
-                self.surfaces = self.surfaces.min(bound);
-            }
-            return (of_boxes < self.points).then_some(leaves);
-        }
-        let limits = Limits { boxes: self.points, enclosures: self.surfaces };
-        let (pairs, gaps) = motion.split(([pair.a, pair.b], pair.part), next.pair.0, limits);
-        let enclosures = if self.of_surfaces { gaps.enclosures } else { gaps.boxes };
-        pair.meter.spent.node_pairs += u64::from(pairs.lanes.count_ones());
-        let mut near = gaps.near;
-        let mut nearest: Option<Open> = None;
-        while near != 0 {
-            let lane = near.trailing_zeros() as usize;
-            near &= near - 1;
-            // What is in its parents is no nearer than they are.
-            let children = pairs.pair(lane);
-            let (mut of_enclosures, mut of_boxes) =
-                (enclosures[lane].max(of_enclosures), gaps.boxes[lane].max(of_boxes));
-            let [is_leaf_a, is_leaf_b] = pair.which_are_leaves(children);
-            if is_leaf_a != is_leaf_b {
-                // The points of a loose leaf say more than its box, also of points.
-                if pair.part == Part::Obstacle
-                    && let Some(gap) = pair.gap_by_points(children)
-                {
-                    of_enclosures = of_enclosures.max(motion.no_nearer(f64::from(gap)));
-                }
-                of_boxes = of_boxes.max(of_enclosures);
-                if of_boxes >= self.points && of_enclosures >= self.surfaces {
-                    continue;
-                }
-            }
-            let own = Open::new(of_enclosures, of_boxes, children);
-            if !dives {
-                self.put_off(own);
-            } else if let Some(known) = nearest {
-                self.put_off(known.min(own));
-                nearest = Some(known.max(own));
-            } else {
-                nearest = Some(own);
-            }
-        }
-        if let Some(nearest) = nearest {
-            self.open.stack.push(nearest);
-        }
-        None
+impl PairVisitor<Nearness> for Search<'_> {
+    #[inline]
+    fn compared(&mut self, pairs: u32) -> ControlFlow<()> {
+        self.pair.meter.spent.node_pairs += u64::from(pairs);
+        self.pair.meter.go_on()
     }
 
     #[inline]
-    fn put_off(&mut self, open: Open) {
-        if self.steps < NEAREST_FIRST { self.open.heap.push(open) } else { self.open.stack.push(open) }
+    fn is_wanted(&mut self, open: &Open) -> bool {
+        open.key.boxes() < self.points || open.key.enclosures() < self.enclosures
+    }
+
+    fn leaf_pair(&mut self, leaves: [usize; 2], open: &Open) -> ControlFlow<()> {
+        let (enclosures, boxes) = (open.key.enclosures(), open.key.boxes());
+        if enclosures < self.enclosures {
+            self.enclosures = self.enclosures.min(self.bound_of_leaves(open.pair, enclosures));
+        }
+        if boxes < self.points {
+            self.compare(open.pair, leaves);
+        }
+        if self.best.distance <= self.near_enough || self.stops_at_zero && self.may_touch() {
+            return ControlFlow::Break(());
+        }
+        self.pair.meter.go_on()
     }
 }
 
-/// The greater of a bound of two leaves by enclosures and that by points, if they have one, both relative to
-/// the centres of the scans. A lesser bound will do that is no less than `enough`.
-#[inline]
-fn bound_of_leaves(
-    pair: &ScanPair<'_>,
-    motion: &Motion,
-    leaves: NodePair,
-    by_enclosures: f32,
-    enough: f32,
-) -> f32 {
-    if pair.part == Part::Surface {
-        return by_enclosures;
+impl BoundVisitor<Nearness> for Search<'_> {
+    #[inline]
+    fn limits(&self) -> Limits {
+        Limits { boxes: self.points, enclosures: self.enclosures }
     }
-    // The points of either and a box about the other are far quicker compared than all points of both.
-    let by_boxes = motion.no_nearer(f64::from(pair.gap_of_leaf_boxes(leaves)));
-    if by_boxes >= enough {
-        return by_boxes;
+
+    #[inline(always)]
+    fn key(&mut self, above: &Open, pair: NodePair, boxes: f32, enclosures: f32) -> Option<Nearness> {
+        let enclosures = if self.of_enclosures { enclosures } else { boxes };
+        // What is in its parents is no nearer than they are.
+        let (mut enclosures, mut boxes) = (enclosures.max(above.key.enclosures()), boxes.max(above.key.boxes()));
+        let [is_leaf_a, is_leaf_b] = self.pair.which_are_leaves(pair);
+        if is_leaf_a != is_leaf_b {
+            // The points of a loose leaf say more than its box, also of points.
+            if self.pair.part == Part::Obstacle
+                && let Some(gap) = self.pair.gap_by_points(pair)
+            {
+                enclosures = enclosures.max(self.motion.no_nearer(f64::from(gap)));
+            }
+            boxes = boxes.max(enclosures);
+            if boxes >= self.points && enclosures >= self.enclosures {
+                return None;
+            }
+        }
+        Some(Nearness::new(enclosures, boxes))
     }
-    by_enclosures.max(motion.no_nearer(f64::from(pair.gap_of_leaves(leaves))))
 }

@@ -6,6 +6,7 @@ use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, Slices, TreePair};
 
 use crate::ask::options::{CollidePlan, Semantics};
+use crate::pair::bounds::{Bounds, Motion};
 use crate::pair::meter::Meter;
 use crate::pair::placed::Placed;
 
@@ -72,6 +73,14 @@ impl<'a> ScanPair<'a> {
         'a: 't,
     {
         TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach }
+    }
+
+    /// The trees of both scans, compared by how far they are apart.
+    pub(crate) fn bounds<'t>(&self, motion: &'t Motion) -> Bounds<'t>
+    where
+        'a: 't,
+    {
+        Bounds { trees: [&self.a.tree, &self.b.tree], motion, part: self.part }
     }
 
     /// The band at two points, in the world: the greater of their local radii.

@@ -18,7 +18,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, mask32x16};
 use nearmiss_geometry::Pose;
 use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
-use nearmiss_hierarchy::{LaneNodes, NodeBounds, NodePair, Part, SLACK, Slices, whole};
+use nearmiss_hierarchy::{
+    Comparison, Frontier, LaneNodes, MostUrgent, NodeBounds, NodePair, Open, PairVisitor, Part, SLACK, Tree,
+};
 use nearmiss_lanes::wide::{bits, product, repeated, spread};
 
 use crate::pair::placed::Placed;
@@ -85,13 +87,142 @@ pub(crate) struct Limits {
     pub(crate) enclosures: f32,
 }
 
+impl Limits {
+    /// All are near enough.
+    pub(crate) const NONE: Self = Self { boxes: f32::INFINITY, enclosures: f32::INFINITY };
+}
+
+/// The callbacks of a descent that compares how far nodes are apart ([`Bounds`]).
+pub(crate) trait BoundVisitor<K>: PairVisitor<K> {
+    /// Pairs that are nearer than neither are left out.
+    fn limits(&self) -> Limits;
+
+    /// Returns `true` if these pairs below `above` may take its place; otherwise it stays.
+    fn may_split(&mut self, above: &Open<K>, pairs: &Pairs, gaps: &Gaps) -> bool {
+        let _ = (above, pairs, gaps);
+        true
+    }
+
+    /// The key of a pair below `above`, whose boxes and whose enclosures are apart by so much; `None` leaves
+    /// it out.
+    fn key(&mut self, above: &Open<K>, pair: NodePair, boxes: f32, enclosures: f32) -> Option<K>;
+}
+
+/// Two trees in relative motion, compared by how far boxes and enclosures are apart.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bounds<'a> {
+    pub(crate) trees: [&'a Tree<'a>; 2],
+    pub(crate) motion: &'a Motion,
+    /// What enclosures hold.
+    pub(crate) part: Part,
+}
+
+impl Bounds<'_> {
+    /// The gaps of two nodes by themselves.
+    pub(crate) fn of(&self, level: Level, pair: NodePair) -> Gaps {
+        dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || self.split(simd, pair, [true; 2], Limits::NONE).1,
+        ))
+    }
+
+    /// The pairs that take the place of a pair whose `whole` nodes are not split, and their gaps.
+    #[inline(always)]
+    fn split<S: Simd>(
+        &self,
+        simd: S,
+        NodePair { a, b }: NodePair,
+        whole: [bool; 2],
+        limits: Limits,
+    ) -> (Pairs, Gaps) {
+        let (&Self { trees: [of_a, of_b], motion, part }, alone_a, alone_b) =
+            (self, LaneNodes::alone(a), LaneNodes::alone(b));
+        let (pairs, bounds_a, bounds_b) = match whole {
+            [true, true] => (
+                Pairs { of_a: alone_a, of_b: alone_b, lanes: 1 },
+                alone(simd, &of_a.bounds_of(part, a)),
+                alone(simd, &motion.moved(&of_b.bounds_of(part, b))),
+            ),
+            [true, false] => {
+                let below = of_b.topology().grandchildren(b);
+                let bounds = of_b.bounds_of_grandchildren(simd, part, &below);
+                (
+                    Pairs { of_a: alone_a, of_b: below.nodes, lanes: below.lanes },
+                    alone(simd, &of_a.bounds_of(part, a)),
+                    motion.moved(&bounds),
+                )
+            }
+            [false, true] => {
+                let below = of_a.topology().grandchildren(a);
+                (
+                    Pairs { of_a: below.nodes, of_b: alone_b, lanes: below.lanes },
+                    of_a.bounds_of_grandchildren(simd, part, &below),
+                    alone(simd, &motion.moved(&of_b.bounds_of(part, b))),
+                )
+            }
+            [false, false] => {
+                let (below_a, below_b) = (of_a.topology().children(a), of_b.topology().children(b));
+                let lanes = FAN_LANES[below_a.len() - 1][below_b.len() - 1];
+                let a = of_a.bounds_of_children(simd, part, a);
+                let b = of_b.bounds_of_children(simd, part, b);
+                (
+                    Pairs { of_a: LaneNodes::spread(below_a), of_b: LaneNodes::repeated(below_b), lanes },
+                    each_spread(&a),
+                    all_repeated(&motion.moved(&b)),
+                )
+            }
+        };
+        let mut gaps = motion.gaps(simd, &bounds_a, &bounds_b, limits);
+        gaps.near &= pairs.lanes;
+        (pairs, gaps)
+    }
+}
+
+impl<K: PartialOrd + Copy, V: BoundVisitor<K>> Comparison<V, K> for Bounds<'_> {
+    #[inline(always)]
+    fn trees(&self) -> [&Tree<'_>; 2] {
+        self.trees
+    }
+
+    #[inline(always)]
+    fn scale(&self) -> f32 {
+        self.motion.scale
+    }
+
+    #[inline(always)]
+    fn put_near<S: Simd, F: Frontier<K>>(
+        &self,
+        simd: S,
+        open: Open<K>,
+        whole: [bool; 2],
+        frontier: &mut F,
+        visitor: &mut V,
+    ) -> (u32, Option<Open<K>>) {
+        let (pairs, gaps) = self.split(simd, open.pair, whole, visitor.limits());
+        let compared = pairs.lanes.count_ones();
+        if !visitor.may_split(&open, &pairs, &gaps) {
+            frontier.push(open);
+            return (compared, None);
+        }
+        let (mut near, mut most) = (gaps.near, MostUrgent::new());
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize % LANES;
+            near &= near - 1;
+            let pair = pairs.pair(lane);
+            if let Some(key) = visitor.key(&open, pair, gaps.boxes[lane], gaps.enclosures[lane]) {
+                most.add(Open { pair, key }, frontier);
+            }
+        }
+        (compared, most.finish(simd, frontier))
+    }
+}
+
 /// Some ten roundings of double precision.
 const DOUBLE_ROUNDING: f64 = 2e-15;
 
 /// The motion of b's stored frame into a's.
 #[derive(Debug, Clone)]
 pub(crate) struct Motion {
-    level: Level,
     rotation: [[f32; 3]; 3],
     scale: f32,
     /// Where a place of b lies, less o.
@@ -114,7 +245,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 impl Motion {
     /// That of two views, whose relative pose is `pose`.
     #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
-    pub(crate) fn new(level: Level, [a, b]: [&Placed<'_>; 2], pose: &Pose) -> Self {
+    pub(crate) fn new([a, b]: [&Placed<'_>; 2], pose: &Pose) -> Self {
         let [root_a, root_b] = [a, b].map(|view| view.scan().root_box());
         let [ca, cb] = [root_a, root_b].map(|root| Vector3::from(root.centre.map(f64::from)));
         let turned = pose.scale() * (pose.rotation() * cb);
@@ -134,7 +265,6 @@ impl Motion {
             + DOUBLE_ROUNDING * far / to_world;
         let row = |i: usize| single(pose.rotation().row(i).transpose());
         Self {
-            level,
             rotation: [row(0), row(1), row(2)],
             scale: pose.scale() as f32,
             shift: single(ca - turned),
@@ -144,11 +274,6 @@ impl Motion {
             slack: 2.0 * f64::from(SLACK) * extent + of_doubles,
             to_world,
         }
-    }
-
-    /// The instructions that bounds are computed by: none depends on it.
-    pub(crate) fn level(&self) -> Level {
-        self.level
     }
 
     /// What a bound in a's stored frame proves of a distance in the world.
@@ -199,63 +324,6 @@ impl Motion {
     #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
     pub(crate) fn least(&self) -> f32 {
         (-self.distance as f32).next_down().next_down()
-    }
-
-    /// The pairs that take the place of a pair of nodes, and their gaps.
-    #[inline(always)]
-    pub(crate) fn split(
-        &self,
-        ([of_a, of_b], part): ([&Slices<'_>; 2], Part),
-        pair: NodePair,
-        limits: Limits,
-    ) -> (Pairs, Gaps) {
-        let ([of_a, of_b], NodePair { a, b }) = ([&of_a.tree, &of_b.tree], pair);
-        let leaves = [of_a.topology().is_leaf(a), of_b.topology().is_leaf(b)];
-        let whole = whole([of_a, of_b], pair, leaves, self.scale);
-        let (pairs, mut gaps) = dispatch!(self.level, simd => simd.vectorize(
-            #[inline(always)]
-            || {
-                let (alone_a, alone_b) = (LaneNodes::alone(a), LaneNodes::alone(b));
-                let (pairs, bounds_a, bounds_b) = match whole {
-                    [true, true] => (
-                        Pairs { of_a: alone_a, of_b: alone_b, lanes: 1 },
-                        alone(simd, &of_a.bounds_of(part, a)),
-                        alone(simd, &self.moved(&of_b.bounds_of(part, b))),
-                    ),
-                    [true, false] => {
-                        let below = of_b.topology().grandchildren(b);
-                        let bounds = of_b.bounds_of_grandchildren(simd, part, &below);
-                        (
-                            Pairs { of_a: alone_a, of_b: below.nodes, lanes: below.lanes },
-                            alone(simd, &of_a.bounds_of(part, a)),
-                            self.moved(&bounds),
-                        )
-                    }
-                    [false, true] => {
-                        let below = of_a.topology().grandchildren(a);
-                        (
-                            Pairs { of_a: below.nodes, of_b: alone_b, lanes: below.lanes },
-                            of_a.bounds_of_grandchildren(simd, part, &below),
-                            alone(simd, &self.moved(&of_b.bounds_of(part, b))),
-                        )
-                    }
-                    [false, false] => {
-                        let (below_a, below_b) = (of_a.topology().children(a), of_b.topology().children(b));
-                        let lanes = FAN_LANES[below_a.len() - 1][below_b.len() - 1];
-                        let a = of_a.bounds_of_children(simd, part, a);
-                        let b = of_b.bounds_of_children(simd, part, b);
-                        (
-                            Pairs { of_a: LaneNodes::spread(below_a), of_b: LaneNodes::repeated(below_b), lanes },
-                            each_spread(&a),
-                            all_repeated(&self.moved(&b)),
-                        )
-                    }
-                };
-                (pairs, self.gaps(simd, &bounds_a, &bounds_b, limits))
-            },
-        ));
-        gaps.near &= pairs.lanes;
-        (pairs, gaps)
     }
 
     /// Bounds of b in a's stored frame, their centres less o.
@@ -439,7 +507,7 @@ fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>;
 #[cfg(test)]
 mod tests {
     use nearmiss_geometry::PointCloud;
-    use nearmiss_hierarchy::{BuildOptions, Growth, OrientedBox, PointHierarchy};
+    use nearmiss_hierarchy::{BuildOptions, Growth, OrientedBox, PointHierarchy, whole};
     use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
     use nearmiss_testdata::instructions::levels;
     use rand::RngExt;
@@ -493,11 +561,10 @@ mod tests {
     }
 
     /// The motion by `pose` between scans about their origins that reach as far as 4.
-    fn motion(level: Level, pose: &Pose) -> Motion {
+    fn motion(pose: &Pose) -> Motion {
         let offset = Vector3::from(pose.translation());
         let row = |i: usize| single(pose.rotation().row(i).transpose());
         Motion {
-            level,
             rotation: [row(0), row(1), row(2)],
             scale: single([pose.scale(); 3].into())[0],
             shift: [0.0; 3],
@@ -535,7 +602,7 @@ mod tests {
             let (more_a, more_b) = (growths(), growths());
             let limits = Limits { boxes: 0.1, enclosures: -0.2 };
             let found = levels().into_iter().map(|level| {
-                let motion = motion(level, &pose);
+                let motion = motion(&pose);
                 let gaps = dispatch!(level, simd => {
                     let (a, b) = (four(simd, &a, &more_a), four(simd, &b, &more_b));
                     motion.gaps(simd, &each_spread(&a), &all_repeated(&motion.moved(&b)), limits)
@@ -592,11 +659,15 @@ mod tests {
             };
             let product = |((a, b), (c, d)): ((usize, usize), (usize, usize))| (b - a) * (d - c);
             for level in levels() {
-                let motion = motion(level, &pose);
-                let infinite = Limits { boxes: f32::INFINITY, enclosures: f32::INFINITY };
+                let motion = motion(&pose);
+                let bounds =
+                    Bounds { trees: [&a.tree, &b.tree], motion: &motion, part: Part::Obstacle };
                 let mut open = vec![NodePair::ROOTS];
                 while let Some(pair) = open.pop() {
-                    let (pairs, gaps) = motion.split(([&a, &b], Part::Obstacle), pair, infinite);
+                    let leaves = [a.tree.topology().is_leaf(pair.a), b.tree.topology().is_leaf(pair.b)];
+                    let whole = whole(bounds.trees, pair, leaves, motion.scale);
+                    let (pairs, gaps) =
+                        dispatch!(level, simd => bounds.split(simd, pair, whole, Limits::NONE));
                     assert_eq!(gaps.near, pairs.lanes);
                     let lanes = (0..LANES).filter(|lane| pairs.lanes >> lane & 1 != 0);
                     let below: Vec<_> = lanes.map(|lane| (lane, pairs.pair(lane))).collect();
@@ -606,7 +677,7 @@ mod tests {
                         let own = dispatch!(level, simd => {
                             let a = alone(simd, &a.tree.bounds_of(Part::Obstacle, below.a));
                             let b = motion.moved(&b.tree.bounds_of(Part::Obstacle, below.b));
-                            motion.gaps(simd, &a, &alone(simd, &b), infinite)
+                            motion.gaps(simd, &a, &alone(simd, &b), Limits::NONE)
                         });
                         assert_eq!(own.boxes[0], gaps.boxes[lane], "{below:?}, {level:?}");
                         assert_eq!(own.enclosures[0], gaps.enclosures[lane], "{below:?}, {level:?}");
