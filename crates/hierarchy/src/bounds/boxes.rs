@@ -94,13 +94,15 @@ impl Relative {
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
     pub fn new(pose: &Pose, reach: f64) -> Self {
-        let r = pose.rotation();
-        let rotation = [0, 1, 2].map(|i| [0, 1, 2].map(|j| r[(i, j)] as f32));
+        let (r, [x, y, z]) = (pose.rotation(), pose.translation());
+        let row = |i: usize| [r[(i, 0)] as f32, r[(i, 1)] as f32, r[(i, 2)] as f32];
+        let rotation = [row(0), row(1), row(2)];
         let scale = pose.scale() as f32;
+        let scaled = |i: usize| [rotation[i][0] * scale, rotation[i][1] * scale, rotation[i][2] * scale];
         Self {
-            linear: rotation.map(|row| row.map(|x| x * scale)),
+            linear: [scaled(0), scaled(1), scaled(2)],
             rotation,
-            translation: pose.translation().map(|x| x as f32),
+            translation: [x as f32, y as f32, z as f32],
             scale,
             scale_back: pose.scale().recip() as f32,
             slack: SLACK * reach as f32,
@@ -171,7 +173,8 @@ impl Relative {
     #[must_use]
     pub fn point_back(&self, p: [f32; 3]) -> [f32; 3] {
         let p = sub(p, self.translation);
-        self.direction_back(p).map(|x| x * self.scale_back)
+        let [x, y, z] = self.direction_back(p);
+        [x * self.scale_back, y * self.scale_back, z * self.scale_back]
     }
 
     /// A direction of a's frame in b's.
@@ -179,7 +182,11 @@ impl Relative {
     #[must_use]
     pub fn direction_back(&self, v: [f32; 3]) -> [f32; 3] {
         let [rx, ry, rz] = self.rotation;
-        [0, 1, 2].map(|k| rx[k] * v[0] + ry[k] * v[1] + rz[k] * v[2])
+        [
+            rx[0] * v[0] + ry[0] * v[1] + rz[0] * v[2],
+            rx[1] * v[0] + ry[1] * v[1] + rz[1] * v[2],
+            rx[2] * v[0] + ry[2] * v[1] + rz[2] * v[2],
+        ]
     }
 
     /// Length in b's frame of a unit of a's.

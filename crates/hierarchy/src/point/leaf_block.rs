@@ -81,14 +81,18 @@ impl LeafBlock {
     #[inline]
     #[must_use]
     pub fn position(&self, lane: usize) -> [f32; 3] {
-        [0, 1, 2].map(|k| self.centre[k] + f32::from(self.positions[k][lane]) * self.step)
+        let ([x, y, z], [i, j, k]) = (self.centre, &self.positions);
+        let steps = [f32::from(i[lane]), f32::from(j[lane]), f32::from(k[lane])];
+        [x + steps[0] * self.step, y + steps[1] * self.step, z + steps[2] * self.step]
     }
 
     /// The normal in a lane.
     #[inline]
     #[must_use]
     pub fn normal(&self, lane: usize) -> [f32; 3] {
-        [0, 1, 2].map(|k| f32::from(self.normals[k][lane]) * (1.0 / STEPS))
+        let [x, y, z] = &self.normals;
+        let per_step = 1.0 / STEPS;
+        [f32::from(x[lane]) * per_step, f32::from(y[lane]) * per_step, f32::from(z[lane]) * per_step]
     }
 
     /// The radius of the disc in a lane.

@@ -135,12 +135,15 @@ impl Slices<'_> {
     #[inline(always)]
     #[must_use]
     pub fn obstacle_balls(&self, block: usize) -> [f32; PointBlock::WIDTH] {
+        const WIDTH: usize = PointBlock::WIDTH;
         let points = self.points_of(block);
-        let mut balls = [0.0; PointBlock::WIDTH];
-        if points.end <= self.dense {
-            let known = self.kinds[points.clone()].iter().zip(&self.radii[points]);
-            for (ball, (kind, radius)) in balls.iter_mut().zip(known) {
-                *ball = DENSE_SHARES[usize::from(*kind)] * radius;
+        let (kinds, radii) = (&self.kinds[points.clone()], &self.radii[points.clone()]);
+        let mut balls = [0.0; WIDTH];
+        if let (true, Some(kinds), Some(radii)) =
+            (points.end <= self.dense, kinds.as_array::<WIDTH>(), radii.as_array::<WIDTH>())
+        {
+            for lane in 0..WIDTH {
+                balls[lane] = DENSE_SHARES[usize::from(kinds[lane])] * radii[lane];
             }
         } else {
             for (ball, i) in balls.iter_mut().zip(points) {

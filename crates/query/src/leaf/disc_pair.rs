@@ -56,9 +56,10 @@ impl ScanPair<'_> {
     /// The middle of what the chords of two crossing discs share, in the world.
     pub(crate) fn shared_chord(&self, i: usize, j: usize) -> Contact {
         let [va, vb] = self.views;
-        let [pa, pb] = [va.point(i), vb.point(j)].map(Vector3::from);
-        let na = Vector3::from(va.placed().rotate(self.a.normals[i].map(f64::from)));
-        let nb = Vector3::from(vb.placed().rotate(self.b.normals[j].map(f64::from)));
+        let (pa, pb) = (Vector3::from(va.point(i)), Vector3::from(vb.point(j)));
+        let double = |[x, y, z]: [f32; 3]| [f64::from(x), f64::from(y), f64::from(z)];
+        let na = Vector3::from(va.placed().rotate(double(self.a.normals[i])));
+        let nb = Vector3::from(vb.placed().rotate(double(self.b.normals[j])));
         let middle = 0.5 * (pa + pb);
         let (fa, fb) = (na.dot(&(pa - middle)), nb.dot(&(pb - middle)));
         let c = na.dot(&nb);

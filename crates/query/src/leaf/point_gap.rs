@@ -118,11 +118,17 @@ impl ScanPair<'_> {
         if !(loose_a || loose_b) {
             return None;
         }
+        Some(self.gap_of_loose_leaf(pair, loose_a))
+    }
+
+    /// Apart, so that asking whether a leaf is loose takes no call.
+    #[inline(never)]
+    fn gap_of_loose_leaf(&self, pair: NodePair, of_a: bool) -> f32 {
         let level = self.level;
-        Some(dispatch!(level, simd => simd.vectorize(
+        dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || self.gap_of_points(simd, pair, loose_a),
-        )))
+            || self.gap_of_points(simd, pair, of_a),
+        ))
     }
 
     /// The same of a leaf and an inner node of obstacles; `None` for others.

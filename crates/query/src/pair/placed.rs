@@ -138,7 +138,8 @@ impl<'a> Placed<'a> {
     /// When there is no such point.
     #[must_use]
     pub fn point(&self, i: usize) -> [f64; 3] {
-        self.placed.apply(PointBlock::position_in(self.scan.blocks(), i).map(f64::from))
+        let [x, y, z] = PointBlock::position_in(self.scan.blocks(), i);
+        self.placed.apply([f64::from(x), f64::from(y), f64::from(z)])
     }
 
     /// Returns `true` if f can be evaluated by the metric of the scan: only then its zeros verify what discs
