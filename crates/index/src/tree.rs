@@ -15,6 +15,7 @@ mod heard;
 mod near;
 mod nearest;
 mod skeleton;
+mod walk;
 
 pub use cells::Cells;
 pub use cones::Cones;

@@ -1,7 +1,7 @@
 //! Placed scans, two of them in relative motion, and what a search through them has cost.
 
-pub(crate) mod likelihood;
 pub(crate) mod bounds;
+pub(crate) mod likelihood;
 pub(crate) mod meter;
 pub(crate) mod placed;
 pub(crate) mod prepared;

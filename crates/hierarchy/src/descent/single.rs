@@ -3,20 +3,31 @@
 use std::ops::ControlFlow;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, mask32x4};
+use fearless_simd::{Level, Simd, dispatch, f32x4, mask32x4};
 use nearmiss_geometry::NodeId;
 
 use crate::tree::topology::{FAN, TREE_STACK};
-use crate::tree::wide::{Tree, lanes_of};
+use crate::tree::wide::{Siblings, Tree, lanes_of};
 
 /// What a descent towards a place does with what it finds. Distances are squares in single precision.
 pub trait PlaceVisitor {
+    /// Whether leaves are to come in their order; otherwise the nearest of siblings comes first.
+    const IN_ORDER: bool = false;
+
     /// Boxes further away than this are not looked into.
     fn most_sq(&self) -> f32;
 
-    /// Returns `true` if a box at this distance is to be looked into; asked just before.
+    /// The same for each of four siblings.
     #[inline(always)]
-    fn is_wanted(&mut self, least_sq: f32) -> bool {
+    fn most_sq_of<S: Simd>(&self, simd: S, siblings: &Siblings) -> f32x4<S> {
+        let _ = siblings;
+        f32x4::splat(simd, self.most_sq())
+    }
+
+    /// Returns `true` if a node, whose box is at this distance, is to be looked into; asked just before.
+    #[inline(always)]
+    fn is_wanted(&mut self, node: NodeId, least_sq: f32) -> bool {
+        let _ = node;
         least_sq <= self.most_sq()
     }
 
@@ -25,8 +36,7 @@ pub trait PlaceVisitor {
 }
 
 impl Tree<'_> {
-    /// Visits the leaves whose boxes are near a place, of siblings the nearest first, until `visitor` ends
-    /// it.
+    /// Visits the leaves whose boxes are near a place until `visitor` ends it.
     pub fn descend_to<V: PlaceVisitor>(
         &self,
         level: Level,
@@ -53,7 +63,7 @@ impl Tree<'_> {
         while top > 0 {
             top -= 1;
             let (least, node) = stack[top];
-            if !visitor.is_wanted(least) {
+            if !visitor.is_wanted(node, least) {
                 continue;
             }
             if topology.is_leaf(node) {
@@ -62,9 +72,17 @@ impl Tree<'_> {
             }
             let (siblings, children) = (&self.siblings[node.index()], topology.children(node));
             let (bottom, distances) = (top, siblings.distances_sq(simd, place));
-            let near: mask32x4<S> = distances.simd_le(visitor.most_sq());
-            let (mut left, distances) =
-                (near.to_bitmask() & u64::from(lanes_of(children)), distances.to_array());
+            let near: mask32x4<S> = distances.simd_le(visitor.most_sq_of(simd, siblings));
+            let near = near.to_bitmask() & u64::from(lanes_of(children));
+            if V::IN_ORDER {
+                // The first on top.
+                for lane in (0..children.len()).rev() {
+                    stack[top] = (0.0, children.lanes()[lane]);
+                    top += usize::from(near >> lane & 1 != 0);
+                }
+                continue;
+            }
+            let (mut left, distances) = (near, distances.to_array());
             while left != 0 {
                 let lane = left.trailing_zeros() as usize;
                 left &= left - 1;

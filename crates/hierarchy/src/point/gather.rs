@@ -1,17 +1,19 @@
 //! The points that f(x) needs: those whose horizon reaches x, from the neighbour list of a leaf near x, or by
 //! a descent where no list holds.
 
+use std::ops::ControlFlow;
+
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, f32x4, mask32x4};
+use fearless_simd::{Level, Simd, dispatch, f32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, SurfacePlan};
 
-use crate::tree::topology::TREE_STACK;
-use crate::tree::wide::Tree;
+use crate::descent::PlaceVisitor;
+use crate::tree::wide::{Siblings, Tree};
 
 /// Points of a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
@@ -144,17 +146,9 @@ impl<'a> Index<'a> {
 
     /// A block of the leaf whose box is near `x`: always into the nearest child.
     fn nearest_block(&self, level: Level, x: [f32; 3]) -> usize {
-        let Tree { topology, siblings, .. } = self.tree;
-        let mut id = NodeId::ROOT;
-        while !topology.is_leaf(id) {
-            let distances = dispatch!(level, simd => simd.vectorize(
-                #[inline(always)]
-                || siblings[id.index()].distances_sq(simd, x).to_array(),
-            ));
-            let children = topology.children(id).iter().zip(distances);
-            id = children.reduce(nearer).map_or(id, |(child, _)| child);
-        }
-        topology.points(id).start / PointBlock::WIDTH
+        let mut first = FirstLeaf(0);
+        let _found = self.tree.descend_to(level, x, &mut first);
+        self.tree.topology.points_of_leaf(first.0).start / PointBlock::WIDTH
     }
 
     /// The groups of which a point may be heard within `distance` of `x`, ascending.
@@ -169,37 +163,9 @@ impl<'a> Index<'a> {
     #[inline(always)]
     pub(crate) fn collect_by<S: Simd>(&self, simd: S, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
         found.clear();
-        let Tree { topology, siblings, .. } = self.tree;
-        let mut stack = [NodeId::ROOT; TREE_STACK];
-        let mut top = 1;
-        // Leaves come in order, and many in one group.
-        let mut next = 0;
-        while top > 0 {
-            top -= 1;
-            let id = stack[top];
-            let points = topology.points(id);
-            let (first, end) = (points.start / GROUP, points.end.div_ceil(GROUP));
-            if end <= next {
-                continue;
-            }
-            if topology.is_leaf(id) {
-                found.extend((first.max(next)..end).map(id32));
-                next = end;
-                continue;
-            }
-            let (children, below) = (topology.children(id), &siblings[id.index()]);
-            let [a, b, c, d] = below.reach;
-            let horizon = |reach: f32| self.plan.horizon(reach);
-            let horizons = f32x4::load_array(simd, [horizon(a), horizon(b), horizon(c), horizon(d)]);
-            let far = (horizons + distance) * GROWN;
-            let is_near: mask32x4<S> = below.distances_sq(simd, x).simd_lt(far * far);
-            let near = is_near.to_bitmask();
-            // The first comes next.
-            for lane in (0..children.len()).rev() {
-                stack[top] = children.lanes()[lane];
-                top += usize::from(near >> lane & 1 != 0);
-            }
-        }
+        // Nothing ends it.
+        let mut groups = Groups { tree: &self.tree, plan: self.plan, distance, found, next: 0 };
+        let _whole = self.tree.descend_to_by(simd, x, &mut groups);
     }
 
     /// The blocks of these groups, which ascend, that may be heard within `distance` of `x`: written to the
@@ -245,7 +211,61 @@ impl<'a> Index<'a> {
     }
 }
 
-/// The nearer of two nodes, the first of equals or where one is no number.
-fn nearer(best: (NodeId, f32), other: (NodeId, f32)) -> (NodeId, f32) {
-    if other.1 < best.1 { other } else { best }
+/// The groups of points of which one may be heard within some distance of a place.
+struct Groups<'a> {
+    tree: &'a Tree<'a>,
+    plan: &'a SurfacePlan,
+    distance: f32,
+    found: &'a mut Vec<u32>,
+    /// Groups before this one were found, or hold nothing that is heard.
+    next: usize,
+}
+
+impl PlaceVisitor for Groups<'_> {
+    /// Groups are to ascend, and many leaves stand in one.
+    const IN_ORDER: bool = true;
+
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        f32::INFINITY
+    }
+
+    #[inline(always)]
+    fn most_sq_of<S: Simd>(&self, simd: S, siblings: &Siblings) -> f32x4<S> {
+        let [a, b, c, d] = siblings.reach;
+        let horizon = |reach: f32| self.plan.horizon(reach);
+        let horizons = f32x4::load_array(simd, [horizon(a), horizon(b), horizon(c), horizon(d)]);
+        let far = (horizons + self.distance) * GROWN;
+        far * far
+    }
+
+    #[inline(always)]
+    fn is_wanted(&mut self, node: NodeId, _: f32) -> bool {
+        self.tree.topology.points(node).end.div_ceil(GROUP) > self.next
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
+        let points = self.tree.topology.points_of_leaf(number);
+        let (first, end) = (points.start / GROUP, points.end.div_ceil(GROUP));
+        self.found.extend((first.max(self.next)..end).map(id32));
+        self.next = end;
+        ControlFlow::Continue(())
+    }
+}
+
+/// The leaf that a descent comes to first.
+struct FirstLeaf(usize);
+
+impl PlaceVisitor for FirstLeaf {
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        f32::INFINITY
+    }
+
+    #[inline(always)]
+    fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
+        self.0 = number;
+        ControlFlow::Break(())
+    }
 }

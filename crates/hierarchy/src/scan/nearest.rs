@@ -4,6 +4,7 @@ use std::ops::{ControlFlow, Range};
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
+use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{bits, lanes_of, product, seen_from};
@@ -79,7 +80,7 @@ impl PlaceVisitor for Search<'_> {
     }
 
     #[inline(always)]
-    fn is_wanted(&mut self, least: f32) -> bool {
+    fn is_wanted(&mut self, _: NodeId, least: f32) -> bool {
         /// The square of how many times as far a point may be beyond reach.
         const ROUGHLY: f64 = 1.25 * 1.25;
         // A point within reach is never passed over: one that is further away lets all nodes be looked at

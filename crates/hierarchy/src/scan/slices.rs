@@ -139,8 +139,8 @@ impl Slices<'_> {
         let points = self.points_of(block);
         let (kinds, radii) = (&self.kinds[points.clone()], &self.radii[points.clone()]);
         let mut balls = [0.0; WIDTH];
-        if let (true, Some(kinds), Some(radii)) =
-            (points.end <= self.dense, kinds.as_array::<WIDTH>(), radii.as_array::<WIDTH>())
+        if let (true, Ok(kinds), Ok(radii)) =
+            (points.end <= self.dense, <&[u8; WIDTH]>::try_from(kinds), <&[f32; WIDTH]>::try_from(radii))
         {
             for lane in 0..WIDTH {
                 balls[lane] = DENSE_SHARES[usize::from(kinds[lane])] * radii[lane];

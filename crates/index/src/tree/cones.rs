@@ -1,11 +1,14 @@
 //! What cones over points leave free: the greatest values below theirs that nowhere grow faster than the
 //! cones do.
 
+use std::ops::ControlFlow;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_lanes::wide::{WIDTH, bits, load, squared};
 
-use super::{BlockTree, Bounds, MOST_LEVELS};
+use super::walk::Walker;
+use super::{BlockTree, Bounds};
 
 /// By so much rounding may make a square differ from another, relatively; what is as near as that is
 /// measured.
@@ -54,11 +57,32 @@ fn rows(heights: &[f32]) -> Vec<[f32; WIDTH]> {
 }
 
 /// The points of a block, how low the cones found so far are there, and the highest of these.
-struct Search<S: Simd> {
+struct Search<'a, S: Simd> {
+    cones: &'a Cones<'a>,
+    block: usize,
     about: Bounds,
     points: [f32x16<S>; 3],
     lowest: f32x16<S>,
     limit: f32,
+}
+
+impl<S: Simd> Walker<S> for Search<'_, S> {
+    #[inline(always)]
+    fn wanted(&mut self, simd: S, level: usize, group: usize) -> u32 {
+        let cones = self.cones;
+        let distances = cones.tree.levels[level][group].distances_sq(simd, &self.about);
+        let margins = -(f32x16::load_array_ref(simd, &cones.least[level][group]) - self.limit);
+        bits(cones.is_below(distances, margins))
+    }
+
+    #[inline(always)]
+    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
+        let cones = self.cones;
+        if id != self.block && cones.may_hold(simd, id, self) {
+            cones.offer(simd, id, self);
+        }
+        ControlFlow::Continue(())
+    }
 }
 
 impl Cones<'_> {
@@ -86,34 +110,14 @@ impl Cones<'_> {
         let count = tree.count(block);
         lowest[..count].copy_from_slice(&heights[..count]);
         let (about, points) = (tree.bounds(0, block), load(simd, &tree.blocks[block].position));
-        let mut search =
-            Search { about, points, lowest: f32x16::load_array(simd, lowest), limit: f32::INFINITY };
+        let lowest = f32x16::load_array(simd, lowest);
+        let mut search = Search { cones: self, block, about, points, lowest, limit: f32::INFINITY };
         self.offer(simd, block, &mut search);
-        // Of each level a group, and its boxes still to be looked into.
-        let mut open = [(0_usize, 0_u32); MOST_LEVELS];
-        let top = tree.levels.len();
-        let (mut level, mut id) = (top, 0);
-        loop {
-            if level > 0 {
-                level -= 1;
-                let distances = tree.levels[level][id].distances_sq(simd, &search.about);
-                let margins = -(f32x16::load_array_ref(simd, &self.least[level][id]) - search.limit);
-                open[level] = (id, bits(self.is_below(distances, margins)));
-            } else if id != block && self.may_hold(simd, id, &search) {
-                self.offer(simd, id, &mut search);
-            }
-            while open[level].1 == 0 {
-                level += 1;
-                if level == top {
-                    let mut heights = *heights;
-                    heights[..count].copy_from_slice(&search.lowest.to_array()[..count]);
-                    return heights;
-                }
-            }
-            let (group, near) = &mut open[level];
-            id = *group * WIDTH + near.trailing_zeros() as usize;
-            *near &= *near - 1;
-        }
+        // Nothing ends it.
+        let _whole = tree.walk(simd, &mut search);
+        let mut heights = *heights;
+        heights[..count].copy_from_slice(&search.lowest.to_array()[..count]);
+        heights
     }
 
     /// Whether cones may rise by less than the margins over such squared distances.
@@ -125,7 +129,7 @@ impl Cones<'_> {
 
     /// Whether a cone over a block may be below what is known at one of the points.
     #[inline(always)]
-    fn may_hold<S: Simd>(&self, simd: S, id: usize, search: &Search<S>) -> bool {
+    fn may_hold<S: Simd>(&self, simd: S, id: usize, search: &Search<'_, S>) -> bool {
         let bounds = self.tree.bounds(0, id);
         let margins = search.lowest - self.least[0][id / WIDTH][id % WIDTH];
         bits(self.is_below(bounds.distances_sq(simd, &search.points), margins)) != 0
@@ -133,7 +137,7 @@ impl Cones<'_> {
 
     /// Offers the cones over a block.
     #[inline(always)]
-    fn offer<S: Simd>(&self, simd: S, id: usize, search: &mut Search<S>) {
+    fn offer<S: Simd>(&self, simd: S, id: usize, search: &mut Search<'_, S>) {
         let [x, y, z] = &self.tree.blocks[id].position;
         let [px, py, pz] = search.points;
         for lane in 0..self.tree.count(id) {

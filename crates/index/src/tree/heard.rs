@@ -1,18 +1,19 @@
 //! Which points are heard at those of a block.
 
+use std::ops::ControlFlow;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16};
 use nearmiss_lanes::id32;
 use nearmiss_lanes::wide::{Bits, WIDTH, bits, load};
 
-use super::BlockTree;
+use super::walk::Walker;
+use super::{BlockTree, Bounds};
 
 /// What [`BlockTree::heard`] found. Reused.
 #[derive(Debug, Clone, Default)]
 pub struct Heard {
     lists: [Vec<u32>; WIDTH],
-    nodes: Vec<u32>,
-    children: Vec<u32>,
 }
 
 impl Heard {
@@ -45,37 +46,20 @@ impl BlockTree<'_> {
 
     #[inline(always)]
     fn heard_by<S: Simd>(&self, simd: S, block: usize, found: &mut Heard) {
-        let Heard { lists, nodes, children } = found;
+        let Heard { lists } = found;
         lists.iter_mut().for_each(Vec::clear);
         let own = &self.blocks[block];
-        let points = load(simd, &own.position);
-        let horizons = f32x16::load_array_ref(simd, &own.horizon);
-        let about = self.bounds(0, block);
-        let present = (1 << self.count(block)) - 1;
-        // From the root down, each level ascending, so that points come ascending too.
-        nodes.clear();
-        nodes.push(0);
-        for level in (0..self.levels.len()).rev() {
-            children.clear();
-            for &group in &*nodes {
-                let boxes = &self.levels[level][group as usize];
-                let far = f32x16::load_array_ref(simd, &boxes.horizon) + about.horizon;
-                let near = boxes.distances_sq(simd, &about).simd_lt(far * far);
-                for lane in Bits(bits(near)) {
-                    let bounds = boxes.get(lane);
-                    let far = horizons + bounds.horizon;
-                    let near = bounds.distances_sq(simd, &points).simd_lt(far * far);
-                    let near = bits(near) & present;
-                    let id = group as usize * WIDTH + lane;
-                    if near != 0 && level > 0 {
-                        children.push(id32(id));
-                    } else if near != 0 {
-                        self.listen(simd, block, id, near, lists);
-                    }
-                }
-            }
-            std::mem::swap(nodes, children);
-        }
+        let mut search = Search {
+            tree: self,
+            block,
+            about: self.bounds(0, block),
+            points: load(simd, &own.position),
+            horizons: f32x16::load_array_ref(simd, &own.horizon),
+            present: self.present(block),
+            lists,
+        };
+        // Nothing ends it, and blocks come in their order, so points ascend.
+        let _whole = self.walk(simd, &mut search);
     }
 
     /// Adds the points of block `id` that are heard at points of `block` to the lists of these; `lanes` says
@@ -91,5 +75,49 @@ impl BlockTree<'_> {
             let count = other.heard(simd, place, own.horizon[lane], id32(id * WIDTH), &mut heard);
             lists[lane].extend_from_slice(&heard[..count]);
         }
+    }
+}
+
+/// The points of a block, and who is heard there so far.
+struct Search<'a, S: Simd> {
+    tree: &'a BlockTree<'a>,
+    block: usize,
+    about: Bounds,
+    points: [f32x16<S>; 3],
+    horizons: f32x16<S>,
+    /// The lanes that have points, as bits.
+    present: u32,
+    lists: &'a mut [Vec<u32>; WIDTH],
+}
+
+impl<S: Simd> Search<'_, S> {
+    /// The lanes of the points at which one in a box may be heard, as bits.
+    #[inline(always)]
+    fn lanes_near(&self, simd: S, bounds: &Bounds) -> u32 {
+        let far = self.horizons + bounds.horizon;
+        bits(bounds.distances_sq(simd, &self.points).simd_lt(far * far)) & self.present
+    }
+}
+
+impl<S: Simd> Walker<S> for Search<'_, S> {
+    #[inline(always)]
+    fn wanted(&mut self, simd: S, level: usize, group: usize) -> u32 {
+        let boxes = &self.tree.levels[level][group];
+        let far = f32x16::load_array_ref(simd, &boxes.horizon) + self.about.horizon;
+        let near = bits(boxes.distances_sq(simd, &self.about).simd_lt(far * far));
+        if level == 0 {
+            return near;
+        }
+        let is_near = |&lane: &usize| self.lanes_near(simd, &boxes.get(lane)) != 0;
+        Bits(near).filter(is_near).fold(0, |lanes, lane| lanes | 1 << lane)
+    }
+
+    #[inline(always)]
+    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
+        let lanes = self.lanes_near(simd, &self.tree.bounds(0, id));
+        if lanes != 0 {
+            self.tree.listen(simd, self.block, id, lanes, self.lists);
+        }
+        ControlFlow::Continue(())
     }
 }

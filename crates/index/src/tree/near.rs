@@ -5,16 +5,15 @@
 //! measured again in double precision. So the answers are those of [`Skeleton::distance_sq`] for every point,
 //! whatever the instructions.
 
+use std::ops::ControlFlow;
+
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Simd, dispatch, mask32x16};
-use nearmiss_lanes::id32;
+use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_lanes::wide::{Bits, WIDTH, bits, load};
 
 use super::skeleton::{Block, Lanes, Place, Skeleton, Stretch, single};
-use super::{BlockTree, MOST_LEVELS};
-
-/// Room for a descent that keeps all siblings.
-const STACK: usize = MOST_LEVELS * WIDTH;
+use super::walk::{NearWalker, Stack, Walker};
+use super::{BlockTree, Boxes};
 
 /// Squares that are less may have lost digits.
 const LEAST_SURE: f32 = 1e-30;
@@ -75,29 +74,8 @@ impl BlockTree<'_> {
 
     #[inline(always)]
     fn any_by<S: Simd>(&self, simd: S, lanes: impl Lanes, skeleton: &Skeleton, radius: f64) -> bool {
-        let (sure, most) = limits(skeleton, radius);
-        // Of each level a group, and its boxes still to be looked into.
-        let mut open = [(0_usize, 0_u32); MOST_LEVELS];
-        let top = self.levels.len();
-        let (mut level, mut id) = (top, 0);
-        loop {
-            if level > 0 {
-                level -= 1;
-                let near: mask32x16<S> = lanes.of_boxes(simd, &self.levels[level][id]).simd_le(most);
-                open[level] = (id, bits(near) & self.filled(level, id));
-            } else if self.is_within(simd, lanes, id, (sure, most), (skeleton, radius)) {
-                return true;
-            }
-            while open[level].1 == 0 {
-                level += 1;
-                if level == top {
-                    return false;
-                }
-            }
-            let (group, near) = &mut open[level];
-            id = *group * WIDTH + near.trailing_zeros() as usize;
-            *near &= *near - 1;
-        }
+        let mut any = Any { tree: self, lanes, limits: limits(skeleton, radius), ball: (skeleton, radius) };
+        self.walk(simd, &mut any).is_break()
     }
 
     /// Whether a point of a block is within `radius`: surely if its squared distance is at most `sure`,
@@ -158,61 +136,17 @@ impl BlockTree<'_> {
         skeleton: &Skeleton,
         reach: f64,
     ) -> Option<(usize, f64)> {
-        let slack = skeleton.slack();
-        let limit = |distance_sq: f64| square(distance_sq.sqrt() * (1.0 + RELATIVE) + slack);
-        let mut best = (reach * reach, usize::MAX);
-        let mut most = limit(best.0);
-        let mut stack = [(0.0_f32, 0_u32, 0_u32); STACK];
-        stack[0] = (0.0, id32(self.levels.len()), 0);
-        let mut top = 1;
-        while top > 0 {
-            top -= 1;
-            let (least, above, id) = stack[top];
-            let id = id as usize;
-            if least > most {
-                continue;
-            }
-            if above == 0 {
-                let distances = lanes.of_points(simd, load(simd, &self.blocks[id].position));
-                let near: mask32x16<S> = distances.simd_le(most);
-                for lane in Bits(bits(near) & self.present(id)) {
-                    let own = (skeleton.distance_sq(self.place(id, lane)), id * WIDTH + lane);
-                    if own < best {
-                        best = own;
-                        most = limit(best.0);
-                    }
-                }
-                continue;
-            }
-            let below = above as usize - 1;
-            let distances = lanes.of_boxes(simd, &self.levels[below][id]);
-            let near: mask32x16<S> = distances.simd_le(most);
-            let distances = distances.to_array();
-            let first = top;
-            for lane in Bits(bits(near) & self.filled(below, id)) {
-                let child = id * WIDTH + lane;
-                // The nearest on top.
-                let mut place = top;
-                while place > first && stack[place - 1].0 < distances[lane] {
-                    stack[place] = stack[place - 1];
-                    place -= 1;
-                }
-                stack[place] = (distances[lane], id32(below), id32(child));
-                top += 1;
-            }
-        }
-        (best.1 < usize::MAX).then_some((best.1, best.0))
-    }
-
-    /// The lanes of a group that have boxes, as bits.
-    #[inline(always)]
-    fn filled(&self, level: usize, group: usize) -> u32 {
-        (1 << (self.nodes(level) - group * WIDTH).min(WIDTH)) - 1
+        let best = (reach * reach, usize::MAX);
+        let mut search = NearestTo { tree: self, lanes, skeleton, best, most: 0.0 };
+        search.most = search.limit();
+        self.walk_near(simd, (self.levels.len() - 1, 0, u32::MAX), &mut Stack::new(), &mut search);
+        let (distance_sq, point) = search.best;
+        (point < usize::MAX).then_some((point, distance_sq))
     }
 
     /// The lanes of a block that have points, as bits.
     #[inline(always)]
-    fn present(&self, block: usize) -> u32 {
+    pub(super) fn present(&self, block: usize) -> u32 {
         (1 << self.count(block)) - 1
     }
 
@@ -220,6 +154,73 @@ impl BlockTree<'_> {
     fn place(&self, block: usize, lane: usize) -> [f64; 3] {
         let [x, y, z] = &self.blocks[block].position;
         [f64::from(x[lane]), f64::from(y[lane]), f64::from(z[lane])]
+    }
+}
+
+/// The search for any point within a radius of a skeleton.
+struct Any<'a, L> {
+    tree: &'a BlockTree<'a>,
+    lanes: L,
+    limits: (f32, f32),
+    ball: (&'a Skeleton, f64),
+}
+
+impl<S: Simd, L: Lanes> Walker<S> for Any<'_, L> {
+    #[inline(always)]
+    fn wanted(&mut self, simd: S, level: usize, group: usize) -> u32 {
+        let boxes = &self.tree.levels[level][group];
+        let near: mask32x16<S> = self.lanes.of_boxes(simd, boxes).simd_le(self.limits.1);
+        bits(near)
+    }
+
+    #[inline(always)]
+    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()> {
+        let is_within = self.tree.is_within(simd, self.lanes, id, self.limits, self.ball);
+        if is_within { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// The search for the point nearest to a skeleton.
+struct NearestTo<'a, L> {
+    tree: &'a BlockTree<'a>,
+    lanes: L,
+    skeleton: &'a Skeleton,
+    /// The square of its distance, and which it is.
+    best: (f64, usize),
+    /// What is nearer has no greater square in single precision.
+    most: f32,
+}
+
+impl<L> NearestTo<'_, L> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        square(self.best.0.sqrt() * (1.0 + RELATIVE) + self.skeleton.slack())
+    }
+}
+
+impl<S: Simd, L: Lanes> NearWalker<S> for NearestTo<'_, L> {
+    #[inline(always)]
+    fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S> {
+        self.lanes.of_boxes(simd, boxes)
+    }
+
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.most
+    }
+
+    #[inline(always)]
+    fn block(&mut self, simd: S, id: usize) {
+        let tree = self.tree;
+        let distances = self.lanes.of_points(simd, load(simd, &tree.blocks[id].position));
+        let near: mask32x16<S> = distances.simd_le(self.most);
+        for lane in Bits(bits(near) & tree.present(id)) {
+            let own = (self.skeleton.distance_sq(tree.place(id, lane)), id * WIDTH + lane);
+            if own < self.best {
+                self.best = own;
+                self.most = self.limit();
+            }
+        }
     }
 }
 

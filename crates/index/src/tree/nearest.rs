@@ -3,9 +3,10 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, f64x8, mask32x16, u32x16};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::wide::{Bits, WIDTH, bits, load, squared};
+use nearmiss_lanes::wide::{WIDTH, bits, load, squared};
 
-use super::{BlockTree, Bounds};
+use super::walk::{NearWalker, Stack};
+use super::{BlockTree, Bounds, Boxes};
 use crate::block::PointBlock;
 
 /// Half a register's worth of keys each.
@@ -27,14 +28,6 @@ pub struct Neighbour {
     pub distance_sq: f32,
 }
 
-/// A node to look into, with its squared distance.
-#[derive(Debug, Clone, Copy)]
-struct Open {
-    distance_sq: f32,
-    level: u32,
-    id: u32,
-}
-
 /// What [`BlockTree::nearest`] found. Reused.
 ///
 /// Distance and id of a neighbour are kept as one double: its upper half has the bits of the squared
@@ -44,7 +37,6 @@ struct Open {
 pub struct Nearest {
     /// A rank each, of all lanes.
     keys: Vec<[[f64; HALF]; 2]>,
-    open: Vec<Open>,
 }
 
 impl Nearest {
@@ -76,7 +68,10 @@ fn neighbour(key: f64) -> Option<Neighbour> {
 }
 
 /// The points of a block, and how near those found so far are.
-struct Search<S: Simd> {
+struct Search<'a, S: Simd> {
+    tree: &'a BlockTree<'a>,
+    /// As [`Nearest`] keeps them.
+    keys: &'a mut [[[f64; HALF]; 2]],
     about: Bounds,
     points: [f32x16<S>; 3],
     present: mask32x16<S>,
@@ -99,7 +94,6 @@ impl BlockTree<'_> {
     pub fn nearest(&self, level: Level, block: usize, count: usize, found: &mut Nearest) {
         found.keys.clear();
         found.keys.resize(count, [[NONE; HALF]; 2]);
-        found.open.clear();
         if count > 0 {
             dispatch!(level, simd => simd.vectorize(
                 #[inline(always)]
@@ -110,89 +104,65 @@ impl BlockTree<'_> {
 
     #[inline(always)]
     fn nearest_by<S: Simd>(&self, simd: S, block: usize, found: &mut Nearest) {
-        let Nearest { keys, open } = found;
         #[expect(clippy::cast_precision_loss, reason = "at most 16")]
         let present = f32x16::load_array_ref(simd, &ORDINALS).simd_lt(self.count(block) as f32);
         let (never, any) = (f32x16::simd_from(simd, -1.0), f32x16::simd_from(simd, f32::INFINITY));
         let mut search = Search {
+            tree: self,
+            keys: &mut found.keys,
             about: self.bounds(0, block),
             points: load(simd, &self.blocks[block].position),
             present,
             last: simd.select_f32x16(present, any, never),
             limit: f32::INFINITY,
         };
-        self.offer(simd, block, true, &mut search, keys);
+        search.offer(simd, block, true);
         // From the block up, what lies beside it first: so the limit is low before anything far is looked
         // into.
-        let mut below = block;
+        let (mut below, mut stack) = (block, Stack::new());
         for level in 0..self.levels.len() {
             let group = below / WIDTH;
             let siblings = !(1 << (below % WIDTH));
-            self.open(simd, (level, group), siblings, &search, open);
-            while let Some(Open { distance_sq, level, id }) = open.pop() {
-                let (level, id) = (level as usize, id as usize);
-                if distance_sq > search.limit {
-                    continue;
-                }
-                let bounds = self.bounds(level, id);
-                if bits(bounds.distances_sq(simd, &search.points).simd_le(search.last)) == 0 {
-                    continue;
-                }
-                if level == 0 {
-                    self.offer(simd, id, false, &mut search, keys);
-                } else {
-                    self.open(simd, (level - 1, id), u32::MAX, &search, open);
-                }
-            }
+            self.walk_near(simd, (level, group, siblings), &mut stack, &mut search);
             below = group;
         }
     }
+}
 
-    /// Puts those of `lanes` of a group on the stack that are not beyond the limit, the nearest last.
+impl<S: Simd> NearWalker<S> for Search<'_, S> {
     #[inline(always)]
-    fn open<S: Simd>(
-        &self,
-        simd: S,
-        (level, group): (usize, usize),
-        lanes: u32,
-        search: &Search<S>,
-        open: &mut Vec<Open>,
-    ) {
-        let distances = self.levels[level][group].distances_sq(simd, &search.about);
-        let count = (self.nodes(level) - group * WIDTH).min(WIDTH);
-        let near = bits(distances.simd_le(search.limit)) & lanes & ((1 << count) - 1);
-        let distances = distances.to_array();
-        let first = open.len();
-        for lane in Bits(near) {
-            let node =
-                Open { distance_sq: distances[lane], level: id32(level), id: id32(group * WIDTH + lane) };
-            // By insertion: they are few.
-            let mut place = open.len();
-            open.push(node);
-            while place > first && open[place - 1].distance_sq < node.distance_sq {
-                open[place] = open[place - 1];
-                place -= 1;
-            }
-            open[place] = node;
-        }
+    fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S> {
+        boxes.distances_sq(simd, &self.about)
     }
 
+    #[inline(always)]
+    fn most_sq(&self) -> f32 {
+        self.limit
+    }
+
+    #[inline(always)]
+    fn is_wanted(&mut self, simd: S, level: usize, id: usize) -> bool {
+        let bounds = self.tree.bounds(level, id);
+        bits(bounds.distances_sq(simd, &self.points).simd_le(self.last)) != 0
+    }
+
+    #[inline(always)]
+    fn block(&mut self, simd: S, id: usize) {
+        self.offer(simd, id, false);
+    }
+}
+
+impl<S: Simd> Search<'_, S> {
     /// Offers the points of block `id`, which is the points' `own` or another, to the lists.
     #[inline(always)]
-    fn offer<S: Simd>(
-        &self,
-        simd: S,
-        id: usize,
-        own: bool,
-        search: &mut Search<S>,
-        keys: &mut [[[f64; HALF]; 2]],
-    ) {
-        let PointBlock { position: [x, y, z], .. } = &self.blocks[id];
-        let [px, py, pz] = search.points;
+    fn offer(&mut self, simd: S, id: usize, own: bool) {
+        let tree = self.tree;
+        let PointBlock { position: [x, y, z], .. } = &tree.blocks[id];
+        let [px, py, pz] = self.points;
         let mut improved = false;
-        for lane in 0..self.count(id) {
+        for lane in 0..tree.count(id) {
             let d_sq = squared([px - x[lane], py - y[lane], pz - z[lane]]);
-            if !d_sq.simd_le(search.last).any_true() {
+            if !d_sq.simd_le(self.last).any_true() {
                 continue;
             }
             improved = true;
@@ -208,7 +178,7 @@ impl BlockTree<'_> {
             let mut low: f64x8<S> = ids.zip_low(distances).bitcast();
             let mut high: f64x8<S> = ids.zip_high(distances).bitcast();
             let mut greatest = (low, high);
-            for [a, b] in &mut *keys {
+            for [a, b] in &mut *self.keys {
                 let (here, there) = (f64x8::load_array_ref(simd, a), f64x8::load_array_ref(simd, b));
                 greatest = (here.min(low), there.min(high));
                 (low, high) = (here.max(low), there.max(high));
@@ -216,10 +186,10 @@ impl BlockTree<'_> {
             }
             let (low, high): (u32x16<S>, u32x16<S>) = (greatest.0.bitcast(), greatest.1.bitcast());
             let last: f32x16<S> = low.unzip_high(high).bitcast();
-            search.last = simd.select_f32x16(search.present, last, search.last);
+            self.last = simd.select_f32x16(self.present, last, self.last);
         }
         if improved {
-            search.limit = search.last.to_array().into_iter().fold(0.0, f32::max);
+            self.limit = self.last.to_array().into_iter().fold(0.0, f32::max);
         }
     }
 }

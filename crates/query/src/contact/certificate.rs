@@ -367,9 +367,8 @@ impl BoundVisitor<f32> for Tightening<'_, '_, '_> {
     fn may_split(&mut self, above: &Open, pairs: &Pairs, gaps: &Gaps) -> bool {
         let Proving { motion, pair, .. } = &*self.proving;
         let slack = pair.relative.slack();
-        let shows_less = |lane: usize| {
-            gaps.near >> lane & 1 != 0 && motion.gap(gaps.enclosures[lane], slack) <= above.key
-        };
+        let shows_less =
+            |lane: usize| gaps.near >> lane & 1 != 0 && motion.gap(gaps.enclosures[lane], slack) <= above.key;
         self.last = Some(*above);
         self.is_over = (0..LANES).any(shows_less);
         self.proving.is_cut |= !self.is_over && gaps.near != pairs.lanes;

@@ -13,9 +13,9 @@ use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, Topology, descend, resume};
 
 use crate::ask::options::CollideOptions;
-use crate::pair::bounds::Motion;
 use crate::contact::certificate::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::contact::search::{Closer, Surfaces};
+use crate::pair::bounds::Motion;
 use crate::pair::scan_pair::ScanPair;
 
 /// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they

@@ -94,7 +94,11 @@ impl hierarchy::Frontier<Nearness> for Frontier {
 
     #[inline]
     fn push_last(&mut self, open: Open) -> Option<Open> {
-        if self.dives { self.stack.push(open) } else { self.push(open) }
+        if self.dives {
+            self.stack.push(open)
+        } else {
+            self.push(open)
+        }
         None
     }
 }
@@ -169,7 +173,9 @@ impl<'a> Search<'a> {
         self.best = nearest(self.pair.level, &self.pair, leaves, self.best);
         let upper = self.best.distance.max(0.0);
         self.points = self.motion.beyond(self.motion.bound_of(upper));
-        if self.of_enclosures && let Some(share) = self.share {
+        if self.of_enclosures
+            && let Some(share) = self.share
+        {
             let enough = self.motion.beyond(self.motion.bound_of(upper * share));
             self.enclosures = self.enclosures.min(enough);
         }
@@ -227,7 +233,8 @@ impl BoundVisitor<Nearness> for Search<'_> {
     fn key(&mut self, above: &Open, pair: NodePair, boxes: f32, enclosures: f32) -> Option<Nearness> {
         let enclosures = if self.of_enclosures { enclosures } else { boxes };
         // What is in its parents is no nearer than they are.
-        let (mut enclosures, mut boxes) = (enclosures.max(above.key.enclosures()), boxes.max(above.key.boxes()));
+        let (mut enclosures, mut boxes) =
+            (enclosures.max(above.key.enclosures()), boxes.max(above.key.boxes()));
         let [is_leaf_a, is_leaf_b] = self.pair.which_are_leaves(pair);
         if is_leaf_a != is_leaf_b {
             // The points of a loose leaf say more than its box, also of points.

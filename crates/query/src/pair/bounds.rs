@@ -660,8 +660,7 @@ mod tests {
             let product = |((a, b), (c, d)): ((usize, usize), (usize, usize))| (b - a) * (d - c);
             for level in levels() {
                 let motion = motion(&pose);
-                let bounds =
-                    Bounds { trees: [&a.tree, &b.tree], motion: &motion, part: Part::Obstacle };
+                let bounds = Bounds { trees: [&a.tree, &b.tree], motion: &motion, part: Part::Obstacle };
                 let mut open = vec![NodePair::ROOTS];
                 while let Some(pair) = open.pop() {
                     let leaves = [a.tree.topology().is_leaf(pair.a), b.tree.topology().is_leaf(pair.b)];

@@ -1,0 +1,136 @@
+//! The two walks through a tree: in the order of the points, and the nearest first.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::wide::{Bits, WIDTH, bits};
+
+use super::{BlockTree, Boxes, MOST_LEVELS};
+
+/// What a walk in the order of the points does with what it finds.
+pub(super) trait Walker<S: Simd> {
+    /// The boxes of a group of a level that are to be looked into, as bits. Lanes without a box do not count.
+    fn wanted(&mut self, simd: S, level: usize, group: usize) -> u32;
+
+    /// A block that was wanted; may end the walk.
+    fn block(&mut self, simd: S, id: usize) -> ControlFlow<()>;
+}
+
+/// What a walk that takes the nearest boxes first does with what it finds. Distances are squares.
+pub(super) trait NearWalker<S: Simd> {
+    /// How far the boxes of a group are.
+    fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S>;
+
+    /// Boxes further away than this are not looked into.
+    fn most_sq(&self) -> f32;
+
+    /// Returns `true` if node `id` of a level is to be looked into; asked just before.
+    fn is_wanted(&mut self, simd: S, level: usize, id: usize) -> bool {
+        let _ = (simd, level, id);
+        true
+    }
+
+    /// A block that was wanted.
+    fn block(&mut self, simd: S, id: usize);
+}
+
+/// A node to look into.
+#[derive(Debug, Clone, Copy)]
+struct Open {
+    distance_sq: f32,
+    level: u32,
+    id: u32,
+}
+
+/// The nodes that a walk keeps while it takes the nearest first.
+#[derive(Debug)]
+pub(super) struct Stack([Open; MOST_LEVELS * WIDTH]);
+
+impl Stack {
+    #[inline(always)]
+    pub(super) const fn new() -> Self {
+        Self([Open { distance_sq: 0.0, level: 0, id: 0 }; MOST_LEVELS * WIDTH])
+    }
+}
+
+impl BlockTree<'_> {
+    /// Visits the wanted blocks in their order, until the walker ends it.
+    #[inline(always)]
+    pub(super) fn walk<S: Simd>(&self, simd: S, walker: &mut impl Walker<S>) -> ControlFlow<()> {
+        // Of each level a group, and its boxes still to be looked into.
+        let mut open = [(0_usize, 0_u32); MOST_LEVELS];
+        let top = self.levels.len();
+        let (mut level, mut id) = (top, 0);
+        loop {
+            if level > 0 {
+                level -= 1;
+                open[level] = (id, walker.wanted(simd, level, id) & self.filled(level, id));
+            } else {
+                walker.block(simd, id)?;
+            }
+            while open[level].1 == 0 {
+                level += 1;
+                if level == top {
+                    return ControlFlow::Continue(());
+                }
+            }
+            let (group, near) = &mut open[level];
+            id = *group * WIDTH + near.trailing_zeros() as usize;
+            *near &= *near - 1;
+        }
+    }
+
+    /// Visits the blocks under these lanes of a group of a level, of boxes side by side the nearest first.
+    #[inline(always)]
+    pub(super) fn walk_near<S: Simd>(
+        &self,
+        simd: S,
+        (level, group, lanes): (usize, usize, u32),
+        Stack(stack): &mut Stack,
+        walker: &mut impl NearWalker<S>,
+    ) {
+        let mut top = 0;
+        let mut next = Some((level, group, lanes));
+        loop {
+            if let Some((level, group, lanes)) = next.take() {
+                let distances = walker.distances_sq(simd, &self.levels[level][group]);
+                let near: mask32x16<S> = distances.simd_le(walker.most_sq());
+                let distances = distances.to_array();
+                let first = top;
+                for lane in Bits(bits(near) & lanes & self.filled(level, group)) {
+                    let distance_sq = distances[lane];
+                    // By insertion, the nearest on top: they are few.
+                    let mut place = top;
+                    while place > first && stack[place - 1].distance_sq < distance_sq {
+                        stack[place] = stack[place - 1];
+                        place -= 1;
+                    }
+                    stack[place] = Open { distance_sq, level: id32(level), id: id32(group * WIDTH + lane) };
+                    top += 1;
+                }
+            }
+            if top == 0 {
+                return;
+            }
+            top -= 1;
+            let Open { distance_sq, level, id } = stack[top];
+            let (level, id) = (level as usize, id as usize);
+            if distance_sq > walker.most_sq() || !walker.is_wanted(simd, level, id) {
+                continue;
+            }
+            if level == 0 {
+                walker.block(simd, id);
+            } else {
+                next = Some((level - 1, id, u32::MAX));
+            }
+        }
+    }
+
+    /// The lanes of a group that have boxes, as bits.
+    #[inline(always)]
+    fn filled(&self, level: usize, group: usize) -> u32 {
+        (1 << (self.nodes(level) - group * WIDTH).min(WIDTH)) - 1
+    }
+}
