@@ -3,6 +3,7 @@
 pub(crate) mod bounds;
 pub(crate) mod likelihood;
 pub(crate) mod meter;
+pub(crate) mod motion;
 pub(crate) mod placed;
 pub(crate) mod prepared;
 pub(crate) mod scan_pair;

@@ -13,7 +13,8 @@ use std::ops::ControlFlow;
 use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::{Frontier, Heap, NodePair, Open, PairVisitor, Stack, resume};
 
-use crate::pair::bounds::{BoundVisitor, Gaps, LANES, Limits, Motion, Pairs};
+use crate::pair::bounds::{BoundVisitor, Pairs};
+use crate::pair::motion::{Gaps, LANES, Limits, Motion};
 use crate::pair::scan_pair::{ScanPair, balls_apart};
 
 /// A proof that two scans are apart: pairs of nodes with disjoint enclosures, which together cover the pair

@@ -15,7 +15,7 @@ use nearmiss_hierarchy::{Ball, Frontier, NodePair, Open, Stack, Topology, descen
 use crate::ask::options::CollideOptions;
 use crate::contact::certificate::{Bound, Certifier, ProofScratch, are_doubtful};
 use crate::contact::search::{Closer, Surfaces};
-use crate::pair::bounds::Motion;
+use crate::pair::motion::Motion;
 use crate::pair::scan_pair::ScanPair;
 
 /// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they

@@ -9,7 +9,8 @@ use nearmiss_hierarchy::{self as hierarchy, NodePair, PairVisitor, Part, resume}
 use nearmiss_lanes::order::{ascending, from_ascending};
 
 use crate::leaf::nearest_points::{PointPair, nearest};
-use crate::pair::bounds::{BoundVisitor, Limits, Motion};
+use crate::pair::bounds::BoundVisitor;
+use crate::pair::motion::{Limits, Motion};
 use crate::pair::scan_pair::ScanPair;
 
 type Open = hierarchy::Open<Nearness>;

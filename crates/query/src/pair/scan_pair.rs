@@ -6,8 +6,9 @@ use nearmiss_geometry::{NodeId, Pose};
 use nearmiss_hierarchy::{Ball, NodePair, Part, Relative, SLACK, Slices, TreePair};
 
 use crate::ask::options::{CollidePlan, Semantics};
-use crate::pair::bounds::{Bounds, Motion};
+use crate::pair::bounds::Bounds;
 use crate::pair::meter::Meter;
+use crate::pair::motion::Motion;
 use crate::pair::placed::Placed;
 
 /// Two views, their arrays, the motion between them, and what the search has cost.

@@ -1,0 +1,450 @@
+//! How far oriented boxes in relative motion are apart at least, sixteen pairs at a time.
+//!
+//! Along the face normals alone boxes may come out two thirds nearer than they are: enough to tell whether
+//! they touch, too little to tell how far off they are. So a box's centre is projected onto the other box and
+//! back (Cheney & Goldstein, "Proximity maps for convex sets", Proc. AMS 10, 1959), and both are measured
+//! along the line between the two feet. Any line gives a lower bound; that between the nearest places gives
+//! the distance.
+//!
+//! Single precision cannot tell the near parts of scans from their far ones where these are a million times
+//! as far from each other as they are large. So the vector o between the centres of the two scans stays in
+//! double precision, and what is computed here is by how much a pair of boxes is nearer or further than |o|:
+//! along a unit vector u, u·o = |o| (1 − |u − o/|o||² / 2), of which the second part is small where |o| is
+//! great. Rounding is then a share of the scans' sizes, not of their distance.
+
+use std::ops::{Add, Mul};
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, mask32x16};
+use nearmiss_geometry::Pose;
+use nearmiss_geometry::nalgebra::{Matrix3, Vector3};
+use nearmiss_hierarchy::{NodeBounds, SLACK};
+use nearmiss_lanes::wide::{bits, product};
+
+use crate::pair::placed::Placed;
+
+/// Projections back and forth: after one of them the descent visits 0.5 % more pairs than with exact
+/// distances.
+const ROUNDS: u32 = 1;
+
+/// So many pairs of nodes are compared at once.
+pub(crate) const LANES: usize = 16;
+
+/// How far the nodes of [`Pairs`] are apart: by how much further, at least, than the centres of the scans, in
+/// a's stored frame; [`Motion::least`] where they may overlap, or are no numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Gaps {
+    pub(crate) boxes: [f32; LANES],
+    pub(crate) enclosures: [f32; LANES],
+    /// The lanes of pairs that are nearer than either limit, as bits.
+    pub(crate) near: u32,
+}
+
+/// How near nodes are to be.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    pub(crate) boxes: f32,
+    pub(crate) enclosures: f32,
+}
+
+impl Limits {
+    /// All are near enough.
+    pub(crate) const NONE: Self = Self { boxes: f32::INFINITY, enclosures: f32::INFINITY };
+}
+
+/// Some ten roundings of double precision.
+const DOUBLE_ROUNDING: f64 = 2e-15;
+
+/// The motion of b's stored frame into a's.
+#[derive(Debug, Clone)]
+pub(crate) struct Motion {
+    rotation: [[f32; 3]; 3],
+    pub(crate) scale: f32,
+    /// Where a place of b lies, less o.
+    shift: [f32; 3],
+    /// From the centre of a to that of b.
+    offset: [f32; 3],
+    direction: [f32; 3],
+    distance: f64,
+    /// What rounding may add to a bound, in a's stored frame.
+    slack: f64,
+    /// Length in the world of a unit of that.
+    to_world: f64,
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
+fn single(v: Vector3<f64>) -> [f32; 3] {
+    v.map(|c| c as f32).into()
+}
+
+impl Motion {
+    /// That of two views, whose relative pose is `pose`.
+    #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
+    pub(crate) fn new([a, b]: [&Placed<'_>; 2], pose: &Pose) -> Self {
+        let [root_a, root_b] = [a, b].map(|view| view.scan().root_box());
+        let [ca, cb] = [root_a, root_b].map(|root| Vector3::from(root.centre.map(f64::from)));
+        let turned = pose.scale() * (pose.rotation() * cb);
+        let offset = turned + Vector3::from(pose.translation()) - ca;
+        let distance = offset.norm();
+        let extent =
+            ca.norm() + f64::from(root_a.radius()) + pose.scale() * (cb.norm() + f64::from(root_b.radius()));
+        let to_world = a.placed().scale();
+        // Places are told in the world, where both scans may be far from the origin, and rotations are such
+        // to rounding only.
+        let far: f64 = [a, b].map(|view| Vector3::from(view.placed().translation()).norm()).iter().sum();
+        let skew = [a, b].map(|view| {
+            let rotation = view.placed().rotation();
+            (rotation.tr_mul(rotation) - Matrix3::identity()).amax()
+        });
+        let of_doubles = (DOUBLE_ROUNDING + 4.0 * skew[0].max(skew[1])) * (extent + distance)
+            + DOUBLE_ROUNDING * far / to_world;
+        let row = |i: usize| single(pose.rotation().row(i).transpose());
+        Self {
+            rotation: [row(0), row(1), row(2)],
+            scale: pose.scale() as f32,
+            shift: single(ca - turned),
+            offset: single(offset),
+            direction: single(offset / if distance > 0.0 { distance } else { 1.0 }),
+            distance,
+            slack: 2.0 * f64::from(SLACK) * extent + of_doubles,
+            to_world,
+        }
+    }
+
+    /// What a bound in a's stored frame proves of a distance in the world.
+    pub(crate) fn proven(&self, bound: f64) -> f64 {
+        ((bound - self.slack) * self.to_world * (1.0 - 4.0 * DOUBLE_ROUNDING)).max(0.0)
+    }
+
+    /// A bound in a's stored frame such that nothing is nearer than `distance` in the world to which a
+    /// greater one belongs.
+    pub(crate) fn bound_of(&self, distance: f64) -> f64 {
+        distance / self.to_world * (1.0 + 4.0 * DOUBLE_ROUNDING) + self.slack
+    }
+
+    /// The bound, in a's stored frame, of what is so much further away than the centres of the scans are. Not
+    /// negative.
+    pub(crate) fn bound(&self, beyond: f32) -> f64 {
+        let own = self.distance + f64::from(beyond);
+        if own > 0.0 { own } else { 0.0 }
+    }
+
+    /// So much further away than the centres of the scans is what has this [`Self::bound`], or a little more.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+    pub(crate) fn beyond(&self, bound: f64) -> f32 {
+        ((bound - self.distance) as f32).next_up().next_up()
+    }
+
+    /// The gap, in a's stored frame, of what is so much further away than the centres of the scans are: what
+    /// the world sees of it is at least this less `slack`.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn gap(&self, beyond: f32, slack: f32) -> f32 {
+        ((self.distance + f64::from(beyond) - self.slack + f64::from(slack)) as f32).next_down()
+    }
+
+    /// So much further away than the centres of the scans is what has this [`Self::gap`], or a little more.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
+    pub(crate) fn beyond_gap(&self, gap: f32, slack: f32) -> f32 {
+        ((f64::from(gap) + self.slack - f64::from(slack) - self.distance) as f32).next_up().next_up()
+    }
+
+    /// So much further away than the centres of the scans, or a little less, is what is no nearer than this
+    /// `bound`.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn no_nearer(&self, bound: f64) -> f32 {
+        ((bound - self.distance) as f32).next_down().next_down().max(self.least())
+    }
+
+    /// The least that nodes are [apart](Self::gaps): its bound is 0.
+    #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
+    pub(crate) fn least(&self) -> f32 {
+        (-self.distance as f32).next_down().next_down()
+    }
+
+    /// Bounds of b in a's stored frame, their centres less o.
+    #[inline(always)]
+    pub(crate) fn moved<V: Copy + Add<Output = V> + Mul<f32, Output = V> + Add<f32, Output = V>>(
+        &self,
+        bounds: &NodeBounds<V>,
+    ) -> NodeBounds<V> {
+        let [x, y, z] = self.scaled(self.turned(&bounds.centre));
+        NodeBounds {
+            centre: [x + self.shift[0], y + self.shift[1], z + self.shift[2]],
+            half: self.scaled(bounds.half),
+            axes: [self.turned(&bounds.axes[0]), self.turned(&bounds.axes[1]), self.turned(&bounds.axes[2])],
+            low: self.scaled(bounds.low),
+            high: self.scaled(bounds.high),
+        }
+    }
+
+    #[inline(always)]
+    fn scaled<V: Mul<f32, Output = V>>(&self, [x, y, z]: [V; 3]) -> [V; 3] {
+        [x * self.scale, y * self.scale, z * self.scale]
+    }
+
+    #[inline(always)]
+    fn turned<V: Copy + Add<Output = V> + Mul<f32, Output = V>>(&self, v: &[V; 3]) -> [V; 3] {
+        let [x, y, z] = self.rotation;
+        [
+            v[0] * x[0] + v[1] * x[1] + v[2] * x[2],
+            v[0] * y[0] + v[1] * y[1] + v[2] * y[2],
+            v[0] * z[0] + v[1] * z[1] + v[2] * z[2],
+        ]
+    }
+
+    /// The gaps of nodes of a and of [moved](Self::moved) nodes of b, lane by lane.
+    #[inline(always)]
+    pub(crate) fn gaps<S: Simd>(
+        &self,
+        simd: S,
+        a: &NodeBounds<f32x16<S>>,
+        b: &NodeBounds<f32x16<S>>,
+        limits: Limits,
+    ) -> Gaps {
+        // Unrolled by hand: loops would keep all of it in memory.
+        let [x, y, z] = self.offset;
+        let between = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];
+        let off = [between[0] + x, between[1] + y, between[2] + z];
+        // All that feet need in terms of the axes: their cosines, and how far apart the centres are along
+        // them.
+        let (along_a, along_b) = (in_terms_of(&a.axes, off), in_terms_of(&b.axes, off));
+        let cosines = [
+            in_terms_of(&b.axes, a.axes[0]),
+            in_terms_of(&b.axes, a.axes[1]),
+            in_terms_of(&b.axes, a.axes[2]),
+        ];
+        // From the centre of b on.
+        let mut seen = along_a;
+        let mut foot_a = within(&seen, &a.half);
+        for _ in 0..ROUNDS {
+            let foot = combined(&cosines, &foot_a);
+            let place = [foot[0] - along_b[0], foot[1] - along_b[1], foot[2] - along_b[2]];
+            let foot = in_terms_of(&cosines, within(&place, &b.half));
+            seen = [along_a[0] + foot[0], along_a[1] + foot[1], along_a[2] + foot[2]];
+            foot_a = within(&seen, &a.half);
+        }
+        let apart = [seen[0] - foot_a[0], seen[1] - foot_a[1], seen[2] - foot_a[2]];
+        let line = combined(&a.axes, &apart);
+        let per_length = f32x16::splat(simd, 1.0) / product(line, line).sqrt();
+        let line = [line[0] * per_length, line[1] * per_length, line[2] * per_length];
+        let [x, y, z] = self.direction;
+        let turn = [line[0] - x, line[1] - y, line[2] - z];
+        #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
+        let boxes = product(line, between) - product(turn, turn) * (0.5 * self.distance) as f32;
+        // Any line bounds: that of the boxes is nearly that of the enclosures.
+        let (along_a, along_b) = (in_terms_of(&a.axes, line), in_terms_of(&b.axes, line));
+        let mut reach = Reach { boxes, growth: f32x16::splat(simd, 0.0) };
+        reach.add(
+            simd,
+            [along_a[0], along_b[0]],
+            [a.half[0], b.half[0]],
+            [a.low[0], a.high[0], b.low[0], b.high[0]],
+        );
+        reach.add(
+            simd,
+            [along_a[1], along_b[1]],
+            [a.half[1], b.half[1]],
+            [a.low[1], a.high[1], b.low[1], b.high[1]],
+        );
+        reach.add(
+            simd,
+            [along_a[2], along_b[2]],
+            [a.half[2], b.half[2]],
+            [a.low[2], a.high[2], b.low[2], b.high[2]],
+        );
+        let Reach { boxes, growth } = reach;
+        let (least, enclosures) = (f32x16::splat(simd, self.least()), boxes - growth);
+        let boxes = simd.select_f32x16(boxes.simd_gt(least), boxes, least);
+        let enclosures = simd.select_f32x16(enclosures.simd_gt(least), enclosures, least);
+        let near: mask32x16<S> = boxes.simd_lt(limits.boxes) | enclosures.simd_lt(limits.enclosures);
+        Gaps { boxes: boxes.to_array(), enclosures: enclosures.to_array(), near: bits(near) }
+    }
+}
+
+/// What is left between two boxes, and what their enclosures take of it.
+struct Reach<S: Simd> {
+    boxes: f32x16<S>,
+    growth: f32x16<S>,
+}
+
+impl<S: Simd> Reach<S> {
+    /// Along the axes of either box with the same number: how far each goes `along` the line, with its half
+    /// edge lengths, and by how much the enclosures reach further at the lower and the upper end of each.
+    #[inline(always)]
+    fn add(
+        &mut self,
+        simd: S,
+        along: [f32x16<S>; 2],
+        half: [f32x16<S>; 2],
+        [low_a, high_a, low_b, high_b]: [f32x16<S>; 4],
+    ) {
+        let shares = [along[0].abs(), along[1].abs()];
+        self.boxes -= half[0] * shares[0];
+        self.boxes -= half[1] * shares[1];
+        // Towards each other: along the line for a, against it for b.
+        let towards_b = simd.select_f32x16(along[0].simd_gt(0.0), high_a, low_a);
+        let towards_a = simd.select_f32x16(along[1].simd_gt(0.0), low_b, high_b);
+        self.growth += towards_b * shares[0] + towards_a * shares[1];
+    }
+}
+
+/// The components of vectors along three axes.
+#[inline(always)]
+fn in_terms_of<S: Simd>(axes: &[[f32x16<S>; 3]; 3], v: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [product(axes[0], v), product(axes[1], v), product(axes[2], v)]
+}
+
+/// The vectors with these components along three axes.
+#[inline(always)]
+fn combined<S: Simd>(axes: &[[f32x16<S>; 3]; 3], along: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    let [u, v, w] = axes;
+    let [x, y, z] = *along;
+    [u[0] * x + v[0] * y + w[0] * z, u[1] * x + v[1] * y + w[1] * z, u[2] * x + v[2] * y + w[2] * z]
+}
+
+/// The place of a box nearest to `place`, both along its axes.
+#[inline(always)]
+fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [
+        place[0].min(half[0]).max(-half[0]),
+        place[1].min(half[1]).max(-half[1]),
+        place[2].min(half[2]).max(-half[2]),
+    ]
+}
+
+#[cfg(test)]
+impl Motion {
+    /// The motion by `pose` between scans about their origins that reach as far as 4.
+    pub(crate) fn of_centred(pose: &Pose) -> Self {
+        let offset = Vector3::from(pose.translation());
+        let row = |i: usize| single(pose.rotation().row(i).transpose());
+        Self {
+            rotation: [row(0), row(1), row(2)],
+            scale: single([pose.scale(); 3].into())[0],
+            shift: [0.0; 3],
+            offset: single(offset),
+            direction: single(offset / offset.norm()),
+            distance: offset.norm(),
+            slack: 2.0 * f64::from(SLACK) * (4.0 + 4.0 * pose.scale()),
+            to_world: 1.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{dispatch, f32x4};
+    use nearmiss_hierarchy::{Growth, OrientedBox};
+    use nearmiss_lanes::wide::{repeated, spread};
+    use nearmiss_testdata::arbitrary::{point_in, rng, rotation};
+    use nearmiss_testdata::instructions::levels;
+    use rand::RngExt;
+
+    use super::*;
+
+    const FAN: usize = 4;
+
+    /// The distance of two boxes: projections to and fro, ten thousand at most.
+    fn distance(a: &OrientedBox, b: &OrientedBox, pose: &Pose) -> f64 {
+        let onto = |of: &OrientedBox, p: [f64; 3]| {
+            let centre = Vector3::from(of.centre.map(f64::from));
+            let away = Vector3::from(p) - centre;
+            let mut foot = centre;
+            for k in 0..3 {
+                let (axis, half) = (Vector3::from(of.axes[k].map(f64::from)), f64::from(of.half[k]));
+                foot += axis * away.dot(&axis).clamp(-half, half);
+            }
+            <[f64; 3]>::from(foot)
+        };
+        let (mut x, mut last) = (a.centre.map(f64::from), f64::INFINITY);
+        for _ in 0..10_000 {
+            let y = pose.apply(onto(b, pose.apply_inverse(x)));
+            x = onto(a, y);
+            let distance = (Vector3::from(x) - Vector3::from(y)).norm();
+            if distance > last - 1e-9 {
+                break;
+            }
+            last = distance;
+        }
+        last
+    }
+
+    /// Growth by these lengths, rounded down: the upper halves of single-precision numbers.
+    fn growth(lengths: [f32; 6]) -> Growth {
+        bytemuck::cast(lengths.map(|length| u16::try_from(length.to_bits() >> 16).unwrap()))
+    }
+
+    /// Four boxes and what they grow by, a lane each.
+    fn four<S: Simd>(simd: S, boxes: &[OrientedBox; FAN], growths: &[Growth; FAN]) -> NodeBounds<f32x4<S>> {
+        let lanes = |of: &dyn Fn(usize) -> f32| f32x4::load_array(simd, [of(0), of(1), of(2), of(3)]);
+        let length = |lane: usize, k: usize| {
+            let halves: [u16; 6] = bytemuck::cast(growths[lane]);
+            f32::from_bits(u32::from(halves[k]) << 16)
+        };
+        NodeBounds {
+            centre: [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].centre[k])),
+            half: [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].half[k])),
+            axes: [0, 1, 2].map(|i| [0, 1, 2].map(|k| lanes(&|lane| boxes[lane].axes[i][k]))),
+            low: [0, 1, 2].map(|k| lanes(&|lane| length(lane, k))),
+            high: [0, 1, 2].map(|k| lanes(&|lane| length(lane, 3 + k))),
+        }
+    }
+
+    #[test]
+    fn bounds_are_below_distances_and_near_them_by_any_instructions() {
+        let rng = &mut rng(81);
+        let mut far = [(0.0, 0.0); 2];
+        for round in 0..600 {
+            let away = [2.0, 4.0, 20.0, 1e7][round % 4];
+            let pose = rotation(rng).with_scale([1.0, 0.3][round % 2]).with_translation(point_in(rng, away));
+            let mut boxes = || {
+                [0; FAN].map(|_| {
+                    let turn = rotation(rng);
+                    let axis = |k: usize| single(turn.rotation().column(k).into_owned());
+                    let flat = [1.0, 0.05][rng.random_range(0..2)];
+                    let half = [rng.random_range(0.1..1.0), 0.3, 0.2 * flat];
+                    OrientedBox {
+                        centre: single(point_in(rng, 1.5).into()),
+                        half: single(half.into()),
+                        axes: [axis(0), axis(1), axis(2)],
+                        reach: 0.1,
+                    }
+                })
+            };
+            let (a, b) = (boxes(), boxes());
+            let mut growths = || [0; FAN].map(|_| growth([0; 6].map(|_| rng.random_range(0.0..0.2))));
+            let (more_a, more_b) = (growths(), growths());
+            let limits = Limits { boxes: 0.1, enclosures: -0.2 };
+            let found = levels().into_iter().map(|level| {
+                let motion = Motion::of_centred(&pose);
+                let gaps = dispatch!(level, simd => {
+                    let (a, b) = (four(simd, &a, &more_a), four(simd, &b, &more_b));
+                    motion.gaps(simd, &a.map(spread), &motion.moved(&b).map(repeated), limits)
+                });
+                (gaps, motion)
+            });
+            let found: Vec<_> = found.collect();
+            let (gaps, motion) = &found[0];
+            assert!(found.iter().all(|other| other.0 == *gaps), "every level: {found:?}");
+            for lane in 0..LANES {
+                let (boxes, enclosures) = (gaps.boxes[lane], gaps.enclosures[lane]);
+                let is_near = boxes < limits.boxes || enclosures < limits.enclosures;
+                assert_eq!(gaps.near >> lane & 1 == 1, is_near, "round {round}, lane {lane}");
+                let (i, j) = (lane / FAN, lane % FAN);
+                let grown = distance(&more_a[i].of(&a[i]), &more_b[j].of(&b[j]), &pose);
+                let own = distance(&a[i], &b[j], &pose);
+                for ((gap, expected), far) in [(boxes, own), (enclosures, grown)].into_iter().zip(&mut far) {
+                    let bound = motion.bound(gap);
+                    let what = format!("{bound} for {expected}, round {round}, lane {lane}");
+                    assert!(bound <= expected + motion.slack, "{what}");
+                    if expected > 0.01 {
+                        *far = (far.0 + 1.0, far.1 + bound / expected);
+                    }
+                }
+            }
+        }
+        let [boxes, enclosures] = far.map(|(count, share)| (count, share / count));
+        assert!(boxes.0 > 5000.0 && boxes.1 > 0.97, "{boxes:?}");
+        assert!(enclosures.0 > 5000.0 && enclosures.1 > 0.9, "{enclosures:?}");
+    }
+}
