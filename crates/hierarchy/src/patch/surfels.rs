@@ -61,8 +61,8 @@ pub(crate) struct Surfel {
     pub(crate) cell: Cell,
 }
 
-/// The discs of all points as arrays, and the bounds of all leaves.
-#[derive(Debug)]
+/// The discs of points as arrays, and the bounds of their leaves.
+#[derive(Debug, Default)]
 pub(crate) struct Surfels {
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) discs: Vec<f32>,
@@ -80,16 +80,23 @@ pub(crate) struct Surfels {
 }
 
 impl Surfels {
-    fn with_capacity(points: usize) -> Self {
+    /// The same of some parts after each other. One array after the other, as both would not fit into
+    /// memory.
+    fn joined(mut parts: Vec<Self>) -> Self {
+        fn join<T: Clone>(parts: &mut [Surfels], of: impl Fn(&mut Surfels) -> &mut Vec<T>) -> Vec<T> {
+            let parts: Vec<Vec<T>> = parts.iter_mut().map(|part| std::mem::take(of(part))).collect();
+            parts.concat()
+        }
+        let parts = &mut parts;
         Self {
-            normals: Vec::with_capacity(points),
-            discs: Vec::with_capacity(points),
-            kinds: Vec::with_capacity(points),
-            balls: Vec::with_capacity(points),
-            flat: Vec::with_capacity(points),
-            cells: Vec::with_capacity(points),
-            leaves: Vec::new(),
-            obstacles: Vec::new(),
+            normals: join(parts, |part| &mut part.normals),
+            discs: join(parts, |part| &mut part.discs),
+            kinds: join(parts, |part| &mut part.kinds),
+            balls: join(parts, |part| &mut part.balls),
+            flat: join(parts, |part| &mut part.flat),
+            cells: join(parts, |part| &mut part.cells),
+            leaves: join(parts, |part| &mut part.leaves),
+            obstacles: join(parts, |part| &mut part.obstacles),
         }
     }
 
@@ -161,37 +168,27 @@ fn leaves(index: &Index<'_>) -> Vec<(Range<usize>, OrientedBox)> {
 pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Surfels {
     let leaves = leaves(index);
     let level = Level::new();
-    let parts = chunks(&leaves, |leaves| {
-        let (mut scratch, mut surfels) = (LeafScratch::default(), Vec::new());
-        let bounds = leaves
-            .iter()
-            .map(|(points, about)| {
-                let Known { positions, radii, reach, dense, .. } = *known;
-                let leaf =
-                    Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
-                let is_dense = points.start < dense;
-                let fits = &fits[points.clone()];
-                dispatch!(level, simd => {
-                    leaf.look_about(simd, index, (fits, reach, is_dense), &mut scratch, &mut surfels)
-                })
-            })
-            .collect::<Vec<_>>();
-        (surfels, bounds)
-    });
-    let mut all = Surfels::with_capacity(known.positions.len());
-    let mut radii = known.radii.iter().enumerate();
-    for (surfels, bounds) in parts {
-        for (surfel, (i, &radius)) in surfels.iter().zip(&mut radii) {
-            let own = obstacle_ball(i, known.dense, surfel.kind, radius);
-            let ball = ball(surfel.kind, radius, known.ordinary);
-            all.push(&Surfel { disc: surfel.disc_within(ball), ..*surfel }, ball.max(own));
-        }
-        for [surface, obstacle] in bounds {
+    Surfels::joined(chunks(&leaves, |leaves| {
+        let (mut scratch, mut surfels, mut all) = (LeafScratch::default(), Vec::new(), Surfels::default());
+        for (points, about) in leaves {
+            let Known { positions, radii, ordinary, reach, dense } = *known;
+            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
+            let is_dense = points.start < dense;
+            let fits = &fits[points.clone()];
+            surfels.clear();
+            let [surface, obstacle] = dispatch!(level, simd => {
+                leaf.look_about(simd, index, (fits, reach, is_dense), &mut scratch, &mut surfels)
+            });
             all.leaves.push(surface);
             all.obstacles.push(obstacle);
+            for ((i, &radius), surfel) in points.clone().zip(leaf.radii).zip(&surfels) {
+                let own = obstacle_ball(i, dense, surfel.kind, radius);
+                let ball = ball(surfel.kind, radius, ordinary);
+                all.push(&Surfel { disc: surfel.disc_within(ball), ..*surfel }, ball.max(own));
+            }
         }
-    }
-    all
+        all
+    }))
 }
 
 /// The points of a leaf, and the box about them.
