@@ -305,19 +305,18 @@ fn is_finite<T: Coordinate>(p: [T; 3]) -> bool {
 
 /// The first of each group of equal positions, in the order given. O(n log n), 16 bytes a point.
 fn distinct(points: Vec<([f32; 3], u32)>) -> Vec<([f32; 3], u32)> {
-    let mut keys: Vec<u128> = (0_u128..)
-        .zip(&points)
-        .map(|(i, (p, _))| p.iter().fold(0, |key, x| key << 32 | u128::from(x.to_bits())) << 32 | i)
-        .collect();
+    // A hash of each point above its index: equal points come to stand in one run.
+    let mut keys: Vec<u64> = (0..).zip(&points).map(|(i, (p, _))| hash(*p) & !0xffff_ffff | i).collect();
     keys.sort_unstable();
-    let repeats = keys.windows(2).filter(|w| w[0] >> 32 == w[1] >> 32);
-    let mut repeated: Vec<u32> = repeats
-        .map(|w| {
-            #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
-            let index = w[1] as u32;
-            index
-        })
-        .collect();
+    #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
+    let index = |key: u64| key as u32;
+    let mut repeated = Vec::new();
+    for run in keys.chunk_by_mut(|a, b| a >> 32 == b >> 32).filter(|run| run.len() > 1) {
+        let bits = |key: u64| points[index(key) as usize].0.map(f32::to_bits);
+        run.sort_unstable_by_key(|&key| (bits(key), key));
+        let repeats = run.windows(2).filter(|two| bits(two[0]) == bits(two[1]));
+        repeated.extend(repeats.map(|two| index(two[1])));
+    }
     if repeated.is_empty() {
         return points;
     }
@@ -325,6 +324,13 @@ fn distinct(points: Vec<([f32; 3], u32)>) -> Vec<([f32; 3], u32)> {
     repeated.sort_unstable();
     let mut next = repeated.into_iter().peekable();
     (0_u32..).zip(points).filter(|(i, _)| next.next_if_eq(i).is_none()).map(|(_, p)| p).collect()
+}
+
+/// The bits of a point, mixed: the upper half of the result tells most points apart.
+fn hash(p: [f32; 3]) -> u64 {
+    let [x, y, z] = p.map(|x| u64::from(x.to_bits()));
+    let mixed = (x << 32 | y).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
+    (mixed ^ mixed >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93)
 }
 
 #[cfg(test)]
@@ -353,6 +359,26 @@ mod tests {
         assert_eq!(cloud.normals().unwrap()[3], [5.0; 3], "attributes follow their points");
         let count = cloud.with_normals(&numbers[1..]).unwrap_err();
         assert_eq!(count, CloudError::AttributeCount { given: 14, points: 15 });
+    }
+
+    #[test]
+    fn points_are_told_apart_as_by_a_set() {
+        // So many that hashes of different points are equal too.
+        let mut state = 1_u64;
+        let mut coordinate = |of: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            #[expect(clippy::cast_precision_loss, reason = "below 2^24")]
+            let x = ((state >> 33) % of) as f32;
+            x
+        };
+        for of in [3, 40, 1 << 20] {
+            let points: Vec<([f32; 3], u32)> =
+                (0..200_000).map(|i| ([coordinate(of), coordinate(of), coordinate(of)], i)).collect();
+            let mut seen = std::collections::BTreeSet::new();
+            let mut expected = points.clone();
+            expected.retain(|(p, _)| seen.insert(p.map(f32::to_bits)));
+            assert_eq!(distinct(points), expected, "{of} values a coordinate");
+        }
     }
 
     #[test]
