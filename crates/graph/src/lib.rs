@@ -34,6 +34,5 @@ pub use length::{Network, edge_lengths};
 pub use levels::{Cells, LevelScratch, Levels};
 pub use options::{GraphError, GraphOptions, Paths, Prune};
 pub use orient::{Decision, Orientation, OrientedPart, Sides, orient};
-pub use sanity::Flaw;
-pub use sections::{GraphMeta, LoadError};
+pub use sections::GraphMeta;
 pub use surface_graph::{Samples, SurfaceGraph, SurfaceGraphMeta};

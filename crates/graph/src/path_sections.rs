@@ -1,12 +1,12 @@
 //! Close pairs and coarser levels in a container, and what must hold of them there.
 
 use bytemuck::Pod;
-use nearmiss_store::{Array, Check, File, OpenError, WriteError, Writer};
+use nearmiss_store::{Array, Check, File, Flaw, LoadError, OpenError, WriteError, Writer};
 
+use crate::Adjacency;
 use crate::close_list::{BESIDE, is_floor, pack, rounded};
 use crate::close_pairs::ClosePairs;
 use crate::levels::{Cells, Levels};
-use crate::{Adjacency, Flaw, LoadError};
 
 /// Part 0 is of the points, part k of the cells of level k.
 const LIST_STARTS: [u8; 4] = *b"CPST";
@@ -30,14 +30,6 @@ const LISTS: &str = "the list of close pairs of point";
 const CELL: &str = "the cell of point";
 const EDGES: &str = "the edges of cell";
 
-fn length(array: &'static str, found: usize, expected: usize) -> Result<(), Flaw> {
-    if found == expected { Ok(()) } else { Err(Flaw::Length { array, found, expected }) }
-}
-
-fn first_wrong(what: &'static str, index: Option<usize>) -> Result<(), Flaw> {
-    index.map_or(Ok(()), |index| Err(Flaw::Value { what, index }))
-}
-
 impl ClosePairs {
     /// Adds the arrays to a container, `part` telling several maps apart.
     ///
@@ -56,14 +48,19 @@ impl ClosePairs {
         Ok(())
     }
 
-    /// The map in `file` of points with these horizons, its arrays in place. With either `check` every list
+    /// The map in `file` of so many points with these horizons, its arrays in place. With either `check` every list
     /// is there, so that no use of it fails. With [`Check::Full`] each is also one that a build writes: of
     /// points that are there, by distance, itself first, and none further than it is heard; and what stands
     /// beside has its place, and would fit none in the list.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
-    pub fn load(file: &File, part: u32, horizons: &[f32], check: Check) -> Result<Self, LoadError> {
+    pub fn load(
+        file: &File,
+        part: u32,
+        (points, horizon): (usize, impl Fn(usize) -> f32),
+        check: Check,
+    ) -> Result<Self, LoadError> {
         let onward = if file.has(ONWARD, part) { file.array(ONWARD, part)? } else { Array::default() };
         let map = Self {
             starts: file.array(LIST_STARTS, part)?,
@@ -73,29 +70,29 @@ impl ClosePairs {
             beside: file.array(BESIDES, part)?,
             onward,
         };
-        map.check_structure(horizons.len())?;
+        map.check_structure(points)?;
         if check == Check::Full {
-            map.check_contents(horizons)?;
+            map.check_contents(points, horizon)?;
         }
         Ok(map)
     }
 
     fn check_structure(&self, points: usize) -> Result<(), Flaw> {
-        length(LISTS, self.starts.len(), points + 1)?;
-        length(LISTS, self.pair_count(), self.starts[points] as usize)?;
-        length("distances of close pairs", self.codes.len(), self.pair_count())?;
+        Flaw::length(LISTS, self.starts.len(), points + 1)?;
+        Flaw::length(LISTS, self.pair_count(), self.starts[points] as usize)?;
+        Flaw::length("distances of close pairs", self.codes.len(), self.pair_count())?;
         if !self.onward.is_empty() {
-            length("steps of paths", self.onward.len(), self.pair_count())?;
+            Flaw::length("steps of paths", self.onward.len(), self.pair_count())?;
         }
         // No code leads to what is no distance then.
-        length("floors of close pairs", self.floors.len(), points)?;
-        first_wrong(LISTS, self.floors.iter().position(|&floor| !is_floor(floor)))?;
+        Flaw::length("floors of close pairs", self.floors.len(), points)?;
+        Flaw::first(LISTS, self.floors.iter().position(|&floor| !is_floor(floor)))?;
         let starts: &[u32] = &self.starts;
         let descends = starts.windows(2).position(|two| two[0] > two[1]);
-        first_wrong(LISTS, descends.or((starts[0] != 0).then_some(0)))
+        Flaw::first(LISTS, descends.or((starts[0] != 0).then_some(0)))
     }
 
-    fn check_contents(&self, horizons: &[f32]) -> Result<(), Flaw> {
+    fn check_contents(&self, points: usize, horizon: impl Fn(usize) -> f32) -> Result<(), Flaw> {
         let (view, floors): (_, &[u8]) = (self.view(), &self.floors);
         let mut beside = self.beside.iter();
         for (i, own) in (0..self.len()).zip(0..) {
@@ -106,16 +103,16 @@ impl ClosePairs {
                     let fits = pack(own, floors[i], close).0 != BESIDE;
                     is_sound &= beside.next().is_some_and(|b| b.pair == pair) && !fits;
                 }
-                let horizon = horizons.get(close.point as usize);
-                let is_heard = horizon.is_some_and(|&h| close.distance <= rounded(h));
+                let point = close.point as usize;
+                let is_heard = point < points && close.distance <= rounded(horizon(point));
                 let is_own = close.point == own && close.distance.to_bits() == 0;
                 let is_first = pair == pairs.start;
                 is_sound &= (is_heard || is_own) && is_own == is_first && before <= close.distance;
                 before = close.distance;
             }
-            first_wrong(LISTS, (!is_sound).then_some(i))?;
+            Flaw::first(LISTS, (!is_sound).then_some(i))?;
         }
-        length("close pairs that stand beside", self.beside.len(), self.beside.len() - beside.len())
+        Flaw::length("close pairs that stand beside", self.beside.len(), self.beside.len() - beside.len())
     }
 }
 
@@ -191,19 +188,19 @@ fn load_cells(file: &File, part: u32) -> Result<Cells, OpenError> {
 
 impl Cells {
     fn check_structure(&self, finer: usize) -> Result<(), Flaw> {
-        length("cells", self.owner.len(), finer)?;
-        length("distances within cells", self.to_centre.len(), finer)?;
-        length("ways within cells", self.inwards.len(), finer)?;
-        length("radii of cells", self.radii.len(), self.len())?;
+        Flaw::length("cells", self.owner.len(), finer)?;
+        Flaw::length("distances within cells", self.to_centre.len(), finer)?;
+        Flaw::length("ways within cells", self.inwards.len(), finer)?;
+        Flaw::length("radii of cells", self.radii.len(), self.len())?;
         self.graph.check_structure(self.len(), EDGES)?;
-        length("lengths of edges between cells", self.lengths.len(), self.graph.neighbours.len())?;
-        length("crossings between cells", self.crossings.len(), self.graph.neighbours.len())?;
+        Flaw::length("lengths of edges between cells", self.lengths.len(), self.graph.neighbours.len())?;
+        Flaw::length("crossings between cells", self.crossings.len(), self.graph.neighbours.len())?;
         let (owner, inwards, centres): (&[u32], &[u32], &[u32]) = (&self.owner, &self.inwards, &self.centres);
         let is_owned = |point: u32, cell: u32| owner.get(point as usize) == Some(&cell);
         let stray = (0..)
             .zip(centres)
             .position(|(cell, &centre)| !is_owned(centre, cell) || inwards[centre as usize] != centre);
-        first_wrong("the centre of cell", stray)?;
+        Flaw::first("the centre of cell", stray)?;
         // The way inwards comes nearer with every step, so it ends; only at a centre it may.
         let to_centre: &[f32] = &self.to_centre;
         let lost = (0..).zip(owner).position(|(point, &cell)| {
@@ -213,7 +210,7 @@ impl Cells {
             let is_centre = centres.get(cell as usize) == Some(&point);
             !(if ends { is_centre } else { goes })
         });
-        first_wrong(CELL, lost)?;
+        Flaw::first(CELL, lost)?;
         let mut crossings = self.crossings.iter();
         let (starts, neighbours) = self.graph.slices();
         let wrong = (0_u32..).zip(starts.windows(2)).position(|(cell, two)| {
@@ -223,13 +220,13 @@ impl Cells {
                 .zip(&mut crossings)
                 .any(|(&other, &[near, far])| !is_owned(near, cell) || !is_owned(far, other))
         });
-        first_wrong(EDGES, wrong)
+        Flaw::first(EDGES, wrong)
     }
 
     fn check_contents(&self) -> Result<(), Flaw> {
         let is_length = |d: &f32| d.is_finite() && *d >= 0.0;
-        first_wrong(CELL, self.to_centre.iter().position(|d| !is_length(d)))?;
-        first_wrong("the length of edge", self.lengths.iter().position(|d| !is_length(d)))?;
-        first_wrong("the radius of cell", self.radii.iter().position(|r| !is_length(r)))
+        Flaw::first(CELL, self.to_centre.iter().position(|d| !is_length(d)))?;
+        Flaw::first("the length of edge", self.lengths.iter().position(|d| !is_length(d)))?;
+        Flaw::first("the radius of cell", self.radii.iter().position(|r| !is_length(r)))
     }
 }

@@ -1,40 +1,10 @@
 //! What must hold of a stored graph: what its users need to stay within its arrays whenever one is loaded,
 //! what their answers need when the whole file is checked.
 
-use thiserror::Error;
+use nearmiss_store::Flaw;
 
 use crate::adjacency::Adjacency;
 use crate::graph::PointGraph;
-
-/// What is wrong with a graph.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum Flaw {
-    /// Two arrays do not fit each other.
-    #[error("{array} has {found} entries where {expected} belong; prepare the scan again")]
-    Length {
-        /// Which array.
-        array: &'static str,
-        /// How many entries it has.
-        found: usize,
-        /// How many it should have.
-        expected: usize,
-    },
-    /// A number is none that a build writes, or contradicts what it says about others.
-    #[error("{what} {index} is wrong; prepare the scan again")]
-    Value {
-        /// Which number, and of what.
-        what: &'static str,
-        /// Whose.
-        index: usize,
-    },
-    /// A number about the whole graph contradicts the arrays.
-    #[error("{what} is wrong; prepare the scan again")]
-    Metadata {
-        /// Which number.
-        what: &'static str,
-    },
-}
 
 const EDGES: &str = "the edges of point";
 const VIRTUAL: &str = "the virtual edges of point";
@@ -45,10 +15,7 @@ impl Adjacency {
     /// pass.
     pub(crate) fn check_structure(&self, points: usize, what: &'static str) -> Result<(), Flaw> {
         let wrong = |index| Err(Flaw::Value { what, index });
-        let found = self.starts.len();
-        if found != points + 1 {
-            return Err(Flaw::Length { array: what, found, expected: points + 1 });
-        }
+        Flaw::length(what, self.starts.len(), points + 1)?;
         let end = self.starts[points] as usize;
         if self.starts[0] != 0 || end != self.neighbours.len() {
             return Err(Flaw::Length { array: what, found: self.neighbours.len(), expected: end });
@@ -91,9 +58,7 @@ impl PointGraph {
             ("the borders", self.borders.len()),
         ];
         for (array, found) in lengths {
-            if found != points {
-                return Err(Flaw::Length { array, found, expected: points });
-            }
+            Flaw::length(array, found, points)?;
         }
         self.edges.check_structure(points, EDGES)?;
         self.virtual_edges.check_structure(points, VIRTUAL)?;

@@ -1,13 +1,11 @@
 //! The graph in a container: one section an array, the rest in the metadata.
 
-use nearmiss_store::{Check, File, OpenError, WriteError, Writer};
+use nearmiss_store::{Check, File, Flaw, LoadError, WriteError, Writer};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use crate::adjacency::Adjacency;
 use crate::graph::PointGraph;
-use crate::options::{GraphError, GraphOptions};
-use crate::sanity::Flaw;
+use crate::options::GraphOptions;
 
 /// Part 0 is of edges on the surface, part 1 of virtual ones.
 const STARTS: [u8; 4] = *b"ESTA";
@@ -22,21 +20,6 @@ const BORDERS: [u8; 4] = *b"BORD";
 pub struct GraphMeta {
     options: GraphOptions,
     components: u32,
-}
-
-/// Why a container does not hold a graph.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum LoadError {
-    /// A section is missing or damaged.
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// It was built with numbers out of range.
-    #[error("{0}; prepare the scan again")]
-    Options(#[from] GraphError),
-    /// The sections contradict each other.
-    #[error(transparent)]
-    Flaw(#[from] Flaw),
 }
 
 impl PointGraph {
@@ -74,8 +57,8 @@ impl PointGraph {
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
     pub fn load(file: &File, meta: GraphMeta, points: usize, check: Check) -> Result<Self, LoadError> {
-        meta.options.check()?;
-        let adjacency = |part| -> Result<Adjacency, OpenError> {
+        meta.options.check().map_err(Flaw::options)?;
+        let adjacency = |part| -> Result<Adjacency, LoadError> {
             Ok(Adjacency { starts: file.array(STARTS, part)?, neighbours: file.array(NEIGHBOURS, part)? })
         };
         let graph = Self {

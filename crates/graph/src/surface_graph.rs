@@ -4,15 +4,15 @@ use std::sync::OnceLock;
 
 use bytemuck::{Pod, Zeroable};
 use nearmiss_lanes::parallel::both;
-use nearmiss_store::{Array, Check, File, WriteError, Writer};
+use nearmiss_store::{Array, Check, File, Flaw, LoadError, WriteError, Writer};
 use nearmiss_surface::SurfacePlan;
 use serde::{Deserialize, Serialize};
 
 use crate::length::distance;
 use crate::orient::{Decision, OrientedPart, Sides, orient};
 use crate::{
-    Adjacency, ClosePairs, Flaw, GeodesicKernel, GraphCounts, GraphError, GraphMeta, GraphOptions, LazyPath,
-    Levels, LoadError, Network, Paths, PointGraph, edge_lengths,
+    Adjacency, ClosePairs, GeodesicKernel, GraphCounts, GraphError, GraphMeta, GraphOptions, LazyPath,
+    Levels, Network, Paths, PointGraph, edge_lengths,
 };
 
 /// Ways over virtual edges stay where the sum of the distances from both ends is at most so many times their
@@ -292,7 +292,7 @@ impl SurfaceGraph {
         }
     }
 
-    /// The graph of `samples` in `file`, its arrays in place. With either `check` no use of it fails. With
+    /// The graph in `file` of points with these radii, its arrays in place. With either `check` no use of it fails. With
     /// [`Check::Full`] arrays also agree with each other, lists are in order and lengths are lengths; whether
     /// a distance is the shortest there is, or a confidence deserved, only a build could tell.
     ///
@@ -301,16 +301,13 @@ impl SurfaceGraph {
     pub fn load(
         file: &File,
         meta: SurfaceGraphMeta,
-        samples: Samples<'_>,
+        (plan, radii): (&SurfacePlan, &[f32]),
         check: Check,
     ) -> Result<Self, LoadError> {
-        let count = samples.positions.len();
+        let count = radii.len();
         let points = PointGraph::load(file, meta.points, count, check)?;
         let confidence: Array<u8> = file.array(CONFIDENCE, 0)?;
-        if confidence.len() != count {
-            let array = "the confidence of normals";
-            return Err(Flaw::Length { array, found: confidence.len(), expected: count }.into());
-        }
+        Flaw::length("the confidence of normals", confidence.len(), count)?;
         let parts: Array<StoredPart> = file.array(PARTS, 0)?;
         let is_sound = |part: &StoredPart| {
             let known = part.flags as usize >> 1 < DECISIONS.len();
@@ -325,9 +322,10 @@ impl SurfaceGraph {
         let (mut close_pairs, mut levels) = (Vec::new(), OnceLock::new());
         if meta.has_close_pairs {
             let stored = Levels::load(file, count, check)?;
-            let radii =
-                std::iter::once(samples.radii).chain(stored.cells().iter().map(|cells| cells.radii()));
-            let map = |(part, radii)| ClosePairs::load(file, part, &horizons(samples.plan, radii), check);
+            let radii = std::iter::once(radii).chain(stored.cells().iter().map(|cells| cells.radii()));
+            let map = |(part, radii): (u32, &[f32])| {
+                ClosePairs::load(file, part, (radii.len(), |i| plan.horizon(radii[i])), check)
+            };
             close_pairs = (0..).zip(radii).map(map).collect::<Result<_, _>>()?;
             levels = stored.into();
         }

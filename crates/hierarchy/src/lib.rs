@@ -16,8 +16,7 @@ pub use descent::{
     BoxVisitor, Comparison, Frontier, Heap, MostUrgent, Open, PairVisitor, PlaceVisitor, Plunging, Stack,
     TreePair, descend, resume,
 };
-pub use file::sanity::Flaw;
-pub use file::sections::{HierarchyMeta, LoadError};
+pub use file::sections::HierarchyMeta;
 pub use patch::covering::Covering;
 pub use patch::samples::Samples;
 pub use point::gather::{GatherScratch, NeighbourList};

@@ -11,50 +11,11 @@ use nearmiss_graph::{
 };
 use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy};
 use nearmiss_query::{Placed, Prepared, ShapeIndex};
-use nearmiss_store::{Bytes, Check, File, OpenError, Writer};
+use nearmiss_store::{Bytes, Check, File, Flaw, Writer};
 use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-pub use nearmiss_store::WriteError as SaveError;
-
-/// Why a file does not hold a scan.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum LoadError {
-    /// It cannot be opened, or is no such file.
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// Its hierarchy contradicts itself.
-    #[error(transparent)]
-    Hierarchy(nearmiss_hierarchy::LoadError),
-    /// Its graph does.
-    #[error(transparent)]
-    Graph(nearmiss_graph::LoadError),
-    /// Its discs are for the geodesic kernel, which needs a map of close pairs.
-    #[error(
-        "its bounds are for the geodesic kernel, but it has no map of close pairs; prepare the scan again"
-    )]
-    NoClosePairs,
-}
-
-impl From<nearmiss_hierarchy::LoadError> for LoadError {
-    fn from(error: nearmiss_hierarchy::LoadError) -> Self {
-        match error {
-            nearmiss_hierarchy::LoadError::Open(error) => Self::Open(error),
-            error => Self::Hierarchy(error),
-        }
-    }
-}
-
-impl From<nearmiss_graph::LoadError> for LoadError {
-    fn from(error: nearmiss_graph::LoadError) -> Self {
-        match error {
-            nearmiss_graph::LoadError::Open(error) => Self::Open(error),
-            error => Self::Graph(error),
-        }
-    }
-}
+pub use nearmiss_store::{LoadError, WriteError as SaveError};
 
 /// What a container of ours holds.
 const KIND: [u8; 4] = *b"SCAN";
@@ -323,11 +284,12 @@ impl Scan {
         file.expect(KIND, OLDEST..=VERSION)?;
         let meta: ScanMeta = file.metadata()?;
         let hierarchy = PointHierarchy::load(file, meta.hierarchy, check)?;
-        let graph =
-            meta.graph.map(|meta| SurfaceGraph::load(file, meta, samples(&hierarchy), check)).transpose()?;
+        let samples = (hierarchy.plan(), hierarchy.radii());
+        let graph = meta.graph.map(|meta| SurfaceGraph::load(file, meta, samples, check)).transpose()?;
         if hierarchy.metric() == Metric::Geodesic && graph.as_ref().is_none_or(|g| g.close_pairs().is_none())
         {
-            return Err(LoadError::NoClosePairs);
+            let cause = "its bounds are for the geodesic kernel, but it has no map of close pairs";
+            return Err(Flaw::options(cause).into());
         }
         Ok(Self { density: meta.density, ..Self::of(hierarchy, graph.map(Arc::new)) })
     }

@@ -22,11 +22,13 @@ mod atomic;
 mod writer;
 
 mod error;
+mod flaw;
 
 pub use array::Array;
 pub use bytes::Bytes;
 pub use error::{Fault, OpenError, WriteError, WriteStep};
 pub use file::{Check, File};
+pub use flaw::{Flaw, LoadError};
 pub use header::LAYOUT;
 pub use id::SectionId;
 pub use metadata::METADATA_LIMIT;

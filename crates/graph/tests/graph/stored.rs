@@ -1,6 +1,6 @@
 //! The graph in a container, and containers that lie.
-use nearmiss_graph::{Flaw, GraphOptions, LoadError, PointGraph};
-use nearmiss_store::{Check, File, Writer};
+use nearmiss_graph::{GraphOptions, PointGraph};
+use nearmiss_store::{Check, File, Flaw, LoadError, Writer};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 
 #[expect(clippy::cast_possible_truncation, reason = "points are stored in single precision")]

@@ -1,10 +1,10 @@
 //! Close pairs and levels in a container, and containers that lie.
 use crate::clouds::Cloud;
 use nearmiss_graph::{
-    Adjacency, ClosePairs, Flaw, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels,
-    LoadError, Network, Paths,
+    Adjacency, ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels, Network,
+    Paths,
 };
-use nearmiss_store::{Check, File, Writer};
+use nearmiss_store::{Check, File, Flaw, LoadError, Writer};
 use nearmiss_surface::{SurfaceOptions, SurfacePlan};
 use nearmiss_testdata::shapes::torus;
 
@@ -34,15 +34,20 @@ fn stored() -> Stored {
 fn what_is_stored_comes_back() {
     let Stored { cloud, horizons, pairs, levels, bytes } = stored();
     let file = File::from_bytes(bytes, Check::Full).unwrap();
-    let again = ClosePairs::load(&file, 0, &horizons, Check::Full).unwrap();
+    let again = ClosePairs::load(&file, 0, (horizons.len(), |i: usize| horizons[i]), Check::Full).unwrap();
     assert_eq!((&again, again.paths()), (&pairs, Paths::Stored));
     assert_eq!(Levels::load(&file, cloud.points.len(), Check::Full).unwrap(), levels);
     assert!(!levels.cells().is_empty());
-    let wrong = ClosePairs::load(&file, 0, &horizons[1..], Check::Structure).unwrap_err();
+    let wrong =
+        ClosePairs::load(&file, 0, (horizons.len() - 1, |i: usize| horizons[i + 1]), Check::Structure)
+            .unwrap_err();
     assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { .. })), "{wrong}");
     let wrong = Levels::load(&file, cloud.points.len() + 1, Check::Structure).unwrap_err();
     assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { .. })), "{wrong}");
-    assert!(matches!(ClosePairs::load(&file, 1, &horizons, Check::Structure), Err(LoadError::Open(_))));
+    assert!(matches!(
+        ClosePairs::load(&file, 1, (horizons.len(), |i: usize| horizons[i]), Check::Structure),
+        Err(LoadError::Open(_))
+    ));
 }
 
 /// Points on a line, half of which come much later: on either side of the seam pairs of almost the same
@@ -69,7 +74,10 @@ fn lists_of_near_and_far_points_stay_in_order() {
     let mut bytes = Vec::new();
     writer.write_to(&mut bytes).unwrap();
     let file = File::from_bytes(bytes, Check::Full).unwrap();
-    assert_eq!(ClosePairs::load(&file, 0, &horizons, Check::Full).unwrap(), pairs);
+    assert_eq!(
+        ClosePairs::load(&file, 0, (horizons.len(), |i: usize| horizons[i]), Check::Full).unwrap(),
+        pairs
+    );
 }
 
 #[test]
@@ -92,7 +100,7 @@ fn no_byte_changed_leads_out_of_the_arrays() {
             // Checksums are not looked at here.
             let file = File::from_bytes(changed, Check::Structure).unwrap();
             tried += 1;
-            match ClosePairs::load(&file, 0, &horizons, Check::Structure) {
+            match ClosePairs::load(&file, 0, (horizons.len(), |i: usize| horizons[i]), Check::Structure) {
                 Ok(lying) => {
                     let kernel =
                         GeodesicKernel::new(&plan, &cloud.points, &cloud.radii, &cloud.graph, &lying);

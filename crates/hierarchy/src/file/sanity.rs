@@ -2,7 +2,6 @@
 //! one is loaded, what their answers rely on too when the whole file is compared with its checksums
 //! ([`Check`](nearmiss_store::Check)), and all of it by [`PointHierarchy::sanity_check`].
 
-mod flaw;
 mod leaves;
 #[cfg(test)]
 mod lies;
@@ -14,11 +13,14 @@ mod samples;
 
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
+use nearmiss_store::Flaw;
 
-pub use flaw::Flaw;
 pub(crate) use metadata::checked_topology;
 
 use crate::scan::build::PointHierarchy;
+
+/// No stored length exceeds this, so that no square of one overflows. Frames keep coordinates below 2³⁴.
+const FARTHEST: f32 = (1_u64 << 40) as f32;
 
 impl PointHierarchy {
     /// What queries need to stay within their arrays and to end: lengths, and the metadata. O(1).

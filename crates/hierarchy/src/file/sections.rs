@@ -5,12 +5,11 @@
 use std::sync::OnceLock;
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
-use nearmiss_store::{Array, Check, File, OpenError, WriteError, Writer};
-use nearmiss_surface::{Metric, SurfaceError, SurfaceOptions, SurfacePlan};
+use nearmiss_store::{Array, Check, File, Flaw, LoadError, WriteError, Writer};
+use nearmiss_surface::{Metric, SurfaceOptions, SurfacePlan};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use crate::file::sanity::{Flaw, checked_topology};
+use crate::file::sanity::checked_topology;
 use crate::scan::build::PointHierarchy;
 use crate::scan::outline::Outline;
 use crate::tree::wide::Root;
@@ -50,21 +49,6 @@ pub struct HierarchyMeta {
     surface: SurfaceOptions,
     root: Root,
     outline: Outline,
-}
-
-/// Why a container does not hold a hierarchy.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum LoadError {
-    /// A section is missing or damaged.
-    #[error(transparent)]
-    Open(#[from] OpenError),
-    /// The surface is defined by numbers out of range.
-    #[error("{0}; prepare the scan again")]
-    Surface(#[from] SurfaceError),
-    /// The sections contradict each other.
-    #[error(transparent)]
-    Flaw(#[from] Flaw),
 }
 
 impl PointHierarchy {
@@ -124,6 +108,7 @@ impl PointHierarchy {
     /// When a section is missing, holds what no build writes, or the sections contradict each other.
     pub fn load(file: &File, meta: HierarchyMeta, check: Check) -> Result<Self, LoadError> {
         let source: Array<u32> = file.array(SOURCE, 0)?;
+        let plan = SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale);
         let topology = checked_topology(source.len(), meta.leaf_size, meta.dense)?;
         let hierarchy = Self {
             frame: meta.frame,
@@ -138,7 +123,7 @@ impl PointHierarchy {
             samples_a_node: meta.samples,
             is_oriented: meta.is_oriented,
             metric: meta.metric,
-            plan: SurfacePlan::new(&meta.surface, f64::from(meta.sampling_radius), 1.0 / meta.frame.scale)?,
+            plan: plan.map_err(Flaw::options)?,
             positions: OnceLock::new(),
             normals: file.array(NORMALS, 0)?,
             radii: file.array(RADII, 0)?,

@@ -7,8 +7,8 @@ use nearmiss::hierarchy::HierarchyMeta;
 use nearmiss::store::Writer;
 use nearmiss::{
     Answer, BatchScratch, BuildOptions, Check, CollideOptions, CollidePlan, Evidence, GraphError,
-    GraphOptions, LoadError, Metric, Pair, Placed, PlanError, PointCloud, PointKind, Pose, Scan, Scratch,
-    Semantics, Until, Verdict, World, each,
+    GraphOptions, Metric, Pair, Placed, PlanError, PointCloud, PointKind, Pose, Scan, Scratch, Semantics,
+    Until, Verdict, World, each,
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
@@ -271,7 +271,7 @@ fn without_the_map_there_is_no_such_scan() {
         writer.write_to(&mut bytes).unwrap();
         for check in [Check::Full, Check::Structure] {
             let refused = Scan::from_bytes(bytes.clone(), check).unwrap_err();
-            assert!(matches!(refused, LoadError::NoClosePairs), "{refused}");
+            assert!(refused.to_string().contains("no map of close pairs"), "{refused}");
         }
     }
 }

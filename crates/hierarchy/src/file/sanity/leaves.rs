@@ -3,8 +3,8 @@
 use bytemuck::bytes_of;
 use nearmiss_lanes::parallel::ranges;
 
-use super::flaw::Flaw;
 use crate::scan::build::PointHierarchy;
+use nearmiss_store::Flaw;
 
 /// Checks that the blocks and marks of all leaves are those of their points.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {

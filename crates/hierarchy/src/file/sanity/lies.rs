@@ -6,11 +6,11 @@ use nearmiss_geometry::{NodeId, PointCloud};
 use nearmiss_lanes::id32;
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-use super::flaw::Flaw;
 use crate::bounds::boxes::OrientedBox;
 use crate::patch::covering::Covering;
 use crate::scan::build::PointHierarchy;
 use crate::scan::options::BuildOptions;
+use nearmiss_store::Flaw;
 
 fn honest() -> PointHierarchy {
     let points = arbitrary::cloud(CloudKind::Sphere, 301, 1);

@@ -2,14 +2,10 @@
 
 use nearmiss_index::{Level, PointBlock};
 
-use super::flaw::Flaw;
 use crate::point::gather::NeighbourList;
 use crate::point::neighbours::MOST_LISTED;
 use crate::scan::build::PointHierarchy;
-
-fn first_wrong(what: &'static str, index: Option<usize>) -> Result<(), Flaw> {
-    index.map_or(Ok(()), |index| Err(Flaw::Value { what, index }))
-}
+use nearmiss_store::Flaw;
 
 /// Checks that every list is there, and none so long that an evaluation would take its time.
 fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
@@ -17,7 +13,7 @@ fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
         let (first, count) = (list.first as usize, list.count as usize);
         count <= MOST_LISTED && first <= listed && count <= listed - first && list.within.is_finite()
     };
-    first_wrong("the neighbour list of block", lists.iter().position(|list| !is_there(list)))
+    Flaw::first("the neighbour list of block", lists.iter().position(|list| !is_there(list)))
 }
 
 /// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that
@@ -26,7 +22,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     check_ranges(&scan.lists, scan.listed.len())?;
     let blocks = scan.plan.blocks(scan.positions(), &scan.radii);
     let differs = blocks.zip(&scan.blocks).position(|(expected, found)| expected != *found);
-    first_wrong("the copy of the points of block", differs)?;
+    Flaw::first("the copy of the points of block", differs)?;
     let left_out = scan.blocks.iter().enumerate().position(|(number, block)| {
         let group = &scan.groups[number / PointBlock::WIDTH];
         let lane = number % PointBlock::WIDTH;
@@ -43,7 +39,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         }
         !(radius.is_finite() && held.iter().all(|&held| held != 0))
     });
-    first_wrong("the ball about block", left_out)?;
+    Flaw::first("the ball about block", left_out)?;
     let count = scan.groups.len();
     let wrong = scan.lists.iter().position(|list| {
         let entries = scan.listed.get(list.first as usize..).and_then(|rest| rest.get(..list.count as usize));
@@ -53,7 +49,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         };
         !entries.is_some_and(ascend)
     });
-    first_wrong("the neighbour list of block", wrong)
+    Flaw::first("the neighbour list of block", wrong)
 }
 
 /// Checks that no list leaves out a group of which a point is heard where the list is said to be complete.
@@ -77,5 +73,5 @@ pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
         };
         found.iter().any(|&group| list.binary_search(&group).is_err() && blocks(group).iter().any(is_heard))
     });
-    first_wrong("the neighbour list of block", incomplete)
+    Flaw::first("the neighbour list of block", incomplete)
 }

@@ -3,7 +3,9 @@
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_index::PointBlock;
 
-use super::flaw::{FARTHEST, Flaw};
+use nearmiss_store::Flaw;
+
+use super::FARTHEST;
 use super::nodes::is_in_range;
 use crate::patch::samples::SAMPLES;
 use crate::point::leaf_block::LeafParts;

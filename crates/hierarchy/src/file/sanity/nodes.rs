@@ -6,7 +6,9 @@ use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::ranges;
 use nearmiss_lanes::vector::{dot, sub};
 
-use super::flaw::{FARTHEST, Flaw};
+use nearmiss_store::Flaw;
+
+use super::FARTHEST;
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
 use crate::scan::build::PointHierarchy;

@@ -1,6 +1,8 @@
 //! The numbers of every point, each against its range and against its leaf.
 
-use super::flaw::{FARTHEST, Flaw};
+use nearmiss_store::Flaw;
+
+use super::FARTHEST;
 use crate::bounds::boxes::OrientedBox;
 use crate::point::kind::{PointKind, THICKNESS};
 use crate::scan::build::PointHierarchy;

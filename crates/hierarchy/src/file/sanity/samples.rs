@@ -5,7 +5,9 @@ use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::ranges;
 
-use super::flaw::{FARTHEST, Flaw};
+use nearmiss_store::Flaw;
+
+use super::FARTHEST;
 use crate::patch::covering::{Covering, centres_of};
 use crate::scan::build::PointHierarchy;
 

@@ -90,7 +90,7 @@ fn parts_that_are_not_the_components_are_refused() {
         lying.copy_within(from, to);
         repair(&mut lying);
         let refused = Scan::from_bytes(lying, Check::Full).unwrap_err();
-        assert!(matches!(refused, LoadError::Graph(_)), "{refused}");
+        assert!(matches!(refused, LoadError::Flaw(_)), "{refused}");
         assert!(refused.to_string().contains("part"), "{refused}");
     }
 }
