@@ -48,10 +48,10 @@ impl ClosePairs {
         Ok(())
     }
 
-    /// The map in `file` of so many points with these horizons, its arrays in place. With either `check` every list
-    /// is there, so that no use of it fails. With [`Check::Full`] each is also one that a build writes: of
-    /// points that are there, by distance, itself first, and none further than it is heard; and what stands
-    /// beside has its place, and would fit none in the list.
+    /// The map in `file` of so many points with these horizons, its arrays in place. With either `check`
+    /// every list is there, so that no use of it fails. With [`Check::Full`] each is also one that a build
+    /// writes: of points that are there, by distance, itself first, and none further than it is heard; and
+    /// what stands beside has its place, and would fit none in the list.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

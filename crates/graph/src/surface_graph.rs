@@ -292,9 +292,10 @@ impl SurfaceGraph {
         }
     }
 
-    /// The graph in `file` of points with these radii, its arrays in place. With either `check` no use of it fails. With
-    /// [`Check::Full`] arrays also agree with each other, lists are in order and lengths are lengths; whether
-    /// a distance is the shortest there is, or a confidence deserved, only a build could tell.
+    /// The graph in `file` of points with these radii, its arrays in place. With either `check` no use of it
+    /// fails. With [`Check::Full`] arrays also agree with each other, lists are in order and lengths are
+    /// lengths; whether a distance is the shortest there is, or a confidence deserved, only a build could
+    /// tell.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

@@ -16,7 +16,6 @@ pub use descent::{
     BoxVisitor, Comparison, Frontier, Heap, MostUrgent, Open, PairVisitor, PlaceVisitor, Plunging, Stack,
     TreePair, descend, resume,
 };
-pub use file::sections::HierarchyMeta;
 pub use patch::covering::Covering;
 pub use patch::samples::Samples;
 pub use point::gather::{GatherScratch, NeighbourList};
@@ -24,6 +23,7 @@ pub use point::kind::{PointKind, SLAB, THICKNESS};
 pub use point::leaf_block::{LeafBlock, Leaves};
 pub use scan::apart::{Extent, apart};
 pub use scan::build::PointHierarchy;
+pub use scan::data::HierarchyMeta;
 pub use scan::options::{BuildError, BuildOptions};
 pub use scan::outline::{Ball, Outline};
 pub use scan::slices::Slices;

@@ -2,6 +2,7 @@
 
 pub(crate) mod apart;
 pub(crate) mod build;
+pub(crate) mod data;
 pub(crate) mod evaluate;
 pub(crate) mod levels;
 pub(crate) mod nearest;

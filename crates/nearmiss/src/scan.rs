@@ -230,7 +230,7 @@ impl Scan {
 
     fn meta(&self) -> ScanMeta {
         ScanMeta {
-            hierarchy: self.hierarchy.meta(),
+            hierarchy: self.hierarchy.meta().clone(),
             graph: self.graph.as_ref().map(|graph| graph.meta()),
             density: self.density,
         }

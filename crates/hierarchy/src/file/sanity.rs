@@ -5,6 +5,7 @@
 mod leaves;
 #[cfg(test)]
 mod lies;
+mod limits;
 mod lists;
 mod metadata;
 mod nodes;
@@ -18,9 +19,6 @@ use nearmiss_store::Flaw;
 pub(crate) use metadata::checked_topology;
 
 use crate::scan::build::PointHierarchy;
-
-/// No stored length exceeds this, so that no square of one overflows. Frames keep coordinates below 2³⁴.
-const FARTHEST: f32 = (1_u64 << 40) as f32;
 
 impl PointHierarchy {
     /// What queries need to stay within their arrays and to end: lengths, and the metadata. O(1).
@@ -55,7 +53,7 @@ impl PointHierarchy {
         for id in self.topology.ids() {
             let bounds = tree.bounds(id);
             for i in self.topology.points(id) {
-                if bounds.reach < self.radii[i] {
+                if bounds.reach < self.arrays.radii[i] {
                     return wrong("the reach of node", id.index());
                 }
                 if !self.box_holds(id, i) {
@@ -64,7 +62,7 @@ impl PointHierarchy {
             }
         }
         lists::check_complete(self)?;
-        let mut sources: Vec<u32> = self.source.to_vec();
+        let mut sources: Vec<u32> = self.arrays.source.to_vec();
         sources.sort_unstable();
         match sources.windows(2).find(|two| two[0] == two[1]) {
             Some(two) => wrong("the place in the input, stored twice,", two[0] as usize),
@@ -80,7 +78,7 @@ impl PointHierarchy {
         let ball = f64::from(self.slices().ball(i).max(self.slices().obstacle_ball(i)));
         (0..3).all(|k| {
             let axis = double(bounds.axes[k]);
-            let spread = f64::from(self.discs[i]) * double(self.normals[i]).cross(&axis).norm();
+            let spread = f64::from(self.arrays.discs[i]) * double(self.arrays.normals[i]).cross(&axis).norm();
             d.dot(&axis).abs() + spread.max(ball) <= f64::from(bounds.half[k])
         })
     }

@@ -8,29 +8,29 @@ use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{map, on_threads};
 use nearmiss_lanes::vector::dot;
-use nearmiss_store::Array;
 use nearmiss_surface::{Metric, SurfacePlan};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
 use crate::bounds::part::Part;
-use crate::patch::covering::{Covering, Ground, coverings};
+use crate::patch::covering::{Ground, coverings};
 use crate::patch::enclosure::growths;
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::{lists, samples};
 use crate::patch::surfels::{Known, Surfels, align, surfels};
-use crate::point::gather::{Index, NeighbourList};
+use crate::point::gather::Index;
 use crate::point::kind::PointKind;
-use crate::point::leaf_block::{LeafBlock, LeafParts, Leaves};
+use crate::point::leaf_block::{LeafParts, Leaves};
 use crate::point::neighbours::neighbours;
+use crate::scan::data::{Arrays, HierarchyMeta};
 use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::ordered::Ordered;
 use crate::scan::outline::{Ball, Outline};
 use crate::scan::sampling::Sampling;
 use crate::scan::slices::Slices;
 use crate::tree::topology::Topology;
-use crate::tree::wide::{Bare, Growths, Root, Siblings, Tree, growths_of_siblings, siblings};
+use crate::tree::wide::{Bare, Root, Tree, growths_of_siblings, siblings};
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
 ///
@@ -38,41 +38,13 @@ use crate::tree::wide::{Bare, Growths, Root, Siblings, Tree, growths_of_siblings
 /// stand apart from each other, so that a moving scan can replace its bounds and keep its topology.
 #[derive(Debug, Clone)]
 pub struct PointHierarchy {
-    pub(crate) frame: Frame,
-    pub(crate) bounds: Aabb,
-    pub(crate) dropped: Dropped,
-    pub(crate) step: f64,
-    pub(crate) sampling_radius: f32,
-    pub(crate) reach: f32,
-    pub(crate) dense: u32,
-    pub(crate) leaf_size: u32,
-    pub(crate) radius_neighbours: u32,
-    pub(crate) samples_a_node: u32,
-    pub(crate) is_oriented: bool,
-    pub(crate) metric: Metric,
+    pub(crate) meta: HierarchyMeta,
+    /// The surface of `meta`, at the scale of the stored positions.
     pub(crate) plan: SurfacePlan,
-    /// Positions in leaf order, unpacked from `blocks` on first use.
-    pub(crate) positions: OnceLock<Arc<Vec<[f32; 3]>>>,
-    pub(crate) normals: Array<[f32; 3]>,
-    pub(crate) radii: Array<f32>,
-    pub(crate) discs: Array<f32>,
-    pub(crate) kinds: Array<u8>,
-    pub(crate) source: Array<u32>,
     pub(crate) topology: Topology,
-    pub(crate) root: Root,
-    pub(crate) siblings: Array<Siblings>,
-    /// By [`Part`].
-    pub(crate) growths: [Array<Growths>; 2],
-    pub(crate) leaf_blocks: Array<LeafBlock>,
-    /// The marks of each leaf: whether it holds sparse points or balls, and whether it is loose.
-    pub(crate) marks: Array<u8>,
-    pub(crate) outline: Outline,
-    pub(crate) sample_lists: Array<u32>,
-    pub(crate) coverings: Array<Covering>,
-    pub(crate) blocks: Array<PointBlock>,
-    pub(crate) groups: Array<PointBlock>,
-    pub(crate) lists: Array<NeighbourList>,
-    pub(crate) listed: Array<u32>,
+    pub(crate) arrays: Arrays,
+    /// Positions in leaf order, unpacked from the blocks on first use.
+    pub(crate) positions: OnceLock<Arc<Vec<[f32; 3]>>>,
 }
 
 impl PointHierarchy {
@@ -90,22 +62,26 @@ impl PointHierarchy {
     #[must_use]
     pub fn slices(&self) -> Slices<'_> {
         Slices {
-            normals: &self.normals,
-            radii: &self.radii,
-            discs: &self.discs,
-            kinds: &self.kinds,
+            normals: &self.arrays.normals,
+            radii: &self.arrays.radii,
+            discs: &self.arrays.discs,
+            kinds: &self.arrays.kinds,
             tree: self.tree(),
-            leaves: Leaves { topology: &self.topology, blocks: &self.leaf_blocks, marks: &self.marks },
-            outline: &self.outline,
-            blocks: &self.blocks,
-            sample_lists: &self.sample_lists,
-            coverings: &self.coverings,
-            leaf_size: self.leaf_size,
-            samples_a_node: self.samples_a_node,
+            leaves: Leaves {
+                topology: &self.topology,
+                blocks: &self.arrays.leaf_blocks,
+                marks: &self.arrays.marks,
+            },
+            outline: &self.meta.outline,
+            blocks: &self.arrays.blocks,
+            sample_lists: &self.arrays.sample_lists,
+            coverings: &self.arrays.coverings,
+            leaf_size: self.meta.leaf_size,
+            samples_a_node: self.meta.samples,
             plan: &self.plan,
-            sampling_radius: self.sampling_radius,
-            reach: self.reach,
-            dense: self.dense as usize,
+            sampling_radius: self.meta.sampling_radius,
+            reach: self.meta.reach,
+            dense: self.meta.dense as usize,
         }
     }
 
@@ -113,44 +89,44 @@ impl PointHierarchy {
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a cloud has at least eight points")]
     pub fn len(&self) -> usize {
-        self.source.len()
+        self.arrays.source.len()
     }
 
     /// The frame of the stored positions in the caller's.
     #[must_use]
     pub fn frame(&self) -> &Frame {
-        &self.frame
+        &self.meta.frame
     }
 
     /// Bounds of the points in the caller's frame.
     #[must_use]
     pub fn bounds(&self) -> &Aabb {
-        &self.bounds
+        &self.meta.bounds
     }
 
     /// What was left out of the input.
     #[must_use]
     pub fn dropped(&self) -> Dropped {
-        self.dropped
+        self.meta.dropped
     }
 
     /// Greatest change of a coordinate by rounding to `f32`, in the caller's units.
     #[must_use]
     pub fn step(&self) -> f64 {
-        self.step
+        self.meta.step
     }
 
     /// The 0.9-quantile of the local radii, in the caller's units.
     #[must_use]
     pub fn sampling_radius(&self) -> f64 {
-        f64::from(self.sampling_radius) * self.frame.scale
+        f64::from(self.meta.sampling_radius) * self.meta.frame.scale
     }
 
     /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and
     /// no local radius exceeds it.
     #[must_use]
     pub fn reach(&self) -> f64 {
-        f64::from(self.reach) * self.frame.scale
+        f64::from(self.meta.reach) * self.meta.frame.scale
     }
 
     /// Share of the points that stand in the obstacle by a sheet; the others stand there as balls.
@@ -170,19 +146,19 @@ impl PointHierarchy {
     /// Points of a full leaf.
     #[must_use]
     pub fn leaf_size(&self) -> u32 {
-        self.leaf_size
+        self.meta.leaf_size
     }
 
     /// K of the local radii.
     #[must_use]
     pub fn radius_neighbours(&self) -> u32 {
-        self.radius_neighbours
+        self.meta.radius_neighbours
     }
 
     /// Samples of an inner node.
     #[must_use]
     pub fn samples_a_node(&self) -> u32 {
-        self.samples_a_node
+        self.meta.samples
     }
 
     /// Positions in leaf order. A scan from a file makes them when they are first wanted, in O(n):
@@ -190,7 +166,7 @@ impl PointHierarchy {
     #[must_use]
     pub fn positions(&self) -> &[[f32; 3]] {
         self.positions.get_or_init(|| {
-            let (blocks, points): (&[PointBlock], _) = (&self.blocks, 0..self.len());
+            let (blocks, points): (&[PointBlock], _) = (&self.arrays.blocks, 0..self.len());
             Arc::new(points.map(|i| PointBlock::position_in(blocks, i)).collect())
         })
     }
@@ -199,13 +175,13 @@ impl PointHierarchy {
     /// turned](Self::turn_normals).
     #[must_use]
     pub fn normals(&self) -> &[[f32; 3]] {
-        &self.normals
+        &self.arrays.normals
     }
 
     /// Whether neighbouring normals are on the same side.
     #[must_use]
     pub fn is_oriented(&self) -> bool {
-        self.is_oriented
+        self.meta.is_oriented
     }
 
     /// Turns normals round that `oriented`, which differs from them in signs alone, has the other way. So
@@ -216,12 +192,12 @@ impl PointHierarchy {
     /// When there is not one for each point.
     pub fn turn_normals(&mut self, oriented: &[[f32; 3]]) {
         assert_eq!(oriented.len(), self.len(), "a normal a point");
-        for (normal, to) in self.normals.to_mut().iter_mut().zip(oriented) {
+        for (normal, to) in self.arrays.normals.to_mut().iter_mut().zip(oriented) {
             if dot(*normal, *to) < 0.0 {
                 *normal = normal.map(|c| -c);
             }
         }
-        self.is_oriented = true;
+        self.meta.is_oriented = true;
         self.renew_leaves();
     }
 
@@ -230,14 +206,15 @@ impl PointHierarchy {
     /// the enclosures are the same.
     pub(crate) fn bound(&mut self, boxes: &[OrientedBox], growths: Option<[&[Growth]; 2]>) {
         let topology = self.topology;
-        self.root.bounds = boxes[NodeId::ROOT.index()];
-        self.siblings = siblings(&topology, boxes).into();
+        self.meta.root.bounds = boxes[NodeId::ROOT.index()];
+        self.arrays.siblings = siblings(&topology, boxes).into();
         if let Some(growths) = growths {
-            self.root.growths = growths.map(|of| of[NodeId::ROOT.index()]);
-            self.growths = growths.map(|of| growths_of_siblings(&topology, of).into());
+            self.meta.root.growths = growths.map(|of| of[NodeId::ROOT.index()]);
+            let [surface, obstacle] = growths.map(|of| growths_of_siblings(&topology, of).into());
+            (self.arrays.surface_growths, self.arrays.obstacle_growths) = (surface, obstacle);
         }
         self.renew_leaves();
-        self.outline = self.outlined();
+        self.meta.outline = self.outlined();
     }
 
     /// Makes what leaves are compared by from the points and the boxes about them.
@@ -246,17 +223,17 @@ impl PointHierarchy {
         let bounds: Vec<OrientedBox> = map(topology.leaves(), |leaf| tree.bounds(topology.leaf(leaf)));
         let blocks = leaves.blocks(&topology, &bounds);
         let marks = map(topology.leaves(), |leaf| leaves.marks(&topology, leaf, &bounds[leaf]));
-        (self.leaf_blocks, self.marks) = (blocks.into(), marks.into());
+        (self.arrays.leaf_blocks, self.arrays.marks) = (blocks.into(), marks.into());
     }
 
     /// The arrays that leaf blocks are built from.
     pub(crate) fn leaf_parts(&self) -> LeafParts<'_> {
         LeafParts {
             positions: self.positions(),
-            normals: &self.normals,
-            discs: &self.discs,
-            kinds: &self.kinds,
-            dense: self.dense as usize,
+            normals: &self.arrays.normals,
+            discs: &self.arrays.discs,
+            kinds: &self.arrays.kinds,
+            dense: self.meta.dense as usize,
         }
     }
 
@@ -266,7 +243,7 @@ impl PointHierarchy {
         let mut hash = Xxh3::new();
         let frame = self.frame();
         hash.update(bytes_of(&[frame.origin[0], frame.origin[1], frame.origin[2], frame.scale]));
-        hash.update(bytes_of(&[self.leaf_size, self.samples_a_node, self.dense]));
+        hash.update(bytes_of(&[self.meta.leaf_size, self.meta.samples, self.meta.dense]));
         hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
         hash.update(bytemuck::cast_slice(self.positions()));
         hash.update(bytemuck::cast_slice(slices.discs));
@@ -274,20 +251,20 @@ impl PointHierarchy {
             identity: hash.digest(),
             surface: Ball::about(&slices.enclosure(0)),
             obstacle: Ball::about(&slices.obstacle_enclosure(0)),
-            discs: Ball::about(&self.root.bounds),
+            discs: Ball::about(&self.meta.root.bounds),
         }
     }
 
     /// Local sampling radii r_i.
     #[must_use]
     pub fn radii(&self) -> &[f32] {
-        &self.radii
+        &self.arrays.radii
     }
 
     /// Radii of the points' tangent discs.
     #[must_use]
     pub fn discs(&self) -> &[f32] {
-        &self.discs
+        &self.arrays.discs
     }
 
     /// What the neighbourhood of the `i`-th stored point looks like.
@@ -297,7 +274,7 @@ impl PointHierarchy {
     #[inline]
     #[must_use]
     pub fn kind(&self, i: usize) -> PointKind {
-        PointKind::from_code(self.kinds[i])
+        PointKind::from_code(self.arrays.kinds[i])
     }
 
     /// Share of the points that sample a sheet.
@@ -310,14 +287,14 @@ impl PointHierarchy {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     pub fn share(&self, kind: PointKind) -> f64 {
-        let count = self.kinds.iter().filter(|&&code| code == kind.code()).count();
+        let count = self.arrays.kinds.iter().filter(|&&code| code == kind.code()).count();
         count as f64 / self.len() as f64
     }
 
     /// For each stored point its index in the caller's input.
     #[must_use]
     pub fn source(&self) -> &[u32] {
-        &self.source
+        &self.arrays.source
     }
 
     /// The caller's id of the `i`-th stored point.
@@ -327,17 +304,17 @@ impl PointHierarchy {
     #[inline]
     #[must_use]
     pub fn id(&self, i: usize) -> PointId {
-        PointId(self.source[i])
+        PointId(self.arrays.source[i])
     }
 
     /// The nodes, and the boxes about them.
     #[must_use]
     pub fn tree(&self) -> Tree<'_> {
-        let [surface, obstacle] = &self.growths;
+        let (surface, obstacle) = (&self.arrays.surface_growths, &self.arrays.obstacle_growths);
         Tree {
             topology: &self.topology,
-            root: &self.root,
-            siblings: &self.siblings,
+            root: &self.meta.root,
+            siblings: &self.arrays.siblings,
             growths: [surface, obstacle],
         }
     }
@@ -346,14 +323,14 @@ impl PointHierarchy {
     #[inline]
     #[must_use]
     pub fn root_box(&self) -> &OrientedBox {
-        &self.root.bounds
+        &self.meta.root.bounds
     }
 
     /// The hash that identifies this scan, and its bounding balls.
     #[inline]
     #[must_use]
     pub fn outline(&self) -> &Outline {
-        &self.outline
+        &self.meta.outline
     }
 
     /// Which nodes there are, and which points lie under them.
@@ -383,31 +360,31 @@ impl PointHierarchy {
     /// §6.1); what points keep, and their neighbour lists, is not counted.
     #[must_use]
     pub fn bytes_of_nodes(&self) -> usize {
-        size_of_val::<[_]>(&self.siblings)
-            + 2 * size_of_val::<[_]>(&self.growths[0])
-            + size_of_val::<[_]>(&self.sample_lists)
-            + size_of_val::<[_]>(&self.coverings)
+        size_of_val::<[_]>(&self.arrays.siblings)
+            + 2 * size_of_val::<[_]>(&self.arrays.surface_growths)
+            + size_of_val::<[_]>(&self.arrays.sample_lists)
+            + size_of_val::<[_]>(&self.arrays.coverings)
     }
 
     /// The points in blocks: `i` stands in lane `i` % 16 of block `i` / 16.
     #[must_use]
     pub fn blocks(&self) -> &[PointBlock] {
-        &self.blocks
+        &self.arrays.blocks
     }
 
     /// For each block of points, a ball that contains the supports of all its points, with the ball's radius
     /// in place of a horizon. The ball of block `i` is in lane `i` % 16 of group `i` / 16.
     #[must_use]
     pub fn groups(&self) -> &[PointBlock] {
-        &self.groups
+        &self.arrays.groups
     }
 
     /// The groups of which a point may be heard within some distance of the middle of the ball of `block`,
     /// ascending, with that distance; `None` where they are too many, or there is no such block.
     #[must_use]
     pub fn neighbours(&self, block: usize) -> Option<(f32, &[u32])> {
-        let list = self.lists.get(block).filter(|list| list.within > 0.0)?;
-        let entries = self.listed.get(list.first as usize..)?.get(..list.count as usize)?;
+        let list = self.arrays.lists.get(block).filter(|list| list.within > 0.0)?;
+        let entries = self.arrays.listed.get(list.first as usize..)?.get(..list.count as usize)?;
         Some((list.within, entries))
     }
 }
@@ -444,7 +421,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let coverings = coverings(&ground, |id| samples(&sample_lists, &topology, id, options.samples));
     drop((flat, cells));
 
-    let mut hierarchy = PointHierarchy {
+    let meta = HierarchyMeta {
         frame: cloud.frame(),
         bounds: cloud.bounds(),
         dropped: cloud.dropped(),
@@ -454,30 +431,30 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         dense: id32(dense),
         leaf_size: options.leaf_size,
         radius_neighbours: options.radius_neighbours,
-        samples_a_node: options.samples,
+        samples: options.samples,
         is_oriented: false,
         metric: Metric::Euclidean,
-        plan,
-        positions: Arc::new(positions).into(),
+        surface: *plan.options(),
+        root: Root::default(),
+        outline: Outline::default(),
+    };
+    let arrays = Arrays {
+        blocks: blocks.into(),
+        sample_lists: sample_lists.into(),
+        coverings: coverings.into(),
+        groups: groups.into(),
+        lists: lists_of_blocks.lists.into(),
+        listed: lists_of_blocks.entries.into(),
         normals: normals.into(),
         radii: radii.into(),
         discs: discs.into(),
         kinds: kinds.into(),
         source: source.into(),
-        topology,
-        root: Root::default(),
-        siblings: Array::default(),
-        growths: Default::default(),
-        leaf_blocks: Array::default(),
-        marks: Array::default(),
-        outline: Outline::default(),
-        sample_lists: sample_lists.into(),
-        coverings: coverings.into(),
-        blocks: blocks.into(),
-        groups: groups.into(),
-        lists: lists_of_blocks.lists.into(),
-        listed: lists_of_blocks.entries.into(),
+        // Made of the others by `bound`.
+        ..Arrays::default()
     };
+    let positions = Arc::new(positions).into();
+    let mut hierarchy = PointHierarchy { meta, plan, topology, arrays, positions };
     hierarchy.bound(&boxes, Some([&growths, &obstacle_growths]));
     Ok(hierarchy)
 }

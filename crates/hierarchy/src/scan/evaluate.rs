@@ -41,11 +41,11 @@ impl PointHierarchy {
     /// the place is ambiguous; unless they [are oriented](Self::is_oriented) all is as there.
     pub fn evaluate_oriented_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let at = self.evaluate_with(x, scratch);
-        if !self.is_oriented || at.support == 0 {
+        if !self.meta.is_oriented || at.support == 0 {
             return at;
         }
         self.index().collect(scratch.level, Centre::new(x).rounded(), 0.0, &mut scratch.found);
-        let (blocks, normals): (&[PointBlock], &[[f32; 3]]) = (&self.blocks, &self.normals);
+        let (blocks, normals): (&[PointBlock], &[[f32; 3]]) = (&self.arrays.blocks, &self.arrays.normals);
         let (mut sum, mut total) = ([0.0; 3], 0.0);
         for &group in &scratch.found {
             let first = group as usize * GROUP;
@@ -91,10 +91,10 @@ impl PointHierarchy {
     pub(crate) fn index(&self) -> Index<'_> {
         Index {
             tree: self.tree(),
-            blocks: &self.blocks,
-            groups: &self.groups,
-            lists: &self.lists,
-            listed: &self.listed,
+            blocks: &self.arrays.blocks,
+            groups: &self.arrays.groups,
+            lists: &self.arrays.lists,
+            listed: &self.arrays.listed,
             plan: &self.plan,
         }
     }

@@ -121,7 +121,7 @@ impl PointHierarchy {
     fn nearest_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3], reach: f64) -> (u32, u32) {
         let nearest = self.nearest_of_leaf(simd, i, x);
         let place = nearest.rounded;
-        let own_leaf = i / self.leaf_size as usize;
+        let own_leaf = i / self.meta.leaf_size as usize;
         let mut search = Search { scan: self, nearest, own_leaf, reach_sq: reach * reach, looked_at: 1 };
         // Nothing ends it.
         let _whole = self.tree().descend_to_by(simd, place, &mut search);
@@ -148,12 +148,12 @@ impl PointHierarchy {
         let listed = self.index().list(i / PointBlock::WIDTH, nearest.rounded, nearest.within)?;
         let points = 0..self.len();
         for &group in listed {
-            let balls = self.groups.get(group as usize)?;
+            let balls = self.arrays.groups.get(group as usize)?;
             let d = seen_from(simd, &balls.position, nearest.rounded);
             let reach = f32x16::load_array_ref(simd, &balls.horizon) + nearest.within;
             let near: mask32x16<S> = product(d, d).simd_le(reach * reach * GROWN);
             let first = group as usize * PointBlock::WIDTH;
-            let mut left = bits(near) & lanes_of(group as usize, &(0..self.blocks.len()));
+            let mut left = bits(near) & lanes_of(group as usize, &(0..self.arrays.blocks.len()));
             while left != 0 {
                 let block = first + left.trailing_zeros() as usize;
                 left &= left - 1;
@@ -167,8 +167,8 @@ impl PointHierarchy {
     #[inline(always)]
     fn nearest_of_leaf<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Nearest {
         let mut nearest = Nearest::new(x, self.bounds_radius());
-        nearest.offer(i, PointBlock::position_in(&self.blocks, i));
-        self.offer_leaf(simd, i / self.leaf_size as usize, &mut nearest);
+        nearest.offer(i, PointBlock::position_in(&self.arrays.blocks, i));
+        self.offer_leaf(simd, i / self.meta.leaf_size as usize, &mut nearest);
         nearest
     }
 
@@ -185,19 +185,19 @@ impl PointHierarchy {
     /// at once.
     #[inline(always)]
     fn offer_block<S: Simd>(&self, simd: S, block: usize, points: &Range<usize>, nearest: &mut Nearest) {
-        let d = seen_from(simd, &self.blocks[block].position, nearest.rounded);
+        let d = seen_from(simd, &self.arrays.blocks[block].position, nearest.rounded);
         let near: mask32x16<S> = product(d, d).simd_le(nearest.most);
         let mut left = bits(near) & lanes_of(block, points);
         while left != 0 {
             let i = block * PointBlock::WIDTH + left.trailing_zeros() as usize;
             left &= left - 1;
-            nearest.offer(i, PointBlock::position_in(&self.blocks, i));
+            nearest.offer(i, PointBlock::position_in(&self.arrays.blocks, i));
         }
     }
 
     /// No stored coordinate is greater.
     fn bounds_radius(&self) -> f64 {
-        let bounds = self.root.bounds;
+        let bounds = self.meta.root.bounds;
         let OrientedBox { centre, .. } = bounds;
         f64::from(bounds.radius()) + f64::from(centre.iter().fold(0.0_f32, |far, c| far.max(c.abs())))
     }

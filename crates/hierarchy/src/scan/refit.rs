@@ -27,7 +27,7 @@ impl PointHierarchy {
     /// them. Only of the Euclidean metric enclosures and covering radii are proven to contain the surface.
     #[must_use]
     pub fn metric(&self) -> Metric {
-        self.metric
+        self.meta.metric
     }
 
     /// Fits the surface at every point by another `metric`: `fit` gives f at a stored point, and adds the
@@ -57,8 +57,8 @@ impl PointHierarchy {
         });
         let mut surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
         let mut fits: Vec<Fit> = surfels.iter().map(|s| Fit { normal: s.normal, kind: s.kind }).collect();
-        let neighbours = BlockBoxes::new(&self.blocks, self.len());
-        vote(&neighbours.over(&self.blocks), self.positions(), &self.radii, &mut fits);
+        let neighbours = BlockBoxes::new(&self.arrays.blocks, self.len());
+        vote(&neighbours.over(&self.arrays.blocks), self.positions(), &self.arrays.radii, &mut fits);
         let corrected: Vec<usize> = (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].kind).collect();
         let discs = chunks(&corrected, |points| {
             let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
@@ -67,14 +67,14 @@ impl PointHierarchy {
                 fit(id32(i), &mut scratch, &mut heard);
                 self.gather(&heard, &mut near);
                 let fit = Fit { normal: self.on_its_side(i, fits[i].normal), ..fits[i] };
-                surfel_of(&fit, self.positions()[i], (self.radii[i], self.reach), &near)
+                surfel_of(&fit, self.positions()[i], (self.arrays.radii[i], self.meta.reach), &near)
             };
             points.iter().map(surfel).collect::<Vec<_>>()
         });
         for (i, disc) in corrected.into_iter().zip(discs.into_iter().flatten()) {
             surfels[i] = disc;
         }
-        self.metric = metric;
+        self.meta.metric = metric;
         self.replace(&surfels);
     }
 
@@ -84,7 +84,7 @@ impl PointHierarchy {
         for points in points.chunks(PointBlock::WIDTH) {
             let mut block = PointBlock::EMPTY;
             for (lane, &i) in points.iter().enumerate() {
-                let horizon = self.plan.horizon(self.radii[i as usize]);
+                let horizon = self.plan.horizon(self.arrays.radii[i as usize]);
                 self.plan.put(&mut block, lane, self.positions()[i as usize], horizon);
             }
             blocks.push(block);
@@ -99,27 +99,27 @@ impl PointHierarchy {
             _ => Look::Area,
         };
         let fit = fitted(at, look);
-        let surfel = surfel_of(&fit, self.positions()[i], (self.radii[i], self.reach), near);
+        let surfel = surfel_of(&fit, self.positions()[i], (self.arrays.radii[i], self.meta.reach), near);
         Surfel { normal: self.on_its_side(i, surfel.normal), ..surfel }
     }
 
     /// A normal of point `i`, on the side of that which it has.
     fn on_its_side(&self, i: usize, normal: [f32; 3]) -> [f32; 3] {
-        if dot(normal, self.normals[i]) < 0.0 { normal.map(|c| -c) } else { normal }
+        if dot(normal, self.arrays.normals[i]) < 0.0 { normal.map(|c| -c) } else { normal }
     }
 
     /// Takes these discs for its own, and bounds them.
     fn replace(&mut self, surfels: &[Surfel]) {
-        let leaf_size = self.leaf_size as usize;
+        let leaf_size = self.meta.leaf_size as usize;
         let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
-        let disc = |(s, &r): (&Surfel, &f32)| s.disc_within(ball(s.kind, r, self.sampling_radius));
-        let discs: Vec<f32> = surfels.iter().zip(&self.radii).map(disc).collect();
-        let dense = self.dense as usize;
+        let disc = |(s, &r): (&Surfel, &f32)| s.disc_within(ball(s.kind, r, self.meta.sampling_radius));
+        let discs: Vec<f32> = surfels.iter().zip(&self.arrays.radii).map(disc).collect();
+        let dense = self.meta.dense as usize;
         let ball = |(i, (s, &r)): (usize, (&Surfel, &f32))| {
-            ball(s.kind, r, self.sampling_radius).max(obstacle_ball(i, dense, s.kind, r))
+            ball(s.kind, r, self.meta.sampling_radius).max(obstacle_ball(i, dense, s.kind, r))
         };
-        let balls: Vec<f32> = surfels.iter().zip(&self.radii).enumerate().map(ball).collect();
-        if !self.is_oriented {
+        let balls: Vec<f32> = surfels.iter().zip(&self.arrays.radii).enumerate().map(ball).collect();
+        if !self.meta.is_oriented {
             normals.chunks_mut(leaf_size).for_each(align);
         }
         let (topology, positions) = (self.topology, self.positions());
@@ -134,16 +134,16 @@ impl PointHierarchy {
             growths: &growths,
             positions,
             normals: &normals,
-            radii: &self.radii,
+            radii: &self.arrays.radii,
             discs: &flat,
             cells: &flat,
         };
         let coverings =
-            coverings(&ground, |id| samples(&self.sample_lists, &topology, id, self.samples_a_node));
-        self.kinds = surfels.iter().map(|s| s.kind.code()).collect::<Vec<_>>().into();
-        self.normals = normals.into();
-        self.discs = discs.into();
-        self.coverings = coverings.into();
+            coverings(&ground, |id| samples(&self.arrays.sample_lists, &topology, id, self.meta.samples));
+        self.arrays.kinds = surfels.iter().map(|s| s.kind.code()).collect::<Vec<_>>().into();
+        self.arrays.normals = normals.into();
+        self.arrays.discs = discs.into();
+        self.arrays.coverings = coverings.into();
         self.bound(&boxes, None);
     }
 }

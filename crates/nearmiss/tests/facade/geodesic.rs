@@ -261,7 +261,7 @@ fn without_the_map_there_is_no_such_scan() {
     // Files that claim it.
     for scan in [&bare, &without] {
         let meta =
-            Meta { hierarchy: whole.meta(), graph: scan.graph().map(|graph| graph.meta()), density: None };
+            Meta { hierarchy: whole.meta().clone(), graph: scan.graph().map(|g| g.meta()), density: None };
         let (mut writer, mut bytes) = (Writer::new(*b"SCAN", 9), Vec::new());
         writer.metadata(&meta).unwrap();
         (*whole).add_to(&mut writer).unwrap();

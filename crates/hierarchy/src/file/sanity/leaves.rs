@@ -9,8 +9,8 @@ use nearmiss_store::Flaw;
 /// Checks that the blocks and marks of all leaves are those of their points.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let (topology, parts) = (scan.topology(), scan.leaf_parts());
-    let blocks_a_leaf = scan.leaf_blocks.len() / topology.leaves();
-    let (stored, marks) = (&*scan.leaf_blocks, &*scan.marks);
+    let blocks_a_leaf = scan.arrays.leaf_blocks.len() / topology.leaves();
+    let (stored, marks) = (&*scan.arrays.leaf_blocks, &*scan.arrays.marks);
     let wrong = ranges(topology.leaves(), |mut leaves| {
         leaves.find(|&leaf| {
             let bounds = scan.tree().bounds(topology.leaf(leaf));

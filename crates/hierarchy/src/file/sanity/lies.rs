@@ -56,7 +56,7 @@ fn place(scan: &PointHierarchy, id: usize) -> (usize, usize) {
 /// A box lies.
 fn lying(scan: &mut PointHierarchy, id: usize, lie: impl FnOnce(&mut OrientedBox)) {
     let (parent, lane) = place(scan, id);
-    let siblings = &mut scan.siblings.to_mut()[parent];
+    let siblings = &mut scan.arrays.siblings.to_mut()[parent];
     let mut bounds = siblings.get(lane);
     lie(&mut bounds);
     siblings.set(lane, &bounds);
@@ -72,13 +72,13 @@ fn boxes_that_are_none() {
             wrong(&|bounds| bounds.axes[k][1] = value);
         }
         wrong(&|bounds| bounds.reach = value);
-        plain("the box of the root is wrong", |scan| scan.root.bounds.half[0] = value);
+        plain("the box of the root is wrong", |scan| scan.meta.root.bounds.half[0] = value);
     }
     wrong(&|bounds| bounds.half[2] = -1e-3);
     wrong(&|bounds| bounds.axes[2][0] = 1.01);
     wrong(&|bounds| bounds.axes = [[0.0; 3]; 3]);
     wrong(&|bounds| bounds.axes[1] = bounds.axes[0]);
-    deep("the box of node 0", |scan| scan.root.bounds.axes[1] = scan.root.bounds.axes[0]);
+    deep("the box of node 0", |scan| scan.meta.root.bounds.axes[1] = scan.meta.root.bounds.axes[0]);
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn lanes_without_a_child_that_say_something() {
     let inner = scan.topology().ids().take(scan.topology().inner());
     let few = inner.into_iter().find(|&id| scan.topology().children(id).len() < 4).unwrap();
     deep(&format!("the boxes of the children of node {}", few.0), |scan| {
-        scan.siblings.to_mut()[few.index()].half[0][3] = 7.0;
+        scan.arrays.siblings.to_mut()[few.index()].half[0][3] = 7.0;
     });
 }
 
@@ -116,7 +116,8 @@ fn enclosures_that_are_none() {
     for part in 0..2 {
         deep("the enclosure of node 7", |scan| {
             let (parent, lane) = place(scan, 7);
-            scan.growths[part].to_mut()[parent].0[1][lane] = 0x8001;
+            let growths = [&mut scan.arrays.surface_growths, &mut scan.arrays.obstacle_growths];
+            growths[part].to_mut()[parent].0[1][lane] = 0x8001;
         });
     }
 }
@@ -125,15 +126,17 @@ fn enclosures_that_are_none() {
 fn leaves_that_are_not_their_points() {
     for (leaf, lane) in [(0, 3), (7, 15), (18, 12), (18, 13)] {
         let block = format!("the block of leaf {leaf}");
-        deep(&block, |scan| scan.leaf_blocks.to_mut()[leaf].set(lane, [0.01; 3], [1.0, 0.0, 0.0], 0.02));
-        deep(&block, |scan| scan.leaf_blocks.to_mut()[leaf].half[1] *= 2.0);
-        deep(&block, |scan| scan.marks.to_mut()[leaf] ^= 1);
+        deep(&block, |scan| {
+            scan.arrays.leaf_blocks.to_mut()[leaf].set(lane, [0.01; 3], [1.0, 0.0, 0.0], 0.02)
+        });
+        deep(&block, |scan| scan.arrays.leaf_blocks.to_mut()[leaf].half[1] *= 2.0);
+        deep(&block, |scan| scan.arrays.marks.to_mut()[leaf] ^= 1);
     }
 }
 
 /// A position lies.
 fn lie_of_position(scan: &mut PointHierarchy, i: usize, k: usize, value: f32) {
-    scan.blocks.to_mut()[i / 16].position[k][i % 16] = value;
+    scan.arrays.blocks.to_mut()[i / 16].position[k][i % 16] = value;
     scan.positions = OnceLock::new();
 }
 
@@ -144,19 +147,19 @@ fn points_that_no_build_writes() {
         let named = |words: &str| format!("{words} of point {i}");
         for value in NONE {
             deep(&named("the position"), |scan| lie_of_position(scan, i, 1, value));
-            deep(&named("the normal"), |scan| scan.normals.to_mut()[i][2] = value);
+            deep(&named("the normal"), |scan| scan.arrays.normals.to_mut()[i][2] = value);
         }
         for value in NONE.into_iter().chain([0.0, -0.1, 1e3]) {
-            deep(&named("the radius"), |scan| scan.radii.to_mut()[i] = value);
-            deep(&named("the disc"), |scan| scan.discs.to_mut()[i] = value);
+            deep(&named("the radius"), |scan| scan.arrays.radii.to_mut()[i] = value);
+            deep(&named("the disc"), |scan| scan.arrays.discs.to_mut()[i] = value);
         }
         deep(&format!("the box about point {i}"), |scan| {
             let x = scan.slices().position(i)[0];
             lie_of_position(scan, i, 0, x + 1.0);
         });
-        deep(&named("the normal"), |scan| scan.normals.to_mut()[i] = [0.0; 3]);
-        deep(&named("the kind"), |scan| scan.kinds.to_mut()[i] = 6);
-        deep(&named("the place in the input"), |scan| scan.source.to_mut()[i] = 301);
+        deep(&named("the normal"), |scan| scan.arrays.normals.to_mut()[i] = [0.0; 3]);
+        deep(&named("the kind"), |scan| scan.arrays.kinds.to_mut()[i] = 6);
+        deep(&named("the place in the input"), |scan| scan.arrays.source.to_mut()[i] = 301);
     }
 }
 
@@ -165,37 +168,37 @@ fn blocks_that_are_not_the_points() {
     // The last block is not full: what stands in its empty lanes counts too.
     for (block, lane) in [(0, 3), (7, 15), (18, 12), (18, 13)] {
         let copy = format!("the copy of the points of block {block}");
-        deep(&copy, |scan| scan.blocks.to_mut()[block].position[1][lane] = 7.0);
-        deep(&copy, |scan| scan.blocks.to_mut()[block].horizon[lane] += 0.5);
+        deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].position[1][lane] = 7.0);
+        deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].horizon[lane] += 0.5);
     }
     for value in NONE.into_iter().chain([0.0, -1.0]) {
-        deep("the ball about block 5", |scan| scan.groups.to_mut()[0].horizon[5] = value);
+        deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].horizon[5] = value);
     }
-    deep("the ball about block 5", |scan| scan.groups.to_mut()[0].horizon[5] *= 0.99);
-    deep("the ball about block 5", |scan| scan.groups.to_mut()[0].position[2][5] += 0.5);
-    deep("the ball about block 5", |scan| scan.groups.to_mut()[0].position[2][5] = f32::NAN);
+    deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].horizon[5] *= 0.99);
+    deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] += 0.5);
+    deep("the ball about block 5", |scan| scan.arrays.groups.to_mut()[0].position[2][5] = f32::NAN);
 }
 
 #[test]
 fn lists_that_are_none() {
     let words = "the neighbour list of block 4";
     for value in NONE {
-        deep(words, |scan| scan.lists.to_mut()[4].within = value);
+        deep(words, |scan| scan.arrays.lists.to_mut()[4].within = value);
     }
     for value in [129, u32::MAX] {
-        deep(words, |scan| scan.lists.to_mut()[4].count = value);
+        deep(words, |scan| scan.arrays.lists.to_mut()[4].count = value);
     }
     for value in [1 << 20, u32::MAX] {
-        deep(words, |scan| scan.lists.to_mut()[4].first = value);
+        deep(words, |scan| scan.arrays.lists.to_mut()[4].first = value);
     }
-    let at = honest().lists[4].first as usize;
-    deep(words, |scan| scan.listed.to_mut()[at + 1] = scan.listed[at]);
+    let at = honest().arrays.lists[4].first as usize;
+    deep(words, |scan| scan.arrays.listed.to_mut()[at + 1] = scan.arrays.listed[at]);
     deep(words, |scan| {
-        let last = at + scan.lists[4].count as usize - 1;
-        scan.listed.to_mut()[last] = 19;
+        let last = at + scan.arrays.lists[4].count as usize - 1;
+        scan.arrays.listed.to_mut()[last] = 19;
     });
     plain("lists has 18 entries where 19 belong", |scan| {
-        scan.lists = scan.lists[1..].to_vec().into();
+        scan.arrays.lists = scan.arrays.lists[1..].to_vec().into();
     });
 }
 
@@ -203,7 +206,7 @@ fn lists_that_are_none() {
 fn a_list_that_leaves_a_block_out_is_for_the_thorough_check() {
     for block in [0, 4, 18] {
         let mut scan = honest();
-        scan.lists.to_mut()[block].count = 1;
+        scan.arrays.lists.to_mut()[block].count = 1;
         assert_eq!(scan.check_contents(), Ok(()), "one pass does not see it");
         let found = scan.sanity_check();
         assert!(matches!(found, Err(Flaw::Value { index, .. }) if index == block), "{found:?}");
@@ -215,26 +218,27 @@ fn samples_and_coverings_that_are_none() {
     let scan = honest();
     let topology = scan.topology();
     let inner = topology.ids().take(topology.inner());
-    let id = inner.rev().find(|&id| topology.points(id).len() > scan.samples_a_node as usize).unwrap();
-    let (at, points) = (id.index() * scan.samples_a_node as usize, topology.points(id));
+    let id = inner.rev().find(|&id| topology.points(id).len() > scan.meta.samples as usize).unwrap();
+    let (at, points) = (id.index() * scan.meta.samples as usize, topology.points(id));
     let named = format!("a sample of node {}", id.0);
     for value in [id32(points.start).wrapping_sub(1), id32(points.end), 301, u32::MAX] {
-        deep(&named, |scan| scan.sample_lists.to_mut()[at + 3] = value);
+        deep(&named, |scan| scan.arrays.sample_lists.to_mut()[at + 3] = value);
     }
-    deep(&named, |scan| scan.sample_lists.to_mut()[at + 3] = scan.sample_lists[at + 2]);
+    deep(&named, |scan| scan.arrays.sample_lists.to_mut()[at + 3] = scan.arrays.sample_lists[at + 2]);
     for value in [f32::NAN, -1.0, f32::NEG_INFINITY] {
-        deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].radius = value);
-        deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].sampling = value);
-        deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].spacing = value);
+        deep("the covering of node 5", |scan| scan.arrays.coverings.to_mut()[5].radius = value);
+        deep("the covering of node 5", |scan| scan.arrays.coverings.to_mut()[5].sampling = value);
+        deep("the covering of node 5", |scan| scan.arrays.coverings.to_mut()[5].spacing = value);
     }
-    deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].sampling = 1e3);
-    deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].spacing = 2e12);
-    deep("the covering of node 5", |scan| scan.coverings.to_mut()[5].spacing *= 10.0);
+    deep("the covering of node 5", |scan| scan.arrays.coverings.to_mut()[5].sampling = 1e3);
+    deep("the covering of node 5", |scan| scan.arrays.coverings.to_mut()[5].spacing = 2e12);
+    deep("the covering of node 5", |scan| scan.arrays.coverings.to_mut()[5].spacing *= 10.0);
     deep("the covering of node 0", |scan| {
-        scan.coverings.to_mut()[0] = Covering { radius: 0.1, sampling: 0.1, ..scan.coverings[0] };
+        scan.arrays.coverings.to_mut()[0] =
+            Covering { radius: 0.1, sampling: 0.1, ..scan.arrays.coverings[0] };
     });
     for value in [0, 7, 33, u32::MAX] {
-        let [structure, full] = found(|scan| scan.samples_a_node = value);
+        let [structure, full] = found(|scan| scan.meta.samples = value);
         assert!(structure.is_some() && full.is_some(), "{value} samples a node");
     }
 }
@@ -242,32 +246,32 @@ fn samples_and_coverings_that_are_none() {
 #[test]
 fn metadata_that_no_build_writes() {
     for value in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e-320, f64::MAX] {
-        plain("the frame of the stored positions is wrong", |scan| scan.frame.scale = value);
+        plain("the frame of the stored positions is wrong", |scan| scan.meta.frame.scale = value);
     }
     for value in [f64::NAN, f64::INFINITY] {
-        plain("the frame of the stored positions is wrong", |scan| scan.frame.origin[2] = value);
-        plain("the box of bounds is wrong", |scan| scan.bounds.max[0] = value);
-        plain("what rounding cost is wrong", |scan| scan.step = value);
+        plain("the frame of the stored positions is wrong", |scan| scan.meta.frame.origin[2] = value);
+        plain("the box of bounds is wrong", |scan| scan.meta.bounds.max[0] = value);
+        plain("what rounding cost is wrong", |scan| scan.meta.step = value);
     }
-    plain("the box of bounds is wrong", |scan| scan.bounds.min[0] = 7.0);
-    deep("the box of bounds", |scan| scan.bounds.min[0] -= 1e-9);
-    deep("the box of bounds", |scan| scan.frame.origin[1] = 0.5);
+    plain("the box of bounds is wrong", |scan| scan.meta.bounds.min[0] = 7.0);
+    deep("the box of bounds", |scan| scan.meta.bounds.min[0] -= 1e-9);
+    deep("the box of bounds", |scan| scan.meta.frame.origin[1] = 0.5);
     for value in [f32::NAN, f32::INFINITY, 0.0, -1.0, 2e12] {
-        plain("the sampling radius is wrong", |scan| scan.sampling_radius = value);
+        plain("the sampling radius is wrong", |scan| scan.meta.sampling_radius = value);
     }
-    deep("the sampling radius", |scan| scan.sampling_radius *= 1.01);
-    deep("the sampling radius", |scan| scan.sampling_radius *= 0.99);
+    deep("the sampling radius", |scan| scan.meta.sampling_radius *= 1.01);
+    deep("the sampling radius", |scan| scan.meta.sampling_radius *= 0.99);
     for value in [0, 2, 33, u32::MAX] {
-        plain("the number of neighbours for a radius is wrong", |scan| scan.radius_neighbours = value);
+        plain("the number of neighbours for a radius is wrong", |scan| scan.meta.radius_neighbours = value);
     }
-    plain("the number of dropped points is wrong", |scan| scan.dropped.duplicate = usize::MAX);
+    plain("the number of dropped points is wrong", |scan| scan.meta.dropped.duplicate = usize::MAX);
 }
 
 #[test]
 fn a_point_stored_twice_is_for_the_thorough_check() {
     let mut scan = honest();
-    let first = scan.source[0];
-    scan.source.to_mut()[9] = first;
+    let first = scan.arrays.source[0];
+    scan.arrays.source.to_mut()[9] = first;
     assert_eq!(scan.check_contents(), Ok(()), "one pass does not see it");
     assert!(matches!(scan.sanity_check(), Err(Flaw::Value { index, .. }) if index == first as usize));
 }

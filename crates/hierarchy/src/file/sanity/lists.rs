@@ -19,12 +19,12 @@ fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
 /// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that
 /// lists ascend and name groups.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
-    check_ranges(&scan.lists, scan.listed.len())?;
-    let blocks = scan.plan.blocks(scan.positions(), &scan.radii);
-    let differs = blocks.zip(&scan.blocks).position(|(expected, found)| expected != *found);
+    check_ranges(&scan.arrays.lists, scan.arrays.listed.len())?;
+    let blocks = scan.plan.blocks(scan.positions(), &scan.arrays.radii);
+    let differs = blocks.zip(&scan.arrays.blocks).position(|(expected, found)| expected != *found);
     Flaw::first("the copy of the points of block", differs)?;
-    let left_out = scan.blocks.iter().enumerate().position(|(number, block)| {
-        let group = &scan.groups[number / PointBlock::WIDTH];
+    let left_out = scan.arrays.blocks.iter().enumerate().position(|(number, block)| {
+        let group = &scan.arrays.groups[number / PointBlock::WIDTH];
         let lane = number % PointBlock::WIDTH;
         let ([cx, cy, cz], radius) = (group.position.map(|c| c[lane]), group.horizon[lane]);
         let PointBlock { position: [x, y, z], horizon, .. } = block;
@@ -40,9 +40,10 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         !(radius.is_finite() && held.iter().all(|&held| held != 0))
     });
     Flaw::first("the ball about block", left_out)?;
-    let count = scan.groups.len();
-    let wrong = scan.lists.iter().position(|list| {
-        let entries = scan.listed.get(list.first as usize..).and_then(|rest| rest.get(..list.count as usize));
+    let count = scan.arrays.groups.len();
+    let wrong = scan.arrays.lists.iter().position(|list| {
+        let entries =
+            scan.arrays.listed.get(list.first as usize..).and_then(|rest| rest.get(..list.count as usize));
         let ascend = |entries: &[u32]| {
             entries.windows(2).all(|two| two[0] < two[1])
                 && entries.last().is_none_or(|&b| (b as usize) < count)
@@ -55,7 +56,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
 /// Checks that no list leaves out a group of which a point is heard where the list is said to be complete.
 pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
     let mut found = Vec::new();
-    let incomplete = (0..scan.blocks.len()).position(|block| {
+    let incomplete = (0..scan.arrays.blocks.len()).position(|block| {
         let index = scan.index();
         let (Some((within, list)), Some([cx, cy, cz])) = (scan.neighbours(block), index.middle(block)) else {
             return false;
@@ -69,7 +70,7 @@ pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
         };
         let blocks = |group: u32| {
             let first = group as usize * PointBlock::WIDTH;
-            &scan.blocks[first..(first + PointBlock::WIDTH).min(scan.blocks.len())]
+            &scan.arrays.blocks[first..(first + PointBlock::WIDTH).min(scan.arrays.blocks.len())]
         };
         found.iter().any(|&group| list.binary_search(&group).is_err() && blocks(group).iter().any(is_heard))
     });

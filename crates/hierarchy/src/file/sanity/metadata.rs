@@ -5,7 +5,7 @@ use nearmiss_index::PointBlock;
 
 use nearmiss_store::Flaw;
 
-use super::FARTHEST;
+use super::limits::FARTHEST;
 use super::nodes::is_in_range;
 use crate::patch::samples::SAMPLES;
 use crate::point::leaf_block::LeafParts;
@@ -38,21 +38,21 @@ impl PointHierarchy {
         let (leaves, inner) = (self.topology.leaves(), self.topology.inner());
         let blocks = points.div_ceil(PointBlock::WIDTH);
         let expected = [
-            ("normals", self.normals.len(), points),
-            ("radii", self.radii.len(), points),
-            ("discs", self.discs.len(), points),
-            ("kinds", self.kinds.len(), points),
-            ("source", self.source.len(), points),
-            ("boxes", self.siblings.len(), inner),
-            ("growths", self.growths[0].len(), inner),
-            ("growths of the obstacle", self.growths[1].len(), inner),
-            ("leaves", self.leaf_blocks.len(), leaves * LeafParts::blocks_a_leaf(&self.topology)),
-            ("marks", self.marks.len(), leaves),
-            ("blocks", self.blocks.len(), blocks),
-            ("samples", self.sample_lists.len(), inner.saturating_mul(self.samples_a_node as usize)),
-            ("coverings", self.coverings.len(), self.topology.len()),
-            ("groups", self.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
-            ("lists", self.lists.len(), blocks),
+            ("normals", self.arrays.normals.len(), points),
+            ("radii", self.arrays.radii.len(), points),
+            ("discs", self.arrays.discs.len(), points),
+            ("kinds", self.arrays.kinds.len(), points),
+            ("source", self.arrays.source.len(), points),
+            ("boxes", self.arrays.siblings.len(), inner),
+            ("growths", self.arrays.surface_growths.len(), inner),
+            ("growths of the obstacle", self.arrays.obstacle_growths.len(), inner),
+            ("leaves", self.arrays.leaf_blocks.len(), leaves * LeafParts::blocks_a_leaf(&self.topology)),
+            ("marks", self.arrays.marks.len(), leaves),
+            ("blocks", self.arrays.blocks.len(), blocks),
+            ("samples", self.arrays.sample_lists.len(), inner.saturating_mul(self.meta.samples as usize)),
+            ("coverings", self.arrays.coverings.len(), self.topology.len()),
+            ("groups", self.arrays.groups.len(), blocks.div_ceil(PointBlock::WIDTH)),
+            ("lists", self.arrays.lists.len(), blocks),
         ];
         match expected.into_iter().find(|(_, found, expected)| found != expected) {
             Some((array, found, expected)) => Err(Flaw::Length { array, found, expected }),
@@ -63,32 +63,32 @@ impl PointHierarchy {
     /// What the metadata say, as far as it shows without the points.
     pub(super) fn check_metadata(&self) -> Result<(), Flaw> {
         let wrong = |what| Err(Flaw::Metadata { what });
-        let Frame { origin, scale } = self.frame;
+        let Frame { origin, scale } = self.meta.frame;
         // Then nothing overflows on its way to the caller's frame and back.
         let turns_back = scale > 0.0 && scale.is_normal() && scale.recip().is_normal();
         if !(turns_back && origin.iter().all(|x| x.is_finite())) {
             return wrong("the frame of the stored positions");
         }
-        let Aabb { min, max } = self.bounds;
+        let Aabb { min, max } = self.meta.bounds;
         if !(0..3).all(|k| min[k].is_finite() && max[k].is_finite() && min[k] <= max[k]) {
             return wrong("the box of bounds");
         }
-        if !(self.step >= 0.0 && self.step.is_finite()) {
+        if !(self.meta.step >= 0.0 && self.meta.step.is_finite()) {
             return wrong("what rounding cost");
         }
-        if !(self.sampling_radius > 0.0 && self.sampling_radius <= FARTHEST) {
+        if !(self.meta.sampling_radius > 0.0 && self.meta.sampling_radius <= FARTHEST) {
             return wrong("the sampling radius");
         }
-        if !(self.reach > 0.0 && self.reach <= FARTHEST) {
+        if !(self.meta.reach > 0.0 && self.meta.reach <= FARTHEST) {
             return wrong("the reach");
         }
-        if !is_in_range(&self.root.bounds) {
+        if !is_in_range(&self.meta.root.bounds) {
             return wrong("the box of the root");
         }
-        if !RADIUS_NEIGHBOURS.contains(&self.radius_neighbours) {
+        if !RADIUS_NEIGHBOURS.contains(&self.meta.radius_neighbours) {
             return wrong("the number of neighbours for a radius");
         }
-        if !SAMPLES.contains(&self.samples_a_node) {
+        if !SAMPLES.contains(&self.meta.samples) {
             return wrong("the number of samples of a node");
         }
         if u32::try_from(self.given()).is_err() {
@@ -99,7 +99,7 @@ impl PointHierarchy {
 
     /// How many points the input had: sources lie below it.
     pub(super) fn given(&self) -> usize {
-        let Dropped { not_finite, duplicate, filtered } = self.dropped;
+        let Dropped { not_finite, duplicate, filtered } = self.meta.dropped;
         let dropped = not_finite.saturating_add(duplicate).saturating_add(filtered);
         dropped.saturating_add(self.len())
     }
@@ -114,13 +114,15 @@ impl PointHierarchy {
             }
         }
         // The way to the caller's frame keeps the order, rounding included.
-        if (self.frame.to_world(low), self.frame.to_world(high)) != (self.bounds.min, self.bounds.max) {
+        if (self.meta.frame.to_world(low), self.meta.frame.to_world(high))
+            != (self.meta.bounds.min, self.meta.bounds.max)
+        {
             return Err(Flaw::Metadata { what: "the box of bounds" });
         }
         let (mut less, mut more) = (0_u32, 0_u32);
-        for &r in &self.radii {
-            less += u32::from(r < self.sampling_radius);
-            more += u32::from(r > self.sampling_radius);
+        for &r in &self.arrays.radii {
+            less += u32::from(r < self.meta.sampling_radius);
+            more += u32::from(r > self.meta.sampling_radius);
         }
         let (less, more) = (less as usize, more as usize);
         let rank = sampling_rank(self.len());
@@ -128,7 +130,7 @@ impl PointHierarchy {
             return Err(Flaw::Metadata { what: "the sampling radius" });
         }
         // As text, so that what is no number equals itself.
-        if format!("{:?}", self.outlined()) != format!("{:?}", self.outline) {
+        if format!("{:?}", self.outlined()) != format!("{:?}", self.meta.outline) {
             return Err(Flaw::Metadata { what: "the outline of the scan" });
         }
         Ok(())

@@ -8,7 +8,7 @@ use nearmiss_lanes::vector::{dot, sub};
 
 use nearmiss_store::Flaw;
 
-use super::FARTHEST;
+use super::limits::FARTHEST;
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
 use crate::scan::build::PointHierarchy;
@@ -57,7 +57,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let (topology, tree) = (scan.topology(), scan.tree());
     let wrong = |what, id: NodeId| Err(Flaw::Value { what, index: id.index() });
     let is_sound = |bounds: &OrientedBox| is_in_range(bounds) && is_frame(&bounds.axes);
-    if !is_sound(&scan.root.bounds) {
+    if !is_sound(&scan.meta.root.bounds) {
         return wrong("the box of node", NodeId::ROOT);
     }
     let found = ranges(topology.inner(), |parents| {

@@ -2,7 +2,7 @@
 
 use nearmiss_store::Flaw;
 
-use super::FARTHEST;
+use super::limits::FARTHEST;
 use crate::bounds::boxes::OrientedBox;
 use crate::point::kind::{PointKind, THICKNESS};
 use crate::scan::build::PointHierarchy;
@@ -29,11 +29,11 @@ type Sound = [u32; LANES];
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let arrays = Arrays {
         positions: scan.positions(),
-        normals: &scan.normals,
-        radii: &scan.radii,
-        discs: &scan.discs,
-        kinds: &scan.kinds,
-        source: &scan.source,
+        normals: &scan.arrays.normals,
+        radii: &scan.arrays.radii,
+        discs: &scan.arrays.discs,
+        kinds: &scan.arrays.kinds,
+        source: &scan.arrays.source,
     };
     let last = u32::try_from(scan.given() - 1).unwrap_or(u32::MAX);
     let topology = scan.topology();

@@ -7,7 +7,7 @@ use nearmiss_lanes::parallel::ranges;
 
 use nearmiss_store::Flaw;
 
-use super::FARTHEST;
+use super::limits::FARTHEST;
 use crate::patch::covering::{Covering, centres_of};
 use crate::scan::build::PointHierarchy;
 
@@ -29,7 +29,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
 }
 
 fn check_node(scan: &PointHierarchy, id: NodeId) -> Result<(), Flaw> {
-    let (topology, slices, covering) = (scan.topology(), scan.slices(), &scan.coverings[id.index()]);
+    let (topology, slices, covering) = (scan.topology(), scan.slices(), &scan.arrays.coverings[id.index()]);
     let wrong = |what| Err(Flaw::Value { what, index: id.index() });
     let Covering { radius, sampling, spacing } = *covering;
     let lengths = (radius >= 0.0) & (sampling >= 0.0) & (spacing >= 0.0) & (sampling <= radius);
@@ -40,8 +40,8 @@ fn check_node(scan: &PointHierarchy, id: NodeId) -> Result<(), Flaw> {
         return Ok(());
     }
     let points = topology.points(id);
-    let count = scan.samples_a_node as usize;
-    let list = &scan.sample_lists[id.index() * count..][..count];
+    let count = scan.meta.samples as usize;
+    let list = &scan.arrays.sample_lists[id.index() * count..][..count];
     let is_own = |i: &u32| points.contains(&(*i as usize));
     let ascends = points.len() <= count || list.windows(2).all(|two| two[0] < two[1]);
     if !(list.iter().all(is_own) && ascends) {
