@@ -69,7 +69,7 @@ impl Flaw {
         index.map_or(Ok(()), |index| Err(Self::Value { what, index }))
     }
 
-    /// What options that a build refuses are wrong with.
+    /// Returns the flaw of options that a build refuses, with the reason.
     pub fn options(cause: impl ToString) -> Self {
         Self::Options { cause: cause.to_string() }
     }

@@ -80,8 +80,7 @@ pub(crate) struct Surfels {
 }
 
 impl Surfels {
-    /// The same of some parts after each other. One array after the other, as both would not fit into
-    /// memory.
+    /// Joins parts, in their order. One array is joined at a time, so that no other exists twice.
     fn joined(mut parts: Vec<Self>) -> Self {
         fn join<T: Clone>(parts: &mut [Surfels], of: impl Fn(&mut Surfels) -> &mut Vec<T>) -> Vec<T> {
             let parts: Vec<Vec<T>> = parts.iter_mut().map(|part| std::mem::take(of(part))).collect();

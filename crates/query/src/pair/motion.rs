@@ -30,7 +30,7 @@ const ROUNDS: u32 = 1;
 /// So many pairs of nodes are compared at once.
 pub(crate) const LANES: usize = 16;
 
-/// How far the nodes of [`Pairs`] are apart: by how much further, at least, than the centres of the scans, in
+/// How far sixteen pairs of nodes are apart: by how much further, at least, than the centres of the scans, in
 /// a's stored frame; [`Motion::least`] where they may overlap, or are no numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gaps {
