@@ -49,9 +49,9 @@ impl ClosePairs {
     }
 
     /// The map in `file` of so many points with these horizons, its arrays in place. With either `check`
-    /// every list is there, so that no use of it fails. With [`Check::Full`] each is also one that a build
-    /// writes: of points that are there, by distance, itself first, and none further than it is heard; and
-    /// what stands beside has its place, and would fit none in the list.
+    /// every list is there, so that no use of it fails. [`Check::Full`] also checks the contents: a list
+    /// names existing points in ascending distance, begins with the point itself, and ends within the
+    /// horizons; exact distances kept beside the list belong to entries that cannot hold them.
     ///
     /// # Errors
     /// When a section is missing, holds what no build writes, or the sections contradict each other.

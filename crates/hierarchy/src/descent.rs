@@ -129,8 +129,8 @@ impl<K: PartialOrd + Copy> MostUrgent<K> {
         }
     }
 
-    /// All have come. Returns the most urgent if it is to be looked at next; where there is none, nothing is
-    /// left below their parents.
+    /// Ends the list of siblings. Returns the most urgent one if the descent continues with it. Without any
+    /// sibling, reports to the frontier that nothing is left below the last pair.
     #[inline(always)]
     pub fn finish<S: Simd, F: Frontier<K>>(self, simd: S, frontier: &mut F) -> Option<Open<K>> {
         match self.0 {

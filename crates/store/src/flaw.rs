@@ -1,4 +1,4 @@
-//! What can be wrong with the arrays of a container that opens.
+//! Flaws in the contents of a container that opens.
 
 use thiserror::Error;
 
@@ -16,7 +16,7 @@ pub enum LoadError {
     Flaw(#[from] Flaw),
 }
 
-/// What is wrong with stored arrays, or with what is stored beside them.
+/// A flaw in stored arrays, or in the metadata.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Flaw {
@@ -30,21 +30,21 @@ pub enum Flaw {
         /// How many it should have.
         expected: usize,
     },
-    /// A number is none that a build writes, or contradicts what it says about others.
+    /// A value that no build writes, or that contradicts other values.
     #[error("{what} {index} is wrong; prepare the scan again")]
     Value {
-        /// Which number, and of what.
+        /// The kind of value.
         what: &'static str,
-        /// Whose.
+        /// The index of the point, node or block it belongs to.
         index: usize,
     },
-    /// A number about the whole is none that a build writes, or contradicts the arrays.
+    /// A number in the metadata that no build writes, or that contradicts the arrays.
     #[error("{what} is wrong; prepare the scan again")]
     Metadata {
         /// Which number.
         what: &'static str,
     },
-    /// What it was built with is out of range, or asks for what is not there.
+    /// Options that are out of range, or that need an array which is absent.
     #[error("{cause}; prepare the scan again")]
     Options {
         /// What is out of range, or missing.

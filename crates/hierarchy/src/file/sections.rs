@@ -1,6 +1,7 @@
 //! The hierarchy in a container: one section an array, the rest in the metadata.
 //!
-//! The version of this layout is `VERSION` in `nearmiss/src/scan.rs`; raise it with every change here.
+//! The sections are declared in `scan/data.rs`. The version of their layout is `VERSION` in
+//! `nearmiss/src/scan.rs`.
 
 use std::sync::OnceLock;
 

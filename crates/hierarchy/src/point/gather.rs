@@ -211,18 +211,18 @@ impl<'a> Index<'a> {
     }
 }
 
-/// The groups of points of which one may be heard within some distance of a place.
+/// The search for all groups with a point whose horizon may reach within some distance of a place.
 struct Groups<'a> {
     tree: &'a Tree<'a>,
     plan: &'a SurfacePlan,
     distance: f32,
     found: &'a mut Vec<u32>,
-    /// Groups before this one were found, or hold nothing that is heard.
+    /// The first group not yet visited: groups ascend.
     next: usize,
 }
 
 impl PlaceVisitor for Groups<'_> {
-    /// Groups are to ascend, and many leaves stand in one.
+    /// Many leaves share a group; in order, each group is found once.
     const IN_ORDER: bool = true;
 
     #[inline(always)]

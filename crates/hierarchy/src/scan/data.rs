@@ -1,4 +1,5 @@
-//! What a prepared scan consists of: numbers about the whole, and arrays, each a section of a file.
+//! The data of a prepared scan: metadata, and arrays that are each a section of a file. Raise `VERSION` in
+//! `nearmiss/src/scan.rs` with every change here.
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_index::PointBlock;
@@ -12,7 +13,7 @@ use crate::point::leaf_block::LeafBlock;
 use crate::scan::outline::Outline;
 use crate::tree::wide::{Growths, Root, Siblings};
 
-/// What a hierarchy stores beside its arrays.
+/// The metadata of a hierarchy: everything stored that is no array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HierarchyMeta {
     pub(crate) frame: Frame,
@@ -42,13 +43,13 @@ macro_rules! arrays {
         }
 
         impl Arrays {
-            /// Adds all to a container.
+            /// Adds all to a container, a section each.
             pub(crate) fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
                 $(writer.section(*$tag, $part, &self.$name)?;)*
                 Ok(())
             }
 
-            /// Those of a container, in place.
+            /// Loads all from a container, in place.
             pub(crate) fn load(file: &File) -> Result<Self, OpenError> {
                 Ok(Self { $($name: file.array(*$tag, $part)?,)* })
             }
@@ -59,15 +60,15 @@ macro_rules! arrays {
 arrays! {
     /// The boxes of the children of each inner node.
     siblings: [Siblings] = b"TREE" 0,
-    /// What their enclosures of the surface reach further.
+    /// The lengths by which their enclosures of the surface exceed those boxes.
     surface_growths: [Growths] = b"GROW" 0,
-    /// The same of the obstacle.
+    /// The lengths by which their enclosures of the obstacle exceed them.
     obstacle_growths: [Growths] = b"GROW" 1,
     /// The discs of each leaf, as queries compare them.
     leaf_blocks: [LeafBlock] = b"LEAF" 0,
     /// The marks of each leaf: whether it holds sparse points or balls, and whether it is loose.
     marks: [u8] = b"MARK" 0,
-    /// The positions of the points, and how far each is heard.
+    /// The positions and the horizons of the points.
     blocks: [PointBlock] = b"BLCK" 0,
     /// The samples of each inner node.
     sample_lists: [u32] = b"SMPL" 0,

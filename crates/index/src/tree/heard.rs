@@ -78,7 +78,7 @@ impl BlockTree<'_> {
     }
 }
 
-/// The points of a block, and who is heard there so far.
+/// The search for the points heard at the points of a block.
 struct Search<'a, S: Simd> {
     tree: &'a BlockTree<'a>,
     block: usize,
@@ -91,7 +91,7 @@ struct Search<'a, S: Simd> {
 }
 
 impl<S: Simd> Search<'_, S> {
-    /// The lanes of the points at which one in a box may be heard, as bits.
+    /// The lanes of the points within the horizon of a box, as bits.
     #[inline(always)]
     fn lanes_near(&self, simd: S, bounds: &Bounds) -> u32 {
         let far = self.horizons + bounds.horizon;

@@ -185,9 +185,9 @@ struct NearestTo<'a, L> {
     tree: &'a BlockTree<'a>,
     lanes: L,
     skeleton: &'a Skeleton,
-    /// The square of its distance, and which it is.
+    /// The squared distance of the nearest point so far, and its index.
     best: (f64, usize),
-    /// What is nearer has no greater square in single precision.
+    /// The upper limit, in single precision, of the squared distance of any nearer point.
     most: f32,
 }
 

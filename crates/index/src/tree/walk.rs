@@ -9,7 +9,7 @@ use nearmiss_lanes::wide::{Bits, WIDTH, bits};
 
 use super::{BlockTree, Boxes, MOST_LEVELS};
 
-/// What a walk in the order of the points does with what it finds.
+/// The callbacks of a walk in the order of the points.
 pub(super) trait Walker<S: Simd> {
     /// The boxes of a group of a level that are to be looked into, as bits. Lanes without a box do not count.
     fn wanted(&mut self, simd: S, level: usize, group: usize) -> u32;
@@ -18,12 +18,12 @@ pub(super) trait Walker<S: Simd> {
     fn block(&mut self, simd: S, id: usize) -> ControlFlow<()>;
 }
 
-/// What a walk that takes the nearest boxes first does with what it finds. Distances are squares.
+/// The callbacks of a walk that takes the nearest boxes first.
 pub(super) trait NearWalker<S: Simd> {
-    /// How far the boxes of a group are.
+    /// The squared distances of the boxes of a group.
     fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S>;
 
-    /// Boxes further away than this are not looked into.
+    /// The squared distance beyond which boxes are skipped.
     fn most_sq(&self) -> f32;
 
     /// Returns `true` if node `id` of a level is to be looked into; asked just before.

@@ -15,8 +15,8 @@ use crate::pair::scan_pair::ScanPair;
 
 type Open = hierarchy::Open<Nearness>;
 
-/// How much further away than the centres of the scans what is in two nodes is at least, by their enclosures
-/// and, of equally near ones, by their boxes.
+/// The lower bounds of the distance of two nodes, less the distance of the scans' centres: by enclosures
+/// first, then by boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Nearness(
     /// The enclosures, and in the lower half the boxes, as numbers in the same order: a heap compares often.

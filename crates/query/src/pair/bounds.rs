@@ -49,7 +49,7 @@ const FAN_LANES: [[u32; FAN]; FAN] = {
 
 /// The callbacks of a descent that compares how far nodes are apart ([`Bounds`]).
 pub(crate) trait BoundVisitor<K>: PairVisitor<K> {
-    /// Pairs that are nearer than neither are left out.
+    /// Returns the limits: pairs beyond both are left out.
     fn limits(&self) -> Limits;
 
     /// Returns `true` if these pairs below `above` may take its place; otherwise it stays.
@@ -68,7 +68,7 @@ pub(crate) trait BoundVisitor<K>: PairVisitor<K> {
 pub(crate) struct Bounds<'a> {
     pub(crate) trees: [&'a Tree<'a>; 2],
     pub(crate) motion: &'a Motion,
-    /// What enclosures hold.
+    /// The part of the scans that enclosures contain.
     pub(crate) part: Part,
 }
 
