@@ -116,7 +116,7 @@ pub(crate) fn splat(view: &Placed<'_>, i: usize) -> Splat {
     Splat {
         centre: view.point(i).into(),
         normal: view.placed().rotate(scan.normals()[i].map(f64::from)).into(),
-        radius: f64::from(scan.discs()[i]) * view.placed().scale(),
+        radius: f64::from(scan.discs().get(i)) * view.placed().scale(),
     }
 }
 

@@ -18,6 +18,7 @@ pub use descent::{
 };
 pub use patch::covering::Covering;
 pub use patch::samples::Samples;
+pub use point::disc::DiscRadii;
 pub use point::gather::{GatherScratch, NeighbourList};
 pub use point::kind::{PointKind, SLAB, THICKNESS};
 pub use point::leaf_block::{LeafBlock, Leaves};

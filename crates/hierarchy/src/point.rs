@@ -1,5 +1,6 @@
 //! What is known of each point: spacing, kind, support, leaf records.
 
+pub(crate) mod disc;
 pub(crate) mod gather;
 pub(crate) mod kind;
 pub(crate) mod leaf_block;

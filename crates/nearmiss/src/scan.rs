@@ -21,11 +21,11 @@ pub use nearmiss_store::{LoadError, WriteError as SaveError};
 const KIND: [u8; 4] = *b"SCAN";
 
 /// Version of the layout of a scan's sections and metadata.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 
 /// The oldest layout version that is read; older files are refused by name. Raise it together with
 /// [`VERSION`] whenever a section or a field of the metadata is added or changes, and record a golden file.
-const OLDEST: u32 = 9;
+const OLDEST: u32 = 10;
 
 /// What a scan's file holds beside arrays.
 #[derive(Debug, Serialize, Deserialize)]
@@ -148,7 +148,7 @@ impl Scan {
         let plan = *hierarchy.plan();
         let samples = Samples { plan: &plan, positions: &positions, radii: &radii };
         let kernel = graph.kernel(samples).ok_or(GraphError::NoClosePairs)?;
-        hierarchy.refit(Metric::Geodesic, |i, scratch: &mut KernelScratch, heard| {
+        hierarchy.use_metric(Metric::Geodesic, |i, scratch: &mut KernelScratch, heard| {
             let (at, near) = kernel.evaluate_at(i, scratch);
             heard.extend(near.iter().map(|close| close.point));
             at

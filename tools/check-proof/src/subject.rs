@@ -76,7 +76,11 @@ impl Subject {
     /// ball; or that of its cell, or of its disc with the thickness of a twentieth of its radius.
     pub(crate) fn reach(&self, i: usize) -> f64 {
         let slices = self.scan.slices();
-        if self.is_on_sheet(i) { self.cell(i).max(1.05 * f64::from(slices.discs[i])) } else { self.ball(i) }
+        if self.is_on_sheet(i) {
+            self.cell(i).max(1.05 * f64::from(slices.discs.get(i)))
+        } else {
+            self.ball(i)
+        }
     }
 
     /// Whether `x`, a place of the surface in the stored frame, belongs to the obstacle, up to rounding: it

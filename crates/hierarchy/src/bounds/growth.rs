@@ -47,7 +47,7 @@ impl Growth {
         }
     }
 
-    /// `bounds` grown.
+    /// `bounds` grown. Lengths without bound leave the centre where it is.
     #[inline]
     #[must_use]
     pub fn of(&self, bounds: &OrientedBox) -> OrientedBox {
@@ -55,6 +55,7 @@ impl Growth {
         let (low, high) = self.lengths();
         for k in 0..3 {
             let shift = 0.5 * (high[k] - low[k]);
+            let shift = if shift.is_finite() { shift } else { 0.0 };
             for i in 0..3 {
                 grown.centre[i] += shift * bounds.axes[k][i];
             }

@@ -71,7 +71,7 @@ fn leaves_in_lanes_are_their_points() {
                     let i = first + lane;
                     assert!(off(block.position(lane), scan.positions()[i]) <= 0.52 * step);
                     assert!(off(block.normal(lane), scan.arrays.normals[i]) <= 0.52 / 32767.0);
-                    assert!((block.disc(lane) - scan.arrays.discs[i]).abs() <= 0.52 * step);
+                    assert!((block.disc(lane) - scan.discs().get(i)).abs() <= 0.52 * step);
                 }
                 for level in levels() {
                     let (positions, normals, discs) = dispatch!(level, simd => simd.vectorize(

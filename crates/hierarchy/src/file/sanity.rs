@@ -78,7 +78,7 @@ impl PointHierarchy {
         let ball = f64::from(self.slices().ball(i).max(self.slices().obstacle_ball(i)));
         (0..3).all(|k| {
             let axis = double(bounds.axes[k]);
-            let spread = f64::from(self.arrays.discs[i]) * double(self.arrays.normals[i]).cross(&axis).norm();
+            let spread = f64::from(self.discs().get(i)) * double(self.arrays.normals[i]).cross(&axis).norm();
             d.dot(&axis).abs() + spread.max(ball) <= f64::from(bounds.half[k])
         })
     }

@@ -11,6 +11,7 @@ use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
 
 use crate::bounds::boxes::OrientedBox;
+use crate::point::disc::DiscRadii;
 use crate::point::kind::THICKNESS;
 use crate::tree::topology::Topology;
 
@@ -31,7 +32,7 @@ struct DiscBlock {
 pub(crate) struct Discs<'a> {
     pub(crate) positions: &'a [[f32; 3]],
     pub(crate) normals: &'a [[f32; 3]],
-    pub(crate) discs: &'a [f32],
+    pub(crate) discs: DiscRadii<'a>,
     pub(crate) balls: &'a [f32],
 }
 
@@ -68,7 +69,7 @@ impl Discs<'_> {
                 block.position[k][i - first] = self.positions[i][k];
                 block.normal[k][i - first] = self.normals[i][k];
             }
-            block.disc[i - first] = self.discs[i];
+            block.disc[i - first] = self.discs.get(i);
             block.ball[i - first] = self.balls[i];
         }
         block

@@ -19,27 +19,14 @@ use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Status, symmetric
 use crate::bounds::boxes::OrientedBox;
 use crate::patch::covering::Solid;
 use crate::patch::enclosure::{Cell, LeafBounds, Surroundings};
+use crate::point::disc::PointCode;
 use crate::point::gather::Index;
 use crate::point::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
 use crate::point::neighbours::Locality;
 use crate::point::spacing::{Look, Spacing};
 
-/// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a
-/// square lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
-const DISC: f32 = 0.65;
-
-/// Disc radius over local sampling radius at a border. Local radii grow there, to some 1.3 times those
-/// inside, and two discs must not bridge a sampling radius.
-const DISC_AT_BORDER: f32 = 0.35;
-
 /// Sectors into which the tangent plane is divided, equal on a diamond: of 11 to 18 degrees.
 const SECTORS: u32 = 24;
-
-/// So many empty sectors side by side occur in the interior, even of random samples.
-const INTERIOR_GAP: u32 = 6;
-
-/// So many mean a border: about 135 degrees. A straight one leaves 180, a right-angled notch 90.
-const BORDER_GAP: u32 = 9;
 
 /// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
 const LINE: f64 = 0.05;
@@ -51,12 +38,11 @@ pub(crate) struct Fit {
     pub(crate) kind: PointKind,
 }
 
-/// A point's disc.
+/// A point's disc, whose radius follows from its code.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surfel {
     pub(crate) normal: [f32; 3],
-    pub(crate) disc: f32,
-    pub(crate) kind: PointKind,
+    pub(crate) code: PointCode,
     /// Where the surface nearest to the point is.
     pub(crate) cell: Cell,
 }
@@ -65,8 +51,7 @@ pub(crate) struct Surfel {
 #[derive(Debug, Default)]
 pub(crate) struct Surfels {
     pub(crate) normals: Vec<[f32; 3]>,
-    pub(crate) discs: Vec<f32>,
-    pub(crate) kinds: Vec<u8>,
+    pub(crate) codes: Vec<PointCode>,
     /// The radius of each point's ball: the greater of [`Slices::ball`](crate::Slices::ball) and
     /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball).
     pub(crate) balls: Vec<f32>,
@@ -89,8 +74,7 @@ impl Surfels {
         let parts = &mut parts;
         Self {
             normals: join(parts, |part| &mut part.normals),
-            discs: join(parts, |part| &mut part.discs),
-            kinds: join(parts, |part| &mut part.kinds),
+            codes: join(parts, |part| &mut part.codes),
             balls: join(parts, |part| &mut part.balls),
             flat: join(parts, |part| &mut part.flat),
             cells: join(parts, |part| &mut part.cells),
@@ -99,11 +83,11 @@ impl Surfels {
         }
     }
 
-    fn push(&mut self, surfel: &Surfel, ball: f32) {
-        let solid = Solid::of_disc(surfel.disc, ball);
+    /// Adds a point whose disc and ball have these radii.
+    fn push(&mut self, surfel: &Surfel, disc: f32, ball: f32) {
+        let solid = Solid::of_disc(disc, ball);
         self.normals.push(surfel.normal);
-        self.discs.push(surfel.disc);
-        self.kinds.push(surfel.kind.code());
+        self.codes.push(surfel.code);
         self.balls.push(ball);
         self.flat.push(solid);
         self.cells.push(Solid::of_cell(&surfel.cell, solid));
@@ -181,9 +165,9 @@ pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Sur
             all.leaves.push(surface);
             all.obstacles.push(obstacle);
             for ((i, &radius), surfel) in points.clone().zip(leaf.radii).zip(&surfels) {
-                let own = obstacle_ball(i, dense, surfel.kind, radius);
-                let ball = ball(surfel.kind, radius, ordinary);
-                all.push(&Surfel { disc: surfel.disc_within(ball), ..*surfel }, ball.max(own));
+                let kind = surfel.code.kind();
+                let ball = ball(kind, radius, ordinary).max(obstacle_ball(i, dense, kind, radius));
+                all.push(surfel, surfel.code.disc(radius, reach, ordinary), ball);
             }
         }
         all
@@ -261,27 +245,14 @@ impl Leaf<'_> {
                             &cell.within(cell_radius(radius, reach), SLAB * radius),
                         );
                     }
-                    surfels.push(Surfel { cell, ..surfel(fit, radius, reach, gap) });
+                    let code = PointCode::new(fit.kind, gap);
+                    surfels.push(Surfel { normal: fit.normal, code, cell });
                 }
                 let obstacle = if has_cells { obstacle.close() } else { bounds.empty() };
                 [cells.close(), obstacle]
             },
         )
     }
-}
-
-impl Surfel {
-    /// The radius of the disc; about a sparse point no more than that of its `ball`.
-    pub(crate) fn disc_within(&self, ball: f32) -> f32 {
-        if self.kind.is_sparse() { self.disc.min(ball) } else { self.disc }
-    }
-}
-
-/// The disc of a point with this many empty sectors about it.
-fn surfel(fit: &Fit, radius: f32, reach: f32, gap: u32) -> Surfel {
-    // What is further than half the reach from all points is a hole.
-    let disc = (radius * disc(gap)).min(0.5 * reach);
-    Surfel { normal: fit.normal, disc, kind: fit.kind, cell: Cell::default() }
 }
 
 /// What f at a point says of it.
@@ -293,20 +264,12 @@ pub(crate) fn fitted(at: &Evaluation, look: Look) -> Fit {
 
 /// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose
 /// support radii reach `p`.
-pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], (radius, reach): (f32, f32), near: &[PointBlock]) -> Surfel {
+pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], near: &[PointBlock]) -> Surfel {
     let gap = dispatch!(Level::new(), simd => simd.vectorize(
         #[inline(always)]
         || widest_gap(simd, p, fit.normal, near.iter()),
     ));
-    surfel(fit, radius, reach, gap)
-}
-
-/// The radius of a disc over the local sampling radius, given how many sectors beside each other are empty.
-fn disc(gap: u32) -> f32 {
-    let gap = gap.clamp(INTERIOR_GAP, BORDER_GAP) - INTERIOR_GAP;
-    #[expect(clippy::cast_precision_loss, reason = "a small number")]
-    let border = gap as f32 / (BORDER_GAP - INTERIOR_GAP) as f32;
-    DISC - (DISC - DISC_AT_BORDER) * border
+    Surfel { normal: fit.normal, code: PointCode::new(fit.kind, gap), cell: Cell::default() }
 }
 
 /// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at

@@ -104,22 +104,9 @@ pub(crate) fn obstacle_ball(i: usize, dense: usize, kind: PointKind, radius: f32
 }
 
 /// The ball of a point that is on no sheet, in its local radius.
-const fn ball_share(kind: PointKind) -> f32 {
+pub(crate) const fn ball_share(kind: PointKind) -> f32 {
     if kind.is_sparse() { BALL_OF_SPARSE } else { BALL_AMONG_OTHERS }
 }
-
-/// The ball of a point before [`crate::Slices::dense`] by the code of its kind, in its local radius.
-pub(crate) const DENSE_SHARES: [f32; 256] = {
-    let mut shares = [0.0; 256];
-    let mut code = 0;
-    while code <= u8::MAX as usize {
-        #[expect(clippy::cast_possible_truncation, reason = "below 256")]
-        let kind = PointKind::from_code(code as u8);
-        shares[code] = if kind.is_sheet() { 0.0 } else { ball_share(kind) };
-        code += 1;
-    }
-    shares
-};
 
 /// See [`crate::Slices::is_on_sheet`].
 #[inline]

@@ -8,7 +8,8 @@ use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::vector::sub;
 
 use crate::bounds::boxes::OrientedBox;
-use crate::point::kind::{PointKind, is_on_sheet};
+use crate::point::disc::DiscRadii;
+use crate::point::kind::is_on_sheet;
 use crate::tree::topology::Topology;
 
 /// Lanes of a block.
@@ -149,8 +150,7 @@ const LOOSE_FROM: f32 = 3.0;
 pub(crate) struct LeafParts<'a> {
     pub(crate) positions: &'a [[f32; 3]],
     pub(crate) normals: &'a [[f32; 3]],
-    pub(crate) discs: &'a [f32],
-    pub(crate) kinds: &'a [u8],
+    pub(crate) discs: DiscRadii<'a>,
     /// Points before this are dense.
     pub(crate) dense: usize,
 }
@@ -168,7 +168,7 @@ impl LeafParts<'_> {
         let mut block = LeafBlock::new(bounds);
         let points = topology.points_of_leaf(leaf);
         for (lane, i) in points.skip(part * WIDTH).take(WIDTH).enumerate() {
-            block.set(lane, self.positions[i], self.normals[i], self.discs[i]);
+            block.set(lane, self.positions[i], self.normals[i], self.discs.get(i));
         }
         block
     }
@@ -184,7 +184,7 @@ impl LeafParts<'_> {
 
     /// What kinds of points a leaf has, and whether it is loose; `bounds` is its box.
     pub(crate) fn marks(&self, topology: &Topology, leaf: usize, bounds: &OrientedBox) -> u8 {
-        let kind = |i: usize| PointKind::from_code(self.kinds[i]);
+        let kind = |i: usize| self.discs.codes[i].kind();
         let points = topology.points_of_leaf(leaf);
         let is_sparse = points.clone().any(|i| kind(i).is_sparse());
         let has_balls = points.into_iter().any(|i| !is_on_sheet(i, self.dense, kind(i)));

@@ -19,6 +19,7 @@ use crate::patch::enclosure::growths;
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::{lists, samples};
 use crate::patch::surfels::{Known, Surfels, align, surfels};
+use crate::point::disc::DiscRadii;
 use crate::point::gather::Index;
 use crate::point::kind::PointKind;
 use crate::point::leaf_block::{LeafParts, Leaves};
@@ -64,8 +65,7 @@ impl PointHierarchy {
         Slices {
             normals: &self.arrays.normals,
             radii: &self.arrays.radii,
-            discs: &self.arrays.discs,
-            kinds: &self.arrays.kinds,
+            discs: self.discs(),
             tree: self.tree(),
             leaves: Leaves {
                 topology: &self.topology,
@@ -231,8 +231,7 @@ impl PointHierarchy {
         LeafParts {
             positions: self.positions(),
             normals: &self.arrays.normals,
-            discs: &self.arrays.discs,
-            kinds: &self.arrays.kinds,
+            discs: self.discs(),
             dense: self.meta.dense as usize,
         }
     }
@@ -246,7 +245,8 @@ impl PointHierarchy {
         hash.update(bytes_of(&[self.meta.leaf_size, self.meta.samples, self.meta.dense]));
         hash.update(bytes_of(&[slices.sampling_radius, slices.reach]));
         hash.update(bytemuck::cast_slice(self.positions()));
-        hash.update(bytemuck::cast_slice(slices.discs));
+        hash.update(bytemuck::cast_slice(slices.discs.codes));
+        hash.update(bytemuck::cast_slice(slices.radii));
         Outline {
             identity: hash.digest(),
             surface: Ball::about(&slices.enclosure(0)),
@@ -263,8 +263,13 @@ impl PointHierarchy {
 
     /// Radii of the points' tangent discs.
     #[must_use]
-    pub fn discs(&self) -> &[f32] {
-        &self.arrays.discs
+    pub fn discs(&self) -> DiscRadii<'_> {
+        DiscRadii {
+            codes: &self.arrays.codes,
+            radii: &self.arrays.radii,
+            reach: self.meta.reach,
+            sampling_radius: self.meta.sampling_radius,
+        }
     }
 
     /// What the neighbourhood of the `i`-th stored point looks like.
@@ -274,7 +279,7 @@ impl PointHierarchy {
     #[inline]
     #[must_use]
     pub fn kind(&self, i: usize) -> PointKind {
-        PointKind::from_code(self.arrays.kinds[i])
+        self.arrays.codes[i].kind()
     }
 
     /// Share of the points that sample a sheet.
@@ -287,7 +292,7 @@ impl PointHierarchy {
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     pub fn share(&self, kind: PointKind) -> f64 {
-        let count = self.arrays.kinds.iter().filter(|&&code| code == kind.code()).count();
+        let count = self.arrays.codes.iter().filter(|code| code.kind() == kind).count();
         count as f64 / self.len() as f64
     }
 
@@ -356,8 +361,8 @@ impl PointHierarchy {
         self.topology.ids().map(move |id| tree.enclosure(Part::Surface, id))
     }
 
-    /// Bytes of all that is stored for nodes: tree, boxes, enclosures, cones, samples and coverings (S0
-    /// §6.1); what points keep, and their neighbour lists, is not counted.
+    /// Bytes stored for nodes: boxes, enclosures, samples and coverings. Klein & Zachmann 2004, §6.1, report
+    /// the same; arrays with an entry a point, and neighbour lists, are not counted.
     #[must_use]
     pub fn bytes_of_nodes(&self) -> usize {
         size_of_val::<[_]>(&self.arrays.siblings)
@@ -398,11 +403,12 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
     let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
     let lists_of_blocks = neighbours(&index, &positions, &radii);
     let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, dense };
-    let Surfels { mut normals, discs, kinds, balls, flat, cells, leaves, obstacles } =
+    let Surfels { mut normals, codes, balls, flat, cells, leaves, obstacles } =
         surfels(&index, &known, &fits);
     drop(fits);
     normals.chunks_mut(leaf_size).for_each(align);
-    let of_points = Discs { positions: &positions, normals: &normals, discs: &discs, balls: &balls };
+    let discs = DiscRadii { codes: &codes, radii: &radii, reach, sampling_radius };
+    let of_points = Discs { positions: &positions, normals: &normals, discs, balls: &balls };
     let boxes = boxes_of_discs(&topology, &boxes, &of_points);
     drop(balls);
     let obstacle_growths = growths(&topology, &boxes, &obstacles);
@@ -447,8 +453,7 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         listed: lists_of_blocks.entries.into(),
         normals: normals.into(),
         radii: radii.into(),
-        discs: discs.into(),
-        kinds: kinds.into(),
+        codes: codes.into(),
         source: source.into(),
         // Made of the others by `bound`.
         ..Arrays::default()

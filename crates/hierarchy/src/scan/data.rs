@@ -8,6 +8,7 @@ use nearmiss_surface::{Metric, SurfaceOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::patch::covering::Covering;
+use crate::point::disc::PointCode;
 use crate::point::gather::NeighbourList;
 use crate::point::leaf_block::LeafBlock;
 use crate::scan::outline::Outline;
@@ -84,10 +85,8 @@ arrays! {
     normals: [[f32; 3]] = b"NRML" 0,
     /// Their local radii.
     radii: [f32] = b"RADI" 0,
-    /// The radii of their discs.
-    discs: [f32] = b"DISC" 0,
-    /// The codes of their kinds.
-    kinds: [u8] = b"KIND" 0,
+    /// Their kinds and the borders near them, from which with the radii those of their discs follow.
+    codes: [PointCode] = b"KIND" 0,
     /// Their indices in the input.
     source: [u32] = b"SRCE" 0,
 }

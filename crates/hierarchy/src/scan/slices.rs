@@ -11,12 +11,14 @@ use nearmiss_surface::SurfacePlan;
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
 use crate::patch::covering::Covering;
-use crate::point::kind::{
-    DENSE_SHARES, PointKind, ball, cell_radius, is_on_sheet, obstacle_ball, sheet_reach,
-};
+use crate::point::disc::{DENSE_SHARES, DiscRadii, PointCode};
+use crate::point::kind::{ball, cell_radius, is_on_sheet, obstacle_ball, sheet_reach};
 use crate::point::leaf_block::Leaves;
 use crate::scan::outline::Outline;
 use crate::tree::wide::Tree;
+
+/// The codes and the radii of as many points as a block has lanes.
+type FullBlock<'a> = (&'a [PointCode; PointBlock::WIDTH], &'a [f32; PointBlock::WIDTH]);
 
 /// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not at every
 /// access.
@@ -27,9 +29,7 @@ pub struct Slices<'a> {
     /// Local sampling radii.
     pub radii: &'a [f32],
     /// Radii of the tangent discs.
-    pub discs: &'a [f32],
-    /// What the points' neighbourhoods look like, as [`PointKind::code`].
-    pub kinds: &'a [u8],
+    pub discs: DiscRadii<'a>,
     /// The nodes, and the boxes about them.
     pub tree: Tree<'a>,
     /// What leaves are compared by.
@@ -99,7 +99,7 @@ impl Slices<'_> {
     #[inline]
     #[must_use]
     pub fn obstacle_ball(&self, i: usize) -> f32 {
-        obstacle_ball(i, self.dense, PointKind::from_code(self.kinds[i]), self.radii[i])
+        obstacle_ball(i, self.dense, self.discs.codes[i].kind(), self.radii[i])
     }
 
     /// Returns `true` if a point stands in the obstacle by the sheet that it samples, and `false` if by a
@@ -110,7 +110,7 @@ impl Slices<'_> {
     #[inline]
     #[must_use]
     pub fn is_on_sheet(&self, i: usize) -> bool {
-        is_on_sheet(i, self.dense, PointKind::from_code(self.kinds[i]))
+        is_on_sheet(i, self.dense, self.discs.codes[i].kind())
     }
 
     /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its
@@ -122,7 +122,7 @@ impl Slices<'_> {
     #[must_use]
     pub fn obstacle_reach(&self, i: usize) -> f32 {
         if self.is_on_sheet(i) {
-            sheet_reach(self.radii[i], self.discs[i], self.reach)
+            sheet_reach(self.radii[i], self.discs.get(i), self.reach)
         } else {
             self.obstacle_ball(i)
         }
@@ -135,18 +135,13 @@ impl Slices<'_> {
     #[inline(always)]
     #[must_use]
     pub fn obstacle_balls(&self, block: usize) -> [f32; PointBlock::WIDTH] {
-        const WIDTH: usize = PointBlock::WIDTH;
-        let points = self.points_of(block);
-        let (kinds, radii) = (&self.kinds[points.clone()], &self.radii[points.clone()]);
-        let mut balls = [0.0; WIDTH];
-        if let (true, Ok(kinds), Ok(radii)) =
-            (points.end <= self.dense, <&[u8; WIDTH]>::try_from(kinds), <&[f32; WIDTH]>::try_from(radii))
-        {
-            for lane in 0..WIDTH {
-                balls[lane] = DENSE_SHARES[usize::from(kinds[lane])] * radii[lane];
+        let mut balls = [0.0; PointBlock::WIDTH];
+        if let Some((codes, radii)) = self.dense_block(block) {
+            for lane in 0..PointBlock::WIDTH {
+                balls[lane] = DENSE_SHARES[usize::from(codes[lane].0)] * radii[lane];
             }
         } else {
-            for (ball, i) in balls.iter_mut().zip(points) {
+            for (ball, i) in balls.iter_mut().zip(self.points_of(block)) {
                 *ball = self.obstacle_ball(i);
             }
         }
@@ -160,14 +155,30 @@ impl Slices<'_> {
     #[inline(always)]
     #[must_use]
     pub fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
-        let points = self.points_of(block);
         let mut reaches = self.obstacle_balls(block);
-        let known = self.radii[points.clone()].iter().zip(&self.discs[points]);
-        for (reach, (radius, disc)) in reaches.iter_mut().zip(known) {
-            let of_sheet = sheet_reach(*radius, *disc, self.reach);
-            *reach = if *reach > 0.0 { *reach } else { of_sheet };
+        if let Some((codes, radii)) = self.dense_block(block) {
+            for lane in 0..PointBlock::WIDTH {
+                let disc = codes[lane].disc_of_sheet(radii[lane], self.reach);
+                let of_sheet = sheet_reach(radii[lane], disc, self.reach);
+                reaches[lane] = if reaches[lane] > 0.0 { reaches[lane] } else { of_sheet };
+            }
+        } else {
+            for (reach, i) in reaches.iter_mut().zip(self.points_of(block)) {
+                *reach = self.obstacle_reach(i);
+            }
         }
         reaches
+    }
+
+    /// The codes and the radii of a full block without sparse points.
+    #[inline(always)]
+    fn dense_block(&self, block: usize) -> Option<FullBlock<'_>> {
+        let points = self.points_of(block);
+        if points.end > self.dense {
+            return None;
+        }
+        let codes = self.discs.codes[points.clone()].try_into().ok()?;
+        Some((codes, self.radii[points].try_into().ok()?))
     }
 
     #[inline(always)]
@@ -196,6 +207,6 @@ impl Slices<'_> {
     #[inline]
     #[must_use]
     pub fn ball(&self, i: usize) -> f32 {
-        ball(PointKind::from_code(self.kinds[i]), self.radii[i], self.sampling_radius)
+        ball(self.discs.codes[i].kind(), self.radii[i], self.sampling_radius)
     }
 }

@@ -152,7 +152,7 @@ fn sampling_radii_equal_the_twin() {
             for i in scan.topology().points(self::id(id)) {
                 let slices = scan.slices();
                 let ball = f64::from(slices.ball(i).max(slices.obstacle_ball(i)));
-                let disc = f64::from(scan.discs()[i]);
+                let disc = f64::from(scan.discs().get(i));
                 let about = to_nearest(&centres, scan.positions()[i].map(f64::from)) + ball;
                 low = low.max(radius_of(i, &centres, disc, 0.0)).max(about);
                 high = high.max(radius_of(i, &centres, (1.05 * disc).max(ball), (0.05 * disc).max(ball)));

@@ -80,7 +80,7 @@ fn blobs_wires_and_lone_points_are_named() {
     let lone = scan.source().iter().position(|&s| s == 1600).unwrap();
     assert_eq!(scan.kind(lone), PointKind::Stray);
     let ball = scan.slices().ball(lone);
-    assert!(scan.discs()[lone] <= ball && f64::from(ball) <= scan.sampling_radius(), "{ball}");
+    assert!(scan.discs().get(lone) <= ball && f64::from(ball) <= scan.sampling_radius(), "{ball}");
     assert!(scan.share(PointKind::Stray) < 0.002, "no other");
 }
 
@@ -95,7 +95,7 @@ fn nothing_is_interpolated_beyond_the_reach() {
     for i in 0..scan.len() {
         let is_far = scan.source()[i] >= 4900;
         assert_eq!(scan.kind(i).is_sparse(), is_far, "point {i}: {:?}", scan.kind(i));
-        let [radius, disc] = [scan.radii()[i], scan.discs()[i]].map(|x| f64::from(x) * scale);
+        let [radius, disc] = [scan.radii()[i], scan.discs().get(i)].map(|x| f64::from(x) * scale);
         let ball = f64::from(scan.slices().obstacle_ball(i)) * scale;
         let limit = reach * (1.0 + 1e-6);
         assert!(radius <= limit && disc <= 0.5 * limit && ball <= 0.5 * limit, "point {i}");

@@ -6,6 +6,6 @@ mod coverings;
 mod enclosures;
 mod kinds;
 mod levels;
-mod refit;
+mod metric;
 mod survey;
 mod twin;

@@ -262,7 +262,7 @@ fn without_the_map_there_is_no_such_scan() {
     for scan in [&bare, &without] {
         let meta =
             Meta { hierarchy: whole.meta().clone(), graph: scan.graph().map(|g| g.meta()), density: None };
-        let (mut writer, mut bytes) = (Writer::new(*b"SCAN", 9), Vec::new());
+        let (mut writer, mut bytes) = (Writer::new(*b"SCAN", 10), Vec::new());
         writer.metadata(&meta).unwrap();
         (*whole).add_to(&mut writer).unwrap();
         if let Some(graph) = scan.graph() {

@@ -34,7 +34,7 @@ fn matter(view: &Placed<'_>) -> Vec<([f64; 3], f64, f64)> {
         let alone = matches!(kind, PointKind::Line | PointKind::Stray | PointKind::Sparse);
         let on_sheet = i < slices.dense && matches!(kind, PointKind::Sheet | PointKind::Edge);
         let (ball, within) = if on_sheet {
-            (0.0, radius.min(0.5 * reach).max(1.05 * f64::from(slices.discs[i])))
+            (0.0, radius.min(0.5 * reach).max(1.05 * f64::from(slices.discs.get(i))))
         } else {
             let ball = radius * if alone { 0.5 } else { 0.325 };
             (ball, ball)

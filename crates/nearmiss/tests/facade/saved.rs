@@ -23,7 +23,7 @@ fn same(a: &Scan, b: &Scan) {
     assert_eq!(a.positions(), b.positions(), "positions");
     assert_eq!(a.normals(), b.normals(), "normals");
     assert_eq!(a.radii(), b.radii(), "radii");
-    assert_eq!(a.discs(), b.discs(), "discs");
+    assert!(a.discs().iter().eq(b.discs().iter()), "discs");
     assert_eq!(a.source(), b.source(), "source");
     assert_eq!(a.topology(), b.topology(), "nodes");
     assert!(a.boxes().eq(b.boxes()), "boxes");
@@ -50,17 +50,27 @@ fn what_is_saved_is_what_opens() {
 
 #[test]
 fn golden_files_of_older_versions_are_refused_by_name() {
-    for version in [1, 2, 3, 4, 5, 6, 8] {
+    for version in [1, 2, 3, 4, 5, 6, 8, 9] {
         let path = format!("{}/tests/golden/sphere-v{version}.nm", env!("CARGO_MANIFEST_DIR"));
         let refused = Scan::open(path, Check::Full).unwrap_err().to_string();
         assert!(refused.contains(&format!("version {version}")) && refused.contains("prepare"), "{refused}");
     }
 }
 
+/// The golden file of the version that is written today.
+const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v10.nm");
+
+/// After a change of the format: raise `VERSION` in `src/scan.rs`, name the new file in [`GOLDEN`], add the old
+/// version to the list above, and run `cargo test -p nearmiss --test facade record_golden -- --ignored`.
 #[test]
-fn the_golden_file_of_version_nine_opens() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v9.nm");
-    let golden = Scan::open(path, Check::Full).unwrap();
+#[ignore = "writes the golden file"]
+fn record_golden() {
+    small().save(GOLDEN).unwrap();
+}
+
+#[test]
+fn the_golden_file_of_this_version_opens() {
+    let golden = Scan::open(GOLDEN, Check::Full).unwrap();
     assert_eq!(golden.sanity_check(), Ok(()), "a valid scan");
     same(&golden, &small());
 }
@@ -177,7 +187,7 @@ fn absurd_numbers_do_not_panic() {
     let sound = scan.at(&Pose::IDENTITY);
     for value in [0.0, 1e20, -1.0, f32::MAX, f32::NAN, f32::INFINITY] {
         for tags in [
-            &[b"DISC"][..],
+            &[b"KIND"][..],
             &[b"NRML"],
             &[b"TREE"],
             &[b"LEAF"],
@@ -186,7 +196,7 @@ fn absurd_numbers_do_not_panic() {
             &[b"LIST"],
             &[b"NEAR"],
             &[b"RADI"],
-            &[b"DISC", b"NRML"],
+            &[b"KIND", b"NRML"],
             &[b"GRUP"],
             &[b"COVR"],
         ] {

@@ -6,7 +6,6 @@ use nearmiss_hierarchy::{LeafBlock, Leaves, Part};
 
 use crate::ask::answer::Reason;
 use crate::contact::search::Surfaces;
-use crate::leaf::disc_pair::FAR;
 use crate::leaf::surfel_pair::{Discs, LeafPair, Near};
 
 impl Surfaces<'_> {
@@ -103,8 +102,7 @@ impl Surfaces<'_> {
         while crossings != 0 {
             let j = first + crossings.trailing_zeros() as usize;
             crossings &= crossings - 1;
-            let (distance, [ra, rb]) = self.pair.points(i, j);
-            if distance > FAR * ra.max(rb) || self.pair.is_of_balls([i, j]) {
+            if !self.pair.are_near(i, j) || self.pair.is_of_balls([i, j]) {
                 continue;
             }
             match self.pair.doubt_about(i, j) {

@@ -171,7 +171,7 @@ impl Solid {
                 let normal = self.way_out(pair, neighbour.of_b, [i, j]);
                 let gap = normal.dot(&between);
                 let side = usize::from(!neighbour.of_b);
-                let disc = [pair.a.discs[i], pair.b.discs[j]][side];
+                let disc = [pair.a.discs.get(i), pair.b.discs.get(j)][side];
                 let disc = f64::from(disc) * pair.views[side].placed().scale();
                 // Beside the disc its plane says nothing.
                 if between.norm_squared() - gap * gap > disc * disc || gap < -self.spacing {

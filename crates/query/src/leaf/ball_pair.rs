@@ -180,7 +180,7 @@ impl ScanPair<'_> {
         let (view, scan) = (self.views[side], [self.a, self.b][side]);
         let centre = Vector3::from(view.point(k));
         let normal = Vector3::from(view.placed().rotate(scan.normals[k].map(f64::from)));
-        let radius = f64::from(scan.discs[k]) * view.placed().scale();
+        let radius = f64::from(scan.discs.get(k)) * view.placed().scale();
         let away = x - centre;
         let across = away - normal * normal.dot(&away);
         let length = across.norm();

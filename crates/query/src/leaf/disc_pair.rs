@@ -19,14 +19,14 @@ pub(crate) const FAR: f32 = 0.9;
 
 impl ScanPair<'_> {
     pub(crate) fn disc_a(&self, i: usize) -> Disc {
-        Disc { centre: self.a.position(i), normal: self.a.normals[i], radius: self.a.discs[i] }
+        Disc { centre: self.a.position(i), normal: self.a.normals[i], radius: self.a.discs.get(i) }
     }
 
     pub(crate) fn disc_b(&self, j: usize) -> Disc {
         Disc {
             centre: self.relative.point(self.b.position(j)),
             normal: self.relative.direction(self.b.normals[j]),
-            radius: self.b.discs[j] * self.relative.scale(),
+            radius: self.b.discs.get(j) * self.relative.scale(),
         }
     }
 
@@ -53,6 +53,13 @@ impl ScanPair<'_> {
         (distance, [self.a.radii[i], self.b.radii[j] * self.relative.scale()])
     }
 
+    /// Returns `true` if two points are so near each other that a crossing of their discs says something.
+    #[inline]
+    pub(crate) fn are_near(&self, i: usize, j: usize) -> bool {
+        let (distance, [ra, rb]) = self.points(i, j);
+        distance <= FAR * ra.max(rb)
+    }
+
     /// The middle of what the chords of two crossing discs share, in the world.
     pub(crate) fn shared_chord(&self, i: usize, j: usize) -> Contact {
         let [va, vb] = self.views;
@@ -70,8 +77,8 @@ impl ScanPair<'_> {
             ((fa - c * fb) * na + (fb - c * fa) * nb) / gram
         };
         let radii = [
-            f64::from(self.a.discs[i]) * va.placed().scale(),
-            f64::from(self.b.discs[j]) * vb.placed().scale(),
+            f64::from(self.a.discs.get(i)) * va.placed().scale(),
+            f64::from(self.b.discs.get(j)) * vb.placed().scale(),
         ];
         let place = middle + step;
         // Along the common line each chord is an interval; for parallel planes the place is as good as any.
@@ -103,7 +110,6 @@ impl ScanPair<'_> {
         let ((discs_a, lane_a), (discs_b, lane_b)) = (Discs::about(a, i), Discs::about(b, j));
         let (relative, reach) = (&self.relative, self.relative.slack());
         let test = LeafPair { a: discs_a, b: discs_b, balls: None, reach, relative };
-        let (distance, [ra, rb]) = self.points(i, j);
-        test.cross_alone(lane_a, lane_b) && distance <= FAR * ra.max(rb) && self.doubt_about(i, j).is_none()
+        test.cross_alone(lane_a, lane_b) && self.are_near(i, j) && self.doubt_about(i, j).is_none()
     }
 }

@@ -39,7 +39,7 @@ fn crossing(a: &Placed<'_>, b: &Placed<'_>) -> [BTreeSet<[usize; 2]>; 2] {
     let disc = |view: &Placed<'_>, i: usize| oracle::Disc {
         centre: view.point(i),
         normal: view.placed().rotate(view.scan().normals()[i].map(f64::from)),
-        radius: f64::from(view.scan().discs()[i]) * view.placed().scale(),
+        radius: f64::from(view.scan().discs().get(i)) * view.placed().scale(),
     };
     let trusted =
         |view: &Placed<'_>, i: usize| matches!(view.scan().kind(i), PointKind::Sheet | PointKind::Edge);

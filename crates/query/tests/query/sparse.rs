@@ -33,7 +33,7 @@ fn nearest_ball(a: &Placed<'_>, b: &Placed<'_>) -> f64 {
         let disc = |i: usize| oracle::Disc {
             centre: view.point(i),
             normal: view.placed().rotate(scan.normals()[i].map(f64::from)),
-            radius: f64::from(scan.discs()[i]) * scale,
+            radius: f64::from(scan.discs().get(i)) * scale,
         };
         let ball = |i: usize| f64::from(scan.slices().ball(i)) * scale;
         (0..scan.len()).map(|i| (disc(i), ball(i))).collect()

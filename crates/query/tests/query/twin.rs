@@ -40,7 +40,7 @@ fn best_crossing(a: &Placed<'_>, b: &Placed<'_>) -> (f64, bool) {
                 let disc = oracle::Disc {
                     centre: view.point(i),
                     normal: view.placed().rotate(scan.normals()[i].map(f64::from)),
-                    radius: f64::from(scan.discs()[i]) * view.placed().scale(),
+                    radius: f64::from(scan.discs().get(i)) * view.placed().scale(),
                 };
                 let radius = f64::from(scan.radii()[i]) * view.placed().scale();
                 (disc, matches!(scan.kind(i), PointKind::Sheet | PointKind::Edge), radius)

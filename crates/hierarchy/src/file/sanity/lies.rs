@@ -8,6 +8,7 @@ use nearmiss_testdata::arbitrary::{self, CloudKind};
 
 use crate::bounds::boxes::OrientedBox;
 use crate::patch::covering::Covering;
+use crate::point::disc::PointCode;
 use crate::scan::build::PointHierarchy;
 use crate::scan::options::BuildOptions;
 use nearmiss_store::Flaw;
@@ -151,14 +152,15 @@ fn points_that_no_build_writes() {
         }
         for value in NONE.into_iter().chain([0.0, -0.1, 1e3]) {
             deep(&named("the radius"), |scan| scan.arrays.radii.to_mut()[i] = value);
-            deep(&named("the disc"), |scan| scan.arrays.discs.to_mut()[i] = value);
         }
         deep(&format!("the box about point {i}"), |scan| {
             let x = scan.slices().position(i)[0];
             lie_of_position(scan, i, 0, x + 1.0);
         });
         deep(&named("the normal"), |scan| scan.arrays.normals.to_mut()[i] = [0.0; 3]);
-        deep(&named("the kind"), |scan| scan.arrays.kinds.to_mut()[i] = 6);
+        for code in [6, 7, 32, 255] {
+            deep(&named("the kind"), |scan| scan.arrays.codes.to_mut()[i] = PointCode(code));
+        }
         deep(&named("the place in the input"), |scan| scan.arrays.source.to_mut()[i] = 301);
     }
 }

@@ -40,8 +40,7 @@ impl PointHierarchy {
         let expected = [
             ("normals", self.arrays.normals.len(), points),
             ("radii", self.arrays.radii.len(), points),
-            ("discs", self.arrays.discs.len(), points),
-            ("kinds", self.arrays.kinds.len(), points),
+            ("kinds", self.arrays.codes.len(), points),
             ("source", self.arrays.source.len(), points),
             ("boxes", self.arrays.siblings.len(), inner),
             ("growths", self.arrays.surface_growths.len(), inner),

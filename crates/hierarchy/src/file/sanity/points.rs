@@ -1,10 +1,13 @@
 //! The numbers of every point, each against its range and against its leaf.
 
+use std::array::from_fn;
+
 use nearmiss_store::Flaw;
 
 use super::limits::FARTHEST;
 use crate::bounds::boxes::OrientedBox;
-use crate::point::kind::{PointKind, THICKNESS};
+use crate::point::disc::{DiscRadii, PointCode};
+use crate::point::kind::THICKNESS;
 use crate::scan::build::PointHierarchy;
 
 /// Normals are unit to rounding.
@@ -31,8 +34,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         positions: scan.positions(),
         normals: &scan.arrays.normals,
         radii: &scan.arrays.radii,
-        discs: &scan.arrays.discs,
-        kinds: &scan.arrays.kinds,
+        discs: scan.discs(),
         source: &scan.arrays.source,
     };
     let last = u32::try_from(scan.given() - 1).unwrap_or(u32::MAX);
@@ -54,8 +56,7 @@ struct Arrays<'a> {
     positions: &'a [[f32; 3]],
     normals: &'a [[f32; 3]],
     radii: &'a [f32],
-    discs: &'a [f32],
-    kinds: &'a [u8],
+    discs: DiscRadii<'a>,
     source: &'a [u32],
 }
 
@@ -65,19 +66,21 @@ struct Block {
     normal: [Lanes; 3],
     radius: Lanes,
     disc: Lanes,
-    kind: [u8; LANES],
+    code: [PointCode; LANES],
     source: [u32; LANES],
 }
 
 impl Arrays<'_> {
     #[inline]
     fn block(&self, start: usize, end: usize) -> Block {
+        let code = lanes(self.discs.codes, start, end);
+        let radius = lanes(self.radii, start, end);
         Block {
             position: transposed(&lanes(self.positions, start, end)),
             normal: transposed(&lanes(self.normals, start, end)),
-            radius: lanes(self.radii, start, end),
-            disc: lanes(self.discs, start, end),
-            kind: lanes(self.kinds, start, end),
+            radius,
+            disc: from_fn(|i| code[i].disc(radius[i], self.discs.reach, self.discs.sampling_radius)),
+            code,
             source: lanes(self.source, start, end),
         }
     }
@@ -114,11 +117,10 @@ struct Leaf<'a> {
 }
 
 /// What is compared, in the order of [`Leaf::sound`].
-const COMPARED: [&str; 7] = [
+const COMPARED: [&str; 6] = [
     "the position of point",
     "the normal of point",
     "the radius of point",
-    "the disc of point",
     "the kind of point",
     "the place in the input of point",
     "the box about point",
@@ -157,13 +159,12 @@ impl Leaf<'_> {
         }
         for i in 0..LANES {
             sound[2][i] = u32::from((p.radius[i] > 0.0) & (p.radius[i] <= self.bounds.reach));
-            sound[3][i] = u32::from((p.disc[i] > 0.0) & (p.disc[i] <= p.radius[i]));
         }
         for i in 0..LANES {
-            sound[4][i] = u32::from(p.kind[i] <= PointKind::LAST);
-            sound[5][i] = u32::from(p.source[i] <= self.last);
+            sound[3][i] = u32::from(p.code[i].is_sound());
+            sound[4][i] = u32::from(p.source[i] <= self.last);
         }
-        sound[6] = self.in_box(p);
+        sound[5] = self.in_box(p);
         sound
     }
 

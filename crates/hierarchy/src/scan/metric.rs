@@ -18,6 +18,7 @@ use crate::patch::covering::{Ground, Solid, coverings};
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::samples;
 use crate::patch::surfels::{Fit, Surfel, align, fitted, surfel_of};
+use crate::point::disc::{DiscRadii, PointCode};
 use crate::point::kind::{PointKind, ball, obstacle_ball};
 use crate::point::spacing::Look;
 use crate::scan::build::PointHierarchy;
@@ -37,7 +38,7 @@ impl PointHierarchy {
     ///
     /// # Panics
     /// When a point is heard that is none.
-    pub fn refit<S: Default>(
+    pub fn use_metric<S: Default>(
         &mut self,
         metric: Metric,
         fit: impl Fn(u32, &mut S, &mut Vec<u32>) -> Evaluation + Sync + Send,
@@ -56,10 +57,12 @@ impl PointHierarchy {
             leaves.iter().cloned().flatten().map(surfel).collect::<Vec<_>>()
         });
         let mut surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
-        let mut fits: Vec<Fit> = surfels.iter().map(|s| Fit { normal: s.normal, kind: s.kind }).collect();
+        let mut fits: Vec<Fit> =
+            surfels.iter().map(|s| Fit { normal: s.normal, kind: s.code.kind() }).collect();
         let neighbours = BlockBoxes::new(&self.arrays.blocks, self.len());
         vote(&neighbours.over(&self.arrays.blocks), self.positions(), &self.arrays.radii, &mut fits);
-        let corrected: Vec<usize> = (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].kind).collect();
+        let corrected: Vec<usize> =
+            (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].code.kind()).collect();
         let discs = chunks(&corrected, |points| {
             let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
             let surfel = |&i: &usize| {
@@ -67,7 +70,7 @@ impl PointHierarchy {
                 fit(id32(i), &mut scratch, &mut heard);
                 self.gather(&heard, &mut near);
                 let fit = Fit { normal: self.on_its_side(i, fits[i].normal), ..fits[i] };
-                surfel_of(&fit, self.positions()[i], (self.arrays.radii[i], self.meta.reach), &near)
+                surfel_of(&fit, self.positions()[i], &near)
             };
             points.iter().map(surfel).collect::<Vec<_>>()
         });
@@ -99,7 +102,7 @@ impl PointHierarchy {
             _ => Look::Area,
         };
         let fit = fitted(at, look);
-        let surfel = surfel_of(&fit, self.positions()[i], (self.arrays.radii[i], self.meta.reach), near);
+        let surfel = surfel_of(&fit, self.positions()[i], near);
         Surfel { normal: self.on_its_side(i, surfel.normal), ..surfel }
     }
 
@@ -112,22 +115,23 @@ impl PointHierarchy {
     fn replace(&mut self, surfels: &[Surfel]) {
         let leaf_size = self.meta.leaf_size as usize;
         let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();
-        let disc = |(s, &r): (&Surfel, &f32)| s.disc_within(ball(s.kind, r, self.meta.sampling_radius));
-        let discs: Vec<f32> = surfels.iter().zip(&self.arrays.radii).map(disc).collect();
+        let codes: Vec<PointCode> = surfels.iter().map(|s| s.code).collect();
+        let discs = DiscRadii { codes: &codes, ..self.discs() };
         let dense = self.meta.dense as usize;
         let ball = |(i, (s, &r)): (usize, (&Surfel, &f32))| {
-            ball(s.kind, r, self.meta.sampling_radius).max(obstacle_ball(i, dense, s.kind, r))
+            let kind = s.code.kind();
+            ball(kind, r, self.meta.sampling_radius).max(obstacle_ball(i, dense, kind, r))
         };
         let balls: Vec<f32> = surfels.iter().zip(&self.arrays.radii).enumerate().map(ball).collect();
         if !self.meta.is_oriented {
             normals.chunks_mut(leaf_size).for_each(align);
         }
         let (topology, positions) = (self.topology, self.positions());
-        let of_points = Discs { positions, normals: &normals, discs: &discs, balls: &balls };
+        let of_points = Discs { positions, normals: &normals, discs, balls: &balls };
         let boxes = boxes_of_discs(&topology, &self.boxes().collect::<Vec<_>>(), &of_points);
         let growths: Vec<Growth> = topology.ids().map(|id| self.tree().growth(Part::Surface, id)).collect();
         let flat: Vec<Solid> =
-            discs.iter().zip(&balls).map(|(&disc, &ball)| Solid::of_disc(disc, ball)).collect();
+            discs.iter().zip(&balls).map(|(disc, &ball)| Solid::of_disc(disc, ball)).collect();
         let ground = Ground {
             topology: &topology,
             boxes: &boxes,
@@ -140,9 +144,8 @@ impl PointHierarchy {
         };
         let coverings =
             coverings(&ground, |id| samples(&self.arrays.sample_lists, &topology, id, self.meta.samples));
-        self.arrays.kinds = surfels.iter().map(|s| s.kind.code()).collect::<Vec<_>>().into();
         self.arrays.normals = normals.into();
-        self.arrays.discs = discs.into();
+        self.arrays.codes = codes.into();
         self.arrays.coverings = coverings.into();
         self.bound(&boxes, None);
     }

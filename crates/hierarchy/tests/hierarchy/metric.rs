@@ -34,7 +34,7 @@ fn a_fit_by_straight_distances_changes_nothing() {
     for points in clouds() {
         let scan = prepared(&points);
         let mut again = scan.clone();
-        again.refit(Metric::Euclidean, |i, scratch, heard| straight(&scan, i, scratch, heard));
+        again.use_metric(Metric::Euclidean, |i, scratch, heard| straight(&scan, i, scratch, heard));
         assert_eq!(again.sanity_check(), Ok(()), "an invariant");
         assert_eq!(again.meta(), scan.meta(), "metadata");
         // Planes are fitted before the last tree is made, so sums have another order.
@@ -47,7 +47,7 @@ fn a_fit_by_straight_distances_changes_nothing() {
             }
             let [n, m] = [&again, &scan].map(|scan| scan.normals()[i]);
             let same = (0..3).all(|k| (n[k] - m[k]).abs() < 1e-4);
-            assert!(!same || near(again.discs()[i], scan.discs()[i]), "the disc of point {i}");
+            assert!(!same || near(again.discs().get(i), scan.discs().get(i)), "the disc of point {i}");
             differ += usize::from(!same);
         }
         // A vote is of the nearest, and takes the normal of the nearest of a sheet: of several equally near,
@@ -83,7 +83,7 @@ fn what_a_fit_says_is_kept() {
     let statuses = [Status::Ok, Status::Border, Status::Ambiguous, Status::Outside];
     let [upright, tilted] = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]];
     let oriented = scan.clone();
-    scan.refit(Metric::Geodesic, |i, _: &mut (), heard| {
+    scan.use_metric(Metric::Geodesic, |i, _: &mut (), heard| {
         // Heard by themselves alone, points are at a border.
         heard.push(i);
         Evaluation {
@@ -114,7 +114,7 @@ fn what_a_fit_says_is_kept() {
         let along: f64 = (0..3).map(|k| f64::from(n[k]) * up[k]).sum();
         assert!(along.abs() > 1.0 - 1e-6, "the normal of point {i}: {n:?}");
         assert!((0..3).map(|k| n[k] * was[k]).sum::<f32>() >= 0.0, "point {i} has changed sides");
-        let share = scan.discs()[i] / scan.radii()[i];
+        let share = scan.discs().get(i) / scan.radii()[i];
         assert!((share - 0.35).abs() < 1e-6, "the disc of point {i}, {share} radii, is none of a border");
     }
     assert!(kept > 500, "{kept} of 700");
