@@ -60,8 +60,8 @@ fn golden_files_of_older_versions_are_refused_by_name() {
 /// The golden file of the version that is written today.
 const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v10.nm");
 
-/// After a change of the format: raise `VERSION` in `src/scan.rs`, name the new file in [`GOLDEN`], add the old
-/// version to the list above, and run `cargo test -p nearmiss --test facade record_golden -- --ignored`.
+/// After a change of the format: raise `VERSION` in `src/scan.rs`, name the new file in [`GOLDEN`], add the
+/// old version to the list above, and run `cargo test -p nearmiss --test facade record_golden -- --ignored`.
 #[test]
 #[ignore = "writes the golden file"]
 fn record_golden() {
