@@ -234,7 +234,7 @@ impl<'a> Leaves<'a> {
         (&self.blocks[leaf * leaf_size.div_ceil(WIDTH) + part], first, count)
     }
 
-    /// Returns `true` if some points of a leaf are [sparse](PointKind::is_sparse).
+    /// Returns `true` if some points of a leaf are [sparse](crate::PointKind::is_sparse).
     ///
     /// # Panics
     /// When there is no such leaf, as below.
