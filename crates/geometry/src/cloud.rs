@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{Aabb, Frame};
+use crate::{Aabb, Frame, Scanner};
 
 /// Fewer distinct points than this define no surface worth asking about.
 const LEAST_POINTS: usize = 8;
@@ -55,8 +55,10 @@ pub enum CloudError {
         /// How many were given.
         given: usize,
     },
-    /// Normals or colours that do not belong to the points given.
-    #[error("{given} normals or colours for {points} points; give one for each point of the input")]
+    /// Attributes, as normals, that do not belong to the points given.
+    #[error(
+        "expected an attribute for each of {points} points, got {given}; give one for each point of the input"
+    )]
     AttributeCount {
         /// How many attributes were given.
         given: usize,
@@ -108,6 +110,9 @@ pub struct PointCloud {
     step: f64,
     normals: Option<Vec<[f32; 3]>>,
     colours: Option<Vec<[u8; 3]>>,
+    intensities: Option<Vec<f32>>,
+    classes: Option<Vec<u8>>,
+    scanners: Vec<Scanner>,
 }
 
 impl PointCloud {
@@ -159,7 +164,19 @@ impl PointCloud {
             return Err(CloudError::TooFew { distinct: kept.len(), given });
         }
         let (positions, source) = kept.into_iter().unzip();
-        Ok(Self { frame, positions, source, given, dropped, step, normals: None, colours: None })
+        Ok(Self {
+            frame,
+            positions,
+            source,
+            given,
+            dropped,
+            step,
+            normals: None,
+            colours: None,
+            intensities: None,
+            classes: None,
+            scanners: Vec::new(),
+        })
     }
 
     /// The same cloud with a normal for each point; `normals` are indexed like the input.
@@ -180,10 +197,36 @@ impl PointCloud {
         Ok(self)
     }
 
+    /// The same cloud with an intensity for each point; `intensities` are indexed like the input.
+    ///
+    /// # Errors
+    /// When there is not one for each point that the cloud was made from.
+    pub fn with_intensities(mut self, intensities: &[f32]) -> Result<Self, CloudError> {
+        self.intensities = Some(self.gathered(intensities)?);
+        Ok(self)
+    }
+
+    /// The same cloud with a class for each point; `classes` are indexed like the input.
+    ///
+    /// # Errors
+    /// When there is not one for each point that the cloud was made from.
+    pub fn with_classes(mut self, classes: &[u8]) -> Result<Self, CloudError> {
+        self.classes = Some(self.gathered(classes)?);
+        Ok(self)
+    }
+
+    /// The same cloud with the places of the scanners that took it; of points in two of their ranges, the first
+    /// counts.
+    #[must_use]
+    pub fn with_scanners(mut self, scanners: Vec<Scanner>) -> Self {
+        self.scanners = scanners;
+        self
+    }
+
     /// Returns the cloud of the points with these `ids`, which are indices into [`PointCloud::positions`] in
     /// ascending order.
     ///
-    /// Normals and colours follow their points. The frame and [`PointCloud::step`] stay as they are,
+    /// Normals, colours, intensities and classes follow their points. The frame and [`PointCloud::step`] stay as they are,
     /// [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads to indices of
     /// the input.
     ///
@@ -219,6 +262,9 @@ impl PointCloud {
             source: selected(&self.source, ids),
             normals: self.normals.as_deref().map(|normals| selected(normals, ids)),
             colours: self.colours.as_deref().map(|colours| selected(colours, ids)),
+            intensities: self.intensities.as_deref().map(|intensities| selected(intensities, ids)),
+            classes: self.classes.as_deref().map(|classes| selected(classes, ids)),
+            scanners: self.scanners.clone(),
             ..*self
         })
     }
@@ -286,6 +332,24 @@ impl PointCloud {
     #[must_use]
     pub fn colours(&self) -> Option<&[[u8; 3]]> {
         self.colours.as_deref()
+    }
+
+    /// Intensities in the unit of the input, if any.
+    #[must_use]
+    pub fn intensities(&self) -> Option<&[f32]> {
+        self.intensities.as_deref()
+    }
+
+    /// Classes by the codes of LAS, if any: 2 is ground, 6 is buildings.
+    #[must_use]
+    pub fn classes(&self) -> Option<&[u8]> {
+        self.classes.as_deref()
+    }
+
+    /// Where the scanners stood that took the cloud, as far as the input says.
+    #[must_use]
+    pub fn scanners(&self) -> &[Scanner] {
+        &self.scanners
     }
 
     /// Bounds in the caller's frame.

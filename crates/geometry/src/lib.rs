@@ -6,6 +6,7 @@ mod cloud;
 mod frame;
 mod id;
 mod pose;
+mod scanner;
 mod triangles;
 
 pub use aabb::Aabb;
@@ -14,4 +15,5 @@ pub use frame::Frame;
 pub use id::{NodeId, PointId};
 pub use nalgebra;
 pub use pose::{Pose, PoseError};
+pub use scanner::Scanner;
 pub use triangles::{MeshError, TriangleMesh};

@@ -33,6 +33,6 @@ pub use lazy_path::{LazyPath, PathPoint};
 pub use length::{Network, edge_lengths};
 pub use levels::{Cells, LevelScratch, Levels};
 pub use options::{GraphError, GraphOptions, Paths, Prune};
-pub use orient::{Decision, Orientation, OrientedPart, Sides, orient};
+pub use orient::{Decision, Orientation, OrientedPart, Sides, Viewpoint, orient};
 pub use sections::GraphMeta;
 pub use surface_graph::{Samples, SurfaceGraph, SurfaceGraphMeta};

@@ -25,7 +25,7 @@ use crate::Adjacency;
 use agreement::{Weights, agreement, strongest_first};
 use outwards::outwards;
 use patches::{Signed, Tree, Votes};
-pub use sides::{Decision, OrientedPart, Sides};
+pub use sides::{Decision, OrientedPart, Sides, Viewpoint};
 
 /// Normals that agree like this lie on one smooth sheet. If a ring of such edges still turns a normal round,
 /// the sheet has one side only.

@@ -2,12 +2,12 @@
 
 use crate::error::Fault;
 
-/// Values of a row that can mean something to us: x y z, normal x y z, red green blue.
-pub(crate) type Row = [f64; 9];
+/// Values of a row that can mean something to us: x y z, normal x y z, red green blue, intensity, class.
+pub(crate) type Row = [f64; 11];
 
 /// Which of a row's values a column holds, by its name in any case.
 pub(crate) fn slot(name: &[u8]) -> Option<usize> {
-    const NAMES: [&[&str]; 9] = [
+    const NAMES: [&[&str]; 11] = [
         &["x"],
         &["y"],
         &["z"],
@@ -17,6 +17,8 @@ pub(crate) fn slot(name: &[u8]) -> Option<usize> {
         &["red", "r"],
         &["green", "g"],
         &["blue", "b"],
+        &["intensity", "scalar_intensity", "i"],
+        &["classification", "scalar_classification", "class"],
     ];
     NAMES.iter().position(|names| names.iter().any(|known| name.eq_ignore_ascii_case(known.as_bytes())))
 }
@@ -26,19 +28,26 @@ pub(crate) fn slot(name: &[u8]) -> Option<usize> {
 pub(crate) struct Holds {
     pub(crate) normals: bool,
     pub(crate) colours: bool,
+    pub(crate) intensities: bool,
+    pub(crate) classes: bool,
 }
 
 impl Holds {
-    /// From the slots that the columns fill; coordinates must be among them, the others count in threes.
+    /// From the slots that the columns fill; coordinates must be among them, normals and colours count in threes.
     pub(crate) fn among(slots: impl Iterator<Item = usize>) -> Result<Self, Fault> {
-        let mut filled = [false; 9];
+        let mut filled = [false; 11];
         slots.for_each(|slot| filled[slot] = true);
         for (there, what) in filled.iter().zip(["a coordinate x", "a coordinate y", "a coordinate z"]) {
             if !there {
                 return Err(Fault::Undeclared { what });
             }
         }
-        Ok(Self { normals: filled[3..6] == [true; 3], colours: filled[6..] == [true; 3] })
+        Ok(Self {
+            normals: filled[3..6] == [true; 3],
+            colours: filled[6..9] == [true; 3],
+            intensities: filled[9],
+            classes: filled[10],
+        })
     }
 }
 
@@ -49,9 +58,10 @@ mod tests {
     #[test]
     fn normals_and_colours_count_in_threes() {
         let of = |names: &str| Holds::among(names.split(' ').filter_map(|n| slot(n.as_bytes())));
-        let both = Holds { normals: true, colours: true };
+        let both = Holds { normals: true, colours: true, intensities: true, classes: false };
         assert_eq!(of("X Y Z intensity nx ny nz Red Green Blue"), Ok(both));
         assert_eq!(of("x y z nx ny red green"), Ok(Holds::default()));
+        assert_eq!(of("x y z Classification"), Ok(Holds { classes: true, ..Holds::default() }));
         assert_eq!(of("x z nx"), Err(Fault::Undeclared { what: "a coordinate y" }));
     }
 }

@@ -32,7 +32,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// Neither content nor name tell the format.
-    #[error("{}: unknown format; known are ply, pcd, xyz (also csv and other text) and obj; say which with `--format`", .path.display())]
+    #[error("{}: unknown format; known are ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off and gltf; say which with `--format`", .path.display())]
     UnknownFormat {
         /// The file.
         path: PathBuf,
@@ -83,18 +83,6 @@ pub enum ReadError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Foreign {
-    /// ASPRS LAS.
-    Las,
-    /// LAS compressed by laszip, COPC included.
-    Laz,
-    /// ASTM E57.
-    E57,
-    /// Stereolithography, text or binary.
-    Stl,
-    /// glTF, text or binary.
-    Gltf,
-    /// Object File Format.
-    Off,
     /// Compressed by gzip.
     Gzip,
     /// A zip archive.
@@ -106,8 +94,6 @@ pub enum Foreign {
 impl Foreign {
     fn remedy(self) -> &'static str {
         match self {
-            Self::Las | Self::Laz | Self::E57 => "convert it to PLY, for example with CloudCompare or PDAL",
-            Self::Stl | Self::Gltf | Self::Off => "convert it to PLY or OBJ, for example with MeshLab",
             Self::Gzip | Self::Zip => "unpack it first",
             Self::Utf16 => "save it as UTF-8",
         }
@@ -117,12 +103,6 @@ impl Foreign {
 impl fmt::Display for Foreign {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Las => "a LAS file",
-            Self::Laz => "a LAZ file",
-            Self::E57 => "an E57 file",
-            Self::Stl => "an STL file",
-            Self::Gltf => "a glTF file",
-            Self::Off => "an OFF file",
             Self::Gzip => "a gzip file",
             Self::Zip => "a zip archive",
             Self::Utf16 => "text in UTF-16",
@@ -320,6 +300,20 @@ pub enum Fault {
         points: u64,
         /// Bytes of the compressed data.
         packed: u64,
+    },
+    /// A foreign decoder refused the data.
+    #[error("the data are damaged: {cause}")]
+    Decoder {
+        /// What it said.
+        cause: Box<str>,
+    },
+    /// A format that this build was made without.
+    #[error("{what} cannot be read by this build; build nearmiss-io with the feature `{feature}`")]
+    Feature {
+        /// The format.
+        what: &'static str,
+        /// What it needs.
+        feature: &'static str,
     },
     /// Compressed data that do not decompress to their declared length.
     #[error("the compressed data are corrupt")]

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use crate::error::{Foreign, ReadError};
 use crate::text::{Lines, number, words};
+use crate::{npy, off, stl};
 
 /// A format that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,11 +22,47 @@ pub enum Format {
     Xyz,
     /// Wavefront OBJ.
     Obj,
+    /// ASPRS LAS 1.0 to 1.4, also compressed by laszip: LAZ and COPC.
+    Las,
+    /// ASTM E57.
+    E57,
+    /// NumPy arrays of N × 3 numbers.
+    Npy,
+    /// Stereolithography, binary or text.
+    Stl,
+    /// Object File Format of Geomview, as text.
+    Off,
+    /// glTF 2.0, text or binary.
+    Gltf,
+}
+
+impl Format {
+    /// All formats.
+    pub const ALL: [Self; 10] = [
+        Self::Ply,
+        Self::Pcd,
+        Self::Xyz,
+        Self::Obj,
+        Self::Las,
+        Self::E57,
+        Self::Npy,
+        Self::Stl,
+        Self::Off,
+        Self::Gltf,
+    ];
+
+    /// Returns `true` if all files of this format can be read from disk in pieces, so that no reader for bytes
+    /// in memory is needed.
+    pub(crate) const fn is_streamed(self) -> bool {
+        matches!(self, Self::Las | Self::E57)
+    }
 }
 
 /// Not the name of a format that can be read.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("unknown format `{given}`; known are ply, pcd, xyz (also csv) and obj")]
+#[error(
+    "unknown format `{given}`; known are ply, pcd, las (also laz), e57, xyz (also csv), npy, obj, stl, off and gltf (also glb)"
+)]
 pub struct UnknownFormatName {
     /// What was given.
     pub given: String,
@@ -40,6 +77,12 @@ impl FromStr for Format {
             "pcd" => Ok(Self::Pcd),
             "xyz" | "csv" => Ok(Self::Xyz),
             "obj" => Ok(Self::Obj),
+            "las" | "laz" => Ok(Self::Las),
+            "e57" => Ok(Self::E57),
+            "npy" => Ok(Self::Npy),
+            "stl" => Ok(Self::Stl),
+            "off" => Ok(Self::Off),
+            "gltf" | "glb" => Ok(Self::Gltf),
             _ => Err(UnknownFormatName { given: name.into() }),
         }
     }
@@ -52,6 +95,12 @@ impl fmt::Display for Format {
             Self::Pcd => "pcd",
             Self::Xyz => "xyz",
             Self::Obj => "obj",
+            Self::Las => "las",
+            Self::E57 => "e57",
+            Self::Npy => "npy",
+            Self::Stl => "stl",
+            Self::Off => "off",
+            Self::Gltf => "gltf",
         })
     }
 }
@@ -65,14 +114,11 @@ pub(crate) fn recognise(bytes: &[u8], length: u64, name: &Path) -> Result<Format
     let unsupported = |format| ReadError::Unsupported { path: name.into(), format };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let ending = ending.to_ascii_lowercase();
-    if let Some(foreign) = foreign_magic(bytes, length) {
+    if let Some(foreign) = foreign_magic(bytes) {
         return Err(unsupported(foreign));
     }
-    if let Some(format) = magic(bytes) {
+    if let Some(format) = magic(bytes, length) {
         return Ok(format);
-    }
-    if let Some(foreign) = foreign_ending(&ending) {
-        return Err(unsupported(foreign));
     }
     if TEXT_ENDINGS.contains(&ending.as_str()) {
         return Ok(Format::Xyz);
@@ -80,53 +126,41 @@ pub(crate) fn recognise(bytes: &[u8], length: u64, name: &Path) -> Result<Format
     ending.parse().ok().or_else(|| look(bytes)).ok_or_else(|| ReadError::UnknownFormat { path: name.into() })
 }
 
-fn magic(bytes: &[u8]) -> Option<Format> {
+fn magic(bytes: &[u8], length: u64) -> Option<Format> {
     let is_ply = bytes.strip_prefix(b"ply").and_then(<[u8]>::first);
     if is_ply.is_some_and(u8::is_ascii_whitespace) {
         return Some(Format::Ply);
     }
-    let is_pcd = bytes.starts_with(b"# .PCD") || matches!(first_word(bytes)?, b"VERSION" | b"FIELDS");
+    let binary: [(&[u8], Format); 4] = [
+        (b"LASF", Format::Las),
+        (b"ASTM-E57", Format::E57),
+        (npy::MAGIC, Format::Npy),
+        (b"glTF", Format::Gltf),
+    ];
+    if let Some((_, format)) = binary.into_iter().find(|(magic, _)| bytes.starts_with(magic)) {
+        return Some(format);
+    }
+    if stl::is_text(bytes) || stl::is_binary(bytes, length) {
+        return Some(Format::Stl);
+    }
+    if bytes.starts_with(b"{") {
+        return bytes.windows(7).take(4096).any(|word| word == b"\"asset\"").then_some(Format::Gltf);
+    }
+    let first = first_word(bytes).unwrap_or_default();
+    if off::is_header(first) {
+        return Some(Format::Off);
+    }
+    let is_pcd = bytes.starts_with(b"# .PCD") || matches!(first, b"VERSION" | b"FIELDS");
     is_pcd.then_some(Format::Pcd)
 }
 
-fn foreign_magic(bytes: &[u8], length: u64) -> Option<Foreign> {
-    // Of the byte that holds the point format, laszip sets the highest bit.
-    let is_laz = bytes.get(104).is_some_and(|format| format & 0x80 != 0);
-    let is_ascii_stl = || {
-        let start = bytes[..bytes.len().min(1024)].trim_ascii_start();
-        start.starts_with(b"solid") && start.windows(5).any(|w| w == b"facet")
-    };
+fn foreign_magic(bytes: &[u8]) -> Option<Foreign> {
     match bytes {
-        [b'L', b'A', b'S', b'F', ..] if is_laz => Some(Foreign::Laz),
-        [b'L', b'A', b'S', b'F', ..] => Some(Foreign::Las),
-        [b'g', b'l', b'T', b'F', ..] => Some(Foreign::Gltf),
         [0x1f, 0x8b, ..] => Some(Foreign::Gzip),
         [b'P', b'K', 3, 4, ..] => Some(Foreign::Zip),
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some(Foreign::Utf16),
-        _ if bytes.starts_with(b"ASTM-E57") => Some(Foreign::E57),
-        _ if is_ascii_stl() || is_binary_stl(bytes, length) => Some(Foreign::Stl),
-        _ if matches!(first_word(bytes)?, b"OFF" | b"COFF" | b"NOFF" | b"STOFF") => Some(Foreign::Off),
         _ => None,
     }
-}
-
-/// Binary STL has no magic, but its length follows from a count: a header of 80 bytes, then 50 a triangle.
-fn is_binary_stl(bytes: &[u8], length: u64) -> bool {
-    let count = bytes.get(80..84).and_then(<[u8]>::first_chunk);
-    let promised = count.map(|count| 84 + 50 * u64::from(u32::from_le_bytes(*count)));
-    promised == Some(length)
-}
-
-fn foreign_ending(ending: &str) -> Option<Foreign> {
-    Some(match ending {
-        "las" => Foreign::Las,
-        "laz" => Foreign::Laz,
-        "e57" => Foreign::E57,
-        "stl" => Foreign::Stl,
-        "gltf" | "glb" => Foreign::Gltf,
-        "off" => Foreign::Off,
-        _ => return None,
-    })
 }
 
 fn look(bytes: &[u8]) -> Option<Format> {
@@ -164,6 +198,7 @@ mod tests {
         assert_eq!(of(b"ply\nformat", "a.xyz"), Ok(Format::Ply));
         assert_eq!(of(b"ply\r\n", "a"), Ok(Format::Ply));
         assert_eq!(of(b"# .PCD v0.7", "a.ply"), Ok(Format::Pcd));
+        assert_eq!(of(b"LASF\0\0", "a.ply"), Ok(Format::Las));
         assert_eq!(of(b"# made by me\nVERSION .7\n", "a"), Ok(Format::Pcd));
         assert_eq!(of(b"plywood", "a.OBJ"), Ok(Format::Obj));
         assert_eq!(of(b"1 2 3", "a.ply"), Ok(Format::Ply), "then the name");
@@ -173,38 +208,48 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_named() {
-        let mut las = *b"LASF";
+    fn formats_show_in_their_first_bytes() {
         let mut stl = vec![b' '; 80];
         stl.extend(1_u32.to_le_bytes());
         stl.resize(134, 0);
+        for (bytes, format) in [
+            (&b"ASTM-E57\x01"[..], Format::E57),
+            (b"glTF\x02", Format::Gltf),
+            (b"{\"asset\":1}", Format::Gltf),
+            (b"solid x\nfacet normal 0 0 1", Format::Stl),
+            (&stl, Format::Stl),
+            (b"OFF\n8 6 0\n", Format::Off),
+            (b"# cube\nCOFF 8 6 0\n", Format::Off),
+            (b"\x93NUMPY\x01\x00", Format::Npy),
+        ] {
+            assert_eq!(of(bytes, "a.xyz"), Ok(format));
+        }
+        for (name, format) in [("a.laz", Format::Las), ("a.GLB", Format::Gltf), ("a.npy", Format::Npy)] {
+            assert_eq!(of(b"whatever", name), Ok(format), "then the name");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_named() {
         for (bytes, name, word) in [
-            (&las[..], "a.ply", "LAS"),
-            (b"ASTM-E57\x01", "a", "E57"),
-            (b"glTF\x02", "a", "glTF"),
-            (b"{\"asset\":1}", "a.gltf", "glTF"),
-            (b"solid x\nfacet normal 0 0 1", "a.txt", "STL"),
-            (&stl, "a", "STL"),
-            (b"OFF\n8 6 0\n", "a.obj", "OFF"),
-            (&[0x1f, 0x8b, 8], "a.ply.gz", "gzip"),
+            (&[0x1f, 0x8b, 8][..], "a.ply.gz", "gzip"),
             (b"\xff\xfe1\0", "a.csv", "UTF-16"),
-            (b"whatever", "a.laz", "LAZ"),
+            (b"PK\x03\x04", "a", "zip"),
         ] {
             let message = of(bytes, name).unwrap_err();
             assert!(message.starts_with(name) && message.contains(word), "{word}: {message}");
         }
-        las[0] = b'?';
-        let message = of(&las, "a.bin").unwrap_err();
+        let message = of(b"?ASF", "a.bin").unwrap_err();
         assert!(message.contains("unknown format") && message.contains("--format"), "{message}");
     }
 
     #[test]
     fn names_of_formats_go_both_ways() {
-        for format in [Format::Ply, Format::Pcd, Format::Xyz, Format::Obj] {
+        for format in Format::ALL {
             assert_eq!(format.to_string().parse(), Ok(format));
         }
         assert_eq!("CSV".parse(), Ok(Format::Xyz));
-        let unknown = "e57".parse::<Format>().unwrap_err();
-        assert!(unknown.to_string().contains("`e57`"), "{unknown}");
+        let unknown = "rcp".parse::<Format>().unwrap_err();
+        assert!(unknown.to_string().contains("`rcp`"), "{unknown}");
     }
 }

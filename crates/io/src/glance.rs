@@ -11,7 +11,7 @@ use crate::format::{Format, recognise};
 use crate::read::{BYTE_ORDER_MARK, check_file};
 use crate::rows::{Encoding, Layout};
 use crate::text::Lines;
-use crate::{obj, pcd, ply, xyz};
+use crate::{las, npy, obj, off, pcd, ply, stl, xyz};
 
 /// Bytes at the start that are looked at.
 const HEAD: u64 = 1 << 16;
@@ -57,8 +57,13 @@ pub fn glance(path: impl AsRef<Path>, format: Option<Format>) -> Option<Glance> 
         Format::Ply => ply::layout(content),
         Format::Pcd => pcd::layout(content),
         Format::Xyz => xyz::layout(content),
-        Format::Obj => None,
+        Format::Npy => npy::layout(content).ok(),
+        Format::Obj | Format::Las | Format::E57 | Format::Stl | Format::Off | Format::Gltf => None,
     };
+    if format == Format::Las {
+        let (points, bounds) = las::glance(content)?;
+        return Some(Glance { points, bytes, bounds });
+    }
     let points = match format {
         Format::Ply => ply::count(content, length)?,
         Format::Pcd => pcd::count(content, length)?,
@@ -69,6 +74,13 @@ pub fn glance(path: impl AsRef<Path>, format: Option<Format>) -> Option<Glance> 
             pieces.each(|piece| share.add(piece));
             share.vertices(length)
         }
+        Format::Npy => layout.as_ref()?.promised?.0.min(length),
+        Format::Stl => stl::count(content, length),
+        Format::Off => off::count(content, length)?,
+        Format::E57 => count_of_e57(&file)?,
+        // Half of it may be positions in single precision.
+        Format::Gltf => length / 24,
+        Format::Las => return None,
     };
     let bounds = layout.and_then(|layout| {
         let start = (mark + layout.start) as u64;
@@ -76,6 +88,16 @@ pub fn glance(path: impl AsRef<Path>, format: Option<Format>) -> Option<Glance> 
         bounds(&layout, &mut pieces)
     });
     Some(Glance { points, bytes, bounds })
+}
+
+#[cfg(feature = "e57")]
+fn count_of_e57(file: &File) -> Option<u64> {
+    crate::e57::count(crate::input::Input::File(file))
+}
+
+#[cfg(not(feature = "e57"))]
+fn count_of_e57(_: &File) -> Option<u64> {
+    None
 }
 
 /// Rows of a text of this length, by the mean length of those in its head.

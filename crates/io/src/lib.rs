@@ -9,14 +9,24 @@ mod error;
 mod format;
 mod sink;
 
+#[cfg(feature = "e57")]
+mod e57;
+#[cfg(feature = "gltf")]
+mod gltf;
+mod las;
+mod npy;
 mod obj;
+mod off;
 mod pcd;
 mod ply;
+mod stl;
 mod xyz;
 
 mod pieces;
 
 mod columns;
+mod input;
+mod points;
 mod scalar;
 mod text;
 
@@ -26,6 +36,7 @@ pub use error::{At, Fault, Foreign, Item, Place, ReadError};
 pub use format::{Format, UnknownFormatName};
 pub use glance::{Glance, glance};
 pub use pieces::{Pieces, PointPieces, read_in_pieces};
+pub use points::Points;
 pub use read::{read, read_bytes, read_mesh, read_mesh_bytes};
 pub use sink::Model;
 pub use write::{Column, PlyPoints, WriteError};

@@ -20,7 +20,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
         }
         Ok(())
     })?;
-    let holds = Holds { normals: false, colours: coloured == total };
+    let holds = Holds { normals: false, colours: coloured == total, ..Holds::default() };
     let mut reader = Reader {
         total,
         vertices: 0,

@@ -49,6 +49,7 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
         encoding,
         element: "point".into(),
         promised,
+        holds: header.holds,
         rows: Box::new(header),
     })
 }
@@ -222,5 +223,5 @@ fn packed(word: &[u8], scalar: Scalar) -> Option<u32> {
 /// Red, green and blue from the lower three bytes.
 fn unpack(bits: u32, row: &mut Row) {
     let [_, r, g, b] = bits.to_be_bytes();
-    row[6..].copy_from_slice(&[r, g, b].map(f64::from));
+    row[6..9].copy_from_slice(&[r, g, b].map(f64::from));
 }

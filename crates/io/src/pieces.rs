@@ -5,19 +5,19 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use nearmiss_geometry::TriangleMesh;
 
 use crate::error::ReadError;
-use crate::format::{Format, recognise};
-use crate::read::{BYTE_ORDER_MARK, check_file, parse_as};
+use crate::format::Format;
+use crate::input::Input;
+use crate::points::Points;
+use crate::read::{Start, check_file, parse_as, stream};
 use crate::rows::{Blocks, Encoding, Layout};
-use crate::{pcd, ply, xyz};
-
-/// Bytes at the start in which the header must end; where it does not, the file is read whole.
-const HEAD: usize = 1 << 16;
+use crate::{npy, pcd, ply, xyz};
 
 /// A mesh, or points that can be gone over a piece at a time.
 #[derive(Debug)]
@@ -36,7 +36,12 @@ pub struct PointPieces {
 
 enum Source {
     /// Formats that cannot be read in pieces.
-    Whole(Vec<[f64; 3]>),
+    Whole(Points),
+    Stream {
+        file: File,
+        format: Format,
+        block: usize,
+    },
     Rows {
         file: File,
         layout: Layout,
@@ -47,7 +52,7 @@ enum Source {
 /// Opens a file for going over its points, of which some `block` bytes are read at a time; meshes are read
 /// whole.
 ///
-/// PLY of vertices alone, PCD that is not compressed, and text are never in memory as a whole, only a block
+/// PLY of vertices alone, PCD that is not compressed, LAS, LAZ, E57, NPY and text are never in memory as a whole, only a block
 /// (more if a row is longer) and its points, which take up to eight times as much. Others are read as by
 /// [`read`](crate::read()).
 ///
@@ -62,33 +67,28 @@ pub fn read_in_pieces(
     let failed = |cause| ReadError::Io { path: path.into(), cause };
     check_file(path)?;
     let mut file = File::open(path).map_err(failed)?;
-    let length = file.metadata().map_err(failed)?.len();
-    let mut head = Vec::new();
-    (&mut file).take(HEAD as u64).read_to_end(&mut head).map_err(failed)?;
-    let marked = head.starts_with(BYTE_ORDER_MARK);
-    let mark = if marked { BYTE_ORDER_MARK.len() } else { 0 };
-    if head.len() == mark {
-        return Err(ReadError::Empty { path: path.into() });
+    let Start { mut head, mark, length, format } = Start::of(&mut file, format, path)?;
+    let block = block.max(1);
+    if format.is_streamed() {
+        return Ok(Pieces::Points(PointPieces {
+            path: path.into(),
+            source: Source::Stream { file, format, block },
+        }));
     }
-    let format = match format {
-        Some(format) => format,
-        None => recognise(&head[mark..], length - mark as u64, path)?,
-    };
     let layout = match format {
         Format::Ply => ply::layout(&head[mark..]),
         Format::Pcd => pcd::layout(&head[mark..]),
         Format::Xyz => xyz::layout(&head[mark..]),
-        Format::Obj => None,
+        Format::Npy => npy::layout(&head[mark..]).ok(),
+        Format::Obj | Format::Las | Format::E57 | Format::Stl | Format::Off | Format::Gltf => None,
     };
     let points = |source| Pieces::Points(PointPieces { path: path.into(), source });
     // A header that fills all of the head may go on after it.
     if let Some(mut layout) = layout.filter(|layout| mark + layout.start < head.len()) {
         layout.start += mark;
         layout.check_length(length).map_err(|broken| broken.of(path))?;
-        return Ok(points(Source::Rows { file, layout, block: block.max(1) }));
+        return Ok(points(Source::Rows { file, layout, block }));
     }
-    file.seek(SeekFrom::Start(0)).map_err(failed)?;
-    head.clear();
     file.read_to_end(&mut head).map_err(failed)?;
     let sink = parse_as(format, &head[mark..], path)?;
     drop(head);
@@ -107,19 +107,50 @@ impl PointPieces {
     /// # Errors
     /// When the file cannot be read, or a row is broken: which, and where. What came before it has been
     /// handed out.
-    pub fn each(&self, mut take: impl FnMut(&[[f64; 3]])) -> Result<(), ReadError> {
+    pub fn each(&self, mut take: impl FnMut(&Points)) -> Result<(), ReadError> {
+        self.each_until(&mut |points| {
+            take(points);
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// As [`Self::each`], until the first error of `take`.
+    ///
+    /// # Errors
+    /// As [`Self::each`], and those of `take`.
+    pub fn try_each<E: From<ReadError>>(
+        &self,
+        mut take: impl FnMut(&Points) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut failed = None;
+        self.each_until(&mut |points| match take(points) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                failed = Some(error);
+                ControlFlow::Break(())
+            }
+        })?;
+        failed.map_or(Ok(()), Err)
+    }
+
+    fn each_until(&self, take: &mut dyn FnMut(&Points) -> ControlFlow<()>) -> Result<(), ReadError> {
         match &self.source {
-            Source::Whole(points) => take(points),
+            Source::Whole(points) => {
+                let _ = take(points);
+                Ok(())
+            }
+            Source::Stream { file, format, block } => {
+                stream(*format, Input::File(file), *block, &self.path, take)
+            }
             Source::Rows { file, layout, block } => {
                 let mut blocks = Blocks::new(&self.path, file, *block);
                 blocks.seek(layout.start)?;
                 match layout.encoding {
-                    Encoding::Binary { stride } => layout.records(&mut blocks, stride, take)?,
-                    Encoding::Text { number, end } => layout.lines(&mut blocks, number, end, take)?,
+                    Encoding::Binary { stride } => layout.records(&mut blocks, stride, take),
+                    Encoding::Text { number, end } => layout.lines(&mut blocks, number, end, take),
                 }
             }
         }
-        Ok(())
     }
 }
 

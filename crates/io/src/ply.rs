@@ -38,7 +38,7 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     let (header, lines) = header::parse(head).ok()?;
     let mut elements = header.elements.into_iter().filter(|e| !e.properties.is_empty() && e.count > 0);
     let vertex = elements.next().filter(|element| element.role == Role::Vertex)?;
-    Holds::among(vertex.slots()).ok()?;
+    let holds = Holds::among(vertex.slots()).ok()?;
     if elements.next().is_some() {
         return None;
     }
@@ -54,7 +54,7 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     };
     let (element, promised) = (vertex.name.clone(), Some((vertex.count, vertex.line)));
     let rows = Box::new(Vertices { element: vertex, order });
-    Some(Layout { start: lines.offset(), encoding, element, promised, rows })
+    Some(Layout { start: lines.offset(), encoding, element, promised, holds, rows })
 }
 
 /// Rows of nothing but vertices.

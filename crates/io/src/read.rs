@@ -1,14 +1,24 @@
 //! From a file, or bytes in memory, to a model.
 
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use nearmiss_geometry::TriangleMesh;
 
+#[cfg(feature = "e57")]
+use crate::e57;
+#[cfg(not(all(feature = "e57", feature = "gltf")))]
+use crate::error::Fault;
 use crate::error::ReadError;
 use crate::format::{Format, recognise};
+#[cfg(feature = "gltf")]
+use crate::gltf;
+use crate::input::{Input, Stop};
+use crate::points::Points;
 use crate::sink::{Model, Sink};
-use crate::{obj, pcd, ply, xyz};
+use crate::{las, npy, obj, off, pcd, ply, stl, xyz};
 
 /// Reads the points of a file, and its triangles where it has faces.
 ///
@@ -20,7 +30,7 @@ use crate::{obj, pcd, ply, xyz};
 /// Says which file, what is wrong and where; never panics, whatever the file holds.
 pub fn read(path: impl AsRef<Path>, format: Option<Format>) -> Result<Model, ReadError> {
     let path = path.as_ref();
-    read_bytes(&load(path)?, format, path)
+    load(path, format)?.into_model(path)
 }
 
 /// [`read`] for content that is already in memory; `name` is for messages, and its ending for the format.
@@ -38,7 +48,8 @@ pub fn read_bytes(bytes: &[u8], format: Option<Format>, name: impl AsRef<Path>) 
 /// As [`read`], and when the file has no faces.
 pub fn read_mesh(path: impl AsRef<Path>, format: Option<Format>) -> Result<TriangleMesh, ReadError> {
     let path = path.as_ref();
-    read_mesh_bytes(&load(path)?, format, path)
+    let no_faces = || ReadError::NoFaces { path: path.into() };
+    load(path, format)?.into_mesh(path)?.ok_or_else(no_faces)
 }
 
 /// [`read_mesh`] for content that is already in memory.
@@ -66,9 +77,86 @@ pub(crate) fn check_file(path: &Path) -> Result<(), ReadError> {
     }
 }
 
-fn load(path: &Path) -> Result<Vec<u8>, ReadError> {
+/// The content of a file.
+fn load(path: &Path, format: Option<Format>) -> Result<Sink, ReadError> {
     check_file(path)?;
-    fs::read(path).map_err(|cause| ReadError::Io { path: path.into(), cause })
+    let failed = |cause| ReadError::Io { path: path.into(), cause };
+    let mut file = File::open(path).map_err(failed)?;
+    let start = Start::of(&mut file, format, path)?;
+    if start.format.is_streamed() {
+        return collect(start.format, Input::File(&file), path);
+    }
+    let mut bytes = start.head;
+    file.read_to_end(&mut bytes).map_err(failed)?;
+    parse_as(start.format, &bytes[start.mark..], path)
+}
+
+/// The first bytes of a file, and what they say of it.
+pub(crate) struct Start {
+    /// 64 KiB, unless the file is shorter.
+    pub(crate) head: Vec<u8>,
+    /// Length of the byte order mark in it.
+    pub(crate) mark: usize,
+    /// Length of the file.
+    pub(crate) length: u64,
+    pub(crate) format: Format,
+}
+
+/// Bytes looked at to recognise a format; headers of files that are read in pieces end in them.
+const HEAD: u64 = 1 << 16;
+
+impl Start {
+    /// Reads the start of a file and leaves it there.
+    pub(crate) fn of(file: &mut File, format: Option<Format>, path: &Path) -> Result<Self, ReadError> {
+        let failed = |cause| ReadError::Io { path: path.into(), cause };
+        let length = file.metadata().map_err(failed)?.len();
+        let mut head = Vec::new();
+        file.take(HEAD).read_to_end(&mut head).map_err(failed)?;
+        let mark = if head.starts_with(BYTE_ORDER_MARK) { BYTE_ORDER_MARK.len() } else { 0 };
+        if head.len() == mark {
+            return Err(ReadError::Empty { path: path.into() });
+        }
+        let format = match format {
+            Some(format) => format,
+            None => recognise(&head[mark..], length - mark as u64, path)?,
+        };
+        Ok(Self { head, mark, length, format })
+    }
+}
+
+/// Goes over the points of a format that is [streamed](Format::is_streamed), some `block` bytes at a time.
+pub(crate) fn stream(
+    format: Format,
+    input: Input<'_>,
+    block: usize,
+    path: &Path,
+    take: &mut dyn FnMut(&Points) -> ControlFlow<()>,
+) -> Result<(), ReadError> {
+    let done = match format {
+        Format::Las => las::each(input, block, take),
+        #[cfg(feature = "e57")]
+        Format::E57 => e57::each(input, block, take),
+        #[cfg(not(feature = "e57"))]
+        Format::E57 => Err(Fault::Feature { what: "E57", feature: "e57" }.at_byte(0).into()),
+        _ => Ok(()),
+    };
+    done.map_err(|stop: Stop| stop.of(path))
+}
+
+/// All points of a format that is streamed.
+fn collect(format: Format, input: Input<'_>, path: &Path) -> Result<Sink, ReadError> {
+    const BLOCK: usize = 1 << 20;
+    let mut sink = Sink::default();
+    stream(format, input, BLOCK, path, &mut |points| {
+        sink.append(points);
+        ControlFlow::Continue(())
+    })?;
+    #[cfg(feature = "e57")]
+    if format == Format::E57 {
+        let scanners = e57::scanners(input).map_err(|stop| stop.of(path))?;
+        sink = sink.with_scanners(scanners);
+    }
+    Ok(sink)
 }
 
 fn parse(bytes: &[u8], format: Option<Format>, name: &Path) -> Result<Sink, ReadError> {
@@ -86,6 +174,14 @@ fn parse(bytes: &[u8], format: Option<Format>, name: &Path) -> Result<Sink, Read
 /// Content of this format, without a byte order mark.
 pub(crate) fn parse_as(format: Format, bytes: &[u8], name: &Path) -> Result<Sink, ReadError> {
     let parsed = match format {
+        Format::Las | Format::E57 => return collect(format, Input::Memory(bytes), name),
+        Format::Npy => npy::layout(bytes).and_then(|layout| layout.whole(bytes)),
+        Format::Stl => stl::parse(bytes),
+        Format::Off => off::parse(bytes),
+        #[cfg(feature = "gltf")]
+        Format::Gltf => gltf::parse(bytes, name),
+        #[cfg(not(feature = "gltf"))]
+        Format::Gltf => Err(Fault::Feature { what: "glTF", feature: "gltf" }.at_byte(0)),
         Format::Ply => ply::parse(bytes),
         Format::Pcd => pcd::parse(bytes),
         Format::Xyz => xyz::parse(bytes),

@@ -2,10 +2,13 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::ops::ControlFlow;
 use std::path::Path;
 
-use crate::columns::Row;
+use crate::columns::{Holds, Row};
 use crate::error::{Broken, Fault, ReadError};
+use crate::points::Points;
+use crate::sink::Sink;
 use crate::text::{Line, Lines};
 
 /// Rows of a file, from its header.
@@ -17,6 +20,8 @@ pub(crate) struct Layout {
     pub(crate) element: Box<str>,
     /// How many there are, and the line that says so.
     pub(crate) promised: Option<(u64, u64)>,
+    /// What of a row is kept.
+    pub(crate) holds: Holds,
     pub(crate) rows: Box<dyn Rows + Send + Sync>,
 }
 
@@ -54,6 +59,21 @@ impl Layout {
         self.check_count(present)
     }
 
+    /// All records of a file in memory.
+    pub(crate) fn whole(&self, bytes: &[u8]) -> Result<Sink, Broken> {
+        self.check_length(bytes.len() as u64)?;
+        let Encoding::Binary { stride } = self.encoding else { return Ok(Sink::default()) };
+        let promised =
+            self.promised.map_or(0, |(promised, _)| usize::try_from(promised).unwrap_or(usize::MAX));
+        let mut sink = Sink::new(self.holds, promised);
+        let mut row = Row::default();
+        for record in bytes[self.start..].chunks_exact(stride).take(promised) {
+            self.rows.record(record, &mut row);
+            sink.row(&row);
+        }
+        Ok(sink)
+    }
+
     fn check_count(&self, present: u64) -> Result<(), Broken> {
         match self.promised {
             Some((promised, line)) if present < promised => {
@@ -68,20 +88,22 @@ impl Layout {
         &self,
         blocks: &mut Blocks<'_>,
         stride: usize,
-        mut take: impl FnMut(&[[f64; 3]]),
+        take: &mut dyn FnMut(&Points) -> ControlFlow<()>,
     ) -> Result<(), ReadError> {
         let mut left = self.promised.map_or(0, |(promised, _)| promised);
         let together = (blocks.block / stride).max(1);
-        let (mut points, mut row) = (Vec::new(), Row::default());
+        let (mut points, mut row) = (Points::default(), Row::default());
         while left > 0 {
             let many = usize::try_from(left).unwrap_or(usize::MAX).min(together);
             blocks.fill(many * stride)?;
             points.clear();
             for record in blocks.bytes.chunks_exact(stride) {
                 self.rows.record(record, &mut row);
-                points.push([row[0], row[1], row[2]]);
+                points.push(self.holds, &row);
             }
-            take(&points);
+            if take(&points).is_break() {
+                break;
+            }
             left -= many as u64;
         }
         Ok(())
@@ -92,9 +114,9 @@ impl Layout {
         blocks: &mut Blocks<'_>,
         mut number: u64,
         end: u8,
-        mut take: impl FnMut(&[[f64; 3]]),
+        take: &mut dyn FnMut(&Points) -> ControlFlow<()>,
     ) -> Result<(), ReadError> {
-        let (mut points, mut row, mut index) = (Vec::new(), Row::default(), 0);
+        let (mut points, mut row, mut index) = (Points::default(), Row::default(), 0);
         let mut is_last = false;
         while !is_last {
             // What was left over has no end of a line, so that a long one is looked through once.
@@ -111,11 +133,13 @@ impl Layout {
                 }
                 let broken = |fault: Fault| fault.on_line(line.number).within(&self.element, index);
                 self.rows.line(line, &mut row).map_err(|fault| broken(fault).of(blocks.path))?;
-                points.push([row[0], row[1], row[2]]);
+                points.push(self.holds, &row);
                 index += 1;
             }
             number = lines.number();
-            take(&points);
+            if take(&points).is_break() {
+                return Ok(());
+            }
             blocks.bytes.drain(..whole);
         }
         self.check_count(index).map_err(|broken| broken.of(blocks.path))

@@ -2,17 +2,19 @@
 
 use std::path::Path;
 
-use nearmiss_geometry::{PointCloud, TriangleMesh};
+use nearmiss_geometry::{PointCloud, Scanner, TriangleMesh};
 
 use crate::columns::{Holds, Row};
 use crate::error::{Fault, ReadError};
+use crate::points::Points;
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Model {
     /// All vertices, broken ones and duplicates dropped and counted; [`PointCloud::source`] leads back to the
-    /// order of the file, and so to the vertices of the mesh. Carries normals and colours if the file does.
+    /// order of the file, and so to the vertices of the mesh. Carries normals, colours, intensities and classes
+    /// if the file does.
     pub cloud: PointCloud,
     /// The faces, cut into triangles, over all vertices in the order of the file; `None` if there are none.
     pub mesh: Option<TriangleMesh>,
@@ -21,11 +23,10 @@ pub struct Model {
 /// Rows and faces as they come, in the order of the file.
 #[derive(Debug, Default)]
 pub(crate) struct Sink {
-    points: Vec<[f64; 3]>,
+    points: Points,
     holds: Holds,
-    normals: Vec<[f32; 3]>,
-    colours: Vec<[u8; 3]>,
     triangles: Vec<[u32; 3]>,
+    scanners: Vec<Scanner>,
 }
 
 impl Sink {
@@ -38,24 +39,24 @@ impl Sink {
     /// The same, now expecting rows; for formats in which faces may come first.
     pub(crate) fn with_rows(mut self, holds: Holds, capacity: usize) -> Self {
         self.holds = holds;
-        self.points.reserve(capacity);
-        self.normals.reserve(if holds.normals { capacity } else { 0 });
-        self.colours.reserve(if holds.colours { capacity } else { 0 });
+        self.points.reserve(holds, capacity);
         self
     }
 
     /// A point with what belongs to it.
     #[inline]
     pub(crate) fn row(&mut self, row: &Row) {
-        let [x, y, z, normal @ .., r, g, b] = *row;
-        self.points.push([x, y, z]);
-        if self.holds.normals {
-            #[expect(clippy::cast_possible_truncation, reason = "single precision is enough for a normal")]
-            self.normals.push(normal.map(|n| n as f32));
-        }
-        if self.holds.colours {
-            self.colours.push([r, g, b].map(channel));
-        }
+        self.points.push(self.holds, row);
+    }
+
+    /// Where scanners stood.
+    pub(crate) fn with_scanners(self, scanners: Vec<Scanner>) -> Self {
+        Self { scanners, ..self }
+    }
+
+    /// Points that all hold the same.
+    pub(crate) fn append(&mut self, points: &Points) {
+        self.points.append(points);
     }
 
     /// A polygon, cut into the triangles of a fan.
@@ -68,6 +69,40 @@ impl Sink {
         }
         self.triangles.extend(rest.windows(2).map(|side| [*first, side[0], side[1]]));
         Ok(())
+    }
+
+    /// Triangles by their corners.
+    pub(crate) fn triangles(&mut self, triangles: &[[u32; 3]]) {
+        self.triangles.extend_from_slice(triangles);
+    }
+
+    /// Triangles by the places of their corners, three after three; corners at one place become one vertex. A
+    /// sort, O(n log n).
+    pub(crate) fn of_corners(corners: &[[f64; 3]]) -> Self {
+        let bits = |i: u32| corners[i as usize].map(|x| (x + 0.0).to_bits());
+        let count = u32::try_from(corners.len()).unwrap_or(u32::MAX);
+        let mut order: Vec<u32> = (0..count).collect();
+        order.sort_unstable_by_key(|&i| (bits(i), i));
+        // Of corners at one place the first stands for all.
+        let mut first_of = vec![0; order.len()];
+        for run in order.chunk_by(|&i, &j| bits(i) == bits(j)) {
+            run.iter().for_each(|&i| first_of[i as usize] = run[0]);
+        }
+        let mut sink = Self::default();
+        let mut vertex_of = vec![0; order.len()];
+        for i in 0..first_of.len() {
+            let first = first_of[i] as usize;
+            if first == i {
+                vertex_of[i] = sink.points.positions.len();
+                sink.points.positions.push(corners[i]);
+            } else {
+                vertex_of[i] = vertex_of[first];
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "no more vertices than corners")]
+        let vertices: Vec<u32> = vertex_of.into_iter().map(|vertex| vertex as u32).collect();
+        sink.triangles = vertices.as_chunks().0.to_vec();
+        sink
     }
 
     /// A strip: each corner makes a triangle with the two before it, every other one turned round. Triangles
@@ -89,18 +124,25 @@ impl Sink {
     }
 
     fn cloud(&self) -> Result<PointCloud, nearmiss_geometry::CloudError> {
-        let mut cloud = PointCloud::cleaned(&self.points)?;
-        if self.holds.normals {
-            cloud = cloud.with_normals(&self.normals)?;
+        let Points { positions, normals, colours, intensities, classes } = &self.points;
+        let mut cloud = PointCloud::cleaned(positions)?.with_scanners(self.scanners.clone());
+        if !normals.is_empty() {
+            cloud = cloud.with_normals(normals)?;
         }
-        if self.holds.colours {
-            cloud = cloud.with_colours(&self.colours)?;
+        if !colours.is_empty() {
+            cloud = cloud.with_colours(colours)?;
+        }
+        if !intensities.is_empty() {
+            cloud = cloud.with_intensities(intensities)?;
+        }
+        if !classes.is_empty() {
+            cloud = cloud.with_classes(classes)?;
         }
         Ok(cloud)
     }
 
     /// The file's points, if it has no faces; else what there is.
-    pub(crate) fn into_points(self) -> Result<Vec<[f64; 3]>, Self> {
+    pub(crate) fn into_points(self) -> Result<Points, Self> {
         if self.triangles.is_empty() { Ok(self.points) } else { Err(self) }
     }
 
@@ -110,10 +152,10 @@ impl Sink {
             return Ok(None);
         }
         let broken = |p: &[f64; 3]| !p.iter().all(|x| x.is_finite());
-        if let Some(vertex) = self.points.iter().position(broken) {
+        if let Some(vertex) = self.points.positions.iter().position(broken) {
             return Err(ReadError::MeshNotFinite { path: path.into(), vertex });
         }
-        let mesh = TriangleMesh::new(self.points, self.triangles);
+        let mesh = TriangleMesh::new(self.points.positions, self.triangles);
         debug_assert!(mesh.is_ok(), "readers check each corner where they know its place");
         Ok(mesh.ok())
     }
@@ -128,17 +170,6 @@ pub(crate) fn corner(index: i64, vertices: u64, first: u8) -> Result<u32, Fault>
         .ok_or(Fault::NoSuchVertex { vertex: index, vertices, first })
 }
 
-/// A colour channel from a number that should be a whole one in 0..=255.
-fn channel(value: f64) -> u8 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the cast saturates, and makes zero of NaN"
-    )]
-    let channel = value.round() as u8;
-    channel
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,16 +182,19 @@ mod tests {
     }
 
     #[test]
+    fn corners_at_one_place_become_one_vertex() {
+        let [a, b, c, d] = [[0.0, -0.0, 1.0], [1.0; 3], [2.0; 3], [0.5; 3]];
+        let sink = Sink::of_corners(&[a, b, c, b, d, [0.0, 0.0, 1.0]]);
+        assert_eq!(sink.points.positions, [a, b, c, d]);
+        assert_eq!(sink.triangles, [[0, 1, 2], [1, 3, 0]]);
+    }
+
+    #[test]
     fn corners_are_checked_at_both_ends() {
         assert_eq!(corner(0, 3, 0), Ok(0));
         assert_eq!(corner(3, 3, 1), Ok(2));
         for (index, first) in [(-1, 0), (3, 0), (0, 1), (4, 1), (i64::MIN, 1), (i64::MAX, 0)] {
             assert!(corner(index, 3, first).is_err(), "{index} counted from {first}");
         }
-    }
-
-    #[test]
-    fn channels_saturate() {
-        assert_eq!([-5.0, 0.4, 254.6, 300.0, f64::NAN].map(channel), [0, 0, 255, 255, 0]);
     }
 }

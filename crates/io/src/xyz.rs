@@ -61,8 +61,14 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     if table.named {
         lines = ahead;
     }
-    let encoding = Encoding::of_text(&lines);
-    Some(Layout { start: lines.offset(), encoding, element: "point".into(), promised, rows: Box::new(table) })
+    Some(Layout {
+        start: lines.offset(),
+        encoding: Encoding::of_text(&lines),
+        element: "point".into(),
+        promised,
+        holds: table.holds,
+        rows: Box::new(table),
+    })
 }
 
 impl Rows for Table {
@@ -161,5 +167,5 @@ fn unquoted(value: &[u8]) -> &[u8] {
 }
 
 fn name_of(slot: usize) -> &'static str {
-    ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"][slot]
+    ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "intensity", "class"][slot]
 }

@@ -5,9 +5,10 @@ use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 
-use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_geometry::{PointCloud, Pose, Scanner};
 use nearmiss_graph::{
     GeodesicKernel, GraphError, GraphOptions, KernelScratch, Samples, Sides, SurfaceGraph, SurfaceGraphMeta,
+    Viewpoint,
 };
 use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy};
 use nearmiss_query::{Placed, Prepared, ShapeIndex};
@@ -77,8 +78,8 @@ impl Scan {
     }
 
     /// The same scan, which is of `cloud`, with a graph over its points, by which normals are turned to one
-    /// side: that of the cloud's own normals where it has some, towards `scanner`, a place in the frame of
-    /// the cloud, where that is known, or outwards. Takes some three times as long as [`Scan::build`],
+    /// side: that of the cloud's own normals where it has some; towards `scanner`, a place in the frame of
+    /// the cloud, or else towards the cloud's own [scanners](PointCloud::scanners); or outwards. Takes some three times as long as [`Scan::build`],
     /// without the map of close pairs half as long.
     ///
     /// ```
@@ -110,7 +111,9 @@ impl Scan {
         }
         let mut hierarchy = Arc::unwrap_or_clone(self.hierarchy);
         let own = cloud.normals().map(|normals| in_order_of(&hierarchy, cloud, normals));
-        let scanner = scanner.map(|place| hierarchy.frame().to_local(place));
+        let each = if scanner.is_none() { viewpoints(&hierarchy, cloud) } else { None };
+        let one = scanner.map(|place| Viewpoint::One(hierarchy.frame().to_local(place)));
+        let scanner = one.or(each.as_deref().map(Viewpoint::Each));
         let mut normals = hierarchy.normals().to_vec();
         let sides = Sides { normals: own.as_deref(), scanner };
         let graph = SurfaceGraph::build(samples(&hierarchy), sides, &mut normals, options)?;
@@ -314,6 +317,22 @@ impl Prepared for Scan {
 /// The points as a graph wants them.
 fn samples(hierarchy: &PointHierarchy) -> Samples<'_> {
     Samples { plan: hierarchy.plan(), positions: hierarchy.positions(), radii: hierarchy.radii() }
+}
+
+/// For each point in the order of the hierarchy where its scanner stood, in its frame, or the point itself where
+/// that is not known; `None` if it is known of no point.
+fn viewpoints(hierarchy: &PointHierarchy, cloud: &PointCloud) -> Option<Vec<[f32; 3]>> {
+    let finite = |scanner: &&Scanner| scanner.position.iter().all(|c| c.is_finite());
+    let scanners: Vec<&Scanner> = cloud.scanners().iter().filter(finite).collect();
+    if scanners.is_empty() {
+        return None;
+    }
+    let places: Vec<[f32; 3]> = scanners.iter().map(|s| hierarchy.frame().to_local(s.position)).collect();
+    let of = |(source, own): (&u32, &[f32; 3])| {
+        let scanner = scanners.iter().position(|scanner| scanner.points.contains(&(*source as usize)));
+        scanner.map_or(*own, |scanner| places[scanner])
+    };
+    Some(hierarchy.source().iter().zip(hierarchy.positions()).map(of).collect())
 }
 
 /// The normals of a cloud in the order of the hierarchy over it; zero for points that it has not.

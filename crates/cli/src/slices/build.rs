@@ -106,7 +106,7 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     let map = pool.install(|| {
         let mut builder = SliceBuilder::new(&plan).map_err(unfit)?;
         match &source {
-            Pieces::Points(points) => points.each(|piece| builder.add(piece))?,
+            Pieces::Points(points) => points.each(|piece| builder.add(&piece.positions))?,
             Pieces::Mesh(mesh) => _ = builder.add_mesh(mesh),
         }
         Ok::<_, CliError>(builder.finish())
@@ -126,7 +126,7 @@ fn bounds(path: &Path, points: &PointPieces) -> Result<Aabb, CliError> {
     let mut given = 0;
     points.each(|piece| {
         given += piece.len();
-        for &p in piece.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
+        for &p in piece.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
             bounds.grow(p);
             if distinct.len() < LEAST_POINTS && !distinct.contains(&p) {
                 distinct.push(p);

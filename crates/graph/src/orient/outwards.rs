@@ -79,7 +79,7 @@ pub(super) fn outwards(
             _ => 0.0,
         };
         sums.normals += sides.normals.map_or(0.0, |given| vote(given[i]));
-        sums.scanner += sides.scanner.map_or(0.0, |scanner| vote(sub(scanner, positions[i])));
+        sums.scanner += sides.scanner.map_or(0.0, |scanner| vote(sub(scanner.of(i), positions[i])));
     }
     for (i, root) in roots.iter().enumerate() {
         let sums = &mut evidence[part_of[root.point as usize] as usize];

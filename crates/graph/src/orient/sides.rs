@@ -6,7 +6,26 @@ pub struct Sides<'a> {
     /// Normals that the scan came with, one a point; zero or NaN where it had none.
     pub normals: Option<&'a [[f32; 3]]>,
     /// Where the scanner stood: normals point there.
-    pub scanner: Option<[f32; 3]>,
+    pub scanner: Option<Viewpoint<'a>>,
+}
+
+/// Where points were seen from.
+#[derive(Debug, Clone, Copy)]
+pub enum Viewpoint<'a> {
+    /// All from one place.
+    One([f32; 3]),
+    /// Each from a place of its own; from itself where that is not known.
+    Each(&'a [[f32; 3]]),
+}
+
+impl Viewpoint<'_> {
+    /// Where point `i` was seen from.
+    pub(crate) fn of(&self, i: usize) -> [f32; 3] {
+        match self {
+            Self::One(place) => *place,
+            Self::Each(places) => places[i],
+        }
+    }
 }
 
 /// What decided the side of a component.

@@ -1,7 +1,7 @@
 //! Oriented normals against those of shapes that are known, from arbitrary signs.
 use crate::clouds::{Cloud, single};
 use nearmiss_geometry::TriangleMesh;
-use nearmiss_graph::{Adjacency, Decision, Orientation, Sides, orient};
+use nearmiss_graph::{Adjacency, Decision, Orientation, Sides, Viewpoint, orient};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use nearmiss_testdata::oracle::{Signs, falls};
 use nearmiss_testdata::shapes::{bowl, cuboid, plates, sphere, torus};
@@ -175,7 +175,8 @@ fn open_shapes_are_consistent_and_follow_what_is_known() {
     let share = right(&normals, outward);
     assert!(share == 0.0 || share == 1.0, "{share} of a bowl");
     // A scanner above looks into it.
-    let (normals, found) = oriented(&cloud, 3, Sides { scanner: Some([0.0, 0.0, 5.0]), ..Sides::default() });
+    let (normals, found) =
+        oriented(&cloud, 3, Sides { scanner: Some(Viewpoint::One([0.0, 0.0, 5.0])), ..Sides::default() });
     assert_eq!((right(&normals, outward), found.parts[0].decision), (0.0, Decision::Scanner));
     // Normals of the scan, a third of them wrong and some missing, say otherwise.
     let given: Vec<[f32; 3]> = (0..cloud.points.len())
@@ -186,7 +187,7 @@ fn open_shapes_are_consistent_and_follow_what_is_known() {
             _ => cloud.points[i],
         })
         .collect();
-    let sides = Sides { normals: Some(&given), scanner: Some([0.0, 0.0, 5.0]) };
+    let sides = Sides { normals: Some(&given), scanner: Some(Viewpoint::One([0.0, 0.0, 5.0])) };
     let (normals, found) = oriented(&cloud, 3, sides);
     assert_eq!((right(&normals, outward), found.parts[0].decision), (1.0, Decision::Normals));
     // Flat: nothing says which side is out.

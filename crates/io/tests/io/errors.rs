@@ -53,12 +53,13 @@ fn formats_that_are_none_of_ours() {
     says(
         "some words\n",
         "notes.md",
-        "notes.md: unknown format; known are ply, pcd, xyz (also csv and other text) and obj; say which with `--format`",
+        "notes.md: unknown format; known are ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off \
+         and gltf; say which with `--format`",
     );
     says(
-        "ASTM-E57...",
-        "hall.e57",
-        "hall.e57: this is an E57 file, which this version cannot read; convert it to PLY, for example with CloudCompare or PDAL",
+        "PK\u{3}\u{4}...",
+        "hall.zip",
+        "hall.zip: this is a zip archive, which this version cannot read; unpack it first",
     );
     let told = read_bytes(b"1 2 3\n", Some(Format::Ply), Path::new("a")).unwrap_err();
     assert_eq!(

@@ -2,6 +2,7 @@
 
 mod errors;
 mod expansion;
+mod foreign;
 mod glances;
 mod mutations;
 mod pieces;

@@ -10,7 +10,7 @@ fn gone_over(path: &Path, block: usize) -> (Vec<[f64; 3]>, usize) {
     let Ok(Pieces::Points(pieces)) = read_in_pieces(path, None, block) else { panic!("{}", path.display()) };
     let (mut points, mut most) = (Vec::new(), 0);
     let done = pieces.each(|piece| {
-        points.extend_from_slice(piece);
+        points.extend_from_slice(&piece.positions);
         most = most.max(piece.len());
     });
     assert!(done.is_ok(), "{done:?}");

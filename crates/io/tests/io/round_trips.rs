@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::foreign;
 use crate::samples::{Encoding, colours, csv, normals, obj, pcd, ply, points, triangles};
 use nearmiss_io::{Column, Format, Model, PlyPoints, read, read_bytes, read_mesh};
 
@@ -191,4 +192,71 @@ fn what_does_not_fit_the_points_is_not_written() {
     let mut full: &mut [u8] = &mut [0; 10];
     let failed = PlyPoints::single(&points).write(&mut full).unwrap_err();
     assert!(failed.to_string().starts_with("writing PLY: "), "{failed}");
+}
+
+#[test]
+fn las_and_laz_in_all_point_formats() {
+    for format in 0..=10 {
+        for (extra, packed) in [(0, None), (3, None), (0, Some(50_000)), (2, Some(7)), (0, Some(1))] {
+            // The compressor for waves in the new formats is not there.
+            let bytes = foreign::las(format, extra, packed);
+            let cloud = model(&bytes, "a").cloud;
+            let case = format!("format {format}, {extra} extra bytes, chunks {packed:?}");
+            for (i, exact) in foreign::far_points().into_iter().enumerate() {
+                assert!((0..3).all(|k| (cloud.point(i)[k] - exact[k]).abs() < 1e-6), "{case}: point {i}");
+            }
+            let classes: Vec<u8> = (0..20).map(foreign::class).collect();
+            let intensities: Vec<f32> = (0..20).map(|i| f32::from(foreign::intensity(i))).collect();
+            assert_eq!(cloud.classes(), Some(&classes[..]), "{case}");
+            assert_eq!(cloud.intensities(), Some(&intensities[..]), "{case}");
+            let has_colours = matches!(format, 2 | 3 | 5 | 7 | 8 | 10);
+            assert_eq!(cloud.colours(), has_colours.then(colours).as_deref(), "{case}");
+        }
+    }
+}
+
+#[test]
+fn e57_of_two_scans_with_poses() {
+    let model = model(&foreign::e57(), "a");
+    assert_same(&model, false, false);
+    assert_eq!(model.cloud.dropped().not_finite, 1, "the point that is marked as invalid");
+    let intensities: Vec<f32> = (0_u8..20).map(|i| f32::from(i) / 32.0).collect();
+    assert_eq!(model.cloud.intensities(), Some(&intensities[..]));
+    let [low, high] = model.cloud.scanners() else { panic!("two scanners") };
+    assert_eq!((low.position, low.points.clone()), ([0.0, 0.0, 5.0], 0..10));
+    assert_eq!((high.position, high.points.clone()), ([0.0, 0.0, 7.0], 10..21));
+}
+
+#[test]
+fn npy_of_several_types() {
+    for kind in ["<f4", ">f4", "<f8"] {
+        assert_eq!(model(&foreign::npy(kind), "a").cloud.positions(), points(), "{kind}");
+    }
+    let turned = String::from_utf8_lossy(&foreign::npy("<f4")).replace("False", "True ");
+    let refused = read_bytes(turned.as_bytes(), Some(Format::Npy), "a.npy").unwrap_err().to_string();
+    assert!(refused.starts_with("a.npy: "), "{refused}");
+}
+
+#[test]
+fn meshes_of_engines() {
+    let exact = model(&foreign::off(), "a");
+    assert_same(&exact, true, true);
+    for is_binary in [false, true] {
+        let found = model(&foreign::gltf(is_binary), "a");
+        assert_eq!(found.cloud.positions(), points(), "nodes put the model where it was");
+        assert_eq!(found.cloud.colours(), Some(&colours()[..]));
+        assert_eq!(found.mesh.unwrap().triangles(), triangles());
+        for (n, unit) in found.cloud.normals().unwrap().iter().zip(foreign::unit_normals()) {
+            assert!((0..3).all(|k| (n[k] - unit[k]).abs() < 1e-6), "{n:?}");
+        }
+        // Corners that are written out come in the order of the triangles.
+        let mesh = model(&foreign::stl(is_binary), "a").mesh.unwrap();
+        assert_eq!(mesh.vertices().len(), 20, "corners at one place are one vertex");
+        for (found, exact) in mesh.triangles().iter().zip(triangles()) {
+            for (corner, exact) in found.iter().zip(exact) {
+                let place = points()[exact as usize].map(f64::from);
+                assert_eq!(mesh.vertices()[*corner as usize], place);
+            }
+        }
+    }
 }

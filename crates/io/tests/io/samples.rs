@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::foreign;
+
 /// The points: a bumpy sheet of 5 by 4, exact in single precision.
 pub(crate) fn points() -> Vec<[f32; 3]> {
     let bump = |i: u8| f32::from(i * 7 % 5) / 8.0 - 0.25;
@@ -222,9 +224,9 @@ pub(crate) fn obj() -> Vec<u8> {
     text.into_bytes()
 }
 
-/// All of them, with a name that has the right ending.
+/// All of them and those of [`foreign`], with a name that has the right ending.
 pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
-    vec![
+    let mut all = vec![
         ("ascii.ply", ply(Encoding::Ascii, "float", "int")),
         ("little.ply", ply(Encoding::Little, "double", "uint")),
         ("big.ply", ply(Encoding::Big, "float", "ushort")),
@@ -234,5 +236,7 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("table.csv", csv(",")),
         ("table.xyz", csv(" ")),
         ("mesh.obj", obj()),
-    ]
+    ];
+    all.extend(foreign::all());
+    all
 }

@@ -1,0 +1,163 @@
+//! E57 (ASTM E2807): scans of terrestrial scanners, decoded by the crate `e57`.
+//!
+//! Spherical coordinates are made Cartesian and each scan's pose is applied. Points that the file marks as
+//! invalid become points that are not finite, so that places in the file still count.
+
+use std::io::Read;
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use ::e57::{CartesianCoordinate, E57Reader, PointCloud, PointCloudReaderSimple};
+
+use nearmiss_geometry::Scanner;
+
+use crate::columns::{Holds, Row};
+use crate::error::{Broken, Fault};
+use crate::input::{Input, Reader, Stop};
+use crate::points::Points;
+
+/// Bytes of the header.
+const HEADER: usize = 48;
+
+/// Where in it the length of the XML stands.
+const XML: usize = 32;
+
+/// Where in it the length of a page stands.
+const PAGE: usize = 40;
+
+/// The longest page that is believed; the standard says 1024.
+const LONGEST_PAGE: u64 = 1 << 20;
+
+/// The longest XML that is believed: it is held in memory several times.
+const LONGEST_XML: u64 = 1 << 26;
+
+/// Points that are handed out together, for so many bytes of a block.
+const BYTES_A_POINT: usize = 32;
+
+/// How many points there are, as the file says.
+pub(crate) fn count(input: Input<'_>) -> Option<u64> {
+    Some(open(input).ok()?.pointclouds().iter().map(|cloud| cloud.records).sum())
+}
+
+/// Where the scanner stood for which points, for the scans that have a pose.
+pub(crate) fn scanners(input: Input<'_>) -> Result<Vec<Scanner>, Stop> {
+    let mut first = 0;
+    let mut scanners = Vec::new();
+    for cloud in open(input)?.pointclouds() {
+        let records = usize::try_from(cloud.records).unwrap_or(usize::MAX);
+        let points = first..records.saturating_add(first);
+        first = points.end;
+        if let Some(pose) = cloud.transform {
+            let at = pose.translation;
+            scanners.push(Scanner { position: [at.x, at.y, at.z], points });
+        }
+    }
+    Ok(scanners)
+}
+
+/// Goes over all points of all scans.
+pub(crate) fn each(
+    input: Input<'_>,
+    block: usize,
+    take: &mut dyn FnMut(&Points) -> ControlFlow<()>,
+) -> Result<(), Stop> {
+    let mut reader = open(input)?;
+    let clouds = reader.pointclouds();
+    // What only some scans have, none keeps.
+    let all = |has: fn(&PointCloud) -> bool| !clouds.is_empty() && clouds.iter().all(has);
+    let holds = Holds {
+        colours: all(PointCloud::has_color),
+        intensities: all(PointCloud::has_intensity),
+        ..Holds::default()
+    };
+    let together = (block / BYTES_A_POINT).max(1);
+    let mut points = Points::default();
+    let mut done = 0;
+    for cloud in &clouds {
+        if !cloud.has_cartesian() && !cloud.has_spherical() {
+            return Err(Fault::Undeclared { what: "coordinates of a scan" }.at_byte(HEADER).into());
+        }
+        let wrong = |cause: String| damaged(cause).within("point", done);
+        let mut simple = reader.pointcloud_simple(cloud).map_err(|cause| wrong(cause.to_string()))?;
+        simple.intensity_to_color(false);
+        simple.normalize_intensity(false);
+        let mut left = cloud.records;
+        while left > 0 {
+            points.clear();
+            let many = usize::try_from(left).unwrap_or(usize::MAX).min(together);
+            // Damaged data may lead the decoder out of its tables.
+            catch_unwind(AssertUnwindSafe(|| fill(&mut simple, many, holds, &mut points)))
+                .unwrap_or_else(|_| Err("the decoder gave up".into()))
+                .map_err(|cause| damaged(cause).within("point", done + points.len() as u64))?;
+            if take(&points).is_break() {
+                return Ok(());
+            }
+            left -= many as u64;
+            done += many as u64;
+        }
+    }
+    Ok(())
+}
+
+fn damaged(cause: String) -> Broken {
+    Fault::Decoder { cause: cause.into() }.at_byte(HEADER)
+}
+
+/// The next so many points of a scan.
+fn fill(
+    simple: &mut PointCloudReaderSimple<'_, Reader<'_>>,
+    many: usize,
+    holds: Holds,
+    points: &mut Points,
+) -> Result<(), String> {
+    for _ in 0..many {
+        let point = simple.next().ok_or("the scan ends before its last point")?;
+        let point = point.map_err(|cause| cause.to_string())?;
+        let mut row: Row = [0.0; 11];
+        let place = match point.cartesian {
+            CartesianCoordinate::Valid { x, y, z } => [x, y, z],
+            CartesianCoordinate::Direction { .. } | CartesianCoordinate::Invalid => [f64::NAN; 3],
+        };
+        row[..3].copy_from_slice(&place);
+        if let Some(colour) = point.color {
+            row[6..9].copy_from_slice(&[colour.red, colour.green, colour.blue].map(|c| f64::from(c) * 255.0));
+        }
+        row[9] = point.intensity.map_or(0.0, f64::from);
+        points.push(holds, &row);
+    }
+    Ok(())
+}
+
+/// Opens a file after what its header declares was held against its length.
+fn open(input: Input<'_>) -> Result<E57Reader<Reader<'_>>, Stop> {
+    let length = input.length()?;
+    let mut header = Vec::new();
+    input.reader(0)?.take(HEADER as u64).read_to_end(&mut header)?;
+    let number =
+        |at: usize| header.get(at..at + 8).and_then(<[u8]>::first_chunk).map(|n| u64::from_le_bytes(*n));
+    let (Some(xml), Some(page)) = (number(XML), number(PAGE)) else {
+        return Err(Fault::PastEnd.at_byte(header.len()).into());
+    };
+    for (found, most, at, expected) in [
+        (xml, length.min(LONGEST_XML), XML, "XML that fits into the file, of 64 MiB at most"),
+        (page, LONGEST_PAGE, PAGE, "pages of 1 MiB at most"),
+    ] {
+        if found > most {
+            return Err(Fault::Expected { expected, found: found.to_string().into() }.at_byte(at).into());
+        }
+    }
+    let source = input.reader(0)?;
+    let reader = catch_unwind(AssertUnwindSafe(|| E57Reader::new(source)))
+        .map_err(|_| damaged("the decoder gave up".into()))?
+        .map_err(|cause| damaged(cause.to_string()))?;
+    // A point takes a bit at least, unless all are the same.
+    let mut left = u128::from(length) * 8;
+    for cloud in reader.pointclouds() {
+        let Some(rest) = left.checked_sub(cloud.records.into()) else {
+            let cause = format!("a scan of {} points does not fit into {length} bytes", cloud.records);
+            return Err(damaged(cause).into());
+        };
+        left = rest;
+    }
+    Ok(reader)
+}

@@ -1,0 +1,233 @@
+//! LAZ: chunks of points compressed by laszip.
+//!
+//! The decoder trusts what it reads: it allocates as many entries as a table of chunks declares, and as many
+//! bytes as a layer declares. Both are held against the length of the file first, and each chunk is decoded
+//! from its own bytes alone.
+
+use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use laz::laszip::ChunkTable;
+use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
+use laz::{LazItem, LazItemType, LazVlr};
+
+use super::header::{Header, record};
+use crate::error::{Broken, Fault};
+use crate::input::{Input, Stop};
+
+/// Bytes before the points that are read: more than all variable-length records of any scan.
+const HEAD: usize = 1 << 26;
+
+/// Chunks that take the rest of the file, by the code of laszip's compressors.
+const ONE_CHUNK: u16 = 1;
+
+/// Bytes before the entries of a table of chunks: its version, and how many there are.
+const TABLE: u64 = 8;
+
+/// Bytes of the place of the table, before the first chunk.
+const PLACE: u64 = 8;
+
+type Decoder<'a> = Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + 'a>;
+
+/// Where a chunk is, and how many points it has.
+#[derive(Debug, Clone, Copy)]
+struct Chunk {
+    start: u64,
+    bytes: u64,
+    points: u64,
+}
+
+/// What laszip says of the file.
+struct Packing {
+    vlr: LazVlr,
+    /// Where that stands.
+    at: usize,
+    layered: bool,
+    one_chunk: bool,
+}
+
+/// Goes over all records, so many of them `together`.
+pub(super) fn each(
+    input: Input<'_>,
+    header: &Header,
+    together: usize,
+    take: &mut dyn FnMut(&[u8]) -> ControlFlow<()>,
+) -> Result<(), Stop> {
+    let before = usize::try_from(header.start).unwrap_or(usize::MAX).min(HEAD);
+    let packing = Packing::of(&input.head(before)?, header)?;
+    let length = input.length()?;
+    let (mut packed, mut records) = (Vec::new(), Vec::new());
+    let mut done = 0;
+    for chunk in chunks(input, header, &packing, length)? {
+        if done == header.count {
+            break;
+        }
+        let points = chunk.points.min(header.count - done);
+        packed.clear();
+        input.reader(chunk.start)?.take(chunk.bytes).read_to_end(&mut packed)?;
+        let corrupt = |cause: String, so_far: u64| -> Stop {
+            let place = Fault::Decoder { cause: cause.into() }.at(crate::At::Byte(chunk.start));
+            place.within("point", done + so_far).into()
+        };
+        if packing.layered {
+            check_layers(&packed, packing.vlr.items(), header.stride, points)
+                .map_err(|fault| Stop::from(fault.at(crate::At::Byte(chunk.start)).within("point", done)))?;
+        }
+        let mut decoder = packing.decoder(&packed)?;
+        let mut so_far = 0;
+        while so_far < points {
+            let many = usize::try_from(points - so_far).unwrap_or(usize::MAX).min(together);
+            records.clear();
+            records.resize(many * header.stride, 0);
+            // Damaged data may lead the decoder's models out of their tables.
+            let mut decoded = 0;
+            let each = || {
+                for record in records.chunks_exact_mut(header.stride) {
+                    decoder.decompress_next(record)?;
+                    decoded += 1;
+                }
+                Ok::<(), std::io::Error>(())
+            };
+            let result = catch_unwind(AssertUnwindSafe(each));
+            match result {
+                Ok(Ok(())) => (),
+                Ok(Err(cause)) => return Err(corrupt(cause.to_string(), so_far + decoded)),
+                Err(_) => return Err(corrupt("it gave up".into(), so_far + decoded)),
+            }
+            if take(&records).is_break() {
+                return Ok(());
+            }
+            so_far += many as u64;
+        }
+        done += points;
+    }
+    if done < header.count { Err(header.promised(done).into()) } else { Ok(()) }
+}
+
+impl Packing {
+    fn of(head: &[u8], header: &Header) -> Result<Self, Broken> {
+        let Some((at, content)) = record(head, header, LazVlr::USER_ID.as_bytes(), LazVlr::RECORD_ID) else {
+            return Err(Fault::Undeclared { what: "how points are compressed" }.at_byte(header.header_size));
+        };
+        let wrong = |cause: String| Fault::Decoder { cause: cause.into() }.at_byte(at);
+        let vlr = LazVlr::from_buffer(content).map_err(|cause| wrong(cause.to_string()))?;
+        let sizes: usize = vlr.items().iter().map(|item| usize::from(item.size())).sum();
+        let as_declared = vlr.items().iter().all(|item| size_of_item(item) == usize::from(item.size()));
+        if sizes != header.stride || !as_declared {
+            return Err(wrong(format!("items of {sizes} bytes make no point of {}", header.stride)));
+        }
+        let layers = vlr.items().iter().filter(|item| item.version() >= 3).count();
+        if layers != 0 && layers != vlr.items().len() {
+            return Err(wrong("some items are in layers and some are not".into()));
+        }
+        let one_chunk = content.get(..2) == Some(&ONE_CHUNK.to_le_bytes());
+        let packing = Self { layered: layers > 0, vlr, at, one_chunk };
+        // Whether all items are known does not depend on the data.
+        packing.decoder(&[]).map(drop)?;
+        Ok(packing)
+    }
+
+    fn decoder<'a>(&self, packed: &'a [u8]) -> Result<Decoder<'a>, Broken> {
+        let source = Cursor::new(packed);
+        let mut decoder: Decoder<'a> = if self.layered {
+            Box::new(LayeredPointRecordDecompressor::new(source))
+        } else {
+            Box::new(SequentialPointRecordDecompressor::new(source))
+        };
+        let known = decoder.set_fields_from(self.vlr.items());
+        known.map_err(|cause| Fault::Decoder { cause: cause.to_string().into() }.at_byte(self.at))?;
+        Ok(decoder)
+    }
+}
+
+/// All chunks, which lie one after the other from the start of the points to the table of chunks.
+fn chunks(input: Input<'_>, header: &Header, packing: &Packing, length: u64) -> Result<Vec<Chunk>, Stop> {
+    if packing.one_chunk {
+        return Ok(vec![Chunk { start: header.start, bytes: length - header.start, points: header.count }]);
+    }
+    let wrong =
+        |cause: String, at: u64| Stop::from(Fault::Decoder { cause: cause.into() }.at(crate::At::Byte(at)));
+    let first = header.start + PLACE;
+    let place = |at: u64| -> Result<u64, Stop> {
+        let mut bytes = [0; 8];
+        input.reader(at)?.read_exact(&mut bytes)?;
+        Ok(u64::from_le_bytes(bytes))
+    };
+    if first + TABLE > length {
+        return Err(Fault::PastEnd.at(crate::At::Byte(length)).into());
+    }
+    let mut table = place(header.start)?;
+    // A writer that could not go back leaves the place at the end.
+    if table <= header.start || i64::try_from(table).is_err() {
+        table = place(length - 8)?;
+    }
+    if table < first || table > length - TABLE {
+        let cause =
+            "there is no table of chunks; the file was not finished: `las2las` or PDAL mends it".into();
+        return Err(wrong(cause, header.start));
+    }
+    let mut reader = input.reader(table + 4)?;
+    let mut count = [0; 4];
+    reader.read_exact(&mut count)?;
+    let count = u64::from(u32::from_le_bytes(count));
+    // The first point of each chunk is not compressed.
+    let most = (table - first) / header.stride as u64;
+    if count > most {
+        return Err(wrong(format!("{count} chunks do not fit into {} bytes", table - first), table));
+    }
+    // So that the decoder cannot read past the end of the table.
+    reader.seek(SeekFrom::Start(table))?;
+    let is_variable = packing.vlr.uses_variable_size_chunks();
+    let entries = catch_unwind(AssertUnwindSafe(|| ChunkTable::read(&mut reader, is_variable)))
+        .map_err(|_| wrong("the table of chunks is damaged".into(), table))?
+        .map_err(|cause| wrong(cause.to_string(), table))?;
+    let mut start = first;
+    let mut chunks = Vec::new();
+    for entry in entries.as_ref() {
+        let points = if is_variable { entry.point_count } else { packing.vlr.chunk_size().into() };
+        if entry.byte_count > table - start {
+            return Err(wrong(format!("a chunk of {} bytes ends after the last", entry.byte_count), table));
+        }
+        chunks.push(Chunk { start, bytes: entry.byte_count, points });
+        start += entry.byte_count;
+    }
+    Ok(chunks)
+}
+
+/// Bytes of an item by its kind; the decoder takes them for granted.
+fn size_of_item(item: &LazItem) -> usize {
+    match item.item_type() {
+        LazItemType::Byte(count) | LazItemType::Byte14(count) => count.into(),
+        LazItemType::Point10 => 20,
+        LazItemType::GpsTime | LazItemType::RGBNIR14 => 8,
+        LazItemType::RGB12 | LazItemType::RGB14 => 6,
+        LazItemType::WavePacket13 | LazItemType::WavePacket14 => 29,
+        LazItemType::Point14 => 30,
+    }
+}
+
+/// Layers of an item in a chunk.
+fn layers_of(item: &LazItem) -> usize {
+    match item.item_type() {
+        LazItemType::Point14 => 9,
+        LazItemType::RGB14 | LazItemType::WavePacket14 => 1,
+        LazItemType::RGBNIR14 => 2,
+        LazItemType::Byte14(count) => count.into(),
+        _ => 0,
+    }
+}
+
+/// Checks that a chunk holds its first point, and all layers that it declares.
+fn check_layers(chunk: &[u8], items: &[LazItem], stride: usize, points: u64) -> Result<(), Fault> {
+    let layers: usize = items.iter().map(layers_of).sum();
+    let content = stride + 4 + 4 * layers;
+    let Some(sizes) = chunk.get(stride..content) else { return Err(Fault::PastEnd) };
+    let number = |i: usize| u64::from(u32::from_le_bytes([0, 1, 2, 3].map(|k| sizes[4 * i + k])));
+    if number(0) < points {
+        return Err(Fault::Promised { element: "point".into(), promised: points, present: number(0) });
+    }
+    let declared: u64 = (1..=layers).map(number).sum();
+    let left = (chunk.len() - content) as u64;
+    if declared > left { Err(Fault::ListPastEnd { values: declared, left }) } else { Ok(()) }
+}
