@@ -17,9 +17,12 @@ use crate::input::pieces;
 #[derive(Debug, Clone, Default, Args)]
 pub struct FilterArgs {
     /// Keep the points within a box, given by its lower and upper corner in the units of the input. Filters
-    /// are applied in this order: --crop, --voxel, --remove-outliers, --min-neighbours
+    /// are applied in this order: --crop, --class, --voxel, --remove-outliers, --min-neighbours
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse_crop)]
     pub crop: Option<CropBox>,
+    /// Keep the points of these classes, by their numbers in LAS: 2 is ground, 6 is buildings
+    #[arg(long, value_name = "C,C,...", value_parser = parse_classes)]
+    pub class: Option<ClassList>,
     /// Keep one point for each cube with edges of length S: the point nearest to the mean of the cube's
     /// points
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
@@ -41,6 +44,10 @@ pub struct CropBox {
     /// The upper corner.
     pub max: [f64; 3],
 }
+
+/// Classes of points, by their numbers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ClassList(pub Vec<u8>);
 
 /// Parameters of the statistical outlier filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +73,8 @@ pub(crate) struct Filtered {
     #[serde(skip_serializing_if = "Option::is_none")]
     crop: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    class: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     voxel: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     outliers: Option<usize>,
@@ -79,8 +88,12 @@ type Keep<'a> = &'a dyn Fn(&PointCloud) -> Result<Vec<u32>, FilterError>;
 impl FilterArgs {
     /// Returns `true` if no filter is asked for.
     pub(crate) fn is_empty(&self) -> bool {
-        let Self { crop, voxel, remove_outliers, min_neighbours } = self;
-        crop.is_none() && voxel.is_none() && remove_outliers.is_none() && min_neighbours.is_none()
+        let Self { crop, class, voxel, remove_outliers, min_neighbours } = self;
+        crop.is_none()
+            && class.is_none()
+            && voxel.is_none()
+            && remove_outliers.is_none()
+            && min_neighbours.is_none()
     }
 
     /// Applies the filters to `cloud`, which was read from `path`, on `threads` threads.
@@ -125,6 +138,11 @@ impl FilterArgs {
             let option = format!("--crop {}", corners.join(","));
             filtered.crop = Some(step(option, &|cloud| filter::crop(cloud, min, max))?);
         }
+        if let Some(ClassList(wanted)) = &self.class {
+            let numbers: Vec<String> = wanted.iter().map(u8::to_string).collect();
+            let option = format!("--class {}", numbers.join(","));
+            filtered.class = Some(step(option, &|cloud| filter::classes(cloud, wanted))?);
+        }
         if let Some(size) = self.voxel {
             filtered.voxel = Some(step(format!("--voxel {size}"), &|cloud| filter::voxel(cloud, size))?);
         }
@@ -148,7 +166,7 @@ fn parse_length(text: &str) -> Result<f64, String> {
     positive(text).ok_or_else(|| "expected a positive length in the units of the input".into())
 }
 
-fn parse_crop(text: &str) -> Result<CropBox, String> {
+pub(crate) fn parse_crop(text: &str) -> Result<CropBox, String> {
     let expected = || "expected six numbers, x0,y0,z0,x1,y1,z1, the lower corner first".to_owned();
     let numbers: Option<Vec<f64>> = pieces(text).map(|piece| piece.parse().ok()).collect();
     let numbers = <[f64; 6]>::try_from(numbers.ok_or_else(expected)?).map_err(|_other_count| expected())?;
@@ -166,6 +184,12 @@ fn parse_crop(text: &str) -> Result<CropBox, String> {
             axis = ["x", "y", "z"][k]
         )),
     }
+}
+
+pub(crate) fn parse_classes(text: &str) -> Result<ClassList, String> {
+    let classes: Option<Vec<u8>> = pieces(text).map(|piece| piece.parse().ok()).collect();
+    let classes = classes.filter(|classes| !classes.is_empty());
+    classes.map(ClassList).ok_or_else(|| "expected numbers from 0 to 255, as in 2,6".into())
 }
 
 /// A whole number from 1 on, and a positive number.

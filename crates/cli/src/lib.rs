@@ -3,6 +3,7 @@
 
 mod collide;
 mod console;
+mod convert;
 mod curve;
 mod density;
 mod distance;
@@ -57,6 +58,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
 pub use collide::{CollideArgs, DetailName, EvidenceName};
+pub use convert::ConvertArgs;
 pub use curve::CurveArgs;
 pub use curve_picture::curve_picture;
 pub use density::DensityArgs;
@@ -64,7 +66,7 @@ pub use distance::DistanceArgs;
 pub use error::CliError;
 pub use eval::{EvalArgs, KernelName};
 pub use export::ExportArgs;
-pub use filters::{CropBox, FilterArgs, LeastNeighbours, Outliers};
+pub use filters::{ClassList, CropBox, FilterArgs, LeastNeighbours, Outliers};
 pub use geodesic::geodesic_picture;
 pub use image::Picture;
 pub use inspect::InspectArgs;
@@ -102,6 +104,12 @@ Examples:
   nearmiss collide a.nm b.nm --poses near.jsonl --work 2000 --json
   nearmiss collide ring-1.nm ring-2.nm --thickened 0.15 --image contact.png";
 
+const CONVERT_EXAMPLES: &str = "\
+Examples:
+  nearmiss convert survey.laz survey.ply --class 2,6
+  nearmiss convert hall.e57 hall.laz --voxel 0.01
+  nearmiss convert part.ply part-in-mm.pcd --units mm";
+
 const POSES_EXAMPLES: &str = "\
 Example:
   nearmiss poses a.nm b.nm --near --per-distance 100 -o near.jsonl
@@ -124,6 +132,9 @@ pub enum Command {
     /// Prepare a point cloud or mesh for queries, once, and save it
     #[command(after_long_help = "Example:\n  nearmiss preprocess dragon.ply -o dragon.nm")]
     Preprocess(PreprocessArgs),
+    /// Convert points from one file format to another, in pieces, so that they need not fit into memory
+    #[command(after_long_help = CONVERT_EXAMPLES)]
+    Convert(ConvertArgs),
     /// Say what a prepared scan holds
     #[command(after_long_help = "Example:\n  nearmiss inspect dragon.nm --verify")]
     Inspect(InspectArgs),
@@ -172,6 +183,7 @@ impl Command {
     pub fn run(&self) -> ExitCode {
         let done = match self {
             Self::Preprocess(args) => preprocess::run(args),
+            Self::Convert(args) => convert::run(args),
             Self::Inspect(args) => inspect::run(args),
             Self::Eval(args) => eval::run(args),
             Self::Collide(args) => collide::run(args),

@@ -83,6 +83,14 @@ pub(crate) fn replace<T>(
     Ok(told)
 }
 
+/// The same for writers that seek in the file.
+pub(crate) fn replace_file(
+    path: &Path,
+    write: impl FnOnce(fs::File) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    replace(path, |out| write(out.get_ref().try_clone().map_err(CliError::writing(path))?))
+}
+
 /// The same for writers that fail with the system's errors alone.
 pub(crate) fn replace_plain(
     path: &Path,

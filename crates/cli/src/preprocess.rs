@@ -21,13 +21,13 @@ use crate::report::ScanReport;
 /// Options of `preprocess`.
 #[derive(Debug, Clone, Args)]
 pub struct PreprocessArgs {
-    /// Point cloud (PLY, PCD, XYZ or CSV text) or mesh (OBJ, PLY with faces), of which the vertices are the
-    /// points
+    /// Point cloud (PLY, PCD, LAS, LAZ, E57, NPY or text) or mesh (OBJ, STL, OFF, glTF, PLY with faces), of
+    /// which the vertices are the points
     pub input: PathBuf,
     /// Prepared scan to write, usually named `.nm`; replaced in one step if it is there
     #[arg(short, long, value_name = "OUT.nm")]
     pub output: PathBuf,
-    /// Format of the input: ply, pcd, xyz, obj, or auto, by content and name
+    /// Format of the input: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf, or auto, by content and name
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
     /// Which points to leave out

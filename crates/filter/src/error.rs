@@ -55,6 +55,9 @@ pub enum FilterError {
         /// The upper corner there.
         max: f64,
     },
+    /// Classes asked of points that have none.
+    #[error("the points have no classes; only LAS, LAZ and tables with a column `class` have them")]
+    NoClasses,
     /// So few points left that they make no cloud.
     #[error("expected at least 8 points to stay, got {left} of {points}; {remedy}")]
     TooFewLeft {

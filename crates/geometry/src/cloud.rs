@@ -215,8 +215,8 @@ impl PointCloud {
         Ok(self)
     }
 
-    /// The same cloud with the places of the scanners that took it; of points in two of their ranges, the first
-    /// counts.
+    /// The same cloud with the places of the scanners that took it; of points in two of their ranges, the
+    /// first counts.
     #[must_use]
     pub fn with_scanners(mut self, scanners: Vec<Scanner>) -> Self {
         self.scanners = scanners;
@@ -226,9 +226,9 @@ impl PointCloud {
     /// Returns the cloud of the points with these `ids`, which are indices into [`PointCloud::positions`] in
     /// ascending order.
     ///
-    /// Normals, colours, intensities and classes follow their points. The frame and [`PointCloud::step`] stay as they are,
-    /// [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads to indices of
-    /// the input.
+    /// Normals, colours, intensities and classes follow their points. The frame and [`PointCloud::step`] stay
+    /// as they are, [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads
+    /// to indices of the input.
     ///
     /// ```
     /// # use nearmiss_geometry::PointCloud;

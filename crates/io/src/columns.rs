@@ -17,10 +17,16 @@ pub(crate) fn slot(name: &[u8]) -> Option<usize> {
         &["red", "r"],
         &["green", "g"],
         &["blue", "b"],
-        &["intensity", "scalar_intensity", "i"],
+        &["intensity", "scalar_intensity"],
         &["classification", "scalar_classification", "class"],
     ];
     NAMES.iter().position(|names| names.iter().any(|known| name.eq_ignore_ascii_case(known.as_bytes())))
+}
+
+/// Whether a second column of the same meaning contradicts the first; of intensities and classes files may
+/// hold several.
+pub(crate) const fn is_unique(slot: usize) -> bool {
+    slot < 9
 }
 
 /// What the rows of a table hold besides coordinates.
@@ -33,7 +39,8 @@ pub(crate) struct Holds {
 }
 
 impl Holds {
-    /// From the slots that the columns fill; coordinates must be among them, normals and colours count in threes.
+    /// From the slots that the columns fill; coordinates must be among them, normals and colours count in
+    /// threes.
     pub(crate) fn among(slots: impl Iterator<Item = usize>) -> Result<Self, Fault> {
         let mut filled = [false; 11];
         slots.for_each(|slot| filled[slot] = true);

@@ -5,7 +5,6 @@
 
 use std::io::Read;
 use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use ::e57::{CartesianCoordinate, E57Reader, PointCloud, PointCloudReaderSimple};
 
@@ -13,6 +12,7 @@ use nearmiss_geometry::Scanner;
 
 use crate::columns::{Holds, Row};
 use crate::error::{Broken, Fault};
+use crate::guard::guarded;
 use crate::input::{Input, Reader, Stop};
 use crate::points::Points;
 
@@ -86,8 +86,8 @@ pub(crate) fn each(
             points.clear();
             let many = usize::try_from(left).unwrap_or(usize::MAX).min(together);
             // Damaged data may lead the decoder out of its tables.
-            catch_unwind(AssertUnwindSafe(|| fill(&mut simple, many, holds, &mut points)))
-                .unwrap_or_else(|_| Err("the decoder gave up".into()))
+            guarded(|| fill(&mut simple, many, holds, &mut points))
+                .unwrap_or_else(|| Err("the decoder gave up".into()))
                 .map_err(|cause| damaged(cause).within("point", done + points.len() as u64))?;
             if take(&points).is_break() {
                 return Ok(());
@@ -147,8 +147,8 @@ fn open(input: Input<'_>) -> Result<E57Reader<Reader<'_>>, Stop> {
         }
     }
     let source = input.reader(0)?;
-    let reader = catch_unwind(AssertUnwindSafe(|| E57Reader::new(source)))
-        .map_err(|_| damaged("the decoder gave up".into()))?
+    let reader = guarded(|| E57Reader::new(source))
+        .ok_or_else(|| damaged("the decoder gave up".into()))?
         .map_err(|cause| damaged(cause.to_string()))?;
     // A point takes a bit at least, unless all are the same.
     let mut left = u128::from(length) * 8;

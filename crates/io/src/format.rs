@@ -51,8 +51,8 @@ impl Format {
         Self::Gltf,
     ];
 
-    /// Returns `true` if all files of this format can be read from disk in pieces, so that no reader for bytes
-    /// in memory is needed.
+    /// Returns `true` if all files of this format can be read from disk in pieces, so that no reader for
+    /// bytes in memory is needed.
     pub(crate) const fn is_streamed(self) -> bool {
         matches!(self, Self::Las | Self::E57)
     }

@@ -3,7 +3,6 @@
 //! where one reaches out of its buffer.
 
 use std::fs;
-use std::panic::catch_unwind;
 use std::path::{Component, Path};
 
 use base64::Engine;
@@ -14,14 +13,15 @@ use gltf::{Accessor, Gltf, Node, Primitive, Semantic};
 
 use crate::columns::{Holds, Row};
 use crate::error::{Broken, Fault};
+use crate::guard::guarded;
 use crate::scalar::{Order, Scalar};
 use crate::sink::Sink;
 
 /// The content of a file; other files that it names are looked for in the folder of `path`.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Sink, Broken> {
     check_lengths(bytes)?;
-    let Gltf { document, blob } = catch_unwind(|| Gltf::from_slice(bytes))
-        .map_err(|_| damaged("the document is none"))?
+    let Gltf { document, blob } = guarded(|| Gltf::from_slice(bytes))
+        .ok_or_else(|| damaged("the decoder gave up"))?
         .map_err(|cause| damaged(&cause.to_string()))?;
     if let Some(extension) = document.extensions_required().find(|name| name.contains("compression")) {
         return Err(damaged(&format!("{extension} is not supported; save it without compression")));
@@ -238,7 +238,8 @@ fn add(
         }
         sink.row(&row);
     }
-    let count = u32::try_from(places.count).map_err(|_| damaged("more than 2^32 vertices"))?;
+    let too_many = || damaged("more than 2^32 vertices");
+    let count = u32::try_from(places.count).ok().ok_or_else(too_many)?;
     let corners = match primitive.indices() {
         None => (0..count).collect(),
         Some(accessor) => indices(&Numbers::of(&accessor, buffers)?, count)?,
@@ -252,7 +253,7 @@ fn add(
         }
         Mode::TriangleFan | Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => (),
     }
-    first.checked_add(count).map(|_| count).ok_or_else(|| damaged("more than 2^32 vertices"))
+    first.checked_add(count).map(|_| count).ok_or_else(too_many)
 }
 
 /// Corners by their index among the `count` vertices of a primitive.

@@ -16,6 +16,7 @@ use crate::columns::{Holds, Row};
 #[cfg(not(feature = "laz"))]
 use crate::error::Fault;
 use crate::input::{Input, Stop};
+use crate::out::Lattice;
 use crate::points::Points;
 use header::Header;
 
@@ -26,6 +27,12 @@ const LOOKED_AT: usize = 1 << 16;
 pub(crate) fn glance(head: &[u8]) -> Option<(u64, Option<Aabb>)> {
     let header = Header::parse(head).ok()?;
     Some((header.count, header.bounds))
+}
+
+/// The steps in which coordinates are counted.
+pub(crate) fn lattice(input: Input<'_>) -> Option<Lattice> {
+    let Header { scale, offset, .. } = Header::parse(&input.head(header::LONGEST).ok()?).ok()?;
+    Some(Lattice { scale, offset })
 }
 
 /// Goes over all points, some `block` bytes of records at a time.

@@ -25,16 +25,20 @@ mod xyz;
 mod pieces;
 
 mod columns;
+#[cfg(any(feature = "e57", feature = "gltf", feature = "laz"))]
+mod guard;
 mod input;
 mod points;
 mod scalar;
 mod text;
 
+mod out;
 mod write;
 
 pub use error::{At, Fault, Foreign, Item, Place, ReadError};
 pub use format::{Format, UnknownFormatName};
 pub use glance::{Glance, glance};
+pub use out::{Lattice, OutError, OutputFormat, PointWriter, Survey, UnknownOutputFormat};
 pub use pieces::{Pieces, PointPieces, read_in_pieces};
 pub use points::Points;
 pub use read::{read, read_bytes, read_mesh, read_mesh_bytes};

@@ -94,8 +94,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     Ok(sink)
 }
 
-/// Coordinates, then a normal and a colour where the header says so. A colour in whole numbers goes up to 255,
-/// one with decimal points up to 1.
+/// Coordinates, then a normal and a colour where the header says so. A colour in whole numbers goes up to
+/// 255, one with decimal points up to 1.
 fn vertex(line: Line<'_>, holds: Holds) -> Result<Row, Fault> {
     const NAMES: [&str; 9] = ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"];
     let mut row: Row = [0.0; 11];

@@ -14,10 +14,11 @@ use nearmiss_geometry::TriangleMesh;
 use crate::error::ReadError;
 use crate::format::Format;
 use crate::input::Input;
+use crate::out::Lattice;
 use crate::points::Points;
 use crate::read::{Start, check_file, parse_as, stream};
 use crate::rows::{Blocks, Encoding, Layout};
-use crate::{npy, pcd, ply, xyz};
+use crate::{las, npy, pcd, ply, xyz};
 
 /// A mesh, or points that can be gone over a piece at a time.
 #[derive(Debug)]
@@ -52,9 +53,9 @@ enum Source {
 /// Opens a file for going over its points, of which some `block` bytes are read at a time; meshes are read
 /// whole.
 ///
-/// PLY of vertices alone, PCD that is not compressed, LAS, LAZ, E57, NPY and text are never in memory as a whole, only a block
-/// (more if a row is longer) and its points, which take up to eight times as much. Others are read as by
-/// [`read`](crate::read()).
+/// PLY of vertices alone, PCD that is not compressed, LAS, LAZ, E57, NPY and text are never in memory as a
+/// whole, only a block (more if a row is longer) and its points, which take up to eight times as much. Others
+/// are read as by [`read`](crate::read()).
 ///
 /// # Errors
 /// As [`read`](crate::read()), as far as the header tells. That there are too few points for a cloud is none.
@@ -102,6 +103,15 @@ pub fn read_in_pieces(
 }
 
 impl PointPieces {
+    /// The steps in which coordinates are counted, if this is LAS.
+    #[must_use]
+    pub fn lattice(&self) -> Option<Lattice> {
+        match &self.source {
+            Source::Stream { file, format: Format::Las, .. } => las::lattice(Input::File(file)),
+            _ => None,
+        }
+    }
+
     /// Goes over all points from the first on, and hands out some at a time. Can be done again.
     ///
     /// # Errors

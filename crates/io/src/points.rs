@@ -20,6 +20,12 @@ pub struct Points {
 }
 
 impl Points {
+    /// Points of which nothing else is known.
+    #[must_use]
+    pub fn of_positions(positions: Vec<[f64; 3]>) -> Self {
+        Self { positions, ..Self::default() }
+    }
+
     /// How many points there are.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -72,7 +78,7 @@ impl Points {
     }
 
     /// Adds all of `other`, which holds the same.
-    pub(crate) fn append(&mut self, other: &Self) {
+    pub fn append(&mut self, other: &Self) {
         self.positions.extend_from_slice(&other.positions);
         self.normals.extend_from_slice(&other.normals);
         self.colours.extend_from_slice(&other.colours);

@@ -13,8 +13,8 @@ use crate::points::Points;
 #[non_exhaustive]
 pub struct Model {
     /// All vertices, broken ones and duplicates dropped and counted; [`PointCloud::source`] leads back to the
-    /// order of the file, and so to the vertices of the mesh. Carries normals, colours, intensities and classes
-    /// if the file does.
+    /// order of the file, and so to the vertices of the mesh. Carries normals, colours, intensities and
+    /// classes if the file does.
     pub cloud: PointCloud,
     /// The faces, cut into triangles, over all vertices in the order of the file; `None` if there are none.
     pub mesh: Option<TriangleMesh>,
@@ -142,8 +142,8 @@ impl Sink {
     }
 
     /// The file's points, if it has no faces; else what there is.
-    pub(crate) fn into_points(self) -> Result<Points, Self> {
-        if self.triangles.is_empty() { Ok(self.points) } else { Err(self) }
+    pub(crate) fn into_points(self) -> Result<Points, Box<Self>> {
+        if self.triangles.is_empty() { Ok(self.points) } else { Err(Box::new(self)) }
     }
 
     /// The file's triangles, if there are any.

@@ -4,7 +4,7 @@
 //! white space. A line of column names may come before it, and a count of the points before that. Without
 //! names the first three columns are x, y and z. `#` and `//` start lines that say nothing.
 
-use crate::columns::{Holds, Row, slot};
+use crate::columns::{Holds, Row, is_unique, slot};
 use crate::error::{Broken, Fault};
 use crate::rows::{Encoding, Layout, Rows};
 use crate::sink::Sink;
@@ -120,7 +120,7 @@ impl Table {
                 expected: "three numbers (with decimal points), or names of columns with x, y and z among them",
                 found: shown(line.text),
             })?;
-        for slot in 0..Row::default().len() {
+        for slot in (0..Row::default().len()).filter(|slot| is_unique(*slot)) {
             if table.columns.iter().filter(|c| **c == Some(slot)).count() > 1 {
                 let name = name_of(slot).into();
                 return Err(Fault::Repeated { name });

@@ -79,8 +79,8 @@ impl Scan {
 
     /// The same scan, which is of `cloud`, with a graph over its points, by which normals are turned to one
     /// side: that of the cloud's own normals where it has some; towards `scanner`, a place in the frame of
-    /// the cloud, or else towards the cloud's own [scanners](PointCloud::scanners); or outwards. Takes some three times as long as [`Scan::build`],
-    /// without the map of close pairs half as long.
+    /// the cloud, or else towards the cloud's own [scanners](PointCloud::scanners); or outwards. Takes some
+    /// three times as long as [`Scan::build`], without the map of close pairs half as long.
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, GraphOptions, PointCloud, Scan};
@@ -319,8 +319,8 @@ fn samples(hierarchy: &PointHierarchy) -> Samples<'_> {
     Samples { plan: hierarchy.plan(), positions: hierarchy.positions(), radii: hierarchy.radii() }
 }
 
-/// For each point in the order of the hierarchy where its scanner stood, in its frame, or the point itself where
-/// that is not known; `None` if it is known of no point.
+/// For each point in the order of the hierarchy where its scanner stood, in its frame, or the point itself
+/// where that is not known; `None` if it is known of no point.
 fn viewpoints(hierarchy: &PointHierarchy, cloud: &PointCloud) -> Option<Vec<[f32; 3]>> {
     let finite = |scanner: &&Scanner| scanner.position.iter().all(|c| c.is_finite());
     let scanners: Vec<&Scanner> = cloud.scanners().iter().filter(finite).collect();

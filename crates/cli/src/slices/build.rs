@@ -17,8 +17,8 @@ use crate::preprocess::{FormatChoice, parse_format, parse_threads};
 /// Options of `slices build`.
 #[derive(Debug, Clone, Args)]
 pub struct BuildArgs {
-    /// Point cloud (PLY, PCD, XYZ or CSV text), read piece by piece unless it is compressed, so it may be
-    /// larger than memory; or mesh (OBJ, PLY with faces), whose surface is sampled so that no pixel of it
+    /// Point cloud (PLY, PCD, LAS, LAZ, E57, NPY or text), read piece by piece, so it may be larger than
+    /// memory; or mesh (OBJ, STL, OFF, glTF, PLY with faces), whose surface is sampled so that no pixel of it
     /// stays empty
     pub input: PathBuf,
     /// Folder for the map: new, empty, or with a map, which is replaced
@@ -44,7 +44,7 @@ pub struct BuildArgs {
     /// Which way is up: x, y, z, -x, -y or -z
     #[arg(long, value_name = "AXIS", default_value = "z", allow_hyphen_values = true)]
     pub up: Up,
-    /// Format of the input: ply, pcd, xyz, obj, or auto, by content and name
+    /// Format of the input: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf, or auto, by content and name
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
     /// Mebibytes that building may take

@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod collide;
+mod converting;
 mod curves;
 mod distances;
 mod estimating;

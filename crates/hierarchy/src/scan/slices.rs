@@ -198,9 +198,9 @@ impl Slices<'_> {
         cell_radius(self.radii[i], self.reach)
     }
 
-    /// About a [sparse](crate::PointKind::is_sparse) point, the radius of the ball in which surface may be that no
-    /// disc stands for: the local radius, but no more than the scan's, within which nothing is promised of
-    /// any point. Zero for others.
+    /// About a [sparse](crate::PointKind::is_sparse) point, the radius of the ball in which surface may be
+    /// that no disc stands for: the local radius, but no more than the scan's, within which nothing is
+    /// promised of any point. Zero for others.
     ///
     /// # Panics
     /// When there is no such point.

@@ -6,7 +6,6 @@
 
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use laz::laszip::ChunkTable;
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
@@ -14,6 +13,7 @@ use laz::{LazItem, LazItemType, LazVlr};
 
 use super::header::{Header, record};
 use crate::error::{Broken, Fault};
+use crate::guard::guarded;
 use crate::input::{Input, Stop};
 
 /// Bytes before the points that are read: more than all variable-length records of any scan.
@@ -89,11 +89,10 @@ pub(super) fn each(
                 }
                 Ok::<(), std::io::Error>(())
             };
-            let result = catch_unwind(AssertUnwindSafe(each));
-            match result {
-                Ok(Ok(())) => (),
-                Ok(Err(cause)) => return Err(corrupt(cause.to_string(), so_far + decoded)),
-                Err(_) => return Err(corrupt("it gave up".into(), so_far + decoded)),
+            match guarded(each) {
+                Some(Ok(())) => (),
+                Some(Err(cause)) => return Err(corrupt(cause.to_string(), so_far + decoded)),
+                None => return Err(corrupt("it gave up".into(), so_far + decoded)),
             }
             if take(&records).is_break() {
                 return Ok(());
@@ -179,8 +178,8 @@ fn chunks(input: Input<'_>, header: &Header, packing: &Packing, length: u64) -> 
     // So that the decoder cannot read past the end of the table.
     reader.seek(SeekFrom::Start(table))?;
     let is_variable = packing.vlr.uses_variable_size_chunks();
-    let entries = catch_unwind(AssertUnwindSafe(|| ChunkTable::read(&mut reader, is_variable)))
-        .map_err(|_| wrong("the table of chunks is damaged".into(), table))?
+    let entries = guarded(|| ChunkTable::read(&mut reader, is_variable))
+        .ok_or_else(|| wrong("the table of chunks is damaged".into(), table))?
         .map_err(|cause| wrong(cause.to_string(), table))?;
     let mut start = first;
     let mut chunks = Vec::new();

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::columns::{Holds, slot};
+use crate::columns::{Holds, is_unique, slot};
 use crate::error::{Broken, Fault};
 use crate::scalar::Scalar;
 use crate::text::{Line, Lines, number, shown, whole};
@@ -194,10 +194,12 @@ fn fields(
         };
         let part = part(name, kind, size, count).map_err(|fault| fault.on_line(kinds.number))?;
         // Few fields get past the first test, so the second costs little.
-        if part != Part::Nothing && fields.iter().any(|f| f.part.slots() == part.slots()) {
-            let name = shown(name);
-            return Err(Fault::Repeated { name }.on_line(names.number));
-        }
+        let is_second = part != Part::Nothing && fields.iter().any(|f| f.part.slots() == part.slots());
+        let part = match part {
+            Part::Slot(slot, _) if is_second && !is_unique(slot) => Part::Nothing,
+            _ if is_second => return Err(Fault::Repeated { name: shown(name) }.on_line(names.number)),
+            part => part,
+        };
         let end = size.checked_mul(count).and_then(|bytes| offset.checked_add(bytes));
         let end = end.filter(|&end| end <= isize::MAX.cast_unsigned());
         fields.push(Field { name: shown(name), size, count, offset, part });
@@ -229,7 +231,7 @@ fn part(name: &[u8], kind: &[u8], size: usize, count: usize) -> Result<Part, Fau
     };
     Ok(match slot {
         // Colours of other types are in no agreed range.
-        Some(slot) if slot < 6 || scalar == Scalar::U8 => Part::Slot(slot, scalar),
+        Some(slot) if !(6..9).contains(&slot) || scalar == Scalar::U8 => Part::Slot(slot, scalar),
         None if size == 4 => Part::Packed(scalar),
         _ => Part::Nothing,
     })

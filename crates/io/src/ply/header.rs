@@ -1,6 +1,6 @@
 //! The header: what elements there are, in what order, of what properties.
 
-use crate::columns::slot;
+use crate::columns::{is_unique, slot};
 use crate::error::{Broken, Fault};
 use crate::scalar::{Order, Scalar};
 use crate::text::{Lines, number, shown, whole, words};
@@ -153,15 +153,18 @@ fn property<'a>(element: Option<&mut Element>, mut next: impl FnMut() -> &'a [u8
     let part = match (element.role, list, name) {
         (Role::Vertex, None, name) => slot(name)
             // Colours of other types are in no agreed range.
-            .filter(|&slot| slot < 6 || scalar == Scalar::U8)
+            .filter(|&slot| !(6..9).contains(&slot) || scalar == Scalar::U8)
             .map_or(Part::Nothing, Part::Slot),
         (Role::Face { .. } | Role::Strips, Some(_), b"vertex_indices" | b"vertex_index") => Part::Corners,
         _ => Part::Nothing,
     };
-    // At most ten properties get past the first test, so the second costs little.
-    if part != Part::Nothing && element.properties.iter().any(|p| p.part == part) {
-        return Err(Fault::Repeated { name: shown(name) });
-    }
+    // At most a dozen properties get past the first test, so the second costs little.
+    let is_second = part != Part::Nothing && element.properties.iter().any(|p| p.part == part);
+    let part = match part {
+        Part::Slot(slot) if is_second && !is_unique(slot) => Part::Nothing,
+        _ if is_second => return Err(Fault::Repeated { name: shown(name) }),
+        part => part,
+    };
     if let (Role::Face { corners }, Part::Corners) = (&mut element.role, part) {
         *corners = true;
     }

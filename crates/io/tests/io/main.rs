@@ -9,3 +9,4 @@ mod pieces;
 mod real_data;
 mod round_trips;
 mod samples;
+mod writing;
