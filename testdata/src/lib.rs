@@ -11,6 +11,7 @@ pub mod cuts;
 
 pub mod arbitrary;
 pub mod dragon;
+pub mod files;
 pub mod house;
 pub mod instructions;
 pub mod matrices;

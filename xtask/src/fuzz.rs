@@ -8,10 +8,12 @@ use std::process::Command;
 
 use nearmiss::{BuildOptions, PointCloud, Scan};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
+use nearmiss_testdata::files;
 
 use crate::repository::{Outcome, cargo, root, run as run_command};
 
-const TARGETS: [&str; 5] = ["container", "ply", "pcd", "obj", "xyz"];
+const TARGETS: [&str; 11] =
+    ["container", "ply", "pcd", "obj", "xyz", "las", "e57", "npy", "stl", "off", "gltf"];
 
 /// Edges are counted in place, and comparisons tell the fuzzer what they wanted.
 const FLAGS: &str = "--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
@@ -71,23 +73,15 @@ fn host() -> Outcome<String> {
 
 /// Small sound inputs of every sort.
 fn seeds(target: &str) -> Outcome<Vec<Vec<u8>>> {
-    match target {
-        "container" => containers(),
-        "ply" => plies(),
-        "pcd" => Ok(pcds()),
-        "obj" => Ok(texts(&[
-            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0 1 0.5 0\nvn 0 0 1\nvt 0 0\nf 1//1 2//1 3//1\nf -1 -2 -3 1\n",
-        ])),
-        _ => Ok(texts(&[
-            "x,y,z,nx,ny,nz\n0,0,0,0,0,1\n1,0,0,0,0,1\n",
-            "# 0\n0 0 0\n1 0 0 255 0 1\n",
-            "0;0;1\r\n\"1\";2e5;-.5\n",
-        ])),
-    }
-}
-
-fn texts(texts: &[&str]) -> Vec<Vec<u8>> {
-    texts.iter().map(|text| text.as_bytes().to_vec()).collect()
+    let endings: &[&str] = match target {
+        "container" => return containers(),
+        "xyz" => &["xyz", "csv"],
+        "las" => &["las", "laz"],
+        "gltf" => &["gltf", "glb"],
+        _ => &[target],
+    };
+    let has_ending = |name: &str| endings.iter().any(|ending| name.ends_with(ending));
+    Ok(files::all().into_iter().filter(|(name, _)| has_ending(name)).map(|(_, bytes)| bytes).collect())
 }
 
 /// Prepared scans, behind a byte that says how they are checked.
@@ -108,45 +102,6 @@ fn containers() -> Outcome<Vec<Vec<u8>>> {
         }
     }
     Ok(seeds)
-}
-
-fn plies() -> Outcome<Vec<Vec<u8>>> {
-    let head = |format: &str| {
-        format!(
-            "ply\nformat {format} 1.0\ncomment a\nelement vertex 3\nproperty float x\nproperty double y\nproperty short z\n\
-             property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\n\
-             property list uchar int vertex_indices\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-        )
-    };
-    let ascii = head("ascii") + "0 0 0 1 2 3\n1 0 0 1 2 3\n0 1 0 1 2 3\n3 0 1 2\n4 0 1 2 -1\n";
-    let mut binary = head("binary_little_endian").into_bytes();
-    binary.extend([0_u8; 3 * 17]);
-    binary.extend([3, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]);
-    let other_end = String::from_utf8_lossy(&binary).replacen("little", "big", 1).into_bytes();
-    let dragon =
-        fs::read(nearmiss_testdata::dragon::dragon_path(nearmiss_testdata::dragon::Dragon::Points5k))?;
-    Ok(vec![ascii.into_bytes(), binary, other_end, dragon[..dragon.len().min(4000)].to_vec()])
-}
-
-fn pcds() -> Vec<Vec<u8>> {
-    let head = |encoding: &str| {
-        format!(
-            "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb _\nSIZE 4 4 4 4 1\nTYPE F F F U U\nCOUNT 1 1 1 1 3\nWIDTH 8\n\
-             HEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 8\nDATA {encoding}\n"
-        )
-    };
-    let rows: String = (0..8).map(|i| format!("{i} {} nan {i} 0 0 0\n", i * i)).collect();
-    let values: Vec<u8> = (0..8 * 19_u8).collect();
-    let binary = [head("binary").into_bytes(), values.clone()].concat();
-    let mut packed = head("binary_compressed").into_bytes();
-    // Runs of literal bytes: packed data need not be shorter.
-    let data: Vec<u8> =
-        values.chunks(32).flat_map(|run| [&[run.len().to_le_bytes()[0] - 1], run].concat()).collect();
-    for length in [data.len(), values.len()] {
-        packed.extend(u32::try_from(length).unwrap_or(0).to_le_bytes());
-    }
-    packed.extend(data);
-    vec![(head("ascii") + &rows).into_bytes(), binary, packed]
 }
 
 #[cfg(test)]

@@ -48,10 +48,10 @@ of the repository
                  a picture of f over a slice of a noisy scan; --table counts where its normal flips
   tables -o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--quick]
                  Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, their paper of 2005, dos Anjos et al. 2012, measured
-  fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz; 60 s each
+  fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz, las, e57, npy, stl, off, gltf; 60 s each
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
-  preprocess, inspect, eval, collide, curve, poses, export, sample, slices";
+  preprocess, convert, inspect, eval, collide, curve, poses, export, sample, slices";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();

@@ -6,7 +6,7 @@ use std::path::Path;
 use nearmiss_geometry::CloudError;
 use nearmiss_io::{At, Fault, Format, ReadError, read, read_bytes, read_mesh_bytes};
 
-use crate::samples::{self, Encoding};
+use nearmiss_testdata::files::plain::{self, Encoding};
 
 fn error(bytes: &[u8], name: &str) -> ReadError {
     match read_bytes(bytes, None, Path::new(name)) {
@@ -160,7 +160,7 @@ fn rows_of_ascii_ply() {
 
 #[test]
 fn rows_of_binary_ply() {
-    let whole = samples::ply(Encoding::Little, "float", "int");
+    let whole = plain::ply(Encoding::Little, "float", "int");
     let start = whole.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     // Two cameras, one with three floats; then vertices, the first without tags.
     let vertices = start + (8 + 2) + (8 + 2 + 12);
@@ -268,12 +268,12 @@ fn pcd_in_text() {
 
 #[test]
 fn pcd_in_bytes() {
-    let binary = samples::pcd("binary");
+    let binary = plain::pcd("binary");
     assert_eq!(
         error(&binary[..binary.len() - 1], "a").to_string(),
         "a: line 10: 22 of `point` promised, but the file holds 21; it is cut off, or this count is wrong"
     );
-    let whole = samples::pcd("binary_compressed");
+    let whole = plain::pcd("binary_compressed");
     let start = whole.windows(11).position(|w| w == b"compressed\n").unwrap() + 11;
     let changed = |at: usize, byte: u8| {
         let mut bytes = whole.clone();

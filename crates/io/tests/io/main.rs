@@ -2,11 +2,9 @@
 
 mod errors;
 mod expansion;
-mod foreign;
 mod glances;
 mod mutations;
 mod pieces;
 mod real_data;
 mod round_trips;
-mod samples;
 mod writing;

@@ -6,7 +6,7 @@ use std::path::Path;
 use nearmiss_io::{Format, Model, Pieces, ReadError, read_bytes, read_in_pieces, read_mesh_bytes};
 use proptest::prelude::*;
 
-use crate::samples;
+use nearmiss_testdata::files;
 
 fn check(bytes: &[u8], format: Option<Format>, name: &str) {
     let check = |answer: Result<Model, ReadError>| match answer {
@@ -74,7 +74,7 @@ fn check_pieces(bytes: &[u8], format: Option<Format>, name: &str) {
 }
 
 fn any_sample() -> impl Strategy<Value = (&'static str, Vec<u8>)> {
-    proptest::sample::select(samples::all())
+    proptest::sample::select(files::all())
 }
 
 fn any_format() -> impl Strategy<Value = Option<Format>> {
@@ -166,7 +166,7 @@ proptest! {
 #[test]
 fn cut_off_anywhere() {
     let mut refused = 0;
-    for (name, bytes) in samples::all() {
+    for (name, bytes) in files::all() {
         check(&bytes, None, name);
         for end in 0..bytes.len() {
             check(&bytes[..end], None, name);

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use crate::foreign;
-use crate::samples::{Encoding, colours, csv, normals, obj, pcd, ply, points, triangles};
 use nearmiss_io::{Column, Format, Model, PlyPoints, read, read_bytes, read_mesh};
+use nearmiss_testdata::files::foreign;
+use nearmiss_testdata::files::model::{colours, normals, points, triangles};
+use nearmiss_testdata::files::plain::{Encoding, csv, obj, pcd, ply};
 
 fn model(bytes: &[u8], name: &str) -> Model {
     read_bytes(bytes, None, Path::new(name)).unwrap_or_else(|e| panic!("{e}"))

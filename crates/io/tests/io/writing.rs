@@ -4,8 +4,7 @@ use std::io::Cursor;
 
 use nearmiss_io::{Lattice, OutError, OutputFormat, PointWriter, Points, Survey, read_bytes};
 
-use crate::foreign;
-use crate::samples;
+use nearmiss_testdata::files::{foreign, model};
 
 const FORMATS: [OutputFormat; 6] = [
     OutputFormat::Ply,
@@ -32,8 +31,8 @@ fn written(points: &Points, format: OutputFormat, lattice: Option<Lattice>) -> R
 
 fn full() -> Points {
     let mut points = Points::of_positions(foreign::far_points());
-    points.normals = samples::normals();
-    points.colours = samples::colours();
+    points.normals = model::normals();
+    points.colours = model::colours();
     points.intensities = (0..20).map(|i| f32::from(foreign::intensity(i))).collect();
     points.classes = (0..20).map(foreign::class).collect();
     points
@@ -90,7 +89,7 @@ fn coordinates_that_las_cannot_count_are_refused() {
 
 #[test]
 fn single_precision_is_enough_where_it_is_exact() {
-    let points = Points::of_positions(samples::points().iter().map(|p| p.map(f64::from)).collect());
+    let points = Points::of_positions(model::points().iter().map(|p| p.map(f64::from)).collect());
     let length = |format| written(&points, format, None).unwrap().len();
     assert_eq!(length(OutputFormat::Npy), 128 + 20 * 12);
     let mut finer = points.clone();

@@ -1,4 +1,4 @@
-//! The model of `samples` in formats of scanners and engines.
+//! The model in formats of scanners and engines.
 
 use std::io::Cursor;
 
@@ -6,7 +6,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 
-use crate::samples::{colours, normals, points, quads, triangles};
+use super::model::{colours, normals, points, quads, triangles};
 
 /// Steps of coordinates in LAS: all points of the model are whole multiples.
 const STEP: f64 = 0.125;
@@ -20,17 +20,23 @@ fn stride(format: u8, extra: u16) -> u16 {
 }
 
 /// The class of the `i`-th point.
-pub(crate) fn class(i: usize) -> u8 {
+#[must_use]
+pub fn class(i: usize) -> u8 {
     [2, 6, 1][i % 3]
 }
 
 /// The intensity of the `i`-th point.
-pub(crate) fn intensity(i: usize) -> u16 {
+///
+/// # Panics
+/// When the parameters name nothing that the format has.
+#[must_use]
+pub fn intensity(i: usize) -> u16 {
     u16::try_from(i * 1000).expect("twenty points")
 }
 
 /// Points of the model so far from the origin as a surveyor's.
-pub(crate) fn far_points() -> Vec<[f64; 3]> {
+#[must_use]
+pub fn far_points() -> Vec<[f64; 3]> {
     points().iter().map(|p| [0, 1, 2].map(|k| f64::from(p[k]) + ORIGIN[k])).collect()
 }
 
@@ -69,7 +75,11 @@ fn records(format: u8, extra: u16) -> Vec<u8> {
 
 /// LAS of this point format: version 1.4 from format 6 on, 1.2 or 1.3 before. `compressed` makes it LAZ, in
 /// chunks of so many points.
-pub(crate) fn las(format: u8, extra: u16, compressed: Option<u32>) -> Vec<u8> {
+///
+/// # Panics
+/// When the parameters name nothing that the format has.
+#[must_use]
+pub fn las(format: u8, extra: u16, compressed: Option<u32>) -> Vec<u8> {
     let minor = if format >= 6 { 4 } else { 2 + format / 4 };
     let size: u16 = [227, 235, 375][usize::from(minor - 2)];
     let vlr = compressed.map(|chunk| {
@@ -128,7 +138,10 @@ pub(crate) fn las(format: u8, extra: u16, compressed: Option<u32>) -> Vec<u8> {
 }
 
 /// E57 of two scans of ten points each, with poses; in the second one point is invalid besides.
-pub(crate) fn e57() -> Vec<u8> {
+///
+/// # Panics
+/// When the parameters name nothing that the format has.
+pub fn e57() -> Vec<u8> {
     use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue, Transform};
     let mut out = Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut out, "file").expect("memory suffices");
@@ -169,7 +182,11 @@ pub(crate) fn e57() -> Vec<u8> {
 }
 
 /// A NumPy array of this type.
-pub(crate) fn npy(kind: &str) -> Vec<u8> {
+///
+/// # Panics
+/// When the parameters name nothing that the format has.
+#[must_use]
+pub fn npy(kind: &str) -> Vec<u8> {
     let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (20, 3), }}");
     while (header.len() + 11) % 64 != 0 {
         header.push(' ');
@@ -189,7 +206,7 @@ pub(crate) fn npy(kind: &str) -> Vec<u8> {
 }
 
 /// STL as text, or binary.
-pub(crate) fn stl(is_text: bool) -> Vec<u8> {
+pub fn stl(is_text: bool) -> Vec<u8> {
     let points = points();
     let mut bytes = if is_text { b"solid sheet\n".to_vec() } else { vec![b' '; 80] };
     if !is_text {
@@ -222,7 +239,8 @@ pub(crate) fn stl(is_text: bool) -> Vec<u8> {
 }
 
 /// OFF with normals and colours.
-pub(crate) fn off() -> Vec<u8> {
+#[must_use]
+pub fn off() -> Vec<u8> {
     let mut text = String::from("CNOFF # a sheet\n20 12 0\n\n");
     for ((p, n), [r, g, b]) in points().iter().zip(normals()).zip(colours()) {
         text += &format!("{} {} {}  {} {} {}  {r} {g} {b} 255\n", p[0], p[1], p[2], n[0], n[1], n[2]);
@@ -234,7 +252,10 @@ pub(crate) fn off() -> Vec<u8> {
 }
 
 /// glTF with its buffer in the document, or GLB. A node halves the model and one about it doubles it again.
-pub(crate) fn gltf(is_binary: bool) -> Vec<u8> {
+///
+/// # Panics
+/// When the parameters name nothing that the format has.
+pub fn gltf(is_binary: bool) -> Vec<u8> {
     let mut buffer = Vec::new();
     for p in points() {
         buffer.extend(p.map(f32::to_le_bytes).as_flattened());
@@ -280,27 +301,11 @@ pub(crate) fn gltf(is_binary: bool) -> Vec<u8> {
 }
 
 /// The normals of the model at unit length, as glTF wants them.
-pub(crate) fn unit_normals() -> Vec<[f32; 3]> {
+#[must_use]
+pub fn unit_normals() -> Vec<[f32; 3]> {
     let unit = |n: [f32; 3]| {
         let length = n.iter().map(|c| c * c).sum::<f32>().sqrt();
         n.map(|c| c / length)
     };
     normals().into_iter().map(unit).collect()
-}
-
-/// All of them, with a name that has the right ending.
-pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
-    vec![
-        ("old.las", las(3, 0, None)),
-        ("new.las", las(7, 2, None)),
-        ("old.laz", las(3, 1, Some(7))),
-        ("new.laz", las(8, 2, Some(7))),
-        ("scans.e57", e57()),
-        ("array.npy", npy("<f8")),
-        ("text.stl", stl(true)),
-        ("binary.stl", stl(false)),
-        ("sheet.off", off()),
-        ("sheet.gltf", gltf(false)),
-        ("sheet.glb", gltf(true)),
-    ]
 }

@@ -1,41 +1,17 @@
-//! One small model in every format and encoding, made by code that shares nothing with the readers.
+//! The model as PLY, PCD, OBJ and text.
 
 use std::fmt::Write as _;
 
-use crate::foreign;
-
-/// The points: a bumpy sheet of 5 by 4, exact in single precision.
-pub(crate) fn points() -> Vec<[f32; 3]> {
-    let bump = |i: u8| f32::from(i * 7 % 5) / 8.0 - 0.25;
-    (0..20).map(|i| [f32::from(i % 5), f32::from(i / 5) * 0.5, bump(i)]).collect()
-}
-
-/// A normal for each point, exact in text with three digits.
-pub(crate) fn normals() -> Vec<[f32; 3]> {
-    (0..20).map(|i: u8| [0.125, f32::from(i) / 32.0, -0.5]).collect()
-}
-
-/// A colour for each point.
-pub(crate) fn colours() -> Vec<[u8; 3]> {
-    (0..20).map(|i: u8| [200 + i, 255 - i, i]).collect()
-}
-
-/// Twelve quads between the points.
-pub(crate) fn quads() -> Vec<[u32; 4]> {
-    let corner = |i: u32| i % 4 + 5 * (i / 4);
-    (0..12).map(corner).map(|c| [c, c + 1, c + 6, c + 5]).collect()
-}
-
-/// The quads as readers cut them.
-pub(crate) fn triangles() -> Vec<[u32; 3]> {
-    quads().iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()
-}
+use super::model::{colours, normals, points, quads};
 
 /// How the numbers of a file are written.
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Encoding {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    /// Text.
     Ascii,
+    /// Binary, least byte first.
     Little,
+    /// Binary, greatest byte first.
     Big,
 }
 
@@ -81,7 +57,8 @@ impl Out {
 }
 
 /// PLY with everything that a reader must step over: other elements, other properties, lists among them.
-pub(crate) fn ply(encoding: Encoding, coordinate: &str, index: &str) -> Vec<u8> {
+#[must_use]
+pub fn ply(encoding: Encoding, coordinate: &str, index: &str) -> Vec<u8> {
     let name = match encoding {
         Encoding::Ascii => "ascii",
         Encoding::Little => "binary_little_endian",
@@ -130,7 +107,11 @@ pub(crate) fn ply(encoding: Encoding, coordinate: &str, index: &str) -> Vec<u8> 
 }
 
 /// PCD with a field of three values a point and one of an odd size to step over, and NaN points at the end.
-pub(crate) fn pcd(data: &str) -> Vec<u8> {
+///
+/// # Panics
+/// When the parameters name nothing that the format has.
+#[must_use]
+pub fn pcd(data: &str) -> Vec<u8> {
     let header = format!(
         "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n\
         FIELDS x y descriptor z normal_x normal_y normal_z rgb\n\
@@ -188,7 +169,7 @@ pub(crate) fn pcd(data: &str) -> Vec<u8> {
 }
 
 /// Text with named columns, in an order of its own.
-pub(crate) fn csv(divider: &str) -> Vec<u8> {
+pub fn csv(divider: &str) -> Vec<u8> {
     let names = ["R", "G", "B", "intensity", "x", "y", "z", "nx", "ny", "nz", "label"];
     let mut text = format!("# a comment\n{}\n", names.join(divider));
     for ((p, n), c) in points().iter().zip(normals()).zip(colours()) {
@@ -202,7 +183,8 @@ pub(crate) fn csv(divider: &str) -> Vec<u8> {
 }
 
 /// OBJ with vertex colours and the four ways of writing a corner.
-pub(crate) fn obj() -> Vec<u8> {
+#[must_use]
+pub fn obj() -> Vec<u8> {
     let mut text = String::from("mtllib a.mtl\no sheet\n# C:\\meshes\\\n");
     for (p, c) in points().iter().zip(colours()) {
         let [x, y, z] = p;
@@ -222,21 +204,4 @@ pub(crate) fn obj() -> Vec<u8> {
         writeln!(text, "{line}").expect("memory suffices");
     }
     text.into_bytes()
-}
-
-/// All of them and those of [`foreign`], with a name that has the right ending.
-pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
-    let mut all = vec![
-        ("ascii.ply", ply(Encoding::Ascii, "float", "int")),
-        ("little.ply", ply(Encoding::Little, "double", "uint")),
-        ("big.ply", ply(Encoding::Big, "float", "ushort")),
-        ("ascii.pcd", pcd("ascii")),
-        ("binary.pcd", pcd("binary")),
-        ("compressed.pcd", pcd("binary_compressed")),
-        ("table.csv", csv(",")),
-        ("table.xyz", csv(" ")),
-        ("mesh.obj", obj()),
-    ];
-    all.extend(foreign::all());
-    all
 }
