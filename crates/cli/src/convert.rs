@@ -9,6 +9,7 @@ use clap::Args;
 use nearmiss::io::{
     Glance, Lattice, OutputFormat, Pieces, PointPieces, PointWriter, Points, Survey, glance, read_in_pieces,
 };
+use nearmiss::store::replace_file;
 use serde::Serialize;
 
 use crate::console::{self, Bar, Console, Results, now};
@@ -210,7 +211,8 @@ fn write(
         nearmiss::io::OutError::Io(cause) => CliError::writing(path)(cause),
         error => CliError::Unfit { path: path.clone(), what: error.to_string() },
     };
-    output::replace_file(path, |file| {
+    replace_file(path, |file| {
+        let file = file.try_clone().map_err(CliError::writing(path))?;
         let mut writer = PointWriter::new(file, format, survey).map_err(refused)?;
         each(&mut |points| writer.write(points).map_err(refused))?;
         writer.finish().map(drop).map_err(refused)

@@ -1,9 +1,10 @@
 //! Files written whole or not at all.
 
-use std::ffi::OsString;
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+
+use nearmiss::store::replace_file;
 
 use crate::error::CliError;
 
@@ -60,35 +61,12 @@ pub(crate) fn replace<T>(
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<T, CliError>,
 ) -> Result<T, CliError> {
     check(path)?;
-    let failed = CliError::writing;
-    // A link stays a link.
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let mut prefix: OsString = target.file_name().unwrap_or_default().to_owned();
-    prefix.push(".tmp-");
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // What any program asks for when it creates a file; the umask takes its share.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    let temporary = builder.tempfile_in(folder(&target)).map_err(failed(path))?;
-    let mut out = BufWriter::with_capacity(1 << 16, temporary.as_file());
-    let told = write(&mut out)?;
-    out.flush().map_err(failed(path))?;
-    drop(out);
-    temporary.as_file().sync_all().map_err(failed(path))?;
-    temporary.persist(&target).map_err(|refused| failed(path)(refused.error))?;
-    Ok(told)
-}
-
-/// The same for writers that seek in the file.
-pub(crate) fn replace_file(
-    path: &Path,
-    write: impl FnOnce(fs::File) -> Result<(), CliError>,
-) -> Result<(), CliError> {
-    replace(path, |out| write(out.get_ref().try_clone().map_err(CliError::writing(path))?))
+    replace_file(path, |file| {
+        let mut out = BufWriter::with_capacity(1 << 16, &*file);
+        let told = write(&mut out)?;
+        out.flush().map_err(CliError::writing(path))?;
+        Ok(told)
+    })
 }
 
 /// The same for writers that fail with the system's errors alone.

@@ -24,31 +24,50 @@ const RANDOM: usize = 12;
 /// Attempts at a temporary file; each fails only if another process cleared it away within microseconds.
 const ATTEMPTS: usize = 16;
 
-/// Replaces the file at `path` by what `write` writes, or leaves everything as it was.
+/// As [`replace_file`], for writers that fail with the system's errors alone.
 pub(crate) fn replace(
     path: &Path,
     write: impl FnOnce(&mut fs::File) -> io::Result<()>,
 ) -> Result<(), WriteError> {
+    let failed = |source| WriteError::Io { path: Some(path.to_owned()), step: WriteStep::Write, source };
+    replace_file(path, |file| write(file).map_err(failed))
+}
+
+/// Replaces the file at `path` by what `write` writes, or leaves everything as it was; hands on what `write`
+/// returns.
+///
+/// The content is written beside the target and put in its place in one step, once it is on the disk. A link
+/// stays a link; permissions of a replaced file are kept. What writers of this target left that were killed is
+/// removed first, where the file system knows locks.
+///
+/// # Errors
+/// Those of `write`, [`WriteError::NotAFile`] for folders and devices, and [`WriteError::Io`] with the step that
+/// failed.
+pub fn replace_file<T, E: From<WriteError>>(
+    path: impl AsRef<Path>,
+    write: impl FnOnce(&mut fs::File) -> Result<T, E>,
+) -> Result<T, E> {
+    let path = path.as_ref();
     let failed = |step| move |source| WriteError::Io { path: Some(path.to_owned()), step, source };
 
     let target = follow(path).map_err(failed(WriteStep::Inspect))?;
     let previous = match fs::metadata(&target) {
         Ok(previous) if previous.is_file() => Some(previous.permissions()),
         Ok(other) => {
-            return Err(WriteError::NotAFile { path: path.to_owned(), directory: other.is_dir() });
+            return Err(WriteError::NotAFile { path: path.to_owned(), directory: other.is_dir() }.into());
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        Err(error) => return Err(failed(WriteStep::Inspect)(error)),
+        Err(error) => return Err(failed(WriteStep::Inspect)(error).into()),
     };
     let Some(name) = target.file_name() else {
-        return Err(WriteError::NotAFile { path: path.to_owned(), directory: true });
+        return Err(WriteError::NotAFile { path: path.to_owned(), directory: true }.into());
     };
     let folder = folder_of(&target);
 
     clear_litter(folder, name);
     // From here on the temporary file is removed when dropped, also if `write` panics.
     let mut temporary = create_locked(folder, name).map_err(failed(WriteStep::Create))?;
-    write(temporary.as_file_mut()).map_err(failed(WriteStep::Write))?;
+    let told = write(temporary.as_file_mut())?;
     if let Some(permissions) = previous {
         // Not every file system has permissions to keep; the bytes matter more.
         let _ = temporary.as_file().set_permissions(permissions);
@@ -56,7 +75,7 @@ pub(crate) fn replace(
     temporary.as_file().sync_all().map_err(failed(WriteStep::Sync))?;
     temporary.persist(&target).map_err(|refused| failed(WriteStep::Rename)(refused.error))?;
     sync_folder(folder);
-    Ok(())
+    Ok(told)
 }
 
 /// The file that a link leads to, so that the link outlives the replacement; anything else as it is.

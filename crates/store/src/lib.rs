@@ -25,6 +25,7 @@ mod error;
 mod flaw;
 
 pub use array::Array;
+pub use atomic::replace_file;
 pub use bytes::Bytes;
 pub use error::{Fault, OpenError, WriteError, WriteStep};
 pub use file::{Check, File};

@@ -43,9 +43,9 @@ fn a_disk_with_no_room_left_keeps_the_previous_file() {
     assert_eq!(litter(&place), [""; 0]);
 }
 
-fn preparing(place: &Place, input: &str) -> Child {
+fn spawn(place: &Place, args: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_nearmiss"))
-        .args(["preprocess", input, "-o", "out.nm", "--quiet", "--threads", "1"])
+        .args(args)
         .current_dir(place.path(""))
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -53,24 +53,20 @@ fn preparing(place: &Place, input: &str) -> Child {
         .unwrap()
 }
 
-#[test]
-fn a_process_killed_at_any_time_leaves_the_old_file_or_the_new_one() {
-    let place = Place::new();
-    place.cloud("bowl.xyz", bowl(1.0), 0.02);
-    place.cloud("ball.xyz", sphere(1.0), 0.03);
-    let content = ["bowl.xyz", "ball.xyz"].map(|input| {
-        place.ok(&["preprocess", input, "-o", "out.nm", "--quiet"]);
-        std::fs::read(place.path("out.nm")).unwrap()
+/// Kills commands that write `out` at many moments: it is always one of the two files that they write.
+fn killed_at_any_time(place: &Place, out: &str, commands: [&[&str]; 2]) {
+    let content = commands.map(|args| {
+        place.ok(args);
+        std::fs::read(place.path(out)).unwrap()
     });
-    assert_ne!(content[0], content[1], "two scans to be told apart");
+    assert_ne!(content[0], content[1], "two files to be told apart");
     let (mut killed, mut midway) = (0, 0);
     for round in 0..24_u32 {
-        let before = litter(&place);
-        let mut child = preparing(&place, ["bowl.xyz", "ball.xyz"][round as usize % 2]);
+        let before = litter(place);
+        let mut child = spawn(place, commands[round as usize % 2]);
         if round < 12 {
             // As soon as it begins to write, or a little later.
-            while child.try_wait().unwrap().is_none()
-                && (litter(&place).is_empty() || litter(&place) == before)
+            while child.try_wait().unwrap().is_none() && (litter(place).is_empty() || litter(place) == before)
             {
                 std::thread::sleep(Duration::from_micros(20));
             }
@@ -80,14 +76,32 @@ fn a_process_killed_at_any_time_leaves_the_old_file_or_the_new_one() {
         }
         child.kill().unwrap();
         killed += u32::from(!child.wait().unwrap().success());
-        midway += u32::from(!litter(&place).is_empty() && litter(&place) != before);
-        assert!(litter(&place).len() <= 1, "the next writer clears up: {:?}", place.files());
-        let found = std::fs::read(place.path("out.nm")).unwrap();
-        assert!(content.contains(&found), "round {round}: {} bytes of neither scan", found.len());
+        midway += u32::from(!litter(place).is_empty() && litter(place) != before);
+        assert!(litter(place).len() <= 1, "the next writer clears up: {:?}", place.files());
+        let found = std::fs::read(place.path(out)).unwrap();
+        assert!(content.contains(&found), "round {round}: {} bytes of neither file", found.len());
     }
     assert!(killed >= 6, "{killed} of 24 were killed, {midway} while they wrote");
-    place.ok(&["preprocess", "bowl.xyz", "-o", "out.nm", "--quiet"]);
-    assert_eq!(std::fs::read(place.path("out.nm")).unwrap(), content[0]);
-    assert_eq!(litter(&place), [""; 0], "the last run leaves nothing behind");
+    place.ok(commands[0]);
+    assert_eq!(std::fs::read(place.path(out)).unwrap(), content[0]);
+    assert_eq!(litter(place), [""; 0], "the last run leaves nothing behind");
+}
+
+#[test]
+fn a_process_killed_while_it_prepares_leaves_the_old_file_or_the_new_one() {
+    let place = Place::new();
+    place.cloud("bowl.xyz", bowl(1.0), 0.02);
+    place.cloud("ball.xyz", sphere(1.0), 0.03);
+    let prepare = |input| ["preprocess", input, "-o", "out.nm", "--quiet", "--threads", "1"];
+    killed_at_any_time(&place, "out.nm", [&prepare("bowl.xyz"), &prepare("ball.xyz")]);
     place.ok(&["inspect", "out.nm", "--verify"]);
+}
+
+#[test]
+fn a_process_killed_while_it_converts_leaves_the_old_file_or_the_new_one() {
+    let place = Place::new();
+    place.cloud("bowl.xyz", bowl(1.0), 0.01);
+    place.cloud("ball.xyz", sphere(1.0), 0.015);
+    let convert = |input| ["convert", input, "out.laz", "--quiet", "--voxel", "0.02"];
+    killed_at_any_time(&place, "out.laz", [&convert("bowl.xyz"), &convert("ball.xyz")]);
 }
