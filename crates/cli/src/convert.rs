@@ -6,6 +6,7 @@ mod voxel;
 use std::path::PathBuf;
 
 use clap::Args;
+use nearmiss::Aabb;
 use nearmiss::io::{
     Glance, Lattice, OutputFormat, Pieces, PointPieces, PointWriter, Points, Survey, glance, read_in_pieces,
 };
@@ -36,6 +37,9 @@ pub struct ConvertArgs {
     /// Keep the points of these classes, by their numbers in LAS: 2 is ground, 6 is buildings
     #[arg(long, value_name = "C,C,...", value_parser = parse_classes)]
     pub class: Option<ClassList>,
+    /// Read a COPC file only down to the level at which points are about R apart
+    #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = parse_length)]
+    pub resolution: Option<f64>,
     /// Keep one point for each cube with edges of length S: the point nearest to the mean of the cube's
     /// points. Points are sorted on disk, in the folder of the output
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
@@ -131,7 +135,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), CliError> {
 /// Opens the input.
 fn open(args: &ConvertArgs) -> Result<Source, CliError> {
     let mesh = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
-        Pieces::Points(points) => return Ok(Source::Pieces(points)),
+        Pieces::Points(points) => return part(args, points).map(Source::Pieces),
         Pieces::Mesh(mesh) => mesh,
     };
     console::warn(format_args!(
@@ -141,6 +145,20 @@ fn open(args: &ConvertArgs) -> Result<Source, CliError> {
         count(mesh.triangles().len() as u64, "triangle"),
     ));
     Ok(Source::Vertices(Points::of_positions(mesh.vertices().to_vec())))
+}
+
+/// What has to be read of the points for what is asked.
+fn part(args: &ConvertArgs, points: PointPieces) -> Result<PointPieces, CliError> {
+    let points = match args.crop {
+        Some(CropBox { min, max }) => points.near(Aabb { min, max }),
+        None => points,
+    };
+    let Some(spacing) = args.resolution else { return Ok(points) };
+    if points.has_levels() {
+        return Ok(points.at_resolution(spacing));
+    }
+    let what = "this file has no levels of detail, as COPC has; for fewer points, use `--voxel`".into();
+    Err(CliError::Unfit { path: args.input.clone(), what })
 }
 
 /// What a first pass over the points has found.

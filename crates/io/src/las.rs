@@ -3,6 +3,8 @@
 //! Records are fixed in length and need no library; LAZ is decoded by the crate `laz`, chunk by chunk, after
 //! its tables were checked against the length of the file.
 
+#[cfg(feature = "laz")]
+mod copc;
 mod header;
 #[cfg(feature = "laz")]
 mod laz;
@@ -18,6 +20,7 @@ use crate::error::Fault;
 use crate::input::{Input, Stop};
 use crate::out::Lattice;
 use crate::points::Points;
+use crate::selection::Selection;
 use header::Header;
 
 /// Points whose colours are looked at to tell eight bits a channel from sixteen.
@@ -35,10 +38,29 @@ pub(crate) fn lattice(input: Input<'_>) -> Option<Lattice> {
     Some(Lattice { scale, offset })
 }
 
-/// Goes over all points, some `block` bytes of records at a time.
+/// Returns `true` if parts of space, and levels, can be read alone.
+pub(crate) fn has_levels(input: Input<'_>) -> bool {
+    octree(input).is_some()
+}
+
+#[cfg(feature = "laz")]
+fn octree(input: Input<'_>) -> Option<copc::Octree> {
+    // Its record is the first one.
+    let head = input.head(1 << 12).ok()?;
+    copc::Octree::of(&head, &Header::parse(&head).ok()?)
+}
+
+#[cfg(not(feature = "laz"))]
+fn octree(_: Input<'_>) -> Option<()> {
+    None
+}
+
+/// Goes over all points, some `block` bytes of records at a time; of COPC over those that are selected, and
+/// some about them.
 pub(crate) fn each(
     input: Input<'_>,
     block: usize,
+    selection: &Selection,
     take: &mut dyn FnMut(&Points) -> ControlFlow<()>,
 ) -> Result<(), Stop> {
     let head = input.head(header::LONGEST)?;
@@ -52,7 +74,12 @@ pub(crate) fn each(
     let together = (block / header.stride).max(1);
     if header.compressed {
         #[cfg(feature = "laz")]
-        return laz::each(input, &header, together, &mut |bytes| records.hand_out(bytes, take));
+        {
+            let octree = if *selection == Selection::default() { None } else { octree(input) };
+            let length = input.length()?;
+            let chosen = octree.map(|octree| octree.chunks(input, &header, selection, length)).transpose()?;
+            return laz::each(input, &header, chosen, together, &mut |bytes| records.hand_out(bytes, take));
+        }
         #[cfg(not(feature = "laz"))]
         return Err(Fault::Feature { what: "LAZ", feature: "laz" }.at_byte(0).into());
     }

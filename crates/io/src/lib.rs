@@ -30,6 +30,7 @@ mod guard;
 mod input;
 mod points;
 mod scalar;
+mod selection;
 mod text;
 
 mod out;

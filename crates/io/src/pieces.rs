@@ -9,7 +9,7 @@ use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use nearmiss_geometry::TriangleMesh;
+use nearmiss_geometry::{Aabb, TriangleMesh};
 
 use crate::error::ReadError;
 use crate::format::Format;
@@ -18,6 +18,7 @@ use crate::out::Lattice;
 use crate::points::Points;
 use crate::read::{Start, check_file, parse_as, stream};
 use crate::rows::{Blocks, Encoding, Layout};
+use crate::selection::Selection;
 use crate::{las, npy, pcd, ply, xyz};
 
 /// A mesh, or points that can be gone over a piece at a time.
@@ -42,6 +43,7 @@ enum Source {
         file: File,
         format: Format,
         block: usize,
+        selection: Selection,
     },
     Rows {
         file: File,
@@ -73,7 +75,7 @@ pub fn read_in_pieces(
     if format.is_streamed() {
         return Ok(Pieces::Points(PointPieces {
             path: path.into(),
-            source: Source::Stream { file, format, block },
+            source: Source::Stream { file, format, block, selection: Selection::default() },
         }));
     }
     let layout = match format {
@@ -103,6 +105,33 @@ pub fn read_in_pieces(
 }
 
 impl PointPieces {
+    /// The same points, without most of those outside `bounds` where the file can be read in part, as COPC
+    /// can: only what lies near them is read. Other files are read whole.
+    #[must_use]
+    pub fn near(mut self, bounds: Aabb) -> Self {
+        if let Source::Stream { selection, .. } = &mut self.source {
+            selection.bounds = Some(bounds);
+        }
+        self
+    }
+
+    /// Returns `true` if the file has levels of detail, as COPC has.
+    #[must_use]
+    pub fn has_levels(&self) -> bool {
+        matches!(&self.source, Source::Stream { file, format: Format::Las, .. }
+            if las::has_levels(Input::File(file)))
+    }
+
+    /// The points of the coarser levels of detail, down to the one whose points are about `spacing` apart.
+    /// Files without levels are read whole.
+    #[must_use]
+    pub fn at_resolution(mut self, spacing: f64) -> Self {
+        if let Source::Stream { selection, .. } = &mut self.source {
+            selection.spacing = Some(spacing);
+        }
+        self
+    }
+
     /// The steps in which coordinates are counted, if this is LAS.
     #[must_use]
     pub fn lattice(&self) -> Option<Lattice> {
@@ -149,8 +178,8 @@ impl PointPieces {
                 let _ = take(points);
                 Ok(())
             }
-            Source::Stream { file, format, block } => {
-                stream(*format, Input::File(file), *block, &self.path, take)
+            Source::Stream { file, format, block, selection } => {
+                stream(*format, Input::File(file), (*block, selection), &self.path, take)
             }
             Source::Rows { file, layout, block } => {
                 let mut blocks = Blocks::new(&self.path, file, *block);

@@ -17,6 +17,7 @@ use crate::format::{Format, recognise};
 use crate::gltf;
 use crate::input::{Input, Stop};
 use crate::points::Points;
+use crate::selection::Selection;
 use crate::sink::{Model, Sink};
 use crate::{las, npy, obj, off, pcd, ply, stl, xyz};
 
@@ -128,12 +129,12 @@ impl Start {
 pub(crate) fn stream(
     format: Format,
     input: Input<'_>,
-    block: usize,
+    (block, selection): (usize, &Selection),
     path: &Path,
     take: &mut dyn FnMut(&Points) -> ControlFlow<()>,
 ) -> Result<(), ReadError> {
     let done = match format {
-        Format::Las => las::each(input, block, take),
+        Format::Las => las::each(input, block, selection, take),
         #[cfg(feature = "e57")]
         Format::E57 => e57::each(input, block, take),
         #[cfg(not(feature = "e57"))]
@@ -147,7 +148,7 @@ pub(crate) fn stream(
 fn collect(format: Format, input: Input<'_>, path: &Path) -> Result<Sink, ReadError> {
     const BLOCK: usize = 1 << 20;
     let mut sink = Sink::default();
-    stream(format, input, BLOCK, path, &mut |points| {
+    stream(format, input, (BLOCK, &Selection::default()), path, &mut |points| {
         sink.append(points);
         ControlFlow::Continue(())
     })?;

@@ -37,12 +37,12 @@ pub(crate) fn replace(
 /// returns.
 ///
 /// The content is written beside the target and put in its place in one step, once it is on the disk. A link
-/// stays a link; permissions of a replaced file are kept. What writers of this target left that were killed is
-/// removed first, where the file system knows locks.
+/// stays a link; permissions of a replaced file are kept. What writers of this target left that were killed
+/// is removed first, where the file system knows locks.
 ///
 /// # Errors
-/// Those of `write`, [`WriteError::NotAFile`] for folders and devices, and [`WriteError::Io`] with the step that
-/// failed.
+/// Those of `write`, [`WriteError::NotAFile`] for folders and devices, and [`WriteError::Io`] with the step
+/// that failed.
 pub fn replace_file<T, E: From<WriteError>>(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut fs::File) -> Result<T, E>,

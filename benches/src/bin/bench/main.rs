@@ -13,6 +13,7 @@ mod eigen;
 mod evaluation;
 mod geodesics;
 mod hints;
+mod reading;
 mod scans;
 mod shapes;
 mod slices;
@@ -56,6 +57,8 @@ enum Command {
     Geodesics(geodesics::Arguments),
     /// Time that hints save in small motions near contact
     Hints(hints::Arguments),
+    /// How fast files of points are read
+    Reading(reading::Options),
     /// How useful answers about real scans are
     Scans(scans::Options),
     /// Spheres, capsules and boxes against the points of a scan
@@ -80,6 +83,7 @@ fn main() -> Result<(), Failure> {
         Command::Evaluation(arguments) => evaluation::run(&arguments),
         Command::Geodesics(arguments) => geodesics::run(&arguments),
         Command::Hints(arguments) => hints::run(&arguments),
+        Command::Reading(options) => reading::run(&options),
         Command::Scans(options) => scans::run(&options),
         Command::Shapes(arguments) => shapes::run(&arguments),
         Command::Slices(asked) => slices::run(&asked),

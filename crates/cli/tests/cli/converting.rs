@@ -105,3 +105,14 @@ fn voxels_and_units() {
         &["cannot be numbered", "larger size"],
     );
 }
+
+#[test]
+fn parts_and_levels_are_of_copc_alone() {
+    let place = Place::new();
+    place.write("all.xyz", text(&sphere(1.0).sample(Sampling::clean(0.1)).points));
+    place.refused(
+        1,
+        &["convert", "all.xyz", "x.laz", "--resolution", "0.1"],
+        &["all.xyz", "no levels", "use `--voxel`"],
+    );
+}

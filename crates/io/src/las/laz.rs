@@ -32,10 +32,10 @@ type Decoder<'a> = Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + 'a>;
 
 /// Where a chunk is, and how many points it has.
 #[derive(Debug, Clone, Copy)]
-struct Chunk {
-    start: u64,
-    bytes: u64,
-    points: u64,
+pub(super) struct Chunk {
+    pub(super) start: u64,
+    pub(super) bytes: u64,
+    pub(super) points: u64,
 }
 
 /// What laszip says of the file.
@@ -47,10 +47,12 @@ struct Packing {
     one_chunk: bool,
 }
 
-/// Goes over all records, so many of them `together`.
+/// Goes over all records, so many of them `together`; `chosen` are the chunks that are wanted, if not all
+/// are.
 pub(super) fn each(
     input: Input<'_>,
     header: &Header,
+    chosen: Option<Vec<Chunk>>,
     together: usize,
     take: &mut dyn FnMut(&[u8]) -> ControlFlow<()>,
 ) -> Result<(), Stop> {
@@ -58,12 +60,19 @@ pub(super) fn each(
     let packing = Packing::of(&input.head(before)?, header)?;
     let length = input.length()?;
     let (mut packed, mut records) = (Vec::new(), Vec::new());
+    let (chunks, wanted) = match chosen {
+        Some(chunks) => {
+            let wanted = chunks.iter().map(|chunk| chunk.points).sum();
+            (chunks, wanted)
+        }
+        None => (chunks(input, header, &packing, length)?, header.count),
+    };
     let mut done = 0;
-    for chunk in chunks(input, header, &packing, length)? {
-        if done == header.count {
+    for chunk in chunks {
+        if done == wanted {
             break;
         }
-        let points = chunk.points.min(header.count - done);
+        let points = chunk.points.min(wanted - done);
         packed.clear();
         input.reader(chunk.start)?.take(chunk.bytes).read_to_end(&mut packed)?;
         let corrupt = |cause: String, so_far: u64| -> Stop {
@@ -101,7 +110,7 @@ pub(super) fn each(
         }
         done += points;
     }
-    if done < header.count { Err(header.promised(done).into()) } else { Ok(()) }
+    if done < wanted { Err(header.promised(done).into()) } else { Ok(()) }
 }
 
 impl Packing {

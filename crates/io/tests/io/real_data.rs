@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use nearmiss_io::{Model, ReadError, read};
+use nearmiss_geometry::Aabb;
+use nearmiss_io::{Model, Pieces, PointPieces, ReadError, read, read_in_pieces};
 
 /// The folder, unless it is absent or the variable `NEARMISS_NO_DATA` is set.
 #[expect(clippy::print_stdout, reason = "says why nothing is checked")]
@@ -44,7 +45,7 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
 }
 
 /// Points in the file, and triangles after polygons are cut (0: no faces), as catalogued or counted by hand.
-const KNOWN: [(&str, usize, usize); 27] = [
+const KNOWN: [(&str, usize, usize); 39] = [
     ("objects/dragon-5k.ply", 5_205, 11_102),
     ("objects/dragon-23k.ply", 22_998, 47_794),
     ("objects/dragon-100k.ply", 100_250, 202_520),
@@ -72,6 +73,18 @@ const KNOWN: [(&str, usize, usize); 27] = [
     ("truth/happy-buddha.ply", 57_379, 114_858),
     ("deforming/cloth-ball/cloth_ball92.ply", 46_598, 92_230),
     ("formats/utm17_space.pcd", 10, 0),
+    ("buildings/two-storey-scan-808k.laz", 808_042, 0),
+    ("scans/lion-342k.copc.laz", 341_989, 0),
+    ("formats/1.2-with-color.las", 1_065, 0),
+    ("formats/test1_4.las", 1_000, 0),
+    ("formats/autzen.las", 106, 0),
+    ("formats/autzen.copc.laz", 107, 0),
+    ("formats/extrabytes.laz", 1_065, 0),
+    ("formats/simple.laz", 1_065, 0),
+    ("formats/bunnyFloat.e57", 30_571, 0),
+    ("formats/bunnyInt19.e57", 30_571, 0),
+    ("formats/gearwheel.ascii.stl", 1_222, 2_444),
+    ("formats/gearwheel.bin.stl", 1_222, 2_444),
 ];
 
 fn given(model: &Model) -> usize {
@@ -95,6 +108,8 @@ fn known_files_have_their_points_and_faces() {
         }
     }
     let dropped = |name: &str| read(data.join(name), None).unwrap().cloud.dropped();
+    assert_eq!(dropped("buildings/two-storey-scan-808k.laz").duplicate, 54_619);
+    assert_eq!(dropped("scans/lion-342k.copc.laz").duplicate, 66_134);
     assert_eq!(dropped("scans/room-113k-compressed.pcd").duplicate, 112_586 - 56_159);
     assert_eq!(dropped("scans/rgbd-organised-nan-307k.pcd").not_finite, 57_553);
     assert_eq!(dropped("buildings/two-storey-scan-zup-753k.ply").duplicate, 0);
@@ -176,4 +191,53 @@ fn broken_files_get_a_clear_answer_in_time() {
             }
         }
     }
+}
+
+/// The same building, as it was scanned with y up and turned so that z is.
+#[test]
+fn two_versions_of_a_building_agree_after_their_change_of_axes() {
+    let Some(data) = data() else { return };
+    let cloud = |name: &str| read(data.join(name), None).unwrap().cloud;
+    let (scanned, turned) =
+        (cloud("buildings/two-storey-scan-808k.laz"), cloud("buildings/two-storey-scan-zup-753k.ply"));
+    let hundredths = |p: [f64; 3]| {
+        #[expect(clippy::cast_possible_truncation, reason = "metres")]
+        let steps = p.map(|x| (100.0 * x).round() as i32);
+        steps
+    };
+    let mut from: Vec<[i32; 3]> = (0..scanned.len()).map(|i| hundredths(scanned.point(i))).collect();
+    let mut to: Vec<[i32; 3]> = (0..turned.len()).map(|i| hundredths(turned.point(i))).collect();
+    from.iter_mut().for_each(|p| *p = [p[0], -p[2], p[1]]);
+    from.sort_unstable();
+    to.sort_unstable();
+    assert_eq!(from.len(), 753_423);
+    let differ = from.iter().zip(&to).filter(|(a, b)| a != b).count();
+    assert_eq!(differ, 0, "{:?} and {:?}", from[0], to[0]);
+}
+
+#[test]
+fn a_part_of_a_copc_file_is_read_alone() {
+    let Some(data) = data() else { return };
+    let path = data.join("scans/lion-342k.copc.laz");
+    let open = || match read_in_pieces(&path, None, 1 << 20) {
+        Ok(Pieces::Points(points)) => points,
+        other => panic!("{other:?}"),
+    };
+    let bounds = Aabb { min: [-4.0, 3.0, -2.0], max: [-3.9, 3.1, -1.8] };
+    let count = |points: PointPieces| {
+        let (mut all, mut within) = (0, 0);
+        let counted = points.each(|some| {
+            all += some.len();
+            within += some.positions.iter().filter(|p| bounds.contains(**p)).count();
+        });
+        counted.unwrap();
+        (all, within)
+    };
+    let (all, within) = count(open());
+    let (read, found) = count(open().near(bounds));
+    assert_eq!((all, found), (341_989, within), "all that lie there are read");
+    assert!(read < all / 2, "{read} points are read for {found}");
+    assert!(open().has_levels());
+    let coarse = open().at_resolution(1.0);
+    assert_eq!(count(coarse).0, 35_903, "the root alone");
 }
