@@ -27,6 +27,7 @@ pub use scan::build::PointHierarchy;
 pub use scan::data::HierarchyMeta;
 pub use scan::options::{BuildError, BuildOptions};
 pub use scan::outline::{Ball, Outline};
+pub use scan::points::ScanPoints;
 pub use scan::slices::Slices;
 pub use scan::survey::Survey;
 pub use tree::topology::{Children, Grandchildren, LaneNodes, MOST_LEAF_POINTS, NodePair, Topology};

@@ -10,6 +10,8 @@ pub(crate) mod nearest;
 pub(crate) mod options;
 pub(crate) mod ordered;
 pub(crate) mod outline;
+pub(crate) mod points;
 pub(crate) mod sampling;
+pub(crate) mod share;
 pub(crate) mod slices;
 pub(crate) mod survey;

@@ -33,18 +33,25 @@ impl PointBlock {
         [block.position[0][lane], block.position[1][lane], block.position[2][lane]]
     }
 
+    /// These points, at most [`Self::WIDTH`], of which none is heard.
+    ///
+    /// # Panics
+    /// When there are more.
+    #[must_use]
+    pub fn of(positions: &[[f32; 3]]) -> Self {
+        let mut block = Self::EMPTY;
+        for (lane, p) in positions.iter().enumerate() {
+            for k in 0..3 {
+                block.position[k][lane] = p[k];
+            }
+        }
+        block
+    }
+
     /// All points of a scan as long as none is heard.
     #[must_use]
     pub fn silent(positions: &[[f32; 3]]) -> impl ExactSizeIterator<Item = Self> {
-        positions.chunks(Self::WIDTH).map(|positions| {
-            let mut block = Self::EMPTY;
-            for (lane, p) in positions.iter().enumerate() {
-                for k in 0..3 {
-                    block.position[k][lane] = p[k];
-                }
-            }
-            block
-        })
+        positions.chunks(Self::WIDTH).map(Self::of)
     }
 }
 

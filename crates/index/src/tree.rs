@@ -23,9 +23,14 @@ pub use heard::Heard;
 pub use nearest::{Nearest, Neighbour};
 pub use skeleton::Skeleton;
 
+use std::convert::Infallible;
+
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16};
+use nearmiss_lanes::parallel::fill;
 use nearmiss_lanes::wide::{WIDTH, squared};
+use nearmiss_store::{Room, WorkError, Workspace};
 
 use crate::block::PointBlock;
 
@@ -33,8 +38,8 @@ use crate::block::PointBlock;
 const MOST_LEVELS: usize = 8;
 
 /// Boxes side by side, with the greatest horizon in each.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(64))]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
 struct Boxes {
     min: [[f32; WIDTH]; 3],
     max: [[f32; WIDTH]; 3],
@@ -48,6 +53,15 @@ impl Boxes {
         max: [[f32::NEG_INFINITY; WIDTH]; 3],
         horizon: [0.0; WIDTH],
     };
+
+    /// The boxes of a group, of `count` in all.
+    fn of(group: usize, count: usize, bounds: impl Fn(usize) -> Bounds) -> Self {
+        let mut boxes = Self::EMPTY;
+        for (lane, i) in (group * WIDTH..count.min(group * WIDTH + WIDTH)).enumerate() {
+            boxes.set(lane, &bounds(i));
+        }
+        boxes
+    }
 
     fn set(&mut self, lane: usize, bounds: &Bounds) {
         for k in 0..3 {
@@ -122,13 +136,13 @@ impl Bounds {
 
 /// The boxes of a tree over points in blocks, which they do not hold: a 16th of their memory and a little
 /// more.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct BlockBoxes {
     /// How many points there are.
     points: usize,
     /// The box of block `i` stands in lane `i` % 16 of group `i` / 16 of the first level, that of such a
     /// group likewise in the next. The last has one group.
-    levels: Vec<Vec<Boxes>>,
+    levels: Vec<Room<Boxes>>,
 }
 
 impl BlockBoxes {
@@ -138,15 +152,41 @@ impl BlockBoxes {
     /// When there are fewer, or a block more than hold them, or 2³² − 1 points.
     #[must_use]
     pub fn new(blocks: &[PointBlock], points: usize) -> Self {
+        Self::with(blocks, points, |groups| Ok::<_, Infallible>(vec![Boxes::EMPTY; groups].into()))
+            .unwrap_or_else(|never| match never {})
+    }
+
+    /// The same in a workspace.
+    ///
+    /// # Errors
+    /// When that has no room.
+    ///
+    /// # Panics
+    /// As [`Self::new`].
+    pub fn new_in(work: &Workspace, blocks: &[PointBlock], points: usize) -> Result<Self, WorkError> {
+        Self::with(blocks, points, |groups| work.room(groups))
+    }
+
+    fn with<E>(
+        blocks: &[PointBlock],
+        points: usize,
+        room: impl Fn(usize) -> Result<Room<Boxes>, E>,
+    ) -> Result<Self, E> {
         assert_eq!(blocks.len(), points.div_ceil(WIDTH), "{points} points fill other blocks");
         assert!(points < u32::MAX as usize, "{points} points have no ids");
-        let counts = (0..blocks.len()).map(|block| (points - block * WIDTH).min(WIDTH));
-        let mut levels = vec![grouped(blocks.iter().zip(counts).map(|(b, n)| Bounds::of_block(b, n)))];
-        while let Some(level) = levels.last().filter(|level| level.len() > 1) {
-            let above = grouped(level.iter().map(Bounds::of_group));
+        let mut level = room(blocks.len().div_ceil(WIDTH))?;
+        fill(&mut level, |group| {
+            let of = |block: usize| Bounds::of_block(&blocks[block], (points - block * WIDTH).min(WIDTH));
+            Boxes::of(group, blocks.len(), of)
+        });
+        let mut levels = vec![level];
+        while let Some(below) = levels.last().filter(|level| level.len() > 1) {
+            let mut above = room(below.len().div_ceil(WIDTH))?;
+            let below: &[Boxes] = below;
+            fill(&mut above, |group| Boxes::of(group, below.len(), |i| Bounds::of_group(&below[i])));
             levels.push(above);
         }
-        Self { points, levels }
+        Ok(Self { points, levels })
     }
 
     /// The tree over `blocks`, of which these are the boxes.
@@ -180,7 +220,7 @@ pub struct BlockTree<'a> {
     blocks: &'a [PointBlock],
     /// How many points there are.
     points: usize,
-    levels: &'a [Vec<Boxes>],
+    levels: &'a [Room<Boxes>],
 }
 
 impl<'a> BlockTree<'a> {
@@ -219,15 +259,4 @@ impl<'a> BlockTree<'a> {
     fn nodes(&self, level: usize) -> usize {
         if level == 0 { self.blocks.len() } else { self.levels[level - 1].len() }
     }
-}
-
-fn grouped(bounds: impl Iterator<Item = Bounds>) -> Vec<Boxes> {
-    let mut groups = Vec::new();
-    for (i, bounds) in bounds.enumerate() {
-        if i % WIDTH == 0 {
-            groups.push(Boxes::EMPTY);
-        }
-        groups[i / WIDTH].set(i % WIDTH, &bounds);
-    }
-    groups
 }

@@ -136,7 +136,8 @@ fn compare_cones(points: &[Point], tips: &[f32], own: &[f32], slope: f32, what: 
     let blocks = blocks(points, |_| 0.0);
     let boxes = BlockBoxes::new(&blocks, points.len());
     let tree = boxes.over(&blocks);
-    let cones = tree.cones(tips, slope);
+    let mut room = vec![[0.0; 16]; blocks.len()];
+    let cones = tree.cones(&mut room, |i| tips[i], slope);
     for level in levels() {
         for (block, own) in own.chunks(16).enumerate() {
             let mut heights = [7.0; 16];

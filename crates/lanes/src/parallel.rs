@@ -68,6 +68,54 @@ pub fn ranges_with<S, R: Send>(
     map_with(count.div_ceil(length), scratch, |scratch, k| f(scratch, range(k)))
 }
 
+/// Runs that wait to be taken by [`in_order`], at most.
+const WAVE: usize = 1 << 12;
+
+/// `f` of consecutive runs of numbers that make up `0..count`: heavy work. `take` gets what it gives, in
+/// order, and soon: never more than some thousand results exist.
+pub fn in_order<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Send, mut take: impl FnMut(R)) {
+    const LENGTH: usize = 16;
+    let runs = count.div_ceil(LENGTH);
+    let run = |k: usize| f(k * LENGTH..((k + 1) * LENGTH).min(count));
+    for wave in (0..runs).step_by(WAVE) {
+        map_each(WAVE.min(runs - wave), |k| run(wave + k)).into_iter().for_each(&mut take);
+    }
+}
+
+/// Sets the items of `out` to what `f` gives of consecutive runs of numbers that make up `0..count`, one
+/// after the other: heavy work.
+///
+/// # Panics
+/// When it gives more items than there are.
+pub fn collect_into<T: Copy + Send>(
+    out: &mut [T],
+    count: usize,
+    f: impl Fn(Range<usize>) -> Vec<T> + Sync + Send,
+) {
+    let mut next = 0;
+    in_order(count, f, |some| {
+        out[next..next + some.len()].copy_from_slice(&some);
+        next += some.len();
+    });
+}
+
+/// Sets every item of `out` to `f` of its number: light work, many at once.
+pub fn fill<T: Send>(out: &mut [T], f: impl Fn(usize) -> T + Sync + Send) {
+    change_each(out, AT_ONCE, |i, item| *item = f(i));
+}
+
+/// `f` of consecutive runs of `length` items where they stand, with their numbers: light work, many at once.
+pub fn fill_runs<T: Send>(out: &mut [T], length: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        let runs = out.par_chunks_mut(length).with_min_len(AT_ONCE).enumerate();
+        runs.for_each(|(number, run)| f(number, run));
+    }
+    #[cfg(not(feature = "rayon"))]
+    out.chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
+}
+
 /// `f` of every item.
 pub fn for_each<T: Send>(items: Vec<T>, f: impl Fn(T) + Sync + Send) {
     #[cfg(feature = "rayon")]

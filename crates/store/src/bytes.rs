@@ -7,6 +7,9 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 
+#[cfg(feature = "mmap")]
+use crate::map::OwnMap;
+
 /// Bytes of a whole container, shared by the [`File`](crate::File) and every [`Array`](crate::Array) made
 /// from it.
 ///
@@ -19,6 +22,8 @@ pub struct Bytes(Backing);
 enum Backing {
     #[cfg(feature = "mmap")]
     Mapped(Arc<memmap2::Mmap>),
+    #[cfg(feature = "mmap")]
+    Own(Arc<OwnMap>),
     /// The last block may be longer than the file: `length` counts.
     Blocks {
         blocks: Arc<Vec<Block>>,
@@ -41,6 +46,8 @@ impl Bytes {
         match &self.0 {
             #[cfg(feature = "mmap")]
             Backing::Mapped(map) => map,
+            #[cfg(feature = "mmap")]
+            Backing::Own(map) => map.bytes(),
             Backing::Blocks { blocks, length } => &bytemuck::cast_slice(blocks)[..*length],
             Backing::Owned(bytes) => bytes,
             Backing::Shared(bytes) => bytes,
@@ -51,6 +58,11 @@ impl Bytes {
     #[cfg(feature = "mmap")]
     pub(crate) fn mapped(map: memmap2::Mmap) -> Self {
         Self(Backing::Mapped(Arc::new(map)))
+    }
+
+    #[cfg(feature = "mmap")]
+    pub(crate) fn own(map: OwnMap) -> Self {
+        Self(Backing::Own(Arc::new(map)))
     }
 
     /// Reads at most `length` bytes into aligned memory; fewer where the file became shorter meanwhile.
@@ -103,6 +115,8 @@ impl fmt::Debug for Bytes {
             Backing::Mapped(_) => "mapped",
             Backing::Blocks { .. } => "read",
             Backing::Owned(_) | Backing::Shared(_) => "given",
+            #[cfg(feature = "mmap")]
+            Backing::Own(_) => "own map",
             Backing::Static(_) => "static",
         };
         f.debug_struct("Bytes").field("backing", &backing).field("length", &self.as_slice().len()).finish()

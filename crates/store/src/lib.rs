@@ -21,6 +21,11 @@ mod sniff;
 mod atomic;
 mod writer;
 
+mod room;
+#[cfg(feature = "mmap")]
+mod warden;
+mod work;
+
 mod error;
 mod flaw;
 
@@ -33,6 +38,8 @@ pub use flaw::{Flaw, LoadError};
 pub use header::LAYOUT;
 pub use id::SectionId;
 pub use metadata::METADATA_LIMIT;
+pub use room::Room;
 pub use section::Section;
 pub use sniff::Looks;
+pub use work::{Progress, Stage, WorkError, Workspace};
 pub use writer::Writer;

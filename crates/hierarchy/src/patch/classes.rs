@@ -5,11 +5,14 @@
 //! none. Sparse points come last in the order of the points and have a subtree of their own, so that a stray
 //! never widens the bounds of a wall. Noisy points have others all around them: they stay among these.
 
+use std::ops::Range;
+
 use fearless_simd::Level;
 use nearmiss_index::{BlockTree, Nearest, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::parallel::in_order;
 use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_store::{Room, WorkError, Workspace};
 
 use crate::patch::surfels::Fit;
 use crate::point::kind::{PointKind, SLAB};
@@ -33,27 +36,26 @@ const AGREEING: f32 = 0.5;
 
 /// Corrects the classes of single points by those of their neighbours. O(n) where all points are on sheets.
 pub(crate) fn vote(tree: &BlockTree<'_>, positions: &[[f32; 3]], radii: &[f32], fits: &mut [Fit]) {
-    let in_doubt = |fits: &[Fit]| fits.iter().any(|fit| fit.kind == PointKind::Noisy);
-    let numbers: Vec<usize> = (0..tree.blocks().len())
-        .filter(|&block| in_doubt(&fits[block * WIDTH..(block * WIDTH + WIDTH).min(fits.len())]))
-        .collect();
     let (level, before) = (Level::new(), &*fits);
-    let changed = chunks(&numbers, |blocks| {
+    let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(positions.len());
+    let in_doubt = |block: usize| before[of_block(block)].iter().any(|fit| fit.kind() == PointKind::Noisy);
+    let mut changed = Vec::new();
+    let correct = |blocks: Range<usize>| {
         let (mut found, mut changed) = (Nearest::default(), Vec::new());
-        for &block in blocks {
+        for block in blocks.filter(|&block| in_doubt(block)) {
             tree.nearest(level, block, VOTERS, &mut found);
-            let first = block * WIDTH;
-            for i in first..(first + WIDTH).min(positions.len()) {
+            for i in of_block(block) {
                 let near = found.of(i % WIDTH).take(VOTERS).map(|n| n.id as usize);
                 if let Some(fit) = corrected(i, near, positions, radii, before) {
-                    changed.push((i, fit));
+                    changed.push((id32(i), fit));
                 }
             }
         }
         changed
-    });
-    for (i, fit) in changed.into_iter().flatten() {
-        fits[i] = fit;
+    };
+    in_order(tree.blocks().len(), correct, |some| changed.extend(some));
+    for (i, fit) in changed {
+        fits[i as usize] = fit;
     }
 }
 
@@ -70,19 +72,19 @@ fn corrected(
     radii: &[f32],
     fits: &[Fit],
 ) -> Option<Fit> {
-    let sheets = near.filter(|&j| fits[j].kind.is_sheet());
-    match fits[i].kind {
+    let sheets = near.filter(|&j| fits[j].kind().is_sheet());
+    match fits[i].kind() {
         PointKind::Noisy => {
             let height = |j: usize| dot(fits[j].normal, sub(positions[i], positions[j])).abs();
             let mut for_sheet = sheets.filter(|&j| height(j) <= SLAB * radii[i].min(radii[j]));
             // The nearest comes first.
             let normal = fits[for_sheet.next()?].normal;
             let agreeing = 1 + for_sheet.filter(|&j| agree(normal, fits[j].normal)).count();
-            (agreeing >= MAJORITY).then_some(Fit { normal, kind: PointKind::Sheet })
+            (agreeing >= MAJORITY).then_some(Fit::new(normal, PointKind::Sheet))
         }
         PointKind::Sheet | PointKind::Edge => {
             let agreeing = sheets.filter(|&j| agree(fits[i].normal, fits[j].normal)).count();
-            (agreeing < ALONE).then_some(Fit { kind: PointKind::Noisy, ..fits[i] })
+            (agreeing < ALONE).then_some(Fit::new(fits[i].normal, PointKind::Noisy))
         }
         _ => None,
     }
@@ -90,34 +92,45 @@ fn corrected(
 
 /// The points in their order again, the sparse ones last, and how many come before these: as many as fill
 /// leaves. Points that are left over stand for themselves among the sparse ones, noisy ones before those at
-/// edges and others. `None` if no point is sparse.
+/// edges and others, the last before the first. `None` if no point is sparse.
 pub(crate) fn dense_first(
     positions: &[[f32; 3]],
     fits: &[Fit],
     leaf_size: usize,
-) -> Option<(Vec<Item>, usize)> {
-    let item = |i: usize| Item { position: positions[i], index: id32(i) };
-    let (mut dense, mut sparse): (Vec<usize>, Vec<usize>) =
-        (0..fits.len()).partition(|&i| !fits[i].kind.is_sparse());
-    if sparse.is_empty() {
-        return None;
+    work: &Workspace,
+) -> Result<Option<(Room<Item>, usize)>, WorkError> {
+    const DENSE: [PointKind; 3] = [PointKind::Noisy, PointKind::Edge, PointKind::Sheet];
+    let mut counts = [0; DENSE.len()];
+    for fit in fits {
+        if let Some(k) = DENSE.iter().position(|&kind| kind == fit.kind()) {
+            counts[k] += 1;
+        }
     }
-    let mut over = dense.len() % leaf_size;
-    for kind in [PointKind::Noisy, PointKind::Edge, PointKind::Sheet] {
-        dense.reverse();
-        dense.retain(|&i| {
-            let leaves = over > 0 && fits[i].kind == kind;
-            if leaves {
-                over -= 1;
-                sparse.push(i);
-            }
-            !leaves
+    let all: usize = counts.iter().sum();
+    if all == fits.len() {
+        return Ok(None);
+    }
+    let mut over = all % leaf_size;
+    let dense = all - over;
+    // So many of each kind stay, the first.
+    for count in &mut counts {
+        let left = over.min(*count);
+        (over, *count) = (over - left, *count - left);
+    }
+    let mut room = work.room(fits.len())?;
+    let items: &mut [Item] = &mut room;
+    let mut next = [0, dense];
+    for (i, fit) in fits.iter().enumerate() {
+        let stays = DENSE.iter().position(|&kind| kind == fit.kind()).is_some_and(|k| {
+            let is_first = counts[k] > 0;
+            counts[k] -= usize::from(is_first);
+            is_first
         });
-        dense.reverse();
+        let place = &mut next[usize::from(!stays)];
+        items[*place] = Item { position: positions[i], index: id32(i) };
+        *place += 1;
     }
-    sparse.sort_unstable();
-    let count = dense.len();
-    Some((dense.into_iter().chain(sparse).map(item).collect(), count))
+    Ok(Some((room, dense)))
 }
 
 #[cfg(test)]
@@ -127,7 +140,7 @@ mod tests {
     #[test]
     fn a_noisy_point_at_a_corner_is_of_neither_sheet_and_one_on_a_floor_is_of_the_floor() {
         let (up, aside) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
-        let fit = |normal, kind| Fit { normal, kind };
+        let fit = Fit::new;
         let floor = (1..=6).map(|i: u8| [0.1 * f32::from(i), 0.05, 0.0]);
         let wall = (1..=2).map(|i: u8| [0.0, 0.05, -0.1 * f32::from(i)]);
         let positions: Vec<_> = [[0.0; 3]].into_iter().chain(floor).chain(wall).collect();
@@ -146,10 +159,10 @@ mod tests {
             "two of the floor and two of the wall are not four of one sheet"
         );
         let found = corrected(&kinds(4)).unwrap();
-        assert_eq!((found.kind, found.normal), (PointKind::Sheet, up));
+        assert_eq!((found.kind(), found.normal), (PointKind::Sheet, up));
         let mut alone = kinds(0);
         alone[0] = fit(up, PointKind::Sheet);
-        assert_eq!(corrected(&alone).unwrap().kind, PointKind::Noisy, "no neighbour has its normal");
+        assert_eq!(corrected(&alone).unwrap().kind(), PointKind::Noisy, "no neighbour has its normal");
         alone[1..=2].fill(fit(up, PointKind::Sheet));
         assert!(corrected(&alone).is_none());
     }

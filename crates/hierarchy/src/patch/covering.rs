@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::parallel::fill;
 use nearmiss_lanes::vector::dot;
 
 use crate::bounds::boxes::OrientedBox;
@@ -111,7 +111,8 @@ fn fold_max(lanes: &[f32; WIDTH]) -> f32 {
 }
 
 /// A flat cylinder about a point and its normal.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Solid {
     /// Radius.
     across: f32,
@@ -155,11 +156,12 @@ pub(crate) struct Ground<'a> {
     pub(crate) cells: &'a [Solid],
 }
 
-/// The coverings of all nodes with these samples.
+/// Sets `out` to the coverings of all nodes with these samples.
 pub(crate) fn coverings<'a>(
     ground: &Ground<'_>,
     samples: impl Fn(NodeId) -> Samples<'a> + Sync + Send,
-) -> Vec<Covering> {
+    out: &mut [Covering],
+) {
     let Ground { topology, positions, radii, .. } = *ground;
     let squares = fold_nodes(
         topology,
@@ -167,7 +169,7 @@ pub(crate) fn coverings<'a>(
         |a: f64, b| a + b,
     );
     let level = Level::new();
-    map(topology.len(), |i| {
+    fill(out, |i| {
         let node = NodeId(id32(i));
         let centres = centres_of(samples(node), positions);
         let count = f64::from(id32(topology.points(node).len()));
@@ -180,7 +182,7 @@ pub(crate) fn coverings<'a>(
                 Covering { radius, sampling: ground.sampling_radius(node, &centres).min(radius), spacing }
             },
         ))
-    })
+    });
 }
 
 // Inlined into a caller that has it compiled for an instruction set.

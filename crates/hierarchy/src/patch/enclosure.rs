@@ -18,15 +18,17 @@
 
 use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::parallel::fill;
 use nearmiss_lanes::vector::{cross, tangents};
 use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load, product, seen_from};
+use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::BORDER;
 
 use crate::bounds::boxes::OrientedBox;
@@ -211,7 +213,8 @@ impl Cell {
 }
 
 /// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct LeafBounds {
     axes: [[f32; 3]; 3],
     origin: [f32; 3],
@@ -324,36 +327,40 @@ impl Cells {
 
 /// What the boxes about the discs of all nodes must grow by to be enclosures, given the bounds of the leaves
 /// in order.
-pub(crate) fn growths(topology: &Topology, boxes: &[OrientedBox], leaves: &[LeafBounds]) -> Vec<Growth> {
+pub(crate) fn growths(
+    topology: &Topology,
+    boxes: &[OrientedBox],
+    leaves: &[LeafBounds],
+    work: &Workspace,
+) -> Result<Room<Growth>, WorkError> {
     let leaf_boxes = &boxes[topology.inner()..];
-    let of_leaves: Vec<(Growth, OrientedBox)> = leaf_boxes
-        .iter()
-        .zip(leaves)
-        .map(|(bounds, leaf)| {
-            let growth = leaf.growth(bounds);
-            (growth, growth.of(bounds))
-        })
-        .collect();
-    let blocks: Vec<BoxBlock> = of_leaves.chunks(WIDTH).map(BoxBlock::of).collect();
-    let level = Level::new();
-    map(topology.len(), |id| {
+    let mut room = work.room(topology.len())?;
+    let growths: &mut [Growth] = &mut room;
+    let (of_inner, of_leaves) = growths.split_at_mut(topology.inner());
+    fill(of_leaves, |number| leaves[number].growth(&leaf_boxes[number]));
+    let of_leaves = &*of_leaves;
+    let mut blocks = work.room(leaves.len().div_ceil(WIDTH))?;
+    fill(&mut blocks, |number| {
+        let leaves = number * WIDTH..leaves.len().min((number + 1) * WIDTH);
+        BoxBlock::of(leaves.map(|leaf| of_leaves[leaf].of(&leaf_boxes[leaf])))
+    });
+    let (level, blocks): (_, &[BoxBlock]) = (Level::new(), &blocks);
+    fill(of_inner, |id| {
         let id = NodeId(id32(id));
         let range = topology.leaves_under(id);
-        if topology.is_leaf(id) {
-            return of_leaves[range.start].0;
-        }
         let bounds = &boxes[id.index()];
         let [low, high] = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || extents(simd, &blocks, &range, &bounds.axes),
+            || extents(simd, blocks, &range, &bounds.axes),
         ));
         Growth::new(bounds, low, high)
-    })
+    });
+    Ok(room)
 }
 
 /// Boxes side by side.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
 struct BoxBlock {
     centre: [[f32; WIDTH]; 3],
     half: [[f32; WIDTH]; 3],
@@ -361,10 +368,10 @@ struct BoxBlock {
 }
 
 impl BoxBlock {
-    fn of(boxes: &[(Growth, OrientedBox)]) -> Self {
+    fn of(boxes: impl Iterator<Item = OrientedBox>) -> Self {
         let zero = [[0.0; WIDTH]; 3];
         let mut block = Self { centre: zero, half: zero, axes: [zero; 3] };
-        for (lane, (_, bounds)) in boxes.iter().enumerate() {
+        for (lane, bounds) in boxes.enumerate() {
             for k in 0..3 {
                 block.centre[k][lane] = bounds.centre[k];
                 block.half[k][lane] = bounds.half[k];

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::parallel::change_each;
 use nearmiss_lanes::wide::{along, greatest, lanes_of, least, load};
 
 use crate::bounds::boxes::OrientedBox;
@@ -17,10 +18,13 @@ use crate::tree::topology::Topology;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
+/// Nodes that a thread takes at once.
+const AT_ONCE: usize = 16;
+
 /// Discs side by side.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
-struct DiscBlock {
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(crate) struct DiscBlock {
     position: [[f32; WIDTH]; 3],
     normal: [[f32; WIDTH]; 3],
     disc: [f32; WIDTH],
@@ -36,31 +40,22 @@ pub(crate) struct Discs<'a> {
     pub(crate) balls: &'a [f32],
 }
 
-/// For each node the least box along the axes of that `about` it that contains the discs of its points with
-/// their thickness, and their balls. O(n log n).
-pub(crate) fn boxes_of_discs(
-    topology: &Topology,
-    about: &[OrientedBox],
-    discs: &Discs<'_>,
-) -> Vec<OrientedBox> {
-    let blocks = discs.blocks();
+/// Makes of the box about each node the least along its axes that contains the discs of the node's points
+/// with their thickness, and their balls. O(n log n).
+pub(crate) fn boxes_of_discs(topology: &Topology, boxes: &mut [OrientedBox], blocks: &[DiscBlock]) {
     let level = Level::new();
-    map(topology.len(), |id| {
-        let about = &about[id];
+    change_each(boxes, AT_ONCE, |id, about| {
         let [low, high] = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || extents(simd, &blocks, topology.points(NodeId(id32(id))), &about.axes),
+            || extents(simd, blocks, topology.points(NodeId(id32(id))), &about.axes),
         ));
-        OrientedBox::spanned(about.axes, low, high, about.reach)
-    })
+        *about = OrientedBox::spanned(about.axes, low, high, about.reach);
+    });
 }
 
 impl Discs<'_> {
-    fn blocks(&self) -> Vec<DiscBlock> {
-        map(self.positions.len().div_ceil(WIDTH), |number| self.block(number))
-    }
-
-    fn block(&self, number: usize) -> DiscBlock {
+    /// Those in block `number`.
+    pub(crate) fn block(&self, number: usize) -> DiscBlock {
         let zero = [0.0; WIDTH];
         let mut block = DiscBlock { position: [zero; 3], normal: [zero; 3], disc: zero, ball: zero };
         let first = number * WIDTH;

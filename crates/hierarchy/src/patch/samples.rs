@@ -10,8 +10,9 @@ use std::ops::Range;
 
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::parallel::fill_runs;
 use nearmiss_lanes::vector::{dot, sub};
+use nearmiss_store::{Room, WorkError, Workspace};
 
 use crate::patch::centres::Centres;
 use crate::tree::topology::Topology;
@@ -125,9 +126,18 @@ pub(crate) fn draw(positions: &[[f32; 3]], topology: &Topology, id: NodeId, coun
 }
 
 /// The lists of all inner nodes, in their order.
-pub(crate) fn lists(positions: &[[f32; 3]], topology: &Topology, count: u32) -> Vec<u32> {
-    let lists = map(topology.inner(), |id| draw(positions, topology, NodeId(id32(id)), count as usize));
-    lists.iter().flat_map(|list| &list[..count as usize]).copied().collect()
+pub(crate) fn lists(
+    positions: &[[f32; 3]],
+    topology: &Topology,
+    count: u32,
+    work: &Workspace,
+) -> Result<Room<u32>, WorkError> {
+    let count = count as usize;
+    let mut lists = work.room(topology.inner() * count)?;
+    fill_runs(&mut lists, count, |id, list| {
+        list.copy_from_slice(&draw(positions, topology, NodeId(id32(id)), count)[..list.len()]);
+    });
+    Ok(lists)
 }
 
 /// Numbers that look random: the sequence of `SplitMix64` from a node's id.

@@ -7,13 +7,15 @@
 
 use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, i32x16, mask32x16};
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::parallel::{collect_into, in_order};
 use nearmiss_lanes::vector::{dot, sub, tangents};
 use nearmiss_lanes::wide::{along, product, seen_from};
+use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Status, symmetric_eigen};
 
 use crate::bounds::boxes::OrientedBox;
@@ -32,10 +34,24 @@ const SECTORS: u32 = 24;
 const LINE: f64 = 0.05;
 
 /// The surface at a point to first order, and the point's class.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Fit {
     pub(crate) normal: [f32; 3],
-    pub(crate) kind: PointKind,
+    /// The code of the kind.
+    code: u32,
+}
+
+impl Fit {
+    pub(crate) fn new(normal: [f32; 3], kind: PointKind) -> Self {
+        Self { normal, code: kind.code().into() }
+    }
+
+    /// The point's class.
+    #[expect(clippy::cast_possible_truncation, reason = "the code of a kind")]
+    pub(crate) const fn kind(&self) -> PointKind {
+        PointKind::from_code(self.code as u8)
+    }
 }
 
 /// A point's disc, whose radius follows from its code.
@@ -48,50 +64,27 @@ pub(crate) struct Surfel {
 }
 
 /// The discs of points as arrays, and the bounds of their leaves.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Surfels {
-    pub(crate) normals: Vec<[f32; 3]>,
-    pub(crate) codes: Vec<PointCode>,
+    pub(crate) normals: Room<[f32; 3]>,
+    pub(crate) codes: Room<PointCode>,
     /// The radius of each point's ball: the greater of [`Slices::ball`](crate::Slices::ball) and
     /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball).
-    pub(crate) balls: Vec<f32>,
+    pub(crate) balls: Room<f32>,
     /// About the disc and the ball of each point.
-    pub(crate) flat: Vec<Solid>,
+    pub(crate) flat: Room<Solid>,
     /// About its cell as well.
-    pub(crate) cells: Vec<Solid>,
-    pub(crate) leaves: Vec<LeafBounds>,
+    pub(crate) cells: Room<Solid>,
+    pub(crate) leaves: Room<LeafBounds>,
     /// Bounds of the leaves' parts of the obstacle.
-    pub(crate) obstacles: Vec<LeafBounds>,
+    pub(crate) obstacles: Room<LeafBounds>,
 }
 
-impl Surfels {
-    /// Joins parts, in their order. One array is joined at a time, so that no other exists twice.
-    fn joined(mut parts: Vec<Self>) -> Self {
-        fn join<T: Clone>(parts: &mut [Surfels], of: impl Fn(&mut Surfels) -> &mut Vec<T>) -> Vec<T> {
-            let parts: Vec<Vec<T>> = parts.iter_mut().map(|part| std::mem::take(of(part))).collect();
-            parts.concat()
-        }
-        let parts = &mut parts;
-        Self {
-            normals: join(parts, |part| &mut part.normals),
-            codes: join(parts, |part| &mut part.codes),
-            balls: join(parts, |part| &mut part.balls),
-            flat: join(parts, |part| &mut part.flat),
-            cells: join(parts, |part| &mut part.cells),
-            leaves: join(parts, |part| &mut part.leaves),
-            obstacles: join(parts, |part| &mut part.obstacles),
-        }
-    }
-
-    /// Adds a point whose disc and ball have these radii.
-    fn push(&mut self, surfel: &Surfel, disc: f32, ball: f32) {
-        let solid = Solid::of_disc(disc, ball);
-        self.normals.push(surfel.normal);
-        self.codes.push(surfel.code);
-        self.balls.push(ball);
-        self.flat.push(solid);
-        self.cells.push(Solid::of_cell(&surfel.cell, solid));
-    }
+/// Those of a few leaves.
+#[derive(Debug, Default)]
+struct Some {
+    discs: Vec<(Surfel, f32, f32)>,
+    leaves: Vec<[LeafBounds; 2]>,
 }
 
 /// Reused from leaf to leaf.
@@ -123,55 +116,95 @@ pub(crate) fn fits(
     index: &Index<'_>,
     positions: &[[f32; 3]],
     (radii, spacings): (&[f32], &[Spacing]),
-) -> Vec<Fit> {
-    let leaves = leaves(index);
-    let level = Level::new();
-    let parts = chunks(&leaves, |leaves| {
+    work: &Workspace,
+) -> Result<Room<Fit>, WorkError> {
+    let (topology, level) = (index.tree.topology, Level::new());
+    let mut all = work.room(positions.len())?;
+    collect_into(&mut all, topology.leaves(), |leaves| {
         let (mut scratch, mut fits) = (LeafScratch::default(), Vec::new());
-        for (points, about) in leaves {
+        for number in leaves {
+            let (points, about) = leaf(index, number);
             let spacings = &spacings[points.clone()];
-            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
+            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points], about: &about };
             dispatch!(level, simd => leaf.fit(simd, index, &mut scratch, |at, i| {
-                fits.push(fitted(&at, spacings[i].look));
+                fits.push(fitted(&at, spacings[i].look()));
             }));
         }
         fits
     });
-    parts.concat()
+    Ok(all)
 }
 
-/// The ranges of points of all leaves, and the boxes about them.
-fn leaves(index: &Index<'_>) -> Vec<(Range<usize>, OrientedBox)> {
+/// The points of a leaf, and the box about them.
+fn leaf(index: &Index<'_>, number: usize) -> (Range<usize>, OrientedBox) {
     let topology = index.tree.topology;
-    let leaf = |number| (topology.points_of_leaf(number), index.tree.bounds(topology.leaf(number)));
-    (0..topology.leaves()).map(leaf).collect()
+    (topology.points_of_leaf(number), index.tree.bounds(topology.leaf(number)))
 }
 
 /// The discs of all points and the bounds of all leaves, in order.
-pub(crate) fn surfels(index: &Index<'_>, known: &Known<'_>, fits: &[Fit]) -> Surfels {
-    let leaves = leaves(index);
-    let level = Level::new();
-    Surfels::joined(chunks(&leaves, |leaves| {
-        let (mut scratch, mut surfels, mut all) = (LeafScratch::default(), Vec::new(), Surfels::default());
-        for (points, about) in leaves {
-            let Known { positions, radii, ordinary, reach, dense } = *known;
-            let leaf = Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about };
+pub(crate) fn surfels(
+    index: &Index<'_>,
+    known: &Known<'_>,
+    fits: &[Fit],
+    work: &Workspace,
+) -> Result<Surfels, WorkError> {
+    let Known { positions, radii, ordinary, reach, dense } = *known;
+    let (topology, level) = (index.tree.topology, Level::new());
+    let some = |leaves: Range<usize>| {
+        let (mut scratch, mut surfels, mut some) = (LeafScratch::default(), Vec::new(), Some::default());
+        for number in leaves {
+            let (points, about) = leaf(index, number);
+            let leaf =
+                Leaf { positions: &positions[points.clone()], radii: &radii[points.clone()], about: &about };
             let is_dense = points.start < dense;
             let fits = &fits[points.clone()];
             surfels.clear();
-            let [surface, obstacle] = dispatch!(level, simd => {
+            some.leaves.push(dispatch!(level, simd => {
                 leaf.look_about(simd, index, (fits, reach, is_dense), &mut scratch, &mut surfels)
-            });
-            all.leaves.push(surface);
-            all.obstacles.push(obstacle);
-            for ((i, &radius), surfel) in points.clone().zip(leaf.radii).zip(&surfels) {
+            }));
+            for ((i, &radius), surfel) in points.zip(leaf.radii).zip(&surfels) {
                 let kind = surfel.code.kind();
                 let ball = ball(kind, radius, ordinary).max(obstacle_ball(i, dense, kind, radius));
-                all.push(surfel, surfel.code.disc(radius, reach, ordinary), ball);
+                some.discs.push((*surfel, surfel.code.disc(radius, reach, ordinary), ball));
             }
         }
-        all
-    }))
+        some
+    };
+    let (points, leaves) = (positions.len(), topology.leaves());
+    let mut all = Surfels {
+        normals: work.room(points)?,
+        codes: work.room(points)?,
+        balls: work.room(points)?,
+        flat: work.room(points)?,
+        cells: work.room(points)?,
+        leaves: work.room(leaves)?,
+        obstacles: work.room(leaves)?,
+    };
+    all.fill(|take| in_order(leaves, some, take));
+    Ok(all)
+}
+
+impl Surfels {
+    /// Puts what `give` gives in its place.
+    fn fill(&mut self, give: impl FnOnce(&mut dyn FnMut(Some))) {
+        let Self { normals, codes, balls, flat, cells, leaves, obstacles } = self;
+        let (normals, codes): (&mut [_], &mut [_]) = (normals, codes);
+        let (balls, flat, cells): (&mut [_], &mut [_], &mut [_]) = (balls, flat, cells);
+        let (leaves, obstacles): (&mut [_], &mut [_]) = (leaves, obstacles);
+        let (mut point, mut leaf) = (0, 0);
+        give(&mut |some| {
+            for (surfel, disc, ball) in some.discs {
+                let solid = Solid::of_disc(disc, ball);
+                (normals[point], codes[point], balls[point]) = (surfel.normal, surfel.code, ball);
+                (flat[point], cells[point]) = (solid, Solid::of_cell(&surfel.cell, solid));
+                point += 1;
+            }
+            for [surface, obstacle] in some.leaves {
+                (leaves[leaf], obstacles[leaf]) = (surface, obstacle);
+                leaf += 1;
+            }
+        });
+    }
 }
 
 /// The points of a leaf, and the box about them.
@@ -237,7 +270,7 @@ impl Leaf<'_> {
                     let gap = widest_gap(simd, *p, fit.normal, blocks());
                     let cell = surroundings.cell(simd, *p, fit.normal, radius, blocks());
                     cells.include(*p, fit.normal, &cell);
-                    if is_dense && fit.kind.is_sheet() {
+                    if is_dense && fit.kind().is_sheet() {
                         has_cells = true;
                         obstacle.include(
                             *p,
@@ -245,7 +278,7 @@ impl Leaf<'_> {
                             &cell.within(cell_radius(radius, reach), SLAB * radius),
                         );
                     }
-                    let code = PointCode::new(fit.kind, gap);
+                    let code = PointCode::new(fit.kind(), gap);
                     surfels.push(Surfel { normal: fit.normal, code, cell });
                 }
                 let obstacle = if has_cells { obstacle.close() } else { bounds.empty() };
@@ -259,7 +292,7 @@ impl Leaf<'_> {
 pub(crate) fn fitted(at: &Evaluation, look: Look) -> Fit {
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
     let normal = at.normal.map(|c| c as f32);
-    Fit { normal, kind: kind(at, look) }
+    Fit::new(normal, kind(at, look))
 }
 
 /// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose
@@ -269,7 +302,7 @@ pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], near: &[PointBlock]) -> Surfel {
         #[inline(always)]
         || widest_gap(simd, p, fit.normal, near.iter()),
     ));
-    Surfel { normal: fit.normal, code: PointCode::new(fit.kind, gap), cell: Cell::default() }
+    Surfel { normal: fit.normal, code: PointCode::new(fit.kind(), gap), cell: Cell::default() }
 }
 
 /// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at

@@ -4,7 +4,6 @@
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i16x16};
-use nearmiss_lanes::parallel::map;
 use nearmiss_lanes::vector::sub;
 
 use crate::bounds::boxes::OrientedBox;
@@ -171,15 +170,6 @@ impl LeafParts<'_> {
             block.set(lane, self.positions[i], self.normals[i], self.discs.get(i));
         }
         block
-    }
-
-    /// As many blocks for each leaf as a full one needs; `bounds` are the boxes of leaves. O(n), on all
-    /// cores.
-    pub(crate) fn blocks(&self, topology: &Topology, bounds: &[OrientedBox]) -> Vec<LeafBlock> {
-        let blocks_a_leaf = Self::blocks_a_leaf(topology);
-        map(topology.leaves() * blocks_a_leaf, |number| {
-            self.block(topology, number, &bounds[number / blocks_a_leaf])
-        })
     }
 
     /// What kinds of points a leaf has, and whether it is loose; `bounds` is its box.

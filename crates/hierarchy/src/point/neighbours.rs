@@ -7,12 +7,15 @@
 //! complete for every place within some distance of the middle of the block's ball, far enough for every
 //! surface point whose nearest stored point is the block's (`docs/theory/certificates.md`, fact 2).
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::parallel::{chunks, map_all};
+use nearmiss_lanes::parallel::{fill, in_order};
 use nearmiss_lanes::vector::{dot, sub};
 use nearmiss_lanes::wide::{greatest, product, seen_from};
+use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::SurfacePlan;
 
 use crate::bounds::boxes::ROUNDING;
@@ -23,23 +26,29 @@ use crate::point::gather::{GROWN, Index, NeighbourList};
 /// everything.
 pub(crate) const MOST_LISTED: usize = 64;
 
+/// Entries that there is room for at first, a block: on surfaces lists have some seven.
+const USUAL_ENTRIES: usize = 10;
+
 /// Steps towards the least ball about a block (Bădoiu & Clarkson 2003).
 const CENTRING: u8 = 12;
 
-/// The points in blocks, with their horizons. O(n), on all cores.
-pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32]) -> Vec<PointBlock> {
-    let starts: Vec<usize> = (0..positions.len()).step_by(PointBlock::WIDTH).collect();
-    map_all(&starts, |&start| {
+/// Sets `out` to the points in blocks, with their horizons. O(n), on all cores.
+pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32], out: &mut [PointBlock]) {
+    fill(out, |number| {
+        let start = number * PointBlock::WIDTH;
         let points = start..(start + PointBlock::WIDTH).min(positions.len());
         let mut block = plan.blocks(&positions[points.clone()], &radii[points]);
         block.next().unwrap_or(PointBlock::EMPTY)
-    })
+    });
 }
 
 /// For every group of blocks the balls outside of which no point of a block is heard, given the blocks.
-pub(crate) fn groups(blocks: &[PointBlock]) -> Vec<PointBlock> {
+pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<PointBlock>, WorkError> {
+    const WIDTH: usize = PointBlock::WIDTH;
     let level = Level::new();
-    chunks(blocks, |blocks| {
+    let mut groups = work.room(blocks.len().div_ceil(WIDTH))?;
+    fill(&mut groups, |number| {
+        let blocks = &blocks[number * WIDTH..blocks.len().min((number + 1) * WIDTH)];
         let mut group = PointBlock::EMPTY;
         for (lane, block) in blocks.iter().enumerate() {
             let (centre, radius) = dispatch!(level, simd => simd.vectorize(
@@ -52,7 +61,8 @@ pub(crate) fn groups(blocks: &[PointBlock]) -> Vec<PointBlock> {
             group.horizon[lane] = radius;
         }
         group
-    })
+    });
+    Ok(groups)
 }
 
 /// A ball outside of which no point of a block is heard.
@@ -108,16 +118,6 @@ impl Lists {
         }
         let within = if fits { within } else { -1.0 };
         self.lists.push(NeighbourList { within, first, count: end(&self.entries) - first });
-    }
-
-    /// Those of later blocks after these.
-    pub(crate) fn append(&mut self, mut later: Self) {
-        let shift = u32::try_from(self.entries.len()).unwrap_or(u32::MAX);
-        for list in &mut later.lists {
-            list.first = list.first.saturating_add(shift);
-        }
-        self.lists.append(&mut later.lists);
-        self.entries.append(&mut later.entries);
     }
 }
 
@@ -179,13 +179,17 @@ impl Locality {
     }
 }
 
-/// The neighbour lists of all blocks.
-pub(crate) fn neighbours(index: &Index<'_>, positions: &[[f32; 3]], radii: &[f32]) -> Lists {
-    let blocks: Vec<usize> = (0..index.blocks.len()).collect();
+/// The neighbour lists of all blocks, and the entries of these.
+pub(crate) fn neighbours(
+    index: &Index<'_>,
+    positions: &[[f32; 3]],
+    radii: &[f32],
+    work: &Workspace,
+) -> Result<(Room<NeighbourList>, Room<u32>), WorkError> {
     let level = Level::new();
-    let list = |blocks: &[usize]| {
+    let some = |blocks: Range<usize>| {
         let (mut locality, mut lists) = (Locality::default(), Lists::default());
-        for &block in blocks {
+        for block in blocks {
             let first = block * PointBlock::WIDTH;
             let points = first..(first + PointBlock::WIDTH).min(positions.len());
             let guess = 1.3 * radii[points.clone()].iter().copied().fold(0.0, f32::max);
@@ -198,7 +202,32 @@ pub(crate) fn neighbours(index: &Index<'_>, positions: &[[f32; 3]], radii: &[f32
         }
         lists
     };
-    let mut all = Lists::default();
-    chunks(&blocks, list).into_iter().for_each(|some| all.append(some));
-    all
+    let blocks = index.blocks.len();
+    let mut lists = work.room(blocks)?;
+    // Room for more than most scans need; moved where a scan needs more.
+    let mut entries = work.room(blocks * USUAL_ENTRIES)?;
+    let (mut list, mut end, mut failed) = (0, 0, None);
+    in_order(blocks, some, |some| {
+        let shift = u32::try_from(end).unwrap_or(u32::MAX);
+        for of_block in some.lists {
+            lists[list] = NeighbourList { first: of_block.first.saturating_add(shift), ..of_block };
+            list += 1;
+        }
+        let count = some.entries.len();
+        if failed.is_none() && end + count > entries.len() {
+            match work.room(2 * (end + count)) {
+                Ok(mut more) => {
+                    more[..end].copy_from_slice(&entries[..end]);
+                    entries = more;
+                }
+                Err(cause) => failed = Some(cause),
+            }
+        }
+        if failed.is_none() {
+            entries[end..end + count].copy_from_slice(&some.entries);
+            end += count;
+        }
+    });
+    entries.truncate(end);
+    failed.map_or(Ok((lists, entries)), Err)
 }

@@ -5,11 +5,13 @@
 //! (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region; lines without another
 //! beside them and bends in rings, whose distances say nothing of a surface, are no such j.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::ops::Range;
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nearmiss_index::{BlockTree, Nearest, PointBlock};
-use nearmiss_lanes::parallel::{chunks, map_all};
+use nearmiss_lanes::parallel::{collect_into, in_order};
+use nearmiss_store::{Room, WorkError, Workspace};
 use nearmiss_surface::symmetric_eigen;
 
 use crate::tree::topology::Topology;
@@ -31,86 +33,104 @@ const LINE: f64 = 0.05;
 const GROWTH: f32 = 0.3;
 
 /// A spacing, and what the neighbours looked like.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Spacing {
     pub(crate) radius: f32,
     /// The distance of the K-th neighbour, which is less than the radius along a ring.
     plain: f32,
-    pub(crate) look: Look,
+    /// The code of the look.
+    look: u32,
 }
 
 /// What the neighbours of a point look like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
 pub(crate) enum Look {
     /// The first K spread over an area.
     #[default]
-    Area,
+    Area = 0,
     /// The first K are a line, more of them are not: a ring among others.
-    Ring,
+    Ring = 1,
     /// A line as far as was looked.
-    Line,
+    Line = 2,
     /// The first K spread, but only because a ring bends there or is jagged: most points about see a ring.
-    Bend,
+    Bend = 3,
     /// The spacing exceeds the reach of the scan.
-    Sparse,
+    Sparse = 4,
+}
+
+impl Spacing {
+    fn new(radius: f32, plain: f32, look: Look) -> Self {
+        Self { radius, plain, look: look as u32 }
+    }
+
+    /// What the neighbours look like.
+    pub(crate) const fn look(&self) -> Look {
+        match self.look {
+            1 => Look::Ring,
+            2 => Look::Line,
+            3 => Look::Bend,
+            4 => Look::Sparse,
+            _ => Look::Area,
+        }
+    }
 }
 
 /// The spacing of every one of the distinct `points`, those of the `tree`.
-pub(crate) fn spacings(points: &[[f32; 3]], tree: &BlockTree<'_>, neighbours: usize) -> Vec<Spacing> {
-    let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
-    let mut spacings = Vec::with_capacity(points.len());
-    spacings.extend(
-        chunks(&numbers, |blocks| {
-            let (mut search, mut spacings) = (Search::new(tree, points), Vec::new());
-            for &block in blocks {
-                search.start(block);
-                let plain = search.plain(neighbours);
-                let first = block * WIDTH;
-                let points = first..(first + WIDTH).min(points.len());
-                spacings.extend(points.map(|i| {
-                    if plain >> (i % WIDTH) & 1 == 1 {
-                        search.area(i, neighbours)
-                    } else {
-                        search.spacing(i, neighbours)
-                    }
-                }));
-            }
-            spacings
-        })
-        .into_iter()
-        .flatten(),
-    );
-
-    let numbers: Vec<usize> = numbers
-        .into_iter()
-        .zip(spacings.chunks(WIDTH))
-        .filter_map(|(block, spacings)| spacings.iter().any(|s| s.look != Look::Area).then_some(block))
-        .collect();
-    if numbers.is_empty() {
-        return spacings;
-    }
-    let votes: Vec<AtomicU32> = spacings.iter().map(|_| 0.into()).collect();
-    // A sum does not depend on its order.
-    chunks(&numbers, |blocks| {
-        let mut search = Search::new(tree, points);
-        for &block in blocks {
+pub(crate) fn spacings(
+    points: &[[f32; 3]],
+    tree: &BlockTree<'_>,
+    neighbours: usize,
+    work: &Workspace,
+) -> Result<Room<Spacing>, WorkError> {
+    let mut room = work.room(points.len())?;
+    let spacings: &mut [Spacing] = &mut room;
+    let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(points.len());
+    collect_into(spacings, tree.blocks().len(), |blocks| {
+        let (mut search, mut spacings) = (Search::new(tree, points), Vec::new());
+        for block in blocks {
             search.start(block);
-            let first = block * WIDTH;
-            let points = first..(first + WIDTH).min(points.len());
-            for i in points.filter(|&i| spacings[i].look != Look::Area) {
-                search.look(i, neighbours);
-                for &(_, j) in &search.near {
-                    votes[j].fetch_add(1, Ordering::Relaxed);
+            let plain = search.plain(neighbours);
+            spacings.extend(of_block(block).map(|i| {
+                if plain >> (i % WIDTH) & 1 == 1 {
+                    search.area(i, neighbours)
+                } else {
+                    search.spacing(i, neighbours)
                 }
+            }));
+        }
+        spacings
+    });
+    if spacings.iter().all(|s| s.look() == Look::Area) {
+        return Ok(room);
+    }
+    // As many votes are needed as a byte can count.
+    let mut votes = work.room::<u8>(points.len())?;
+    let counted: &mut [u8] = &mut votes;
+    let found = &*spacings;
+    let vote = |blocks: Range<usize>| {
+        let (mut search, mut heard) = (Search::new(tree, points), Vec::new());
+        for block in blocks.filter(|&block| found[of_block(block)].iter().any(|s| s.look() != Look::Area)) {
+            search.start(block);
+            for i in of_block(block).filter(|&i| found[i].look() != Look::Area) {
+                search.look(i, neighbours);
+                heard.extend(search.near.iter().map(|&(_, j)| j));
             }
+        }
+        heard
+    };
+    in_order(tree.blocks().len(), vote, |heard| {
+        for j in heard {
+            counted[j] = counted[j].saturating_add(1);
         }
     });
-    for (spacing, votes) in spacings.iter_mut().zip(votes) {
-        if spacing.look == Look::Area && 2 * votes.into_inner() as usize >= neighbours {
-            spacing.look = Look::Bend;
+    for (spacing, votes) in spacings.iter_mut().zip(counted) {
+        if spacing.look() == Look::Area && 2 * usize::from(*votes) >= neighbours {
+            spacing.look = Look::Bend as u32;
         }
     }
-    spacings
+    Ok(room)
 }
 
 /// A search for the neighbours of the points of a block.
@@ -190,7 +210,7 @@ impl<'a> Search<'a> {
     fn area(&self, i: usize, neighbours: usize) -> Spacing {
         let last = self.found.ranked(i % WIDTH, neighbours - 1);
         let radius = last.map_or(0.0, |last| length(&self.exact(i, last.id as usize)));
-        Spacing { radius, plain: radius, look: Look::Area }
+        Spacing::new(radius, radius, Look::Area)
     }
 
     /// The squared distance of point `j` from point `i` in double precision, and its index.
@@ -220,7 +240,7 @@ impl<'a> Search<'a> {
         let mut sums = Sums::default();
         self.near.iter().for_each(|n| sums.add(self.points, i, n.1));
         if self.near.len() <= neighbours || !sums.is_line() {
-            return Spacing { radius, plain: radius, look: Look::Area };
+            return Spacing::new(radius, radius, Look::Area);
         }
         let mut count = LINE_NEIGHBOURS;
         while sums.count < MOST_NEIGHBOURS {
@@ -229,7 +249,7 @@ impl<'a> Search<'a> {
             for k in known..self.near.len() {
                 sums.add(self.points, i, self.near[k].1);
                 if !sums.is_line() && sums.lies_across(self.points, &self.near[..=k]) {
-                    return Spacing { radius: length(&self.near[k]), plain: radius, look: Look::Ring };
+                    return Spacing::new(length(&self.near[k]), radius, Look::Ring);
                 }
             }
             if self.near.len() <= count {
@@ -237,7 +257,7 @@ impl<'a> Search<'a> {
             }
             count *= 2;
         }
-        Spacing { radius, plain: radius, look: Look::Line }
+        Spacing::new(radius, radius, Look::Line)
     }
 }
 
@@ -309,22 +329,27 @@ impl Sums {
 }
 
 /// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines and bends.
-pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
+pub(crate) fn smooth(
+    tree: &BlockTree<'_>,
+    spacings: &[Spacing],
+    work: &Workspace,
+) -> Result<Room<f32>, WorkError> {
     // How near points are along a line says nothing of the surface about it.
-    let tips = map_all(spacings, |s| match s.look {
-        Look::Area | Look::Ring => s.radius,
+    let tip = |i: usize| match spacings[i].look() {
+        Look::Area | Look::Ring => spacings[i].radius,
         Look::Line | Look::Bend | Look::Sparse => f32::INFINITY,
-    });
-    let (cones, level) = (tree.cones(&tips, GROWTH), Level::new());
-    let numbers: Vec<usize> = (0..tree.blocks().len()).collect();
-    let smoothed = chunks(&numbers, |blocks| {
+    };
+    let mut tips = work.room(tree.blocks().len())?;
+    let (cones, level) = (tree.cones(&mut tips, tip, GROWTH), Level::new());
+    let mut radii = work.room(spacings.len())?;
+    collect_into(&mut radii, tree.blocks().len(), |blocks| {
         let mut radii = Vec::with_capacity(blocks.len() * WIDTH);
-        for &block in blocks {
+        for block in blocks {
             let first = block * WIDTH;
             let own = &spacings[first..(first + WIDTH).min(spacings.len())];
             let mut heights = [0.0; WIDTH];
             for (height, own) in heights.iter_mut().zip(own) {
-                *height = if own.look == Look::Bend { f32::MAX } else { own.radius };
+                *height = if own.look() == Look::Bend { f32::MAX } else { own.radius };
             }
             let lowest = cones.below(level, block, &heights);
             let radius = |(own, lowest): (&Spacing, f32)| if lowest < f32::MAX { lowest } else { own.radius };
@@ -332,7 +357,7 @@ pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
         }
         radii
     });
-    smoothed.concat()
+    Ok(radii)
 }
 
 /// Limits `radii`, the smoothed `spacings`, to `reach`. A ring whose next ring is further away than that is a
@@ -343,11 +368,11 @@ pub(crate) fn smooth(tree: &BlockTree<'_>, spacings: &[Spacing]) -> Vec<f32> {
 pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
     for (spacing, radius) in spacings.iter_mut().zip(radii) {
         if spacing.radius > reach {
-            if spacing.look == Look::Ring {
-                spacing.look = Look::Line;
+            if spacing.look() == Look::Ring {
+                spacing.look = Look::Line as u32;
                 *radius = radius.min(spacing.plain);
-            } else if spacing.look != Look::Line {
-                spacing.look = Look::Sparse;
+            } else if spacing.look() != Look::Line {
+                spacing.look = Look::Sparse as u32;
             }
         }
         *radius = radius.min(reach);
@@ -358,7 +383,7 @@ pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
 /// their children.
 pub(crate) fn fold_nodes<T: Copy + Default>(
     topology: &Topology,
-    leaf: impl Fn(std::ops::Range<usize>) -> T,
+    leaf: impl Fn(Range<usize>) -> T,
     join: impl Fn(T, T) -> T,
 ) -> Vec<T> {
     let mut values = vec![T::default(); topology.len()];

@@ -1,34 +1,35 @@
 //! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use bytemuck::bytes_of;
 use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
 use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::{map, on_threads};
+use nearmiss_lanes::parallel::{fill, on_threads};
 use nearmiss_lanes::vector::dot;
+use nearmiss_store::{Array, Workspace};
 use nearmiss_surface::{Metric, SurfacePlan};
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::bounds::boxes::OrientedBox;
-use crate::bounds::growth::Growth;
 use crate::bounds::part::Part;
 use crate::patch::covering::{Ground, coverings};
 use crate::patch::enclosure::growths;
 use crate::patch::extents::{Discs, boxes_of_discs};
-use crate::patch::samples::{lists, samples};
+use crate::patch::samples::{lists as lists_of_samples, samples};
 use crate::patch::surfels::{Known, Surfels, align, surfels};
 use crate::point::disc::DiscRadii;
 use crate::point::gather::Index;
 use crate::point::kind::PointKind;
-use crate::point::leaf_block::{LeafParts, Leaves};
-use crate::point::neighbours::neighbours;
+use crate::point::leaf_block::{LeafBlock, LeafParts, Leaves};
+use crate::point::neighbours::{groups, neighbours};
 use crate::scan::data::{Arrays, HierarchyMeta};
 use crate::scan::options::{BuildError, BuildOptions};
-use crate::scan::ordered::Ordered;
+use crate::scan::ordered::{Ordered, Summary};
 use crate::scan::outline::{Ball, Outline};
-use crate::scan::sampling::Sampling;
+use crate::scan::points::ScanPoints;
+use crate::scan::share;
 use crate::scan::slices::Slices;
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Bare, Root, Tree, growths_of_siblings, siblings};
@@ -45,7 +46,7 @@ pub struct PointHierarchy {
     pub(crate) topology: Topology,
     pub(crate) arrays: Arrays,
     /// Positions in leaf order, unpacked from the blocks on first use.
-    pub(crate) positions: OnceLock<Arc<Vec<[f32; 3]>>>,
+    pub(crate) positions: OnceLock<Array<[f32; 3]>>,
 }
 
 impl PointHierarchy {
@@ -54,8 +55,21 @@ impl PointHierarchy {
     /// # Errors
     /// Names the option that is out of range.
     pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
+        Self::build_in(&cloud.into(), options, &Workspace::in_memory())
+    }
+
+    /// The same of points that may lie in files, with what is made of them in a workspace: the same scan.
+    ///
+    /// # Errors
+    /// Names the option that is out of range; or the workspace has no room.
+    pub fn build_in(
+        points: &ScanPoints<'_>,
+        options: &BuildOptions,
+        work: &Workspace,
+    ) -> Result<Self, BuildError> {
         options.check()?;
-        on_threads(options.threads, || build(cloud, options)).or(Err(BuildError::Threads(options.threads)))?
+        on_threads(options.threads, || build(points, options, work))
+            .or(Err(BuildError::Threads(options.threads)))?
     }
 
     /// The arrays that a query reads.
@@ -167,7 +181,7 @@ impl PointHierarchy {
     pub fn positions(&self) -> &[[f32; 3]] {
         self.positions.get_or_init(|| {
             let (blocks, points): (&[PointBlock], _) = (&self.arrays.blocks, 0..self.len());
-            Arc::new(points.map(|i| PointBlock::position_in(blocks, i)).collect())
+            points.map(|i| PointBlock::position_in(blocks, i)).collect::<Vec<_>>().into()
         })
     }
 
@@ -201,29 +215,29 @@ impl PointHierarchy {
         self.renew_leaves();
     }
 
-    /// Replaces the boxes of all nodes and, if given, the enclosure growths, both in the order of the nodes'
-    /// ids; then recomputes leaf blocks, marks and outline. With `None` the old growths stay: valid only if
-    /// the enclosures are the same.
-    pub(crate) fn bound(&mut self, boxes: &[OrientedBox], growths: Option<[&[Growth]; 2]>) {
-        let topology = self.topology;
+    /// Replaces the boxes of all nodes, given in the order of the nodes' ids; then recomputes leaf blocks,
+    /// marks and outline. The growths stay: valid only if the enclosures are the same.
+    pub(crate) fn bound(&mut self, boxes: &[OrientedBox]) {
         self.meta.root.bounds = boxes[NodeId::ROOT.index()];
-        self.arrays.siblings = siblings(&topology, boxes).into();
-        if let Some(growths) = growths {
-            self.meta.root.growths = growths.map(|of| of[NodeId::ROOT.index()]);
-            let [surface, obstacle] = growths.map(|of| growths_of_siblings(&topology, of).into());
-            (self.arrays.surface_growths, self.arrays.obstacle_growths) = (surface, obstacle);
-        }
+        siblings(&self.topology, boxes, self.arrays.siblings.to_mut());
         self.renew_leaves();
         self.meta.outline = self.outlined();
     }
 
     /// Makes what leaves are compared by from the points and the boxes about them.
     fn renew_leaves(&mut self) {
-        let (tree, topology, leaves) = (self.tree(), self.topology, self.leaf_parts());
-        let bounds: Vec<OrientedBox> = map(topology.leaves(), |leaf| tree.bounds(topology.leaf(leaf)));
-        let blocks = leaves.blocks(&topology, &bounds);
-        let marks = map(topology.leaves(), |leaf| leaves.marks(&topology, leaf, &bounds[leaf]));
-        (self.arrays.leaf_blocks, self.arrays.marks) = (blocks.into(), marks.into());
+        let (mut blocks, mut marks) =
+            (std::mem::take(&mut self.arrays.leaf_blocks), std::mem::take(&mut self.arrays.marks));
+        self.fill_leaves(blocks.to_mut(), marks.to_mut());
+        (self.arrays.leaf_blocks, self.arrays.marks) = (blocks, marks);
+    }
+
+    fn fill_leaves(&self, blocks: &mut [LeafBlock], marks: &mut [u8]) {
+        let (tree, topology, leaves) = (self.tree(), &self.topology, self.leaf_parts());
+        let bounds = |leaf: usize| tree.bounds(topology.leaf(leaf));
+        let blocks_a_leaf = LeafParts::blocks_a_leaf(topology);
+        fill(blocks, |number| leaves.block(topology, number, &bounds(number / blocks_a_leaf)));
+        fill(marks, |leaf| leaves.marks(topology, leaf, &bounds(leaf)));
     }
 
     /// The arrays that leaf blocks are built from.
@@ -394,44 +408,59 @@ impl PointHierarchy {
     }
 }
 
-fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, BuildError> {
+fn build(
+    points: &ScanPoints<'_>,
+    options: &BuildOptions,
+    work: &Workspace,
+) -> Result<PointHierarchy, BuildError> {
     let leaf_size = options.leaf_size as usize;
-    let Ordered { topology, boxes, positions, source, fits, dense, groups, sampling } =
-        Ordered::of(cloud, options)?;
-    let Sampling { radii, sampling_radius, reach, plan, blocks, .. } = sampling;
-    let bare = Bare::new(topology, &boxes);
+    let Ordered { topology, mut boxes, positions, source, radii, fits, blocks, plan, summary } =
+        Ordered::of(points, options, work)?;
+    let Summary { dense, sampling_radius, reach } = summary;
+    let groups = groups(&blocks, work)?;
+    let bare = Bare::new(work, topology, &boxes)?;
     let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
-    let lists_of_blocks = neighbours(&index, &positions, &radii);
+    let (lists, listed) = neighbours(&index, &positions, &radii, work)?;
+    work.progress().reach(share::LISTS);
     let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, dense };
     let Surfels { mut normals, codes, balls, flat, cells, leaves, obstacles } =
-        surfels(&index, &known, &fits);
-    drop(fits);
+        surfels(&index, &known, &fits, work)?;
+    drop((fits, bare));
+    work.progress().reach(share::SURFELS);
     normals.chunks_mut(leaf_size).for_each(align);
     let discs = DiscRadii { codes: &codes, radii: &radii, reach, sampling_radius };
     let of_points = Discs { positions: &positions, normals: &normals, discs, balls: &balls };
-    let boxes = boxes_of_discs(&topology, &boxes, &of_points);
+    let mut solid = work.room(blocks.len())?;
+    fill(&mut solid, |number| of_points.block(number));
+    boxes_of_discs(&topology, &mut boxes, &solid);
+    drop(solid);
     drop(balls);
-    let obstacle_growths = growths(&topology, &boxes, &obstacles);
-    let growths = growths(&topology, &boxes, &leaves);
-    let sample_lists = lists(&positions, &topology, options.samples);
+    work.progress().reach(share::BOXES);
+    let obstacle_growths = growths(&topology, &boxes, &obstacles, work)?;
+    let surface_growths = growths(&topology, &boxes, &leaves, work)?;
+    drop((obstacles, leaves));
+    work.progress().reach(share::ENCLOSURES);
+    let sample_lists = lists_of_samples(&positions, &topology, options.samples, work)?;
     let ground = Ground {
         topology: &topology,
         boxes: &boxes,
-        growths: &growths,
+        growths: &surface_growths,
         positions: &positions,
         normals: &normals,
         radii: &radii,
         discs: &flat,
         cells: &cells,
     };
-    let coverings = coverings(&ground, |id| samples(&sample_lists, &topology, id, options.samples));
+    let mut covered = work.room(topology.len())?;
+    coverings(&ground, |id| samples(&sample_lists, &topology, id, options.samples), &mut covered);
     drop((flat, cells));
+    work.progress().reach(share::COVERINGS);
 
     let meta = HierarchyMeta {
-        frame: cloud.frame(),
-        bounds: cloud.bounds(),
-        dropped: cloud.dropped(),
-        step: cloud.step(),
+        frame: points.frame,
+        bounds: points.bounds,
+        dropped: points.dropped,
+        step: points.step,
         sampling_radius,
         reach,
         dense: id32(dense),
@@ -441,25 +470,41 @@ fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<PointHierarchy, B
         is_oriented: false,
         metric: Metric::Euclidean,
         surface: *plan.options(),
-        root: Root::default(),
+        root: Root {
+            bounds: boxes[NodeId::ROOT.index()],
+            growths: [&surface_growths, &obstacle_growths].map(|growths| growths[NodeId::ROOT.index()]),
+        },
         outline: Outline::default(),
     };
+    let mut of_siblings = work.room(topology.inner())?;
+    siblings(&topology, &boxes, &mut of_siblings);
+    let mut surface = work.room(topology.inner())?;
+    growths_of_siblings(&topology, &surface_growths, &mut surface);
+    let mut obstacle = work.room(topology.inner())?;
+    growths_of_siblings(&topology, &obstacle_growths, &mut obstacle);
     let arrays = Arrays {
+        siblings: of_siblings.into(),
+        surface_growths: surface.into(),
+        obstacle_growths: obstacle.into(),
         blocks: blocks.into(),
         sample_lists: sample_lists.into(),
-        coverings: coverings.into(),
+        coverings: covered.into(),
         groups: groups.into(),
-        lists: lists_of_blocks.lists.into(),
-        listed: lists_of_blocks.entries.into(),
+        lists: lists.into(),
+        listed: listed.into(),
         normals: normals.into(),
         radii: radii.into(),
         codes: codes.into(),
         source: source.into(),
-        // Made of the others by `bound`.
+        // Made of the others.
         ..Arrays::default()
     };
-    let positions = Arc::new(positions).into();
+    let positions = Array::from(positions).into();
     let mut hierarchy = PointHierarchy { meta, plan, topology, arrays, positions };
-    hierarchy.bound(&boxes, Some([&growths, &obstacle_growths]));
+    let mut leaf_blocks = work.room(topology.leaves() * LeafParts::blocks_a_leaf(&topology))?;
+    let mut marks = work.room(topology.leaves())?;
+    hierarchy.fill_leaves(&mut leaf_blocks, &mut marks);
+    (hierarchy.arrays.leaf_blocks, hierarchy.arrays.marks) = (leaf_blocks.into(), marks.into());
+    hierarchy.meta.outline = hierarchy.outlined();
     Ok(hierarchy)
 }

@@ -7,14 +7,15 @@ use std::ops::Range;
 
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::chunks;
+use nearmiss_lanes::parallel::{chunks, map};
 use nearmiss_lanes::vector::dot;
 use nearmiss_surface::{Evaluation, Metric};
 
+use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
 use crate::bounds::part::Part;
 use crate::patch::classes::vote;
-use crate::patch::covering::{Ground, Solid, coverings};
+use crate::patch::covering::{Covering, Ground, Solid, coverings};
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::samples;
 use crate::patch::surfels::{Fit, Surfel, align, fitted, surfel_of};
@@ -57,19 +58,18 @@ impl PointHierarchy {
             leaves.iter().cloned().flatten().map(surfel).collect::<Vec<_>>()
         });
         let mut surfels: Vec<Surfel> = surfels.into_iter().flatten().collect();
-        let mut fits: Vec<Fit> =
-            surfels.iter().map(|s| Fit { normal: s.normal, kind: s.code.kind() }).collect();
+        let mut fits: Vec<Fit> = surfels.iter().map(|s| Fit::new(s.normal, s.code.kind())).collect();
         let neighbours = BlockBoxes::new(&self.arrays.blocks, self.len());
         vote(&neighbours.over(&self.arrays.blocks), self.positions(), &self.arrays.radii, &mut fits);
         let corrected: Vec<usize> =
-            (0..fits.len()).filter(|&i| fits[i].kind != surfels[i].code.kind()).collect();
+            (0..fits.len()).filter(|&i| fits[i].kind() != surfels[i].code.kind()).collect();
         let discs = chunks(&corrected, |points| {
             let (mut scratch, mut heard, mut near) = (S::default(), Vec::new(), Vec::new());
             let surfel = |&i: &usize| {
                 heard.clear();
                 fit(id32(i), &mut scratch, &mut heard);
                 self.gather(&heard, &mut near);
-                let fit = Fit { normal: self.on_its_side(i, fits[i].normal), ..fits[i] };
+                let fit = Fit::new(self.on_its_side(i, fits[i].normal), fits[i].kind());
                 surfel_of(&fit, self.positions()[i], &near)
             };
             points.iter().map(surfel).collect::<Vec<_>>()
@@ -128,7 +128,12 @@ impl PointHierarchy {
         }
         let (topology, positions) = (self.topology, self.positions());
         let of_points = Discs { positions, normals: &normals, discs, balls: &balls };
-        let boxes = boxes_of_discs(&topology, &self.boxes().collect::<Vec<_>>(), &of_points);
+        let mut boxes: Vec<OrientedBox> = self.boxes().collect();
+        boxes_of_discs(
+            &topology,
+            &mut boxes,
+            &map(self.arrays.blocks.len(), |number| of_points.block(number)),
+        );
         let growths: Vec<Growth> = topology.ids().map(|id| self.tree().growth(Part::Surface, id)).collect();
         let flat: Vec<Solid> =
             discs.iter().zip(&balls).map(|(disc, &ball)| Solid::of_disc(disc, ball)).collect();
@@ -142,11 +147,12 @@ impl PointHierarchy {
             discs: &flat,
             cells: &flat,
         };
-        let coverings =
-            coverings(&ground, |id| samples(&self.arrays.sample_lists, &topology, id, self.meta.samples));
+        let mut covered = vec![Covering::default(); topology.len()];
+        let sample = |id| samples(&self.arrays.sample_lists, &topology, id, self.meta.samples);
+        coverings(&ground, sample, &mut covered);
         self.arrays.normals = normals.into();
         self.arrays.codes = codes.into();
-        self.arrays.coverings = coverings.into();
-        self.bound(&boxes, None);
+        self.arrays.coverings = covered.into();
+        self.bound(&boxes);
     }
 }

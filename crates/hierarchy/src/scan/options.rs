@@ -1,5 +1,6 @@
 //! How a hierarchy is built.
 
+use nearmiss_store::WorkError;
 use nearmiss_surface::{SurfaceError, SurfaceOptions};
 use thiserror::Error;
 
@@ -117,6 +118,9 @@ pub enum BuildError {
     /// A reach that is not a length, or vanishes beside the scan's extent.
     #[error("reach must be positive, finite and no less than the rounding of positions, got {0}")]
     Reach(f64),
+    /// The folder that the work is done in fails.
+    #[error(transparent)]
+    Work(#[from] WorkError),
     /// The threads could not be started.
     #[error("cannot start {0} threads")]
     Threads(usize),

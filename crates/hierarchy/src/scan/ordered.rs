@@ -1,9 +1,13 @@
 //! The points in the order of their final tree, whose root parts dense from sparse ones, and what is known of
 //! them then.
 
-use nearmiss_geometry::PointCloud;
+use bytemuck::Pod;
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::fill;
+use nearmiss_store::{Room, WorkError, Workspace};
+use nearmiss_surface::SurfacePlan;
+use serde::{Deserialize, Serialize};
 
 use crate::bounds::boxes::OrientedBox;
 use crate::patch::classes::{dense_first, vote};
@@ -11,7 +15,9 @@ use crate::patch::surfels::{Fit, fits};
 use crate::point::gather::Index;
 use crate::point::neighbours::{self, groups as groups_of};
 use crate::scan::options::{BuildError, BuildOptions};
+use crate::scan::points::ScanPoints;
 use crate::scan::sampling::{Sampling, set_reaches};
+use crate::scan::share;
 use crate::tree::split::{Item, split};
 use crate::tree::topology::Topology;
 use crate::tree::wide::Bare;
@@ -20,59 +26,126 @@ use crate::tree::wide::Bare;
 pub(crate) struct Ordered {
     pub(crate) topology: Topology,
     /// About the points alone, in the order of the nodes' ids.
-    pub(crate) boxes: Vec<OrientedBox>,
-    pub(crate) positions: Vec<[f32; 3]>,
+    pub(crate) boxes: Room<OrientedBox>,
+    pub(crate) positions: Room<[f32; 3]>,
     /// Their numbers in the input.
-    pub(crate) source: Vec<u32>,
-    pub(crate) fits: Vec<Fit>,
+    pub(crate) source: Room<u32>,
+    pub(crate) radii: Room<f32>,
+    pub(crate) fits: Room<Fit>,
+    /// The points with their horizons.
+    pub(crate) blocks: Room<PointBlock>,
+    pub(crate) plan: SurfacePlan,
+    pub(crate) summary: Summary,
+}
+
+/// What is known of all points.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(crate) struct Summary {
     /// Sparse points come from here on.
     pub(crate) dense: usize,
-    /// A bounding ball for each block of `sampling.blocks`.
-    pub(crate) groups: Vec<PointBlock>,
-    pub(crate) sampling: Sampling,
+    pub(crate) sampling_radius: f32,
+    /// No radius exceeds it.
+    pub(crate) reach: f32,
 }
 
 impl Ordered {
-    /// Orders the points of a cloud. A first tree of all points tells their spacing and the surface that they
-    /// sample. If some are sparse, a second tree parts these from the others.
-    pub(crate) fn of(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
-        let leaf_size = options.leaf_size as usize;
-        let mut items: Vec<Item> =
-            (0..).zip(cloud.positions()).map(|(index, &position)| Item { position, index }).collect();
-        let points = id32(items.len());
-        let topology = Topology::new(points, options.leaf_size);
-        let mut boxes = split(&mut items, &topology, cloud.positions().len());
-        let mut positions: Vec<[f32; 3]> = items.iter().map(|item| item.position).collect();
-        let mut source: Vec<u32> = items.iter().map(|item| cloud.source()[item.index as usize]).collect();
-        drop(items);
-
-        let mut sampling =
-            Sampling::of(&positions, (&topology, &mut boxes), options, 1.0 / cloud.frame().scale)?;
-        let mut groups = groups_of(&sampling.blocks);
-        let bare = Bare::new(topology, &boxes);
-        let index = Index::without_lists(bare.tree(), (&sampling.blocks, &groups), &sampling.plan);
-        let mut fits = fits(&index, &positions, (&sampling.radii, &sampling.spacings));
-        sampling.spacings = Vec::new();
-        let neighbours = BlockBoxes::new(&sampling.blocks, positions.len());
-        vote(&neighbours.over(&sampling.blocks), &positions, &sampling.radii, &mut fits);
-        drop(neighbours);
-        let mut dense = positions.len();
-        if let Some((mut items, count)) = dense_first(&positions, &fits, leaf_size) {
-            dense = count;
-            boxes = split(&mut items, &topology, dense);
-            positions = items.iter().map(|item| item.position).collect();
-            source = reordered(&items, &source);
-            fits = reordered(&items, &fits);
-            sampling.radii = reordered(&items, &sampling.radii);
-            set_reaches(&topology, &mut boxes, &sampling.radii);
-            sampling.blocks = neighbours::blocks(&sampling.plan, &positions, &sampling.radii);
-            groups = groups_of(&sampling.blocks);
+    /// Orders the points of a scan, or finds them in order where that has been done.
+    pub(crate) fn of(
+        points: &ScanPoints<'_>,
+        options: &BuildOptions,
+        work: &Workspace,
+    ) -> Result<Self, BuildError> {
+        let count = points.positions.len();
+        let topology = Topology::new(id32(count), options.leaf_size);
+        let unit = 1.0 / points.frame.scale;
+        let stage = work.stage("order");
+        if let Some(summary) = stage.done::<Summary>() {
+            return Ok(Self {
+                topology,
+                boxes: stage.room("boxes", topology.len())?,
+                positions: stage.room("positions", count)?,
+                source: stage.room("source", count)?,
+                radii: stage.room("radii", count)?,
+                fits: stage.room("fits", count)?,
+                blocks: stage.room("blocks", count.div_ceil(PointBlock::WIDTH))?,
+                plan: SurfacePlan::new(&options.surface, f64::from(summary.sampling_radius), unit)?,
+                summary,
+            });
         }
-        Ok(Self { topology, boxes, positions, source, fits, dense, groups, sampling })
+        let ordered = Self::new(points, options, unit, topology, work)?;
+        let ordered = Self {
+            boxes: stage.keep("boxes", ordered.boxes)?,
+            positions: stage.keep("positions", ordered.positions)?,
+            source: stage.keep("source", ordered.source)?,
+            radii: stage.keep("radii", ordered.radii)?,
+            fits: stage.keep("fits", ordered.fits)?,
+            blocks: stage.keep("blocks", ordered.blocks)?,
+            ..ordered
+        };
+        stage.close(&ordered.summary)?;
+        Ok(ordered)
+    }
+
+    /// Orders them. A first tree of all points tells their spacing and the surface that they sample. If some
+    /// are sparse, a second tree parts these from the others.
+    fn new(
+        points: &ScanPoints<'_>,
+        options: &BuildOptions,
+        unit: f64,
+        topology: Topology,
+        work: &Workspace,
+    ) -> Result<Self, BuildError> {
+        let count = points.positions.len();
+        let mut items = work.room(count)?;
+        fill(&mut items, |i| Item { position: points.positions[i], index: id32(i) });
+        let mut boxes = work.room(topology.len())?;
+        split(&mut items, &topology, count, &mut boxes);
+        let mut positions = work.room(count)?;
+        let mut source = work.room(count)?;
+        {
+            let items: &[Item] = &items;
+            fill(&mut positions, |i| items[i].position);
+            fill(&mut source, |i| points.source[items[i].index as usize]);
+        }
+        drop(items);
+        work.progress().reach(share::TREE);
+
+        let Sampling { spacings, mut radii, sampling_radius, reach, plan, mut blocks } =
+            Sampling::of(&positions, (&topology, &mut boxes), options, unit, work)?;
+        let groups = groups_of(&blocks, work)?;
+        let bare = Bare::new(work, topology, &boxes)?;
+        let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
+        let mut fits = fits(&index, &positions, (&radii, &spacings), work)?;
+        drop((bare, groups, spacings));
+        work.progress().reach(share::FITS);
+        let neighbours = BlockBoxes::new_in(work, &blocks, count)?;
+        vote(&neighbours.over(&blocks), &positions, &radii, &mut fits);
+        drop(neighbours);
+        let mut dense = count;
+        if let Some((mut items, before)) = dense_first(&positions, &fits, options.leaf_size as usize, work)? {
+            dense = before;
+            split(&mut items, &topology, dense, &mut boxes);
+            let items: &[Item] = &items;
+            fill(&mut positions, |i| items[i].position);
+            source = reordered(items, &source, work)?;
+            fits = reordered(items, &fits, work)?;
+            radii = reordered(items, &radii, work)?;
+            set_reaches(&topology, &mut boxes, &radii);
+            neighbours::blocks(&plan, &positions, &radii, &mut blocks);
+        }
+        work.progress().reach(share::ORDERED);
+        let summary = Summary { dense, sampling_radius, reach };
+        Ok(Self { topology, boxes, positions, source, radii, fits, blocks, plan, summary })
     }
 }
 
 /// The values of points in the order of `items`, whose indices are their places before.
-fn reordered<T: Copy>(items: &[Item], values: &[T]) -> Vec<T> {
-    items.iter().map(|item| values[item.index as usize]).collect()
+fn reordered<T: Pod + Send + Sync>(
+    items: &[Item],
+    values: &[T],
+    work: &Workspace,
+) -> Result<Room<T>, WorkError> {
+    let mut room = work.room(items.len())?;
+    fill(&mut room, |i| values[items[i].index as usize]);
+    Ok(room)
 }

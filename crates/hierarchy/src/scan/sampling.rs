@@ -1,11 +1,15 @@
 //! How densely points lie: local radii, the sampling radius, and the points with their horizons.
 
 use nearmiss_index::{BlockBoxes, PointBlock};
+use nearmiss_lanes::id32;
+use nearmiss_lanes::parallel::fill;
+use nearmiss_store::{Room, Workspace};
 use nearmiss_surface::SurfacePlan;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::point::spacing::{Spacing, fold_nodes, limit, smooth, spacings};
 use crate::scan::options::{BuildError, BuildOptions};
+use crate::scan::share;
 use crate::tree::topology::Topology;
 
 /// Share of the points whose local radius is at most the scan's sampling radius.
@@ -17,14 +21,14 @@ const REACH: f32 = 2.0;
 
 /// How densely points lie, and what follows from it.
 pub(crate) struct Sampling {
-    pub(crate) spacings: Vec<Spacing>,
-    pub(crate) radii: Vec<f32>,
+    pub(crate) spacings: Room<Spacing>,
+    pub(crate) radii: Room<f32>,
     pub(crate) sampling_radius: f32,
     /// No radius exceeds it.
     pub(crate) reach: f32,
     pub(crate) plan: SurfacePlan,
     /// The points with their horizons.
-    pub(crate) blocks: Vec<PointBlock>,
+    pub(crate) blocks: Room<PointBlock>,
 }
 
 impl Sampling {
@@ -35,12 +39,18 @@ impl Sampling {
         (topology, boxes): (&Topology, &mut [OrientedBox]),
         options: &BuildOptions,
         unit: f64,
+        work: &Workspace,
     ) -> Result<Self, BuildError> {
-        let mut blocks: Vec<PointBlock> = PointBlock::silent(positions).collect();
-        let neighbours = BlockBoxes::new(&blocks, positions.len());
+        const WIDTH: usize = PointBlock::WIDTH;
+        let mut blocks = work.room(positions.len().div_ceil(WIDTH))?;
+        let of_block = |number: usize| &positions[number * WIDTH..positions.len().min((number + 1) * WIDTH)];
+        fill(&mut blocks, |number| PointBlock::of(of_block(number)));
+        let neighbours = BlockBoxes::new_in(work, &blocks, positions.len())?;
         let tree = neighbours.over(&blocks);
-        let mut spacings = spacings(positions, &tree, options.radius_neighbours as usize);
-        let mut radii = smooth(&tree, &spacings);
+        let mut spacings = spacings(positions, &tree, options.radius_neighbours as usize, work)?;
+        work.progress().reach(share::SPACINGS);
+        let mut radii = smooth(&tree, &spacings, work)?;
+        work.progress().reach(share::RADII);
         #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
         let reach = options.reach.map_or_else(|| REACH * quantile(&radii), |reach| (reach * unit) as f32);
         if !(reach.is_normal() && reach >= f32::EPSILON * extent(positions)) {
@@ -70,9 +80,26 @@ fn extent(positions: &[[f32; 3]]) -> f32 {
     positions.iter().flatten().fold(0.0, |most, x| most.max(x.abs()))
 }
 
+/// The [sampling radius](sampling_rank) of radii, none of which is negative: their bits are in their order,
+/// and are counted, the upper half first.
 fn quantile(radii: &[f32]) -> f32 {
-    let mut sorted = radii.to_vec();
-    *sorted.select_nth_unstable_by(sampling_rank(radii.len()), f32::total_cmp).1
+    const HALF: u32 = 16;
+    let mut rank = sampling_rank(radii.len());
+    let mut half_at_rank = |halves: &mut dyn Iterator<Item = u32>| {
+        let mut counts = vec![0_usize; 1 << HALF];
+        halves.for_each(|half| counts[half as usize] += 1);
+        let half = counts.iter().position(|&count| {
+            let is_here = rank < count;
+            rank -= if is_here { 0 } else { count };
+            is_here
+        });
+        id32(half.unwrap_or_default())
+    };
+    let bits = || radii.iter().map(|radius| radius.to_bits());
+    let upper = half_at_rank(&mut bits().map(|bits| bits >> HALF));
+    let lower =
+        half_at_rank(&mut bits().filter(|bits| bits >> HALF == upper).map(|bits| bits & ((1 << HALF) - 1)));
+    f32::from_bits(upper << HALF | lower)
 }
 
 /// Which of `count` ascending radii, from 0, is the sampling radius.

@@ -5,6 +5,8 @@
 //! children have the least summed volume of boxes along the same axes. A patch of surface is flat, so every
 //! extent is taken larger by the mean spacing of the points; otherwise all volumes would vanish alike.
 
+use std::sync::{Mutex, PoisonError};
+
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16, f64x2, f64x4};
@@ -35,15 +37,12 @@ const WORTH_A_TRY: f32 = 0.5;
 /// Splits need no more than this many points to tell which axis is better.
 const JUDGED_BY: usize = 512;
 
-/// Orders `items` into the leaves of `topology` and returns a box about the points of each node, in the order
-/// of their ids. The first `dense` items, which fill whole leaves unless they are all, stay before the
-/// others. O(n log n).
-pub(crate) fn split(items: &mut [Item], topology: &Topology, dense: usize) -> Vec<OrientedBox> {
-    let mut boxes = vec![OrientedBox::default(); topology.len()];
-    for (id, bounds) in (Place { items, dense, half: Half::ALL }).split(topology) {
-        boxes[id.index()] = bounds;
-    }
-    boxes
+/// Orders `items` into the leaves of `topology` and sets `boxes` to a box about the points of each node, in
+/// the order of their ids. The first `dense` items, which fill whole leaves unless they are all, stay before
+/// the others. O(n log n).
+pub(crate) fn split(items: &mut [Item], topology: &Topology, dense: usize, boxes: &mut [OrientedBox]) {
+    let boxes = Mutex::new(boxes);
+    Place { items, dense, half: Half::ALL }.split(topology, &boxes);
 }
 
 /// The box about some points along their principal axes.
@@ -62,32 +61,36 @@ struct Place<'a> {
 }
 
 impl<'a> Place<'a> {
-    /// Orders them into leaves; returns the nodes that they make with their boxes.
-    fn split(self, topology: &Topology) -> Vec<(NodeId, OrientedBox)> {
-        let mut boxes = Vec::new();
-        self.split_into(topology, &mut boxes);
-        boxes
+    /// Orders them into leaves, and sets the boxes of the nodes that they make.
+    fn split(self, topology: &Topology, boxes: &Mutex<&mut [OrientedBox]>) {
+        let mut found = Vec::new();
+        if self.items.len() <= TASK {
+            self.split_into(topology, &mut found);
+        } else {
+            let bounds = about(Level::new(), self.items);
+            found.extend(topology.node_of(self.half).map(|id| (id, bounds)));
+            let [left, right] = self.halve(topology, &bounds);
+            both(|| left.split(topology, boxes), || right.split(topology, boxes));
+        }
+        let mut boxes = boxes.lock().unwrap_or_else(PoisonError::into_inner);
+        for (id, bounds) in found {
+            boxes[id.index()] = bounds;
+        }
     }
 
-    fn split_into(self, topology: &Topology, boxes: &mut Vec<(NodeId, OrientedBox)>) {
+    /// The same on one thread: adds the nodes with their boxes to `found`.
+    fn split_into(self, topology: &Topology, found: &mut Vec<(NodeId, OrientedBox)>) {
         let bounds = about(Level::new(), self.items);
-        boxes.extend(topology.node_of(self.half).map(|id| (id, bounds)));
+        found.extend(topology.node_of(self.half).map(|id| (id, bounds)));
         let leaves = topology.leaves_of(self.half);
         if leaves.len() == 1 {
-            boxes.push((topology.leaf(leaves.start), bounds));
+            found.push((topology.leaf(leaves.start), bounds));
             self.items.sort_unstable_by_key(|item| item.index);
             return;
         }
-        let many = self.items.len() > TASK;
         let [left, right] = self.halve(topology, &bounds);
-        if many {
-            let (of_left, of_right) = both(|| left.split(topology), || right.split(topology));
-            boxes.extend(of_left);
-            boxes.extend(of_right);
-        } else {
-            left.split_into(topology, boxes);
-            right.split_into(topology, boxes);
-        }
+        left.split_into(topology, found);
+        right.split_into(topology, found);
     }
 
     /// Parts them; `bounds` is the box about them. What is dense comes first, so where there are both sorts

@@ -6,8 +6,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, u32x4};
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
-use nearmiss_lanes::parallel::map;
+use nearmiss_lanes::parallel::fill;
 use nearmiss_lanes::wide::product;
+use nearmiss_store::{Room, WorkError, Workspace};
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::boxes::OrientedBox;
@@ -322,14 +323,20 @@ fn combined<S: Simd>([a, b, c, d]: [[f32x4<S>; 3]; FAN]) -> [f32x16<S>; 3] {
 pub(crate) struct Bare {
     topology: Topology,
     root: Root,
-    siblings: Vec<Siblings>,
+    siblings: Room<Siblings>,
 }
 
 impl Bare {
     /// With these boxes of all nodes, in the order of their ids.
-    pub(crate) fn new(topology: Topology, boxes: &[OrientedBox]) -> Self {
+    pub(crate) fn new(
+        work: &Workspace,
+        topology: Topology,
+        boxes: &[OrientedBox],
+    ) -> Result<Self, WorkError> {
         let root = Root { bounds: boxes[NodeId::ROOT.index()], growths: [Growth::default(); 2] };
-        Self { topology, root, siblings: siblings(&topology, boxes) }
+        let mut room = work.room(topology.inner())?;
+        siblings(&topology, boxes, &mut room);
+        Ok(Self { topology, root, siblings: room })
     }
 
     pub(crate) fn tree(&self) -> Tree<'_> {
@@ -337,28 +344,24 @@ impl Bare {
     }
 }
 
-/// The boxes of all nodes, in the order of their ids, as those of siblings.
-pub(crate) fn siblings(topology: &Topology, boxes: &[OrientedBox]) -> Vec<Siblings> {
-    inner(topology, |children| {
+/// Sets `out` to the boxes of all nodes, which are in the order of their ids, as those of siblings.
+pub(crate) fn siblings(topology: &Topology, boxes: &[OrientedBox], out: &mut [Siblings]) {
+    fill(out, |i| {
         let mut siblings = Siblings::NONE;
-        for (lane, id) in children.iter().enumerate() {
+        for (lane, id) in topology.children(NodeId(id32(i))).iter().enumerate() {
             siblings.set(lane, &boxes[id.index()]);
         }
         siblings
-    })
+    });
 }
 
 /// The same of what enclosures reach further.
-pub(crate) fn growths_of_siblings(topology: &Topology, growths: &[Growth]) -> Vec<Growths> {
-    inner(topology, |children| {
+pub(crate) fn growths_of_siblings(topology: &Topology, growths: &[Growth], out: &mut [Growths]) {
+    fill(out, |i| {
         let mut siblings = Growths::default();
-        for (lane, id) in children.iter().enumerate() {
+        for (lane, id) in topology.children(NodeId(id32(i))).iter().enumerate() {
             siblings.set(lane, &growths[id.index()]);
         }
         siblings
-    })
-}
-
-fn inner<T: Send>(topology: &Topology, of: impl Fn(Children) -> T + Sync + Send) -> Vec<T> {
-    map(topology.inner(), |i| of(topology.children(NodeId(id32(i)))))
+    });
 }

@@ -20,24 +20,33 @@ pub struct Cones<'a> {
     tree: &'a BlockTree<'a>,
     slope: f32,
     /// The heights of the tips; infinite where there is no point.
-    tips: Vec<[f32; WIDTH]>,
+    tips: &'a [[f32; WIDTH]],
     /// The least tip of each box of the tree, level by level.
     least: Vec<Vec<[f32; WIDTH]>>,
 }
 
 impl<'a> BlockTree<'a> {
-    /// Cones that rise by `slope`, not negative, per length, with their tips at heights that may be infinite,
-    /// but are numbers. O(n).
+    /// Cones that rise by `slope`, not negative, per length, with their tips at the heights of points, which
+    /// may be infinite, but are numbers. They are kept in `tips`. O(n).
     ///
     /// # Panics
-    /// When there is not a height for every point.
+    /// When `tips` has not an item for every block.
     #[must_use]
-    pub fn cones(&'a self, heights: &[f32], slope: f32) -> Cones<'a> {
-        assert_eq!(heights.len(), self.len(), "a height a point");
-        let tips = rows(heights);
+    pub fn cones(
+        &'a self,
+        tips: &'a mut [[f32; WIDTH]],
+        height: impl Fn(usize) -> f32,
+        slope: f32,
+    ) -> Cones<'a> {
+        assert_eq!(tips.len(), self.blocks.len(), "tips a block");
+        for (block, tips) in tips.iter_mut().enumerate() {
+            *tips = [f32::INFINITY; WIDTH];
+            let points = block * WIDTH..block * WIDTH + self.count(block);
+            tips.iter_mut().zip(points).for_each(|(tip, i)| *tip = height(i));
+        }
         let mut least: Vec<Vec<[f32; WIDTH]>> = Vec::with_capacity(self.levels.len());
         for _ in self.levels {
-            let below = least.last().unwrap_or(&tips);
+            let below = least.last().map_or(&*tips, |least| least);
             let tips: Vec<f32> =
                 below.iter().map(|row| row.iter().copied().fold(f32::INFINITY, f32::min)).collect();
             least.push(rows(&tips));

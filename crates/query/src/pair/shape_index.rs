@@ -1,5 +1,7 @@
 //! An index of the points of a scan, for many shapes.
 
+use std::sync::Arc;
+
 use fearless_simd::Level;
 use nearmiss_hierarchy::PointHierarchy;
 use nearmiss_index::{BlockBoxes, BlockTree, Cells};
@@ -13,7 +15,7 @@ use nearmiss_index::{BlockBoxes, BlockTree, Cells};
 pub struct ShapeIndex {
     /// The [identity](nearmiss_hierarchy::Outline) of the scan.
     scan: u64,
-    boxes: BlockBoxes,
+    boxes: Arc<BlockBoxes>,
     pub(crate) cells: Cells,
     pub(crate) level: Level,
 }
@@ -22,7 +24,7 @@ impl ShapeIndex {
     /// The index of `scan`.
     #[must_use]
     pub fn new(scan: &PointHierarchy) -> Self {
-        let boxes = BlockBoxes::new(scan.blocks(), scan.len());
+        let boxes = Arc::new(BlockBoxes::new(scan.blocks(), scan.len()));
         let level = Level::new();
         let cells = boxes.over(scan.blocks()).cells(level);
         Self { scan: scan.outline().identity, boxes, cells, level }

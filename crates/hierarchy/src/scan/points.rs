@@ -1,0 +1,43 @@
+//! The points that a scan is built from.
+
+use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud};
+
+/// The distinct points of a scan, wherever they are: those of a [`PointCloud`], or of a file larger than
+/// memory ([`ScanIntake`](crate::ScanIntake)).
+#[derive(Debug, Clone, Copy)]
+pub struct ScanPoints<'a> {
+    pub(crate) positions: &'a [[f32; 3]],
+    pub(crate) source: &'a [u32],
+    pub(crate) frame: Frame,
+    pub(crate) bounds: Aabb,
+    pub(crate) dropped: Dropped,
+    pub(crate) step: f64,
+}
+
+impl ScanPoints<'_> {
+    /// How many there are.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "a scan has at least eight points")]
+    pub const fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Bounds in the caller's frame.
+    #[must_use]
+    pub const fn bounds(&self) -> &Aabb {
+        &self.bounds
+    }
+}
+
+impl<'a> From<&'a PointCloud> for ScanPoints<'a> {
+    fn from(cloud: &'a PointCloud) -> Self {
+        Self {
+            positions: cloud.positions(),
+            source: cloud.source(),
+            frame: cloud.frame(),
+            bounds: cloud.bounds(),
+            dropped: cloud.dropped(),
+            step: cloud.step(),
+        }
+    }
+}
