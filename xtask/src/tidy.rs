@@ -20,7 +20,7 @@ const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 const LAYERS: [(&str, &[&str]); 18] = [
     ("nearmiss-geometry", &[]),
     ("nearmiss-lanes", &[]),
-    ("nearmiss-index", &["nearmiss-geometry", "nearmiss-lanes"]),
+    ("nearmiss-index", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-store"]),
     ("nearmiss-store", &[]),
     ("nearmiss-io", &["nearmiss-geometry"]),
     ("nearmiss-filter", &["nearmiss-geometry", "nearmiss-lanes", "nearmiss-index"]),

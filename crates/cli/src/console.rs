@@ -3,11 +3,14 @@
 use std::fmt::Display;
 use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
 use std::process::ExitCode;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
+use crate::digits::grouped;
 use crate::error::CliError;
 
 /// Standard error. Failing to write there is ignored: there is nowhere left to say so.
@@ -46,6 +49,43 @@ impl Console {
         Bar(bar)
     }
 
+    /// A bar for about `length` points, with their rate and the time that is left; gone when dropped.
+    pub(crate) fn rate(self, what: impl Display, length: u64) -> Bar {
+        let template = "{msg} [{bar:30}] {human_pos} points, {per_sec}, {eta} left";
+        let bar = self.bar(ProgressBar::new(length), template);
+        bar.set_message(what.to_string());
+        Bar(bar)
+    }
+
+    /// A bar for work that tells the share of it that is done, and how many points it is about; with the
+    /// rate and the time that is left. Gone when dropped.
+    pub(crate) fn share(self, what: impl Display, told: impl Fn() -> (f64, usize) + Send + 'static) -> Watch {
+        const STEPS: f64 = 1000.0;
+        let bar = self.bar(ProgressBar::new(1000), "{msg} [{bar:30}] {percent} %, {eta} left");
+        let (end, ended) = channel();
+        let start = now();
+        let what = what.to_string();
+        let bars = self.bars;
+        let watch = move || {
+            while bars && ended.recv_timeout(Duration::from_millis(200)) == Err(RecvTimeoutError::Timeout) {
+                let (share, points) = told();
+                #[expect(
+                    clippy::cast_precision_loss,
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a rough figure, at most 1000"
+                )]
+                {
+                    let rate = share * points as f64 / start.elapsed().as_secs_f64();
+                    bar.set_position((STEPS * share) as u64);
+                    bar.set_message(format!("{what}, {} points/s", grouped(rate as u64)));
+                }
+            }
+            bar.finish_and_clear();
+        };
+        Watch { end: Some(end), thread: std::thread::Builder::new().spawn(watch).ok() }
+    }
+
     fn bar(self, bar: ProgressBar, template: &str) -> ProgressBar {
         let target = if self.bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         bar.set_draw_target(target);
@@ -68,6 +108,23 @@ impl Bar {
 impl Drop for Bar {
     fn drop(&mut self) {
         self.0.finish_and_clear();
+    }
+}
+
+/// Progress that a thread watches.
+#[derive(Debug)]
+pub(crate) struct Watch {
+    /// Dropped to end the thread.
+    end: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.end = None;
+        if let Some(thread) = self.thread.take() {
+            let _ended = thread.join();
+        }
     }
 }
 

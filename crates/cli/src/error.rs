@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use nearmiss::io::ReadError;
 use nearmiss::mesh::SampleError;
 use nearmiss::slices::{SliceError, StoreError};
-use nearmiss::{BuildError, GraphError, LoadError, PlanError, SaveError};
+use nearmiss::{BuildError, GraphError, LoadError, PlanError, SaveError, WorkError};
 use thiserror::Error;
 
 use crate::matrix::PoseRefused;
@@ -56,6 +56,9 @@ pub enum CliError {
     /// A prepared scan could not be saved.
     #[error(transparent)]
     Save(#[from] SaveError),
+    /// The folder that the work is done in fails.
+    #[error(transparent)]
+    Work(#[from] WorkError),
     /// A mesh could not be sampled.
     #[error("{}: {cause}", path.display())]
     Sample {

@@ -87,9 +87,22 @@ pub(crate) struct Forecast<'a> {
     pub(crate) threads: usize,
     pub(crate) console: Console,
     pub(crate) preparation: Preparation,
+    /// Whether all that is asked for beside the preparation can be done on disk, in less memory.
+    pub(crate) filters_on_disk: bool,
 }
 
+/// Less memory than this is not enough to work on disk with.
+const LEAST_MEMORY: f64 = 1e8;
+
 impl Forecast<'_> {
+    /// The memory that was asked for, if so many points do not fit into it but can be prepared on disk.
+    pub(crate) fn on_disk(&self, points: u64) -> Option<u64> {
+        let Limit::Asked(most) = self.limit else { return None };
+        let fits = self.preparation.bytes(to_float(points)) <= to_float(most);
+        let can = self.preparation == Preparation::Hierarchy && self.filters_on_disk;
+        (can && !fits && to_float(most) >= LEAST_MEMORY).then_some(most)
+    }
+
     /// Refuses a file of `points` points and `bytes` bytes that cannot even be read.
     pub(crate) fn check_reading(&self, points: u64, bytes: u64) -> Result<(), CliError> {
         let need = BASE + to_float(bytes) + READING * to_float(points);
@@ -110,7 +123,9 @@ impl Forecast<'_> {
                 None => "--voxel with a length".to_owned(),
             });
             let lighter = self.preparation.lighter().iter().find(|(lighter, _)| lighter.bytes(count) <= most);
-            remedies.extend(lighter.map(|(_, option)| (*option).to_owned()));
+            let on_disk = self.filters_on_disk && self.preparation != Preparation::Hierarchy;
+            let on_disk = (on_disk && most >= LEAST_MEMORY).then_some("to do without a graph");
+            remedies.extend(lighter.map(|(_, option)| *option).or(on_disk).map(str::to_owned));
         }
         self.refuse(&format!("{} points need", grouped(points)), need, &remedies)
     }
@@ -129,7 +144,12 @@ impl Forecast<'_> {
     }
 
     fn refuse(&self, what: &str, need: f64, remedies: &[String]) -> Result<(), CliError> {
-        refuse(self.path, self.limit, what, need, remedies)
+        let on_disk = self.filters_on_disk && self.preparation == Preparation::Hierarchy;
+        let within = self.limit.bytes().map_or(1e9, |most| (0.5 * most).clamp(LEAST_MEMORY, 1e9));
+        let on_disk = (on_disk && need > within)
+            .then(|| format!("--memory {:.0}MB to work on disk", (within / 1e6).floor()));
+        let remedies: Vec<String> = on_disk.into_iter().chain(remedies.iter().cloned()).collect();
+        refuse(self.path, self.limit, what, need, &remedies)
     }
 }
 
@@ -269,7 +289,7 @@ mod tests {
 
     fn forecast(limit: Limit, preparation: Preparation, path: &PathBuf) -> Forecast<'_> {
         let console = Console::new(true);
-        Forecast { path, limit, threads: 2, console, preparation }
+        Forecast { path, limit, threads: 2, console, preparation, filters_on_disk: false }
     }
 
     #[test]

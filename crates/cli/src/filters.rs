@@ -82,6 +82,13 @@ pub(crate) struct Filtered {
     few_neighbours: Option<usize>,
 }
 
+impl Filtered {
+    /// By the filters of single points.
+    pub(crate) fn by_point(crop: Option<usize>, class: Option<usize>) -> Self {
+        Self { crop, class, ..Self::default() }
+    }
+}
+
 /// Finds the points that stay.
 type Keep<'a> = &'a dyn Fn(&PointCloud) -> Result<Vec<u32>, FilterError>;
 
@@ -94,6 +101,12 @@ impl FilterArgs {
             && voxel.is_none()
             && remove_outliers.is_none()
             && min_neighbours.is_none()
+    }
+
+    /// Returns `true` if points are left out one by one, whatever the others are.
+    pub(crate) fn is_by_point(&self) -> bool {
+        let Self { voxel, remove_outliers, min_neighbours, .. } = self;
+        voxel.is_none() && remove_outliers.is_none() && min_neighbours.is_none()
     }
 
     /// Applies the filters to `cloud`, which was read from `path`, on `threads` threads.

@@ -186,16 +186,8 @@ pub(crate) fn check_raw(path: &Path) -> Result<(), CliError> {
 pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Result<Scan, CliError> {
     let scan = Scan::build(&model.cloud, options)
         .map_err(|cause| CliError::Build { path: path.to_owned(), cause })?;
+    check_step(path, &scan);
     let radius = scan.sampling_radius();
-    if scan.step() > radius / 100.0 {
-        console::warn(format_args!(
-            "{}: single precision moves points by up to {}, more than a hundredth of the sampling radius \
-             {}; shift or split the input, so that it spans less",
-            path.display(),
-            short(scan.step()),
-            short(radius)
-        ));
-    }
     let share = share_of_long_faces(model, LONG * radius);
     if share > LONG_SHARE {
         console::warn(format_args!(
@@ -207,6 +199,20 @@ pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Resul
         ));
     }
     Ok(scan)
+}
+
+/// Warns where rounding moves points by as much as matters.
+pub(crate) fn check_step(path: &Path, scan: &Scan) {
+    let radius = scan.sampling_radius();
+    if scan.step() > radius / 100.0 {
+        console::warn(format_args!(
+            "{}: single precision moves points by up to {}, more than a hundredth of the sampling radius \
+             {}; shift or split the input, so that it spans less",
+            path.display(),
+            short(scan.step()),
+            short(radius)
+        ));
+    }
 }
 
 /// By area; 0 of what has no faces.

@@ -1,6 +1,6 @@
 #![doc = include_str!("../README.md")]
-#![forbid(unsafe_code)]
 
+mod bus;
 mod collide;
 mod console;
 mod convert;
@@ -203,6 +203,7 @@ impl Command {
 /// Runs a command line, the program's own name first, as in [`std::env::args_os`]: help and errors call it
 /// so.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    bus::tell_of_lost_files();
     let mut args = args.into_iter();
     let program = args.next().unwrap_or_default();
     let bin_name = match Path::new(&program).file_stem().and_then(|stem| stem.to_str()) {

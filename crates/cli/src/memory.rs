@@ -8,8 +8,9 @@ use clap::Args;
 /// The option that sets a limit.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct MemoryArgs {
-    /// Refuse to start if more memory is expected to be needed, as in 500MB or 16GB; by default more than is
-    /// available, where that is known
+    /// Memory that may be used, as in 500MB or 16GB; by default what is available, where that is known. What
+    /// needs more is refused before it starts; but `preprocess` prepares points on disk then, beside the
+    /// output, without a graph and with filters of single points
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub memory: Option<u64>,
 }

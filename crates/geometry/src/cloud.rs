@@ -1,15 +1,10 @@
 //! `PointCloud`: distinct finite points in single precision about a double-precision origin.
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
+use crate::cloud_error::CloudError;
+use crate::intake::{Intake, LEAST_POINTS, find_repeated};
 use crate::{Aabb, Frame, Scanner};
-
-/// Fewer distinct points than this define no surface worth asking about.
-const LEAST_POINTS: usize = 8;
-
-/// Beyond this a squared distance leaves the range of double precision.
-const FARTHEST: f64 = 1e150;
 
 mod sealed {
     #[expect(unnameable_types, reason = "that is what seals `Coordinate`")]
@@ -22,66 +17,6 @@ mod sealed {
 pub trait Coordinate: sealed::Sealed + Into<f64> {}
 impl Coordinate for f32 {}
 impl Coordinate for f64 {}
-
-/// Why points do not make a cloud.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum CloudError {
-    /// A coordinate is NaN or infinite.
-    #[error(
-        "point {index} has a coordinate that is not finite; use `PointCloud::cleaned` to drop such points"
-    )]
-    NotFinite {
-        /// Index of the first such point.
-        index: usize,
-    },
-    /// A coordinate is so large that squared distances overflow.
-    #[error("point {index} has a coordinate beyond ±1e150; scale the input down")]
-    TooLarge {
-        /// Index of the first such point.
-        index: usize,
-    },
-    /// Too few distinct finite points.
-    #[error("{distinct} distinct finite points of {given} given; at least 8 are needed")]
-    TooFew {
-        /// How many distinct finite points there are.
-        distinct: usize,
-        /// How many were given.
-        given: usize,
-    },
-    /// More points than a 32-bit id can name.
-    #[error("{given} points; at most 4294967295 can be told apart by a 32-bit id")]
-    TooMany {
-        /// How many were given.
-        given: usize,
-    },
-    /// Attributes, as normals, that do not belong to the points given.
-    #[error(
-        "expected an attribute for each of {points} points, got {given}; give one for each point of the input"
-    )]
-    AttributeCount {
-        /// How many attributes were given.
-        given: usize,
-        /// How many points the cloud was made from.
-        points: usize,
-    },
-    /// An index that no point of the cloud has.
-    #[error("expected indices below {points}, got {index}; use indices of the cloud, not of its input")]
-    NoSuchPoint {
-        /// The first such index.
-        index: u32,
-        /// How many points the cloud has.
-        points: usize,
-    },
-    /// Indices out of order or repeated.
-    #[error("expected ascending indices, got {index} after {before}; sort them and remove duplicates")]
-    NotAscending {
-        /// The first index that is out of order.
-        index: u32,
-        /// The index before it.
-        before: u32,
-    },
-}
 
 /// How many points were left out, and why.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -135,17 +70,10 @@ impl PointCloud {
     /// Names the first point that is too large; fails on fewer than 8 distinct points.
     pub fn cleaned<T: Coordinate>(positions: &[[T; 3]]) -> Result<Self, CloudError> {
         let given = positions.len();
-        if u32::try_from(given).is_err() {
-            return Err(CloudError::TooMany { given });
-        }
-        let bounds = Aabb::of(positions.iter().filter(|p| is_finite(**p)).map(|p| p.map(Into::into)));
-        if bounds.min.iter().chain(&bounds.max).any(|x| x.is_finite() && x.abs() > FARTHEST) {
-            let far = |p: &[T; 3]| is_finite(*p) && p.iter().any(|x| (*x).into().abs() > FARTHEST);
-            let index = positions.iter().position(far).unwrap_or_default();
-            return Err(CloudError::TooLarge { index });
-        }
-        let frame = Frame::around(bounds.min, bounds.max);
-        let mut kept = Vec::with_capacity(given);
+        let mut intake = Intake::default();
+        positions.iter().for_each(|p| intake.add((*p).map(Into::into)));
+        let frame = intake.frame()?;
+        let (mut kept, mut source) = (Vec::with_capacity(given), Vec::with_capacity(given));
         let mut step = 0.0_f64;
         for (index, p) in (0_u32..).zip(positions) {
             if is_finite(*p) {
@@ -153,17 +81,17 @@ impl PointCloud {
                 let local = frame.to_local(world);
                 let back = frame.to_world(local);
                 step = (0..3).fold(step, |s, k| s.max((world[k] - back[k]).abs()));
-                kept.push((local, index));
+                kept.push(local);
+                source.push(index);
             }
         }
         let not_finite = given - kept.len();
         let finite = kept.len();
-        let kept = distinct(kept);
-        let dropped = Dropped { not_finite, duplicate: finite - kept.len(), filtered: 0 };
-        if kept.len() < LEAST_POINTS {
-            return Err(CloudError::TooFew { distinct: kept.len(), given });
+        let (positions, source) = distinct(kept, source);
+        let dropped = Dropped { not_finite, duplicate: finite - positions.len(), filtered: 0 };
+        if positions.len() < LEAST_POINTS {
+            return Err(CloudError::TooFew { distinct: positions.len(), given });
         }
-        let (positions, source) = kept.into_iter().unzip();
         Ok(Self {
             frame,
             positions,
@@ -368,33 +296,16 @@ fn is_finite<T: Coordinate>(p: [T; 3]) -> bool {
 }
 
 /// The first of each group of equal positions, in the order given. O(n log n), 16 bytes a point.
-fn distinct(points: Vec<([f32; 3], u32)>) -> Vec<([f32; 3], u32)> {
-    // A hash of each point above its index: equal points come to stand in one run.
-    let mut keys: Vec<u64> = (0..).zip(&points).map(|(i, (p, _))| hash(*p) & !0xffff_ffff | i).collect();
-    keys.sort_unstable();
-    #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
-    let index = |key: u64| key as u32;
+fn distinct(points: Vec<[f32; 3]>, source: Vec<u32>) -> (Vec<[f32; 3]>, Vec<u32>) {
     let mut repeated = Vec::new();
-    for run in keys.chunk_by_mut(|a, b| a >> 32 == b >> 32).filter(|run| run.len() > 1) {
-        let bits = |key: u64| points[index(key) as usize].0.map(f32::to_bits);
-        run.sort_unstable_by_key(|&key| (bits(key), key));
-        let repeats = run.windows(2).filter(|two| bits(two[0]) == bits(two[1]));
-        repeated.extend(repeats.map(|two| index(two[1])));
-    }
+    find_repeated(&points, &mut vec![0; points.len()], |i| repeated.push(i));
     if repeated.is_empty() {
-        return points;
+        return (points, source);
     }
-    drop(keys);
     repeated.sort_unstable();
     let mut next = repeated.into_iter().peekable();
-    (0_u32..).zip(points).filter(|(i, _)| next.next_if_eq(i).is_none()).map(|(_, p)| p).collect()
-}
-
-/// The bits of a point, mixed: the upper half of the result tells most points apart.
-fn hash(p: [f32; 3]) -> u64 {
-    let [x, y, z] = p.map(|x| u64::from(x.to_bits()));
-    let mixed = (x << 32 | y).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
-    (mixed ^ mixed >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93)
+    let kept = |(i, _): &(u32, _)| next.next_if_eq(i).is_none();
+    (0_u32..).zip(points.into_iter().zip(source)).filter(kept).map(|(_, kept)| kept).unzip()
 }
 
 #[cfg(test)]
@@ -436,12 +347,12 @@ mod tests {
             x
         };
         for of in [3, 40, 1 << 20] {
-            let points: Vec<([f32; 3], u32)> =
-                (0..200_000).map(|i| ([coordinate(of), coordinate(of), coordinate(of)], i)).collect();
+            let points: Vec<[f32; 3]> =
+                (0..200_000).map(|_| [coordinate(of), coordinate(of), coordinate(of)]).collect();
             let mut seen = std::collections::BTreeSet::new();
-            let mut expected = points.clone();
-            expected.retain(|(p, _)| seen.insert(p.map(f32::to_bits)));
-            assert_eq!(distinct(points), expected, "{of} values a coordinate");
+            let is_new = |(p, _): &([f32; 3], u32)| seen.insert(p.map(f32::to_bits));
+            let expected = points.iter().copied().zip(0..).filter(is_new).unzip();
+            assert_eq!(distinct(points, (0..200_000).collect()), expected, "{of} values a coordinate");
         }
     }
 

@@ -3,16 +3,20 @@
 
 mod aabb;
 mod cloud;
+mod cloud_error;
 mod frame;
 mod id;
+mod intake;
 mod pose;
 mod scanner;
 mod triangles;
 
 pub use aabb::Aabb;
-pub use cloud::{CloudError, Coordinate, Dropped, PointCloud};
+pub use cloud::{Coordinate, Dropped, PointCloud};
+pub use cloud_error::CloudError;
 pub use frame::Frame;
 pub use id::{NodeId, PointId};
+pub use intake::{Intake, LEAST_POINTS, find_repeated};
 pub use nalgebra;
 pub use pose::{Pose, PoseError};
 pub use scanner::Scanner;

@@ -25,6 +25,7 @@ pub use point::leaf_block::{LeafBlock, Leaves};
 pub use scan::apart::{Extent, apart};
 pub use scan::build::PointHierarchy;
 pub use scan::data::HierarchyMeta;
+pub use scan::intake::{GatheredPoints, IntakeError, PointGatherer};
 pub use scan::options::{BuildError, BuildOptions};
 pub use scan::outline::{Ball, Outline};
 pub use scan::points::ScanPoints;

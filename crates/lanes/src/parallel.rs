@@ -198,3 +198,36 @@ pub fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R
 /// The threads asked for cannot be started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoThreads;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_over_many_waves() {
+        let count = 16 * WAVE * 2 + 5;
+        let mut next = 0;
+        in_order(
+            count,
+            |range| range,
+            |range: Range<usize>| {
+                assert_eq!(range.start, next, "no run is left out");
+                next = range.end;
+            },
+        );
+        assert_eq!(next, count);
+        let mut out = vec![0; 100];
+        collect_into(&mut out, 50, |range| range.flat_map(|i| [2 * i, 2 * i + 1]).collect());
+        assert_eq!(out, (0..100).collect::<Vec<_>>());
+        in_order(0, |_| (), |()| unreachable!("there is nothing to do"));
+    }
+
+    #[test]
+    fn runs_are_filled_where_they_stand() {
+        let mut out = vec![0; 10];
+        fill_runs(&mut out, 4, |number, run| run.fill(number));
+        assert_eq!(out, [0, 0, 0, 0, 1, 1, 1, 1, 2, 2]);
+        fill(&mut out, |i| 3 * i);
+        assert_eq!(out[9], 27);
+    }
+}

@@ -24,9 +24,12 @@ pub use nearmiss_slices as slices;
 pub use nearmiss_store as store;
 pub use nearmiss_surface as surface;
 
-pub use nearmiss_geometry::{Aabb, CloudError, PointCloud, PointId, Pose, PoseError, TriangleMesh};
+pub use nearmiss_geometry::{Aabb, CloudError, Intake, PointCloud, PointId, Pose, PoseError, TriangleMesh};
 pub use nearmiss_graph::{GraphError, GraphOptions, Paths, SurfaceGraph};
-pub use nearmiss_hierarchy::{BuildError, BuildOptions, PointHierarchy, PointKind};
+pub use nearmiss_hierarchy::{
+    BuildError, BuildOptions, GatheredPoints, IntakeError, PointGatherer, PointHierarchy, PointKind,
+    ScanPoints,
+};
 pub use nearmiss_query::{
     Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, CollideOptions, CollidePlan, Contact, Contacts,
     Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions,
@@ -34,6 +37,6 @@ pub use nearmiss_query::{
     Placed, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
     ShapeIndex, Statistics, Surfels, Until, Verdict, World, each,
 };
-pub use nearmiss_store::Check;
+pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};
 pub use scan::{Density, LoadError, SaveError, Scan};

@@ -10,9 +10,9 @@ use nearmiss_graph::{
     GeodesicKernel, GraphError, GraphOptions, KernelScratch, Samples, Sides, SurfaceGraph, SurfaceGraphMeta,
     Viewpoint,
 };
-use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy};
+use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy, ScanPoints};
 use nearmiss_query::{Placed, Prepared, ShapeIndex};
-use nearmiss_store::{Bytes, Check, File, Flaw, Writer};
+use nearmiss_store::{Bytes, Check, File, Flaw, Workspace, Writer};
 use nearmiss_surface::Metric;
 use serde::{Deserialize, Serialize};
 
@@ -75,6 +75,42 @@ impl Scan {
     /// Names the option that is out of range.
     pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
         Ok(Self::of(PointHierarchy::build(cloud, options)?, None))
+    }
+
+    /// Prepares points that may lie in files, with what is made of them in a workspace: so a scan may be
+    /// larger than memory. The result is the same.
+    ///
+    /// ```
+    /// # use nearmiss::{BuildOptions, GatheredPoints, Intake, PointCloud, PointGatherer, Scan, Workspace};
+    /// # let points: Vec<[f64; 3]> =
+    /// #     (0..400_u32).map(|i| [f64::from(i % 20), f64::from(i / 20), 0.0]).collect();
+    /// let folder = tempfile::tempdir()?;
+    /// let work = Workspace::in_folder(folder.path().join("work"), "what it is made of", 500_000_000)?;
+    /// let points = match GatheredPoints::kept(&work)? {
+    ///     Some(kept) => kept,
+    ///     None => {
+    ///         let mut intake = Intake::default();
+    ///         points.iter().for_each(|p| intake.add(*p));
+    ///         let mut gatherer = PointGatherer::new(&work, &intake)?;
+    ///         points.chunks(100).for_each(|some| gatherer.add(some, |_, _| true));
+    ///         gatherer.finish()?
+    ///     }
+    /// };
+    /// let scan = Scan::build_in(&points.points(), &BuildOptions::default(), &work)?;
+    /// assert_eq!(scan.len(), 400);
+    /// drop(scan);
+    /// work.remove();
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Names the option that is out of range; or the workspace has no room.
+    pub fn build_in(
+        points: &ScanPoints<'_>,
+        options: &BuildOptions,
+        work: &Workspace,
+    ) -> Result<Self, BuildError> {
+        Ok(Self::of(PointHierarchy::build_in(points, options, work)?, None))
     }
 
     /// The same scan, which is of `cloud`, with a graph over its points, by which normals are turned to one

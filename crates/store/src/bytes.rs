@@ -8,7 +8,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 
 #[cfg(feature = "mmap")]
-use crate::map::OwnMap;
+use crate::own_map::OwnMap;
 
 /// Bytes of a whole container, shared by the [`File`](crate::File) and every [`Array`](crate::Array) made
 /// from it.

@@ -21,6 +21,8 @@ mod sniff;
 mod atomic;
 mod writer;
 
+#[cfg(feature = "mmap")]
+mod own_map;
 mod room;
 #[cfg(feature = "mmap")]
 mod warden;

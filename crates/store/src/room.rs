@@ -9,7 +9,7 @@ use crate::array::Array;
 #[cfg(feature = "mmap")]
 use crate::bytes::Bytes;
 #[cfg(feature = "mmap")]
-use crate::map::OwnMap;
+use crate::own_map::OwnMap;
 
 /// An array from a [`Workspace`](crate::Workspace).
 ///

@@ -7,13 +7,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crate::map::Tenant;
+use crate::own_map::Tenant;
 
 /// How often it looks: in this time two cores touch some 50 MB anew.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// It acts when this share of what is allowed is held.
-const SHARE: f64 = 0.75;
+/// It acts when this share of what is allowed is held: while it gives memory back, others touch half as much
+/// again.
+const SHARE: f64 = 0.55;
 
 type Tenants = Arc<Mutex<Vec<Tenant>>>;
 

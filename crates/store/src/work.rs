@@ -11,6 +11,7 @@ use std::io;
 #[cfg(feature = "mmap")]
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytemuck::Pod;
@@ -46,11 +47,11 @@ struct Folder {
     warden: Warden,
 }
 
-/// How far work has come, as shares of the whole.
-#[derive(Debug, Default)]
+/// How far work has come, as shares of the whole. Clones tell the same.
+#[derive(Debug, Clone, Default)]
 pub struct Progress {
     /// Millionths that are done.
-    done: AtomicU64,
+    done: Arc<AtomicU64>,
 }
 
 impl Progress {
@@ -284,7 +285,7 @@ impl Folder {
     /// Room in a file: of this name, which is `kept` with its content or made anew, or without one.
     #[cfg(feature = "mmap")]
     fn room<T: Pod>(&self, name: Option<(&Path, bool)>, len: usize) -> Result<Room<T>, WorkError> {
-        use crate::map::OwnMap;
+        use crate::own_map::OwnMap;
 
         let Some(bytes) = len.checked_mul(size_of::<T>()).filter(|bytes| *bytes > 0) else {
             return Ok(Room::in_memory(len));

@@ -18,6 +18,7 @@ mod scans;
 mod shapes;
 mod slices;
 mod sweep;
+mod town;
 
 use clap::{Parser, Subcommand};
 use nearmiss_benches::Failure;
@@ -67,6 +68,8 @@ enum Command {
     Slices(slices::Asked),
     /// Times of boolean queries over the distance, and near contact
     Sweep(sweep::Options),
+    /// Writes a generated scan of a town, of any size
+    Town(town::Options),
 }
 
 fn main() -> Result<(), Failure> {
@@ -88,5 +91,6 @@ fn main() -> Result<(), Failure> {
         Command::Shapes(arguments) => shapes::run(&arguments),
         Command::Slices(asked) => slices::run(&asked),
         Command::Sweep(options) => sweep::run(&options),
+        Command::Town(options) => town::run(&options),
     }
 }

@@ -1,5 +1,5 @@
-//! Disks that are full, and processes that are killed, while a scan is saved: there is the old file or the
-//! new one.
+//! Disks that are full, processes that are killed, and files that change while they are read: there is the
+//! old file or the new one, and a clear answer.
 #![cfg(unix)]
 
 use std::process::{Child, Command, Stdio};
@@ -43,7 +43,7 @@ fn a_disk_with_no_room_left_keeps_the_previous_file() {
     assert_eq!(litter(&place), [""; 0]);
 }
 
-fn spawn(place: &Place, args: &[&str]) -> Child {
+pub(crate) fn spawn(place: &Place, args: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_nearmiss"))
         .args(args)
         .current_dir(place.path(""))
@@ -85,6 +85,127 @@ fn killed_at_any_time(place: &Place, out: &str, commands: [&[&str]; 2]) {
     place.ok(commands[0]);
     assert_eq!(std::fs::read(place.path(out)).unwrap(), content[0]);
     assert_eq!(litter(place), [""; 0], "the last run leaves nothing behind");
+}
+
+/// Runs a command on a disk of its own, mounted at `disk` with what `before` puts there: `limit` says how.
+/// The status, and then what is there, a name and a checksum a line; `None` where the system allows no such
+/// disk.
+pub(crate) fn on_own_disk(place: &Place, limit: &str, before: &str, args: &[&str]) -> Option<(Done, String)> {
+    let script = format!(
+        "mkdir -p disk && mount -t tmpfs -o {limit} none disk 2>/dev/null || exit 77
+         {before}
+         \"$0\" \"$@\"; status=$?
+         echo ===; cd disk; find . -type f | sort | xargs -r cksum
+         exit $status"
+    );
+    let output = Command::new("unshare")
+        .args(["-rm", "sh", "-c", &script, env!("CARGO_BIN_EXE_nearmiss")])
+        .args(args)
+        .current_dir(place.path(""))
+        .output();
+    let output = output.ok().filter(|output| output.status.code().is_some_and(|code| code < 3));
+    if output.is_none() {
+        eprintln!("skipped: this system lets no test mount a disk");
+    }
+    let mut done = Done::new(output?, args);
+    let (results, left) = done.results.split_once("===\n")?;
+    let left = left.to_owned();
+    done.results = results.to_owned();
+    Some((done, left))
+}
+
+/// A full disk, and one that cannot be written: one error, and what was there is there.
+#[test]
+fn a_disk_that_takes_nothing_keeps_what_was_there() {
+    let place = Place::new();
+    place.cloud("bowl.xyz", bowl(1.0), 0.2);
+    place.cloud("ball.xyz", sphere(1.0), 0.02);
+    place.ok(&["preprocess", "bowl.xyz", "-o", "old.nm", "--quiet"]);
+    place.ok(&["convert", "bowl.xyz", "old.ply", "--quiet"]);
+    place.ok(&["slices", "build", "bowl.xyz", "-o", "old", "--quiet"]);
+    let commands: [&[&str]; 3] = [
+        &["preprocess", "ball.xyz", "-o", "disk/old.nm"],
+        &["convert", "ball.xyz", "disk/old.ply", "--voxel", "0.001"],
+        &["slices", "build", "ball.xyz", "-o", "disk/old", "--pixel", "0.002"],
+    ];
+    for args in commands {
+        let name = args.iter().find_map(|arg| arg.strip_prefix("disk/")).unwrap();
+        let fill = format!("cp -r {name} disk/");
+        let Some((_, before)) = on_own_disk(&place, "size=300k", &fill, &["--version"]) else { return };
+        assert!(!before.is_empty(), "{name}");
+        for (limit, more, words) in
+            [("size=300k", "", "space left"), ("size=300k", "; mount -o remount,ro disk", "ead-only")]
+        {
+            let (done, after) = on_own_disk(&place, limit, &format!("{fill}{more}"), args).unwrap();
+            assert_eq!(done.status, 1, "{args:?}: {}{}", done.results, done.errors);
+            assert_eq!(done.errors.matches("error: ").count(), 1, "{args:?}: {}", done.errors);
+            assert!(done.errors.contains(words) && done.errors.contains("disk"), "{args:?}: {}", done.errors);
+            assert_eq!(after, before, "{args:?}: {}", done.errors);
+        }
+    }
+}
+
+/// A prepared scan that is removed is still there for whoever has opened it; one that is cut short is not.
+#[test]
+fn a_file_that_vanishes_or_is_cut_short_while_it_is_read() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.02);
+    let far: String = (0..200_000)
+        .map(|i| {
+            format!(
+                "{{\"a\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"b\":[1,0,0,{},0,1,0,0,0,0,1,0,0,0,0,1]}}\n",
+                1.0 + f64::from(i) * 1e-6
+            )
+        })
+        .collect();
+    place.write("poses.jsonl", far);
+    for (is_cut, words) in [(false, ""), (true, "error: a file was cut short while it was read")] {
+        place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_nearmiss"))
+            .args(["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl", "--json"])
+            .current_dir(place.path(""))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // The first answers are there: both scans are open.
+        let mut out = child.stdout.take().unwrap();
+        let mut first = [0; 1];
+        std::io::Read::read_exact(&mut out, &mut first).unwrap();
+        if is_cut {
+            std::fs::File::options().write(true).open(place.path("ball.nm")).unwrap().set_len(4096).unwrap();
+        } else {
+            std::fs::remove_file(place.path("ball.nm")).unwrap();
+        }
+        let drained = std::thread::spawn(move || std::io::copy(&mut out, &mut std::io::sink()));
+        let output = child.wait_with_output().unwrap();
+        drained.join().unwrap().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(errors.starts_with(words), "{errors}");
+        assert_eq!(output.status.code(), Some(i32::from(is_cut)), "{errors}");
+    }
+}
+
+/// Ctrl-C, at many moments.
+#[test]
+fn an_interrupted_command_leaves_the_old_file_or_the_new_one() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.015);
+    let args = ["convert", "ball.xyz", "out.las", "--quiet", "--voxel", "0.01"];
+    place.ok(&args);
+    let expected = std::fs::read(place.path("out.las")).unwrap();
+    let mut interrupted = 0;
+    for round in 0..20 {
+        let mut child = spawn(&place, &args);
+        std::thread::sleep(Duration::from_millis(4 * round));
+        let id = child.id().to_string();
+        Command::new("kill").args(["-INT", &id]).status().unwrap();
+        interrupted += u32::from(!child.wait().unwrap().success());
+        assert_eq!(std::fs::read(place.path("out.las")).unwrap(), expected, "round {round}");
+    }
+    assert!(interrupted > 3, "{interrupted} of 20 were interrupted");
+    place.ok(&args);
+    assert_eq!(place.files(), ["ball.xyz", "out.las"]);
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod filtering;
 mod interpolating;
 mod looking_inside;
 mod making_poses;
+mod on_disk;
 mod prepare;
 mod running;
 mod slicing;

@@ -5,34 +5,25 @@ use std::sync::OnceLock;
 use bytemuck::bytes_of;
 use nearmiss_geometry::{Aabb, Dropped, Frame, NodeId, PointCloud, PointId};
 use nearmiss_index::PointBlock;
-use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{fill, on_threads};
 use nearmiss_lanes::vector::dot;
 use nearmiss_store::{Array, Workspace};
-use nearmiss_surface::{Metric, SurfacePlan};
+use nearmiss_surface::SurfacePlan;
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::part::Part;
-use crate::patch::covering::{Ground, coverings};
-use crate::patch::enclosure::growths;
-use crate::patch::extents::{Discs, boxes_of_discs};
-use crate::patch::samples::{lists as lists_of_samples, samples};
-use crate::patch::surfels::{Known, Surfels, align, surfels};
 use crate::point::disc::DiscRadii;
-use crate::point::gather::Index;
 use crate::point::kind::PointKind;
 use crate::point::leaf_block::{LeafBlock, LeafParts, Leaves};
-use crate::point::neighbours::{groups, neighbours};
 use crate::scan::data::{Arrays, HierarchyMeta};
 use crate::scan::options::{BuildError, BuildOptions};
-use crate::scan::ordered::{Ordered, Summary};
 use crate::scan::outline::{Ball, Outline};
 use crate::scan::points::ScanPoints;
-use crate::scan::share;
+use crate::scan::prepare::{Prepared, prepare};
 use crate::scan::slices::Slices;
 use crate::tree::topology::Topology;
-use crate::tree::wide::{Bare, Root, Tree, growths_of_siblings, siblings};
+use crate::tree::wide::{Tree, siblings};
 
 /// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
 ///
@@ -413,92 +404,7 @@ fn build(
     options: &BuildOptions,
     work: &Workspace,
 ) -> Result<PointHierarchy, BuildError> {
-    let leaf_size = options.leaf_size as usize;
-    let Ordered { topology, mut boxes, positions, source, radii, fits, blocks, plan, summary } =
-        Ordered::of(points, options, work)?;
-    let Summary { dense, sampling_radius, reach } = summary;
-    let groups = groups(&blocks, work)?;
-    let bare = Bare::new(work, topology, &boxes)?;
-    let index = Index::without_lists(bare.tree(), (&blocks, &groups), &plan);
-    let (lists, listed) = neighbours(&index, &positions, &radii, work)?;
-    work.progress().reach(share::LISTS);
-    let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, dense };
-    let Surfels { mut normals, codes, balls, flat, cells, leaves, obstacles } =
-        surfels(&index, &known, &fits, work)?;
-    drop((fits, bare));
-    work.progress().reach(share::SURFELS);
-    normals.chunks_mut(leaf_size).for_each(align);
-    let discs = DiscRadii { codes: &codes, radii: &radii, reach, sampling_radius };
-    let of_points = Discs { positions: &positions, normals: &normals, discs, balls: &balls };
-    let mut solid = work.room(blocks.len())?;
-    fill(&mut solid, |number| of_points.block(number));
-    boxes_of_discs(&topology, &mut boxes, &solid);
-    drop(solid);
-    drop(balls);
-    work.progress().reach(share::BOXES);
-    let obstacle_growths = growths(&topology, &boxes, &obstacles, work)?;
-    let surface_growths = growths(&topology, &boxes, &leaves, work)?;
-    drop((obstacles, leaves));
-    work.progress().reach(share::ENCLOSURES);
-    let sample_lists = lists_of_samples(&positions, &topology, options.samples, work)?;
-    let ground = Ground {
-        topology: &topology,
-        boxes: &boxes,
-        growths: &surface_growths,
-        positions: &positions,
-        normals: &normals,
-        radii: &radii,
-        discs: &flat,
-        cells: &cells,
-    };
-    let mut covered = work.room(topology.len())?;
-    coverings(&ground, |id| samples(&sample_lists, &topology, id, options.samples), &mut covered);
-    drop((flat, cells));
-    work.progress().reach(share::COVERINGS);
-
-    let meta = HierarchyMeta {
-        frame: points.frame,
-        bounds: points.bounds,
-        dropped: points.dropped,
-        step: points.step,
-        sampling_radius,
-        reach,
-        dense: id32(dense),
-        leaf_size: options.leaf_size,
-        radius_neighbours: options.radius_neighbours,
-        samples: options.samples,
-        is_oriented: false,
-        metric: Metric::Euclidean,
-        surface: *plan.options(),
-        root: Root {
-            bounds: boxes[NodeId::ROOT.index()],
-            growths: [&surface_growths, &obstacle_growths].map(|growths| growths[NodeId::ROOT.index()]),
-        },
-        outline: Outline::default(),
-    };
-    let mut of_siblings = work.room(topology.inner())?;
-    siblings(&topology, &boxes, &mut of_siblings);
-    let mut surface = work.room(topology.inner())?;
-    growths_of_siblings(&topology, &surface_growths, &mut surface);
-    let mut obstacle = work.room(topology.inner())?;
-    growths_of_siblings(&topology, &obstacle_growths, &mut obstacle);
-    let arrays = Arrays {
-        siblings: of_siblings.into(),
-        surface_growths: surface.into(),
-        obstacle_growths: obstacle.into(),
-        blocks: blocks.into(),
-        sample_lists: sample_lists.into(),
-        coverings: covered.into(),
-        groups: groups.into(),
-        lists: lists.into(),
-        listed: listed.into(),
-        normals: normals.into(),
-        radii: radii.into(),
-        codes: codes.into(),
-        source: source.into(),
-        // Made of the others.
-        ..Arrays::default()
-    };
+    let Prepared { meta, plan, topology, arrays, positions } = prepare(points, options, work)?;
     let positions = Array::from(positions).into();
     let mut hierarchy = PointHierarchy { meta, plan, topology, arrays, positions };
     let mut leaf_blocks = work.room(topology.leaves() * LeafParts::blocks_a_leaf(&topology))?;

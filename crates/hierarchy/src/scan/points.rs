@@ -3,7 +3,7 @@
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud};
 
 /// The distinct points of a scan, wherever they are: those of a [`PointCloud`], or of a file larger than
-/// memory ([`ScanIntake`](crate::ScanIntake)).
+/// memory ([`GatheredPoints`](crate::GatheredPoints)).
 #[derive(Debug, Clone, Copy)]
 pub struct ScanPoints<'a> {
     pub(crate) positions: &'a [[f32; 3]],

@@ -8,3 +8,4 @@ mod golden;
 mod round_trip;
 mod sample;
 mod saving;
+mod working;

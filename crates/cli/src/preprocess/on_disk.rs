@@ -1,0 +1,154 @@
+//! `preprocess` of points that do not fit into memory: what is made of them lies in files beside the output,
+//! and a run that was ended is gone on with.
+
+use std::cell::Cell;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use nearmiss::io::{Pieces, PointPieces, Points, read_in_pieces};
+use nearmiss::{Aabb, GatheredPoints, Intake, IntakeError, PointGatherer, Scan, Workspace};
+
+use super::args::{PreprocessArgs, options};
+use super::outcome::{Seconds, save, tell};
+use crate::console::{Console, now};
+use crate::digits::grouped;
+use crate::error::CliError;
+use crate::filters::{ClassList, Filtered};
+use crate::input;
+use crate::report::ScanReport;
+
+/// Bytes of a file that are read at a time.
+const BLOCK: usize = 1 << 20;
+
+/// The folder that the work for an output is done in.
+pub(super) fn folder(output: &Path) -> PathBuf {
+    let mut name = output.file_name().map(OsString::from).unwrap_or_default();
+    name.push(".work");
+    output.with_file_name(name)
+}
+
+/// Prepares `points` points within `memory` bytes.
+pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Console) -> Result<(), CliError> {
+    let unfit = |what: String| CliError::Unfit { path: args.input.clone(), what };
+    let pieces = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
+        Pieces::Points(pieces) => pieces,
+        Pieces::Mesh(_) => {
+            let what = "this is a mesh, which is read whole; expected points, or more --memory".into();
+            return Err(unfit(what));
+        }
+    };
+    let folder = folder(&args.output);
+    let work = Workspace::in_folder(&folder, &key(args)?, memory)?;
+    let place = folder.display();
+    let start = now();
+    let (gathered, filtered) = match GatheredPoints::kept(&work)? {
+        Some(kept) => {
+            console.note(format_args!("going on with the work of an ended run in {place}"));
+            (kept, Filtered::default())
+        }
+        None => {
+            console.note(format_args!("working on disk, in {place}, which is removed at the end"));
+            match gather(args, &pieces, &work, points, console) {
+                Ok(gathered) => gathered,
+                Err(cause) => {
+                    work.remove();
+                    return Err(cause);
+                }
+            }
+        }
+    };
+    let read = start.elapsed().as_secs_f64();
+
+    let start = now();
+    let points = gathered.points();
+    let bar = console.share(format_args!("preparing {} points", grouped(points.len() as u64)), {
+        let (progress, points) = (work.progress().clone(), points.len());
+        move || (progress.share(), points)
+    });
+    let scan = Scan::build_in(&points, &options(args), &work)
+        .map_err(|cause| CliError::Build { path: args.input.clone(), cause })?;
+    drop(bar);
+    input::check_step(&args.input, &scan);
+    let hierarchy = start.elapsed().as_secs_f64();
+
+    let (bytes, write) = save(args, &scan, console)?;
+    let report = ScanReport::new(&scan, bytes).with_filtered(filtered);
+    let seconds = Seconds { read, hierarchy, graph: 0.0, write };
+    tell(args, &scan, report, seconds)?;
+    drop((scan, gathered));
+    work.remove();
+    Ok(())
+}
+
+/// What the work in a folder is for: the input as it is, and the options that change the result.
+fn key(args: &PreprocessArgs) -> Result<String, CliError> {
+    let failed = CliError::reading(&args.input);
+    let about = args.input.metadata().map_err(failed)?;
+    let path = args.input.canonicalize().unwrap_or_else(|_| args.input.clone());
+    let changed = about.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+    let (version, length) = (env!("CARGO_PKG_VERSION"), about.len());
+    let options = options(args).with_threads(0);
+    let (crop, class, format) = (args.filters.crop, &args.filters.class, args.format.0);
+    Ok(format!("{version} {path:?} {length} {changed:?} {format:?} {options:?} {crop:?} {class:?}"))
+}
+
+/// Reads the points twice: for their frame, and to gather them.
+fn gather(
+    args: &PreprocessArgs,
+    pieces: &PointPieces,
+    work: &Workspace,
+    expected: u64,
+    console: Console,
+) -> Result<(GatheredPoints, Filtered), CliError> {
+    let unfit = |cause: IntakeError| match cause {
+        IntakeError::Work(cause) => CliError::Work(cause),
+        other => CliError::Unfit { path: args.input.clone(), what: other.to_string() },
+    };
+    let name = args.input.display();
+    let bar = console.rate(format_args!("looking through {name}"), expected);
+    let mut intake = Intake::default();
+    pieces.each(|points| {
+        points.positions.iter().for_each(|p| intake.add(*p));
+        bar.advance(points.len() as u64);
+    })?;
+    drop(bar);
+    let bar = console.rate(format_args!("reading {name}"), intake.given() as u64);
+    let mut gatherer = PointGatherer::new(work, &intake).map_err(unfit)?;
+    let crop = args.filters.crop.map(|crop| Aabb { min: crop.min, max: crop.max });
+    let (cropped, of_other_class) = (Cell::new(0), Cell::new(0));
+    let mut without_classes = false;
+    pieces.each(|points| {
+        let classes = wanted_classes(args, points, &mut without_classes);
+        gatherer.add(&points.positions, |i, place| {
+            let is_inside = crop.is_none_or(|crop| crop.contains(place));
+            let is_wanted = classes.is_none_or(|(classes, wanted)| wanted.contains(&classes[i]));
+            let left_out = if is_inside { &of_other_class } else { &cropped };
+            left_out.set(left_out.get() + usize::from(!(is_inside && is_wanted)));
+            is_inside && is_wanted
+        });
+        bar.advance(points.len() as u64);
+    })?;
+    drop(bar);
+    if without_classes {
+        let what = "expected points with classes for --class, got points without; leave it out".into();
+        return Err(CliError::Unfit { path: args.input.clone(), what });
+    }
+    let bar = console.spinner("looking for points at the place of others");
+    let gathered = gatherer.finish().map_err(unfit)?;
+    drop(bar);
+    let of_class = args.filters.class.as_ref().map(|_| of_other_class.get());
+    let filtered = Filtered::by_point(crop.map(|_| cropped.get()), of_class);
+    Ok((gathered, filtered))
+}
+
+/// The classes of some points, and those that are wanted, if some are.
+fn wanted_classes<'a>(
+    args: &'a PreprocessArgs,
+    points: &'a Points,
+    without: &mut bool,
+) -> Option<(&'a [u8], &'a [u8])> {
+    let ClassList(wanted) = args.filters.class.as_ref()?;
+    *without |= points.classes.len() != points.len();
+    (!*without).then_some((&*points.classes, &**wanted))
+}
