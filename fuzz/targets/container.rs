@@ -2,9 +2,9 @@
 //! says how much is checked, and whether the header is to state the length that the file has.
 #![no_main]
 
-#[path = "../../crates/nearmiss/tests/hostile/exercise.rs"]
+#[path = "../../crates/nearmiss/tests/facade/hostile/exercise.rs"]
 mod exercise;
-#[path = "../../crates/nearmiss/tests/hostile/repair.rs"]
+#[path = "../../crates/nearmiss/tests/facade/hostile/repair.rs"]
 mod repair;
 
 use std::sync::OnceLock;

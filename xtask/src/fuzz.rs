@@ -4,16 +4,18 @@
 //! for it are passed through.
 
 use std::fs;
+use std::path::PathBuf;
 use std::process::Command;
 
-use nearmiss::{BuildOptions, PointCloud, Scan};
+use nearmiss::slices::{Pixel, SliceBuilder, SliceOptions, SlicePlan, SliceTarget};
+use nearmiss::{Aabb, BuildOptions, PointCloud, Scan};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::files;
 
 use crate::repository::{Outcome, cargo, root, run as run_command};
 
-const TARGETS: [&str; 11] =
-    ["container", "ply", "pcd", "obj", "xyz", "las", "e57", "npy", "stl", "off", "gltf"];
+const TARGETS: [&str; 13] =
+    ["container", "slices", "lines", "ply", "pcd", "obj", "xyz", "las", "e57", "npy", "stl", "off", "gltf"];
 
 /// Edges are counted in place, and comparisons tell the fuzzer what they wanted.
 const FLAGS: &str = "--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
@@ -75,6 +77,8 @@ fn host() -> Outcome<String> {
 fn seeds(target: &str) -> Outcome<Vec<Vec<u8>>> {
     let endings: &[&str] = match target {
         "container" => return containers(),
+        "slices" => return slices(),
+        "lines" => return Ok(LINES.iter().map(|line| line.as_bytes().to_vec()).collect()),
         "xyz" => &["xyz", "csv"],
         "las" => &["las", "laz"],
         "gltf" => &["gltf", "glb"],
@@ -82,6 +86,31 @@ fn seeds(target: &str) -> Outcome<Vec<Vec<u8>>> {
     };
     let has_ending = |name: &str| endings.iter().any(|ending| name.ends_with(ending));
     Ok(files::all().into_iter().filter(|(name, _)| has_ending(name)).map(|(_, bytes)| bytes).collect())
+}
+
+/// Poses, shapes, boxes and a route, behind a byte that says which.
+const LINES: [&str; 4] = [
+    "\u{0}{\"a\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"b\":[1,0,0,0.5,0,1,0,0,0,0,1,0.2,0,0,0,1]}\n",
+    "\u{1}{\"sphere\":{\"centre\":[0,0,1],\"radius\":0.5}}\n",
+    "\u{2}{\"min\":[0,0,0],\"max\":[1,1,1]}\n",
+    "\u{3}{\"start\":[0.2,0.2,0],\"points\":[[1,1],[1.5,0.5]]}\n",
+];
+
+/// The files of a small map, each behind a byte that says which it is.
+fn slices() -> Outcome<Vec<Vec<u8>>> {
+    let points: Vec<[f64; 3]> = arbitrary::cloud(CloudKind::Sphere, 300, 3);
+    let bounds = Aabb::of(points.iter().copied());
+    let options = SliceOptions::default().with_pixel(Pixel::Count(20));
+    let plan = SlicePlan::new(&options, &bounds)?;
+    let mut builder = SliceBuilder::new(&plan)?;
+    builder.add(&points);
+    let folder = tempfile::tempdir()?;
+    SliceTarget::new(folder.path())?.save(&builder.finish())?;
+    let mut files: Vec<_> = fs::read_dir(folder.path())?.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| path.is_file());
+    files.sort();
+    let seed = |(i, path): (u8, &PathBuf)| Ok([&[i][..], &fs::read(path)?].concat());
+    (0..).zip(&files).map(seed).collect()
 }
 
 /// Prepared scans, behind a byte that says how they are checked.
@@ -112,7 +141,11 @@ mod tests {
     fn every_target_has_a_source_and_sound_seeds() {
         for target in TARGETS {
             let source = root().join("fuzz/targets").join(target).with_extension("rs");
-            assert!(source.is_file(), "{target}");
+            let text = fs::read_to_string(&source).unwrap();
+            for part in text.lines().filter_map(|line| line.strip_prefix("#[path = \"")) {
+                let part = root().join("fuzz/targets").join(part.trim_end_matches("\"]"));
+                assert!(part.is_file(), "{target} uses {}", part.display());
+            }
             let seeds = seeds(target).unwrap();
             assert!(
                 !seeds.is_empty() && seeds.iter().all(|seed| seed.len() < LONGEST_INPUT as usize),

@@ -136,9 +136,14 @@ pub(crate) fn warn(what: impl Display) {
 /// Says why the command failed, if there is anything to say.
 pub(crate) fn fail(error: &CliError) -> ExitCode {
     if !error.is_silent() {
-        let _ = writeln!(io::stderr().lock(), "error: {error}");
+        say_error(error);
     }
     ExitCode::from(error.status())
+}
+
+/// Says what has gone wrong, on standard error.
+pub(crate) fn say_error(what: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "error: {what}");
 }
 
 /// Standard output, for results alone.

@@ -68,10 +68,16 @@ const BLOCK: usize = 1 << 20;
 #[derive(Debug, Serialize)]
 struct Report {
     read: u64,
-    not_finite: u64,
     written: u64,
+    dropped: Dropped,
     bytes: u64,
     seconds: f64,
+}
+
+/// Points that are left out whatever is asked.
+#[derive(Debug, Serialize)]
+struct Dropped {
+    not_finite: u64,
 }
 
 /// Where points come from, as often as they are asked for.
@@ -97,6 +103,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), CliError> {
     let expected = glance(&args.input, args.format.0).map(|Glance { points, .. }| points);
     let factor = args.units.map_or(1.0, |unit| args.from_units.metres() / unit.metres());
     let steps = Steps { args, factor };
+    let _limit = input::limit_reading(&args.input, args.format.0);
     let bar = progress(console, "reading", expected);
     let (source, found) = look(open(args)?, &steps, expected, &bar)?;
     drop(bar);
@@ -129,7 +136,7 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), CliError> {
     drop(bar);
     let bytes = args.output.metadata().map_err(CliError::reading(&args.output))?.len();
     let seconds = start.elapsed().as_secs_f64();
-    tell(args, &Report { read, not_finite, written: survey.points(), bytes, seconds })
+    tell(args, &Report { read, written: survey.points(), dropped: Dropped { not_finite }, bytes, seconds })
 }
 
 /// Opens the input.
@@ -242,7 +249,7 @@ fn tell(args: &ConvertArgs, report: &Report) -> Result<(), CliError> {
     if args.json {
         results.json(report)?;
     } else {
-        let Report { read, not_finite, written, bytes, seconds } = *report;
+        let Report { read, written, dropped: Dropped { not_finite }, bytes, seconds } = *report;
         #[expect(clippy::cast_precision_loss, reason = "a rate to two digits")]
         let rate = read as f64 / seconds.max(1e-9) / 1e6;
         let dropped =

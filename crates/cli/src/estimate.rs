@@ -91,6 +91,11 @@ pub(crate) struct Forecast<'a> {
     pub(crate) filters_on_disk: bool,
 }
 
+/// Bytes of memory that it takes to read a file of `points` points and `bytes` bytes, itself included.
+pub(crate) fn reading(points: u64, bytes: u64) -> f64 {
+    BASE + to_float(bytes) + READING * to_float(points)
+}
+
 /// Less memory than this is not enough to work on disk with.
 const LEAST_MEMORY: f64 = 1e8;
 
@@ -105,7 +110,7 @@ impl Forecast<'_> {
 
     /// Refuses a file of `points` points and `bytes` bytes that cannot even be read.
     pub(crate) fn check_reading(&self, points: u64, bytes: u64) -> Result<(), CliError> {
-        let need = BASE + to_float(bytes) + READING * to_float(points);
+        let need = reading(points, bytes);
         let what = format!("reading {} points needs", grouped(points));
         self.refuse(&what, need, &["a part of the file".to_owned()])
     }

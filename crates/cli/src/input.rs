@@ -4,12 +4,14 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
-use nearmiss::io::{Format, Model};
+use nearmiss::io::{Format, Model, glance};
 use nearmiss::{BuildOptions, Check, GraphOptions, Metric, Scan};
 
 use crate::console::{self, Console};
 use crate::digits::short;
 use crate::error::CliError;
+use crate::estimate;
+use crate::guarded::ReadingLimit;
 
 /// First bytes of a prepared scan, also of one whose line ends were translated on the way.
 const MAGIC: &[u8] = b"\x8Enmiss";
@@ -168,7 +170,14 @@ pub(crate) fn with_graph(
 /// Reads a raw input.
 pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliError> {
     check_raw(path)?;
+    let _limit = limit_reading(path, format);
     Ok(nearmiss::io::read(path, format)?)
+}
+
+/// Limits the memory that a child process may take to read a file.
+pub(crate) fn limit_reading(path: &Path, format: Option<Format>) -> ReadingLimit {
+    let expected = glance(path, format).map_or(0.0, |seen| estimate::reading(seen.points, seen.bytes));
+    ReadingLimit::new(expected)
 }
 
 /// Checks that an input is there and no prepared scan.

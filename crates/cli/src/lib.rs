@@ -20,6 +20,7 @@ mod touch;
 
 mod estimate;
 mod filters;
+mod guarded;
 mod input;
 mod matrix;
 mod memory;
@@ -178,6 +179,26 @@ pub enum Command {
 }
 
 impl Command {
+    /// The files that are read: points, meshes or prepared scans.
+    fn inputs(&self) -> Vec<&Path> {
+        match self {
+            Self::Preprocess(args) => vec![&args.input],
+            Self::Convert(args) => vec![&args.input],
+            Self::Inspect(args) => vec![&args.file],
+            Self::Eval(args) => vec![&args.file],
+            Self::Collide(args) => vec![&args.pair.a, &args.pair.b],
+            Self::Curve(args) => vec![&args.pair.a, &args.pair.b],
+            Self::Distance(args) => vec![&args.pair.a, &args.pair.b],
+            Self::Touch(args) => vec![&args.scan],
+            Self::Density(args) => vec![&args.a],
+            Self::Poses(args) => vec![&args.a, &args.b],
+            Self::Export(args) => vec![&args.file],
+            Self::Sample(args) => vec![&args.input],
+            Self::Slices(SlicesCommand::Build(args)) => vec![&args.input],
+            Self::Slices(_) => vec![],
+        }
+    }
+
     /// Does what is asked: results on standard output, the rest on standard error.
     #[must_use]
     pub fn run(&self) -> ExitCode {
@@ -204,20 +225,24 @@ impl Command {
 /// so.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     bus::tell_of_lost_files();
-    let mut args = args.into_iter();
-    let program = args.next().unwrap_or_default();
-    let bin_name = match Path::new(&program).file_stem().and_then(|stem| stem.to_str()) {
-        // The way to call it is an alias in the repository's configuration.
-        Some("xtask") => "cargo xtask",
-        Some(stem) => stem,
-        None => "nearmiss",
-    };
+    let args: Vec<OsString> = args.into_iter().collect();
+    let bin_name =
+        match args.first().map(Path::new).unwrap_or(Path::new("")).file_stem().and_then(|stem| stem.to_str())
+        {
+            // The way to call it is an alias in the repository's configuration.
+            Some("xtask") => "cargo xtask",
+            Some(stem) => stem,
+            None => "nearmiss",
+        };
     let parsed = Cli::command()
         .bin_name(bin_name)
-        .try_get_matches_from(iter::once(bin_name.into()).chain(args))
+        .try_get_matches_from(iter::once(bin_name.into()).chain(args.iter().skip(1).cloned()))
         .and_then(|matches| Cli::from_arg_matches(&matches));
     match parsed {
-        Ok(cli) => cli.command.run(),
+        Ok(cli) => {
+            let in_child = guarded::run_in_child(&args, &cli.command.inputs());
+            in_child.unwrap_or_else(|| cli.command.run())
+        }
         Err(mut refused) => {
             suggest_output(&mut refused);
             // Help and version go to standard output, errors to standard error; a closed pipe is nobody's

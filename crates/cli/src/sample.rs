@@ -58,7 +58,9 @@ pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     let bar = console.spinner(format_args!("sampling {}", args.input.display()));
     input::check_there(&args.input)?;
+    let limit = input::limit_reading(&args.input, None);
     let mesh = nearmiss::io::read_mesh(&args.input, None)?;
+    drop(limit);
     if let Some(spacing) = args.spacing {
         check_sampling(&args.input, args.memory.limit(), console, &mesh, (spacing, args.seed.is_some()))?;
     }

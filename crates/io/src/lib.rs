@@ -42,6 +42,6 @@ pub use glance::{Glance, glance};
 pub use out::{Lattice, OutError, OutputFormat, PointWriter, Survey, UnknownOutputFormat};
 pub use pieces::{Pieces, PointPieces, read_in_pieces};
 pub use points::Points;
-pub use read::{read, read_bytes, read_mesh, read_mesh_bytes};
+pub use read::{format_of, read, read_bytes, read_mesh, read_mesh_bytes};
 pub use sink::Model;
 pub use write::{Column, PlyPoints, WriteError};

@@ -67,6 +67,17 @@ pub fn read_mesh_bytes(
     parse(bytes, format, name)?.into_mesh(name)?.ok_or_else(no_faces)
 }
 
+/// The format of a file, by its first 64 KiB, then by its name.
+///
+/// # Errors
+/// When the file cannot be read, is empty, or is of no format that can be read.
+pub fn format_of(path: impl AsRef<Path>) -> Result<Format, ReadError> {
+    let path = path.as_ref();
+    check_file(path)?;
+    let mut file = File::open(path).map_err(|cause| ReadError::Io { path: path.into(), cause })?;
+    Start::of(&mut file, None, path).map(|start| start.format)
+}
+
 /// What some programs begin text with.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 

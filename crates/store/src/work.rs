@@ -30,7 +30,7 @@ const KEY: &str = "work.key";
 const ARRAY: &str = "room";
 const DONE: &str = "done";
 
-/// A place for large arrays. See the [module](self).
+/// A place for large arrays: in memory, or in mapped files of a folder.
 #[derive(Debug, Default)]
 pub struct Workspace {
     folder: Option<Folder>,

@@ -31,6 +31,7 @@ pub(super) fn folder(output: &Path) -> PathBuf {
 /// Prepares `points` points within `memory` bytes.
 pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Console) -> Result<(), CliError> {
     let unfit = |what: String| CliError::Unfit { path: args.input.clone(), what };
+    let limit = input::limit_reading(&args.input, args.format.0);
     let pieces = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
         Pieces::Points(pieces) => pieces,
         Pieces::Mesh(_) => {
@@ -59,6 +60,7 @@ pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Cons
         }
     };
     let read = start.elapsed().as_secs_f64();
+    drop(limit);
 
     let start = now();
     let points = gathered.points();

@@ -27,7 +27,7 @@ fn round_trips_through_all_formats_are_exact() {
     let mut from = "start.csv".to_owned();
     for to in ["a.ply", "a.pcd", "a.las", "a.laz", "b.las", "a.xyz"] {
         let report = place.ok(&["convert", &from, to, "--json"]).json().remove(0);
-        assert_eq!(keys(&report), sorted("read not_finite written bytes seconds"));
+        assert_eq!(keys(&report), sorted("read dropped written bytes seconds"));
         assert_eq!((report["read"].as_u64(), report["written"].as_u64()), (Some(500), Some(500)), "{to}");
         let cloud = read(place.path(to), None).unwrap().cloud;
         let places: Vec<[f64; 3]> = (0..500).map(|i| cloud.point(i)).collect();
@@ -85,7 +85,7 @@ fn voxels_and_units() {
     points.push([f64::NAN, 0.0, 0.0]);
     place.write("all.xyz", text(&points));
     let report = place.ok(&["convert", "all.xyz", "few.ply", "--voxel", "0.1", "--json"]).json().remove(0);
-    assert_eq!(report["not_finite"].as_u64(), Some(1));
+    assert_eq!(report["dropped"]["not_finite"].as_u64(), Some(1));
     place.ok(&["preprocess", "all.xyz", "-o", "few.nm", "--voxel", "0.1", "--quiet"]);
     let in_memory = place.ok(&["inspect", "few.nm", "--json"]).json().remove(0)["points"].as_u64();
     assert_eq!(report["written"].as_u64(), in_memory, "as many cells as in memory");

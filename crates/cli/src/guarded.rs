@@ -1,0 +1,119 @@
+//! The second line of defence against damaged files: a command that reads a format which a library decodes
+//! (LAZ, E57, glTF) runs in a child process, whose memory is limited while it reads.
+//!
+//! The first line is `nearmiss::io`, which checks sizes and counts before the library sees a byte. If a
+//! library ends the process nevertheless, by running out of memory for example, the parent says so, with the
+//! name of the file, as for any other error.
+
+use std::env;
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::{Command, ExitCode, ExitStatus};
+
+use nearmiss::io::{Format, format_of};
+
+use crate::console;
+
+/// Set in the child, so that it does the work.
+const IN_CHILD: &str = "NEARMISS_IN_CHILD";
+
+/// Exit status after Ctrl-C, by the custom of shells.
+#[cfg(unix)]
+const INTERRUPTED: u8 = 130;
+
+/// Runs this program again, in a child process, if one of the inputs is decoded by a library. Returns `None`
+/// if the work is to be done here: in the child, for all other inputs, and where no child can be started.
+pub(crate) fn run_in_child(args: &[OsString], inputs: &[&Path]) -> Option<ExitCode> {
+    if env::var_os(IN_CHILD).is_some() {
+        end_with_parent();
+        return None;
+    }
+    let file = inputs.iter().find(|path| is_decoded_by_library(path))?;
+    let mut command = Command::new(env::current_exe().ok()?);
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::arg0(&mut command, args.first()?);
+    let status = command.args(args.get(1..)?).env(IN_CHILD, "1").status().ok()?;
+    Some(exit_code(status, file))
+}
+
+fn is_decoded_by_library(path: &Path) -> bool {
+    matches!(format_of(path), Ok(Format::Las | Format::E57 | Format::Gltf))
+}
+
+/// The exit status of the child, or an error if a signal has ended it.
+fn exit_code(status: ExitStatus, file: &Path) -> ExitCode {
+    if let Some(code) = status.code() {
+        return ExitCode::from(u8::try_from(code).unwrap_or(1));
+    }
+    #[cfg(unix)]
+    if std::os::unix::process::ExitStatusExt::signal(&status) == Some(signal_hook::consts::SIGINT) {
+        return ExitCode::from(INTERRUPTED);
+    }
+    console::say_error(format_args!(
+        "{}: expected a file that can be decoded, got a decoder that ended the process ({status}): the file \
+         is damaged, or memory is short; nothing was written. Try a copy of the file that was written anew",
+        file.display()
+    ));
+    ExitCode::FAILURE
+}
+
+/// Sees to it that a child does not outlive the parent.
+fn end_with_parent() {
+    #[cfg(target_os = "linux")]
+    let _asked = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
+}
+
+/// What a child may allocate while it reads, beyond what is expected, in bytes.
+#[cfg(target_os = "linux")]
+const SPARE: f64 = 512e6;
+
+/// A limit on the memory of a child, until it is dropped.
+#[derive(Debug)]
+pub(crate) struct ReadingLimit {
+    #[cfg(target_os = "linux")]
+    before: Option<rustix::process::Rlimit>,
+}
+
+impl ReadingLimit {
+    /// Limits the memory that a child may allocate to some 500 MB more than the `expected` bytes. Does nothing
+    /// outside a child, and on systems other than Linux.
+    pub(crate) fn new(expected: f64) -> Self {
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+
+            let set = || {
+                env::var_os(IN_CHILD)?;
+                let before = getrlimit(Resource::Data);
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
+                let most = allocated()?.saturating_add((expected + SPARE) as u64);
+                let current = Some(before.current.map_or(most, |current| current.min(most)));
+                setrlimit(Resource::Data, Rlimit { current, maximum: before.maximum }).ok()?;
+                Some(before)
+            };
+            Self { before: set() }
+        }
+        #[cfg(not(target_os = "linux"))]
+        {
+            let _unlimited = expected;
+            Self {}
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+impl Drop for ReadingLimit {
+    fn drop(&mut self) {
+        if let Some(before) = self.before.take() {
+            let _lifted = rustix::process::setrlimit(rustix::process::Resource::Data, before);
+        }
+    }
+}
+
+/// Bytes of memory that the process has asked for, mapped files apart.
+#[cfg(target_os = "linux")]
+fn allocated() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmData:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
+}
