@@ -11,6 +11,7 @@
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
 //! * `check-proof` — whether what `collide --prove` wrote holds.
 //! * `field` — f over a slice of a noisy scan, and how often its normal changes sides.
+//! * `readers` — install readers of other people, whose points a test compares with ours.
 //! * `fuzz [TARGET] [SECONDS]` — feed the readers with inputs that a fuzzer makes up; see fuzz/README.md.
 //! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
@@ -23,6 +24,7 @@ mod fuzz;
 mod geodesic;
 mod inventory;
 mod level;
+mod readers;
 mod repository;
 mod tables;
 mod tidy;
@@ -48,7 +50,9 @@ of the repository
                  a picture of f over a slice of a noisy scan; --table counts where its normal flips
   tables -o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--quick]
                  Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, their paper of 2005, dos Anjos et al. 2012, measured
-  fuzz [TARGET] [SECONDS]  inputs made up by a fuzzer: container, ply, pcd, obj, xyz, las, e57, npy, stl, off, gltf; 60 s each
+  readers        install readers of other people, whose points a test then compares with ours
+  fuzz [TARGET] [SECONDS]
+                 inputs made up by a fuzzer: container, slices, lines, ply, pcd, obj, xyz, las, e57, npy, stl, off, gltf; 60 s each
 
 of nearmiss (`cargo xtask COMMAND --help` says more)
   preprocess, convert, inspect, eval, collide, curve, poses, export, sample, slices";
@@ -73,6 +77,7 @@ fn main() -> ExitCode {
         ["geodesic", words @ ..] => geodesic::run(words),
         ["inventory", words @ ..] => inventory::run_with(words),
         ["level", words @ ..] => level::run(words),
+        ["readers"] => readers::run(),
         ["fuzz", words @ ..] => fuzz::run(words),
         ["tables", words @ ..] => tables::run(words),
         ["test", names @ ..] => checks::run(names),

@@ -141,9 +141,9 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), CliError> {
 
 /// Opens the input.
 fn open(args: &ConvertArgs) -> Result<Source, CliError> {
-    let mesh = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
+    let (vertices, mesh) = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
         Pieces::Points(points) => return part(args, points).map(Source::Pieces),
-        Pieces::Mesh(mesh) => mesh,
+        Pieces::Mesh { vertices, mesh } => (vertices, mesh),
     };
     console::warn(format_args!(
         "{}: only the {} vertices are written, not the {}; `sample` makes points all over the surface",
@@ -151,7 +151,7 @@ fn open(args: &ConvertArgs) -> Result<Source, CliError> {
         grouped(mesh.vertices().len() as u64),
         count(mesh.triangles().len() as u64, "triangle"),
     ));
-    Ok(Source::Vertices(Points::of_positions(mesh.vertices().to_vec())))
+    Ok(Source::Vertices(vertices))
 }
 
 /// What has to be read of the points for what is asked.

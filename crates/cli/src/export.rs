@@ -135,11 +135,14 @@ fn points(scan: &Scan, out: &mut impl Write) -> Result<(), WriteError> {
 /// The nodes at a depth, and leaves above it; all of them if no depth is given.
 pub(crate) fn at_depth<'a>(
     scan: &'a Scan,
-    depths: &'a [u32],
+    depths: &'a [u8],
     level: Option<u32>,
 ) -> impl Iterator<Item = usize> + 'a {
     let is_wanted = move |i: usize| match level {
-        Some(level) => depths[i] == level || i >= scan.topology().inner() && depths[i] < level,
+        Some(level) => {
+            let depth = u32::from(depths[i]);
+            depth == level || i >= scan.topology().inner() && depth < level
+        }
         None => true,
     };
     (0..depths.len()).filter(move |&i| is_wanted(i))

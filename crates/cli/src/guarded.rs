@@ -50,8 +50,8 @@ fn exit_code(status: ExitStatus, file: &Path) -> ExitCode {
         return ExitCode::from(INTERRUPTED);
     }
     console::say_error(format_args!(
-        "{}: expected a file that can be decoded, got a decoder that ended the process ({status}): the file \
-         is damaged, or memory is short; nothing was written. Try a copy of the file that was written anew",
+        "{}: expected a file that can be decoded, got a decoder that ended its process ({status}); write the \
+         file anew if it is damaged, or free some memory; the output is as it was",
         file.display()
     ));
     ExitCode::FAILURE

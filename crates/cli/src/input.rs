@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
 
 use nearmiss::io::{Format, Model, glance};
 use nearmiss::{BuildOptions, Check, GraphOptions, Metric, Scan};
@@ -178,6 +179,14 @@ pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliErro
 pub(crate) fn limit_reading(path: &Path, format: Option<Format>) -> ReadingLimit {
     let expected = glance(path, format).map_or(0.0, |seen| estimate::reading(seen.points, seen.bytes));
     ReadingLimit::new(expected)
+}
+
+/// What work on disk is for: this version of the program, and the input as it is.
+pub(crate) fn identity(path: &Path) -> Result<String, CliError> {
+    let about = path.metadata().map_err(CliError::reading(path))?;
+    let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let changed = about.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+    Ok(format!("{} {whole:?} {} {changed:?}", env!("CARGO_PKG_VERSION"), about.len()))
 }
 
 /// Checks that an input is there and no prepared scan.

@@ -1,5 +1,6 @@
 //! Files written whole or not at all.
 
+use std::ffi::OsString;
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -82,4 +83,11 @@ fn folder(path: &Path) -> PathBuf {
         Some(folder) if folder != Path::new("") => folder.to_owned(),
         _ => PathBuf::from("."),
     }
+}
+
+/// The folder beside an output that work on disk for it is done in.
+pub(crate) fn work_folder(output: &Path) -> PathBuf {
+    let mut name = output.file_name().map(OsString::from).unwrap_or_default();
+    name.push(".work");
+    output.with_file_name(name)
 }

@@ -30,7 +30,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
         Plan::OnDisk { memory, points } => return on_disk::run(args, memory, points, console),
     };
     // What a run on disk may have left that was ended.
-    Workspace::clear(&on_disk::folder(&args.output));
+    Workspace::clear(&output::work_folder(&args.output));
     let start = now();
     let bar = console.spinner(format_args!("reading {name}"));
     let mut model = input::read(&args.input, args.format.0)?;

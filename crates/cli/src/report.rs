@@ -198,8 +198,8 @@ fn leaves(scan: &Scan) -> (usize, f64) {
     (of_leaves.len(), sum as f64 / of_leaves.len() as f64)
 }
 
-/// The depth of each node. Parents come before their children.
-pub(crate) fn depths(scan: &Scan) -> Vec<u32> {
+/// The depth of each node, at most 32. Parents come before their children.
+pub(crate) fn depths(scan: &Scan) -> Vec<u8> {
     let topology = scan.topology();
     let mut depths = vec![0; topology.len()];
     for id in topology.ids().take(topology.inner()) {
@@ -211,16 +211,39 @@ pub(crate) fn depths(scan: &Scan) -> Vec<u32> {
     depths
 }
 
-/// The middle value, or the mean of the two in the middle.
+/// The middle value, or the mean of the two in the middle. Copies nothing: there may be more values than fit
+/// into memory twice.
 pub(crate) fn median(values: &[f32]) -> f32 {
-    let mut sorted = values.to_vec();
-    let middle = sorted.len() / 2;
-    let (below, &mut upper, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
-    if values.len() % 2 == 1 {
-        return upper;
+    let upper = ranked(values, values.len() / 2);
+    if values.len() % 2 == 1 { upper } else { 0.5 * (ranked(values, values.len() / 2 - 1) + upper) }
+}
+
+/// The value of this rank, counted from 0, by two passes that count halves of the values' bits.
+fn ranked(values: &[f32], rank: usize) -> f32 {
+    const SIGN: u32 = 1 << 31;
+    // Of the order of the values: negative ones come first, the largest in magnitude before the others.
+    let key = |value: &f32| {
+        let bits = value.to_bits();
+        if bits & SIGN == 0 { bits | SIGN } else { !bits }
+    };
+    let (high, rank) = ranked_half(values.iter().map(|value| key(value) >> 16), rank);
+    let of_half = values.iter().map(key).filter(|key| key >> 16 == high);
+    let (low, _) = ranked_half(of_half.map(|key| key & 0xffff), rank);
+    let key = high << 16 | low;
+    f32::from_bits(if key & SIGN == 0 { !key } else { key & !SIGN })
+}
+
+/// Of numbers below 2¹⁶ the one of this rank, and its rank among those that are equal to it.
+fn ranked_half(halves: impl Iterator<Item = u32>, mut rank: usize) -> (u32, usize) {
+    let mut counts = vec![0_usize; 1 << 16];
+    halves.for_each(|half| counts[half as usize] += 1);
+    for (half, count) in (0..).zip(counts) {
+        if rank < count {
+            return (half, rank);
+        }
+        rank -= count;
     }
-    let lower = below.iter().copied().fold(f32::MIN, f32::max);
-    0.5 * (lower + upper)
+    (0, 0)
 }
 
 /// What `collide` answers.
@@ -421,5 +444,11 @@ mod tests {
     fn a_median_of_two_halves_is_their_middle() {
         assert_eq!(median(&[3.0, 1.0, 2.0]).to_bits(), 2.0_f32.to_bits());
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]).to_bits(), 2.5_f32.to_bits());
+        let values = [-3.0, 7.5e-8, 1e30, -0.0, 2.0, 2.0, -1e-30, 5.0];
+        let mut sorted = values;
+        sorted.sort_by(f32::total_cmp);
+        for (rank, value) in sorted.iter().enumerate() {
+            assert_eq!(ranked(&values, rank).to_bits(), value.to_bits(), "rank {rank}");
+        }
     }
 }

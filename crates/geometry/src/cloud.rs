@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::cloud_error::CloudError;
-use crate::intake::{Intake, LEAST_POINTS, find_repeated};
+use crate::intake::{Intake, LEAST_POINTS, Repeated};
 use crate::{Aabb, Frame, Scanner};
 
 mod sealed {
@@ -297,15 +297,12 @@ fn is_finite<T: Coordinate>(p: [T; 3]) -> bool {
 
 /// The first of each group of equal positions, in the order given. O(n log n), 16 bytes a point.
 fn distinct(points: Vec<[f32; 3]>, source: Vec<u32>) -> (Vec<[f32; 3]>, Vec<u32>) {
-    let mut repeated = Vec::new();
-    find_repeated(&points, &mut vec![0; points.len()], |i| repeated.push(i));
-    if repeated.is_empty() {
+    let repeated = Repeated::among(&points, &mut vec![0; points.len()]);
+    if repeated.count() == 0 {
         return (points, source);
     }
-    repeated.sort_unstable();
-    let mut next = repeated.into_iter().peekable();
-    let kept = |(i, _): &(u32, _)| next.next_if_eq(i).is_none();
-    (0_u32..).zip(points.into_iter().zip(source)).filter(kept).map(|(_, kept)| kept).unzip()
+    let kept = (0..).zip(points.into_iter().zip(source)).filter(|(i, _)| !repeated.contains(*i));
+    kept.map(|(_, kept)| kept).unzip()
 }
 
 #[cfg(test)]

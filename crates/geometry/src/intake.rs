@@ -64,31 +64,116 @@ impl Intake {
     }
 }
 
-/// Calls `repeated` with the index of every point at the very place of an earlier one, in no order. `keys` is
-/// scratch with an element a point. O(n log n).
-///
-/// # Panics
-/// When `keys` is shorter than `points`.
-pub fn find_repeated(points: &[[f32; 3]], keys: &mut [u64], mut repeated: impl FnMut(u32)) {
-    // A hash of each point above its index: equal points come to stand in one run.
-    let keys = &mut keys[..points.len()];
-    for ((i, p), key) in (0..).zip(points).zip(&mut *keys) {
-        *key = hash(*p) & !0xffff_ffff | i;
+/// Which points are at the very place of an earlier one.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Repeated {
+    /// A bit a point.
+    bits: Vec<u64>,
+    count: usize,
+}
+
+/// Records that are sorted together: so many fit a cache.
+const TOGETHER: usize = 1 << 17;
+
+/// Most groups of records: each is written from its start to its end, a page at a time.
+const MOST_GROUPS: u32 = 12;
+
+impl Repeated {
+    /// Finds them. `records` is scratch with an element a point, and may be larger than memory: it is written
+    /// in some thousand runs, and then sorted run by run. O(n log n).
+    ///
+    /// # Panics
+    /// When `records` is shorter than `points`.
+    #[must_use]
+    pub fn among(points: &[[f32; 3]], records: &mut [u128]) -> Self {
+        let records = &mut records[..points.len()];
+        // Equal points have equal hashes, and so come into the same group.
+        let bits = (points.len() / TOGETHER).checked_ilog2().map_or(0, |log| (log + 1).min(MOST_GROUPS));
+        let group = |p: &[f32; 3]| (hash(*p) >> 1 >> (63 - bits)) as usize;
+        let mut starts = vec![0_usize; (1 << bits) + 1];
+        points.iter().for_each(|p| starts[group(p) + 1] += 1);
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        for (i, p) in (0_u32..).zip(points) {
+            let place = &mut next[group(p)];
+            records[*place] = record(*p, i);
+            *place += 1;
+        }
+        let mut repeated = Self { bits: vec![0; points.len().div_ceil(64)], count: 0 };
+        for group in starts.windows(2) {
+            let group = &mut records[group[0]..group[1]];
+            group.sort_unstable();
+            let later = group.windows(2).filter(|two| two[0] >> 32 == two[1] >> 32).map(|two| two[1]);
+            later.for_each(|record| repeated.insert(record));
+        }
+        repeated
     }
-    keys.sort_unstable();
-    #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
-    let index = |key: u64| key as u32;
-    for run in keys.chunk_by_mut(|a, b| a >> 32 == b >> 32).filter(|run| run.len() > 1) {
-        let bits = |key: u64| points[index(key) as usize].map(f32::to_bits);
-        run.sort_unstable_by_key(|&key| (bits(key), key));
-        let repeats = run.windows(2).filter(|two| bits(two[0]) == bits(two[1]));
-        repeats.for_each(|two| repeated(index(two[1])));
+
+    fn insert(&mut self, record: u128) {
+        #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
+        let i = record as u32 as usize;
+        self.bits[i / 64] |= 1 << (i % 64);
+        self.count += 1;
+    }
+
+    /// Returns `true` if the `i`-th point is one of them.
+    #[must_use]
+    pub fn contains(&self, i: usize) -> bool {
+        self.bits[i / 64] >> (i % 64) & 1 == 1
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub const fn count(&self) -> usize {
+        self.count
     }
 }
 
-/// The bits of a point, mixed: the upper half of the result tells most points apart.
+/// The bits of a point above its index: the first of equal points comes first.
+fn record([x, y, z]: [f32; 3], i: u32) -> u128 {
+    let [x, y, z] = [x, y, z].map(|x| u128::from(x.to_bits()));
+    x << 96 | y << 64 | z << 32 | u128::from(i)
+}
+
+/// The bits of a point, mixed: the highest bits of the result tell most points apart.
 fn hash(p: [f32; 3]) -> u64 {
     let [x, y, z] = p.map(|x| u64::from(x.to_bits()));
     let mixed = (x << 32 | y).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     (mixed ^ mixed >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    /// Few or many groups, points that are repeated often, and zeros of either sign.
+    #[test]
+    #[expect(clippy::disallowed_types, reason = "only asked, never iterated")]
+    fn the_later_ones_of_equal_points_are_repeated() {
+        for (count, places) in [(0, 1), (1, 1), (1000, 7), (3000, 1), (5 * TOGETHER, 3 * TOGETHER)] {
+            let mut state = 1_u64;
+            let mut random = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                usize::try_from(state >> 33).unwrap_or_default() % places
+            };
+            #[expect(clippy::cast_precision_loss, reason = "small")]
+            let mut points: Vec<[f32; 3]> = (0..count)
+                .map(|_| random())
+                .map(|k| [(k % 97) as f32 - 48.0, (k / 97) as f32, 0.5])
+                .collect();
+            if count > 2 {
+                points[2] = [-0.0; 3];
+                points[1] = [0.0; 3];
+            }
+            let found = Repeated::among(&points, &mut vec![0; count]);
+            let mut seen = HashSet::new();
+            let expected: Vec<bool> = points.iter().map(|p| !seen.insert(p.map(f32::to_bits))).collect();
+            assert!((0..count).all(|i| found.contains(i) == expected[i]), "{count} points");
+            assert_eq!(found.count(), expected.iter().filter(|is| **is).count());
+        }
+    }
 }

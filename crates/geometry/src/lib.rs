@@ -16,7 +16,7 @@ pub use cloud::{Coordinate, Dropped, PointCloud};
 pub use cloud_error::CloudError;
 pub use frame::Frame;
 pub use id::{NodeId, PointId};
-pub use intake::{Intake, LEAST_POINTS, find_repeated};
+pub use intake::{Intake, LEAST_POINTS, Repeated};
 pub use nalgebra;
 pub use pose::{Pose, PoseError};
 pub use scanner::Scanner;

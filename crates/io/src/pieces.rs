@@ -25,7 +25,12 @@ use crate::{las, npy, pcd, ply, xyz};
 #[derive(Debug)]
 pub enum Pieces {
     /// What has faces, read whole.
-    Mesh(TriangleMesh),
+    Mesh {
+        /// The vertices, with what the file says of each.
+        vertices: Points,
+        /// The triangles over the same vertices.
+        mesh: TriangleMesh,
+    },
     /// What has none.
     Points(PointPieces),
 }
@@ -97,9 +102,10 @@ pub fn read_in_pieces(
     drop(head);
     match sink.into_points() {
         Ok(whole) => Ok(points(Source::Whole(whole))),
-        Err(mesh) => {
+        Err(sink) => {
+            let vertices = sink.points().clone();
             let no_faces = || ReadError::NoFaces { path: path.into() };
-            mesh.into_mesh(path)?.map(Pieces::Mesh).ok_or_else(no_faces)
+            sink.into_mesh(path)?.map(|mesh| Pieces::Mesh { vertices, mesh }).ok_or_else(no_faces)
         }
     }
 }

@@ -146,6 +146,11 @@ impl Sink {
         if self.triangles.is_empty() { Ok(self.points) } else { Err(Box::new(self)) }
     }
 
+    /// The file's points.
+    pub(crate) fn points(&self) -> &Points {
+        &self.points
+    }
+
     /// The file's triangles, if there are any.
     pub(crate) fn into_mesh(self, path: &Path) -> Result<Option<TriangleMesh>, ReadError> {
         if self.triangles.is_empty() {

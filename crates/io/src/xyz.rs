@@ -1,8 +1,11 @@
 //! Points as lines of text: XYZ, CSV and their kin.
 //!
 //! The first line of values decides how all are divided: by semicolons if it has any, else by commas, else by
-//! white space. A line of column names may come before it, and a count of the points before that. Without
-//! names the first three columns are x, y and z. `#` and `//` start lines that say nothing.
+//! white space. A line of column names may come before it, and a count of the points before that, as in PTS.
+//! Without names the first three columns are x, y and z, and others are known by what they hold. `#` and `//`
+//! start lines that say nothing.
+
+mod unnamed;
 
 use crate::columns::{Holds, Row, is_unique, slot};
 use crate::error::{Broken, Fault};
@@ -20,7 +23,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
             _ => Ok(Sink::default()),
         };
     };
-    let table = Table::from_first(first).map_err(|fault| fault.on_line(first.number))?;
+    let table =
+        Table::of(first, lines.clone(), count.is_some()).map_err(|fault| fault.on_line(first.number))?;
     if table.named {
         lines.find(has_values);
     }
@@ -54,7 +58,7 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     let mut lines = Lines::new(head);
     let promised = count(&mut lines);
     let mut ahead = lines.clone();
-    let table = Table::from_first(ahead.find(has_values)?).ok()?;
+    let table = Table::of(ahead.find(has_values)?, lines.clone(), promised.is_some()).ok()?;
     if ahead.left() == 0 {
         return None;
     }
@@ -105,12 +109,15 @@ struct Table {
 }
 
 impl Table {
-    fn from_first(line: Line<'_>) -> Result<Self, Fault> {
+    /// From the first line with values; `lines` begin at or before it.
+    fn of(line: Line<'_>, lines: Lines<'_>, is_counted: bool) -> Result<Self, Fault> {
         let divider = [b';', b','].into_iter().find(|d| line.text.contains(d));
-        let mut table =
-            Self { divider, columns: [0, 1, 2].map(Some).into(), holds: Holds::default(), named: false };
+        let mut table = Self { divider, columns: vec![], holds: Holds::default(), named: false };
         let starts_with_number = table.values(line).next().is_some_and(|v| number(v).is_some());
         if starts_with_number {
+            let values = |line: Line<'_>| table.values(line).map(number).collect();
+            table.columns = unnamed::columns(lines, values, is_counted);
+            table.holds = Holds::among(table.columns.iter().copied().flatten())?;
             return Ok(table);
         }
         table.named = true;

@@ -3,26 +3,36 @@
 //! A block of points at a time is sorted by the part of the map that they lie in; then every part is filled
 //! by one thread. So nothing is shared between threads, and what is written lies close together.
 
+use std::convert::Infallible;
+
 use nearmiss_geometry::{PointCloud, TriangleMesh};
 use nearmiss_lanes::parallel::{change_each, map_each};
 use nearmiss_mesh::{Lattice, lattice_samples};
+use nearmiss_store::Workspace;
 
 use crate::error::SliceError;
 use crate::layer::{BLOCKS, Layer, PART};
 use crate::map::{About, Index};
 use crate::options::{Obstacle, SlicePlan};
+use crate::slice::Slice;
 use crate::{Grid, SliceMap, finish};
 
 /// Points that a thread sorts at a time: they and what becomes of them fit its cache.
 const BLOCK: usize = 1 << 15;
 
+/// The stage of the work that ends when all points are in.
+const STAGE: &str = "voxels";
+
 /// Samples of a mesh that are kept before they are poured into the map.
 const BATCH: usize = BLOCK * BLOCKS;
+
+/// Slices that are finished together; their cells are then let go of.
+const WAVE: usize = 16;
 
 /// Takes points in any number of pieces and makes a map of them.
 ///
 /// Takes 2 bytes a voxel until it is done, touched only where points are, and some 20 MB to sort in. The map
-/// depends on the points alone, not on their order, their pieces or the number of threads.
+/// depends on the points alone, not on their order, their pieces, the number of threads or the workspace.
 #[derive(Debug)]
 pub struct SliceBuilder {
     plan: SlicePlan,
@@ -30,6 +40,7 @@ pub struct SliceBuilder {
     layers: Vec<Layer>,
     points: u64,
     left_out: u64,
+    is_filled: bool,
 }
 
 impl SliceBuilder {
@@ -38,9 +49,38 @@ impl SliceBuilder {
     /// # Errors
     /// When the system gives no memory.
     pub fn new(plan: &SlicePlan) -> Result<Self, SliceError> {
+        Self::new_in(plan, &Workspace::in_memory())
+    }
+
+    /// A map without points whose voxels lie in a workspace, so that they may exceed memory; or, if
+    /// [`Self::is_filled`], one with all of its points, that a process which has ended has left there.
+    ///
+    /// # Errors
+    /// When the workspace gives no memory, or no space on the disk.
+    pub fn new_in(plan: &SlicePlan, work: &Workspace) -> Result<Self, SliceError> {
+        let stage = work.stage(STAGE);
+        let filled: Option<[u64; 2]> = stage.done();
+        let [points, left_out] = filled.unwrap_or_default();
         let area = plan.grid().area();
-        let layers = (0..plan.grid().counts[2]).map(|_| Layer::new(area)).collect::<Result<_, _>>()?;
-        Ok(Self { plan: *plan, layers, points: 0, left_out: 0 })
+        let layers =
+            (0..plan.grid().counts[2]).map(|s| Layer::new(&stage, s, area)).collect::<Result<_, _>>()?;
+        Ok(Self { plan: *plan, layers, points, left_out, is_filled: filled.is_some() })
+    }
+
+    /// Returns `true` if all points are in: [`Self::keep`] has said so, in this process or an earlier one.
+    #[must_use]
+    pub fn is_filled(&self) -> bool {
+        self.is_filled
+    }
+
+    /// Says that all points are in, so that the next process need not add them again if this one ends.
+    ///
+    /// # Errors
+    /// When the workspace's folder cannot be written.
+    pub fn keep(&mut self, work: &Workspace) -> Result<(), SliceError> {
+        work.stage(STAGE).close(&[self.points, self.left_out])?;
+        self.is_filled = true;
+        Ok(())
     }
 
     /// Adds points given in the caller's coordinates. Those outside the bounds of the plan, and those with a
@@ -118,6 +158,18 @@ impl SliceBuilder {
     /// The map.
     #[must_use]
     pub fn finish(self) -> SliceMap {
+        let index = self.index();
+        let mut slices = Vec::with_capacity(self.layers.len());
+        let all: Result<(), Infallible> = self.each(index, WAVE, |wave| {
+            slices.extend(wave);
+            Ok(())
+        });
+        let Ok(()) = all;
+        SliceMap::of_slices(index, slices)
+    }
+
+    /// What the map will be made of. Goes over all voxels if noise is to be estimated.
+    pub(crate) fn index(&self) -> Index {
         let grid = *self.plan.grid();
         let rule = self.plan.obstacle();
         let noise = match rule {
@@ -125,11 +177,23 @@ impl SliceBuilder {
             Obstacle::Slope { noise, .. } => noise.unwrap_or_else(|| finish::noise(&grid, &self.layers)),
         };
         let share = self.plan.share(noise);
-        let most = finish::most_levels(share);
+        Index { grid, about: About { rule, share, noise, points: self.points, left_out: self.left_out } }
+    }
+
+    /// Hands out the slices of the map, lowest first, some at a time, until the first error.
+    pub(crate) fn each<E>(
+        self,
+        index: Index,
+        together: usize,
+        take: impl FnMut(Vec<Slice>) -> Result<(), E>,
+    ) -> Result<(), E> {
         let mut layers = self.layers;
-        let slices = finish::slices(&grid, &mut layers, most);
-        let about = About { rule, share, noise, points: self.points, left_out: self.left_out };
-        SliceMap::of_slices(Index { grid, about }, slices)
+        finish::each(&index.grid, &mut layers, finish::most_levels(index.about.share), together, take)
+    }
+
+    /// How many slices may be made at a time.
+    pub(crate) fn together(&self) -> usize {
+        self.plan.together().min(WAVE)
     }
 }
 

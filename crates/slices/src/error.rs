@@ -1,6 +1,7 @@
 //! Why no map is made.
 
 use nearmiss_geometry::Aabb;
+use nearmiss_store::WorkError;
 use thiserror::Error;
 
 use crate::Up;
@@ -79,12 +80,9 @@ pub enum SliceError {
         /// Of the points.
         bounds: Aabb,
     },
-    /// Memory that the system does not give.
-    #[error("the system gives no {bytes} bytes for a slice; give larger pixels")]
-    OutOfMemory {
-        /// How many were asked for.
-        bytes: usize,
-    },
+    /// Memory that the system does not give, or a folder that fails.
+    #[error(transparent)]
+    Work(#[from] WorkError),
     /// No share of a slice's height.
     #[error("an obstacle share of {share:?} is none; give a number above 0")]
     Share {

@@ -13,7 +13,7 @@ use nearmiss_lanes::parallel::map_each;
 
 use crate::Grid;
 use crate::grid::LEVELS;
-use crate::layer::Layer;
+use crate::layer::{Layer, Seen};
 use crate::slice::{Canvas, Content, Slice};
 
 /// Of the spans of level voxels this share is no greater than the noise: enough that few floors become
@@ -26,9 +26,6 @@ const LEAST: u64 = 100;
 /// Runs of layers whose spans are counted apart: enough for any number of threads, few where layers are many
 /// and thin.
 const RUNS: usize = 256;
-
-/// Layers that are finished together; their cells are then let go of.
-const WAVE: usize = 16;
 
 /// The greatest number of levels that a floor may span, for ε. Rounding of a tangent must not decide, hence
 /// the small addition.
@@ -44,11 +41,12 @@ pub(crate) fn most_levels(share: f64) -> i32 {
 ///
 /// Voxels with something right below or above are left out: they may hold half a floor.
 pub(crate) fn noise(grid: &Grid, layers: &[Layer]) -> f64 {
+    let layers: Vec<Seen<'_>> = layers.iter().map(Layer::seen).collect();
     let width = grid.counts[0] as usize;
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
     let step = (0.5 * grid.pixel / grid.slice_height * f64::from(LEVELS)) as i32;
     let add_layer = |spans: &mut [u64; LEVELS as usize], s: usize| {
-        let layer = &layers[s];
+        let layer = layers[s];
         let others = [s.checked_sub(1), Some(s + 1)].map(|s| s.and_then(|s| layers.get(s)));
         for row in 1..(grid.counts[1] as usize).saturating_sub(1) {
             for i in layer.filled(row * width + 1..((row + 1) * width).saturating_sub(1)) {
@@ -94,28 +92,35 @@ pub(crate) fn noise(grid: &Grid, layers: &[Layer]) -> f64 {
     f64::from(levels) / f64::from(LEVELS) * grid.slice_height
 }
 
-/// The slices, lowest first; takes the cells away.
-pub(crate) fn slices(grid: &Grid, layers: &mut [Layer], most: i32) -> Vec<Slice> {
-    let mut slices = Vec::with_capacity(layers.len());
-    while slices.len() < layers.len() {
-        let first = slices.len();
-        let wave = map_each(WAVE.min(layers.len() - first), |i| slice(grid, layers, first + i, most));
-        slices.extend(wave);
+/// Hands out the slices, lowest first, `together` at a time, until the first error; takes the cells away.
+pub(crate) fn each<E>(
+    grid: &Grid,
+    layers: &mut [Layer],
+    most: i32,
+    together: usize,
+    mut take: impl FnMut(Vec<Slice>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut first = 0;
+    while first < layers.len() {
+        let end = layers.len().min(first + together.max(1));
+        take(map_each(end - first, |i| slice(grid, layers, first + i, most)))?;
         // The last of them is still needed by the one above.
-        layers[first.saturating_sub(1)..slices.len() - 1].fill_with(Layer::default);
+        layers[first.saturating_sub(1)..end - 1].fill_with(Layer::empty);
+        first = end;
     }
-    slices
+    Ok(())
 }
 
 fn slice(grid: &Grid, layers: &[Layer], s: usize, most: i32) -> Slice {
     let [width, height, _] = grid.counts;
     let columns = width as usize;
     let mut canvas = Canvas::new(width, height);
-    let above = layers.get(s + 1);
-    let below = s.checked_sub(1).map(|s| &layers[s]);
+    let own = layers[s].seen();
+    let above = layers.get(s + 1).map(Layer::seen);
+    let below = s.checked_sub(1).map(|s| layers[s].seen());
     for row in 0..height as usize {
-        for i in layers[s].filled(row * columns..(row + 1) * columns) {
-            let Some(own) = layers[s].span(i) else { continue };
+        for i in own.filled(row * columns..(row + 1) * columns) {
+            let Some(own) = own.span(i) else { continue };
             let up = above.and_then(|layer| layer.span(i));
             let down = below.and_then(|layer| layer.span(i));
             canvas.set(i - row * columns, row, judge(own, down, up, most));

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::error::SliceError;
+use nearmiss_store::{Room, Stage, WorkError};
 
 /// Blocks that are sorted before the map is filled from them; any number gives the same map.
 pub(crate) const BLOCKS: usize = 16;
@@ -15,23 +15,25 @@ pub(crate) const PART: usize = 1 << 16;
 pub(crate) type Cell = u16;
 
 /// What the voxels of a slice have seen.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct Layer {
     /// A cell a pixel.
-    cells: Vec<Cell>,
+    cells: Room<Cell>,
     /// A bit a cell, whether it has seen something: most have not.
-    filled: Vec<u64>,
+    filled: Room<u64>,
 }
 
 impl Layer {
-    /// One that has seen nothing.
-    pub(crate) fn new(area: usize) -> Result<Self, SliceError> {
-        let cells = bytemuck::allocation::try_zeroed_vec(area);
-        let filled = bytemuck::allocation::try_zeroed_vec(area.div_ceil(64));
-        match (cells, filled) {
-            (Ok(cells), Ok(filled)) => Ok(Self { cells, filled }),
-            _ => Err(SliceError::OutOfMemory { bytes: Self::bytes_of(area) }),
-        }
+    /// The layer of slice `s`: one that has seen nothing, or what an ended run has left of it.
+    pub(crate) fn new(stage: &Stage<'_>, s: u32, area: usize) -> Result<Self, WorkError> {
+        let cells = stage.room(&format!("cells-{s}"), area)?;
+        let filled = stage.room(&format!("bits-{s}"), area.div_ceil(64))?;
+        Ok(Self { cells, filled })
+    }
+
+    /// One without cells.
+    pub(crate) fn empty() -> Self {
+        Self { cells: Vec::new().into(), filled: Vec::new().into() }
     }
 
     /// Bytes that one of so many pixels takes.
@@ -39,10 +41,30 @@ impl Layer {
         size_of::<Self>() + area * size_of::<Cell>() + area.div_ceil(64) * size_of::<u64>()
     }
 
-    /// Which of these cells, have seen something.
-    pub(crate) fn filled(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
+    /// Its cells, for reading.
+    pub(crate) fn seen(&self) -> Seen<'_> {
+        Seen { cells: &self.cells, filled: &self.filled }
+    }
+
+    /// Parts of [`PART`] cells, with their bits.
+    pub(crate) fn parts(&mut self) -> Vec<Part<'_>> {
+        let parts = self.cells.chunks_mut(PART).zip(self.filled.chunks_mut(PART / 64));
+        parts.map(|(cells, filled)| Part { cells, filled }).collect()
+    }
+}
+
+/// The cells of a layer, for reading.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen<'a> {
+    cells: &'a [Cell],
+    filled: &'a [u64],
+}
+
+impl<'a> Seen<'a> {
+    /// Which of these cells have seen something.
+    pub(crate) fn filled(self, range: Range<usize>) -> impl Iterator<Item = usize> + use<'a> {
         let words = range.start / 64..range.end.div_ceil(64);
-        let bits = words.flat_map(|i| {
+        let bits = words.flat_map(move |i| {
             let next = |left: u64| Some(left).filter(|left| *left != 0);
             let bits = std::iter::successors(next(self.filled[i]), move |left| next(left & (left - 1)));
             bits.map(move |left| 64 * i + left.trailing_zeros() as usize)
@@ -50,24 +72,18 @@ impl Layer {
         bits.filter(move |i| range.contains(i))
     }
 
-    /// Whether a cell has seen something.
+    /// Returns `true` if a cell has seen something.
     #[inline]
-    pub(crate) fn is_filled(&self, i: usize) -> bool {
+    pub(crate) fn is_filled(self, i: usize) -> bool {
         self.filled[i / 64] >> (i % 64) & 1 == 1
     }
 
     /// Lowest and highest level of a cell; none if it has seen nothing, for which its bit is enough: the bits
     /// of a layer fit a cache.
     #[inline]
-    pub(crate) fn span(&self, i: usize) -> Option<[i32; 2]> {
+    pub(crate) fn span(self, i: usize) -> Option<[i32; 2]> {
         let seen = || self.cells[i];
         self.is_filled(i).then(seen).map(|seen| [255 - i32::from(seen >> 8), i32::from(seen & 0xff) - 1])
-    }
-
-    /// Parts of [`PART`] cells, with their bits.
-    pub(crate) fn parts(&mut self) -> Vec<Part<'_>> {
-        let parts = self.cells.chunks_mut(PART).zip(self.filled.chunks_mut(PART / 64));
-        parts.map(|(cells, filled)| Part { cells, filled }).collect()
     }
 }
 

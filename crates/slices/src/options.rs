@@ -28,6 +28,15 @@ fn bytes([width, height]: [u32; 2]) -> usize {
     Layer::bytes_of(area) + Slice::bytes_of(width, height) + lists + blocks + ALLOCATIONS
 }
 
+/// Bytes that it takes to make a slice of voxels on disk and to write it: the image, and what it is encoded
+/// to.
+fn bytes_on_disk([width, height]: [u32; 2]) -> usize {
+    2 * Slice::bytes_of(width, height)
+}
+
+/// More slices than this are not made on disk: each takes two files.
+const MOST_ON_DISK: f64 = 10_000.0;
+
 /// How large a pixel is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Pixel {
@@ -188,6 +197,8 @@ impl Obstacle {
 pub struct SlicePlan {
     grid: Grid,
     obstacle: Obstacle,
+    /// How many slices may be made at a time.
+    together: usize,
 }
 
 impl SlicePlan {
@@ -198,6 +209,22 @@ impl SlicePlan {
     /// Names the option that makes no sense, or what of the bounds does not serve; says how many bytes are
     /// needed where more are than allowed.
     pub fn new(options: &SliceOptions, bounds: &Aabb) -> Result<Self, SliceError> {
+        Self::of(options, bounds, false)
+    }
+
+    /// As [`Self::new`], for a builder whose voxels lie on disk ([`SliceBuilder::new_in`]), and whose slices
+    /// are [written](crate::SliceTarget::build) as they are made: only a few of them have to fit into the
+    /// bytes that are allowed.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    ///
+    /// [`SliceBuilder::new_in`]: crate::SliceBuilder::new_in
+    pub fn on_disk(options: &SliceOptions, bounds: &Aabb) -> Result<Self, SliceError> {
+        Self::of(options, bounds, true)
+    }
+
+    fn of(options: &SliceOptions, bounds: &Aabb, on_disk: bool) -> Result<Self, SliceError> {
         options.check()?;
         let up = options.up;
         let turned = [bounds.min, bounds.max].map(|corner| up.to_map(corner));
@@ -236,8 +263,15 @@ impl SlicePlan {
         let counts = counts.map(|n| n as u32);
         let [width, height, _] = counts;
         #[expect(clippy::cast_precision_loss, reason = "a limit of memory needs no more digits")]
-        let (bytes, allowed) = (slices * bytes([width, height]) as f64, options.memory as f64);
-        if bytes > allowed || slices > MOST {
+        let (bytes, allowed, most) = if on_disk {
+            // Two of them, so that two cores are busy; the rest is for the pages of the voxels.
+            (4.0 * bytes_on_disk([width, height]) as f64, options.memory as f64, MOST_ON_DISK)
+        } else {
+            (slices * bytes([width, height]) as f64, options.memory as f64, MOST)
+        };
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+        let together = if on_disk { (2.0 * allowed / bytes) as usize } else { usize::MAX };
+        if bytes > allowed || slices > most {
             return Err(SliceError::Memory {
                 slices,
                 pixels: [width, height],
@@ -247,7 +281,8 @@ impl SlicePlan {
             });
         }
         options.obstacle.check(pixel, slice_height)?;
-        Ok(Self { grid: Grid { up, origin: min, pixel, slice_height, counts }, obstacle: options.obstacle })
+        let grid = Grid { up, origin: min, pixel, slice_height, counts };
+        Ok(Self { grid, obstacle: options.obstacle, together })
     }
 
     /// The lattice.
@@ -260,6 +295,11 @@ impl SlicePlan {
     #[must_use]
     pub fn obstacle(&self) -> Obstacle {
         self.obstacle
+    }
+
+    /// How many slices may be made at a time.
+    pub(crate) fn together(&self) -> usize {
+        self.together
     }
 
     /// ε, where noise that was not given is this.

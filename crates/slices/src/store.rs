@@ -122,6 +122,19 @@ pub(crate) fn image_name(checksum: u64) -> String {
     format!("{checksum:016x}.nms")
 }
 
+/// Loads the slice with this checksum from a folder.
+pub(crate) fn load(folder: &Path, slice: u32, checksum: u64, grid: &Grid) -> Result<Slice, StoreError> {
+    let path = folder.join(image_name(checksum));
+    let failed = |cause| StoreError::Slice { slice, cause };
+    // The checksum of the image tells all that those of the file would.
+    let file = File::read(&path, Check::Structure).map_err(failed)?;
+    file.expect(IMAGE.0, IMAGE.1..=IMAGE.1).map_err(failed)?;
+    let bytes = file.array::<u8>(PIXELS, 0).map_err(failed)?;
+    let [width, height, _] = grid.counts;
+    let image = decode(&bytes, [width, height]);
+    image.filter(|image| image.checksum() == checksum).ok_or(StoreError::Image { slice, path })
+}
+
 /// A map in a folder, of which the index is read and every slice is loaded when it is wanted.
 #[derive(Debug, Clone)]
 pub struct SliceFolder {
@@ -203,16 +216,7 @@ impl SliceFolder {
     /// # Panics
     /// When there is no such slice.
     pub fn load(&self, slice: u32) -> Result<Slice, StoreError> {
-        let checksum = self.checksums[slice as usize];
-        let path = self.folder.join(image_name(checksum));
-        let failed = |cause| StoreError::Slice { slice, cause };
-        // The checksum of the image tells all that those of the file would.
-        let file = File::read(&path, Check::Structure).map_err(failed)?;
-        file.expect(IMAGE.0, IMAGE.1..=IMAGE.1).map_err(failed)?;
-        let bytes = file.array::<u8>(PIXELS, 0).map_err(failed)?;
-        let [width, height, _] = self.grid().counts;
-        let image = decode(&bytes, [width, height]);
-        image.filter(|image| image.checksum() == checksum).ok_or(StoreError::Image { slice, path })
+        load(&self.folder, slice, self.checksums[slice as usize], self.grid())
     }
 
     /// The whole map in memory, and what could not be loaded of it, lowest first, a file once: those slices

@@ -4,7 +4,7 @@
 //! then the index replaces the old one in one step, then files that it does not name go. So two that write at
 //! once would remove each other's slices: whoever writes holds a lock on a file in the folder.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,12 @@ use std::path::{Path, PathBuf};
 use nearmiss_lanes::parallel::map_each;
 use nearmiss_store::{Check, Fault, File, WriteError, Writer};
 
-use crate::SliceMap;
+use crate::build::SliceBuilder;
 use crate::encode::encode;
+use crate::map::Index;
 use crate::slice::Slice;
-use crate::store::{CHECKSUMS, IMAGE, INDEX, INDEX_NAME, PIXELS, SliceFolder, StoreError, image_name};
+use crate::store::{CHECKSUMS, IMAGE, INDEX, INDEX_NAME, PIXELS, SliceFolder, StoreError, image_name, load};
+use crate::{Grid, SliceMap};
 
 /// Name of the file that is locked, there only as long.
 const LOCK_NAME: &str = "index.lock";
@@ -54,7 +56,7 @@ impl SliceTarget {
         Ok(Self { folder: folder.to_owned(), _lock: lock(folder)?, _made: made })
     }
 
-    /// Writes the map, which replaces the one that is there. Tells the bytes of all files.
+    /// Writes the map, which replaces the one that is there. Returns the bytes of all files.
     ///
     /// # Errors
     /// When something cannot be written, or slices are missing; then nothing new is left, and a map that was
@@ -65,36 +67,48 @@ impl SliceTarget {
             None => Err(StoreError::Incomplete { slice }),
         });
         let images = images.collect::<Result<Vec<_>, _>>()?;
-        let checksums: Vec<u64> = images.iter().map(|image| image.checksum()).collect();
-        let distinct = distinct(checksums.iter().copied().zip(images))?;
-        let before = SliceFolder::open(&self.folder);
-        let before = before.as_ref().map_or(&[][..], SliceFolder::checksums);
-        let added: Vec<PathBuf> =
-            distinct.keys().map(|c| self.image_path(*c)).filter(|p| !p.exists()).collect();
-        let written = self.write(map, &checksums, &distinct);
-        match written {
-            Ok(_) => self.clear(before, &distinct),
-            // What cannot be removed does no harm, here and below.
-            Err(_) => added.iter().for_each(|path| _ = fs::remove_file(path)),
-        }
-        written
+        self.write(map.index(), |saved| saved.add(&images))
     }
 
+    /// Makes a map of what the builder has seen and writes each slice as it is made, so that the map need not
+    /// fit into memory; otherwise as [`save`](Self::save), with the same files.
+    ///
+    /// # Errors
+    /// As [`save`](Self::save).
+    pub fn build(self, builder: SliceBuilder) -> Result<u64, StoreError> {
+        let (index, together) = (builder.index(), builder.together());
+        self.write(&index, |saved| {
+            builder.each(index, together, |slices| saved.add(&slices.iter().collect::<Vec<_>>()))
+        })
+    }
+
+    /// Writes the slices that `add_all` adds, and then the index.
     fn write(
         &self,
-        map: &SliceMap,
-        checksums: &[u64],
-        distinct: &BTreeMap<u64, &Slice>,
+        index: &Index,
+        add_all: impl FnOnce(&mut Saved<'_>) -> Result<(), StoreError>,
     ) -> Result<u64, StoreError> {
-        let images: Vec<&Slice> = distinct.values().copied().collect();
-        let mut bytes = 0;
-        for length in map_each(images.len(), |i| self.write_image(images[i])) {
-            bytes += length?;
+        let before = SliceFolder::open(&self.folder);
+        let before = before.as_ref().map_or(&[][..], SliceFolder::checksums);
+        let mut saved = Saved {
+            target: self,
+            grid: &index.grid,
+            sums: vec![],
+            known: BTreeSet::new(),
+            new: vec![],
+            bytes: 0,
+        };
+        let written = add_all(&mut saved).and_then(|()| {
+            let mut writer = Writer::new(INDEX.0, INDEX.1);
+            writer.metadata(index)?.section(CHECKSUMS, 0, &saved.sums)?;
+            Ok(saved.bytes + writer.save(self.folder.join(INDEX_NAME))?)
+        });
+        match written {
+            Ok(_) => self.clear(before, &saved.known),
+            // What cannot be removed does no harm, here and below.
+            Err(_) => saved.new.iter().for_each(|path| _ = fs::remove_file(path)),
         }
-        let mut writer = Writer::new(INDEX.0, INDEX.1);
-        writer.metadata(map.index())?.section(CHECKSUMS, 0, checksums)?;
-        bytes += writer.save(self.folder.join(INDEX_NAME))?;
-        Ok(bytes)
+        written
     }
 
     fn write_image(&self, image: &Slice) -> Result<u64, WriteError> {
@@ -109,18 +123,56 @@ impl SliceTarget {
     }
 
     /// Removes slices of the map that was there before, and what killed writers left.
-    fn clear(&self, before: &[u64], now: &BTreeMap<u64, &Slice>) {
+    fn clear(&self, before: &[u64], now: &BTreeSet<u64>) {
         let Ok(entries) = fs::read_dir(&self.folder) else { return };
         for entry in entries.flatten() {
             let (name, path) = (entry.file_name(), entry.path());
             let name = name.to_string_lossy();
             let is_old = checksum_of(&name).is_some_and(|checksum| {
-                !now.contains_key(&checksum) && (before.contains(&checksum) || is_image(&path))
+                !now.contains(&checksum) && (before.contains(&checksum) || is_image(&path))
             });
             if is_old || is_temporary(&name) && is_abandoned(&path) {
                 let _ = fs::remove_file(path);
             }
         }
+    }
+}
+
+/// Slices of a map that are written already.
+struct Saved<'a> {
+    target: &'a SliceTarget,
+    grid: &'a Grid,
+    /// Checksums of all slices so far, lowest first.
+    sums: Vec<u64>,
+    /// The same, each once.
+    known: BTreeSet<u64>,
+    /// Files that were not there before.
+    new: Vec<PathBuf>,
+    bytes: u64,
+}
+
+impl Saved<'_> {
+    /// Writes the next slices, lowest first; equal ones once.
+    fn add(&mut self, images: &[&Slice]) -> Result<(), StoreError> {
+        let first = self.sums.len();
+        self.sums.extend(images.iter().map(|image| image.checksum()));
+        let sums = &self.sums[first..];
+        let mut distinct = distinct(sums.iter().copied().zip(images.iter().copied()))?;
+        for (slice, checksum) in (first..).zip(sums).filter(|(_, checksum)| self.known.contains(checksum)) {
+            let Some(image) = distinct.remove(checksum) else { continue };
+            let slice = u32::try_from(slice).unwrap_or(u32::MAX);
+            if load(&self.target.folder, slice, *checksum, self.grid)? != *image {
+                return Err(StoreError::Alike { checksum: *checksum });
+            }
+        }
+        let paths = distinct.keys().map(|checksum| self.target.image_path(*checksum));
+        self.new.extend(paths.filter(|path| !path.exists()));
+        self.known.extend(distinct.keys());
+        let images: Vec<&Slice> = distinct.into_values().collect();
+        for length in map_each(images.len(), |i| self.target.write_image(images[i])) {
+            self.bytes += length?;
+        }
+        Ok(())
     }
 }
 

@@ -27,6 +27,7 @@ mod room;
 #[cfg(feature = "mmap")]
 mod warden;
 mod work;
+mod work_error;
 
 mod error;
 mod flaw;
@@ -43,5 +44,6 @@ pub use metadata::METADATA_LIMIT;
 pub use room::Room;
 pub use section::Section;
 pub use sniff::Looks;
-pub use work::{Progress, Stage, WorkError, Workspace};
+pub use work::{Progress, Stage, Workspace};
+pub use work_error::WorkError;
 pub use writer::Writer;

@@ -10,6 +10,7 @@ use crate::array::Array;
 use crate::bytes::Bytes;
 #[cfg(feature = "mmap")]
 use crate::own_map::OwnMap;
+use crate::work_error::WorkError;
 
 /// An array from a [`Workspace`](crate::Workspace).
 ///
@@ -29,8 +30,10 @@ enum Backing<T> {
 }
 
 impl<T: Pod> Room<T> {
-    pub(crate) fn in_memory(len: usize) -> Self {
-        Self { backing: Backing::Memory(bytemuck::zeroed_vec(len)) }
+    pub(crate) fn in_memory(len: usize) -> Result<Self, WorkError> {
+        let elements = bytemuck::allocation::try_zeroed_vec(len);
+        let refused = |()| WorkError::memory(len.saturating_mul(size_of::<T>()));
+        elements.map(Self::from).map_err(refused)
     }
 
     #[cfg(feature = "mmap")]

@@ -5,7 +5,6 @@
 //! removes with the process.
 
 use std::ffi::OsStr;
-use std::fmt;
 use std::fs;
 use std::io;
 #[cfg(feature = "mmap")]
@@ -22,6 +21,7 @@ use crate::metadata;
 use crate::room::Room;
 #[cfg(feature = "mmap")]
 use crate::warden::Warden;
+use crate::work_error::WorkError;
 
 /// The file that holds the lock of a folder, and says what it is for.
 const KEY: &str = "work.key";
@@ -66,41 +66,6 @@ impl Progress {
     pub fn reach(&self, share: f64) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a million")]
         self.done.store((share.clamp(0.0, 1.0) * 1e6) as u64, Ordering::Relaxed);
-    }
-}
-
-/// A step of the work in a folder did not succeed.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WorkError {
-    /// The file or folder.
-    pub path: PathBuf,
-    /// What was to be done.
-    pub step: &'static str,
-    /// The kind of the system's answer.
-    pub kind: io::ErrorKind,
-    /// The system's words.
-    pub cause: String,
-}
-
-impl fmt::Display for WorkError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: cannot {}: {}", self.path.display(), self.step, self.cause)?;
-        match self.kind {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-                f.write_str("; free some space, or write the output to another disk")
-            }
-            io::ErrorKind::WouldBlock => f.write_str("; wait for the other process to end"),
-            _ => Ok(()),
-        }
-    }
-}
-
-impl std::error::Error for WorkError {}
-
-impl WorkError {
-    pub(crate) fn new(path: &Path, step: &'static str) -> impl FnOnce(io::Error) -> Self {
-        let path = path.to_owned();
-        move |cause| Self { path, step, kind: cause.kind(), cause: cause.to_string() }
     }
 }
 
@@ -151,10 +116,10 @@ impl Workspace {
     /// Room for `len` elements, all zero.
     ///
     /// # Errors
-    /// When the disk is full.
+    /// When the disk is full, or the system gives no memory.
     pub fn room<T: Pod>(&self, len: usize) -> Result<Room<T>, WorkError> {
         match &self.folder {
-            None => Ok(Room::in_memory(len)),
+            None => Room::in_memory(len),
             Some(folder) => folder.room(None, len),
         }
     }
@@ -193,10 +158,10 @@ impl Stage<'_> {
     /// Room for `len` elements: with what the stage has put there if it is done, else all zero.
     ///
     /// # Errors
-    /// When the disk is full, or what was there is gone.
+    /// When the disk is full, the system gives no memory, or what was there is gone.
     pub fn room<T: Pod>(&self, name: &str, len: usize) -> Result<Room<T>, WorkError> {
         match &self.work.folder {
-            None => Ok(Room::in_memory(len)),
+            None => Room::in_memory(len),
             Some(folder) => {
                 let path = folder.file(&format!("{}-{name}", self.name), ARRAY);
                 folder.room(Some((&path, self.done.is_some())), len)
@@ -279,7 +244,7 @@ impl Folder {
 
     #[cfg(not(feature = "mmap"))]
     fn room<T: Pod>(&self, _: Option<(&Path, bool)>, len: usize) -> Result<Room<T>, WorkError> {
-        Ok(Room::in_memory(len))
+        Room::in_memory(len)
     }
 
     /// Room in a file: of this name, which is `kept` with its content or made anew, or without one.
@@ -288,7 +253,7 @@ impl Folder {
         use crate::own_map::OwnMap;
 
         let Some(bytes) = len.checked_mul(size_of::<T>()).filter(|bytes| *bytes > 0) else {
-            return Ok(Room::in_memory(len));
+            return Room::in_memory(len);
         };
         let bytes = bytes as u64;
         let at = |step| WorkError::new(name.map_or(&*self.path, |(path, _)| path), step);

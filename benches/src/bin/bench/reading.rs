@@ -55,7 +55,7 @@ fn in_pieces(file: &PathBuf) -> Result<(u64, u64), Failure> {
             points += some.len() as u64;
             finite += some.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())).count() as u64;
         })?,
-        Pieces::Mesh(mesh) => {
+        Pieces::Mesh { mesh, .. } => {
             points = mesh.vertices().len() as u64;
             finite = points;
         }

@@ -2,9 +2,6 @@
 //! and a run that was ended is gone on with.
 
 use std::cell::Cell;
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
 
 use nearmiss::io::{Pieces, PointPieces, Points, read_in_pieces};
 use nearmiss::{Aabb, GatheredPoints, Intake, IntakeError, PointGatherer, Scan, Workspace};
@@ -15,18 +12,11 @@ use crate::console::{Console, now};
 use crate::digits::grouped;
 use crate::error::CliError;
 use crate::filters::{ClassList, Filtered};
-use crate::input;
 use crate::report::ScanReport;
+use crate::{input, output};
 
 /// Bytes of a file that are read at a time.
 const BLOCK: usize = 1 << 20;
-
-/// The folder that the work for an output is done in.
-pub(super) fn folder(output: &Path) -> PathBuf {
-    let mut name = output.file_name().map(OsString::from).unwrap_or_default();
-    name.push(".work");
-    output.with_file_name(name)
-}
 
 /// Prepares `points` points within `memory` bytes.
 pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Console) -> Result<(), CliError> {
@@ -34,12 +24,12 @@ pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Cons
     let limit = input::limit_reading(&args.input, args.format.0);
     let pieces = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
         Pieces::Points(pieces) => pieces,
-        Pieces::Mesh(_) => {
+        Pieces::Mesh { .. } => {
             let what = "this is a mesh, which is read whole; expected points, or more --memory".into();
             return Err(unfit(what));
         }
     };
-    let folder = folder(&args.output);
+    let folder = output::work_folder(&args.output);
     let work = Workspace::in_folder(&folder, &key(args)?, memory)?;
     let place = folder.display();
     let start = now();
@@ -85,14 +75,9 @@ pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Cons
 
 /// What the work in a folder is for: the input as it is, and the options that change the result.
 fn key(args: &PreprocessArgs) -> Result<String, CliError> {
-    let failed = CliError::reading(&args.input);
-    let about = args.input.metadata().map_err(failed)?;
-    let path = args.input.canonicalize().unwrap_or_else(|_| args.input.clone());
-    let changed = about.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
-    let (version, length) = (env!("CARGO_PKG_VERSION"), about.len());
     let options = options(args).with_threads(0);
     let (crop, class, format) = (args.filters.crop, &args.filters.class, args.format.0);
-    Ok(format!("{version} {path:?} {length} {changed:?} {format:?} {options:?} {crop:?} {class:?}"))
+    Ok(format!("{} {format:?} {options:?} {crop:?} {class:?}", input::identity(&args.input)?))
 }
 
 /// Reads the points twice: for their frame, and to gather them.

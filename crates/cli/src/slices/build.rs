@@ -3,16 +3,17 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use nearmiss::io::{Pieces, PointPieces, ReadError, read_in_pieces};
-use nearmiss::slices::{Obstacle, Pixel, SliceBuilder, SliceOptions, SlicePlan, SliceTarget, Up};
-use nearmiss::{Aabb, CloudError};
+use nearmiss::io::{Pieces, PointPieces, ReadError, glance, read_in_pieces};
+use nearmiss::slices::{Obstacle, Pixel, SliceBuilder, SliceError, SliceOptions, SlicePlan, SliceTarget, Up};
+use nearmiss::{Aabb, CloudError, Workspace};
 
 use super::report::{Report, open};
-use crate::console::{Console, now};
+use crate::console::{Bar, Console, now};
 use crate::error::CliError;
-use crate::input;
+use crate::memory::MemoryArgs;
 use crate::parse::parse_length;
 use crate::preprocess::{FormatChoice, parse_format, parse_threads};
+use crate::{input, output};
 
 /// Options of `slices build`.
 #[derive(Debug, Clone, Args)]
@@ -47,9 +48,9 @@ pub struct BuildArgs {
     /// Format of the input: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf, or auto, by content and name
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
-    /// Mebibytes that building may take
-    #[arg(long, value_name = "MIB", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(1..))]
-    pub memory: u32,
+    /// How much memory may be used
+    #[command(flatten)]
+    pub memory: MemoryArgs,
     /// Threads to work on, 0 for all cores; the result is the same
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
     pub threads: usize,
@@ -87,45 +88,87 @@ pub(super) fn run(args: &BuildArgs) -> Result<(), CliError> {
     options(args, false).check().map_err(|cause| CliError::Usage(cause.to_string()))?;
     input::check_raw(&args.input)?;
     let target = SliceTarget::new(&args.output)?;
-    let bar = console.spinner(format_args!("reading {}", args.input.display()));
+    let name = args.input.display();
+    let limit = input::limit_reading(&args.input, args.format.0);
     let source = read_in_pieces(&args.input, args.format.0, BLOCK)?;
-    let bounds = match &source {
-        Pieces::Points(points) => bounds(&args.input, points)?,
-        Pieces::Mesh(mesh) => {
+    let (bounds, given) = match &source {
+        Pieces::Points(points) => {
+            let expected = glance(&args.input, args.format.0).map_or(0, |seen| seen.points);
+            bounds(&args.input, points, &console.rate(format_args!("looking through {name}"), expected))?
+        }
+        Pieces::Mesh { mesh, .. } => {
             let corners = mesh.triangles().iter().flatten();
-            Aabb::of(corners.map(|&v| mesh.vertices()[v as usize]))
+            (Aabb::of(corners.map(|&v| mesh.vertices()[v as usize])), 0)
         }
     };
-    drop(bar);
+    drop(limit);
     let unfit = |cause| CliError::Slices { path: args.input.clone(), cause };
-    let plan = SlicePlan::new(&options(args, matches!(source, Pieces::Mesh(_))), &bounds).map_err(unfit)?;
+    let (plan, work) = place(args, &options(args, matches!(source, Pieces::Mesh { .. })), &bounds, console)?;
     let [width, height, slices] = plan.grid().counts;
-    let bar = console.spinner(format_args!("filling {slices} slices of {width} × {height} pixels"));
+    let what = format!("filling {slices} slices of {width} × {height} pixels");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.or(Err(CliError::Threads(args.threads)))?;
-    let map = pool.install(|| {
-        let mut builder = SliceBuilder::new(&plan).map_err(unfit)?;
-        match &source {
-            Pieces::Points(points) => points.each(|piece| builder.add(&piece.positions))?,
-            Pieces::Mesh(mesh) => _ = builder.add_mesh(mesh),
+    pool.install(|| {
+        let mut builder = SliceBuilder::new_in(&plan, &work).map_err(unfit)?;
+        if builder.is_filled() {
+            console.note("going on with the work of an ended run");
+        } else {
+            match &source {
+                Pieces::Points(points) => {
+                    let bar = console.rate(what, given);
+                    points.each(|piece| {
+                        builder.add(&piece.positions);
+                        bar.advance(piece.len() as u64);
+                    })?;
+                }
+                Pieces::Mesh { mesh, .. } => {
+                    let _bar = console.spinner(what);
+                    builder.add_mesh(mesh);
+                }
+            }
+            builder.keep(&work).map_err(unfit)?;
         }
-        Ok::<_, CliError>(builder.finish())
+        let _bar = console.spinner(format_args!("writing {}", args.output.display()));
+        if work.is_in_memory() { target.save(&builder.finish()) } else { target.build(builder) }
+            .map_err(CliError::from)
     })?;
-    drop(bar);
-    let bar = console.spinner(format_args!("writing {}", args.output.display()));
-    pool.install(|| target.save(&map))?;
-    drop(bar);
+    work.remove();
     let folder = open(&args.output)?;
     Report::new(&folder, start.elapsed()).tell(&folder, args.json)
 }
 
-/// Of all points that are finite, of which there must be enough for a cloud.
-fn bounds(path: &Path, points: &PointPieces) -> Result<Aabb, CliError> {
+/// Where the voxels lie: in memory, or on disk if `--memory` was given and they need more.
+fn place(
+    args: &BuildArgs,
+    options: &SliceOptions,
+    bounds: &Aabb,
+    console: Console,
+) -> Result<(SlicePlan, Workspace), CliError> {
+    let unfit = |cause| CliError::Slices { path: args.input.clone(), cause };
+    let folder = output::work_folder(&args.output);
+    let plan = SlicePlan::new(options, bounds);
+    let Some(memory) = args.memory.memory.filter(|_| matches!(plan, Err(SliceError::Memory { .. }))) else {
+        let plan = plan.map_err(unfit)?;
+        // What a run on disk may have left that was ended.
+        Workspace::clear(&folder);
+        return Ok((plan, Workspace::in_memory()));
+    };
+    let plan = SlicePlan::on_disk(options, bounds).map_err(unfit)?;
+    let key = format!("slices {} {plan:?}", input::identity(&args.input)?);
+    let work = Workspace::in_folder(&folder, &key, memory)?;
+    console.note(format_args!("working on disk, in {}, which is removed at the end", folder.display()));
+    Ok((plan, work))
+}
+
+/// The bounds of all points that are finite, of which there must be enough for a cloud; and how many points
+/// there are.
+fn bounds(path: &Path, points: &PointPieces, bar: &Bar) -> Result<(Aabb, u64), CliError> {
     let mut bounds = Aabb::EMPTY;
     let mut distinct: Vec<[f64; 3]> = Vec::with_capacity(LEAST_POINTS);
     let mut given = 0;
     points.each(|piece| {
         given += piece.len();
+        bar.advance(piece.len() as u64);
         for &p in piece.positions.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
             bounds.grow(p);
             if distinct.len() < LEAST_POINTS && !distinct.contains(&p) {
@@ -137,7 +180,7 @@ fn bounds(path: &Path, points: &PointPieces) -> Result<Aabb, CliError> {
         let cause = CloudError::TooFew { distinct: distinct.len(), given };
         return Err(ReadError::Cloud { path: path.to_owned(), cause }.into());
     }
-    Ok(bounds)
+    Ok((bounds, given as u64))
 }
 
 fn options(args: &BuildArgs, is_mesh: bool) -> SliceOptions {
@@ -153,10 +196,10 @@ fn options(args: &BuildArgs, is_mesh: bool) -> SliceOptions {
             Obstacle::Slope { degrees: args.max_slope, noise: args.noise.or(of_mesh) }
         }
     };
-    SliceOptions::default()
+    let options = SliceOptions::default()
         .with_pixel(pixel)
         .with_slice_height(args.slice_height)
         .with_obstacle(obstacle)
-        .with_up(args.up)
-        .with_memory(u64::from(args.memory) << 20)
+        .with_up(args.up);
+    args.memory.memory.map_or(options, |memory| options.with_memory(memory))
 }

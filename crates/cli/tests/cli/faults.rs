@@ -226,3 +226,60 @@ fn a_process_killed_while_it_converts_leaves_the_old_file_or_the_new_one() {
     let convert = |input| ["convert", input, "out.laz", "--quiet", "--voxel", "0.02"];
     killed_at_any_time(&place, "out.laz", [&convert("bowl.xyz"), &convert("ball.xyz")]);
 }
+
+/// A decoder that ends its process, here because there is no memory left, ends in an error like any other.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_decoder_that_ends_the_process_is_an_error_by_name() {
+    let place = Place::new();
+    place.cloud("ball.xyz", sphere(1.0), 0.01);
+    place.ok(&["convert", "ball.xyz", "ball.laz", "--quiet"]);
+    place.ok(&["preprocess", "ball.laz", "-o", "ball.nm", "--quiet"]);
+    let before = std::fs::read(place.path("ball.nm")).unwrap();
+    let limited = |kilobytes: u32, args: &[&str]| {
+        let script = format!("ulimit -d {kilobytes}; exec \"$0\" \"$@\"");
+        let output = Command::new("sh")
+            .args(["-c", &script, env!("CARGO_BIN_EXE_nearmiss")])
+            .args(args)
+            .current_dir(place.path(""))
+            .output()
+            .unwrap();
+        Done::new(output, args)
+    };
+    let args = ["preprocess", "ball.laz", "-o", "ball.nm", "--quiet", "--threads", "1"];
+    let done = limited(4_000, &args);
+    assert_eq!(done.status, 1, "{}", done.errors);
+    assert!(done.errors.contains("error: ball.laz: expected a file that can be decoded"), "{}", done.errors);
+    assert_eq!(std::fs::read(place.path("ball.nm")).unwrap(), before, "the previous file");
+    assert_eq!(limited(400_000, &args).status, 0);
+    // What the command says otherwise, and its status, come through.
+    place.refused(2, &["convert", "ball.laz", "./ball.laz"], &["would replace the input"]);
+    place.refused(1, &["preprocess", "ball.laz", "-o", "nowhere/ball.nm"], &["there is no folder nowhere"]);
+    assert_eq!(place.ok(&["collide", "ball.laz", "ball.nm", "--json"]).json().len(), 1);
+}
+
+/// Two commands that write one file at the same time: one of their outputs is there in the end, whole.
+#[test]
+fn two_commands_that_write_one_file() {
+    let place = Place::new();
+    place.cloud("bowl.xyz", bowl(1.0), 0.02);
+    place.cloud("ball.xyz", sphere(1.0), 0.03);
+    for out in ["out.nm", "out.laz"] {
+        let args = |input| match out {
+            "out.nm" => ["preprocess", input, "-o", out, "--quiet"].to_vec(),
+            _ => ["convert", input, out, "--quiet"].to_vec(),
+        };
+        let whole = ["bowl.xyz", "ball.xyz"].map(|input| {
+            place.ok(&args(input));
+            std::fs::read(place.path(out)).unwrap()
+        });
+        for round in 0..10 {
+            let children = ["bowl.xyz", "ball.xyz"].map(|input| spawn(&place, &args(input)));
+            for mut child in children {
+                assert!(child.wait().unwrap().success(), "{out}, round {round}");
+            }
+            assert!(whole.contains(&std::fs::read(place.path(out)).unwrap()), "{out}, round {round}");
+        }
+        assert_eq!(litter(&place), [""; 0], "{out}");
+    }
+}

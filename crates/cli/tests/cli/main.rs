@@ -9,6 +9,7 @@ mod distances;
 mod estimating;
 mod faults;
 mod filtering;
+mod independent;
 mod interpolating;
 mod looking_inside;
 mod making_poses;

@@ -330,7 +330,7 @@ fn what_does_not_serve_is_refused_by_name() {
     for (status, args, words) in [
         (1, vec!["slices", "build", "flat.xyz", "-o", "new"], &["flat.xyz", "no extent along z"][..]),
         (1, build(&["--pixel", "0.00001"]), &["house.xyz", "2^31"]),
-        (1, build(&["--pixel", "0.002", "--memory", "64"]), &["house.xyz", "64 are allowed"]),
+        (1, build(&["--pixel", "0.002", "--memory", "64MB"]), &["house.xyz", "61 are allowed"]),
         (
             1,
             build(&["--pixel", "100", "--slice-height", "1.2e-8", "--obstacle", "0.5"]),
@@ -347,7 +347,7 @@ fn what_does_not_serve_is_refused_by_name() {
         (2, build(&["--obstacle", "0"]), &["above 0"]),
         (2, build(&["--obstacle", "1"]), &["no wall"]),
         (2, build(&["--pixel", "1e308"]), &["a pixel of side 1e308"]),
-        (2, build(&["--memory", "0"]), &["0 is not in 1.."]),
+        (2, build(&["--memory", "0"]), &["expected a size of memory"]),
         (2, vec!["slices", "build", "none.xyz", "-o", "new", "--obstacle", "2"], &["no wall"]),
         // Before the input is read.
         (
@@ -426,4 +426,49 @@ fn the_slice_that_is_needed_and_missing_is_named() {
     place.write("pose.jsonl", "{\"b\":[1,0,0,50, 0,1,0,0, 0,0,1,0, 0,0,0,1]}\n");
     let done = place.run(&["slices", "query", "whole", "--map", "house", "--poses", "pose.jsonl"]);
     assert_eq!((done.status, said(&done.errors, "error")), (1, vec!["3".to_owned()]), "{}", done.errors);
+}
+
+/// Names and contents of the files of a map.
+fn files_of(place: &Place, map: &str) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(place.path(map)).unwrap().map(|entry| entry.unwrap());
+    let mut files: Vec<_> = entries
+        .map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap()))
+        .collect();
+    files.sort();
+    files
+}
+
+/// Within less memory than the voxels need, the same map is made on disk; a run that was killed is gone on
+/// with.
+#[test]
+fn a_map_larger_than_memory_is_made_on_disk() {
+    let place = with_house();
+    place.write("house.obj", obj(&house()));
+    let build = |input: &'static str, map: &'static str, more: &[&'static str]| {
+        [&["slices", "build", input, "-o", map, "--pixel", "0.05"], more].concat()
+    };
+    let memory = ["--memory", "4MB"];
+    for (input, threads) in [("house.xyz", "1"), ("house.xyz", "2"), ("house.obj", "2")] {
+        place.ok(&build(input, "memory", &[]));
+        let done = place.ok(&build(input, "disk", &[&memory[..], &["--threads", threads]].concat()));
+        assert!(done.errors.contains("working on disk, in disk.work"), "{}", done.errors);
+        assert_eq!(files_of(&place, "disk"), files_of(&place, "memory"), "{input}");
+        assert!(!place.path("disk.work").exists());
+    }
+    place.refused(1, &build("house.xyz", "other", &["--memory", "200kB"]), &["house.xyz", "larger pixels"]);
+
+    let args = build("house.xyz", "disk", &memory);
+    let mut child = crate::faults::spawn(&place, &args);
+    while !place.path("disk.work/voxels.done").exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_micros(100));
+    }
+    child.kill().unwrap();
+    assert!(!child.wait().unwrap().success(), "it was killed");
+    let before = files_of(&place, "disk");
+    let done = place.ok(&args);
+    assert!(done.errors.contains("going on with the work of an ended run"), "{}", done.errors);
+    assert!(!place.path("disk.work").exists());
+    place.ok(&build("house.xyz", "memory", &[]));
+    assert_eq!(files_of(&place, "disk"), files_of(&place, "memory"));
+    assert!(before.iter().any(|(name, _)| name == "index.nms"), "the old map stays until then");
 }

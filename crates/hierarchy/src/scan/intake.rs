@@ -1,6 +1,6 @@
 //! Points of a scan, gathered piece by piece in a workspace.
 
-use nearmiss_geometry::{Aabb, CloudError, Dropped, Frame, Intake, LEAST_POINTS, find_repeated};
+use nearmiss_geometry::{Aabb, CloudError, Dropped, Frame, Intake, LEAST_POINTS, Repeated};
 use nearmiss_lanes::id32;
 use nearmiss_store::{Room, WorkError, Workspace};
 use serde::{Deserialize, Serialize};
@@ -10,9 +10,6 @@ use crate::scan::points::ScanPoints;
 
 /// The name of the stage.
 const STAGE: &str = "points";
-
-/// Stands in the array of sources for a point that is left out: no point has this index.
-const LEFT_OUT: u32 = u32::MAX;
 
 /// Why no points can be gathered.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -107,14 +104,8 @@ impl<'w> PointGatherer<'w> {
         }
         self.positions.truncate(self.kept);
         self.source.truncate(self.kept);
-        let mut keys = work.room(self.kept)?;
-        let source: &mut [u32] = &mut self.source;
-        let mut duplicate = 0;
-        find_repeated(&self.positions, &mut keys, |i| {
-            source[i as usize] = LEFT_OUT;
-            duplicate += 1;
-        });
-        drop(keys);
+        let repeated = Repeated::among(&self.positions, &mut work.room(self.kept)?);
+        let duplicate = repeated.count();
         let count = self.kept - duplicate;
         if count < LEAST_POINTS {
             return Err(CloudError::TooFew { distinct: count, given }.into());
@@ -124,8 +115,9 @@ impl<'w> PointGatherer<'w> {
             (stage.room("positions", count)?, stage.room("source", count)?);
         {
             let (positions, kept_source): (&mut [[f32; 3]], &mut [u32]) = (&mut positions, &mut kept_source);
-            let all = self.positions.iter().zip(&*source).filter(|(_, source)| **source != LEFT_OUT);
-            for ((p, i), (position, source)) in all.zip(positions.iter_mut().zip(kept_source)) {
+            let all = self.positions.iter().zip(&*self.source).enumerate();
+            let first = all.filter(|(i, _)| !repeated.contains(*i)).map(|(_, point)| point);
+            for ((p, i), (position, source)) in first.zip(positions.iter_mut().zip(kept_source)) {
                 (*position, *source) = (*p, *i);
             }
         }

@@ -1,14 +1,15 @@
 //! Spacing, borders and holes of a scan, from a sample of its points.
 
 use std::f64::consts::TAU;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd};
 use nearmiss_geometry::NodeId;
 use nearmiss_geometry::nalgebra::Vector3;
-use nearmiss_index::{BlockBoxes, BlockTree, Nearest, PointBlock};
+use nearmiss_index::PointBlock;
 use nearmiss_lanes::parallel::chunks;
 
+use crate::descent::PlaceVisitor;
 use crate::scan::build::PointHierarchy;
 
 const WIDTH: usize = PointBlock::WIDTH;
@@ -80,8 +81,6 @@ impl PointHierarchy {
     #[expect(clippy::cast_precision_loss, reason = "counts")]
     pub fn survey(&self, seed: u64) -> Survey {
         let slices = self.slices();
-        let boxes = BlockBoxes::new(slices.blocks, self.len());
-        let tree = boxes.over(slices.blocks);
         let mut survey = Survey::default();
         let parts = [(0..slices.dense, BLOCKS), (slices.dense..self.len(), BLOCKS / 2)];
         for (points, most) in parts {
@@ -90,8 +89,7 @@ impl PointHierarchy {
             }
             let blocks = sample(points.clone(), most, seed);
             let seen = chunks(&blocks, |blocks| {
-                let mut found = Nearest::default();
-                blocks.iter().map(|&block| self.look(&tree, block, &points, &mut found)).collect::<Vec<_>>()
+                blocks.iter().map(|&block| self.look(block, &points)).collect::<Vec<_>>()
             });
             let seen: Vec<Seen> = seen.into_iter().flatten().collect();
             let count: usize = seen.iter().map(|seen| seen.count).sum();
@@ -112,18 +110,18 @@ impl PointHierarchy {
     }
 
     /// Looks at those points of a block that are among `points`.
-    fn look(&self, tree: &BlockTree<'_>, block: usize, points: &Range<usize>, found: &mut Nearest) -> Seen {
+    fn look(&self, block: usize, points: &Range<usize>) -> Seen {
         let slices = self.slices();
-        let count = RING.min(self.len() - 1);
-        tree.nearest(Level::new(), block, count, found);
+        let mut ring = Ring::of(self);
         let mut seen = Seen::default();
         let first = block * WIDTH;
         for i in (first..first + WIDTH).filter(|i| points.contains(i)) {
-            let near = found.ranked(i % WIDTH, RANK.min(count) - 1);
-            let spacing = near.map_or(0.0, |near| f64::from(near.distance_sq).sqrt());
+            ring.gather(i);
+            let near = ring.near.get(RANK.min(ring.count) - 1);
+            let spacing = near.map_or(0.0, |(distance_sq, _)| f64::from(*distance_sq).sqrt());
             seen.count += 1;
             let is_outlier = i >= slices.dense && spacing > f64::from(slices.reach) && {
-                let near = found.of(i % WIDTH).take(RANK).map(|near| near.id as usize);
+                let near = ring.ids().take(RANK);
                 // The radii of other points are limited by the reach.
                 let is_denser = |j: usize| j < slices.dense && DENSER * f64::from(slices.radii[j]) < spacing;
                 let denser = near.filter(|&j| is_denser(j));
@@ -135,8 +133,7 @@ impl PointHierarchy {
                 seen.spacings.push(spacing * self.frame().scale);
             }
             if slices.is_on_sheet(i) {
-                let ids = found.of(i % WIDTH).map(|near| near.id as usize);
-                if let Some(outward) = self.outward(i, ids) {
+                if let Some(outward) = self.outward(i, ring.ids()) {
                     seen.border += 1;
                     seen.holes.extend(self.hole(i, outward).map(|width| width * self.frame().scale));
                 }
@@ -215,6 +212,58 @@ impl PointHierarchy {
         let height = normal.dot(&(self.place(j) - p)).abs();
         let is_same = normal.dot(&self.normal(j)).abs() > PARALLEL && height < LEVEL * best;
         (is_same && best > reach).then_some(best)
+    }
+}
+
+/// The nearest other points of a point.
+struct Ring<'a> {
+    scan: &'a PointHierarchy,
+    /// How many of them are wanted.
+    count: usize,
+    /// Their common neighbour, and where it is.
+    centre: usize,
+    place: [f32; 3],
+    /// Squared distances and numbers, ascending.
+    near: Vec<(f32, usize)>,
+}
+
+impl<'a> Ring<'a> {
+    fn of(scan: &'a PointHierarchy) -> Self {
+        let count = RING.min(scan.len() - 1);
+        Self { scan, count, centre: 0, place: [0.0; 3], near: Vec::with_capacity(count + 1) }
+    }
+
+    /// Finds those of the `i`-th point.
+    fn gather(&mut self, i: usize) {
+        self.near.clear();
+        (self.centre, self.place) = (i, self.scan.positions()[i]);
+        let _all = self.scan.tree().descend_to(Level::new(), self.place, self);
+    }
+
+    fn ids(&self) -> impl Iterator<Item = usize> {
+        self.near.iter().map(|(_, id)| *id)
+    }
+}
+
+impl PlaceVisitor for Ring<'_> {
+    fn most_sq(&self) -> f32 {
+        /// More than rounding can make of a distance to a box.
+        const ROUNDED: f32 = 1.0 + 1e-5;
+        if self.near.len() < self.count { f32::INFINITY } else { self.near[self.count - 1].0 * ROUNDED }
+    }
+
+    fn leaf<S: Simd>(&mut self, _: S, number: usize) -> ControlFlow<()> {
+        for j in self.scan.topology().points_of_leaf(number).filter(|j| *j != self.centre) {
+            let p = self.scan.positions()[j];
+            let distance_sq: f32 = (0..3).map(|k| (p[k] - self.place[k]).powi(2)).sum();
+            let found = (distance_sq, j);
+            let place = self.near.partition_point(|other| *other < found);
+            if place < self.count {
+                self.near.insert(place, found);
+                self.near.truncate(self.count);
+            }
+        }
+        ControlFlow::Continue(())
     }
 }
 

@@ -41,7 +41,7 @@ fn check_pieces(bytes: &[u8], format: Option<Format>, name: &str) {
     let whole = read_bytes(bytes, format, &path);
     for block in [30, 200] {
         let pieces = read_in_pieces(&path, format, block).and_then(|pieces| match pieces {
-            Pieces::Mesh(mesh) => Ok(mesh.vertices().to_vec()),
+            Pieces::Mesh { vertices, .. } => Ok(vertices.positions),
             Pieces::Points(pieces) => {
                 let mut points = Vec::new();
                 pieces.each(|piece| points.extend_from_slice(&piece.positions))?;
