@@ -130,6 +130,7 @@ fn attributes_come_along() {
         assert!(unit.count() * 10 > 9 * normals.len(), "normals are of unit length");
     }
     assert!(read(data.join("scans/rgbd-108k.pcd"), None).unwrap().cloud.colours().is_some());
+    assert!(read(data.join("objects/kitten-5k.xyz"), None).unwrap().cloud.normals().is_some(), "unnamed");
 }
 
 #[test]
