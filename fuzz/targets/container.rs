@@ -2,10 +2,12 @@
 //! says how much is checked, and whether the header is to state the length that the file has.
 #![no_main]
 
-#[path = "../../crates/nearmiss/tests/facade/hostile/exercise.rs"]
-mod exercise;
-#[path = "../../crates/nearmiss/tests/facade/hostile/repair.rs"]
-mod repair;
+#[path = "../../crates/nearmiss/tests/facade/hostile"]
+mod hostile {
+    pub(crate) mod exercise;
+    pub(crate) mod graph;
+    pub(crate) mod repair;
+}
 
 use std::sync::OnceLock;
 
@@ -29,15 +31,15 @@ fn partner() -> &'static Scan {
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let [how, bytes @ ..] = bytes else { return };
     let mut bytes = bytes.to_vec();
-    if how & 2 != 0 && bytes.len() >= repair::HEADER {
+    if how & 2 != 0 && bytes.len() >= hostile::repair::HEADER {
         bytes.resize(bytes.len().next_multiple_of(64), 0);
         let length = bytes.len() as u64;
         bytes[24..32].copy_from_slice(&length.to_le_bytes());
     }
-    repair::repair(&mut bytes);
+    hostile::repair::repair(&mut bytes);
     let check = if how & 1 == 0 { Check::Structure } else { Check::Full };
     match Scan::from_bytes(bytes, check) {
-        Ok(scan) => _ = exercise::exercise(&scan, partner()),
+        Ok(scan) => _ = hostile::exercise::exercise(&scan, partner()),
         Err(error) => assert!(!error.to_string().is_empty()),
     }
 });

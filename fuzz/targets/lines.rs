@@ -12,7 +12,8 @@ fn folder() -> &'static PathBuf {
     FOLDER.get_or_init(|| {
         let folder = std::env::temp_dir().join(format!("nearmiss-lines-{}", std::process::id()));
         fs::create_dir_all(&folder).expect("a folder of our own");
-        let rows = (0..400_u32).map(|i| format!("{} {} {}\n", f64::from(i % 20) * 0.1, f64::from(i / 20) * 0.1, 0));
+        let rows =
+            (0..400_u32).map(|i| format!("{} {} {}\n", f64::from(i % 20) * 0.1, f64::from(i / 20) * 0.1, 0));
         fs::write(folder.join("floor.xyz"), rows.collect::<String>()).expect("a folder of our own");
         for args in ["preprocess floor.xyz -o floor.nm --quiet", "slices build floor.xyz -o map --quiet"] {
             run(&folder, args);

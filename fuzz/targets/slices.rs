@@ -16,15 +16,20 @@ fn sound() -> &'static (PathBuf, Vec<(PathBuf, Vec<u8>)>) {
     static SOUND: OnceLock<(PathBuf, Vec<(PathBuf, Vec<u8>)>)> = OnceLock::new();
     SOUND.get_or_init(|| {
         let folder = std::env::temp_dir().join(format!("nearmiss-fuzz-{}", std::process::id()));
-        let points: Vec<[f64; 3]> =
-            (0..400_u32).map(|i| [f64::from(i % 20) * 0.1, f64::from(i / 20) * 0.1, f64::from(i % 3) * 0.4]).collect();
+        let points: Vec<[f64; 3]> = (0..400_u32)
+            .map(|i| [f64::from(i % 20) * 0.1, f64::from(i / 20) * 0.1, f64::from(i % 3) * 0.4])
+            .collect();
         let bounds = nearmiss::Aabb::of(points.iter().copied());
         let plan = SlicePlan::new(&SliceOptions::default(), &bounds).expect("sound options");
         let mut builder = SliceBuilder::new(&plan).expect("little memory");
         builder.add(&points);
-        SliceTarget::new(&folder).and_then(|target| target.save(&builder.finish())).expect("a folder of our own");
+        SliceTarget::new(&folder)
+            .and_then(|target| target.save(&builder.finish()))
+            .expect("a folder of our own");
         let files = fs::read_dir(&folder).expect("it is there").flatten().map(|entry| entry.path());
-        let files = files.filter(|path| path.is_file()).map(|path| (path.clone(), fs::read(&path).unwrap_or_default()));
+        let files = files
+            .filter(|path| path.is_file())
+            .map(|path| (path.clone(), fs::read(&path).unwrap_or_default()));
         let mut files: Vec<_> = files.collect();
         files.sort();
         (folder, files)

@@ -75,12 +75,15 @@ pub struct Repeated {
 /// Records that are sorted together: so many fit a cache.
 const TOGETHER: usize = 1 << 17;
 
-/// Most groups of records: each is written from its start to its end, a page at a time.
-const MOST_GROUPS: u32 = 12;
+/// Most groups of records are two to this power.
+const MOST_GROUPS: u32 = 8;
+
+/// Records of a group that are written together, some pages of memory.
+const RUN: usize = 1 << 12;
 
 impl Repeated {
     /// Finds them. `records` is scratch with an element a point, and may be larger than memory: it is written
-    /// in some thousand runs, and then sorted run by run. O(n log n).
+    /// in runs of 64 KiB, and then sorted part by part. O(n log n), and up to 16 MiB.
     ///
     /// # Panics
     /// When `records` is shorter than `points`.
@@ -96,11 +99,23 @@ impl Repeated {
             starts[i] += starts[i - 1];
         }
         let mut next = starts.clone();
+        let mut runs: Vec<Vec<u128>> = vec![Vec::new(); 1 << bits];
+        let mut write = |group: usize, run: &mut Vec<u128>| {
+            let end = next[group] + run.len();
+            records[next[group]..end].copy_from_slice(run);
+            next[group] = end;
+            run.clear();
+        };
         for (i, p) in (0_u32..).zip(points) {
-            let place = &mut next[group(p)];
-            records[*place] = record(*p, i);
-            *place += 1;
+            let group = group(p);
+            let run = &mut runs[group];
+            run.push(record(*p, i));
+            if run.len() == RUN {
+                write(group, run);
+            }
         }
+        runs.iter_mut().enumerate().for_each(|(group, run)| write(group, run));
+        drop(runs);
         let mut repeated = Self { bits: vec![0; points.len().div_ceil(64)], count: 0 };
         for group in starts.windows(2) {
             let group = &mut records[group[0]..group[1]];

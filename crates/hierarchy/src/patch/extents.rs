@@ -21,11 +21,10 @@ const WIDTH: usize = PointBlock::WIDTH;
 /// Nodes that a thread takes at once.
 const AT_ONCE: usize = 16;
 
-/// Discs side by side.
+/// The discs of a block of points, side by side.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(crate) struct DiscBlock {
-    position: [[f32; WIDTH]; 3],
     normal: [[f32; WIDTH]; 3],
     disc: [f32; WIDTH],
     ball: [f32; WIDTH],
@@ -34,20 +33,24 @@ pub(crate) struct DiscBlock {
 /// The discs of all points, and the balls about those that have one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Discs<'a> {
-    pub(crate) positions: &'a [[f32; 3]],
     pub(crate) normals: &'a [[f32; 3]],
     pub(crate) discs: DiscRadii<'a>,
     pub(crate) balls: &'a [f32],
 }
 
 /// Makes of the box about each node the least along its axes that contains the discs of the node's points
-/// with their thickness, and their balls. O(n log n).
-pub(crate) fn boxes_of_discs(topology: &Topology, boxes: &mut [OrientedBox], blocks: &[DiscBlock]) {
+/// with their thickness, and their balls. `points` has the positions. O(n log n).
+pub(crate) fn boxes_of_discs(
+    topology: &Topology,
+    boxes: &mut [OrientedBox],
+    points: &[PointBlock],
+    discs: &[DiscBlock],
+) {
     let level = Level::new();
     change_each(boxes, AT_ONCE, |id, about| {
         let [low, high] = dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
-            || extents(simd, blocks, topology.points(NodeId(id32(id))), &about.axes),
+            || extents(simd, (points, discs), topology.points(NodeId(id32(id))), &about.axes),
         ));
         *about = OrientedBox::spanned(about.axes, low, high, about.reach);
     });
@@ -57,11 +60,10 @@ impl Discs<'_> {
     /// Those in block `number`.
     pub(crate) fn block(&self, number: usize) -> DiscBlock {
         let zero = [0.0; WIDTH];
-        let mut block = DiscBlock { position: [zero; 3], normal: [zero; 3], disc: zero, ball: zero };
+        let mut block = DiscBlock { normal: [zero; 3], disc: zero, ball: zero };
         let first = number * WIDTH;
-        for i in first..(first + WIDTH).min(self.positions.len()) {
+        for i in first..(first + WIDTH).min(self.normals.len()) {
             for k in 0..3 {
-                block.position[k][i - first] = self.positions[i][k];
                 block.normal[k][i - first] = self.normals[i][k];
             }
             block.disc[i - first] = self.discs.get(i);
@@ -75,16 +77,16 @@ impl Discs<'_> {
 #[inline(always)]
 fn extents<S: Simd>(
     simd: S,
-    blocks: &[DiscBlock],
-    points: Range<usize>,
+    (points, discs): (&[PointBlock], &[DiscBlock]),
+    range: Range<usize>,
     axes: &[[f32; 3]; 3],
 ) -> [[f32; 3]; 2] {
     let (most, none) = (f32x16::splat(simd, f32::INFINITY), f32x16::splat(simd, f32::NEG_INFINITY));
     let (mut low, mut high) = ([most; 3], [none; 3]);
-    for number in points.start / WIDTH..points.end.div_ceil(WIDTH) {
-        let block = &blocks[number];
-        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, &points)));
-        let (position, normal) = (load(simd, &block.position), load(simd, &block.normal));
+    for number in range.start / WIDTH..range.end.div_ceil(WIDTH) {
+        let block = &discs[number];
+        let inside = mask32x16::from_bitmask(simd, u64::from(lanes_of(number, &range)));
+        let (position, normal) = (load(simd, &points[number].position), load(simd, &block.normal));
         let (disc, ball) =
             (f32x16::load_array_ref(simd, &block.disc), f32x16::load_array_ref(simd, &block.ball));
         for k in 0..3 {

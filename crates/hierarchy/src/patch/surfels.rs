@@ -71,9 +71,7 @@ pub(crate) struct Surfels {
     /// The radius of each point's ball: the greater of [`Slices::ball`](crate::Slices::ball) and
     /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball).
     pub(crate) balls: Room<f32>,
-    /// About the disc and the ball of each point.
-    pub(crate) flat: Room<Solid>,
-    /// About its cell as well.
+    /// About the disc, the ball and the cell of each point.
     pub(crate) cells: Room<Solid>,
     pub(crate) leaves: Room<LeafBounds>,
     /// Bounds of the leaves' parts of the obstacle.
@@ -175,7 +173,6 @@ pub(crate) fn surfels(
         normals: work.room(points)?,
         codes: work.room(points)?,
         balls: work.room(points)?,
-        flat: work.room(points)?,
         cells: work.room(points)?,
         leaves: work.room(leaves)?,
         obstacles: work.room(leaves)?,
@@ -187,16 +184,15 @@ pub(crate) fn surfels(
 impl Surfels {
     /// Puts what `give` gives in its place.
     fn fill(&mut self, give: impl FnOnce(&mut dyn FnMut(Some))) {
-        let Self { normals, codes, balls, flat, cells, leaves, obstacles } = self;
+        let Self { normals, codes, balls, cells, leaves, obstacles } = self;
         let (normals, codes): (&mut [_], &mut [_]) = (normals, codes);
-        let (balls, flat, cells): (&mut [_], &mut [_], &mut [_]) = (balls, flat, cells);
+        let (balls, cells): (&mut [_], &mut [_]) = (balls, cells);
         let (leaves, obstacles): (&mut [_], &mut [_]) = (leaves, obstacles);
         let (mut point, mut leaf) = (0, 0);
         give(&mut |some| {
             for (surfel, disc, ball) in some.discs {
-                let solid = Solid::of_disc(disc, ball);
                 (normals[point], codes[point], balls[point]) = (surfel.normal, surfel.code, ball);
-                (flat[point], cells[point]) = (solid, Solid::of_cell(&surfel.cell, solid));
+                cells[point] = Solid::of_cell(&surfel.cell, Solid::of_disc(disc, ball));
                 point += 1;
             }
             for [surface, obstacle] in some.leaves {

@@ -127,11 +127,12 @@ impl PointHierarchy {
             normals.chunks_mut(leaf_size).for_each(align);
         }
         let (topology, positions) = (self.topology, self.positions());
-        let of_points = Discs { positions, normals: &normals, discs, balls: &balls };
+        let of_points = Discs { normals: &normals, discs, balls: &balls };
         let mut boxes: Vec<OrientedBox> = self.boxes().collect();
         boxes_of_discs(
             &topology,
             &mut boxes,
+            &self.arrays.blocks,
             &map(self.arrays.blocks.len(), |number| of_points.block(number)),
         );
         let growths: Vec<Growth> = topology.ids().map(|id| self.tree().growth(Part::Surface, id)).collect();

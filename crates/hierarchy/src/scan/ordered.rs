@@ -97,7 +97,8 @@ impl Ordered {
     ) -> Result<Self, BuildError> {
         let count = points.positions.len();
         let mut items = work.room(count)?;
-        fill(&mut items, |i| Item { position: points.positions[i], index: id32(i) });
+        // Points ascend by their numbers in the input, so these order them as their places would.
+        fill(&mut items, |i| Item { position: points.positions[i], index: points.source[i] });
         let mut boxes = work.room(topology.len())?;
         split(&mut items, &topology, count, &mut boxes);
         let mut positions = work.room(count)?;
@@ -105,7 +106,7 @@ impl Ordered {
         {
             let items: &[Item] = &items;
             fill(&mut positions, |i| items[i].position);
-            fill(&mut source, |i| points.source[items[i].index as usize]);
+            fill(&mut source, |i| items[i].index);
         }
         drop(items);
         work.progress().reach(share::TREE);

@@ -8,7 +8,7 @@ use nearmiss_surface::{Metric, SurfaceOptions, SurfacePlan};
 
 use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
-use crate::patch::covering::{Ground, coverings};
+use crate::patch::covering::{Ground, Solid, coverings};
 use crate::patch::enclosure::growths;
 use crate::patch::extents::{Discs, boxes_of_discs};
 use crate::patch::samples::{lists as lists_of_samples, samples};
@@ -49,22 +49,25 @@ pub(crate) fn prepare(
     let (lists, listed) = neighbours(&index, &positions, &radii, work)?;
     work.progress().reach(share::LISTS);
     let known = Known { positions: &positions, radii: &radii, ordinary: sampling_radius, reach, dense };
-    let Surfels { mut normals, codes, balls, flat, cells, leaves, obstacles } =
+    let Surfels { mut normals, codes, balls, cells, leaves, obstacles } =
         surfels(&index, &known, &fits, work)?;
     drop((fits, bare));
     work.progress().reach(share::SURFELS);
     normals.chunks_mut(options.leaf_size as usize).for_each(align);
     let discs = DiscRadii { codes: &codes, radii: &radii, reach, sampling_radius };
-    let of_points = Discs { positions: &positions, normals: &normals, discs, balls: &balls };
+    let of_points = Discs { normals: &normals, discs, balls: &balls };
     let mut side_by_side = work.room(blocks.len())?;
     fill(&mut side_by_side, |number| of_points.block(number));
-    boxes_of_discs(&topology, &mut boxes, &side_by_side);
-    drop((side_by_side, balls));
+    boxes_of_discs(&topology, &mut boxes, &blocks, &side_by_side);
+    drop(side_by_side);
     work.progress().reach(share::BOXES);
     let obstacle_growths = growths(&topology, &boxes, &obstacles, work)?;
     let surface_growths = growths(&topology, &boxes, &leaves, work)?;
     drop((obstacles, leaves));
     work.progress().reach(share::ENCLOSURES);
+    let mut flat = work.room(positions.len())?;
+    fill(&mut flat, |i| Solid::of_disc(discs.get(i), balls[i]));
+    drop(balls);
     let sample_lists = lists_of_samples(&positions, &topology, options.samples, work)?;
     let ground = Ground {
         topology: &topology,

@@ -24,7 +24,7 @@ use crate::tree::topology::{Half, Topology};
 #[repr(C)]
 pub(crate) struct Item {
     pub(crate) position: [f32; 3],
-    /// Index in the cloud.
+    /// A number that no other point has; of equally good orders the one by ascending numbers is taken.
     pub(crate) index: u32,
 }
 
