@@ -111,9 +111,15 @@ const SHOWN: usize = 40;
 pub(crate) fn shown(piece: &[u8]) -> Box<str> {
     let start = &piece[..piece.len().min(4 * SHOWN)];
     let text = String::from_utf8_lossy(start.trim_ascii());
-    let mut shown: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
-    if text.chars().nth(SHOWN).is_some() {
-        shown.push('…');
+    let (mut shown, mut length) = (String::new(), 0);
+    for c in text.chars() {
+        // Six characters may stand for one.
+        length += c.escape_debug().count();
+        if length > SHOWN {
+            shown.push('…');
+            break;
+        }
+        shown.extend(c.escape_debug());
     }
     shown.into()
 }
@@ -150,5 +156,7 @@ mod tests {
         assert_eq!(&*shown(b" a\x1b[31mb "), "a\\u{1b}[31mb");
         assert_eq!(shown(&[b'x'; 1000]).chars().count(), SHOWN + 1, "cut with an ellipsis");
         assert_eq!(&*shown("Größe".as_bytes()), "Größe");
+        // Found by fuzzing: a message of two words that were escaped was longer than 400 bytes.
+        assert_eq!(shown(&[0x1b; 1000]).chars().count(), 6 * 6 + 1, "cut as it is shown");
     }
 }

@@ -472,3 +472,45 @@ fn a_map_larger_than_memory_is_made_on_disk() {
     assert_eq!(files_of(&place, "disk"), files_of(&place, "memory"));
     assert!(before.iter().any(|(name, _)| name == "index.nms"), "the old map stays until then");
 }
+
+/// Killed at many moments: the index is that of the old map or of the new one, and all slices that it names are
+/// whole. The next build clears up.
+#[test]
+fn a_build_that_is_killed_leaves_the_old_map_or_the_new_one() {
+    let place = with_house();
+    place.cloud("ball.xyz", nearmiss_testdata::shapes::sphere(1.0), 0.02);
+    let build = |input, map| ["slices", "build", input, "-o", map, "--pixel", "0.02", "--quiet"];
+    let inputs = ["house.xyz", "ball.xyz"];
+    let whole = inputs.map(|input| {
+        place.ok(&build(input, "whole"));
+        files_of(&place, "whole")
+    });
+    place.ok(&build(inputs[0], "map"));
+    let index = |files: &[(String, Vec<u8>)]| files.iter().find(|(name, _)| name == "index.nms").cloned();
+    let (mut killed, mut midway) = (0, 0);
+    for round in 0..24_u32 {
+        let mut child = crate::faults::spawn(&place, &build(inputs[round as usize % 2], "map"));
+        if round < 16 {
+            // As soon as it begins to write, or a little later.
+            let writes = || {
+                let entries = fs::read_dir(place.path("map")).unwrap().flatten();
+                entries.into_iter().any(|entry| entry.file_name().to_string_lossy().contains(".tmp-"))
+            };
+            while child.try_wait().unwrap().is_none() && !writes() {}
+            std::thread::sleep(std::time::Duration::from_micros(u64::from(round) * 200));
+        } else {
+            std::thread::sleep(std::time::Duration::from_millis(u64::from(round - 16) * 10));
+        }
+        child.kill().unwrap();
+        killed += u32::from(!child.wait().unwrap().success());
+        let found = files_of(&place, "map");
+        midway += u32::from(!whole.contains(&found));
+        assert!(whole.iter().any(|files| index(files) == index(&found)), "round {round}");
+        place.ok(&["slices", "inspect", "map", "--verify"]);
+    }
+    assert!(killed >= 12 && midway >= 4, "{killed} of 24 were killed, {midway} while they wrote");
+    for (input, files) in inputs.iter().zip(&whole) {
+        place.ok(&build(input, "map"));
+        assert!(files_of(&place, "map") == *files, "{input}: nothing else is left");
+    }
+}
