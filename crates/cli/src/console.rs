@@ -1,13 +1,13 @@
 //! What people see beside the results: progress, warnings, errors; and the clock.
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
 use std::process::ExitCode;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 
 use crate::digits::grouped;
@@ -51,7 +51,7 @@ impl Console {
 
     /// A bar for about `length` points, with their rate and the time that is left; gone when dropped.
     pub(crate) fn rate(self, what: impl Display, length: u64) -> Bar {
-        let template = "{msg} [{bar:30}] {human_pos} points, {per_sec}, {eta} left";
+        let template = "{msg} [{bar:30}] {human_pos} points, {rate}/s, {eta} left";
         let bar = self.bar(ProgressBar::new(length), template);
         bar.set_message(what.to_string());
         Bar(bar)
@@ -89,9 +89,12 @@ impl Console {
     fn bar(self, bar: ProgressBar, template: &str) -> ProgressBar {
         let target = if self.bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         bar.set_draw_target(target);
-        bar.with_style(
-            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
-        )
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        bar.with_style(style.with_key("rate", |state: &ProgressState, out: &mut dyn fmt::Write| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rough figure")]
+            let rate = state.per_sec() as u64;
+            let _ = out.write_str(&grouped(rate));
+        }))
     }
 }
 

@@ -217,7 +217,7 @@ fn look(
 
 fn progress(console: Console, what: &str, points: Option<u64>) -> Bar {
     match points {
-        Some(points) => console.steps(what, points),
+        Some(points) => console.rate(what, points),
         None => console.spinner(what),
     }
 }

@@ -75,8 +75,8 @@ pub(crate) struct ReadingLimit {
 }
 
 impl ReadingLimit {
-    /// Limits the memory that a child may allocate to some 500 MB more than the `expected` bytes. Does nothing
-    /// outside a child, and on systems other than Linux.
+    /// Limits the memory that a child may allocate to some 500 MB more than the `expected` bytes. Does
+    /// nothing outside a child, and on systems other than Linux.
     pub(crate) fn new(expected: f64) -> Self {
         #[cfg(target_os = "linux")]
         {

@@ -86,6 +86,12 @@ pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
+/// Returns `true` if a line is neither blank nor a comment.
+pub(crate) fn has_values(line: &Line<'_>) -> bool {
+    let text = line.text.trim_ascii_start();
+    !text.is_empty() && !text.starts_with(b"#") && !text.starts_with(b"//")
+}
+
 /// The number that a word spells, NaN and infinity in all their spellings included.
 pub(crate) fn number(word: &[u8]) -> Option<f64> {
     let parsed = std::str::from_utf8(word).ok()?.parse().ok();

@@ -11,7 +11,7 @@ use crate::columns::{Holds, Row, is_unique, slot};
 use crate::error::{Broken, Fault};
 use crate::rows::{Encoding, Layout, Rows};
 use crate::sink::Sink;
-use crate::text::{Line, Lines, number, shown, whole};
+use crate::text::{Line, Lines, has_values, number, shown, whole};
 
 /// The content of a text file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
@@ -85,11 +85,6 @@ impl Rows for Table {
     }
 
     fn record(&self, _: &[u8], _: &mut Row) {}
-}
-
-fn has_values(line: &Line<'_>) -> bool {
-    let text = line.text.trim_ascii_start();
-    !text.is_empty() && !text.starts_with(b"#") && !text.starts_with(b"//")
 }
 
 fn short(promised: u64, present: u64, line: u64) -> Broken {

@@ -19,8 +19,7 @@ impl OwnMap {
         // SAFETY: as for `map`: the file was made by this process in a folder that it holds the lock of, and
         // neither it nor anybody who keeps to the lock changes the file but through this map.
         let map = unsafe { memmap2::MmapMut::map_mut(file) }?;
-        // By huge pages, scattered reads would bring in gigabytes within the milliseconds between two looks of
-        // the warden.
+        // By huge pages, scattered reads would bring in gigabytes between two looks of the warden.
         #[cfg(any(target_os = "linux", target_os = "android"))]
         let _asked = map.advise(memmap2::Advice::NoHugePage);
         Ok(Self(Arc::new(map.into())))
@@ -53,8 +52,8 @@ impl Tenant {
             // there again.
             let _asked = unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
         }
-        // Whoever used it may have dropped it meanwhile. To remove a large file takes a while, in which nobody
-        // would watch the memory.
+        // Whoever used it may have dropped it meanwhile. Removing a large file takes a while, in which
+        // nobody would watch the memory.
         if let Some(last) = Arc::into_inner(map) {
             let _dropped = std::thread::Builder::new().spawn(move || drop(last));
             return false;

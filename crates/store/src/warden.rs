@@ -9,13 +9,13 @@ use std::time::Duration;
 
 use crate::own_map::Tenant;
 
-/// How often it looks: in this time two cores that go through an array touch some 40 MB anew, and as much as
-/// 200 MB if they jump about in one that the system has in its cache.
-const PAUSE: Duration = Duration::from_millis(2);
+/// How often it looks: in this time two cores that go through an array touch some 20 MB anew, and as much as
+/// 100 MB if they jump about in one that the system has in its cache.
+const PAUSE: Duration = Duration::from_millis(1);
 
 /// It acts when this share of what is allowed is held. To give a gigabyte back takes some 20 ms, in which
 /// others touch more.
-const SHARE: f64 = 0.25;
+const SHARE: f64 = 0.15;
 
 type Tenants = Arc<Mutex<Vec<Tenant>>>;
 

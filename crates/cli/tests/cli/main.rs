@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod bad_input;
+mod building_maps;
 mod collide;
 mod converting;
 mod curves;

@@ -4,7 +4,7 @@
 //! they are whole numbers from 0 to 255. One column before these is an intensity, as in PTS; one that stands
 //! alone is an intensity only in PTS, which begins with a count.
 
-use crate::text::Lines;
+use crate::text::{Line, Lines, has_values};
 
 /// Rows that are looked at.
 const ROWS: usize = 32;
@@ -24,7 +24,7 @@ const INTENSITY: usize = 9;
 /// a row of numbers; `is_counted` tells that the text begins with a count.
 pub(super) fn columns(
     lines: Lines<'_>,
-    values: impl Fn(crate::text::Line<'_>) -> Option<Vec<f64>>,
+    values: impl Fn(Line<'_>) -> Option<Vec<f64>>,
     is_counted: bool,
 ) -> Vec<Option<usize>> {
     let mut columns: Vec<Option<usize>> = [0, 1, 2].map(Some).into();
@@ -45,16 +45,13 @@ pub(super) fn columns(
     columns
 }
 
-fn first_rows(
-    mut lines: Lines<'_>,
-    values: impl Fn(crate::text::Line<'_>) -> Option<Vec<f64>>,
-) -> Vec<Vec<f64>> {
+fn first_rows(mut lines: Lines<'_>, values: impl Fn(Line<'_>) -> Option<Vec<f64>>) -> Vec<Vec<f64>> {
     let mut rows = Vec::new();
     while rows.len() < ROWS
         && let Some(line) = lines.next()
         && lines.offset() <= BYTES
     {
-        if super::has_values(&line) {
+        if has_values(&line) {
             match values(line) {
                 Some(row) => rows.push(row),
                 None => break,
@@ -82,7 +79,7 @@ mod tests {
     use super::*;
 
     fn of(text: &str, is_counted: bool) -> Vec<Option<usize>> {
-        let values = |line: crate::text::Line<'_>| line.words().map(crate::text::number).collect();
+        let values = |line: Line<'_>| line.words().map(crate::text::number).collect();
         columns(Lines::new(text.as_bytes()), values, is_counted)
     }
 
