@@ -161,13 +161,12 @@ fn hash(p: [f32; 3]) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashSet;
+    use std::collections::BTreeSet;
 
     use super::*;
 
     /// Few or many groups, points that are repeated often, and zeros of either sign.
     #[test]
-    #[expect(clippy::disallowed_types, reason = "only asked, never iterated")]
     fn the_later_ones_of_equal_points_are_repeated() {
         for (count, places) in [(0, 1), (1, 1), (1000, 7), (3000, 1), (5 * TOGETHER, 3 * TOGETHER)] {
             let mut state = 1_u64;
@@ -185,7 +184,7 @@ mod tests {
                 points[1] = [0.0; 3];
             }
             let found = Repeated::among(&points, &mut vec![0; count]);
-            let mut seen = HashSet::new();
+            let mut seen = BTreeSet::new();
             let expected: Vec<bool> = points.iter().map(|p| !seen.insert(p.map(f32::to_bits))).collect();
             assert!((0..count).all(|i| found.contains(i) == expected[i]), "{count} points");
             assert_eq!(found.count(), expected.iter().filter(|is| **is).count());

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use nearmiss_geometry::CloudError;
 use thiserror::Error;
 
+use crate::text::said;
+
 /// Why a file could not be read. The message names the file, what is wrong, where, and what would mend it.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -302,7 +304,7 @@ pub enum Fault {
         packed: u64,
     },
     /// A foreign decoder refused the data.
-    #[error("the data are damaged: {cause}")]
+    #[error("the data are damaged: {}", said(cause))]
     Decoder {
         /// What it said.
         cause: Box<str>,

@@ -116,18 +116,29 @@ const SHOWN: usize = 40;
 /// A piece of the file fit for a message: short, and without control characters.
 pub(crate) fn shown(piece: &[u8]) -> Box<str> {
     let start = &piece[..piece.len().min(4 * SHOWN)];
-    let text = String::from_utf8_lossy(start.trim_ascii());
+    cut(&String::from_utf8_lossy(start.trim_ascii()), SHOWN).into()
+}
+
+/// What a decoder says, which may repeat what is in the file: no longer than fits a message, and without
+/// control characters.
+pub(crate) fn said(cause: &str) -> String {
+    cut(cause, 200)
+}
+
+/// At most `most` characters, as they are shown.
+fn cut(text: &str, most: usize) -> String {
     let (mut shown, mut length) = (String::new(), 0);
     for c in text.chars() {
+        let is_quote = matches!(c, '"' | '\'');
         // Six characters may stand for one.
-        length += c.escape_debug().count();
-        if length > SHOWN {
+        length += if is_quote { 1 } else { c.escape_debug().count() };
+        if length > most {
             shown.push('…');
             break;
         }
-        shown.extend(c.escape_debug());
+        if is_quote { shown.push(c) } else { shown.extend(c.escape_debug()) }
     }
-    shown.into()
+    shown
 }
 
 #[cfg(test)]

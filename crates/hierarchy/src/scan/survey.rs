@@ -132,11 +132,11 @@ impl PointHierarchy {
             } else {
                 seen.spacings.push(spacing * self.frame().scale);
             }
-            if slices.is_on_sheet(i) {
-                if let Some(outward) = self.outward(i, ring.ids()) {
-                    seen.border += 1;
-                    seen.holes.extend(self.hole(i, outward).map(|width| width * self.frame().scale));
-                }
+            if slices.is_on_sheet(i)
+                && let Some(outward) = self.outward(i, ring.ids())
+            {
+                seen.border += 1;
+                seen.holes.extend(self.hole(i, outward).map(|width| width * self.frame().scale));
             }
         }
         seen

@@ -375,3 +375,16 @@ fn meshes() {
         "a.ply: vertex 3 of a mesh has a coordinate that is not finite; repair it, or remove the faces to use the points alone"
     );
 }
+
+/// Found by fuzzing: a buffer that is named by a kilobyte was named by all of it in the message.
+#[test]
+fn what_a_decoder_repeats_of_the_file_is_cut() {
+    let uri = "A".repeat(1000);
+    let text = format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"buffers\":[{{\"uri\":\"{uri}\",\"byteLength\":4}}],\
+         \"scenes\":[{{\"nodes\":[]}}],\"scene\":0}}"
+    );
+    let message = read_bytes(text.as_bytes(), None, Path::new("sheet.gltf")).unwrap_err().to_string();
+    assert!(message.starts_with("sheet.gltf") && message.contains("AAAA"), "{message}");
+    assert!(message.chars().count() < 300 && message.contains('…'), "{message}");
+}
