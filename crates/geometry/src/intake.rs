@@ -90,6 +90,12 @@ impl Repeated {
     #[must_use]
     pub fn among(points: &[[f32; 3]], records: &mut [u128]) -> Self {
         let records = &mut records[..points.len()];
+        if points.len() <= TOGETHER {
+            records.iter_mut().zip((0..).zip(points)).for_each(|(to, (i, p))| *to = record(*p, i));
+            let mut repeated = Self::none(points.len());
+            repeated.find(records);
+            return repeated;
+        }
         // Equal points have equal hashes, and so come into the same group.
         let bits = (points.len() / TOGETHER).checked_ilog2().map_or(0, |log| (log + 1).min(MOST_GROUPS));
         let group = |p: &[f32; 3]| (hash(*p) >> 1 >> (63 - bits)) as usize;
@@ -116,21 +122,30 @@ impl Repeated {
         }
         runs.iter_mut().enumerate().for_each(|(group, run)| write(group, run));
         drop(runs);
-        let mut repeated = Self { bits: vec![0; points.len().div_ceil(64)], count: 0 };
-        for group in starts.windows(2) {
-            let group = &mut records[group[0]..group[1]];
-            group.sort_unstable();
-            let later = group.windows(2).filter(|two| two[0] >> 32 == two[1] >> 32).map(|two| two[1]);
-            later.for_each(|record| repeated.insert(record));
-        }
+        let mut repeated = Self::none(points.len());
+        starts.windows(2).for_each(|group| repeated.find(&mut records[group[0]..group[1]]));
         repeated
     }
 
-    fn insert(&mut self, record: u128) {
-        #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
-        let i = record as u32 as usize;
-        self.bits[i / 64] |= 1 << (i % 64);
-        self.count += 1;
+    fn none(points: usize) -> Self {
+        Self { bits: vec![0; points.div_ceil(64)], count: 0 }
+    }
+
+    /// Adds the later ones of equal points among these.
+    fn find(&mut self, records: &mut [u128]) {
+        // Half of a record is sorted faster, and tells nearly all points apart.
+        #[expect(clippy::cast_possible_truncation, reason = "a half")]
+        let half = |record: u128| (record >> 64) as u64;
+        records.sort_unstable_by_key(|record| half(*record));
+        for alike in records.chunk_by_mut(|a, b| half(*a) == half(*b)).filter(|alike| alike.len() > 1) {
+            alike.sort_unstable();
+            for two in alike.windows(2).filter(|two| two[0] >> 32 == two[1] >> 32) {
+                #[expect(clippy::cast_possible_truncation, reason = "the low 32 bits are the index")]
+                let i = two[1] as u32 as usize;
+                self.bits[i / 64] |= 1 << (i % 64);
+                self.count += 1;
+            }
+        }
     }
 
     /// Returns `true` if the `i`-th point is one of them.
@@ -146,13 +161,14 @@ impl Repeated {
     }
 }
 
-/// The bits of a point above its index: the first of equal points comes first.
-fn record([x, y, z]: [f32; 3], i: u32) -> u128 {
-    let [x, y, z] = [x, y, z].map(|x| u128::from(x.to_bits()));
-    x << 96 | y << 64 | z << 32 | u128::from(i)
+/// The hash of a point, its z, and its index: equal points are equal but for that, others are not, and the
+/// first of equal ones comes first.
+fn record(p: [f32; 3], i: u32) -> u128 {
+    u128::from(hash(p)) << 64 | u128::from(p[2].to_bits()) << 32 | u128::from(i)
 }
 
-/// The bits of a point, mixed: the highest bits of the result tell most points apart.
+/// The bits of a point, mixed: the highest bits of the result tell most points apart, and no two points of
+/// equal z have the same, for each step can be undone.
 fn hash(p: [f32; 3]) -> u64 {
     let [x, y, z] = p.map(|x| u64::from(x.to_bits()));
     let mixed = (x << 32 | y).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
