@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 
 use laz::laszip::ChunkTable;
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
-use laz::{LazItem, LazItemType, LazVlr};
+use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
 
 use super::header::{Header, record};
 use crate::error::{Broken, Fault};
@@ -18,6 +18,13 @@ use crate::input::{Input, Stop};
 
 /// Bytes before the points that are read: more than all variable-length records of any scan.
 const HEAD: usize = 1 << 26;
+
+/// The fields that are read, where they stand in layers of their own. Times among those that are not: damaged
+/// ones lead the decoder into a recursion without end.
+const FIELDS: u32 = DecompressionSelection::Z
+    | DecompressionSelection::CLASSIFICATION
+    | DecompressionSelection::INTENSITY
+    | DecompressionSelection::RGB;
 
 /// Chunks that take the rest of the file, by the code of laszip's compressors.
 const ONE_CHUNK: u16 = 1;
@@ -145,6 +152,7 @@ impl Packing {
         };
         let known = decoder.set_fields_from(self.vlr.items());
         known.map_err(|cause| Fault::Decoder { cause: cause.to_string().into() }.at_byte(self.at))?;
+        decoder.set_selection(DecompressionSelection(FIELDS));
         Ok(decoder)
     }
 }
