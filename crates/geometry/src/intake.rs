@@ -134,7 +134,6 @@ impl Repeated {
     /// Adds the later ones of equal points among these.
     fn find(&mut self, records: &mut [u128]) {
         // Half of a record is sorted faster, and tells nearly all points apart.
-        #[expect(clippy::cast_possible_truncation, reason = "a half")]
         let half = |record: u128| (record >> 64) as u64;
         records.sort_unstable_by_key(|record| half(*record));
         for alike in records.chunk_by_mut(|a, b| half(*a) == half(*b)).filter(|alike| alike.len() > 1) {
