@@ -63,7 +63,7 @@ fn end_with_parent() {
     let _asked = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
 }
 
-/// What a child may allocate while it reads, beyond what is expected, in bytes.
+/// Bytes that a child may allocate while it reads, beyond the expected ones.
 #[cfg(target_os = "linux")]
 const SPARE: f64 = 512e6;
 
@@ -75,9 +75,9 @@ pub(crate) struct ReadingLimit {
 }
 
 impl ReadingLimit {
-    /// Limits the memory that a child may allocate to some 500 MB more than the `expected` bytes. Does
-    /// nothing outside a child, and on systems other than Linux.
-    pub(crate) fn new(expected: f64) -> Self {
+    /// Limits the memory that a child may allocate to some 500 MB more than `expected` returns, in bytes.
+    /// Does nothing outside a child, and on systems other than Linux.
+    pub(crate) fn new(expected: impl FnOnce() -> f64) -> Self {
         #[cfg(target_os = "linux")]
         {
             use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
@@ -86,7 +86,7 @@ impl ReadingLimit {
                 env::var_os(IN_CHILD)?;
                 let before = getrlimit(Resource::Data);
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "not negative")]
-                let most = allocated()?.saturating_add((expected + SPARE) as u64);
+                let most = allocated()?.saturating_add((expected() + SPARE) as u64);
                 let current = Some(before.current.map_or(most, |current| current.min(most)));
                 setrlimit(Resource::Data, Rlimit { current, maximum: before.maximum }).ok()?;
                 Some(before)

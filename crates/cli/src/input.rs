@@ -177,11 +177,10 @@ pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliErro
 
 /// Limits the memory that a child process may take to read a file.
 pub(crate) fn limit_reading(path: &Path, format: Option<Format>) -> ReadingLimit {
-    let expected = glance(path, format).map_or(0.0, |seen| estimate::reading(seen.points, seen.bytes));
-    ReadingLimit::new(expected)
+    ReadingLimit::new(|| glance(path, format).map_or(0.0, |seen| estimate::reading(seen.points, seen.bytes)))
 }
 
-/// What work on disk is for: this version of the program, and the input as it is.
+/// The identity of work on disk: the version of the program, and the path, length and age of the input.
 pub(crate) fn identity(path: &Path) -> Result<String, CliError> {
     let about = path.metadata().map_err(CliError::reading(path))?;
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());

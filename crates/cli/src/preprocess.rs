@@ -29,7 +29,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
         Plan::InMemory { is_announced } => is_announced,
         Plan::OnDisk { memory, points } => return on_disk::run(args, memory, points, console),
     };
-    // What a run on disk may have left that was ended.
+    // Clears up after a run on disk that was killed.
     Workspace::clear(&output::work_folder(&args.output));
     let start = now();
     let bar = console.spinner(format_args!("reading {name}"));

@@ -119,8 +119,8 @@ pub(crate) fn shown(piece: &[u8]) -> Box<str> {
     cut(&String::from_utf8_lossy(start.trim_ascii()), SHOWN).into()
 }
 
-/// What a decoder says, which may repeat what is in the file: no longer than fits a message, and without
-/// control characters.
+/// The message of a decoder, which may repeat parts of the file: cut to 200 characters, control characters
+/// escaped.
 pub(crate) fn said(cause: &str) -> String {
     cut(cause, 200)
 }

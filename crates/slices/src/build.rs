@@ -168,7 +168,7 @@ impl SliceBuilder {
         SliceMap::of_slices(index, slices)
     }
 
-    /// What the map will be made of. Goes over all voxels if noise is to be estimated.
+    /// The index of the map. Goes over all voxels if noise is to be estimated.
     pub(crate) fn index(&self) -> Index {
         let grid = *self.plan.grid();
         let rule = self.plan.obstacle();

@@ -105,7 +105,7 @@ impl SliceTarget {
         });
         match written {
             Ok(_) => self.clear(before, &saved.known),
-            // What cannot be removed does no harm, here and below.
+            // A file that cannot be removed does no harm, here and below.
             Err(_) => saved.new.iter().for_each(|path| _ = fs::remove_file(path)),
         }
         written

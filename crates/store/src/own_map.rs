@@ -52,8 +52,8 @@ impl Tenant {
             // there again.
             let _asked = unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
         }
-        // Whoever used it may have dropped it meanwhile. Removing a large file takes a while, in which
-        // nobody would watch the memory.
+        // The room may have been dropped meanwhile. Removing a large file takes a while; on this thread, the
+        // memory would not be watched until then.
         if let Some(last) = Arc::into_inner(map) {
             let _dropped = std::thread::Builder::new().spawn(move || drop(last));
             return false;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub struct WorkError {
     /// The file or folder; empty if arrays are in memory.
     pub path: PathBuf,
-    /// What was to be done.
+    /// The step that failed, as a verb phrase.
     pub step: &'static str,
     /// The kind of the system's answer.
     pub kind: io::ErrorKind,

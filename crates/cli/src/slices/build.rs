@@ -149,7 +149,7 @@ fn place(
     let plan = SlicePlan::new(options, bounds);
     let Some(memory) = args.memory.memory.filter(|_| matches!(plan, Err(SliceError::Memory { .. }))) else {
         let plan = plan.map_err(unfit)?;
-        // What a run on disk may have left that was ended.
+        // Clears up after a run on disk that was killed.
         Workspace::clear(&folder);
         return Ok((plan, Workspace::in_memory()));
     };

@@ -252,7 +252,7 @@ fn a_decoder_that_ends_the_process_is_an_error_by_name() {
     assert!(done.errors.contains("error: ball.laz: expected a file that can be decoded"), "{}", done.errors);
     assert_eq!(std::fs::read(place.path("ball.nm")).unwrap(), before, "the previous file");
     assert_eq!(limited(400_000, &args).status, 0);
-    // What the command says otherwise, and its status, come through.
+    // Other errors of the child, and its exit status, are passed on.
     place.refused(2, &["convert", "ball.laz", "./ball.laz"], &["would replace the input"]);
     place.refused(1, &["preprocess", "ball.laz", "-o", "nowhere/ball.nm"], &["there is no folder nowhere"]);
     assert_eq!(place.ok(&["collide", "ball.laz", "ball.nm", "--json"]).json().len(), 1);

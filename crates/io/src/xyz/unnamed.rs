@@ -1,4 +1,4 @@
-//! What columns without names hold, as far as the first rows tell.
+//! The meaning of columns without names, guessed from the first rows.
 //!
 //! x, y and z come first. What follows is normals if three columns are vectors of unit length, and colours if
 //! they are whole numbers from 0 to 255. One column before these is an intensity, as in PTS; one that stands
