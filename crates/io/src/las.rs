@@ -8,6 +8,8 @@ mod copc;
 mod header;
 #[cfg(feature = "laz")]
 mod laz;
+#[cfg(feature = "laz")]
+mod times;
 
 use std::io::Read;
 use std::ops::ControlFlow;

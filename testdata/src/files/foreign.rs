@@ -1,9 +1,13 @@
 //! The model in formats of scanners and engines.
 
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use laz::encoders::ArithmeticEncoder;
+use laz::las::v2::LasPoint0Compressor;
+use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
+use laz::record::{FieldCompressor, RecordCompressor, SequentialPointRecordCompressor};
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 
 use super::model::{colours, normals, points, quads, triangles};
@@ -134,6 +138,42 @@ pub fn las(format: u8, extra: u16, compressed: Option<u32>) -> Vec<u8> {
             bytes = out.into_inner();
         }
     }
+    bytes
+}
+
+/// LAZ of point format 1 whose second time is a million switches from one sequence of times to the next.
+///
+/// # Panics
+/// Never, while memory suffices.
+#[must_use]
+pub fn laz_of_endless_times() -> Vec<u8> {
+    struct Switches(ArithmeticModel);
+    impl<W: Write> FieldCompressor<W> for Switches {
+        fn size_of_field(&self) -> usize {
+            8
+        }
+        fn compress_first(&mut self, out: &mut W, time: &[u8]) -> std::io::Result<()> {
+            out.write_all(time)
+        }
+        fn compress_with(&mut self, encoder: &mut ArithmeticEncoder<W>, _: &[u8]) -> std::io::Result<()> {
+            (0..1_000_000).try_for_each(|_| encoder.encode_symbol(&mut self.0, 3))
+        }
+    }
+    let mut bytes = las(1, 0, Some(50_000));
+    let start = u32::from_le_bytes([96, 97, 98, 99].map(|at| bytes[at]));
+    bytes.truncate(start as usize);
+    // One chunk, to the end of the file, needs no table.
+    let packing = bytes.windows(LazVlr::USER_ID.len()).position(|at| at == LazVlr::USER_ID.as_bytes());
+    let packing = packing.expect("of LAZ") - 2 + 54;
+    bytes[packing..packing + 2].copy_from_slice(&1_u16.to_le_bytes());
+    let mut packer = SequentialPointRecordCompressor::new(&mut bytes);
+    packer.add_field_compressor(LasPoint0Compressor::default());
+    packer.add_field_compressor(Switches(ArithmeticModelBuilder::new(6).with_compression(true).build()));
+    for record in records(1, 0)[..2 * 28].chunks_exact(28) {
+        packer.compress_next(record).expect("memory suffices");
+    }
+    packer.done().expect("memory suffices");
+    drop(packer);
     bytes
 }
 

@@ -9,9 +9,10 @@ use std::ops::ControlFlow;
 
 use laz::laszip::ChunkTable;
 use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor};
-use laz::{DecompressionSelection, LazItem, LazItemType, LazVlr};
+use laz::{DecompressionSelection, LasZipError, LazItem, LazItemType, LazVlr};
 
 use super::header::{Header, record};
+use super::times::Times;
 use crate::error::{Broken, Fault};
 use crate::guard::guarded;
 use crate::input::{Input, Stop};
@@ -19,8 +20,8 @@ use crate::input::{Input, Stop};
 /// Bytes before the points that are read: more than all variable-length records of any scan.
 const HEAD: usize = 1 << 26;
 
-/// The fields that are read, where they stand in layers of their own. Times among those that are not: damaged
-/// ones lead the decoder into a recursion without end.
+/// The fields that are read, where they stand in layers of their own. Times are not: damaged ones lead the
+/// decoder of `laz` into a recursion without end.
 const FIELDS: u32 = DecompressionSelection::Z
     | DecompressionSelection::CLASSIFICATION
     | DecompressionSelection::INTENSITY
@@ -144,16 +145,24 @@ impl Packing {
     }
 
     fn decoder<'a>(&self, packed: &'a [u8]) -> Result<Decoder<'a>, Broken> {
+        let unknown =
+            |cause: LasZipError| Fault::Decoder { cause: cause.to_string().into() }.at_byte(self.at);
         let source = Cursor::new(packed);
-        let mut decoder: Decoder<'a> = if self.layered {
-            Box::new(LayeredPointRecordDecompressor::new(source))
-        } else {
-            Box::new(SequentialPointRecordDecompressor::new(source))
-        };
-        let known = decoder.set_fields_from(self.vlr.items());
-        known.map_err(|cause| Fault::Decoder { cause: cause.to_string().into() }.at_byte(self.at))?;
-        decoder.set_selection(DecompressionSelection(FIELDS));
-        Ok(decoder)
+        if self.layered {
+            let mut decoder = LayeredPointRecordDecompressor::new(source);
+            decoder.set_fields_from(self.vlr.items()).map_err(unknown)?;
+            decoder.set_selection(DecompressionSelection(FIELDS));
+            return Ok(Box::new(decoder));
+        }
+        let mut decoder = SequentialPointRecordDecompressor::new(source);
+        for item in self.vlr.items() {
+            if item.item_type() == LazItemType::GpsTime && item.version() == 2 {
+                decoder.add_field_decompressor(Times::default());
+            } else {
+                decoder.set_fields_from(&vec![*item]).map_err(unknown)?;
+            }
+        }
+        Ok(Box::new(decoder))
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 use nearmiss_geometry::CloudError;
 use nearmiss_io::{At, Fault, Format, ReadError, read, read_bytes, read_mesh_bytes};
 
+use nearmiss_testdata::files::foreign;
 use nearmiss_testdata::files::plain::{self, Encoding};
 
 fn error(bytes: &[u8], name: &str) -> ReadError {
@@ -387,4 +388,11 @@ fn what_a_decoder_repeats_of_the_file_is_cut() {
     let message = read_bytes(text.as_bytes(), None, Path::new("sheet.gltf")).unwrap_err().to_string();
     assert!(message.starts_with("sheet.gltf") && message.contains("AAAA"), "{message}");
     assert!(message.chars().count() < 300 && message.contains('…'), "{message}");
+}
+
+/// The decoder of `laz` 0.13 calls itself for each switch, and overflows the stack.
+#[test]
+fn times_of_laz_that_switch_without_end() {
+    let refused = error(&foreign::laz_of_endless_times(), "a.laz").to_string();
+    assert_eq!(refused, "a.laz: byte 384, point 1: the data are damaged: a GPS time that is in no sequence");
 }
