@@ -1,15 +1,15 @@
 //! `collide`: whether, where and how near two scans meet.
 
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
-    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Contacts, Deadline, Detail, Evidence,
-    ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch, each,
+    Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Contacts, Deadline, Detail, Distance,
+    DistanceOptions, DistancePlan, Evidence, ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch,
+    Verdict, each,
 };
 
 use crate::console::{self, Console, Results, now};
@@ -18,7 +18,8 @@ use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
 use crate::parse::{parse_duration, parse_radius};
-use crate::posing::{self, PairArgs, PoseFile};
+use crate::path::{PathArgs, PathEntry, PathLog, PathVerdict};
+use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::search::SearchArgs;
@@ -32,9 +33,9 @@ pub struct CollideArgs {
     /// What is asked about
     #[command(flatten)]
     pub pair: PairArgs,
-    /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
-    #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b", "image"])]
-    pub poses: Option<PathBuf>,
+    /// Many poses
+    #[command(flatten)]
+    pub path: PathArgs,
     /// Stop after the first hit of --poses: the last line is the hit, if there is one, and all before it are
     /// none
     #[arg(long, requires = "poses")]
@@ -80,7 +81,7 @@ pub struct CollideArgs {
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
     /// Picture, as PNG, of both scans and of the place where they meet
-    #[arg(long, value_name = "OUT.png")]
+    #[arg(long, value_name = "OUT.png", conflicts_with = "poses")]
     pub image: Option<PathBuf>,
     /// One object of JSON a query instead of sentences
     #[arg(long)]
@@ -122,12 +123,15 @@ struct Question {
     prove: bool,
     all: bool,
     manifold: bool,
+    /// How clearance is found along a path, if it is.
+    clearance: Option<DistancePlan>,
     sizes: SizeCheck,
 }
 
 impl Question {
     /// The answer to the question on this line of the file of poses.
-    fn ask(&self, line: Option<u64>, poses: [Pose; 2], scratch: &mut Scratch) -> Asked {
+    fn ask(&self, line: Option<u64>, posed: Posed, scratch: &mut Scratch) -> Asked {
+        let Posed { poses, time } = posed;
         let start = now();
         let [a, b] = self.views(&poses);
         let budget = self.budget_from(start);
@@ -148,7 +152,9 @@ impl Question {
         let answer = question.collide(&self.plan, scratch);
         #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
         let micros = start.elapsed().as_nanos() as f64 / 1e3;
-        Asked { line, poses, answer, proof, contacts, manifold, micros }
+        let clearance = self.clearance.as_ref().filter(|_| needs_clearance(&answer, self.plan.options()));
+        let clearance = clearance.map(|plan| pair.within(&self.budget_from(now())).distance(plan, scratch));
+        Asked { line, time, poses, answer, clearance, proof, contacts, manifold, micros }
     }
 
     /// The budget of a query that starts at `start`.
@@ -170,13 +176,16 @@ impl Question {
         [self.a.at(&poses[0]), self.b.at(&poses[1])]
     }
 
-    fn tell(&self, out: &mut Outputs<'_, '_>, asked: &Asked, args: &CollideArgs) -> Result<(), CliError> {
+    fn tell(&self, out: &mut Outputs<'_, '_, '_>, asked: &Asked, args: &CollideArgs) -> Result<(), CliError> {
         let [a, b] = self.views(&asked.poses);
         self.sizes.compare([&a, &b]);
         if let (Some((path, file)), Some(proof)) = (&mut out.proof, &asked.proof) {
             let line = asked.line.unwrap_or(0);
             proof::write(file, line, [&a, &b], self.plan.options(), &asked.answer, proof)
                 .map_err(CliError::writing(path))?;
+        }
+        if let (Some(log), Some(line)) = (&mut out.log, asked.line) {
+            log.add(asked.entry(line))?;
         }
         let results = &mut *out.results;
         let report = AnswerReport::new(&asked.answer, asked.contacts.as_ref(), asked.micros);
@@ -188,7 +197,8 @@ impl Question {
         let is_apart = asked.line.is_none() && asked.answer.verdict.is_separated();
         let distance =
             is_apart.then(|| beside([&a, &b], options.semantics, &self.budget_from(now()))).flatten();
-        let sentence = sentence(&asked.answer, [&a, &b], options, distance.as_ref());
+        let distance = distance.as_ref().or(asked.clearance.as_ref());
+        let sentence = sentence(&asked.answer, [&a, &b], options, distance);
         if let Some(line) = asked.line {
             return results.line(format_args!("line {line}: {sentence}"));
         }
@@ -201,12 +211,21 @@ impl Question {
     }
 }
 
+/// Returns `true` if the distance says more than the answer: not of a contact without a margin.
+fn needs_clearance(answer: &Answer, options: &CollideOptions) -> bool {
+    !answer.verdict.is_intersecting() || options.margin > 0.0
+}
+
 /// A query and its answer.
 struct Asked {
-    /// Of the file of poses.
+    /// The line of the file of poses.
     line: Option<u64>,
+    /// The time of that line.
+    time: Option<f64>,
     poses: [Pose; 2],
     answer: Answer,
+    /// The distance, if it was asked for.
+    clearance: Option<Distance>,
     /// What it rests on, if that is to be written.
     proof: Option<Proof>,
     /// All contacts, if they are wanted.
@@ -220,12 +239,30 @@ impl Asked {
     fn is_hit(&self) -> bool {
         self.answer.verdict.is_intersecting()
     }
+
+    /// Returns the entry of this answer in the log of a path.
+    fn entry(&self, line: u64) -> PathEntry {
+        let report = AnswerReport::new(&self.answer, None, self.micros);
+        let (verdict, witness, gap) = match self.answer.verdict {
+            Verdict::Intersecting { contact, .. } => (PathVerdict::Intersecting, Some(contact.point), 0.0),
+            Verdict::Separated { gap, .. } => (PathVerdict::Separated, None, gap),
+            Verdict::Undecided(_) => (PathVerdict::Undecided, None, 0.0),
+        };
+        let bounds = self.clearance.map(|found| [found.lower.max(gap).min(found.upper), found.upper]);
+        let clearance = bounds.or(witness.map(|_| [0.0; 2]));
+        let place = witness.or(self.clearance.map(|found| found.points[0]));
+        let (time, micros) = (self.time, self.micros);
+        let (evidence, reason) = report.evidence_and_reason();
+        PathEntry { line, time, verdict, evidence, reason, clearance, place, micros }
+    }
 }
 
 /// Where answers go.
-struct Outputs<'a, 'f> {
+struct Outputs<'a, 'p, 'c> {
     results: &'a mut Results,
-    proof: Option<(&'a Path, &'a mut BufWriter<&'f File>)>,
+    proof: Option<(&'a Path, &'p mut (dyn Write + 'p))>,
+    /// Of many poses.
+    log: Option<PathLog<'c>>,
 }
 
 pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
@@ -237,8 +274,9 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     if let Some(path) = &args.prove {
         output::check_apart(path, &args.pair.inputs())?;
     }
+    args.path.check(&args.pair.inputs())?;
     let matrices = args.pair.matrices()?;
-    let mut poses = args.pair.pose_file(args.poses.as_ref())?;
+    let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
 
     let threads = args.threads.unwrap_or(0);
     let [a, b] = open(args, threads, console)?;
@@ -266,21 +304,40 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let (budget, work, resolution) = (args.budget, args.work, args.search.resolution);
     let sizes = args.pair.size_check(console);
     let manifold = args.detail == DetailName::Manifold;
-    let question = Question { a, b, plan, budget, work, resolution, prove, all: args.all, manifold, sizes };
+    let wants_clearance = poses.is_some() && (args.path.wants_clearance() || !args.json);
+    let distance = DistanceOptions::default().with_semantics(semantics);
+    let clearance = wants_clearance.then(|| DistancePlan::new(&distance, &a, &b)).transpose()?;
+    let question =
+        Question { a, b, plan, budget, work, resolution, prove, all: args.all, manifold, clearance, sizes };
 
     let mut results = Results::new();
-    let mut answer = |out: &mut Outputs<'_, '_>| match &mut poses {
-        Some(poses) => answer_all(&question, poses, args, out),
-        None => answer_one(&question, &matrices, args, console, out),
-    };
-    match &args.prove {
-        Some(path) => output::replace(path, |file| {
-            let mut out = Outputs { results: &mut results, proof: Some((path, file)) };
-            answer(&mut out)
-        })?,
-        None => answer(&mut Outputs { results: &mut results, proof: None })?,
-    }
+    output::replace_if_any(args.prove.as_deref(), |proof| {
+        let proof = args.prove.as_deref().zip(proof);
+        output::replace_if_any(args.path.csv.as_deref(), |csv| match &mut poses {
+            Some(poses) => {
+                let log = Some(PathLog::new(&args.path, csv)?);
+                let mut out = Outputs { results: &mut results, proof, log };
+                answer_all(&question, poses, args, &mut out)?;
+                conclude(&question, args, &mut out)
+            }
+            None => {
+                let mut out = Outputs { results: &mut results, proof, log: None };
+                answer_one(&question, &matrices, args, console, &mut out)
+            }
+        })
+    })?;
     results.flush()
+}
+
+/// Says, and draws, what the answers along a path come to.
+fn conclude(question: &Question, args: &CollideArgs, out: &mut Outputs<'_, '_, '_>) -> Result<(), CliError> {
+    let Some(log) = &out.log else { return Ok(()) };
+    log.draw(&args.path, &picture::names(args.pair.inputs()), args.margin)?;
+    if args.json {
+        return Ok(());
+    }
+    let unit = question.a.sampling_radius().min(question.b.sampling_radius()) / 100.0;
+    out.results.line(log.summary(unit))
 }
 
 /// The scans: balls about points know no kernel, so any do for these.
@@ -312,10 +369,10 @@ fn answer_one(
     matrices: &[[f64; 16]; 2],
     args: &CollideArgs,
     console: Console,
-    out: &mut Outputs<'_, '_>,
+    out: &mut Outputs<'_, '_, '_>,
 ) -> Result<(), CliError> {
     let poses = posing::of_options(matrices, [&question.a, &question.b])?;
-    let asked = question.ask(None, poses, &mut Scratch::default());
+    let asked = question.ask(None, Posed { poses, time: None }, &mut Scratch::default());
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
         let [a, b] = question.views(&asked.poses);
@@ -337,7 +394,7 @@ fn answer_all(
     question: &Question,
     poses: &mut PoseFile,
     args: &CollideArgs,
-    out: &mut Outputs<'_, '_>,
+    out: &mut Outputs<'_, '_, '_>,
 ) -> Result<(), CliError> {
     let threads = args.threads.unwrap_or(1);
     // One thread, this one, answers each line before it reads the next.
@@ -349,8 +406,8 @@ fn answer_all(
         let read = read_lines(poses, most, &mut lines);
         let ask = |i: usize, scratch: &mut Scratch| {
             let (line, text): &(u64, String) = &lines[i];
-            let poses = poses.poses(*line, text, [&question.a, &question.b]);
-            let asked = poses.map(|poses| question.ask(Some(*line), poses, scratch));
+            let posed = poses.poses(*line, text, [&question.a, &question.b]);
+            let asked = posed.map(|posed| question.ask(Some(*line), posed, scratch));
             // What comes after a fault, or after the hit that was looked for, is not told.
             let is_last = asked.as_ref().map_or(true, |asked| args.first && asked.is_hit());
             if is_last { ControlFlow::Break(Some(asked)) } else { ControlFlow::Continue(Some(asked)) }

@@ -16,8 +16,9 @@ use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
 use crate::parse::parse_duration;
+use crate::path::{PathArgs, PathEntry, PathLog, PathVerdict};
 use crate::picture::names;
-use crate::posing::{self, PairArgs};
+use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
 use crate::report::word;
 use crate::sentence::{bracket, unit, untold};
@@ -30,9 +31,9 @@ pub struct DistanceArgs {
     /// What is asked about
     #[command(flatten)]
     pub pair: PairArgs,
-    /// A query a line, {"a":[16 numbers],"b":[16 numbers]}, as `poses` makes them; an answer a line, in order
-    #[arg(long, value_name = "FILE.jsonl", conflicts_with_all = ["pose_a", "pose_b"])]
-    pub poses: Option<PathBuf>,
+    /// Many poses
+    #[command(flatten)]
+    pub path: PathArgs,
     /// Which distances define the surfaces; by default as prepared, else straight ones. By the geodesic
     /// kernel no lower bound is proven
     #[arg(long, value_enum, conflicts_with = "thickened")]
@@ -101,8 +102,9 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
         output::check_apart(path, &args.pair.inputs())?;
         picture::check_name(path)?;
     }
+    args.path.check(&args.pair.inputs())?;
     let matrices = args.pair.matrices()?;
-    let mut poses = args.pair.pose_file(args.poses.as_ref())?;
+    let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
     let inputs = args.pair.inputs();
     let opening = args.pair.opening(args.threads, console);
     let [a, b] = if args.meaning.thickened.is_some() {
@@ -114,33 +116,52 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
     let options = DistanceOptions::default().with_semantics(semantics).with_relative(args.relative);
     let plan = DistancePlan::new(&options, &a, &b)?;
     let question = Question { scans: [&a, &b], plan, args, sizes: args.pair.size_check(console) };
-    let mut scratch = Scratch::default();
     let mut results = Results::new();
     match &mut poses {
-        Some(poses) => {
-            while let Some((line, text)) = poses.next_line()? {
-                // What was answered before a faulty line is told before the fault.
-                let read = poses.poses(line, &text, question.scans);
-                let placed = read.or_else(|fault| results.flush().and(Err(fault)))?;
-                question.answer(Some(line), &placed, &mut scratch, &mut results)?;
-            }
-        }
+        Some(poses) => output::replace_if_any(args.path.csv.as_deref(), |csv| {
+            let mut log = PathLog::new(&args.path, csv)?;
+            question.answer_all(poses, &mut log, &mut results)?;
+            log.draw(&args.path, &names(inputs), 0.0)?;
+            let unit = a.sampling_radius().min(b.sampling_radius()) / 100.0;
+            if args.json { Ok(()) } else { results.line(log.summary(unit)) }
+        })?,
         None => {
-            let placed = posing::of_options(&matrices, question.scans)?;
-            question.answer(None, &placed, &mut scratch, &mut results)?;
+            let poses = posing::of_options(&matrices, question.scans)?;
+            let _ = question.answer(None, &poses, &mut Scratch::default(), &mut results)?;
         }
     }
     results.flush()
 }
 
 impl Question<'_> {
+    fn answer_all(
+        &self,
+        poses: &mut PoseFile,
+        log: &mut PathLog<'_>,
+        results: &mut Results,
+    ) -> Result<(), CliError> {
+        let mut scratch = Scratch::default();
+        while let Some((line, text)) = poses.next_line()? {
+            // Answers to the lines before a faulty one are written before the error.
+            let read = poses.poses(line, &text, self.scans);
+            let Posed { poses, time } = read.or_else(|fault| results.flush().and(Err(fault)))?;
+            let (found, micros) = self.answer(Some(line), &poses, &mut scratch, results)?;
+            let verdict = if found.upper <= 0.0 { PathVerdict::Intersecting } else { PathVerdict::Separated };
+            let (clearance, place) = (Some([found.lower, found.upper]), Some(found.points[0]));
+            let (evidence, reason) = (Some(word(found.evidence)), None);
+            log.add(PathEntry { line, time, verdict, evidence, reason, clearance, place, micros })?;
+        }
+        Ok(())
+    }
+
+    /// Answers for one pair of poses. Returns the distance and the time it took.
     fn answer(
         &self,
         line: Option<u64>,
         poses: &[Pose; 2],
         scratch: &mut Scratch,
         results: &mut Results,
-    ) -> Result<(), CliError> {
+    ) -> Result<(Distance, f64), CliError> {
         let start = now();
         let [a, b] = [self.scans[0].at(&poses[0]), self.scans[1].at(&poses[1])];
         let mut budget = Budget::UNLIMITED;
@@ -158,11 +179,13 @@ impl Question<'_> {
             paint_distance([&a, &b], &found, &style).save(path)?;
         }
         if self.args.json {
-            return results.json(&report(&found, micros));
+            results.json(&report(&found, micros))?;
+            return Ok((found, micros));
         }
         let sentence = sentence(&found, [&a, &b], self.plan.options().semantics);
         if let Some(line) = line {
-            return results.line(format_args!("line {line}: {sentence}"));
+            results.line(format_args!("line {line}: {sentence}"))?;
+            return Ok((found, micros));
         }
         results.line(sentence)?;
         results.line(format_args!(
@@ -172,7 +195,8 @@ impl Question<'_> {
             count(found.statistics.node_pairs, "node pair"),
             count(found.statistics.leaf_pairs, "leaf pair"),
             count(found.statistics.evaluations, "evaluation"),
-        ))
+        ))?;
+        Ok((found, micros))
     }
 }
 

@@ -250,18 +250,29 @@ fn share_of_long_faces(model: &Model, long: f64) -> f64 {
 }
 
 /// The filled lines of a text file, one at a time.
-#[derive(Debug)]
 pub(crate) struct TextLines {
     path: PathBuf,
-    reader: BufReader<File>,
+    reader: BufReader<Box<dyn Read + Send + Sync>>,
     number: u64,
 }
 
+impl std::fmt::Debug for TextLines {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { path, number, .. } = self;
+        f.debug_struct("TextLines").field("path", path).field("number", number).finish_non_exhaustive()
+    }
+}
+
 impl TextLines {
+    /// Opens a file, or standard input for `-`.
     pub(crate) fn open(path: &Path) -> Result<Self, CliError> {
-        check_there(path)?;
-        let file = File::open(path).map_err(CliError::reading(path))?;
-        Ok(Self { path: path.to_owned(), reader: BufReader::with_capacity(1 << 16, file), number: 0 })
+        let (path, source): (_, Box<dyn Read + Send + Sync>) = if path == Path::new("-") {
+            ("standard input".into(), Box::new(std::io::stdin()))
+        } else {
+            check_there(path)?;
+            (path.to_owned(), Box::new(File::open(path).map_err(CliError::reading(path))?))
+        };
+        Ok(Self { path, reader: BufReader::with_capacity(1 << 16, source), number: 0 })
     }
 
     /// The next line that is not blank, with its number, counted from 1.

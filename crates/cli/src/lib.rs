@@ -26,6 +26,9 @@ mod matrix;
 mod memory;
 mod output;
 mod parse;
+mod path;
+mod path_plot;
+mod pose_text;
 mod posing;
 mod units;
 
@@ -76,6 +79,7 @@ pub use level::level_picture;
 pub use matrix::PoseRefused;
 pub use meaning::MeaningArgs;
 pub use memory::MemoryArgs;
+pub use path::PathArgs;
 pub use picture::contact_picture;
 pub use poses::PosesArgs;
 pub use posing::PairArgs;

@@ -70,6 +70,17 @@ pub(crate) fn replace<T>(
     })
 }
 
+/// As [`replace`], where there may be no file to write.
+pub(crate) fn replace_if_any<T>(
+    path: Option<&Path>,
+    write: impl for<'w> FnOnce(Option<&'w mut (dyn Write + 'w)>) -> Result<T, CliError>,
+) -> Result<T, CliError> {
+    match path {
+        Some(path) => replace(path, |out| write(Some(out))),
+        None => write(None),
+    }
+}
+
 /// The same for writers that fail with the system's errors alone.
 pub(crate) fn replace_plain(
     path: &Path,

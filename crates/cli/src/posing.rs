@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nearmiss::{Pose, PoseError, Scan};
-use serde::Deserialize;
 
 use crate::console::Console;
 use crate::error::CliError;
 use crate::input::{Opening, TextLines, pieces};
 use crate::matrix::{Matrix, PoseRefused};
+use crate::pose_text::{self, FILE_FORMS, FORMS, PoseFormat};
 use crate::units::{SizeCheck, UnitName, scaled};
 
 /// Two scans, and where they are.
@@ -19,7 +19,8 @@ pub struct PairArgs {
     pub a: PathBuf,
     /// The other scan
     pub b: PathBuf,
-    /// Pose of a, object to world: 16 numbers, row-major, in one argument, or a file that holds them
+    /// Pose of a, object to world, as one argument: `x y z qx qy qz qw`, or the 16 numbers of a row-major 4×4
+    /// matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_a: Option<String>,
     /// Pose of b
@@ -56,10 +57,14 @@ impl PairArgs {
         Ok([scaled(a?, by_a), scaled(b?, by_b)])
     }
 
-    /// The file of poses, if there is one.
+    /// Opens the file of poses, if there is one.
     pub(crate) fn pose_file(&self, path: Option<&PathBuf>) -> Result<Option<PoseFile>, CliError> {
-        let open = |path: &PathBuf| PoseFile::open(path, self.factors().unwrap_or([1.0; 2]));
-        path.map(open).transpose()
+        let Some(path) = path else { return Ok(None) };
+        let given = |option: &str, given: &Option<String>| {
+            given.as_ref().map(|given| from_option(option, Some(given))).transpose()
+        };
+        let fixed = [given("--pose-a", &self.pose_a)?, given("--pose-b", &self.pose_b)?];
+        PoseFile::open(path, fixed, self.factors().unwrap_or([1.0; 2])).map(Some)
     }
 
     /// A check that asks about units once if the scans differ too much in size.
@@ -83,42 +88,25 @@ pub(crate) fn of_options(matrices: &[Matrix; 2], scans: [&Scan; 2]) -> Result<[P
     Ok([placed("--pose-a", 0)?, placed("--pose-b", 1)?])
 }
 
-/// The matrix of an option: sixteen numbers, or a file that holds them; the identity if not given.
+/// Returns the pose that an option gives, as numbers or as a file that holds them; the identity if the option
+/// is absent.
 pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, CliError> {
     let Some(given) = given else { return Ok(Pose::IDENTITY.to_row_major()) };
-    if let Ok(matrix) = parse(given) {
-        return Ok(matrix);
-    }
+    let what = match pose_text::parse(given) {
+        Ok(matrix) => return Ok(matrix),
+        Err(what) => what,
+    };
     let path = Path::new(given);
-    if !path.is_file() {
-        let what = match parse(given) {
-            Err(what) if pieces(given).nth(1).is_some() => what,
-            _ => format!("`{given}` is neither sixteen numbers nor a file that holds them"),
-        };
-        return Err(CliError::Usage(format!(
-            "{option}: {what}; a pose is a row-major 4×4 matrix, divided by commas or spaces, in one argument"
-        )));
+    if path.is_file() {
+        let text = std::fs::read_to_string(path).map_err(CliError::reading(path))?;
+        return pose_text::parse(&text).map_err(|what| CliError::Unfit { path: path.to_owned(), what });
     }
-    let text = std::fs::read_to_string(path).map_err(CliError::reading(path))?;
-    parse(&text).map_err(|what| CliError::Unfit { path: path.to_owned(), what })
-}
-
-/// Sixteen numbers, brackets allowed.
-fn parse(text: &str) -> Result<Matrix, String> {
-    let bare = text.replace(['[', ']'], " ");
-    let mut matrix = [0.0; 16];
-    let mut count = 0;
-    for piece in pieces(&bare) {
-        let number = piece.parse().map_err(|_not_a_number| {
-            let shown: String = piece.chars().take(40).flat_map(char::escape_debug).collect();
-            format!("`{shown}` is not a number")
-        })?;
-        if let Some(slot) = matrix.get_mut(count) {
-            *slot = number;
-        }
-        count += 1;
+    if pieces(given).nth(1).is_some() {
+        return Err(CliError::Usage(format!("{option}: {what}")));
     }
-    if count == 16 { Ok(matrix) } else { Err(format!("{count} numbers where 16 belong")) }
+    Err(CliError::Usage(format!(
+        "{option}: expected {FORMS} numbers or a file that holds them, got `{given}`"
+    )))
 }
 
 /// The pose nearest to `matrix`, unless that moves the scan's bounds by more than a tenth of its sampling
@@ -137,61 +125,79 @@ pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseRefused>
     })
 }
 
-/// What the messages show.
-const POSE_LINE: &str = r#"a pose line is {"a":[16 numbers],"b":[16 numbers]}"#;
-
-/// A line of a file of poses. Other fields are ignored.
-#[derive(Debug, Deserialize)]
-#[serde(expecting = "an object")]
-struct PoseLine {
-    a: Vec<f64>,
-    b: Vec<f64>,
+/// The poses of a query, from a line of a file.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Posed {
+    /// Of a and b.
+    pub(crate) poses: [Pose; 2],
+    /// The time of the line, if it has one.
+    pub(crate) time: Option<f64>,
 }
 
-/// A file with a query's two poses on each line. Lines are read in order; what they say can be read by many
-/// threads.
+/// A file with the poses of a query on each line. Lines are read in order; they can be parsed by many threads.
 #[derive(Debug)]
 pub(crate) struct PoseFile {
     lines: TextLines,
+    /// Known from the first line on.
+    format: Option<PoseFormat>,
     /// No line with poses has been met so far.
     is_empty: bool,
+    /// The poses of the command line, for what lines leave out.
+    fixed: [Option<Matrix>; 2],
     /// The units of both scans in metres.
     factors: [f64; 2],
 }
 
 impl PoseFile {
-    fn open(path: &Path, factors: [f64; 2]) -> Result<Self, CliError> {
-        Ok(Self { lines: TextLines::open(path)?, is_empty: true, factors })
+    fn open(path: &Path, fixed: [Option<Matrix>; 2], factors: [f64; 2]) -> Result<Self, CliError> {
+        Ok(Self { lines: TextLines::open(path)?, format: None, is_empty: true, fixed, factors })
     }
 
-    /// The next line that is not blank, and its number, counted from 1.
+    /// Returns the next line with poses, and its number, counted from 1. Lines that start with `#` are
+    /// comments.
     pub(crate) fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
-        let line = self.lines.next_filled()?;
-        if line.is_none() && self.is_empty {
-            return Err(self.lines.unfit(format!("holds no poses; {POSE_LINE}, as `poses` makes them")));
+        loop {
+            let Some((number, text)) = self.lines.next_filled()? else {
+                if self.is_empty {
+                    return Err(self.lines.unfit(format!("expected poses, got none; {FILE_FORMS}")));
+                }
+                return Ok(None);
+            };
+            if text.starts_with('#') {
+                continue;
+            }
+            if self.format.is_none() {
+                let format = PoseFormat::of(&text).map_err(|what| self.lines.fault_on(number, what))?;
+                let has_header = format.has_header();
+                self.format = Some(format);
+                if has_header {
+                    continue;
+                }
+            }
+            self.is_empty = false;
+            return Ok(Some((number, text)));
         }
-        self.is_empty = false;
-        Ok(line)
     }
 
-    /// The poses on a line of this number and text.
-    pub(crate) fn poses(&self, number: u64, text: &str, scans: [&Scan; 2]) -> Result<[Pose; 2], CliError> {
-        let line: PoseLine = serde_json::from_str(text).map_err(|e| {
-            let message = e.to_string();
-            let what = message.split(" at line ").next().unwrap_or_default();
-            self.lines.fault_on(number, format!("column {}: {what}; {POSE_LINE}", e.column()))
-        })?;
-        let pose = |name: &str, numbers: &[f64], side: usize| {
-            pose(numbers, self.factors[side], scans[side])
-                .map_err(|what| self.lines.fault_on(number, format!("`{name}`{what}")))
+    /// Returns the poses on a line of this number and text.
+    pub(crate) fn poses(&self, number: u64, text: &str, scans: [&Scan; 2]) -> Result<Posed, CliError> {
+        let format = self.format.as_ref().unwrap_or(&PoseFormat::Json);
+        let row = format.read(text).map_err(|what| self.lines.fault_on(number, what))?;
+        let pose = |side: usize| {
+            let name = ["a", "b"][side];
+            let matrix = match (row.matrices[side], self.fixed[side]) {
+                (Some(_), Some(_)) => {
+                    return Err(format!("the line has a pose of {name}, and --pose-{name} is given as well"));
+                }
+                (Some(matrix), None) => matrix,
+                (None, Some(fixed)) => fixed,
+                (None, None) => Pose::IDENTITY.to_row_major(),
+            };
+            of_scan(&scaled(matrix, self.factors[side]), scans[side])
+                .map_err(|refused| format!("`{name}`: {refused}"))
         };
-        Ok([pose("a", &line.a, 0)?, pose("b", &line.b, 1)?])
+        let placed = pose(0).and_then(|a| Ok([a, pose(1)?]));
+        let poses = placed.map_err(|what| self.lines.fault_on(number, what))?;
+        Ok(Posed { poses, time: row.time })
     }
-}
-
-fn pose(numbers: &[f64], factor: f64, scan: &Scan) -> Result<Pose, String> {
-    let matrix: Matrix = numbers.try_into().map_err(|_wrong_count| {
-        format!(" has {} numbers where 16 belong, a row-major 4×4 matrix", numbers.len())
-    })?;
-    of_scan(&scaled(matrix, factor), scan).map_err(|refused| format!(": {refused}"))
 }

@@ -379,6 +379,11 @@ impl AnswerReport {
         report
     }
 
+    /// Returns how sure the verdict is, and why there is none.
+    pub(crate) fn evidence_and_reason(&self) -> (Option<&'static str>, Option<&'static str>) {
+        (self.evidence, self.reason)
+    }
+
     /// The same with a manifold.
     pub(crate) fn with_manifold(self, places: Option<&[ManifoldPoint]>) -> Self {
         let manifold = places.map(|places| places.iter().map(PlaceReport::new).collect());

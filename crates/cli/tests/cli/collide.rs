@@ -202,9 +202,9 @@ fn people_read_sentences() {
         assert!(told.len() == 2 && told[0] <= true_distance + 0.02, "{told:?}");
         assert!(told[0] >= 0.85 * true_distance - 0.16 && (told[1] - true_distance).abs() < 0.03, "{told:?}");
     }
-    // Lines of a file say nothing of distances.
     place.write("far.jsonl", format!("{{\"a\":[{0}],\"b\":[{1}]}}\n", identity(), commas(9.0)));
-    assert_eq!(say(&["--poses", "far.jsonl"]), "line 1: No contact (certified).");
+    let told = say(&["--poses", "far.jsonl"]);
+    assert_eq!(between(told.strip_prefix("line 1: ").unwrap()).len(), 2, "{told}");
     for (x, is_hinted) in [(9.0, true), (4.5, true), (3.5, false), (2.5, false)] {
         let done = place.ok(&["collide", "ball.nm", "ball.xyz", "--pose-b", &shift(x, 0.0, 0.0)]);
         assert_eq!(done.results.contains("hint: their bounds are"), is_hinted, "{x}: {}", done.results);
@@ -264,10 +264,13 @@ fn a_file_of_poses_is_answered_in_order() {
     }
     assert_eq!(untimed("2"), one, "whatever the threads");
     let people = place.ok(&["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl"]);
-    assert_eq!(people.results.lines().count(), 2500);
+    assert_eq!(people.results.lines().count(), 2501, "a line a pose, and a summary");
     assert!(people.results.starts_with("line 1: They touch"), "{}", people.results.lines().next().unwrap());
-    let last = people.results.lines().last().unwrap();
+    let [last, summary] = people.results.lines().skip(2499).collect::<Vec<_>>()[..] else { panic!() };
     assert!(last.starts_with("line 2501: "), "one line is blank: {last}");
+    let words = "2500 poses: 834 touch (first on line 1, at (0.7";
+    assert!(summary.starts_with(words), "{summary}");
+    assert!(summary.contains("), 1666 apart. Least clearance of those apart: between 0.3"), "{summary}");
 }
 
 #[test]
@@ -277,15 +280,15 @@ fn a_faulty_line_is_named_after_the_answers_before_it() {
     let good = format!("{{\"a\":{identity},\"b\":{identity}}}");
     for (bad, word) in [
         ("nonsense", "column 2"),
-        ("3", "expected an object; a pose line is {\"a\":[16 numbers],\"b\":[16 numbers]}"),
-        ("[[1]]", "expected an object; a pose line"),
+        ("3", "expected an object or an array; a line is {\"a\":[…],\"b\":[…]}"),
+        ("[[1]]", "expected the numbers of a pose"),
         (
             &good.replacen("0,0,0,1]", "7,8,9,1]", 1),
             "`a`: the last row of the pose is not 0 0 0 1; it looks column-major",
         ),
         (&good.replacen("[1,0", "[1.123456789,0", 1), "bounds by 0.101, more than 0.0117 (a"),
-        ("{\"a\":[1,2,3],\"b\":[]}", "`a` has 3 numbers"),
-        (&format!("{{\"a\":{identity}}}"), "missing field `b`"),
+        ("{\"a\":[1,2,3],\"b\":[]}", "`a`: expected 16 (a row-major 4×4 matrix), 12"),
+        ("{\"c\":1}", "expected `a`, `b` or both, got neither"),
         (&good.replace("0,0,0,1]}", "0,0,1,1]}"), "`b`: the last row"),
         (&good.replacen("[1,0", "[2,0", 1), "`a`: the pose is not a rotation"),
         (&good.replacen("[1,", "[-1,", 1), "determinant -1"),
@@ -343,8 +346,11 @@ fn wrong_usage_ends_with_status_2() {
     let place = balls();
     let both = |options: &[&'static str]| [&["collide", "ball.nm", "ball.nm"], options].concat();
     for (options, word) in [
-        (&["--pose-a", "1 2 3"][..], "3 numbers where 16 belong"),
-        (&["--pose-b", "elsewhere"], "`elsewhere` is neither"),
+        (
+            &["--pose-a", "1 2 3"][..],
+            "--pose-a: expected 16 (a row-major 4×4 matrix), 12 (its first three rows) or 7",
+        ),
+        (&["--pose-b", "elsewhere"], "or a file that holds them, got `elsewhere`"),
         (&["--budget", "200"], "ns, us, ms, s"),
         (&["--budget", "-3us"], "--budget"),
         (&["--thickened", "-1"], "--thickened"),
@@ -382,7 +388,7 @@ fn wrong_usage_ends_with_status_2() {
     place.write("empty.jsonl", "\n\n");
     for threads in ["1", "2"] {
         let args = both(&["--poses", "empty.jsonl", "--threads", threads]);
-        place.refused(1, &args, &["empty.jsonl: holds no poses; a pose line is"]);
+        place.refused(1, &args, &["empty.jsonl: expected poses, got none; a line is"]);
     }
     let transposed = "1 0 0 0 0 1 0 0 0 0 1 0 1 2 3 1";
     place.refused(1, &both(&["--pose-b", transposed]), &["--pose-b", "looks column-major; transpose it"]);

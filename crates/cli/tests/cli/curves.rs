@@ -152,7 +152,7 @@ fn curves_are_refused_with_a_reason() {
         (&["-o", "ball.xyz"], "would replace the input"),
         (&["-o", "c.png", "--image", "c.png"], "two outputs"),
         (&["-o", "c.ply", "--image", "c.jpg"], "PNG"),
-        (&["-o", "c.ply", "--pose-b", "1 2 3"], "3 numbers"),
+        (&["-o", "c.ply", "--pose-b", "1 2 3"], "got 3"),
     ] {
         place.refused(2, &both(options), &[word]);
     }

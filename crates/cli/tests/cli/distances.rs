@@ -105,7 +105,7 @@ fn distances_are_refused_with_a_reason() {
         (&["--thickened", "-1"][..], "zero or more"),
         (&["--budget", "5"], "units"),
         (&["--relative", "1"], "from 0 to less than 1"),
-        (&["--pose-b", "1 2 3"], "3 numbers"),
+        (&["--pose-b", "1 2 3"], "got 3"),
         (&["--thickened", "1", "--kernel", "geodesic"], "cannot be used with"),
     ] {
         place.refused(2, &both(options), &[word]);

@@ -15,6 +15,7 @@ mod interpolating;
 mod looking_inside;
 mod making_poses;
 mod on_disk;
+mod paths;
 mod prepare;
 mod running;
 mod slicing;

@@ -1,0 +1,195 @@
+//! Answers along a path of poses: a summary, a table and a plot.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::digits::{count, place, short};
+use crate::error::CliError;
+use crate::output;
+use crate::path_plot::PathPlot;
+
+/// Options of commands that answer for many poses.
+#[derive(Debug, Clone, Args)]
+pub struct PathArgs {
+    /// Many queries, a line each: `{"a":[…],"b":[…]}`, either of which may be left out, or the pose of b
+    /// alone, as 16, 12 (KITTI) or 7 numbers (x y z qx qy qz qw), 8 with the time first (TUM), JSON arrays, or
+    /// a table with columns x,y,z,qx,qy,qz,qw. `-` reads standard input. One answer a line, in order, then a
+    /// summary
+    #[arg(long, value_name = "FILE")]
+    pub poses: Option<PathBuf>,
+    /// Write a table of --poses: line, time, verdict, clearance and place, a line for each pose
+    #[arg(long, value_name = "OUT.csv", requires = "poses")]
+    pub csv: Option<PathBuf>,
+    /// Draw clearance and verdict over the poses of --poses
+    #[arg(long, value_name = "OUT.svg", requires = "poses")]
+    pub plot: Option<PathBuf>,
+}
+
+impl PathArgs {
+    /// Checks the names of the outputs before any work is done.
+    pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), CliError> {
+        let mut inputs = inputs.to_vec();
+        inputs.extend(self.poses.as_deref());
+        for path in self.csv.iter().chain(&self.plot) {
+            output::check_apart(path, &inputs)?;
+        }
+        match &self.plot {
+            Some(path) if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg")) => {
+                let path = path.display();
+                Err(CliError::Usage(format!("--plot: expected a name that ends in .svg, got `{path}`")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns `true` if the clearance of each pose is needed even where answers are not for people.
+    pub(crate) fn wants_clearance(&self) -> bool {
+        self.csv.is_some() || self.plot.is_some()
+    }
+}
+
+/// The answer for one pose.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PathEntry {
+    /// The line of the pose in its file, counted from 1.
+    pub(crate) line: u64,
+    pub(crate) time: Option<f64>,
+    pub(crate) verdict: PathVerdict,
+    pub(crate) evidence: Option<&'static str>,
+    pub(crate) reason: Option<&'static str>,
+    /// Bounds of the distance, lower and upper, in world units.
+    pub(crate) clearance: Option<[f64; 2]>,
+    /// The witness of a contact, else the nearest place on a.
+    pub(crate) place: Option<[f64; 3]>,
+    pub(crate) micros: f64,
+}
+
+/// A verdict, ordered from the best to the worst news.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum PathVerdict {
+    Separated,
+    Undecided,
+    Intersecting,
+}
+
+impl PathVerdict {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Separated => "separated",
+            Self::Undecided => "undecided",
+            Self::Intersecting => "intersecting",
+        }
+    }
+}
+
+/// Gathers the answers along a path. Keeps them all only for a plot.
+pub(crate) struct PathLog<'a> {
+    csv: Option<(PathBuf, &'a mut (dyn Write + 'a))>,
+    kept: Option<Vec<PathEntry>>,
+    /// Separated, undecided, intersecting.
+    counts: [u64; 3],
+    /// The first contact.
+    first: Option<PathEntry>,
+    /// The pose of least clearance of those that are apart.
+    least: Option<PathEntry>,
+}
+
+impl<'a> PathLog<'a> {
+    /// Starts a log that writes its table to `csv`.
+    pub(crate) fn new(args: &PathArgs, csv: Option<&'a mut (dyn Write + 'a)>) -> Result<Self, CliError> {
+        let csv = args.csv.clone().zip(csv);
+        let kept = args.plot.is_some().then(Vec::new);
+        let mut log = Self { csv, kept, counts: [0; 3], first: None, least: None };
+        log.write("line,time,verdict,evidence,reason,clearance_lower,clearance_upper,x,y,z,micros")?;
+        Ok(log)
+    }
+
+    fn write(&mut self, row: &str) -> Result<(), CliError> {
+        match &mut self.csv {
+            Some((path, out)) => writeln!(out, "{row}").map_err(CliError::writing(path)),
+            None => Ok(()),
+        }
+    }
+
+    /// Adds the answer for the next pose.
+    pub(crate) fn add(&mut self, entry: PathEntry) -> Result<(), CliError> {
+        self.write(&entry.row())?;
+        self.counts[entry.verdict as usize] += 1;
+        if entry.verdict == PathVerdict::Intersecting {
+            self.first.get_or_insert(entry);
+        }
+        let upper = |entry: &PathEntry| entry.clearance.map_or(f64::INFINITY, |[_, upper]| upper);
+        if entry.verdict == PathVerdict::Separated
+            && upper(&entry) < self.least.as_ref().map_or(f64::INFINITY, upper)
+        {
+            self.least = Some(entry);
+        }
+        if let Some(kept) = &mut self.kept {
+            kept.push(entry);
+        }
+        Ok(())
+    }
+
+    /// Draws the plot, if one is wanted, of scans with these names; `margin` as in the question.
+    pub(crate) fn draw(&self, args: &PathArgs, names: &[String; 2], margin: f64) -> Result<(), CliError> {
+        match (&args.plot, &self.kept) {
+            (Some(path), Some(kept)) => PathPlot { names, margin }.save(path, kept),
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns the summary for people. Places are told to the nearest `unit`.
+    pub(crate) fn summary(&self, unit: f64) -> String {
+        let [apart, unknown, touching] = self.counts;
+        let total = count(apart + unknown + touching, "pose");
+        let mut text = format!("{total}: {touching} touch");
+        if let Some(first) = &self.first {
+            text += &format!(" (first on {})", first.where_found(unit));
+        }
+        text += &format!(", {apart} apart");
+        if unknown > 0 {
+            text += &format!(", {unknown} undecided");
+        }
+        text.push('.');
+        if let Some(PathEntry { clearance: Some(bounds), .. }) = &self.least {
+            let where_found = self.least.as_ref().map(|least| least.where_found(unit)).unwrap_or_default();
+            text += &format!(" Least clearance of those apart: {}, on {where_found}.", between(*bounds));
+        }
+        text
+    }
+}
+
+/// Returns a clearance in words.
+fn between([lower, upper]: [f64; 2]) -> String {
+    match (short(lower.max(0.0)), short(upper)) {
+        (lower, upper) if lower == upper => upper,
+        (lower, upper) if lower == "0" => format!("at most {upper}"),
+        (lower, upper) => format!("between {lower} and {upper}"),
+    }
+}
+
+impl PathEntry {
+    fn where_found(&self, unit: f64) -> String {
+        let time = self.time.map_or(String::new(), |time| format!(", time {time}"));
+        let at = self.place.map_or(String::new(), |at| format!(", at {}", place(at, unit)));
+        format!("line {}{time}{at}", self.line)
+    }
+
+    /// Returns the row of the table; what is unknown is empty.
+    fn row(&self) -> String {
+        let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
+        let [lower, upper] = [0, 1].map(|k| number(self.clearance.map(|bounds| bounds[k])));
+        let [x, y, z] = [0, 1, 2].map(|k| number(self.place.map(|p| p[k])));
+        format!(
+            "{},{},{},{},{},{lower},{upper},{x},{y},{z},{:.1}",
+            self.line,
+            number(self.time),
+            self.verdict.word(),
+            self.evidence.unwrap_or_default(),
+            self.reason.unwrap_or_default(),
+            self.micros,
+        )
+    }
+}
