@@ -36,58 +36,68 @@ pub struct CollideArgs {
     /// Many poses
     #[command(flatten)]
     pub path: PathArgs,
-    /// Stop after the first hit of --poses: the last line is the hit, if there is one, and all before it are
-    /// none
+    /// Stop at the first contact of --poses
     #[arg(long, requires = "poses")]
     pub first: bool,
-    /// Which distances define the surfaces, as scans are prepared for and raw inputs will be; by default as
-    /// prepared, else straight ones. By the geodesic kernel surfaces alone are compared, and separations are
-    /// estimated
-    #[arg(long, value_enum, conflicts_with = "thickened")]
+    /// Distances that define the surfaces; by default those that the scans were prepared for
+    ///
+    /// Raw inputs are prepared for it. With the geodesic kernel, surfaces alone are compared
+    /// and separations are estimated.
+    #[arg(long, value_enum, conflicts_with = "thickened", help_heading = "Research", hide_short_help = true)]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Count as meeting what comes nearer than this, in world units
+    /// Report scans that come nearer than this as touching, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub margin: f64,
-    /// How sure a separation should be: certified is tried for, and proven distances told, for half as much
-    /// time again, near contact two to three times as much; by default certified, where the kernel is
-    /// geodesic estimated, as nothing is proven of that
-    #[arg(long, value_enum)]
+    /// How sure a separation must be
+    ///
+    /// A certified separation is proven; trying for one takes half as much time again, near
+    /// contact two to three times as much. The default is certified, with the geodesic kernel
+    /// estimated.
+    #[arg(long, value_enum, help_heading = "Budget and evidence")]
     pub evidence: Option<EvidenceName>,
-    /// Write what certified answers rest on, a line of JSON a query, for an independent check
-    #[arg(long, value_name = "FILE", conflicts_with = "thickened")]
+    /// Write the proof of certified answers, for an independent check: one line of JSON a query
+    #[arg(long, value_name = "FILE", conflicts_with = "thickened", help_heading = "Output")]
     pub prove: Option<PathBuf>,
-    /// Time for each query from its start, whatever other threads do, often 50us to 1ms: a number with ns,
-    /// us, ms or s
-    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
+    /// Time limit for each query, such as 200us
+    ///
+    /// The unit is ns, us, ms or s; 50us to 1ms is common. When time runs out, the answer is
+    /// undecided, with a likelihood of contact.
+    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
     pub budget: Option<Duration>,
-    /// Work units for each query, evaluations of f and node pairs, often 500 to 10000; reproducible, unlike
-    /// time
-    #[arg(long, value_name = "N")]
+    /// Work limit for each query; reproducible, unlike time
+    ///
+    /// A unit is one evaluation of f or one node pair; 500 to 10000 is common.
+    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
     pub work: Option<u64>,
     /// How much to find out about a contact
     #[arg(long, value_enum, default_value_t = DetailName::Witness)]
     pub detail: DetailName,
-    /// All contacts, one for each pair of leaves that meets or, without hierarchy, each bracket: to first
-    /// order, beside the answer
+    /// Find all contacts, not one
+    ///
+    /// There is one for each pair of leaves that touch or, with --flat, for each bracket, to
+    /// first order.
     #[arg(long)]
     pub all: bool,
     /// How to search
     #[command(flatten)]
     pub search: SearchArgs,
-    /// Threads, 0 for all cores: to prepare raw inputs, by default all, and to answer --poses, by default one
-    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    /// Threads; 0 for all cores
+    ///
+    /// By default, raw inputs are prepared on all cores and --poses are answered on one. The
+    /// answers do not depend on it.
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
     pub threads: Option<usize>,
-    /// Picture, as PNG, of both scans and of the place where they meet
-    #[arg(long, value_name = "OUT.png", conflicts_with = "poses")]
+    /// Draw both scans and the place where they touch, as PNG
+    #[arg(long, value_name = "OUT.png", conflicts_with = "poses", help_heading = "Output")]
     pub image: Option<PathBuf>,
-    /// One object of JSON a query instead of sentences
-    #[arg(long)]
+    /// Print one JSON object a query
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// No progress on the terminal
-    #[arg(long)]
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
     pub quiet: bool,
 }
 

@@ -26,22 +26,26 @@ use spill::Spill;
 /// Options of `convert`.
 #[derive(Debug, Clone, Args)]
 pub struct ConvertArgs {
-    /// Points, or a mesh, of which the vertices are taken
+    /// Point cloud, or a mesh, of which the vertices are taken
     pub input: PathBuf,
-    /// File to write, in the format of its name: ply, pcd, las, laz, xyz (also txt and csv) or npy
+    /// File to write; its name gives the format: ply, pcd, las, laz, xyz, txt, csv or npy
     pub output: PathBuf,
-    /// Keep the points within a box, given by its lower and upper corner in the units of the input. Applied
-    /// in this order: --crop, --class, --voxel, --units
+    /// Keep the points within a box, given by its lower and upper corner
+    ///
+    /// Coordinates are in the units of the input. Steps are applied in the order --crop,
+    /// --class, --voxel, --units.
     #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse_crop)]
     pub crop: Option<CropBox>,
-    /// Keep the points of these classes, by their numbers in LAS: 2 is ground, 6 is buildings
+    /// Keep the points of these LAS classes; 2 is ground, 6 is buildings
     #[arg(long, value_name = "C,C,...", value_parser = parse_classes)]
     pub class: Option<ClassList>,
-    /// Read a COPC file only down to the level at which points are about R apart
+    /// Read a COPC file only down to the level with this distance between points
     #[arg(long, value_name = "R", allow_hyphen_values = true, value_parser = parse_length)]
     pub resolution: Option<f64>,
-    /// Keep one point for each cube with edges of length S: the point nearest to the mean of the cube's
-    /// points. Points are sorted on disk, in the folder of the output
+    /// Keep one point for each cube with edges of this length
+    ///
+    /// The point nearest to the mean of the cube's points is kept. Points are sorted on disk,
+    /// in the folder of the output.
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
     pub voxel: Option<f64>,
     /// Unit of the output
@@ -50,13 +54,13 @@ pub struct ConvertArgs {
     /// Unit of the input
     #[arg(long, value_enum, value_name = "UNIT", default_value = "m", requires = "units")]
     pub from_units: UnitName,
-    /// Format of the input, or auto: by content, then by name
+    /// Format of the input; auto decides by content, then by name
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
-    /// One object of JSON instead of sentences
+    /// Print one JSON object
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }

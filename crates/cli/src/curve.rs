@@ -28,37 +28,39 @@ pub struct CurveArgs {
     /// What is asked about
     #[command(flatten)]
     pub pair: PairArgs,
-    /// Which distances define the surfaces; by default as prepared, else straight ones
-    #[arg(long, value_enum)]
+    /// Distances that define the surfaces; by default those that the scans were prepared for
+    #[arg(long, value_enum, help_heading = "Research", hide_short_help = true)]
     pub kernel: Option<KernelName>,
-    /// Wanted distance of points along a curve, in world units; nearer where it turns. By default twice the
-    /// lesser sampling radius
+    /// Distance between points along a curve, in world units
+    ///
+    /// Points are closer together where a curve bends. The default is twice the smaller
+    /// sampling radius.
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
     pub spacing: Option<f64>,
-    /// How far points may be off either surface, in world units. By default a thousandth of that radius
+    /// Largest distance of a point from either surface, in world units; by default a thousandth
+    /// of the smaller sampling radius
     #[arg(long, value_name = "E", allow_hyphen_values = true, value_parser = parse_length)]
     pub tolerance: Option<f64>,
-    /// Time for the curves: a number with ns, us, ms or s. What was found by then is written
-    #[arg(long, value_name = "5ms", allow_hyphen_values = true, value_parser = parse_duration)]
+    /// Time limit, such as 5ms; the curves found until then are written
+    #[arg(long, value_name = "5ms", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
     pub budget: Option<Duration>,
-    /// Work units, evaluations of f and node pairs; reproducible, unlike time
-    #[arg(long, value_name = "N")]
+    /// Work limit, in evaluations of f and node pairs; reproducible, unlike time
+    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
     pub work: Option<u64>,
-    /// Threads to prepare raw inputs, 0 for all cores
-    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    /// Threads to prepare raw inputs; 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
     pub threads: Option<usize>,
-    /// Where to write the curves, as PLY: points, each with the number of its curve, and the edges that join
-    /// them
-    #[arg(short, long, value_name = "OUT.ply")]
+    /// PLY file for the curves: points with the number of their curve, and edges
+    #[arg(short, long, value_name = "OUT.ply", help_heading = "Output")]
     pub output: PathBuf,
-    /// Picture, as PNG, of both scans and their curves
-    #[arg(long, value_name = "OUT.png")]
+    /// Draw both scans and their curves, as PNG
+    #[arg(long, value_name = "OUT.png", help_heading = "Output")]
     pub image: Option<PathBuf>,
-    /// One object of JSON instead of a sentence
-    #[arg(long)]
+    /// Print one JSON object
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// No progress on the terminal
-    #[arg(long)]
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
     pub quiet: bool,
 }
 

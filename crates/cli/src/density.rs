@@ -24,34 +24,35 @@ use crate::preprocess::parse_threads;
 /// Options of `density`.
 #[derive(Debug, Clone, Args)]
 pub struct DensityArgs {
-    /// The scan: prepared with a graph, or a raw input, prepared on the fly
+    /// Scan that was prepared with --graph, or a point cloud or mesh, which is prepared on the
+    /// fly
     pub a: PathBuf,
-    /// Wrong verdicts among all tests, at most
+    /// Largest share of wrong verdicts
     #[arg(long, value_name = "RATE", default_value_t = 0.001, value_parser = parse_rate)]
     pub error: f64,
-    /// Surfels of the derived number: how finely the surface is thought to be cut
+    /// Number of surfels for the derived number of points
     #[arg(long, value_name = "A", default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub surfels: u32,
-    /// Number of poses at each of the 13 distances of the sweep
+    /// Poses at each of the 13 distances of the sweep
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
-    /// Measure brackets alone, as Klein & Zachmann 2005 do: without the approaches that find what they miss
+    /// Measure brackets alone, as Klein & Zachmann 2005 do, without the searches that find what
+    /// brackets miss
     #[arg(long, conflicts_with = "store")]
     pub brackets_alone: bool,
-    /// Keep what was measured in the file, if it suffices: `collide --method interpolation --flat` draws as
-    /// many points from it by default
+    /// Keep the measured number in the file, for `collide --method interpolation --flat`
     #[arg(long)]
     pub store: bool,
-    /// Seed of all that is random
+    /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Threads, 0 for all cores; the numbers are the same
+    /// Threads; 0 for all cores; the numbers do not depend on it
     #[arg(long, value_name = "N", value_parser = parse_threads, default_value = "0")]
     pub threads: usize,
-    /// One object of JSON instead of sentences
+    /// Print one JSON object
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }

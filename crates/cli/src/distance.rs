@@ -34,36 +34,43 @@ pub struct DistanceArgs {
     /// Many poses
     #[command(flatten)]
     pub path: PathArgs,
-    /// Which distances define the surfaces; by default as prepared, else straight ones. By the geodesic
-    /// kernel no lower bound is proven
-    #[arg(long, value_enum, conflicts_with = "thickened")]
+    /// Distances that define the surfaces; by default those that the scans were prepared for
+    ///
+    /// With the geodesic kernel, no lower bound is proven.
+    #[arg(long, value_enum, conflicts_with = "thickened", help_heading = "Research", hide_short_help = true)]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// Obstacles only: the search stops when the lower bound is this share of the upper one below it, 0 to
-    /// less than 1. Within about the local spacing of contact the bounds may stay further apart
-    #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative)]
+    /// Stop when the bounds differ by at most this share of the upper one: from 0 to less than
+    /// 1
+    ///
+    /// Within about the local spacing of contact, the bounds may stay further apart. Applies to
+    /// obstacles only.
+    #[arg(long, value_name = "E", allow_hyphen_values = true, default_value_t = DistanceOptions::default().relative, value_parser = parse_relative, help_heading = "Budget and evidence")]
     pub relative: f64,
-    /// Time for each query, often 50us to 1ms: a number with ns, us, ms or s. The bounds are then further
-    /// apart
-    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration)]
+    /// Time limit for each query, such as 200us
+    ///
+    /// The unit is ns, us, ms or s. The bounds are valid whenever the search ends; with less
+    /// time they are further apart.
+    #[arg(long, value_name = "200us", allow_hyphen_values = true, value_parser = parse_duration, help_heading = "Budget and evidence")]
     pub budget: Option<Duration>,
-    /// Work units for each query, evaluations of f and node pairs, often 1000 to 20000; reproducible, unlike
-    /// time
-    #[arg(long, value_name = "N")]
+    /// Work limit for each query; reproducible, unlike time
+    ///
+    /// A unit is one evaluation of f or one node pair; 1000 to 20000 is common.
+    #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
     pub work: Option<u64>,
-    /// Threads to prepare raw inputs, 0 for all cores
-    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    /// Threads to prepare raw inputs; 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Budget and evidence")]
     pub threads: Option<usize>,
-    /// Picture, as PNG, of both scans, the two nearest places, and the lengths between
-    #[arg(long, value_name = "OUT.png", conflicts_with = "poses")]
+    /// Draw both scans, the nearest places and the distance between them, as PNG
+    #[arg(long, value_name = "OUT.png", conflicts_with = "poses", help_heading = "Output")]
     pub image: Option<PathBuf>,
-    /// One object of JSON a query instead of sentences
-    #[arg(long)]
+    /// Print one JSON object a query
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// No progress on the terminal
-    #[arg(long)]
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
     pub quiet: bool,
 }
 

@@ -15,20 +15,20 @@ use crate::input::{self, Opening, TextLines, pieces};
 /// Options of `eval`.
 #[derive(Debug, Clone, Args)]
 pub struct EvalArgs {
-    /// Prepared scan, or a raw input, prepared on the fly
+    /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Where to evaluate: a point a line, x y z, in the frame of the scan's input
+    /// Points to evaluate at: a line `x y z` each, in the frame of the scan; `-` reads standard
+    /// input
     #[arg(long, value_name = "FILE")]
     pub points: PathBuf,
-    /// How far points are from where f is asked for: straight, or along the surface by the graph; by default
-    /// as the scan was prepared
+    /// Distances that define the surface; by default those that the scan was prepared for
     #[arg(long, value_enum)]
     pub kernel: Option<KernelName>,
-    /// One object of JSON a line instead of sentences
+    /// Print one JSON object a point
     #[arg(long)]
     pub json: bool,
-    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    /// Check prepared scans in full before use: checksums, and every number
     #[arg(long)]
     pub verify: bool,
 }

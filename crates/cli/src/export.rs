@@ -21,38 +21,42 @@ use crate::{output, picture, report};
 #[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "samples", "boxes", "radii", "edges", "close_pairs", "image"]))]
 #[command(group = clap::ArgGroup::new("levelled").multiple(true).args(["samples", "boxes"]))]
 pub struct ExportArgs {
-    /// Prepared scan, or a raw input, prepared on the fly
+    /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Points with normals in the order of the prepared file, their index in its input as `source`, and their
-    /// kind as `kind`, a number with a colour: 0 sheet, grey; 1 edge, blue; 2 noisy, yellow; 3 line, green; 4
-    /// stray, red; 5 sparse, pink
+    /// Points with normals and kinds, as PLY
+    ///
+    /// In the order of the prepared file. `source` is the index in the input. `kind` is a
+    /// number with a colour: 0 sheet, grey; 1 edge, blue; 2 noisy, yellow; 3 line, green; 4
+    /// stray, red; 5 sparse, pink.
     #[arg(long, value_name = "P.ply")]
     pub points: Option<PathBuf>,
-    /// Samples of the nodes at one depth (--level), of each its node, the node's covering radius and sampling
-    /// radius
+    /// Samples of the nodes at --level, each with its node and the node's covering and sampling
+    /// radius, as PLY
     #[arg(long, value_name = "S.ply", requires = "level")]
     pub samples: Option<PathBuf>,
-    /// Boxes of the hierarchy's nodes, as lines
+    /// Boxes of the nodes, as lines, as OBJ
     #[arg(long, value_name = "B.obj")]
     pub boxes: Option<PathBuf>,
     /// Sampling radius and bandwidth of each point: i,r,h
     #[arg(long, value_name = "R.csv")]
     pub radii: Option<PathBuf>,
-    /// Edges of the graph: i,j,length,virtual with i < j, indices into the exported points; virtual is 1 for
-    /// those too long for the surface
+    /// Edges of the graph: i,j,length,virtual, with i < j
+    ///
+    /// i and j are indices into the exported points. virtual is 1 for edges that are too long
+    /// for the surface.
     #[arg(long, value_name = "E.csv")]
     pub edges: Option<PathBuf>,
-    /// Points that are heard at each point i: i,j,distance along the graph, nearest first
+    /// Close pairs of each point: i,j,distance along the graph, nearest first
     #[arg(long, value_name = "C.csv")]
     pub close_pairs: Option<PathBuf>,
-    /// Picture, as PNG, of the points in the colours of their kinds, with their shares
+    /// Draw the points in the colours of their kinds, with their shares, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
-    /// Only nodes at this depth, the root's being 0, and leaves above it
+    /// Depth of the nodes to export; the root has depth 0; leaves above it are included
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
-    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    /// Check prepared scans in full before use: checksums, and every number
     #[arg(long)]
     pub verify: bool,
 }

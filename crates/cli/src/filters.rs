@@ -16,23 +16,28 @@ use crate::input::pieces;
 /// Options that leave points out, in the order in which they are applied.
 #[derive(Debug, Clone, Default, Args)]
 pub struct FilterArgs {
-    /// Keep the points within a box, given by its lower and upper corner in the units of the input. Filters
-    /// are applied in this order: --crop, --class, --voxel, --remove-outliers, --min-neighbours
-    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse_crop)]
+    /// Keep the points within a box, given by its lower and upper corner
+    ///
+    /// Coordinates are in the units of the input. Filters are applied in the order --crop,
+    /// --class, --voxel, --remove-outliers, --min-neighbours.
+    #[arg(long, value_name = "X0,Y0,Z0,X1,Y1,Z1", allow_hyphen_values = true, value_parser = parse_crop, help_heading = "Filters")]
     pub crop: Option<CropBox>,
-    /// Keep the points of these classes, by their numbers in LAS: 2 is ground, 6 is buildings
-    #[arg(long, value_name = "C,C,...", value_parser = parse_classes)]
+    /// Keep the points of these LAS classes; 2 is ground, 6 is buildings
+    #[arg(long, value_name = "C,C,...", value_parser = parse_classes, help_heading = "Filters")]
     pub class: Option<ClassList>,
-    /// Keep one point for each cube with edges of length S: the point nearest to the mean of the cube's
-    /// points
-    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length)]
+    /// Keep one point for each cube with edges of this length
+    ///
+    /// The point nearest to the mean of the cube's points is kept.
+    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = parse_length, help_heading = "Filters")]
     pub voxel: Option<f64>,
-    /// Remove points whose mean distance to their K nearest neighbours exceeds the mean of that distance over
-    /// all points by more than SIGMA standard deviations; often 16,2
-    #[arg(long, value_name = "K,SIGMA", allow_hyphen_values = true, value_parser = parse_outliers)]
+    /// Remove isolated points; often 16,2
+    ///
+    /// A point is removed if its mean distance to its K nearest neighbours exceeds the average
+    /// of that distance by more than SIGMA standard deviations.
+    #[arg(long, value_name = "K,SIGMA", allow_hyphen_values = true, value_parser = parse_outliers, help_heading = "Filters")]
     pub remove_outliers: Option<Outliers>,
     /// Keep the points that have at least N others within the distance R
-    #[arg(long, value_name = "N,R", allow_hyphen_values = true, value_parser = parse_neighbours)]
+    #[arg(long, value_name = "N,R", allow_hyphen_values = true, value_parser = parse_neighbours, help_heading = "Filters")]
     pub min_neighbours: Option<LeastNeighbours>,
 }
 

@@ -16,13 +16,13 @@ use crate::report::ScanReport;
 /// Options of `inspect`.
 #[derive(Debug, Clone, Args)]
 pub struct InspectArgs {
-    /// Prepared scan
+    /// Prepared scan (.nm)
     #[arg(value_name = "FILE.nm")]
     pub file: PathBuf,
-    /// Check every checksum, and every id and number against the others
+    /// Check everything: checksums, ids, and every number
     #[arg(long)]
     pub verify: bool,
-    /// One object of JSON instead of sentences
+    /// Print one JSON object
     #[arg(long)]
     pub json: bool,
 }

@@ -10,12 +10,16 @@ use crate::parse::parse_radius;
 /// measured point.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct MeaningArgs {
-    /// Compare surfaces alone, as Klein & Zachmann define them; points that sample no sheet then
-    /// count for nothing. By default they count as balls of half the local spacing. The geodesic
-    /// kernel always compares surfaces alone
+    /// Compare surfaces alone, and ignore points that sample no sheet
+    ///
+    /// By default, points that sample no sheet count as balls of half the local spacing. With
+    /// the geodesic kernel, surfaces alone are compared in any case. Surfaces are those of
+    /// Klein & Zachmann 2004.
     #[arg(long, conflicts_with = "thickened")]
     pub surface_only: bool,
-    /// Compare balls of this radius about the points, in world units, and no surfaces: exact
+    /// Compare balls of this radius about the points, and no surfaces
+    ///
+    /// The answer is exact. The radius is in world units.
     #[arg(long, value_name = "RADIUS", allow_hyphen_values = true, value_parser = parse_radius)]
     pub thickened: Option<f64>,
 }

@@ -8,10 +8,12 @@ use clap::Args;
 /// The option that sets a limit.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct MemoryArgs {
-    /// Memory that may be used, as in 500MB or 16GB; by default what is available, where that is known, and
-    /// 4 GiB for slice maps. What needs more is refused before it starts, unless this option is given and the
-    /// work can be done on disk, beside the output: as `slices build` can, and `preprocess` without a graph
-    /// and with filters of single points
+    /// Memory limit, such as 500MB or 16GB
+    ///
+    /// By default the available memory, where it is known, and 4 GiB for slice maps. A command
+    /// that needs more is refused before it starts. With this option, `slices build`, and
+    /// `preprocess` without a graph and with filters of single points, work on disk instead,
+    /// beside the output.
     #[arg(long, value_name = "SIZE", value_parser = parse_size)]
     pub memory: Option<u64>,
 }

@@ -13,17 +13,19 @@ use crate::path_plot::PathPlot;
 /// Options of commands that answer for many poses.
 #[derive(Debug, Clone, Args)]
 pub struct PathArgs {
-    /// Many queries, a line each: `{"a":[…],"b":[…]}`, either of which may be left out, or the pose of b
-    /// alone, as 16, 12 (KITTI) or 7 numbers (x y z qx qy qz qw), 8 with the time first (TUM), JSON arrays, or
-    /// a table with columns x,y,z,qx,qy,qz,qw. `-` reads standard input. One answer a line, in order, then a
-    /// summary
+    /// Answer for many poses, one on each line of this file; `-` reads standard input
+    ///
+    /// A line is `{"a":[…],"b":[…]}`, where either may be left out, or the pose of b alone: 16,
+    /// 12 (KITTI) or 7 numbers (x y z qx qy qz qw), 8 with the time first (TUM), or a JSON
+    /// array. The file may also be a table with columns x,y,z,qx,qy,qz,qw. Each pose gets one
+    /// line of output, in order; a summary follows.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Write a table of --poses: line, time, verdict, clearance and place, a line for each pose
-    #[arg(long, value_name = "OUT.csv", requires = "poses")]
+    /// Write a table of --poses: line, time, verdict, clearance, place
+    #[arg(long, value_name = "OUT.csv", requires = "poses", help_heading = "Output")]
     pub csv: Option<PathBuf>,
-    /// Draw clearance and verdict over the poses of --poses
-    #[arg(long, value_name = "OUT.svg", requires = "poses")]
+    /// Plot clearance and verdict over --poses, as SVG
+    #[arg(long, value_name = "OUT.svg", requires = "poses", help_heading = "Output")]
     pub plot: Option<PathBuf>,
 }
 

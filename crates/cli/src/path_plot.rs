@@ -130,20 +130,22 @@ impl PathPlot<'_> {
             ));
         }
         let [height, gap] = STRIP;
-        for (i, column) in columns.iter().enumerate() {
-            // A column ends half way to the next one.
-            let half = |other: Option<&Column>, own: f64, far: fn(&Column) -> f64| {
-                other.map_or(own, |other| 0.5 * (own + far(other)))
+        let mut start = left;
+        let mut columns_left = &columns[..];
+        for run in columns.chunk_by(|one, next| one.verdict == next.verdict) {
+            columns_left = &columns_left[run.len()..];
+            // A run ends half way to the next one.
+            let end = match (run.last(), columns_left.first()) {
+                (Some(own), Some(next)) => x(0.5 * (own.to + next.from)),
+                _ => right,
             };
-            let before = i.checked_sub(1).and_then(|i| columns.get(i));
-            let [from, to] =
-                [half(before, column.from, |c| c.to), half(columns.get(i + 1), column.to, |c| c.from)].map(x);
             put(&format!(
-                "<rect x=\"{from:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{height}\" fill=\"{}\"/>",
+                "<rect x=\"{start:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{height}\" fill=\"{}\"/>",
                 bottom + gap,
-                (to - from).max(1.0),
-                colour(column.verdict)
+                (end - start).max(1.0),
+                colour(run[0].verdict)
             ));
+            start = end;
         }
         put(&format!(
             "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{FRAME}\"/>",

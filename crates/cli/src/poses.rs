@@ -27,9 +27,9 @@ use approach::Approach;
 #[derive(Debug, Clone, Args)]
 #[command(group = clap::ArgGroup::new("kind").required(true).args(["sweep", "near"]))]
 pub struct PosesArgs {
-    /// The scan that stays: prepared, or a raw input, prepared on the fly
+    /// Scan that stays: prepared (.nm), or a point cloud or mesh
     pub a: PathBuf,
-    /// The scan that is turned and moved
+    /// Scan that is turned and moved
     pub b: PathBuf,
     /// Distances d of the centres from 0 to 3 in steps of 0.25, both scans being scaled to a longest side of
     /// 2, with random rotations and directions at each
@@ -39,19 +39,19 @@ pub struct PosesArgs {
     /// r/2; r is the greater sampling radius. Found by bisection on that distance
     #[arg(long)]
     pub near: bool,
-    /// Number of poses at each distance (--sweep) or in all (--near), at least 1
+    /// Number of poses at each distance (--sweep) or in all (--near)
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
-    /// Seed of all that is random
+    /// Seed of everything random
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// File to write, a pair of poses a line, for `collide --poses`
+    /// File to write, for `collide --poses`; `-` writes to standard output
     #[arg(short, long, value_name = "F.jsonl")]
     pub output: PathBuf,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
-    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
+    /// Check prepared scans in full before use: checksums, and every number
     #[arg(long)]
     pub verify: bool,
 }

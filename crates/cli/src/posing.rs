@@ -15,26 +15,31 @@ use crate::units::{SizeCheck, UnitName, scaled};
 /// Two scans, and where they are.
 #[derive(Debug, Clone, Args)]
 pub struct PairArgs {
-    /// The one scan: prepared, or a raw input, prepared on the fly
+    /// First scan: prepared (.nm), or a point cloud or mesh, which is prepared on the fly
     pub a: PathBuf,
-    /// The other scan
+    /// Second scan
     pub b: PathBuf,
-    /// Pose of a, object to world, as one argument: `x y z qx qy qz qw`, or the 16 numbers of a row-major 4×4
-    /// matrix, or a file that holds either
+    /// Pose of a: `x y z qx qy qz qw`, or a 4×4 matrix
+    ///
+    /// The pose maps the object to the world. Give 7 numbers (a position and a unit
+    /// quaternion), 12 (the first three rows of a matrix) or 16 (a row-major 4×4 matrix, with
+    /// uniform scale allowed), in one argument; or a file that holds them.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_a: Option<String>,
-    /// Pose of b
+    /// Pose of b, in the same form
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose_b: Option<String>,
-    /// Unit of the lengths of a. With --units-a or --units-b the world is in metres, and so is a scan without
-    /// a unit: scans are scaled to metres before their poses are applied
+    /// Unit of a; the world is then in metres
+    ///
+    /// With --units-a or --units-b, scans are scaled to metres before their poses are applied.
+    /// A scan without a unit is taken to be in metres.
     #[arg(long, value_enum, value_name = "U")]
     pub units_a: Option<UnitName>,
-    /// Unit of the lengths of b
+    /// Unit of b; the world is then in metres
     #[arg(long, value_enum, value_name = "U")]
     pub units_b: Option<UnitName>,
-    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
-    #[arg(long)]
+    /// Check prepared scans in full before use: checksums, and every number
+    #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
 }
 

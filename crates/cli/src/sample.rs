@@ -19,27 +19,27 @@ use crate::{input, output};
 #[derive(Debug, Clone, Args)]
 #[command(group = clap::ArgGroup::new("samples").required(true).args(["spacing", "points"]))]
 pub struct SampleArgs {
-    /// Mesh: OBJ, or PLY with faces
+    /// Mesh: OBJ, STL, OFF, glTF, or PLY with faces
     pub input: PathBuf,
-    /// Where to write the points, as PLY
+    /// PLY file for the points
     #[arg(short, long, value_name = "CLOUD.ply")]
     pub output: PathBuf,
-    /// No place of the surface is further than this from a point, in the units of the mesh
+    /// Largest distance of any place on the surface from a point, in the units of the mesh
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub spacing: Option<f64>,
-    /// So many points, at random, everywhere as densely as the area says
+    /// Number of points, drawn at random, uniformly by area
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub points: Option<u32>,
-    /// What is random depends on it; with --spacing, points are moved at random instead of lying in rows
+    /// Seed; with --spacing, it moves points at random instead of leaving them in rows
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
     /// How much memory may be used
     #[command(flatten)]
     pub memory: MemoryArgs,
-    /// One object of JSON instead of a sentence
+    /// Print one JSON object
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }

@@ -9,44 +9,50 @@ use crate::parse::parse_radius;
 /// Options of `collide` that say how to search.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct SearchArgs {
-    /// How leaves are compared. `sampling` and `interpolation` compare surfaces alone, as with --surface-only
-    #[arg(long, value_enum, default_value_t = MethodName::Traversal)]
+    /// How leaves are compared
+    ///
+    /// `sampling` and `interpolation` compare surfaces alone, as --surface-only does.
+    #[arg(long, value_enum, default_value_t = MethodName::Traversal, help_heading = "Research", hide_short_help = true)]
     pub method: MethodName,
-    /// Leave the hierarchy out, with `--method sampling` or `interpolation`: points about, or of, all of a in
-    /// the box of b
-    #[arg(long)]
+    /// Search without the hierarchy, with `--method sampling` or `interpolation`
+    #[arg(long, help_heading = "Research", hide_short_help = true)]
     pub flat: bool,
     /// Test points for each pair of leaves, with `--method sampling`
-    #[arg(long, value_name = "N", default_value_t = Sampling::default().test_points)]
+    #[arg(long, value_name = "N", default_value_t = Sampling::default().test_points, help_heading = "Research", hide_short_help = true)]
     pub test_points: u32,
-    /// Greatest |f_A| + |f_B| of a test point that counts as contact, in sampling radii (`--method sampling`)
-    #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance)]
+    /// Largest |f_A| + |f_B| of a test point in contact, in sampling radii, with `--method
+    /// sampling`
+    #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance, help_heading = "Research", hide_short_help = true)]
     pub tolerance: f64,
-    /// Into how many surfels the surface of a is thought to be cut where b may be, with `--method
-    /// interpolation --flat`: a number, or `adapted` to the sampling density, 8 sampling radii wide; by
-    /// default what `density` stored with a, or 30
-    #[arg(long, value_name = "A", value_parser = parse_surfels)]
+    /// Number of surfels that the surface of a is divided into, with `--method interpolation
+    /// --flat`
+    ///
+    /// A number, or `adapted` for surfels that are 8 sampling radii wide. By default the number
+    /// that `density --store` kept with a, or 30.
+    #[arg(long, value_name = "A", value_parser = parse_surfels, help_heading = "Research", hide_short_help = true)]
     pub surfels: Option<Surfels>,
-    /// The probability that each surfel gets a point, with `--method interpolation --flat`
-    #[arg(long, value_name = "P", default_value_t = Interpolation::default().probability)]
+    /// Probability that a surfel gets a point, with `--method interpolation --flat`
+    #[arg(long, value_name = "P", default_value_t = Interpolation::default().probability, help_heading = "Research", hide_short_help = true)]
     pub probability: f64,
-    /// Where the other ends of brackets come from, with `--method interpolation --flat`
-    #[arg(long, value_enum, default_value_t = BracketsName::Drawn)]
+    /// Source of the second end of a bracket, with `--method interpolation --flat`
+    #[arg(long, value_enum, default_value_t = BracketsName::Drawn, help_heading = "Research", hide_short_help = true)]
     pub brackets: BracketsName,
-    /// How a place on both surfaces is found, with `--method interpolation`
-    #[arg(long, value_enum, default_value_t = RefinementName::Newton)]
+    /// How a point on both surfaces is found, with `--method interpolation`
+    #[arg(long, value_enum, default_value_t = RefinementName::Newton, help_heading = "Research", hide_short_help = true)]
     pub refinement: RefinementName,
-    /// Seed of the random points
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Seed of random points
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Research", hide_short_help = true)]
     pub seed: u64,
-    /// Which pairs of nodes are looked at first; by default depth first, or by overlap under a budget
-    #[arg(long, value_enum)]
+    /// Node pairs to visit first; by default depth first, with a budget by overlap
+    #[arg(long, value_enum, help_heading = "Research", hide_short_help = true)]
     pub order: Option<OrderName>,
-    /// Let sphere coverings part nodes whose boxes overlap
-    #[arg(long)]
+    /// Prune nodes by their sphere coverings where their boxes overlap
+    #[arg(long, help_heading = "Research", hide_short_help = true)]
     pub coverings: bool,
-    /// Look no finer than this, in world units: samples answer for what is below
-    #[arg(long, value_name = "LEN", allow_hyphen_values = true, value_parser = parse_radius)]
+    /// Stop at nodes of this size, in world units, and let their samples answer
+    ///
+    /// The answer is then estimated.
+    #[arg(long, value_name = "LEN", allow_hyphen_values = true, value_parser = parse_radius, help_heading = "Budget and evidence")]
     pub resolution: Option<f64>,
 }
 

@@ -17,27 +17,29 @@ use crate::preprocess::parse_threads;
 /// Options of `touch`.
 #[derive(Debug, Clone, Args)]
 pub struct TouchArgs {
-    /// The scan: prepared, or a raw input, prepared on the fly
+    /// Prepared scan (.nm), or a point cloud or mesh, which is prepared on the fly
     pub scan: PathBuf,
-    /// A shape a line, in world units: `{"sphere":{"centre":[x,y,z],"radius":r}}`,
-    /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}` or `{"box":{"pose":[16 numbers],"half":[x,y,z]}}`;
-    /// an answer a line, in order
+    /// Shapes, one JSON object a line, in world units; `-` reads standard input
+    ///
+    /// `{"sphere":{"centre":[x,y,z],"radius":r}}`,
+    /// `{"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}}` or `{"box":{"pose":[16
+    /// numbers],"half":[x,y,z]}}`. Each shape gets one line of output, in order.
     #[arg(long, value_name = "FILE.jsonl")]
     pub shapes: PathBuf,
-    /// Pose of the scan, object to world: 16 numbers, row-major, in one argument, or a file that holds them
+    /// Pose of the scan: `x y z qx qy qz qw`, a 4×4 matrix, or a file that holds either
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub pose: Option<String>,
-    /// Threads to prepare a raw input, 0 for all cores
-    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    /// Threads to prepare a raw input; 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads, help_heading = "Advanced", hide_short_help = true)]
     pub threads: Option<usize>,
-    /// Compare prepared scans with their checksums, and check every number of theirs, before they are used
-    #[arg(long)]
+    /// Check prepared scans in full before use: checksums, and every number
+    #[arg(long, help_heading = "Advanced", hide_short_help = true)]
     pub verify: bool,
-    /// One object of JSON a shape instead of sentences
-    #[arg(long)]
+    /// Print one JSON object a shape
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// No progress on the terminal
-    #[arg(long)]
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
     pub quiet: bool,
 }
 

@@ -14,69 +14,81 @@ use crate::memory::MemoryArgs;
 /// Options of `preprocess`.
 #[derive(Debug, Clone, Args)]
 pub struct PreprocessArgs {
-    /// Point cloud (PLY, PCD, LAS, LAZ, E57, NPY or text) or mesh (OBJ, STL, OFF, glTF, PLY with faces), of
-    /// which the vertices are the points
+    /// Point cloud (PLY, PCD, LAS, LAZ, E57, NPY, text) or mesh (OBJ, STL, OFF, glTF, PLY with
+    /// faces)
+    ///
+    /// Of a mesh, the vertices are the points; `nearmiss sample` puts points on its faces.
     pub input: PathBuf,
-    /// Prepared scan to write, usually named `.nm`; replaced in one step if it is there
+    /// Prepared scan to write, usually named .nm; an existing file is replaced in one step
     #[arg(short, long, value_name = "OUT.nm")]
     pub output: PathBuf,
-    /// Format of the input: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf, or auto, by content and name
+    /// Format of the input; auto decides by content, then by name
+    ///
+    /// Known formats: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf.
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
     /// Which points to leave out
     #[command(flatten)]
     pub filters: FilterArgs,
-    /// K: local radii reach to the K-th neighbour, further where the points look like lines; 3 to 32
-    #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32))]
+    /// Neighbours that set the local radius of a point; more where points lie on lines; 3 to 32
+    #[arg(long, value_name = "K", default_value_t = 6, value_parser = clap::value_parser!(u32).range(3..=32), help_heading = "Surface")]
     pub radius_neighbours: u32,
-    /// L: how far the scan may be interpolated, in the units of the input. No gap wider than this is bridged,
-    /// and no ball is wider. By default twice the sampling radius, within which nine tenths of the points
-    /// have six neighbours
-    #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach)]
+    /// Largest gap to bridge between points, in the units of the input
+    ///
+    /// No wider gap is bridged, and no ball is wider. By default twice the sampling radius,
+    /// within which nine tenths of the points have six neighbours.
+    #[arg(long, value_name = "L", allow_hyphen_values = true, value_parser = parse_reach, help_heading = "Surface")]
     pub reach: Option<f64>,
     /// Weight of a point by its distance
-    #[arg(long, value_enum, default_value_t = WeightName::Gaussian)]
+    #[arg(long, value_enum, default_value_t = WeightName::Gaussian, help_heading = "Research", hide_short_help = true)]
     pub weight: WeightName,
-    /// Width of the weight: local (follows the spacing), global (from the sampling radius), or a length
-    #[arg(long, value_name = "local|global|M", default_value = "local", allow_hyphen_values = true, value_parser = parse_bandwidth)]
+    /// Bandwidth: local (follows the spacing), global (from the sampling radius), or a length
+    #[arg(long, value_name = "local|global|M", default_value = "local", allow_hyphen_values = true, value_parser = parse_bandwidth, help_heading = "Research", hide_short_help = true)]
     pub bandwidth: Bandwidth,
     /// Points in a leaf of the hierarchy, 4 to 64
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(4..=64))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(4..=64), help_heading = "Research", hide_short_help = true)]
     pub leaf: u32,
-    /// Add a graph over the points: normals are turned to one side, and searches can go along the surface
-    #[arg(long)]
+    /// Add the proximity graph: normals are oriented, and curves and paths along the surface
+    /// can be found
+    #[arg(long, help_heading = "Graph")]
     pub graph: bool,
-    /// R: two points are neighbours in the graph if the spheres about them that reach their R-th nearest
-    /// points meet; 1 to 32, by default 4. Implies --graph
-    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(1..=32))]
+    /// Number of neighbours that sets the size of spheres of influence, 1 to 32; by default 4;
+    /// implies --graph
+    ///
+    /// Two points are joined in the graph if the spheres about them meet that reach to their
+    /// nearest points of this number.
+    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u32).range(1..=32), help_heading = "Research", hide_short_help = true)]
     pub neighbours: Option<u32>,
-    /// Add a map of close pairs to the graph, which takes most of the file; the geodesic kernel needs it.
-    /// Implies --graph
-    #[arg(long)]
+    /// Add the map of close pairs, which the geodesic kernel needs; implies --graph
+    ///
+    /// It takes most of the file.
+    #[arg(long, help_heading = "Graph")]
     pub close_pairs: bool,
-    /// Whether shortest paths of close pairs are stored, a byte a pair, or rebuilt when wanted, the default.
-    /// Implies --close-pairs
-    #[arg(long, value_enum)]
+    /// Store the shortest paths of close pairs, or rebuild them when needed; implies
+    /// --close-pairs
+    #[arg(long, value_enum, help_heading = "Research", hide_short_help = true)]
     pub paths: Option<PathsName>,
-    /// Which distances define the surface: straight ones, or those along the graph, which keep sheets apart
-    /// that are close to each other. The latter implies --close-pairs, and nothing but witnesses is certified
-    /// of it
-    #[arg(long, value_enum, default_value_t = KernelName::Euclidean)]
+    /// Distances that define the surface; `geodesic` implies --close-pairs
+    ///
+    /// Distances along the graph keep sheets apart that are close to each other. Of the
+    /// geodesic kernel, only contacts are certified.
+    #[arg(long, value_enum, default_value_t = KernelName::Euclidean, help_heading = "Graph")]
     pub kernel: KernelName,
-    /// Where the scanner stood, in the frame of the input: normals are turned towards it. Implies --graph
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse_place)]
+    /// Position of the scanner, in the frame of the input: normals are turned towards it;
+    /// implies --graph
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse_place, help_heading = "Graph")]
     pub scanner: Option<Place>,
-    /// Threads to work on, 0 for all cores; the result is the same
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads)]
+    /// Threads; 0 for all cores; the result does not depend on it
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads, help_heading = "Output")]
     pub threads: usize,
     /// How much memory may be used
     #[command(flatten)]
     pub memory: MemoryArgs,
-    /// One object of JSON instead of sentences
-    #[arg(long)]
+    /// Print one JSON object
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// No progress on the terminal
-    #[arg(long)]
+    /// Show no progress
+    #[arg(long, help_heading = "Output")]
     pub quiet: bool,
 }
 

@@ -356,7 +356,7 @@ fn wrong_usage_ends_with_status_2() {
         (&["--thickened", "-1"], "--thickened"),
         (&["--thickened", "nan"], "--thickened"),
         (&["--threads", "many"], "--threads"),
-        (&["--poses", "p.jsonl", "--pose-a", "x"], "cannot be used with"),
+        (&["--poses", "p.jsonl", "--image", "x.png"], "cannot be used with"),
         (&["--image", "ball.nm"], "would replace the input"),
         (&["--detail", "everything"], "manifold"),
         (&["--first"], "--poses"),
