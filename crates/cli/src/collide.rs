@@ -1,4 +1,4 @@
-//! `collide`: whether, where and how near two scans meet.
+//! `collide`: tests whether, where and how near two scans meet.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -104,25 +104,24 @@ pub struct CollideArgs {
 /// How much to find out about a contact, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DetailName {
-    /// That there is one, to first order: fastest
+    /// Only that there is one, to first order; fastest
     Verdict,
-    /// A point on both surfaces, verified where that can be had
+    /// A point on both surfaces, verified where possible
     Witness,
-    /// A contact, and several places of it, well spread, each with the way out and the gap along it, for a
-    /// solver
+    /// Several well-spread points, each with a normal and a gap, for a solver
     Manifold,
 }
 
 /// How sure a separation should be, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum EvidenceName {
-    /// Proven, where the volumes about the surfaces are disjoint
+    /// Proven: volumes that enclose the scans are disjoint
     Certified,
-    /// By an exhaustive search, with nothing proven: faster
+    /// Found by an exhaustive search, without proof; faster
     Estimated,
 }
 
-/// Everything that is the same for all queries.
+/// What all queries have in common.
 struct Question {
     a: Scan,
     b: Scan,
@@ -139,7 +138,7 @@ struct Question {
 }
 
 impl Question {
-    /// The answer to the question on this line of the file of poses.
+    /// Answers one query; `line` is its line in the file of poses.
     fn ask(&self, line: Option<u64>, posed: Posed, scratch: &mut Scratch) -> Asked {
         let Posed { poses, time } = posed;
         let start = now();
@@ -350,7 +349,7 @@ fn conclude(question: &Question, args: &CollideArgs, out: &mut Outputs<'_, '_, '
     out.results.line(log.summary(unit))
 }
 
-/// The scans: balls about points know no kernel, so any do for these.
+/// Opens both scans. Balls about points need no kernel, so scans of different kernels may be mixed for them.
 fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2], CliError> {
     let opening = args.pair.opening(Some(threads), console);
     if args.meaning.thickened.is_some() {
@@ -363,17 +362,17 @@ fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2
         opening.open_both(kernel, args.pair.inputs())?
     };
     if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
-        let what = "--prove is for the euclidean kernel: by the geodesic one no separation is proven, and what would \
-                    check witnesses does not know it";
+        let what = "--prove needs the euclidean kernel: with the geodesic kernel no separation is proven; prepare the \
+                    scans with `--kernel euclidean`";
         return Err(CliError::Usage(what.into()));
     }
     if args.evidence == Some(EvidenceName::Certified) && scans[0].metric() == Metric::Geodesic {
-        console::warn("by the geodesic kernel no separation is proven: they are all estimated");
+        console::warn("with the geodesic kernel no separation is proven; all are estimated");
     }
     Ok(scans)
 }
 
-/// The one answer to the poses of the command line.
+/// Answers for the poses of the command line.
 fn answer_one(
     question: &Question,
     matrices: &[[f64; 16]; 2],
@@ -396,10 +395,10 @@ fn answer_one(
     question.tell(out, &asked, args)
 }
 
-/// Lines held at a time when several threads answer.
+/// Number of lines held at a time when several threads answer.
 const BATCH: usize = 1024;
 
-/// An answer a line, in order, up to the first hit if no more are wanted; holds no more than a batch.
+/// Answers line by line, in order, with --first up to the first contact. Holds at most a batch of lines.
 fn answer_all(
     question: &Question,
     poses: &mut PoseFile,

@@ -1,4 +1,4 @@
-//! `distance`: how far two scans are apart.
+//! `distance`: finds how far apart two scans are.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -74,19 +74,19 @@ pub struct DistanceArgs {
     pub quiet: bool,
 }
 
-/// What `distance` finds.
+/// The JSON output of `distance`.
 #[derive(Debug, Serialize)]
 struct DistanceReport {
     lower: f64,
     upper: f64,
     points: [[f64; 3]; 2],
-    /// Nothing is promised of where the scanned things are within it.
+    /// The accuracy of the scans where they are nearest, in world units.
     band: f64,
-    /// Of the upper bound.
+    /// The evidence of the upper bound.
     evidence: &'static str,
     source_a: u32,
     source_b: u32,
-    /// False where the budget ended the search, else not said.
+    /// `false` if the budget ended the search; absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     complete: Option<bool>,
     evaluations: u64,
@@ -95,7 +95,7 @@ struct DistanceReport {
     micros: f64,
 }
 
-/// What is the same for all queries.
+/// What all queries have in common.
 struct Question<'a> {
     scans: [&'a Scan; 2],
     plan: DistancePlan,
@@ -224,7 +224,7 @@ fn report(found: &Distance, micros: f64) -> DistanceReport {
     }
 }
 
-/// The distance, for people.
+/// Returns the distance as a sentence.
 fn sentence(found: &Distance, views: [&Placed<'_>; 2], semantics: Semantics) -> String {
     let unfinished = if found.complete { "" } else { " The budget ran out first." };
     if found.upper <= 0.0 {
@@ -238,14 +238,14 @@ fn sentence(found: &Distance, views: [&Placed<'_>; 2], semantics: Semantics) -> 
     match semantics {
         Semantics::Thickened(_) => format!("They are {bracket}.{unfinished}"),
         _ => format!(
-            "They are {bracket} ({}), give or take the local spacing of {}.{unfinished}",
+            "They are {bracket} ({}), within the local spacing of {}.{unfinished}",
             word(found.evidence),
             rough(found.band)
         ),
     }
 }
 
-/// How far `a` and `b` are apart within a budget, to be told beside a separation.
+/// Finds the distance of two scans within a budget, to be stated beside a separation.
 pub(crate) fn beside(views: [&Placed<'_>; 2], semantics: Semantics, budget: &Budget) -> Option<Distance> {
     let options = DistanceOptions::default().with_semantics(semantics);
     let plan = DistancePlan::new(&options, views[0].scan(), views[1].scan()).ok()?;

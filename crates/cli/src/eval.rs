@@ -38,7 +38,7 @@ pub struct EvalArgs {
 pub enum KernelName {
     /// Straight distances
     Euclidean,
-    /// Distances along the graph (needs a scan prepared with graph and close pairs)
+    /// Distances along the proximity graph; needs close pairs
     Geodesic,
 }
 

@@ -93,9 +93,9 @@ pub use slices::{
 pub use touch::TouchArgs;
 pub use units::UnitName;
 
-/// Whether, where and how near scanned things meet, straight from their points.
+/// Tells whether, where and how near scanned things meet, straight from their points.
 ///
-/// Exit status: 0 the command did its job, whatever the verdict; 1 it failed; 2 wrong usage.
+/// Exit status: 0 on success, whatever the verdict; 1 on failure; 2 on wrong usage.
 #[derive(Debug, Parser)]
 #[command(name = "nearmiss", version, propagate_version = true)]
 struct Cli {
@@ -134,56 +134,55 @@ Example, with a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} a
 #[derive(Debug, Clone, Subcommand)]
 #[non_exhaustive]
 pub enum Command {
-    /// Prepare a point cloud or mesh for queries, once, and save it
+    /// Prepare a point cloud or mesh for fast queries, and save it
     #[command(after_long_help = "Example:\n  nearmiss preprocess dragon.ply -o dragon.nm")]
     Preprocess(PreprocessArgs),
-    /// Convert points from one file format to another, in pieces, so that they need not fit into memory
+    /// Convert points from one file format to another; files may be larger than memory
     #[command(after_long_help = CONVERT_EXAMPLES)]
     Convert(ConvertArgs),
-    /// Say what a prepared scan holds
+    /// Describe a prepared scan: size, spacing, health, advice
     #[command(after_long_help = "Example:\n  nearmiss inspect dragon.nm --verify")]
     Inspect(InspectArgs),
-    /// The implicit function f of a scan at given points
+    /// Evaluate the implicit surface of a scan at given points
     #[command(
         after_long_help = "Example, with a line x y z a point in at.txt:\n  nearmiss eval dragon.nm --points at.txt"
     )]
     Eval(EvalArgs),
-    /// Whether, where and how near two scans meet
+    /// Test whether two scans touch, where, and how near they come
     #[command(after_long_help = COLLIDE_EXAMPLES)]
     Collide(CollideArgs),
-    /// All curves in which the surfaces of two scans cut each other
+    /// Find all curves in which two surfaces intersect
     #[command(after_long_help = "Example:\n  nearmiss curve a.nm b.nm --image curves.png -o curves.ply")]
     Curve(CurveArgs),
-    /// How far two scans are apart: a proven bound from below, and two points that show one from above
+    /// Find the distance between two scans, with a proven lower bound
     #[command(
         after_long_help = "Example:\n  nearmiss distance a.nm b.nm --pose-b \"1 0 0 2  0 1 0 0  0 0 1 0  0 0 0 1\""
     )]
     Distance(DistanceArgs),
-    /// Which spheres, capsules and boxes touch the points of a scan, and which point is nearest
+    /// Test spheres, capsules and boxes against the points of a scan
     #[command(after_long_help = TOUCH_EXAMPLE)]
     Touch(TouchArgs),
-    /// How many points to draw for an error rate, with `collide --method interpolation --flat`: measured, and
-    /// derived
+    /// Find how many random points an error rate needs, for `collide --method interpolation --flat`
     #[command(after_long_help = "Example:\n  nearmiss density dragon.nm --store")]
     Density(DensityArgs),
-    /// Make poses to ask `collide` about: a sweep, or poses about first contact
+    /// Generate test poses for `collide`: a sweep, or poses near contact
     #[command(after_long_help = POSES_EXAMPLES)]
     Poses(PosesArgs),
-    /// Look inside a prepared scan: points with normals, samples, node boxes, radii
+    /// Export what is inside a prepared scan: points with normals, graph, boxes
     #[command(
         after_long_help = "Example:\n  nearmiss export dragon.nm --points normals.ply --boxes level-6.obj --level 6"
     )]
     Export(ExportArgs),
-    /// Points on the surface of a mesh
+    /// Sample points on the surface of a mesh
     #[command(after_long_help = "Example:\n  nearmiss sample atrium.obj -o atrium.ply --spacing 0.02")]
     Sample(SampleArgs),
-    /// 2.5+D maps: a building as a stack of images, to walk an avatar through
+    /// Make and query slice maps: a building as a stack of images, to walk through
     #[command(subcommand)]
     Slices(SlicesCommand),
 }
 
 impl Command {
-    /// The files that are read: points, meshes or prepared scans.
+    /// Returns the input files: points, meshes or prepared scans.
     fn inputs(&self) -> Vec<&Path> {
         match self {
             Self::Preprocess(args) => vec![&args.input],
@@ -203,7 +202,7 @@ impl Command {
         }
     }
 
-    /// Does what is asked: results on standard output, the rest on standard error.
+    /// Runs the command. Results go to standard output, all else to standard error.
     #[must_use]
     pub fn run(&self) -> ExitCode {
         let done = match self {
@@ -257,7 +256,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-/// Whoever names the output of `preprocess` without `-o` is told of it.
+/// Suggests `-o` to users who name the output of `preprocess` without it.
 fn suggest_output(refused: &mut clap::Error) {
     let Some(ContextValue::String(extra)) = refused.get(ContextKind::InvalidArg) else { return };
     if refused.kind() == ErrorKind::UnknownArgument && !extra.starts_with('-') && extra.ends_with(".nm") {

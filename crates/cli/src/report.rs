@@ -1,4 +1,4 @@
-//! What scripts are told, the fields of the JSON lines, and the same in rows for people.
+//! Results: the fields of the JSON lines, and the same as text.
 
 use nearmiss::graph::ClosePairs;
 use nearmiss::{
@@ -151,12 +151,14 @@ impl ScanReport {
         let filtered = filtered.map_or(String::new(), |n| format!("; {n} removed by filters"));
         vec![
             format!(
-                "points     {} ({duplicate} duplicates and {not_finite} not finite dropped{filtered})",
-                self.points
+                "points     {} ({} and {} dropped{filtered})",
+                self.points,
+                count(duplicate as u64, "duplicate"),
+                count(not_finite as u64, "non-finite point"),
             ),
             format!("bounds     {min} to {max}"),
             format!(
-                "surface    {} kernel, sampling radius {}, bandwidth {}, horizon {}, least support {}",
+                "surface    {} kernel, sampling radius {}, bandwidth {}, support radius {}, minimum support {}",
                 self.kernel,
                 short(self.sampling_radius),
                 short(self.bandwidth),
@@ -396,7 +398,7 @@ impl AnswerReport {
             let ([x, y, z], [u, v, w]) = (place.point, place.normal);
             let depth = if place.gap < 0.0 { "deep" } else { "apart" };
             format!(
-                "  ({x}, {y}, {z}), {:.4e} {depth}, a gets out by ({u:.4}, {v:.4}, {w:.4})",
+                "  ({x}, {y}, {z}), {:.4e} {depth}, push a along ({u:.4}, {v:.4}, {w:.4})",
                 place.gap.abs()
             )
         })

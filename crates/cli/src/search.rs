@@ -1,4 +1,4 @@
-//! How `collide` searches: methods, orders, resolution.
+//! The search options of `collide`: methods, orders, resolution.
 
 use clap::{Args, ValueEnum};
 use nearmiss::{Brackets, CollideOptions, Interpolation, Method, Order, Refinement, Sampling, Scan, Surfels};
@@ -59,12 +59,11 @@ pub struct SearchArgs {
 /// How leaves are compared, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
-    /// By tangent discs of their points
+    /// By the tangent discs of their points
     Traversal,
-    /// By random test points (Klein & Zachmann 2004, section 5.3): slower, and not exhaustive
+    /// By random test points (Klein & Zachmann 2004, section 5.3); slower, not exhaustive
     Sampling,
-    /// By searches along paths of the proximity graph of a (Klein & Zachmann 2005): without hierarchy not
-    /// exhaustive
+    /// By searches along the proximity graph of a (Klein & Zachmann 2005); with --flat not exhaustive
     Interpolation,
 }
 

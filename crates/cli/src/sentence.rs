@@ -1,4 +1,4 @@
-//! Answers for people, with as many digits as the sampling carries.
+//! Answers as sentences, with as many digits as the sampling supports.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
@@ -11,8 +11,8 @@ use crate::digits::{percent, place, rough, rounded, rounded_down, short};
 use crate::picture::stored_index;
 use crate::report::word;
 
-/// The answer to a question with these `options`, as a sentence. Without a `distance` a separation
-/// is told without one: the proven gap of a verdict is no clearance.
+/// Returns the answer to a question with these `options`, as a sentence. It states a clearance only if
+/// `distance` is given: the proven gap of a verdict may be much smaller than the distance.
 pub(crate) fn sentence(
     answer: &Answer,
     views: [&Placed<'_>; 2],
@@ -45,7 +45,7 @@ pub(crate) fn sentence(
                     format!("They come within {margin} of each other at {at} ({}).", word(evidence))
                 }
                 (None, None) => format!(
-                    "They touch at {at} ({}); the measured points that show it are {apart} apart, and {}.",
+                    "They touch at {at} ({}). The nearest measured points are {apart} apart; {}.",
                     word(evidence),
                     untold(answer.band)
                 ),
@@ -70,7 +70,7 @@ pub(crate) fn sentence(
     }
 }
 
-/// The distance as a clause. The lower bound is rounded down, the upper one up.
+/// Returns the distance as a clause. The lower bound is rounded down, the upper one up.
 pub(crate) fn bracket(found: &Distance, unit: f64) -> String {
     if found.lower.to_bits() == found.upper.to_bits() {
         return format!("{} apart", short(found.upper));
@@ -84,24 +84,24 @@ pub(crate) fn bracket(found: &Distance, unit: f64) -> String {
     }
 }
 
-/// What a band means for a contact.
+/// Returns what the band means for a contact.
 pub(crate) fn untold(band: f64) -> String {
-    format!("no gap below {} can be told from contact", rough(band))
+    format!("gaps below {} cannot be distinguished from contact", rough(band))
 }
 
-/// Lengths are told to a hundredth of the lesser sampling radius.
+/// Returns the unit to which lengths are rounded: a hundredth of the smaller sampling radius.
 pub(crate) fn unit(views: [&Placed<'_>; 2]) -> f64 {
     let [ra, rb] = views.map(world_radius);
     ra.min(rb) / 100.0
 }
 
-/// The distance between the two points that show a contact.
+/// Returns the distance between the two measured points of a contact.
 fn points_apart(contact: &Contact, views: [&Placed<'_>; 2]) -> f64 {
     let at = |k: usize| Vector3::from(views[k].point(stored_index(views[k], contact.sources[k])));
     (at(1) - at(0)).norm()
 }
 
-/// A hint where two scans are further from each other than they are large, which is rarely meant.
+/// Returns a hint if two scans are further apart than they are large, which is rarely intended.
 pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
     if !answer.verdict.is_separated() {
         return None;
@@ -114,16 +114,16 @@ pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
         .then(|| format!("hint: their bounds are {} apart; are both in the same frame?", short(apart)))
 }
 
-/// Bounds, in the world, of the bounds of a scan.
+/// Returns the bounds of a posed scan, in world units.
 fn world_bounds(view: &Placed<'_>) -> Aabb {
     let frame = view.scan().frame();
     let to_stored = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - frame.origin[k]) / frame.scale);
     Aabb::of(view.scan().bounds().corners().map(|p| view.placed().apply(to_stored(p))))
 }
 
-/// Why there is no verdict, and what would help.
+/// Returns why there is no verdict, and what would help.
 fn doubt(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> String {
-    // Only surfaces are ever in doubt; balls stand for all other points of obstacles.
+    // Only surfaces leave doubts: in obstacles, all other points are balls.
     let first = match (options.method, options.metric) {
         (_, Some(Metric::Geodesic)) => None,
         (Method::Traversal, _) => Some("leave --surface-only out"),
@@ -137,7 +137,7 @@ fn doubt(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> S
     match reason {
         Reason::Budget { likelihood } => {
             format!(
-                "the budget ran out first, contact has a likelihood of about {likelihood:.2}; try a greater --budget or --work"
+                "the budget ran out (likelihood of contact {likelihood:.2}); try a larger --budget or --work"
             )
         }
         Reason::Undersampled => {
@@ -146,28 +146,27 @@ fn doubt(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> S
             let (name, view, share) = worse(sparse);
             let how = if lines(view) >= 0.5 * share { "sampled as lines" } else { "sampled too sparsely" };
             let ways = advice::for_sparse(view, radius, first);
-            let near = if share < 0.2 {
-                "they come near each other only where points say too little, and "
-            } else {
-                ""
-            };
+            let near =
+                if share < 0.2 { "they come close only where points are too sparse, and " } else { "" };
             format!("{near}{} of {name} is {how}; try {ways}", percent(share))
         }
         Reason::Ambiguous => {
             let (name, _, share) = worse(|v| v.scan().share(PointKind::Noisy));
             let ways = advice::for_ambiguous(views, radius, first);
             format!(
-                "where they meet the points do not look like one sheet, as do {} of {name}; try {ways}",
+                "where they meet, the points do not sample one sheet, like {} of {name}; try {ways}",
                 percent(share)
             )
         }
-        Reason::NoGraph => "the first scan has no graph to search along; prepare it with --graph".to_owned(),
-        Reason::Pose => "a pose is not finite or makes one object vanish beside the other".to_owned(),
-        _ => "for a reason that this program does not know; update it".to_owned(),
+        Reason::NoGraph => "the first scan has no graph; prepare it with --graph".to_owned(),
+        Reason::Pose => {
+            "a pose is not finite, or its scale makes one object vanish beside the other".to_owned()
+        }
+        _ => "the reason is unknown to this version; update nearmiss".to_owned(),
     }
 }
 
-/// A scan's sampling radius in the world.
+/// Returns a scan's sampling radius, in world units.
 pub(crate) fn world_radius(view: &Placed<'_>) -> f64 {
     view.scan().sampling_radius() * view.placed().scale() / view.scan().frame().scale
 }

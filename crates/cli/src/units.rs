@@ -1,4 +1,4 @@
-//! Units of two scans: what options say about them, and a question where sizes look wrong.
+//! Units of two scans: their options, and a warning where sizes look wrong.
 
 use std::sync::Once;
 

@@ -102,18 +102,18 @@ pub struct FormatChoice(
 /// A weight function, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum WeightName {
-    /// exp(−d²/h²), cut off where it is small
+    /// exp(−d²/h²), cut off where it is small (Klein & Zachmann 2004)
     Gaussian,
-    /// Wendland's C² function, zero from a finite distance on
+    /// Wendland's C² function, which has compact support
     Wendland,
 }
 
 /// What becomes of shortest paths, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum PathsName {
-    /// Kept in the file
+    /// Stored in the file
     Stored,
-    /// Found again when wanted
+    /// Rebuilt when needed
     Rebuilt,
 }
 

@@ -51,7 +51,7 @@ fn a_manifold_is_told_when_asked_for() {
         "--detail",
         "manifold",
     ]);
-    assert!(told.results.lines().filter(|line| line.contains("a gets out by")).count() == places.len());
+    assert!(told.results.lines().filter(|line| line.contains("push a along")).count() == places.len());
 }
 
 #[test]
@@ -178,12 +178,13 @@ fn people_read_sentences() {
     };
     let touch = say(&["--pose-b", &shift(1.2, 0.0, 0.0)]);
     assert!(
-        touch.starts_with("They touch at (0.6") && touch.contains(") (certified); the measured"),
+        touch.starts_with("They touch at (0.6")
+            && touch.contains(") (certified). The nearest measured points are "),
         "{touch}"
     );
     let after = |words: &str| touch.split(words).nth(1).and_then(|t| t.split(' ').next()).unwrap();
-    let apart: f64 = after("that show it are ").parse().unwrap();
-    let band: f64 = after("no gap below ").parse().unwrap();
+    let apart: f64 = after("measured points are ").parse().unwrap();
+    let band: f64 = after("gaps below ").parse().unwrap();
     assert!(apart < 0.16 && (0.08..0.25).contains(&band), "a spacing of 0.08: {touch}");
     let balls = say(&["--pose-b", &shift(2.05, 0.0, 0.0), "--thickened", "0.1"]);
     assert!(balls.starts_with("Balls of radius 0.1 overlap at (1.0"), "{balls}");

@@ -23,7 +23,7 @@ fn two_spheres_are_as_far_apart_as_they_are() {
 
     let people = place.ok(&asked[..5]).results;
     assert!(people.starts_with("They are between 0.9") && people.contains(" and 1.0"), "{people}");
-    assert!(people.contains(" apart (certified), give or take the local spacing of 0."), "{people}");
+    assert!(people.contains(" apart (certified), within the local spacing of 0."), "{people}");
     let band = told["band"].as_f64().unwrap();
     assert!((0.05..0.15).contains(&band), "a spacing of 0.05: {told}");
     let thick = [&asked[..], &["--thickened", "0.25"]].concat();
@@ -46,7 +46,7 @@ fn what_meets_is_at_distance_zero_and_lines_are_answered_in_order() {
     place.cloud("one.xyz", sphere(1.0), 0.05);
     let pose = shift(1.0, 0.0, 0.0);
     let asked = ["distance", "one.xyz", "one.xyz", "--pose-b", &pose];
-    assert!(place.ok(&asked).results.starts_with("They touch (certified); no gap below 0."));
+    assert!(place.ok(&asked).results.starts_with("They touch (certified); gaps below 0."));
     place.ok(&["poses", "one.xyz", "one.xyz", "--sweep", "--per-distance", "1", "-o", "poses.jsonl"]);
     let told = place.ok(&["distance", "one.xyz", "one.xyz", "--poses", "poses.jsonl", "--json"]).json();
     assert_eq!(told.len(), 13, "a line a pose");
