@@ -14,7 +14,7 @@ use crate::console::Console;
 use crate::error::CliError;
 use crate::input::Opening;
 use crate::kinds_picture::{colour, kinds_picture};
-use crate::{output, picture, report};
+use crate::{digits, output, picture, report};
 
 /// Options of `export`. At least one output is asked for.
 #[derive(Debug, Clone, Args)]
@@ -59,6 +59,9 @@ pub struct ExportArgs {
     /// Check prepared scans in full before use: checksums, and every number
     #[arg(long)]
     pub verify: bool,
+    /// Show no progress
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
@@ -69,12 +72,14 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
         picture::check_name(path)?;
     }
     for (i, path) in outputs.iter().enumerate().filter_map(|(i, p)| p.map(|p| (i, p))) {
-        output::check_apart(path, &[&args.file])?;
+        if !output::is_stdout(path) {
+            output::check_apart(path, &[&args.file])?;
+        }
         if outputs[..i].contains(&Some(path)) {
             return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
         }
     }
-    let opening = Opening::new(args.verify, Console::new(false));
+    let opening = Opening::new(args.verify, Console::new(args.quiet));
     let scan = if args.edges.is_some() || args.close_pairs.is_some() {
         opening.open_with_graph(&args.file)?
     } else {
@@ -87,23 +92,40 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
                     `--close-pairs`";
         return Err(CliError::Unfit { path: args.file.clone(), what: what.into() });
     }
+    let console = Console::new(args.quiet);
+    let wrote = |count: usize, what: &str, path: &Path| {
+        if !output::is_stdout(path) {
+            let counted = digits::count(count as u64, what);
+            console.note(format_args!("wrote {counted} to {}", path.display()));
+        }
+    };
     if let (Some(path), Some(graph)) = (&args.edges, scan.graph()) {
-        output::replace_plain(path, |out| edges(&scan, graph.points(), out))?;
+        output::replace_or_print(path, |out| edges(&scan, graph.points(), out))?;
+        let counts = graph.counts();
+        wrote(counts.edges + counts.virtual_edges, "edge", path);
     }
     if let (Some(path), Some(pairs)) = (&args.close_pairs, pairs) {
-        output::replace_plain(path, |out| close_pairs(&scan, pairs, out))?;
+        output::replace_or_print(path, |out| close_pairs(&scan, pairs, out))?;
+        wrote(pairs.pair_count(), "close pair", path);
     }
     if let Some(path) = &args.points {
         output::replace(path, |out| points(&scan, out).map_err(|e| refused(path, e)))?;
+        wrote(scan.len(), "point", path);
     }
+    let depths = report::depths(&scan);
+    let nodes = at_depth(&scan, &depths, args.level).count();
     if let (Some(path), Some(level)) = (&args.samples, args.level) {
         output::replace(path, |out| samples(&scan, level, out).map_err(|e| refused(path, e)))?;
+        let of_node = |node| scan.slices().samples(node).iter().count();
+        wrote(at_depth(&scan, &depths, Some(level)).map(of_node).sum(), "sample", path);
     }
     if let Some(path) = &args.boxes {
-        output::replace_plain(path, |out| boxes(&scan, args.level, out))?;
+        output::replace_or_print(path, |out| boxes(&scan, args.level, out))?;
+        wrote(nodes, "node", path);
     }
     if let Some(path) = &args.radii {
-        output::replace_plain(path, |out| radii(&scan, out))?;
+        output::replace_or_print(path, |out| radii(&scan, out))?;
+        wrote(scan.len(), "point", path);
     }
     if let Some(path) = &args.image {
         kinds_picture(&scan).save(path)?;
@@ -180,7 +202,7 @@ fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), WriteErr
 const EDGES: [[u64; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-fn boxes(scan: &Scan, level: Option<u32>, out: &mut impl Write) -> io::Result<()> {
+fn boxes(scan: &Scan, level: Option<u32>, out: &mut dyn Write) -> io::Result<()> {
     let depths = report::depths(scan);
     writeln!(out, "# node boxes, eight corners and twelve edges each")?;
     let mut first = 1_u64;
@@ -208,7 +230,7 @@ fn boxes(scan: &Scan, level: Option<u32>, out: &mut impl Write) -> io::Result<()
     Ok(())
 }
 
-fn radii(scan: &Scan, out: &mut impl Write) -> io::Result<()> {
+fn radii(scan: &Scan, out: &mut dyn Write) -> io::Result<()> {
     let scale = scan.frame().scale;
     writeln!(out, "i,r,h")?;
     for (i, &r) in scan.radii().iter().enumerate() {
@@ -218,7 +240,7 @@ fn radii(scan: &Scan, out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn edges(scan: &Scan, graph: &PointGraph, out: &mut impl Write) -> io::Result<()> {
+fn edges(scan: &Scan, graph: &PointGraph, out: &mut dyn Write) -> io::Result<()> {
     let scale = scan.frame().scale;
     let length = |[i, j]: [u32; 2]| {
         let [p, q] = [i, j].map(|i| Vector3::from(scan.positions()[i as usize].map(f64::from)));
@@ -233,7 +255,7 @@ fn edges(scan: &Scan, graph: &PointGraph, out: &mut impl Write) -> io::Result<()
     Ok(())
 }
 
-fn close_pairs(scan: &Scan, pairs: &ClosePairs, out: &mut impl Write) -> io::Result<()> {
+fn close_pairs(scan: &Scan, pairs: &ClosePairs, out: &mut dyn Write) -> io::Result<()> {
     let scale = scan.frame().scale;
     writeln!(out, "i,j,distance")?;
     for i in 0..pairs.len() {

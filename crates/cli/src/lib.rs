@@ -121,10 +121,9 @@ Example:
   nearmiss collide a.nm b.nm --poses near.jsonl --json
 
 A line of the output is {\"a\":[16 numbers],\"b\":[16 numbers],\"d\":d}, with \"offset\" too for --near. The \
-matrices, row-major, object to world, scale each scan so that the longest side of its bounding box is 2, and move \
-that box's centre, of a to the origin and of b to the distance d from there. Lengths of the answers are in that \
-world. offset is the shift along the line between the centres from where the two first touch: positive apart, \
-negative further in.";
+matrices are row-major and map an object to the world. a stays where it is; d is the distance between the centres \
+of the bounding boxes, in the units of the files. offset is the shift along the line between the centres from first \
+contact: positive apart, negative further in.";
 
 const TOUCH_EXAMPLE: &str = "\
 Example, with a line {\"sphere\":{\"centre\":[0.02,0.1,0.04],\"radius\":0.01}} a shape in robot.jsonl:

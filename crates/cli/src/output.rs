@@ -9,9 +9,12 @@ use nearmiss::store::replace_file;
 
 use crate::error::CliError;
 
-/// Whether a file could be put at `path`, asked before the work that would fill it.
+/// Checks that a file can be put at `path`, before the work that would fill it.
 pub(crate) fn check(path: &Path) -> Result<(), CliError> {
     let unfit = |what: &str| Err(CliError::Unfit { path: path.to_owned(), what: what.to_owned() });
+    if is_stdout(path) {
+        return unfit("cannot be written to standard output; name a file");
+    }
     match fs::metadata(path) {
         Ok(there) if there.is_dir() => return unfit("is a folder; name a file to write to"),
         Ok(there) if !there.is_file() => {
@@ -87,6 +90,23 @@ pub(crate) fn replace_plain(
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> io::Result<()>,
 ) -> Result<(), CliError> {
     replace(path, |out| write(out).map_err(CliError::writing(path)))
+}
+
+/// As [`replace_plain`], or writes to standard output for `-`.
+pub(crate) fn replace_or_print(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), CliError> {
+    if !is_stdout(path) {
+        return replace_plain(path, |out| write(out));
+    }
+    let mut out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
+    write(&mut out).and_then(|()| out.flush()).map_err(CliError::Stdout)
+}
+
+/// Returns `true` for `-`, which stands for standard output.
+pub(crate) fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
 }
 
 fn folder(path: &Path) -> PathBuf {

@@ -1,10 +1,10 @@
-//! `poses`: a sweep over distances, or poses about first contact.
+//! `poses`: generates a sweep over distances, or poses near first contact.
 //!
-//! Both scans are scaled so that the longest side of their bounding box is 2, and centred. a stays, b is
-//! turned at random and lies at a distance d from a in a random direction.
+//! a stays, and b is rotated at random about its centre and placed at a distance d from the centre of a, in a
+//! random direction. Poses are made in a world in which the longest side of a is 2, and scaled back unless
+//! `--normalise` is given; that option also scales b to this size, as in Klein & Zachmann 2004, section 6.
 
 use std::f64::consts::TAU;
-use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -23,7 +23,7 @@ mod approach;
 
 use approach::Approach;
 
-/// Options of `poses`. Either a sweep or poses near contact are asked for.
+/// Options of `poses`: either a sweep or poses near contact.
 #[derive(Debug, Clone, Args)]
 #[command(group = clap::ArgGroup::new("kind").required(true).args(["sweep", "near"]))]
 pub struct PosesArgs {
@@ -31,14 +31,21 @@ pub struct PosesArgs {
     pub a: PathBuf,
     /// Scan that is turned and moved
     pub b: PathBuf,
-    /// Distances d of the centres from 0 to 3 in steps of 0.25, both scans being scaled to a longest side of
-    /// 2, with random rotations and directions at each
+    /// Thirteen distances of the centres, from 0 to 1.5 times the longest side of a, with random rotations and
+    /// directions
     #[arg(long)]
     pub sweep: bool,
-    /// Shifts by up to 10 r from first touch, half of them apart. They touch at a least point distance of
-    /// r/2; r is the greater sampling radius. Found by bisection on that distance
+    /// Shifts by up to 10 r from first contact, half of them apart
+    ///
+    /// r is the larger sampling radius. Two scans are in contact here when two of their points are r/2 apart;
+    /// where that happens is found by bisection, not by `collide`.
     #[arg(long)]
     pub near: bool,
+    /// Scale both scans to a longest side of 2, and centre them
+    ///
+    /// Without it the poses keep the units of the files: a stays where it is, and b keeps its size.
+    #[arg(long)]
+    pub normalise: bool,
     /// Number of poses at each distance (--sweep) or in all (--near)
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub per_distance: u32,
@@ -67,40 +74,79 @@ const STEP: f64 = 0.25;
 struct Line {
     a: [f64; 16],
     b: [f64; 16],
-    /// Between the centres.
+    /// The distance of the centres.
     d: f64,
-    /// Shift from first touch, positive apart.
+    /// The shift from first contact, positive apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     offset: Option<f64>,
 }
 
+/// The world in which poses are made, and the way back to that of the file.
+#[derive(Debug)]
+struct Stage {
+    /// The poses of a, and of b before it is turned and moved.
+    bases: [Pose; 2],
+    /// Half the longest side of b in this world; that of a is 1.
+    size_of_b: f64,
+    /// From this world to that of the file; `None` if they are the same.
+    back: Option<Pose>,
+}
+
+impl Stage {
+    /// Fails for scans without extent.
+    fn new(args: &PosesArgs, [a, b]: [&Scan; 2]) -> Result<Self, CliError> {
+        let base = |path: &PathBuf, scan| {
+            let what = "all points are at one place, so the scan has no size; poses need one with an extent";
+            normalised(scan).ok_or_else(|| CliError::Unfit { path: path.clone(), what: what.into() })
+        };
+        let [base_a, base_b] = [base(&args.a, a)?, base(&args.b, b)?];
+        if args.normalise {
+            return Ok(Self { bases: [base_a, base_b], size_of_b: 1.0, back: None });
+        }
+        let size_of_b = base_a.scale() / base_b.scale();
+        let resized = Pose::IDENTITY.with_scale(size_of_b).after(&base_b);
+        Ok(Self { bases: [base_a, resized], size_of_b, back: Some(base_a.inverse()) })
+    }
+
+    /// Returns the line for a pose of b and the lengths that go with it.
+    fn line(&self, b: &Pose, d: f64, offset: Option<f64>) -> Line {
+        match &self.back {
+            None => Line { a: self.bases[0].to_row_major(), b: b.to_row_major(), d, offset },
+            Some(back) => Line {
+                a: Pose::IDENTITY.to_row_major(),
+                b: back.after(b).to_row_major(),
+                d: d * back.scale(),
+                offset: offset.map(|offset| offset * back.scale()),
+            },
+        }
+    }
+}
+
 pub(crate) fn run(args: &PosesArgs) -> Result<(), CliError> {
-    output::check_apart(&args.output, &[&args.a, &args.b])?;
+    if !output::is_stdout(&args.output) {
+        output::check_apart(&args.output, &[&args.a, &args.b])?;
+    }
     let console = Console::new(args.quiet);
     let [a, b] = Opening::new(args.verify, console).open_both(None, [&args.a, &args.b])?;
-    let [base_a, base_b] = [(&args.a, &a), (&args.b, &b)].map(|(path, scan)| {
-        let what = || "all points lie in one place, so it cannot be scaled to a size of 2".into();
-        normalised(scan).ok_or_else(|| CliError::Unfit { path: path.clone(), what: what() })
-    });
-    let bases = [base_a?, base_b?];
+    let stage = Stage::new(args, [&a, &b])?;
     if args.near {
-        let lines = near(args, [&a, &b], bases, console)?;
+        let lines = near(args, [&a, &b], &stage, console)?;
         write(args, lines.into_iter())
     } else {
         let count = u64::from(DISTANCES) * u64::from(args.per_distance);
         let bar = console.steps("making poses", count);
-        let poses = (0..).zip(sweep(args.per_distance, args.seed, &bases[1]));
+        let poses = (0..).zip(sweep(args.per_distance, args.seed, &stage.bases[1]));
         let lines = poses.map(|(i, pose)| {
             bar.advance(1);
             let d = distance(i, args.per_distance);
-            Line { a: bases[0].to_row_major(), b: pose.to_row_major(), d, offset: None }
+            stage.line(&pose, d, None)
         });
         write(args, lines)
     }
 }
 
 fn write(args: &PosesArgs, mut lines: impl Iterator<Item = Line>) -> Result<(), CliError> {
-    output::replace_plain(&args.output, |out| {
+    output::replace_or_print(&args.output, |out| {
         lines.try_for_each(|line| {
             serde_json::to_writer(&mut *out, &line)?;
             writeln!(out)
@@ -163,15 +209,13 @@ const FARTHEST: f64 = 10.0;
 /// Turns and directions that are tried before it is given up that two scans touch at all.
 const TRIES: usize = 200;
 
-fn near(
-    args: &PosesArgs,
-    scans: [&Scan; 2],
-    bases: [Pose; 2],
-    console: Console,
-) -> Result<Vec<Line>, CliError> {
+fn near(args: &PosesArgs, scans: [&Scan; 2], stage: &Stage, console: Console) -> Result<Vec<Line>, CliError> {
+    let bases = &stage.bases;
     let [ra, rb] = [0, 1].map(|k| scans[k].sampling_radius() * bases[k].scale());
     let radius = ra.max(rb);
-    let approach = Approach::new(scans, &bases[0], 0.5 * radius, 0.02 * radius);
+    // Each scan is within √3 times half its longest side of its centre.
+    let far = 1.75 * (1.0 + stage.size_of_b);
+    let approach = Approach::new(scans, &bases[0], 0.5 * radius, 0.02 * radius, far);
     let bar: Bar = console.steps("making poses", u64::from(args.per_distance));
     let line = |i: u32| {
         let mut rng = rng(args.seed, u64::from(i));
@@ -181,21 +225,15 @@ fn near(
             let shift: f64 = rng.random_range(0.0..FARTHEST) * radius;
             let offset = if i.is_multiple_of(2) { shift } else { -shift };
             let d = touch + offset;
-            Some(Line {
-                a: bases[0].to_row_major(),
-                b: at(&turn, direction, d, &bases[1]).to_row_major(),
-                d,
-                offset: Some(offset),
-            })
+            Some(stage.line(&at(&turn, direction, d, &bases[1]), d, Some(offset)))
         });
         bar.advance(1);
         line.ok_or_else(|| CliError::Unfit {
             path: args.b.clone(),
             what: format!(
-                "it slid through {} in {TRIES} random directions without a point distance of {:.2e} or less (half \
-                 a sampling radius, at a size of 2); are these scans surfaces?",
-                args.a.display(),
-                0.5 * radius
+                "expected contact with {}, got none in {TRIES} random directions; check that both scans sample \
+                 surfaces, and are in the same units",
+                args.a.display()
             ),
         })
     };

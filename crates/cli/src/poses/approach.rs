@@ -8,9 +8,6 @@ use nearmiss::{Pose, Scan};
 /// How many balls a descent may have open: one sibling a level, and no tree of 2³² points is deeper.
 const ROOM: usize = 64;
 
-/// From so far two scans of size 2 cannot touch: either lies within √3 of its centre.
-const FAR: f64 = 3.5;
-
 /// Bisections of the last step: enough for a thousandth of it.
 const HALVINGS: u32 = 10;
 
@@ -28,6 +25,8 @@ pub(crate) struct Approach<'a> {
     touch: f64,
     /// Least step.
     step: f64,
+    /// Distance of the centres from which on the scans cannot touch.
+    far: f64,
 }
 
 /// The stored frame of a scan in the frame of its input.
@@ -38,7 +37,7 @@ fn stored(scan: &Scan) -> Pose {
 impl<'a> Approach<'a> {
     /// `base` is a's pose; touching means a least point distance of `touch`, and `step` is a length that does
     /// not matter.
-    pub(super) fn new([a, b]: [&'a Scan; 2], base: &Pose, touch: f64, step: f64) -> Self {
+    pub(super) fn new([a, b]: [&'a Scan; 2], base: &Pose, touch: f64, step: f64, far: f64) -> Self {
         Self {
             // Only points that are not finite are refused, and a scan has none.
             tree: ImmutableKdTree::new_from_slice(a.positions()).ok(),
@@ -47,6 +46,7 @@ impl<'a> Approach<'a> {
             to_a: base.after(&stored(a)).inverse(),
             touch,
             step,
+            far,
         }
     }
 
@@ -57,7 +57,7 @@ impl<'a> Approach<'a> {
     /// touch. The last step is bisected.
     pub(super) fn first_touch(&self, pose: impl Fn(f64) -> Pose) -> Option<f64> {
         let apart = |d: f64| self.least_distance(&pose(d)) - self.touch;
-        let mut far = FAR;
+        let mut far = self.far;
         let mut gap = apart(far);
         while gap > 0.0 {
             let near = far - gap.max(self.step);

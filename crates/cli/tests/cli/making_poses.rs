@@ -18,7 +18,7 @@ fn lines(place: &Place, file: &str) -> Vec<serde_json::Value> {
 #[test]
 fn a_sweep_has_thirteen_distances_of_normalised_scans() {
     let place = dragon();
-    place.ok(&["poses", "d.nm", "d.nm", "--sweep", "--per-distance", "20", "-o", "s.jsonl"]);
+    place.ok(&["poses", "d.nm", "d.nm", "--sweep", "--per-distance", "20", "--normalise", "-o", "s.jsonl"]);
     let bounds = place.ok(&["inspect", "d.nm", "--json"]).json()[0]["bounds"].clone();
     let [min, max] = [numbers(&bounds[0]), numbers(&bounds[1])];
     let longest = (0..3).map(|k| max[k] - min[k]).fold(0.0, f64::max);
@@ -48,6 +48,47 @@ fn a_sweep_has_thirteen_distances_of_normalised_scans() {
     };
     assert!(hits(0..20) >= 18, "at one centre they meet");
     assert_eq!(hits(240..260), 0, "at distance 3 they do not");
+}
+
+#[test]
+fn poses_keep_the_units_of_the_files() {
+    let place = dragon();
+    let half: String = std::fs::read_to_string({
+        place.ok(&["convert", name(&dragon_path(Dragon::Points5k)), "half.xyz"]);
+        place.path("half.xyz")
+    })
+    .unwrap();
+    let halved = |line: &str| {
+        let row = numbers(&serde_json::json!(
+            line.split_whitespace().take(3).map(|x| x.parse::<f64>().unwrap() / 2.0).collect::<Vec<_>>()
+        ));
+        format!("{} {} {}\n", row[0], row[1], row[2])
+    };
+    let rows = half.lines().filter(|line| line.starts_with(|c: char| c == '-' || c.is_ascii_digit()));
+    place.write("half.xyz", rows.map(halved).collect::<String>());
+    for kind in ["--sweep", "--near"] {
+        let make = |extra: &[&str]| {
+            let args =
+                [&["poses", "d.nm", "half.xyz", kind, "--per-distance", "6", "-o", "-"], extra].concat();
+            place.ok(&args).json()
+        };
+        let kept = make(&[]);
+        let identity = numbers(&serde_json::json!(nearmiss::Pose::IDENTITY.to_row_major()));
+        for line in &kept {
+            assert_eq!(numbers(&line["a"]), identity, "a stays");
+            let m = numbers(&line["b"]);
+            let row: f64 = m[..3].iter().map(|x| x * x).sum();
+            assert!((row - 1.0).abs() < 1e-12, "b keeps its size: {row}");
+        }
+        // Of one size, both conventions ask the same questions.
+        let ask = |file: &str, extra: &[&str]| {
+            let args = ["poses", "d.nm", "d.nm", kind, "--per-distance", "6", "-o", file];
+            place.ok(&[&args[..], extra].concat());
+            let answers = place.ok(&["collide", "d.nm", "d.nm", "--poses", file, "--json"]).json();
+            answers.iter().map(|answer| answer["verdict"].clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(ask("units.jsonl", &[]), ask("same.jsonl", &["--normalise"]), "{kind}");
+    }
 }
 
 #[test]
