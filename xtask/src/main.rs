@@ -31,42 +31,93 @@ mod tidy;
 
 use std::process::ExitCode;
 
-const USAGE: &str = "\
-usage: cargo xtask COMMAND
+/// A chore of the repository: name, arguments, description.
+type Chore = (&'static str, &'static str, &'static str);
 
-of the repository
-  demo           prepare a real scan, sweep two copies past each other; a table and a picture
-  test [CHECK…]  every check, or: tidy, format, tests, verify, lints, docs, features, packages, determinism
-  tidy, ci       the first of them; all of them
-  geodesic [SCAN] [--from POINT] [-o FILE.png]
-                 a picture of its graph, coloured by the distance from a point along it
-  inventory [COMMIT]
-                 the size of the libraries: files, lines, circles, public items, descents; beside that of a commit
-  level [SCAN] [--depth L]… [-o FILE.png]
-                 a picture of levels of its hierarchy: samples and the balls that cover their nodes
-  check-proof PROOF A B [--poses F]
-                 whether what `collide A B --prove PROOF` wrote holds, by means of its own
-  field SCAN [--noise 0.1] -o OUT.png
-                 a picture of f over a slice of a noisy scan; --table counts where its normal flips
-  tables -o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--quick]
-                 Table 1 and Figs 8 to 12 of Klein & Zachmann 2004, their paper of 2005, dos Anjos et al. 2012, measured
-  readers        install readers of other people, whose points a test then compares with ours
-  fuzz [TARGET] [SECONDS]
-                 inputs made up by a fuzzer: container, slices, lines, ply, pcd, obj, xyz, las, e57, npy, stl, off, gltf; 60 s each
+const CHORES: [Chore; 12] = [
+    (
+        "demo",
+        "",
+        "Preprocess a real scan and sweep two copies past each other; prints a table, draws a picture",
+    ),
+    (
+        "test",
+        "[CHECK…]",
+        "Run all checks, or these: tidy, format, tests, verify, lints, docs, features, packages, determinism",
+    ),
+    ("tidy", "", "Run the check `tidy`"),
+    ("ci", "", "Run all checks"),
+    (
+        "geodesic",
+        "[SCAN] [--from POINT] [-o FILE.png]",
+        "Draw the graph of a scan, coloured by the distance along it from a point",
+    ),
+    (
+        "inventory",
+        "[COMMIT]",
+        "Count files, lines, circles, public items and loops of the libraries, beside those of a commit",
+    ),
+    (
+        "level",
+        "[SCAN] [--depth L]… [-o FILE.png]",
+        "Draw levels of the hierarchy of a scan: samples, and the balls that cover their nodes",
+    ),
+    ("check-proof", "PROOF A B [--poses F]", "Check the output of `collide A B --prove PROOF` independently"),
+    (
+        "field",
+        "SCAN [--noise 0.1] [--table] -o OUT.png",
+        "Draw f over a slice of a noisy scan; --table counts where its normal flips",
+    ),
+    (
+        "tables",
+        "-o FOLDER [--data FOLDER] [--2005] [--2012] [--only NUMBER] [--quick]",
+        "Measure the tables and figures of Klein & Zachmann 2004 and 2005 and of Anjos et al. 2012",
+    ),
+    ("readers", "", "Install independent readers, whose points a test compares with ours"),
+    (
+        "fuzz",
+        "[TARGET] [SECONDS]",
+        "Fuzz a target, or all of them, 60 seconds each by default: container, slices, lines, ply, pcd, obj, xyz, \
+         las, e57, npy, stl, off, gltf",
+    ),
+];
 
-of nearmiss (`cargo xtask COMMAND --help` says more)
-  preprocess, convert, inspect, eval, collide, curve, poses, export, sample, slices";
+fn usage() -> String {
+    let mut text = "Usage: cargo xtask COMMAND\n\nCommands of nearmiss:\n".to_owned();
+    let mut row = |name: &str, about: &str| {
+        text += &format!("  {name:<12} {about}\n");
+    };
+    for (name, about) in nearmiss_cli::commands() {
+        row(&name, &about);
+    }
+    text += "\nChores of the repository:\n";
+    for (name, _, about) in CHORES {
+        text += &format!("  {name:<12} {about}\n");
+    }
+    text + "\n`cargo xtask COMMAND --help` explains a command."
+}
+
+/// Returns the help of a chore, or `None` if it was not asked for.
+fn help(words: &[&str]) -> Option<String> {
+    let [name, .., "--help" | "-h"] = words else { return None };
+    let (name, arguments, about) = CHORES.iter().find(|(chore, ..)| chore == name)?;
+    Some(format!("{about}\n\nUsage: cargo xtask {name} {arguments}"))
+}
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = args.iter().map(String::as_str).collect();
+    if let Some(help) = help(&words) {
+        println!("{help}");
+        return ExitCode::SUCCESS;
+    }
     let outcome = match words.as_slice() {
         [] => {
-            eprintln!("{USAGE}");
+            eprintln!("{}", usage());
             return ExitCode::from(2);
         }
         ["--help" | "-h" | "help"] => {
-            println!("{USAGE}");
+            println!("{}", usage());
             Ok(())
         }
         ["demo"] => demo::run(),

@@ -108,7 +108,7 @@ pub enum CliError {
         path: PathBuf,
     },
     /// A file could not be read or written.
-    #[error("{}: cannot {verb} ({cause}); {remedy}", path.display())]
+    #[error("{}: cannot {verb}: {}; {remedy}", path.display(), plain(cause))]
     File {
         /// The file.
         path: PathBuf,
@@ -131,7 +131,7 @@ pub enum CliError {
     #[error("cannot start {0} threads; ask for fewer with --threads")]
     Threads(usize),
     /// Standard output is gone.
-    #[error("cannot write to standard output: {0}")]
+    #[error("cannot write to standard output: {}", plain(.0))]
     Stdout(io::Error),
 }
 
@@ -177,6 +177,14 @@ impl CliError {
     pub fn is_silent(&self) -> bool {
         self.status() == 0
     }
+}
+
+/// Returns what the operating system said, in lower case and without its number.
+pub(crate) fn plain(cause: &io::Error) -> String {
+    let text = cause.to_string();
+    let text = text.split(" (os error ").next().unwrap_or_default();
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
 }
 
 /// What the container says names the file already.

@@ -223,8 +223,17 @@ impl Command {
     }
 }
 
-/// Runs a command line, the program's own name first, as in [`std::env::args_os`]: help and errors call it
-/// so.
+/// Returns the names of all commands, with a line about each.
+pub fn commands() -> impl Iterator<Item = (String, String)> {
+    let commands: Vec<_> = Cli::command().get_subcommands().cloned().collect();
+    commands.into_iter().map(|command| {
+        let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+        (command.get_name().to_owned(), about)
+    })
+}
+
+/// Runs a command line that starts with the name of the program, as [`std::env::args_os`] does. Help and
+/// errors use that name.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     bus::tell_of_lost_files();
     let args: Vec<OsString> = args.into_iter().collect();

@@ -1,9 +1,11 @@
-//! `touch`: which of many shapes touch the points of a scan.
+//! `touch`: tests many shapes against the points of a scan.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nearmiss::{Aabb, NearestPoint, Placed, Pose, Shape, ShapeIndex};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::console::{Console, Results, now};
@@ -114,6 +116,9 @@ fn sentence(touches: bool, nearest: &NearestPoint, unit: f64) -> String {
 /// What the messages show.
 const SHAPE_LINE: &str = r#"a line is {"sphere":{"centre":[x,y,z],"radius":r}}, {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}} or {"box":{"pose":[16 numbers],"half":[x,y,z]}}"#;
 
+/// The names of the shapes.
+const SHAPES: [&str; 3] = ["sphere", "capsule", "box"];
+
 /// A line of a file of shapes: one of them. Other fields are ignored.
 #[derive(Debug, Deserialize)]
 #[serde(expecting = "an object")]
@@ -121,10 +126,27 @@ struct ShapeLine {
     sphere: Option<SphereLine>,
     capsule: Option<CapsuleLine>,
     r#box: Option<BoxLine>,
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
+}
+
+impl ShapeLine {
+    /// Returns what is wrong with a line that has no shape, or several.
+    fn fault(&self) -> String {
+        let count = [self.sphere.is_some(), self.capsule.is_some(), self.r#box.is_some()];
+        match (count.iter().filter(|is_there| **is_there).count(), self.others.keys().next()) {
+            (0, Some(name)) => {
+                let name: String = name.chars().take(40).flat_map(char::escape_debug).collect();
+                format!("unknown shape `{name}`; known: {}", SHAPES.join(", "))
+            }
+            (count, _) => format!("expected one shape, got {count}; {SHAPE_LINE}"),
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]
 struct SphereLine {
+    #[serde(alias = "center")]
     centre: [f64; 3],
     radius: f64,
 }
@@ -157,7 +179,7 @@ impl ShapeFile {
     fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
         let line = self.lines.next_filled()?;
         if line.is_none() && self.is_empty {
-            return Err(self.lines.unfit(format!("holds no shapes; {SHAPE_LINE}")));
+            return Err(self.lines.unfit(format!("expected shapes, got none; {SHAPE_LINE}")));
         }
         self.is_empty = false;
         Ok(line)
@@ -172,16 +194,16 @@ impl ShapeFile {
             self.lines.fault_on(number, format!("column {}: {what}; {SHAPE_LINE}", e.column()))
         })?;
         let shape = match line {
-            ShapeLine { sphere: Some(SphereLine { centre, radius }), capsule: None, r#box: None } => {
+            ShapeLine { sphere: Some(SphereLine { centre, radius }), capsule: None, r#box: None, .. } => {
                 positive("radius", radius).map(|radius| Shape::Sphere { centre, radius })
             }
-            ShapeLine { sphere: None, capsule: Some(CapsuleLine { ends, radius }), r#box: None } => {
+            ShapeLine { sphere: None, capsule: Some(CapsuleLine { ends, radius }), r#box: None, .. } => {
                 positive("radius", radius).map(|radius| Shape::Capsule { ends, radius })
             }
-            ShapeLine { sphere: None, capsule: None, r#box: Some(BoxLine { pose, half }) } => {
+            ShapeLine { sphere: None, capsule: None, r#box: Some(BoxLine { pose, half }), .. } => {
                 solid(&pose, half, r)
             }
-            _ => Err(format!("holds not one shape; {SHAPE_LINE}")),
+            line => Err(line.fault()),
         };
         shape.map_err(|what| self.lines.fault_on(number, what))
     }
@@ -196,5 +218,9 @@ fn solid(pose: &[f64; 16], half: [f64; 3], r: f64) -> Result<Shape, String> {
 }
 
 fn positive(name: &str, length: f64) -> Result<f64, String> {
-    if length >= 0.0 { Ok(length) } else { Err(format!("`{name}` is {}; give zero or more", short(length))) }
+    if length >= 0.0 {
+        Ok(length)
+    } else {
+        Err(format!("`{name}` must be at least 0, got {}", short(length)))
+    }
 }
