@@ -46,7 +46,7 @@ fn what_is_no_shape_is_refused_with_its_line() {
     place.cloud("ball.xyz", sphere(1.0), 0.2);
     let good = r#"{"sphere":{"centre":[3,0,2],"radius":0.5}}"#;
     for (line, words) in [
-        (r#"{"sphere":{"centre":[0,0,0],"radius":-1}}"#, &["line 2", "radius", "zero or more"][..]),
+        (r#"{"sphere":{"centre":[0,0,0],"radius":-1}}"#, &["line 2", "radius", "must be at least 0"][..]),
         (r#"{"sphere":{"centre":[0,0],"radius":1}}"#, &["line 2", "column"]),
         (r#"{"sphere":{"centre":[0,0,0]}}"#, &["line 2", "radius"]),
         (r#"{"cone":{}}"#, &["line 2", "not one shape", "capsule"]),
