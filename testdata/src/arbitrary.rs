@@ -1,30 +1,30 @@
-//! Seeded generators of clouds and poses that property tests share: ordinary ones, and such as break trees,
-//! grids and fits.
+//! Seeded generators of clouds and poses for property tests: ordinary ones, and ones that break
+//! trees, grids and fits.
 
 use nearmiss_geometry::Pose;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// What is peculiar about a cloud of [`cloud`].
+/// The peculiarity of a cloud of [`cloud`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CloudKind {
-    /// Nothing: uniform in a cube of side 2.
+    /// No peculiarity: uniform in a cube of side 2.
     Random,
-    /// Nine tenths of the points in a tenth of each axis: density differs about a thousandfold.
+    /// Nine tenths of the points in a tenth of each axis: the density differs about a thousandfold.
     Clustered,
     /// A lattice without noise: many equal distances.
     Lattice,
     /// Rings of a spinning scanner on a floor: dense along, far apart across.
     Rings,
-    /// All on one line, which is no axis.
+    /// All on one line, not parallel to an axis.
     Collinear,
-    /// All on one plane, which is no axis plane, to rounding.
+    /// All on one plane, not parallel to two axes, up to rounding.
     Coplanar,
     /// All within a millionth of the distance from the origin.
     OneVoxel,
     /// Only three different values of x.
     EqualX,
-    /// Two clusters a million times their size apart.
+    /// Two clusters, a million times their size apart.
     FarClusters,
     /// Every point several times, interleaved.
     Duplicates,
@@ -34,7 +34,7 @@ pub enum CloudKind {
     Tiny,
     /// A dense flat patch, and one point at a tenth of its size above it.
     Outlier,
-    /// A noisy sphere of radius 1: what the surface is made for.
+    /// A noisy sphere of radius 1, the typical input of the implicit surface.
     Sphere,
 }
 
@@ -58,13 +58,13 @@ impl CloudKind {
     ];
 }
 
-/// The generator that this crate uses everywhere; its stream is the same on every platform.
+/// Returns the random generator of this crate; its stream is the same on every platform.
 #[must_use]
 pub fn rng(seed: u64) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(seed)
 }
 
-/// `n` finite points of a kind; the same for the same seed.
+/// Returns `n` finite points of a kind; the same for the same seed.
 #[must_use]
 pub fn cloud(kind: CloudKind, n: u32, seed: u64) -> Vec<[f64; 3]> {
     let rng = &mut rng(seed);
@@ -123,19 +123,20 @@ fn cube<R: Rng>(rng: &mut R, n: u32, half: f64) -> Vec<[f64; 3]> {
     (0..n).map(|_| point_in(rng, half)).collect()
 }
 
-/// A point of the cube of half side `half` about the origin.
+/// Returns a point of the cube of half side `half` about the origin.
 pub fn point_in<R: Rng>(rng: &mut R, half: f64) -> [f64; 3] {
     [0; 3].map(|_| half * rng.random_range(-1.0..1.0))
 }
 
-/// The first `n` nodes of the least cubic lattice that has as many, a quarter apart.
+/// Returns the first `n` nodes of the smallest cubic lattice that has as many, a quarter apart.
 fn lattice(n: u32) -> Vec<[f64; 3]> {
     let side = (1..).find(|s: &u32| s.saturating_pow(3) >= n).unwrap_or(1);
     let nodes = (0..side).flat_map(|x| (0..side).flat_map(move |y| (0..side).map(move |z| [x, y, z])));
     nodes.map(|node| node.map(|k| 0.25 * f64::from(k))).zip(0..n).map(|(p, _)| p).collect()
 }
 
-/// A return of a scanner 1.8 above a flat floor with sixteen beams, 2° to 17° below the horizon.
+/// Returns a return of a scanner 1.8 above a flat floor with sixteen beams, 2° to 17° below the
+/// horizon.
 fn ring_point<R: Rng>(rng: &mut R, i: u32) -> [f64; 3] {
     let down = f64::from(2 + i % 16).to_radians();
     let reach = 1.8 / down.tan() + 0.01 * gaussian(rng);
@@ -143,7 +144,7 @@ fn ring_point<R: Rng>(rng: &mut R, i: u32) -> [f64; 3] {
     [reach * c, reach * s, 0.01 * gaussian(rng)]
 }
 
-/// A direction, evenly spread over the sphere.
+/// Returns a uniformly distributed direction.
 pub fn unit_vector<R: Rng>(rng: &mut R) -> [f64; 3] {
     // Cylinders of equal height cut off equal areas of the sphere (Archimedes).
     let z: f64 = rng.random_range(-1.0..1.0);
@@ -152,8 +153,8 @@ pub fn unit_vector<R: Rng>(rng: &mut R) -> [f64; 3] {
     [flat * c, flat * s, z]
 }
 
-/// A normally distributed number, mean 0, variance 1 (Marsaglia's polar method; its second number is
-/// dropped).
+/// Returns a normally distributed number, mean 0, variance 1 (Marsaglia's polar method; its second
+/// number is dropped).
 pub fn gaussian<R: Rng>(rng: &mut R) -> f64 {
     loop {
         let (u, v): (f64, f64) = (rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
@@ -164,7 +165,8 @@ pub fn gaussian<R: Rng>(rng: &mut R) -> f64 {
     }
 }
 
-/// A rotation about the origin, uniform over all of them (Shoemake, *Uniform random rotations*, 1992).
+/// Returns a uniformly distributed rotation about the origin (Shoemake, *Uniform random rotations*,
+/// 1992).
 pub fn rotation<R: Rng>(rng: &mut R) -> Pose {
     let share: f64 = rng.random_range(0.0..1.0);
     let (sin_a, cos_a) = rng.random_range(0.0..std::f64::consts::TAU).sin_cos();
@@ -173,7 +175,7 @@ pub fn rotation<R: Rng>(rng: &mut R) -> Pose {
     Pose::from_quaternion([p * sin_a, p * cos_a, q * sin_b, q * cos_b])
 }
 
-/// A uniform rotation, then a shift to a point of the cube of half side `spread`.
+/// Returns a uniform rotation, then a shift to a point of the cube of half side `spread`.
 pub fn pose<R: Rng>(rng: &mut R, spread: f64) -> Pose {
     rotation(rng).with_translation(point_in(rng, spread))
 }

@@ -1,4 +1,4 @@
-//! Pairs of forms that cut each other in curves known exactly.
+//! Pairs of forms whose curves of intersection are known exactly.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -8,37 +8,38 @@ use nearmiss_geometry::Pose;
 use crate::oracle::count;
 use crate::shapes::{Form, Primitive, bowl, patch, sphere, torus};
 
-/// Points of a true curve.
+/// Number of points of a true curve.
 const POINTS: usize = 3000;
 
-/// Two forms of one part each, b in the pose in which it cuts a.
+/// Two forms of one part each, with b in the pose in which it intersects a.
 #[derive(Debug, Clone)]
 pub struct Cut {
-    /// What cuts what.
+    /// Names of the two forms.
     pub name: &'static str,
-    /// The one form.
+    /// The first form.
     pub a: Form,
-    /// The other.
+    /// The second form.
     pub b: Form,
-    /// Frame of b → frame of a.
+    /// Pose of b in the frame of a.
     pub pose_b: Pose,
-    /// Where they cut each other, in a's frame.
+    /// The curves of intersection, in a's frame.
     pub curves: Vec<TrueCurve>,
 }
 
-/// A curve, by many of its points.
+/// A curve, given by many of its points.
 #[derive(Debug, Clone)]
 pub struct TrueCurve {
-    /// Whether the last point is joined to the first.
+    /// `true` if the last point is joined to the first.
     pub closed: bool,
     /// Points in order.
     pub points: Vec<[f64; 3]>,
 }
 
 impl Cut {
-    /// How far, times h², the curve of two surfaces goes aside at its point `x` when each of them goes h²H/2
-    /// to the hollow side of its mean curvature H: the least d whose shares along the two normals are these
-    /// is no longer than their sum over the sine of the angle.
+    /// Returns, per h², how far the curve of intersection moves at its point `x` if each surface
+    /// moves by h²H/2 to the hollow side, with mean curvature H. It is an upper bound: the least
+    /// vector with these components along the two normals is no longer than their sum over the sine
+    /// of the angle.
     #[must_use]
     pub fn aside(&self, x: [f64; 3]) -> f64 {
         let (na, ha) = bent(&self.a.parts[0], x);
@@ -49,7 +50,7 @@ impl Cut {
 }
 
 impl Cut {
-    /// The greatest mean curvature of either surface along the curves.
+    /// Returns the greatest mean curvature of either surface along the curves.
     #[must_use]
     pub fn curvature(&self) -> f64 {
         let bends = |&x: &[f64; 3]| {
@@ -61,7 +62,7 @@ impl Cut {
     }
 }
 
-/// Normal and mean curvature of a sphere, bowl, torus or rectangle at its point `x`.
+/// Returns the normal and mean curvature of a sphere, bowl, torus or rectangle at its point `x`.
 fn bent(part: &Primitive, x: [f64; 3]) -> (Vector3<f64>, f64) {
     let p = Vector3::from(x);
     match *part {
@@ -78,29 +79,29 @@ fn bent(part: &Primitive, x: [f64; 3]) -> (Vector3<f64>, f64) {
     }
 }
 
-/// A loop through `point` of shares of a turn.
+/// Returns the loop through `point`, which takes fractions of a turn.
 fn closed(point: impl Fn(f64) -> [f64; 3]) -> TrueCurve {
     let points = (0..POINTS).map(|i| point(TAU * count(i) / count(POINTS))).collect();
     TrueCurve { closed: true, points }
 }
 
-/// A curve through `point` of shares from 0 to 1.
+/// Returns the curve through `point`, which takes parameters from 0 to 1.
 fn open(point: impl Fn(f64) -> [f64; 3]) -> TrueCurve {
     let points = (0..=POINTS).map(|i| point(count(i) / count(POINTS))).collect();
     TrueCurve { closed: false, points }
 }
 
-/// `a` and a plane that is z = 0 in `pose`, as large as `a` or larger.
+/// Returns `a` and a plane, z = 0 in `pose`, as large as `a` or larger.
 fn with_plane(name: &'static str, a: Form, side: f64, pose: Pose, curves: Vec<TrueCurve>) -> Cut {
     Cut { name, a, b: patch(side, side), pose_b: pose, curves }
 }
 
-/// Turns the plane z = 0 into the plane y = `offset`.
+/// Returns a pose that turns the plane z = 0 into the plane y = `offset`.
 fn upright(offset: f64) -> Pose {
     Pose::from_axis_angle([1.0, 0.0, 0.0], FRAC_PI_2).with_translation([0.0, offset, 0.0])
 }
 
-/// All cuts without a place where the surfaces touch, and few where they graze.
+/// Returns all cuts without a place where the surfaces touch, and few where they graze.
 #[must_use]
 pub fn clean() -> Vec<Cut> {
     vec![
@@ -116,7 +117,7 @@ pub fn clean() -> Vec<Cut> {
     ]
 }
 
-/// Spheres about the origin and (`d`, 0, 0): a circle.
+/// Returns spheres about the origin and (`d`, 0, 0): a circle.
 #[must_use]
 pub fn spheres(radius_a: f64, radius_b: f64, d: f64) -> Cut {
     let x = 0.5 * (d * d + radius_a * radius_a - radius_b * radius_b) / d;
@@ -130,7 +131,7 @@ pub fn spheres(radius_a: f64, radius_b: f64, d: f64) -> Cut {
     }
 }
 
-/// A sphere and the plane z = `z`: a circle.
+/// Returns a sphere and the plane z = `z`: a circle.
 #[must_use]
 pub fn sphere_and_plane(radius: f64, z: f64) -> Cut {
     let rho = (radius * radius - z * z).sqrt();
@@ -139,7 +140,7 @@ pub fn sphere_and_plane(radius: f64, z: f64) -> Cut {
     with_plane("a sphere and a plane", sphere(radius), 2.4 * radius, pose, vec![circle])
 }
 
-/// A torus and the plane z = `z` across its axis: two circles.
+/// Returns a torus and the plane z = `z` across its axis: two circles.
 #[must_use]
 pub fn torus_and_level(major: f64, minor: f64, z: f64) -> Cut {
     let off = (minor * minor - z * z).sqrt();
@@ -149,8 +150,8 @@ pub fn torus_and_level(major: f64, minor: f64, z: f64) -> Cut {
     with_plane("a torus and a plane across its axis", torus(major, minor), side, pose, circles.into())
 }
 
-/// A torus and the plane y = `y` along its axis, a section of Perseus: two loops, a figure of eight for `y` =
-/// `major` − `minor`, or one loop.
+/// Returns a torus and the plane y = `y` along its axis, a section of Perseus: two loops, a figure
+/// of eight for `y` = `major` − `minor`, or one loop.
 #[must_use]
 pub fn torus_and_upright(major: f64, minor: f64, y: f64) -> Cut {
     let side = 2.4 * (major + minor);
@@ -161,7 +162,7 @@ pub fn torus_and_upright(major: f64, minor: f64, y: f64) -> Cut {
     let curves = if y <= major - minor {
         [1.0, -1.0].map(|sign| closed(|t| at(t, sign))).into()
     } else {
-        // To where the plane just meets the tube and back on the other side.
+        // To where the plane just touches the tube, and back on the other side.
         let widest = ((y - major) / minor).acos();
         vec![closed(|t| {
             // Evenly spread where the curve crosses x = 0.
@@ -172,11 +173,11 @@ pub fn torus_and_upright(major: f64, minor: f64, y: f64) -> Cut {
     with_plane("a torus and a plane along its axis", torus(major, minor), side, upright(y), curves)
 }
 
-/// Two tori about one axis: two circles.
+/// Returns two tori about one axis: two circles.
 #[must_use]
 pub fn coaxial_tori() -> Cut {
     let [(major_a, minor), (major_b, z)]: [(f64, f64); 2] = [(1.0, 0.5), (1.2, 0.4)];
-    // In the plane through the axis two circles, of equal radii.
+    // Two circles of equal radii in the plane through the axis.
     let between = Vector3::new(0.5 * (major_a + major_b), 0.0, 0.5 * z);
     let apart = Vector3::new(major_b - major_a, 0.0, z);
     let along = Vector3::new(-apart.z, 0.0, apart.x) / apart.norm();
@@ -194,7 +195,8 @@ pub fn coaxial_tori() -> Cut {
     }
 }
 
-/// Two tori, the tube of b thinner than that of a: where it enters that of a and leaves it, a loop each.
+/// Two tori, the tube of b thinner than that of a. One loop where b enters a's tube, one where it
+/// leaves it.
 #[derive(Debug, Clone, Copy)]
 struct Crossing {
     a: [f64; 2],
@@ -203,8 +205,9 @@ struct Crossing {
 }
 
 impl Crossing {
-    /// The loop on b where it passes the surface of a between `outside` and `inside`: angles along the tube
-    /// of b, for each one about it, where the loop goes `across` the tube; otherwise the other way round.
+    /// Returns the loop on b where it passes the surface of a between the angles `outside` and
+    /// `inside` along the tube of b. If it goes `across` the tube, the angle along b is a function
+    /// of the angle about it; otherwise the reverse.
     fn curve(&self, outside: f64, inside: f64, across: bool) -> TrueCurve {
         let [major, minor] = self.b;
         let [major_a, minor_a] = self.a;
@@ -225,8 +228,9 @@ impl Crossing {
     }
 }
 
-/// Pairs of tori whose tubes cross: upright to each other and at a slant, each through the tube of the other
-/// twice, in four loops; once, in two; and one that is a ring too narrow about the other's tube, in two.
+/// Returns pairs of tori whose tubes cross. Perpendicular or at a slant, each passes the tube of
+/// the other twice, in four loops, or once, in two. In the last pair one ring is too narrow to
+/// surround the other's tube, in two loops.
 #[must_use]
 pub fn crossing_tori() -> Vec<Cut> {
     let upright =
@@ -254,7 +258,7 @@ pub fn crossing_tori() -> Vec<Cut> {
     ]
 }
 
-/// An open half sphere and the plane y = `y`: half a circle, which ends at the rim twice.
+/// Returns an open half sphere and the plane y = `y`: half a circle, which ends at the rim twice.
 #[must_use]
 pub fn bowl_and_plane(radius: f64, y: f64) -> Cut {
     let rho = (radius * radius - y * y).sqrt();
@@ -265,7 +269,8 @@ pub fn bowl_and_plane(radius: f64, y: f64) -> Cut {
     with_plane("an open half sphere and a plane", bowl(radius), 2.4 * radius, upright(y), vec![arc])
 }
 
-/// A sphere and a strip of the plane z = 0, |y| ≤ `half`: two arcs, which end at the strip's borders.
+/// Returns a sphere and a strip of the plane z = 0, |y| ≤ `half`: two arcs, which end at the
+/// strip's borders.
 #[must_use]
 pub fn sphere_and_strip(radius: f64, half: f64) -> Cut {
     let widest = (half / radius).asin();
@@ -325,7 +330,7 @@ mod tests {
                 y[k] += sign * e;
                 y
             };
-            // Of the distance function: the trace of its second derivatives.
+            // The trace of the second derivatives of the distance function.
             let d = |y: [f64; 3]| {
                 let [px, py, pz] = y;
                 match part {

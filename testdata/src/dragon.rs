@@ -1,13 +1,13 @@
-//! The Stanford Dragon in two resolutions, as files and read.
+//! The Stanford Dragon in two resolutions, as files and as meshes.
 //!
-//! Where it comes from and what it may be used for: `testdata/data/STANFORD-TERMS.md`.
+//! Source and terms of use: `testdata/data/STANFORD-TERMS.md`.
 
 use std::io::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
 use nearmiss_geometry::TriangleMesh;
 
-/// Which resolution.
+/// The resolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dragon {
     /// 5,205 points, 11,102 triangles.
@@ -25,9 +25,10 @@ impl Dragon {
     }
 }
 
-/// The file: binary little-endian PLY, `f32` vertices, faces as lists of three `i32`. About 0.2 units high.
+/// Returns the path of the file: binary little-endian PLY, `f32` vertices, faces as lists of three
+/// `i32`. The dragon is about 0.2 units high.
 ///
-/// The path leads into the source tree that this crate was compiled from.
+/// The path is in the source tree from which this crate was compiled.
 #[must_use]
 pub fn dragon_path(which: Dragon) -> PathBuf {
     let name = match which {
@@ -37,10 +38,11 @@ pub fn dragon_path(which: Dragon) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name)
 }
 
-/// The file's vertices and triangles, read without any other crate; knows this one layout only.
+/// Returns the file's vertices and triangles, read without any other crate. Supports this layout
+/// only.
 ///
 /// # Errors
-/// When the file cannot be read or is not the one this crate ships.
+/// If the file cannot be read or is not the one of this crate.
 pub fn dragon_mesh(which: Dragon) -> Result<TriangleMesh> {
     const END: &[u8] = b"end_header\n";
     let bytes = std::fs::read(dragon_path(which))?;

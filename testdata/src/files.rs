@@ -1,4 +1,5 @@
-//! One small model in every format and encoding, made by code that shares nothing with the readers.
+//! A small model in every format and encoding, written by code that shares nothing with the
+//! readers.
 
 pub mod foreign;
 pub mod model;
@@ -7,7 +8,7 @@ pub mod plain;
 use foreign::{e57, gltf, las, npy, off, stl};
 use plain::{Encoding, csv, obj, pcd, ply};
 
-/// The model in all formats, with a name that has the right ending.
+/// Returns the model in all formats, with names of the right ending.
 #[must_use]
 pub fn all() -> Vec<(&'static str, Vec<u8>)> {
     vec![

@@ -1,47 +1,47 @@
-//! A house to walk through: two storeys, a staircase, ramps from 10° to 60°, round columns, doors, a low
-//! ceiling. Metres, z up.
+//! A house to walk through: two storeys, a staircase, ramps from 10° to 60°, round columns, doors,
+//! a low ceiling. Metres, z up.
 //!
-//! The lower floor is at z = 0, x 0 to 16, y 0 to 12; the upper one at z = 3, x 6.5 to 16, y 6 to 12, with
-//! open edges.
+//! The lower floor is at z = 0, x 0 to 16, y 0 to 12. The upper floor is at z = 3, x 6.5 to 16, y 6
+//! to 12, with open edges.
 
 use nearmiss_geometry::TriangleMesh;
 use rand::RngExt;
 
 use crate::arbitrary::{gaussian, rng};
 
-/// Where the upper floor is.
+/// Height of the upper floor.
 pub const STOREY: f64 = 3.0;
 
 /// A step of the staircase: up, along x.
 pub const STEP: [f64; 2] = [STOREY / 17.0, 0.28];
 
-/// The staircase goes up along x between these y, from this x on.
+/// The staircase goes up along x between the first two numbers in y, from the third in x.
 pub const STAIRS: [f64; 3] = [10.2, 11.6, 1.74];
 
 /// Angles of the ramps in degrees.
 pub const RAMPS: [f64; 6] = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 
-/// Length and breadth of a ramp on the ground.
+/// Length and width of a ramp on the ground.
 pub const RAMP: [f64; 2] = [1.4, 1.2];
 
-/// Radius of the columns, and where their axes are.
+/// Radius of the columns.
 pub const COLUMN: f64 = 0.25;
-/// Middles of the columns.
+/// Axes of the columns.
 pub const COLUMNS: [[f64; 2]; 3] = [[12.0, 4.0], [13.5, 4.02], [15.013, 4.017]];
 
-/// The wall x = 9 of the lower storey has a door between these y, so high.
+/// The door in the wall x = 9 of the lower storey: from y, to y, height.
 pub const DOOR: [f64; 3] = [7.0, 7.9, 2.1];
 
-/// And a gap between these y, too narrow for most.
+/// A gap in the same wall, from y to y, too narrow for most avatars.
 pub const GAP: [f64; 2] = [8.8, 9.1];
 
-/// A ceiling so high over the lower floor, between these x and y.
+/// A low ceiling: extent in x, extent in y, height over the lower floor.
 pub const LOW: ([f64; 2], [f64; 2], f64) = ([11.0, 14.0], [7.0, 9.0], 1.5);
 
 /// Underside of the upper floor.
 const SLAB: f64 = STOREY - 0.2;
 
-/// Flat sides of a round column.
+/// Number of flat sides of a round column.
 const SIDES: u32 = 96;
 
 /// A parallelogram: a corner and two sides.
@@ -49,17 +49,17 @@ const SIDES: u32 = 96;
 pub struct Quad {
     /// Its corner.
     pub corner: [f64; 3],
-    /// From the corner.
+    /// The two sides, from the corner.
     pub sides: [[f64; 3]; 2],
 }
 
 impl Quad {
-    /// Its point with these shares of its sides.
+    /// Returns the point with these shares of the sides.
     fn at(&self, [s, t]: [f64; 2]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.corner[k] + s * self.sides[0][k] + t * self.sides[1][k])
     }
 
-    /// Of unit length.
+    /// Returns the unit normal.
     fn normal(&self) -> [f64; 3] {
         let [u, v] = self.sides;
         let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
@@ -71,13 +71,13 @@ fn length(a: [f64; 3]) -> f64 {
     a.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Where a ramp begins: it climbs along y from here, broad along x.
+/// Returns the corner of a ramp. The ramp climbs along y from there and extends along x.
 #[must_use]
 pub fn ramp_corner(i: u8) -> [f64; 2] {
     [0.8 + 2.0 * f64::from(i), 1.0]
 }
 
-/// All surfaces.
+/// Returns all surfaces.
 #[must_use]
 pub fn house() -> Vec<Quad> {
     let quad = |corner, u, v| Quad { corner, sides: [u, v] };
@@ -130,8 +130,8 @@ pub fn house() -> Vec<Quad> {
     quads
 }
 
-/// Points on surfaces, one for each `spacing`² in a jittered lattice, with Gaussian noise of this standard
-/// deviation along the normal.
+/// Returns points on surfaces, one for each `spacing`² in a jittered lattice, with Gaussian noise
+/// of this standard deviation along the normal.
 #[must_use]
 pub fn scanned(quads: &[Quad], spacing: f64, noise: f64, seed: u64) -> Vec<[f64; 3]> {
     let rng = &mut rng(seed);
@@ -152,10 +152,10 @@ pub fn scanned(quads: &[Quad], spacing: f64, noise: f64, seed: u64) -> Vec<[f64;
     points
 }
 
-/// The surfaces as triangles.
+/// Returns the surfaces as triangles.
 ///
 /// # Panics
-/// When there are 2³⁰ surfaces.
+/// If there are 2³⁰ surfaces.
 #[must_use]
 pub fn triangles(quads: &[Quad]) -> TriangleMesh {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];

@@ -1,8 +1,8 @@
-//! What code in lanes can run with.
+//! Instruction sets for code in lanes.
 
 use fearless_simd::Level;
 
-/// Every instruction set there is here, the greatest first: results depend on none.
+/// Returns every instruction set of this processor, the greatest first. Results depend on none.
 #[must_use]
 pub fn levels() -> Vec<Level> {
     #[cfg_attr(not(target_arch = "x86_64"), expect(unused_mut, reason = "there are more on x86"))]

@@ -1,32 +1,32 @@
-//! Symmetric 3×3 matrices, ordinary and adversarial, and how well eigenpairs fit them. Entries are in the
+//! Symmetric 3×3 matrices, ordinary and adversarial, and errors of eigenpairs. Entries are in the
 //! order xx xy xz yy yz zz.
 
 use rand::{Rng, RngExt};
 
 use crate::arbitrary::{gaussian, point_in, rng, rotation};
 
-/// What is peculiar about a matrix.
+/// The peculiarity of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Family {
-    /// Nothing: entries uniform in −1…1.
+    /// No peculiarity: entries uniform in −1…1.
     Random,
     /// Weighted covariance of points about a place on a noisy curved sheet.
     Neighbourhood,
     /// A multiple of the identity.
     Isotropic,
-    /// The same but for the last bits of its entries.
+    /// A multiple of the identity, except for the last bits of its entries.
     NearlyIsotropic,
-    /// Eigenvalues 0, 1, 1, turned.
+    /// Eigenvalues 0, 1, 1, rotated.
     Planar,
-    /// Eigenvalues 0, 0, 1, turned.
+    /// Eigenvalues 0, 0, 1, rotated.
     Linear,
     /// v vᵀ.
     RankOne,
-    /// Two eigenvalues one bit apart, on the diagonal or turned.
+    /// Two eigenvalues one bit apart, on the diagonal or rotated.
     OneBit,
-    /// Eigenvalues 1, 1 + d, 1 + e with d and e from 1e-16 to 1, turned.
+    /// Eigenvalues 1, 1 + d, 1 + e with d and e from 1e-16 to 1, rotated.
     Clustered,
-    /// No more than its diagonal.
+    /// Zero outside the diagonal.
     Diagonal,
     /// Zeros, of either sign.
     Zero,
@@ -36,14 +36,14 @@ pub enum Family {
     Large,
     /// Entries that are subnormal numbers.
     Subnormal,
-    /// Entries from 1e300 to the greatest number.
+    /// Entries from 1e300 to the greatest finite number.
     Huge,
-    /// Every entry of a magnitude of its own, 1e-300 to 1e300.
+    /// Every entry with a magnitude of its own, 1e-300 to 1e300.
     Wide,
 }
 
 impl Family {
-    /// All of them.
+    /// All families.
     pub const ALL: [Self; 16] = [
         Self::Random,
         Self::Neighbourhood,
@@ -63,7 +63,7 @@ impl Family {
         Self::Wide,
     ];
 
-    /// `count` matrices of this family; the same for the same seed.
+    /// Returns `count` matrices of this family; the same for the same seed.
     #[must_use]
     pub fn matrices(self, count: u32, seed: u64) -> Vec<[f64; 6]> {
         let mut rng = rng(seed);
@@ -131,7 +131,7 @@ impl Family {
     }
 }
 
-/// A matrix of these eigenvalues in a random frame, to rounding.
+/// Returns a matrix with these eigenvalues in a random frame, to rounding.
 fn turned<R: Rng>(rng: &mut R, values: [f64; 3]) -> [f64; 6] {
     let pose = rotation(rng);
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| pose.rotate(axis));
@@ -139,7 +139,8 @@ fn turned<R: Rng>(rng: &mut R, values: [f64; 3]) -> [f64; 6] {
     [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
 }
 
-/// The covariance of 30 points of a paraboloid with noise, Gaussian weights, seen from a random side.
+/// Returns the covariance of 30 points of a noisy paraboloid with Gaussian weights, randomly
+/// rotated.
 fn neighbourhood<R: Rng>(rng: &mut R) -> [f64; 6] {
     let pose = rotation(rng);
     let (bend, noise) = (rng.random_range(-0.5..0.5), rng.random_range(0.0..0.05));
@@ -160,17 +161,18 @@ fn neighbourhood<R: Rng>(rng: &mut R) -> [f64; 6] {
     [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
 }
 
-/// The largest component of B n − λ n over the largest entry of B, NaN if anything is; 0 where B is 0 and λ
-/// too.
+/// Returns the largest component of B n − λ n over the largest entry of B. NaN if anything is NaN;
+/// 0 if B and λ are 0.
 ///
-/// What the last bit of a subnormal λ explains is not counted. Where the eigenvalue is beyond the range of
-/// `f64` its end is as near as can be: that fits if B n points along n and is as long or longer.
+/// Errors up to the last bit of a subnormal λ do not count. If the eigenvalue is beyond the range
+/// of `f64`, the end of the range is the best possible value. It is right if B n points along n and
+/// is at least as long.
 #[must_use]
 pub fn residual(matrix: [f64; 6], value: f64, vector: [f64; 3]) -> f64 {
     /// The least positive number.
     const LEAST: f64 = 5e-324;
     let largest = matrix.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    // In two steps, as the inverse of a subnormal number is beyond the range.
+    // In two steps, because the inverse of a subnormal number is out of range.
     let first = if largest < 1e-290 { 1e200 } else { 1.0 };
     let relative = |x: f64| if largest > 0.0 { x * first / (largest * first) } else { x };
     let [xx, xy, xz, yy, yz, zz] = matrix.map(relative);
@@ -185,7 +187,8 @@ pub fn residual(matrix: [f64; 6], value: f64, vector: [f64; 3]) -> f64 {
     if worst.is_nan() { worst } else { (worst - relative(LEAST)).max(0.0) }
 }
 
-/// The largest difference of the dot products of three vectors from those of a frame, NaN if any is.
+/// Returns the largest difference of the dot products of three vectors from those of a frame, NaN
+/// if any is NaN.
 #[must_use]
 pub fn orthogonality_error(vectors: [[f64; 3]; 3]) -> f64 {
     let mut worst = 0.0_f64;

@@ -1,7 +1,8 @@
-//! Naive twins in double precision, written from the formulas alone: every point against every point.
+//! Naive twins in double precision, written from the formulas alone: every point against every
+//! point.
 //!
-//! They share no code with the libraries they judge. Everything is O(n) per evaluation and O(n²) per cloud,
-//! which is fine up to some ten thousand points.
+//! The twins share no code with the libraries they test. Everything is O(n) per evaluation and
+//! O(n²) per cloud, which is fast enough up to some ten thousand points.
 
 mod covering;
 mod disc;

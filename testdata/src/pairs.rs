@@ -1,12 +1,14 @@
-//! Posed pairs with the true answer, from geometry alone.
+//! Posed pairs whose true answer follows from geometry alone.
 //!
-//! `gap` is the exact distance of the two exact surfaces when they are apart. When they intersect it is minus
-//! a depth d ≥ 0 such that *no* shift shorter than d, in any direction, parts them: a stronger statement than
-//! one about 26 directions. For every family d is the least shift that parts them, or a lower bound of it;
-//! `why` says which. Surfaces are two-sided: a ball within a hollow ball is apart from it.
+//! `gap` is the exact distance of the two exact surfaces if they are separated. If they intersect,
+//! `gap` is −d with a depth d ≥ 0 such that *no* shift shorter than d, in any direction, separates
+//! them. That is stronger than testing 26 directions. For every family d is the least separating
+//! shift, or a lower bound of it; `why` says which. Surfaces are two-sided: a ball within a hollow
+//! ball is separated from it.
 //!
-//! Poses are rigid, in double precision. The truth is about the exact surfaces; sampled points may be noisy,
-//! and no method that sees only points is right below r, so pairs with |gap| ≤ r are counted apart.
+//! Poses are rigid, in double precision. The truth is about the exact surfaces. Sampled points may
+//! be noisy, and no method that has only points is right below r. So pairs with |gap| ≤ r are
+//! counted separately.
 
 mod ball;
 mod bodies;
@@ -22,38 +24,39 @@ use crate::shapes::{Order, Sampling, Shape, scorer_radius};
 use bodies::Body;
 use families::{Family, families};
 
-/// Gaps in multiples of r; of either sign. The first two lie within the band.
+/// Gaps in multiples of r; of either sign. The first two are within the band.
 pub const MULTIPLES: [f64; 8] = [0.3, 0.7, 1.05, 1.5, 2.0, 3.0, 6.0, 10.0];
 
-/// Two shapes in the world, and whether their surfaces meet there.
+/// Two shapes in the world, with the true verdict.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// Index of shape A in the set.
     pub a: usize,
     /// Index of shape B in the set; may equal `a`.
     pub b: usize,
-    /// From A's points to the world.
+    /// Pose of A's points in the world.
     pub pose_a: Pose,
-    /// From B's points to the world.
+    /// Pose of B's points in the world.
     pub pose_b: Pose,
-    /// Whether the exact surfaces intersect.
+    /// `true` if the exact surfaces intersect.
     pub truth: bool,
-    /// Distance when apart, else minus the depth, in world units; see the module.
+    /// Distance if separated, else minus the depth, in world units; see the module.
     pub gap: f64,
-    /// r of scoring: the larger of the two shapes' [`scorer_radius`], in world units.
+    /// r of scoring: the larger [`scorer_radius`] of the two shapes, in world units.
     pub r: f64,
     /// Standard deviation of the noise of both, as a share of the spacing.
     pub noise: f64,
-    /// What the pair is an instance of.
+    /// The family of the pair.
     pub family: &'static str,
-    /// Why `truth` and `gap` are what they are.
+    /// The reason why `truth` and `gap` are right.
     pub why: &'static str,
-    /// Whether one shape is two sheets so close that `Ambiguous` is allowed for 5 % of such pairs.
+    /// `true` if one shape is two sheets so close that `Ambiguous` is allowed for 5 % of such
+    /// pairs.
     pub thin: bool,
 }
 
 impl Pair {
-    /// Whether no point method can be asked to be right: |gap| ≤ r.
+    /// Returns `true` if |gap| ≤ r, so that no point method can be required to be right.
     #[must_use]
     pub fn is_in_band(&self) -> bool {
         self.gap.abs() <= self.r
@@ -63,7 +66,7 @@ impl Pair {
 /// Shapes, and pairs that refer to them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AnalyticSet {
-    /// Each shape once for every noise.
+    /// Each shape, once for every noise.
     pub shapes: Vec<Shape>,
     /// [`scorer_radius`] of each shape.
     pub radii: Vec<f64>,
@@ -71,11 +74,11 @@ pub struct AnalyticSet {
     pub pairs: Vec<Pair>,
 }
 
-/// How large a set to make.
+/// Size of a set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetOptions {
-    /// Levels of noise, as shares of the spacing; every family is made for each. Default 0, 0.05, 0.1, 0.2.
-    /// Shapes of even place in this list are sampled regularly, the others at random.
+    /// Levels of noise, as shares of the spacing; every family is made for each. Default 0, 0.05,
+    /// 0.1, 0.2. Shapes at even positions of this list are sampled regularly, the others at random.
     pub noises: Vec<f64>,
     /// Pairs for each family, noise and gap. Default 3.
     pub repeats: u32,
@@ -87,25 +90,25 @@ impl Default for SetOptions {
     }
 }
 
-/// How many pairs of each verdict a family has.
+/// Numbers of pairs of a family by verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tally {
     /// The family.
     pub family: &'static str,
-    /// Whether it is one of close plates.
+    /// `true` if it is a family of close plates.
     pub thin: bool,
-    /// Pairs that are apart by more than r.
+    /// Pairs that are separated by more than r.
     pub apart: usize,
     /// Pairs that intersect by more than r.
     pub intersecting: usize,
-    /// Pairs within the band that are apart.
+    /// Pairs within the band that are separated.
     pub band_apart: usize,
     /// Pairs within the band that intersect.
     pub band_intersecting: usize,
 }
 
 impl AnalyticSet {
-    /// Verdicts by family, in the order of the pairs.
+    /// Returns the verdicts by family, in the order of the pairs.
     #[must_use]
     pub fn tally(&self) -> Vec<Tally> {
         let mut tallies: Vec<Tally> = Vec::new();
@@ -134,10 +137,10 @@ impl AnalyticSet {
     }
 }
 
-/// A set of pairs of all families; the same for the same arguments.
+/// Returns a set of pairs of all families; the same for the same arguments.
 ///
-/// With the default options 5,500 pairs of 76 shapes with 330,000 points together, 2 seconds in a release
-/// build.
+/// With the default options 5,500 pairs of 76 shapes with 330,000 points in total, in 2 seconds in
+/// a release build.
 #[must_use]
 pub fn analytic_set(seed: u64, options: &SetOptions) -> AnalyticSet {
     let mut set = AnalyticSet { shapes: Vec::new(), radii: Vec::new(), pairs: Vec::new() };
@@ -179,7 +182,7 @@ fn pairs_of(
     repeats: u32,
     rng: &mut place::Stream,
 ) {
-    /// A placement that a random direction does not allow is tried again this often.
+    /// Attempts at a placement that a random direction does not allow.
     const TRIES: usize = 8;
     let (shape_a, shape_b) = (&set.shapes[a], &set.shapes[b]);
     let r = set.radii[a].max(set.radii[b]);
@@ -221,10 +224,11 @@ mod tests {
         SET.get_or_init(|| analytic_set(1, &options()))
     }
 
-    /// Steps between the samples that stand for an exact surface.
+    /// Step between the samples of an exact surface.
     const DENSE: f64 = 0.035;
 
-    /// A's exact surface in B's frame, densely, and how near it comes to B after a shift of the world.
+    /// Returns how near A's exact surface, densely sampled in B's frame, comes to B after a shift
+    /// of the world.
     fn nearest_after(dense: &[[f64; 3]], pair: &Pair, b: &Shape, shift: Vector3<f64>) -> f64 {
         let to_b = pair.pose_b.inverse().after(&pair.pose_a);
         let shift = Vector3::from(to_b.rotate(pair.pose_a.rotate_inverse(shift.into())));

@@ -1,27 +1,28 @@
-//! What a spinning laser scanner returns: rings, near each other along and far from each other across.
+//! Frames of a spinning laser scanner: rings, dense along and far apart across.
 
 use crate::arbitrary::{gaussian, rng};
 
 /// Height of the scanner above the floor.
 pub const HEIGHT: f64 = 1.8;
 
-/// Half the sides of the hall about the scanner, whose walls are upright.
+/// Half the sides of the hall about the scanner, with vertical walls.
 pub const HALL: [f64; 2] = [14.0, 9.0];
 
-/// How a frame is taken.
+/// Parameters of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
     /// Beams, from 20° below the horizon to 10° above it.
     pub beams: u32,
     /// Returns of a beam in one turn.
     pub steps: u32,
-    /// Standard deviation of the distance measured.
+    /// Standard deviation of the measured distance.
     pub noise: f64,
-    /// Of the noise.
+    /// Seed of the noise.
     pub seed: u64,
 }
 
-/// One frame, ring by ring: the scanner in the origin, the floor at −[`HEIGHT`], the walls at ±[`HALL`].
+/// Returns one frame, ring by ring: the scanner at the origin, the floor at −[`HEIGHT`], the walls
+/// at ±[`HALL`].
 #[must_use]
 pub fn frame(frame: &Frame) -> Vec<[f64; 3]> {
     let rng = &mut rng(frame.seed);
@@ -41,7 +42,7 @@ pub fn frame(frame: &Frame) -> Vec<[f64; 3]> {
     points
 }
 
-/// Distance of `x` from the nearest of floor and walls, and the unit normal there.
+/// Returns the distance of `x` from the nearest of floor and walls, and the unit normal there.
 #[must_use]
 pub fn off(x: [f64; 3]) -> (f64, [f64; 3]) {
     let floor = ((x[2] + HEIGHT).abs(), [0.0, 0.0, 1.0]);

@@ -1,11 +1,12 @@
-//! Shapes whose surface is known exactly, and samplings of them.
+//! Shapes with exactly known surfaces, and samplings of them.
 //!
-//! A [`Form`] is a union of primitive surfaces: two-sided, without inside. A [`Shape`] is a form with points
-//! sampled from it. Points of a noise-free shape lie on the form up to rounding; where the form ends (the rim
-//! of a bowl, the edge of a patch) points lie on the end itself, so that the samples end where the truth
-//! does.
+//! A [`Form`] is a union of primitive surfaces: two-sided, without inside. A [`Shape`] is a form
+//! with points sampled from it. Points of a noise-free shape are on the form up to rounding. Where
+//! the form ends (the rim of a bowl, the edge of a patch), there are points on the end itself, so
+//! that the samples end where the truth does.
 //!
-//! Random numbers are the same on every platform; sines and logarithms may differ in their last bit.
+//! Random numbers are the same on every platform; sines and logarithms may differ in their last
+//! bit.
 
 mod form;
 mod forms;
@@ -23,14 +24,14 @@ pub use sampling::{Order, Sampling, scorer_radius};
 pub struct Shape {
     /// The exact surface.
     pub form: Form,
-    /// How it was sampled.
+    /// The parameters of the sampling.
     pub sampling: Sampling,
     /// The samples.
     pub points: Vec<[f64; 3]>,
 }
 
 impl Form {
-    /// Samples it.
+    /// Samples the form.
     #[must_use]
     pub fn sample(self, sampling: Sampling) -> Shape {
         let points = sampling::points(&self, &sampling);
@@ -39,7 +40,7 @@ impl Form {
 }
 
 impl Shape {
-    /// Exact distance of `x` to the form, whatever noise the points have.
+    /// Returns the exact distance of `x` to the form, regardless of the noise of the points.
     #[must_use]
     pub fn distance(&self, x: [f64; 3]) -> f64 {
         self.form.distance(x)
@@ -130,7 +131,7 @@ mod tests {
                 let exact = form.distance(x);
                 let (_, sampled) = oracle::nearest(&dense.points, x).unwrap();
                 assert!(exact <= sampled + 1e-12, "{}: {exact} above {sampled}", form.name);
-                // A sample within 0.03 of the foot, and no cancellation when that is seen from afar.
+                // A sample is within 0.03 of the foot, without cancellation for distant x.
                 assert!(sampled <= exact.hypot(0.03) + 0.03 * 0.5, "{}: {exact}, {sampled}", form.name);
             }
         }

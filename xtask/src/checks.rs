@@ -1,4 +1,4 @@
-//! `cargo xtask test`: every check, each with a name and the time it took.
+//! `cargo xtask test`: all checks, each with a name and its running time.
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -8,7 +8,7 @@ use crate::tidy;
 
 type Check = fn() -> Outcome;
 
-/// In order of how soon they tell something.
+/// The checks, the quickest first.
 const CHECKS: [(&str, Check); 9] = [
     ("tidy", tidy::run),
     ("format", || run_cargo(&["fmt", "--all", "--check"])),
@@ -21,7 +21,7 @@ const CHECKS: [(&str, Check); 9] = [
     ("determinism", determinism),
 ];
 
-/// Runs the checks named, or all.
+/// Runs the named checks, or all.
 pub(crate) fn run_named(names: &[&str]) -> Outcome<Vec<(&'static str, Duration)>> {
     if let Some(unknown) = names.iter().find(|name| CHECKS.iter().all(|(known, _)| known != *name)) {
         let known: Vec<&str> = CHECKS.iter().map(|(name, _)| *name).collect();
@@ -53,17 +53,17 @@ fn now() -> Instant {
     Instant::now()
 }
 
-/// Runs a program of the workspace with these words.
+/// Runs a program of the workspace with these arguments.
 fn run_program(package: &str, program: &str, words: &[&str]) -> Outcome {
     run_cargo(&[&["run", "--release", "--quiet", "-p", package, "--bin", program, "--"], words].concat())
 }
 
-/// Checks what `collide --prove` wrote, as these words say.
+/// Checks the output of `collide --prove` with these arguments of `check-proof`.
 pub(crate) fn check_proof(words: &[&str]) -> Outcome {
     run_program("check-proof", "check-proof", words)
 }
 
-/// Answers, counts and shapes with known answers; then the proofs of a scan near itself.
+/// Verifies answers, counts and shapes with known answers; then the proofs of a scan near itself.
 fn verify() -> Outcome {
     run_program("nearmiss-benches", "verify", &["--quick"])?;
     let folder = root().join("target").join("proofs");
@@ -86,12 +86,12 @@ fn verify() -> Outcome {
 fn docs() -> Outcome {
     let mut command = cargo();
     command.args(["doc", "--workspace", "--no-deps", "--document-private-items", "--quiet"]);
-    // Private items are documented for those who work here; public text may link to them.
+    // Private items are documented for contributors; public text may link to them.
     command.env("RUSTDOCFLAGS", "-D warnings -A rustdoc::private_intra_doc_links");
     crate::repository::run(&mut command, "cargo doc")
 }
 
-/// Each crate alone, with its default features and with none.
+/// Checks each crate alone, with its default features and with none.
 fn features() -> Outcome {
     for member in members()?.iter().filter(|member| member.published) {
         for features in [&["--quiet"][..], &["--quiet", "--no-default-features"]] {
@@ -101,8 +101,8 @@ fn features() -> Outcome {
     Ok(())
 }
 
-/// The same file from one thread and two, from a debug and a release build: that which the tests run, and
-/// this program.
+/// Checks that one thread and two, a debug and a release build (that of the tests, and this
+/// program) write the same file.
 fn determinism() -> Outcome {
     if cfg!(debug_assertions) {
         return Err("run it by `cargo xtask`, which is a release build".into());

@@ -1,9 +1,9 @@
-//! Circles of the files of a crate, and of its folders: each uses the next, and the last the first. Folders
-//! without circles have an order in which each uses those below it alone.
+//! Dependency cycles between the files of a crate, and between its folders. Folders without cycles
+//! have an order in which each uses only those below it.
 //!
-//! A file uses another if it names something of it, by `use` or by a path that starts with `crate`, `self`,
-//! `super` or a module of its own. What a file makes public of its own modules (`pub use`) is no use. Tests
-//! within a file, and files `tests.rs`, do not count.
+//! A file uses another if it names one of its items, by `use` or by a path that starts with
+//! `crate`, `self`, `super` or a module of its own. Re-exports of a file's own modules (`pub use`)
+//! do not count. Neither do tests within a file, and files `tests.rs`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,13 +15,13 @@ use syn::visit::{self, Visit};
 
 use crate::repository::Outcome;
 
-/// A module by the names on the way from the root of the crate, which has none.
+/// Path of a module from the root of the crate; empty for the root.
 type Module = Vec<String>;
 
-/// A line for each circle of the sources in a folder.
+/// Returns a line for each cycle in the sources of a folder.
 ///
 /// # Errors
-/// When a source cannot be read or is no Rust.
+/// If a source cannot be read or is not valid Rust.
 pub(crate) fn circles(sources: &Path) -> Outcome<Vec<String>> {
     let mut files = BTreeMap::new();
     collect(sources, &Module::new(), &mut files)?;
@@ -33,7 +33,7 @@ pub(crate) fn circles(sources: &Path) -> Outcome<Vec<String>> {
     Ok(circles_among(&parsed.collect::<Outcome<BTreeMap<Module, syn::File>>>()?))
 }
 
-/// The same of files that are read.
+/// Returns a line for each cycle among parsed files.
 fn circles_among(files: &BTreeMap<Module, syn::File>) -> Vec<String> {
     let known: Vec<&Module> = files.keys().collect();
     let root = Module::new();
@@ -54,7 +54,7 @@ fn circles_among(files: &BTreeMap<Module, syn::File>) -> Vec<String> {
     circles_of(&between).into_iter().map(|circle| format!("folders {circle}")).collect()
 }
 
-/// A line for each circle of these arrows.
+/// Returns a line for each cycle of these edges.
 fn circles_of(arrows: &[(Module, Module)]) -> Vec<String> {
     let mut graph = DiGraph::<&Module, ()>::new();
     let mut nodes = BTreeMap::new();
@@ -71,7 +71,7 @@ fn circles_of(arrows: &[(Module, Module)]) -> Vec<String> {
     told.collect()
 }
 
-/// The files in a folder, by the modules that they are.
+/// Collects the files in a folder by their modules.
 fn collect(folder: &Path, module: &Module, files: &mut BTreeMap<Module, PathBuf>) -> Outcome {
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
@@ -87,14 +87,14 @@ fn collect(folder: &Path, module: &Module, files: &mut BTreeMap<Module, PathBuf>
         if path.is_dir() {
             collect(&path, &own, files)?;
         } else if path.extension().is_some_and(|extension| extension == "rs") {
-            // A crate with both has its modules in the library.
+            // A crate with both a library and a program has its modules in the library.
             files.entry(own).or_insert(path);
         }
     }
     Ok(())
 }
 
-/// The names that the root of a crate has from its modules, with these.
+/// Returns the names that the root of a crate re-exports from these modules.
 fn exported(root: &syn::File, known: &[&Module]) -> BTreeMap<String, Module> {
     let mut names = BTreeMap::new();
     for item in &root.items {
@@ -112,7 +112,7 @@ fn exported(root: &syn::File, known: &[&Module]) -> BTreeMap<String, Module> {
     names
 }
 
-/// The paths of a tree of `use`, each with the name that it gives.
+/// Collects the paths of a `use` tree, each with the name that it introduces.
 fn flatten(tree: &syn::UseTree, before: &mut Module, paths: &mut Vec<(Module, String)>) {
     match tree {
         syn::UseTree::Path(path) => {
@@ -133,7 +133,7 @@ fn flatten(tree: &syn::UseTree, before: &mut Module, paths: &mut Vec<(Module, St
     }
 }
 
-/// The longest start of a path that is a module with a file.
+/// Returns the longest prefix of a path that is a module with a file.
 fn longest(path: &[String], known: &[&Module]) -> Option<Module> {
     let starts = (1..=path.len()).rev().map(|length| path[..length].to_vec());
     starts.into_iter().find(|start| known.contains(&start))
@@ -171,7 +171,7 @@ impl Uses<'_> {
     }
 }
 
-/// Whether something is there for tests or documentation alone.
+/// Returns `true` if an item exists for tests or documentation only.
 fn is_aside(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         let syn::Meta::List(list) = &attribute.meta else { return false };

@@ -1,4 +1,4 @@
-//! `cargo xtask demo`: the main job on a real scan.
+//! `cargo xtask demo`: the main use of the library on a real scan.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -11,14 +11,14 @@ use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
 use crate::repository::{Outcome, root};
 
-/// Where the second copy stands along its way in, in sampling radii past first touch.
+/// Positions of the second copy on its path, in sampling radii past first touch.
 const STEPS: [f64; 16] =
     [-20.0, -10.0, -6.0, -3.0, -2.0, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 2.0, 3.0, 6.0, 10.0];
 
-/// The way in for the picture: this far past first touch.
+/// Position of the second copy in the picture, in sampling radii past first touch.
 const PICTURED: f64 = 6.0;
 
-/// The second copy comes from here, turned like this.
+/// Direction from which the second copy comes.
 const FROM: [f64; 3] = [0.1, 0.2, 1.0];
 const TURNED: ([f64; 3], f64) = ([0.0, 1.0, 0.0], 0.6);
 
@@ -46,7 +46,7 @@ pub(crate) fn run() -> Outcome {
     let certified = CollideOptions::default().with_evidence(Evidence::Certified);
     let plan = CollidePlan::new(&certified, &scan, &scan)?;
     let a = scan.at(&Pose::IDENTITY);
-    // Warm: the first question pays for memory.
+    // Warm up: the first query allocates memory.
     Pair::new(a, scan.at(&pose(&scan, touch))).collide(&plan, &mut scratch);
     for offset in STEPS {
         let b_pose = pose(&scan, touch - offset * r);
@@ -63,7 +63,7 @@ pub(crate) fn run() -> Outcome {
     Ok(())
 }
 
-/// Prepares the shipped scan, saves it, opens it mapped.
+/// Preprocesses the shipped scan, saves it and opens it mapped.
 fn prepared(path: &std::path::Path) -> Outcome<Scan> {
     let source = dragon_path(Dragon::Points23k);
     let start = now();
@@ -89,7 +89,8 @@ fn prepared(path: &std::path::Path) -> Outcome<Scan> {
     Ok(scan)
 }
 
-/// The second copy at this distance on its way in, both about the middle of the scan's bounds.
+/// Returns the pose of the second copy at this distance, both about the middle of the scan's
+/// bounds.
 fn pose(scan: &Scan, distance: f64) -> Pose {
     let middle = scan.bounds().centre();
     let turn = Pose::from_axis_angle(TURNED.0, TURNED.1);
@@ -99,7 +100,7 @@ fn pose(scan: &Scan, distance: f64) -> Pose {
     turn.with_translation([0, 1, 2].map(|k| at[k] - moved[k]))
 }
 
-/// The least distance of any two points: twice the radius at which balls about them come to touch.
+/// Returns the least distance of any two points: twice the radius at which balls about them touch.
 fn least_distance(scan: &Scan, a: &Placed<'_>, b: &Placed<'_>, scratch: &mut Scratch) -> Outcome<f64> {
     let (mut apart, mut touching) = (0.0, 20.0 * scan.sampling_radius());
     for _ in 0..16 {
@@ -115,8 +116,8 @@ fn least_distance(scan: &Scan, a: &Placed<'_>, b: &Placed<'_>, scratch: &mut Scr
     Ok(2.0 * apart)
 }
 
-/// The distance at which the points, not the surfaces, first come within r of each other: by bisection from
-/// afar on the exact question for thickened points.
+/// Returns the distance at which the points, not the surfaces, first come within r of each other,
+/// by bisection from far away with the exact query for thickened points.
 fn first_touch(scan: &Scan) -> Outcome<f64> {
     let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.5 * scan.sampling_radius()));
     let plan = CollidePlan::new(&balls, scan, scan)?;
@@ -127,7 +128,7 @@ fn first_touch(scan: &Scan) -> Outcome<f64> {
     };
     let half = scan.bounds().half_extents();
     let mut apart = 2.0 * half.iter().map(|x| x * x).sum::<f64>().sqrt();
-    // Step in until something touches, then halve.
+    // Step in until the copies touch, then bisect.
     let step = 2.0 * scan.sampling_radius();
     while apart > 0.0 && !touches(apart - step) {
         apart -= step;
@@ -154,7 +155,7 @@ fn print_row(offset: f64, answer: &Answer, [distance, r]: [f64; 2], micros: f64)
         Verdict::Undecided(_) => ("undecided", "", none(), none()),
     };
     let spent = answer.statistics;
-    // Points r apart, surfaces touching some r further in.
+    // The points are r apart; the surfaces touch about r further in.
     let close = if (0.0..=2.0).contains(&offset) { '~' } else { ' ' };
     println!(
         "{close}{offset:>7.1}  {verdict:<10} {evidence:<10} {distance:>8.2} {gap:>8} {residual:>9} {micros:>9.1} {:>12} {:>11}",

@@ -1,7 +1,7 @@
-//! `cargo xtask field`: the picture of Klein & Zachmann 2004, Fig. 6, and what it says in numbers.
+//! `cargo xtask field`: the picture of Klein & Zachmann 2004, Fig. 6, and its content in numbers.
 //!
-//! f over a slice of a noisy scan with the covariance about x and about a(x), and a table of how often its
-//! normal changes sides near the surface.
+//! The picture shows f over a slice of a noisy scan, with the covariance about x and about a(x). A
+//! table counts how often the normal changes sides near the surface.
 
 mod flips;
 mod paint;
@@ -31,9 +31,10 @@ const NOISES: [f64; 5] = [0.0, 0.05, 0.1, 0.15, 0.2];
 #[derive(Debug, Parser)]
 #[command(bin_name = "cargo xtask field")]
 struct Args {
-    /// Prepared scans, or raw inputs. Without any the table is about those that come with the repository
+    /// Preprocessed scans, or raw inputs. Without any, the table is about the scans of the
+    /// repository
     scans: Vec<PathBuf>,
-    /// The picture
+    /// File of the picture
     #[arg(short, long, value_name = "OUT.png", required_unless_present = "table")]
     output: Option<PathBuf>,
     /// Count flips near the surface instead, for noise of 0 to 20 % of the spacing
@@ -42,24 +43,24 @@ struct Args {
     /// Standard deviation of the noise, in spacings
     #[arg(long, default_value_t = 0.1)]
     noise: f64,
-    /// Of the noise, and of the places of the table
+    /// Seed of the noise, and of the places of the table
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// The middle of the slice; by default where the surface turns most
+    /// Middle of the slice; by default where the surface turns most
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "normal", allow_hyphen_values = true)]
     at: Option<Vector3<f64>>,
-    /// The direction in which the slice is looked at
+    /// Normal of the slice, towards the viewer
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, requires = "at", allow_hyphen_values = true)]
     normal: Option<Vector3<f64>>,
-    /// A side of the slice, in sampling radii
+    /// Side of the slice, in sampling radii
     #[arg(long, default_value_t = 24.0)]
     width: f64,
-    /// Pairs of places for each line of the table
+    /// Number of pairs of places for each line of the table
     #[arg(long, default_value_t = 500_000)]
     pairs: u64,
 }
 
-/// Paints or counts as `args` say, the command's own name first.
+/// Paints or counts according to `args`, whose first word is the command's name.
 pub(crate) fn run(args: impl IntoIterator<Item = OsString>) -> Outcome {
     let args = Args::parse_from(args);
     if args.table {
@@ -125,7 +126,7 @@ fn paint(args: &Args, path: &Path, output: &Path) -> Outcome {
     Ok(())
 }
 
-/// A line for each object and noise, as it is counted.
+/// Prints a line for each object and noise as soon as it is counted.
 fn table(args: &Args) -> Outcome {
     println!(
         "Flips of n per million evaluations of f within h of the surface; pairs of places 0.1 h apart, {} a line.\n",
@@ -151,7 +152,7 @@ fn table(args: &Args) -> Outcome {
     Ok(())
 }
 
-/// What the table is about.
+/// Returns the scans of the table with their names.
 fn subjects(paths: &[PathBuf]) -> Outcome<Vec<(String, Scan)>> {
     if !paths.is_empty() {
         return paths.iter().map(|path| Ok((name(path), open(path)?))).collect();

@@ -1,7 +1,8 @@
-//! `cargo xtask fuzz [TARGET] [SECONDS]`: builds the fuzz targets with coverage, makes seeds, runs them.
+//! `cargo xtask fuzz [TARGET] [SECONDS]`: builds the fuzz targets with coverage, makes seeds, runs
+//! them.
 //!
-//! What cargo-fuzz does, without a nightly toolchain: the instrumentation is LLVM's, and the flags that ask
-//! for it are passed through.
+//! This does what cargo-fuzz does, without a nightly toolchain: LLVM instruments the code, and the
+//! flags for it are passed through.
 
 use std::fs;
 use std::path::PathBuf;
@@ -17,15 +18,15 @@ use crate::repository::{Outcome, cargo, root, run as run_command};
 const TARGETS: [&str; 13] =
     ["container", "slices", "lines", "ply", "pcd", "obj", "xyz", "las", "e57", "npy", "stl", "off", "gltf"];
 
-/// Edges are counted in place, and comparisons tell the fuzzer what they wanted.
+/// Flags that count edges inline, and pass the operands of comparisons to the fuzzer.
 const FLAGS: &str = "--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
     -Cllvm-args=-sanitizer-coverage-trace-compares -Cdebug-assertions -Ccodegen-units=1";
 
-/// Long enough for every sort of section and row, short enough for thousands a second.
+/// Long enough for every kind of section and row, short enough for thousands of inputs a second.
 const LONGEST_INPUT: u32 = 16_384;
 
-/// Runs the target that `words` name, or all, for as many seconds as they say, or sixty.
+/// Runs the named target, or all, for the given number of seconds, or sixty.
 pub(crate) fn run(words: &[&str]) -> Outcome {
     let (names, rest): (&[&str], _) = match words {
         [name, rest @ ..] if TARGETS.contains(name) => (&words[..1], rest),
@@ -65,7 +66,8 @@ fn usage() -> String {
     format!("usage: cargo xtask fuzz [{}] [SECONDS]", TARGETS.join("|"))
 }
 
-/// The platform that the compiler runs on: named, so that build scripts are not instrumented.
+/// Returns the platform that the compiler runs on. It is named so that build scripts are not
+/// instrumented.
 fn host() -> Outcome<String> {
     let output = Command::new("rustc").arg("-vV").current_dir(root()).output()?;
     let text = String::from_utf8(output.stdout)?;
@@ -73,7 +75,7 @@ fn host() -> Outcome<String> {
     Ok(host.ok_or("rustc names no host")?.to_owned())
 }
 
-/// Small sound inputs of every sort.
+/// Returns small valid inputs of every kind.
 fn seeds(target: &str) -> Outcome<Vec<Vec<u8>>> {
     let endings: &[&str] = match target {
         "container" => return containers(),
@@ -88,7 +90,7 @@ fn seeds(target: &str) -> Outcome<Vec<Vec<u8>>> {
     Ok(files::all().into_iter().filter(|(name, _)| has_ending(name)).map(|(_, bytes)| bytes).collect())
 }
 
-/// Poses, shapes, boxes and a route, behind a byte that says which.
+/// Poses, shapes, boxes and a route, each after a byte that selects the kind.
 const LINES: [&str; 4] = [
     "\u{0}{\"a\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],\"b\":[1,0,0,0.5,0,1,0,0,0,0,1,0.2,0,0,0,1]}\n",
     "\u{1}{\"sphere\":{\"centre\":[0,0,1],\"radius\":0.5}}\n",
@@ -96,7 +98,7 @@ const LINES: [&str; 4] = [
     "\u{3}{\"start\":[0.2,0.2,0],\"points\":[[1,1],[1.5,0.5]]}\n",
 ];
 
-/// The files of a small map, each behind a byte that says which it is.
+/// Returns the files of a small map, each after a byte that selects the kind.
 fn slices() -> Outcome<Vec<Vec<u8>>> {
     let points: Vec<[f64; 3]> = arbitrary::cloud(CloudKind::Sphere, 300, 3);
     let bounds = Aabb::of(points.iter().copied());
@@ -113,7 +115,7 @@ fn slices() -> Outcome<Vec<Vec<u8>>> {
     (0..).zip(&files).map(seed).collect()
 }
 
-/// Prepared scans, behind a byte that says how they are checked.
+/// Returns preprocessed scans, each after a byte that selects the check.
 fn containers() -> Outcome<Vec<Vec<u8>>> {
     let mut seeds = Vec::new();
     for (kind, points, leaf_size) in [

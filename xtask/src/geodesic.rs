@@ -30,7 +30,7 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     Ok(())
 }
 
-/// Opens a prepared scan, or prepares one with a graph.
+/// Opens a preprocessed scan, or preprocesses one with a graph.
 fn prepared(path: &Path) -> Outcome<Scan> {
     if path.extension().is_some_and(|extension| extension == "nm") {
         return Ok(Scan::open(path, Check::Structure)?);

@@ -1,4 +1,4 @@
-//! `cargo xtask inventory [COMMIT]`: the size of the libraries, beside that of an earlier commit.
+//! `cargo xtask inventory [COMMIT]`: the size of the libraries, compared with an earlier commit.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ struct Inventory {
 }
 
 impl Inventory {
-    /// The rows of the table.
+    /// Returns the rows of the table.
     fn rows(&self) -> [(&'static str, usize); 5] {
         [
             ("source files", self.files),
@@ -32,7 +32,7 @@ impl Inventory {
     }
 }
 
-/// Prints the inventory of the working tree, and that of the commit that `words` name, if they do.
+/// Prints the inventory of the working tree, and that of the commit in `words` if there is one.
 pub(crate) fn run_with(words: &[&str]) -> Outcome {
     let now = Inventory::of(&root().join("crates"))?;
     match words {
@@ -54,7 +54,7 @@ pub(crate) fn run_with(words: &[&str]) -> Outcome {
     Ok(())
 }
 
-/// The folder of crates at a commit, in the target folder.
+/// Unpacks the folder of crates at a commit into the target folder.
 fn unpacked(commit: &str) -> Outcome<PathBuf> {
     let folder = root().join("target").join("inventory");
     if folder.exists() {
@@ -75,7 +75,7 @@ fn unpacked(commit: &str) -> Outcome<PathBuf> {
 }
 
 impl Inventory {
-    /// The inventory of the sources of all crates in a folder.
+    /// Returns the inventory of the sources of all crates in a folder.
     fn of(crates: &Path) -> Outcome<Self> {
         let mut all = Self::default();
         for entry in fs::read_dir(crates)? {
@@ -109,7 +109,7 @@ impl Inventory {
     }
 }
 
-/// Whether a loop takes what comes next from a stack, a queue or a heap.
+/// A visitor that records if a loop takes its next item from a stack, a queue or a heap.
 #[derive(Default)]
 struct Takes(bool);
 
@@ -157,7 +157,7 @@ impl<'ast> Visit<'ast> for Inventory {
     fn visit_expr_while(&mut self, item: &'ast syn::ExprWhile) {
         let mut takes = Takes::default();
         takes.visit_expr_while(item);
-        // Of nested loops the outermost counts.
+        // Of nested loops, the outermost counts.
         self.descents += usize::from(takes.0);
     }
 

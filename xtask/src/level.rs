@@ -7,7 +7,7 @@ use nearmiss_testdata::dragon::{Dragon, dragon_path};
 
 use crate::repository::{Outcome, root};
 
-/// Shown unless others are asked for.
+/// Levels shown by default.
 const DEPTHS: [u32; 3] = [1, 4, 7];
 
 pub(crate) fn run(words: &[&str]) -> Outcome {
@@ -32,7 +32,7 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     Ok(())
 }
 
-/// Opens a prepared scan, or prepares one.
+/// Opens a preprocessed scan, or preprocesses one.
 fn prepared(path: &Path) -> Outcome<Scan> {
     if path.extension().is_some_and(|extension| extension == "nm") {
         return Ok(Scan::open(path, Check::Structure)?);

@@ -1,19 +1,19 @@
 //! `cargo xtask …`: the commands of `nearmiss` on a fresh checkout, and repository chores.
 //!
-//! * `demo` — the main job on a real scan, with a table and a picture.
-//! * `tidy` — what compilers do not check; `ci` — every check, as `test` without names.
-//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, those of their paper of 2005, and tables and
-//!   plots of dos Anjos et al. 2012, measured.
-//! * `test [tidy|format|lints|docs|features|packages|tests|verify|determinism …]` — every check, or those
-//!   named.
+//! * `demo` — the main use on a real scan, with a table and a picture.
+//! * `tidy` — checks that compilers do not make; `ci` — every check, as `test` without names.
+//! * `tables` — Table 1 and the plots of Klein & Zachmann 2004, those of Klein & Zachmann 2005, and
+//!   tables and plots of dos Anjos et al. 2012, measured.
+//! * `test [tidy|format|lints|docs|features|packages|tests|verify|determinism …]` — every check, or
+//!   the named ones.
 //! * `geodesic` — a picture of the graph of a scan, coloured by the distance from a point along it.
-//! * `inventory [COMMIT]` — the size of the libraries, beside that of an earlier commit.
+//! * `inventory [COMMIT]` — the size of the libraries, compared with an earlier commit.
 //! * `level` — a picture of levels of a hierarchy: samples and the balls that cover their nodes.
-//! * `check-proof` — whether what `collide --prove` wrote holds.
+//! * `check-proof` — check the output of `collide --prove`.
 //! * `field` — f over a slice of a noisy scan, and how often its normal changes sides.
-//! * `readers` — install readers of other people, whose points a test compares with ours.
-//! * `fuzz [TARGET] [SECONDS]` — feed the readers with inputs that a fuzzer makes up; see fuzz/README.md.
-//! * anything else — as `nearmiss` would do it: `cargo xtask preprocess scan.ply -o scan.nm`.
+//! * `readers` — install third-party readers, whose points a test compares with ours.
+//! * `fuzz [TARGET] [SECONDS]` — run the readers on inputs from a fuzzer; see fuzz/README.md.
+//! * anything else — the command of `nearmiss`: `cargo xtask preprocess scan.ply -o scan.nm`.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 mod checks;

@@ -1,11 +1,11 @@
-//! Installs readers of other people, in a Python environment of the repository's own: a test compares their
-//! points with ours, and is skipped where they are missing.
+//! Installs third-party readers in a Python environment of the repository's own. A test compares
+//! their points with ours, and is skipped without them.
 
 use std::process::Command;
 
 use crate::repository::{Outcome, root, run as run_command};
 
-/// Makes the environment `target/readers` and installs `readers/requirements.txt` there.
+/// Creates the environment `target/readers` and installs `readers/requirements.txt` there.
 pub(crate) fn run() -> Outcome {
     let environment = root().join("target/readers");
     run_command(Command::new("python3").args(["-m", "venv"]).arg(&environment), "python3")?;

@@ -1,38 +1,38 @@
-//! Where things are, and how to run cargo on them.
+//! Paths and members of the repository, and how to run cargo on it.
 
 use std::error::Error;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What chores fail with.
+/// The result of a chore.
 pub(crate) type Outcome<T = ()> = Result<T, Box<dyn Error>>;
 
-/// The root of the repository.
+/// Returns the root of the repository.
 pub(crate) fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).to_owned()
 }
 
-/// The cargo that runs this.
+/// Returns a command of the cargo that runs this program.
 pub(crate) fn cargo() -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo")));
     command.current_dir(root());
     command
 }
 
-/// Runs cargo with these arguments; its output is shown.
+/// Runs cargo with these arguments and shows its output.
 pub(crate) fn run_cargo(args: &[&str]) -> Outcome {
     run(cargo().args(args), &format!("cargo {}", args.join(" ")))
 }
 
-/// Runs a command; its output is shown.
+/// Runs a command and shows its output.
 pub(crate) fn run(command: &mut Command, name: &str) -> Outcome {
     let status = command.status()?;
     if status.success() { Ok(()) } else { Err(format!("`{name}` failed: {status}").into()) }
 }
 
-/// What cargo prints with these arguments.
+/// Returns the output of cargo with these arguments.
 pub(crate) fn ask_cargo(args: &[&str]) -> Outcome<String> {
     let output = cargo().args(args).stderr(std::process::Stdio::inherit()).output()?;
     if !output.status.success() {
@@ -47,11 +47,11 @@ pub(crate) struct Member {
     pub(crate) name: String,
     pub(crate) folder: PathBuf,
     pub(crate) published: bool,
-    /// Members and others it depends on, development apart.
+    /// Members and other crates that this one depends on, without development dependencies.
     pub(crate) dependencies: Vec<String>,
 }
 
-/// The members of the workspace, by name.
+/// Returns the members of the workspace by name.
 pub(crate) fn members() -> Outcome<Vec<Member>> {
     let text = ask_cargo(&["metadata", "--no-deps", "--format-version", "1"])?;
     let metadata: serde_json::Value = serde_json::from_str(&text)?;

@@ -3,16 +3,16 @@
 
 use crate::repository::{Outcome, root, run_cargo};
 
-/// Where the objects lie that are no part of the repository, from its root.
+/// Folder of the objects that are not in the repository, from its root.
 const OBJECTS: &str = "../shared/data";
 
-/// Programs and their words for each paper.
+/// Program and arguments for each paper.
 const PAPERS: [[&str; 2]; 3] = [["papers", "klein2004"], ["papers", "klein2005"], ["memory", "anjos2012"]];
 
-/// Papers that can be asked for alone.
+/// Papers that can be measured alone.
 const YEARS: [(&str, [&str; 2]); 2] = [("--2005", PAPERS[1]), ("--2012", PAPERS[2])];
 
-/// Measures, with these words after the program's name; with the folder of objects, if it is there and none
+/// Measures with these additional arguments, and with the folder of objects if it exists and none
 /// is named.
 pub(crate) fn run(words: &[&str]) -> Outcome {
     let folder = root().join(OBJECTS);
@@ -20,7 +20,7 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     let folder = folder.to_string_lossy();
     let data: &[&str] = if found { &["--data", &folder] } else { &[] };
     let here = std::env::current_dir()?;
-    // Cargo runs programs in the repository's root, whoever calls.
+    // Cargo runs programs in the root of the repository, wherever it is called.
     let mut absolute = Vec::new();
     let mut words = words.iter();
     while let Some(word) = words.next() {
@@ -35,7 +35,7 @@ pub(crate) fn run(words: &[&str]) -> Outcome {
     let words: Vec<&str> = absolute.iter().map(String::as_str).collect();
     let papers = if asked.is_empty() { PAPERS.to_vec() } else { asked };
     for (i, [program, paper]) in papers.into_iter().enumerate() {
-        // Numbers of figures are those of one paper.
+        // Numbers of figures refer to one paper only.
         if i > 0 && words.contains(&"--only") {
             continue;
         }

@@ -1,4 +1,4 @@
-//! `cargo xtask test tidy`: what compilers do not check.
+//! `cargo xtask test tidy`: checks that compilers do not make.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,16 +7,16 @@ use std::process::Command;
 use crate::circles::circles;
 use crate::repository::{Outcome, ask_cargo, members, root};
 
-/// A file longer than this is more than one noun or one step.
+/// The maximum number of lines of a file: a longer one holds more than one noun or one step.
 const MOST_LINES: usize = 500;
 
-/// A comment reaches no further than this column.
+/// The last column that a comment may reach.
 const COMMENT_WIDTH: usize = 110;
 
-/// Names that say nothing about what is inside.
+/// Names that do not describe the content.
 const VAGUE: [&str; 4] = ["utils.rs", "helpers.rs", "types.rs", "common.rs"];
 
-/// Which members of the workspace each crate may use; the table of ARCHITECTURE.md.
+/// The members of the workspace that each crate may use; the table of ARCHITECTURE.md.
 const LAYERS: [(&str, &[&str]); 18] = [
     ("nearmiss-geometry", &[]),
     ("nearmiss-lanes", &[]),
@@ -108,7 +108,7 @@ fn find_faults() -> Outcome<Vec<String>> {
     Ok(faults)
 }
 
-/// Files that git tracks or would track, with this ending.
+/// Returns the files with this ending that git tracks or would track.
 fn tracked(ending: &str) -> Vec<PathBuf> {
     let listing = Command::new("git")
         .current_dir(root())
@@ -146,7 +146,7 @@ fn source_faults(path: &Path, text: &str, references: &str) -> Vec<String> {
     faults
 }
 
-/// Titles in quotation marks in comments, followed by a year soon after.
+/// Returns the titles in quotation marks in comments that a year follows within a few words.
 fn cited_titles(code: &str) -> Vec<String> {
     let comments: Vec<&str> = code
         .lines()
@@ -162,7 +162,7 @@ fn cited_titles(code: &str) -> Vec<String> {
         .collect()
 }
 
-/// Whether a year stands within the next few words.
+/// Returns `true` if a year occurs within the next few words.
 fn names_a_year(after: &str) -> bool {
     let words = after.split(|c: char| !c.is_ascii_alphanumeric()).take(16);
     words.filter_map(|word| word.parse::<u32>().ok()).any(|year| (1900..2100).contains(&year))
@@ -182,7 +182,7 @@ fn readme_faults(folder: &Path) -> Vec<String> {
     faults
 }
 
-/// What would be published: sources and README, no test data.
+/// Checks that packages hold sources and README only, no test data.
 pub(crate) fn packages() -> Outcome {
     let mut faults = Vec::new();
     for member in members()?.iter().filter(|member| member.published) {

@@ -1,10 +1,11 @@
-//! Classes: the points that a surveyor's program gave certain labels.
+//! Classes: keeps the points with certain class codes.
 
 use nearmiss_geometry::PointCloud;
 
 use crate::error::{FilterError, enough};
 
-/// Returns the points whose class is one of those `wanted`, by the codes of LAS: 2 is ground, 6 is buildings.
+/// Returns the points whose class is in `wanted`. Classes are LAS codes: 2 is ground, 6 is
+/// buildings.
 ///
 /// ```
 /// # use nearmiss_geometry::PointCloud;
@@ -17,7 +18,7 @@ use crate::error::{FilterError, enough};
 /// ```
 ///
 /// # Errors
-/// When the cloud has no classes, or fewer than 8 points have one of those.
+/// Fails if the cloud has no classes, or if fewer than 8 points have a wanted class.
 pub fn classes(cloud: &PointCloud, wanted: &[u8]) -> Result<Vec<u32>, FilterError> {
     let classes = cloud.classes().ok_or(FilterError::NoClasses)?;
     let kept = (0_u32..).zip(classes).filter(|(_, class)| wanted.contains(class));

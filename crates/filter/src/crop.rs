@@ -1,13 +1,14 @@
-//! Crop: the points within a box.
+//! Crop: keeps the points within a box.
 
 use nearmiss_geometry::{Aabb, PointCloud};
 
 use crate::error::{FilterError, enough};
 
-/// Returns the points within the box from `min` to `max`, border included, in the frame of the cloud's input.
+/// Returns the points within the box from `min` to `max`, border included, in the frame of the
+/// cloud's input.
 ///
-/// A corner may be infinite, which leaves the box open on that side. Positions are those of the cloud, so a
-/// point may have moved across the border by at most [`PointCloud::step`].
+/// A corner may be infinite, which leaves the box open on that side. The positions compared are
+/// those of the cloud, which differ from the input by at most [`PointCloud::step`].
 ///
 /// ```
 /// # use nearmiss_geometry::PointCloud;
@@ -20,7 +21,8 @@ use crate::error::{FilterError, enough};
 /// ```
 ///
 /// # Errors
-/// When a corner is NaN, when `min` exceeds `max` on an axis, or when fewer than 8 points lie within the box.
+/// Fails if a corner is NaN, if `min` exceeds `max` on an axis, or if fewer than 8 points are in
+/// the box.
 pub fn crop(cloud: &PointCloud, min: [f64; 3], max: [f64; 3]) -> Result<Vec<u32>, FilterError> {
     for axis in 0..3 {
         let (min, max) = (min[axis], max[axis]);

@@ -1,42 +1,42 @@
-//! `FilterError`: the reasons why a filter refuses its parameters or its result.
+//! `FilterError`: the reasons why a filter rejects its parameters or its result.
 
 use thiserror::Error;
 
-/// A cloud needs at least as many points.
+/// Least number of points in a cloud.
 const LEAST_POINTS: usize = 8;
 
-/// Why a cloud cannot be filtered.
+/// Error of a filter.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FilterError {
     /// A length or factor that is zero, negative, infinite or NaN.
     #[error("expected a positive finite {what}, got {value}")]
     NotPositive {
-        /// The parameter.
+        /// Name of the parameter.
         what: &'static str,
-        /// Its value.
+        /// Value of the parameter.
         value: f64,
     },
-    /// No neighbours asked for.
+    /// A neighbour count of 0.
     #[error("expected at least 1 neighbour, got 0")]
     NoNeighbours,
-    /// As many neighbours as points, or more.
+    /// A neighbour count that is not below the number of points.
     #[error("expected fewer neighbours than there are points ({points}), got {neighbours}; ask for fewer")]
     TooManyNeighbours {
-        /// How many neighbours were asked for.
+        /// Number of neighbours requested.
         neighbours: usize,
-        /// How many points the cloud has.
+        /// Number of points in the cloud.
         points: usize,
     },
-    /// Voxels so small that 64 bits cannot number them.
+    /// A voxel size so small that 64 bits cannot number the cells.
     #[error(
         "expected a voxel size of at least {least:e}, got {size:e}; smaller cells at these coordinates \
          cannot be numbered with 64 bits"
     )]
     VoxelTooSmall {
-        /// The size.
+        /// The voxel size given.
         size: f64,
-        /// A size that is large enough.
+        /// A voxel size that is large enough.
         least: f64,
     },
     /// A box with a corner that is NaN.
@@ -45,7 +45,7 @@ pub enum FilterError {
         /// The first such axis, 0 to 2.
         axis: usize,
     },
-    /// A box whose upper corner is below its lower one.
+    /// A box with `min` above `max`.
     #[error("expected min ≤ max on every axis of the box, got {min} to {max} on axis {axis}; swap them")]
     EmptyBox {
         /// The first such axis, 0 to 2.
@@ -55,17 +55,17 @@ pub enum FilterError {
         /// The upper corner there.
         max: f64,
     },
-    /// Classes asked of points that have none.
+    /// A filter by class on points without classes.
     #[error("the points have no classes; only LAS, LAZ and tables with a column `class` have them")]
     NoClasses,
-    /// So few points left that they make no cloud.
+    /// Too few points left for a cloud.
     #[error("expected at least 8 points to stay, got {left} of {points}; {remedy}")]
     TooFewLeft {
-        /// How many points would stay.
+        /// Number of points that would stay.
         left: usize,
-        /// How many points the cloud has.
+        /// Number of points in the cloud.
         points: usize,
-        /// What keeps more of them.
+        /// Advice that keeps more points.
         remedy: &'static str,
     },
 }
@@ -75,7 +75,7 @@ pub(crate) fn positive(what: &'static str, value: f64) -> Result<f64, FilterErro
     if value > 0.0 && value.is_finite() { Ok(value) } else { Err(FilterError::NotPositive { what, value }) }
 }
 
-/// Returns `kept` if it is enough for a cloud.
+/// Returns `kept` if it holds enough points for a cloud.
 pub(crate) fn enough(kept: Vec<u32>, points: usize, remedy: &'static str) -> Result<Vec<u32>, FilterError> {
     let left = kept.len();
     if left < LEAST_POINTS { Err(FilterError::TooFewLeft { left, points, remedy }) } else { Ok(kept) }

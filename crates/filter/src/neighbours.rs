@@ -1,5 +1,4 @@
-//! Least neighbours: the points that have enough others nearby. And the nearest neighbours that filters ask
-//! for.
+//! Filter by neighbour count, and the nearest-neighbour search that filters share.
 
 use std::num::NonZero;
 
@@ -9,7 +8,7 @@ use nearmiss_lanes::parallel;
 
 use crate::error::{FilterError, enough, positive};
 
-/// Returns the points that have at least `n` others within `radius`.
+/// Returns the points that have at least `n` other points within `radius`.
 ///
 /// ```
 /// # use nearmiss_geometry::PointCloud;
@@ -23,11 +22,11 @@ use crate::error::{FilterError, enough, positive};
 /// ```
 ///
 /// # Errors
-/// When `n` is 0 or not below the number of points, when `radius` is not positive and finite, or when fewer
-/// than 8 points stay.
+/// Fails if `n` is 0 or not below the number of points, if `radius` is not positive and finite, or
+/// if fewer than 8 points stay.
 pub fn min_neighbours(cloud: &PointCloud, n: usize, radius: f64) -> Result<Vec<u32>, FilterError> {
     positive("radius", radius)?;
-    // In the local frame, as all distances here.
+    // All distances here are in the local frame.
     let reach = radius / cloud.frame().scale;
     let near = Neighbours::new(cloud, n)?.map(|distances| distances.last().is_some_and(|d| *d <= reach));
     let kept = (0_u32..).zip(near).filter_map(|(id, near)| near.then_some(id)).collect();
@@ -38,7 +37,7 @@ pub fn min_neighbours(cloud: &PointCloud, n: usize, radius: f64) -> Result<Vec<u
 pub(crate) struct Neighbours<'a> {
     cloud: &'a PointCloud,
     tree: ImmutableKdTree<f64, 3>,
-    /// How many neighbours, the point itself not counted.
+    /// Number of neighbours, without the point itself.
     count: NonZero<usize>,
 }
 
@@ -54,10 +53,13 @@ impl<'a> Neighbours<'a> {
         Ok(Self { cloud, tree: tree.expect("positions are finite"), count })
     }
 
-    /// Returns `work` of the distances of each point's nearest neighbours, which ascend, in the local frame.
+    /// Calls `work` for each point with the distances of its nearest neighbours, and returns the
+    /// results.
+    ///
+    /// Distances ascend and are in the local frame.
     pub(crate) fn map<T: Send>(&self, work: impl Fn(&[f64]) -> T + Sync + Send) -> Vec<T> {
         let positions = self.cloud.positions();
-        // The nearest of all is the point itself: points are distinct.
+        // The nearest point found is the point itself, because points are distinct.
         let asked = self.count.saturating_add(1);
         parallel::map_with(positions.len(), Vec::new, |distances, i| {
             let p = positions[i].map(f64::from);

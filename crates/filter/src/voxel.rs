@@ -1,18 +1,20 @@
-//! Voxel grid: one point for each occupied cell.
+//! Voxel grid: keeps one point for each occupied cell.
 
 use nearmiss_geometry::PointCloud;
 use nearmiss_lanes::parallel;
 
 use crate::error::{FilterError, enough, positive};
 
-/// A little less than 2⁶³, so that a quotient below it fits into 64 bits whatever its rounding.
+/// Slightly less than 2⁶³, so that a quotient below it fits into 64 bits however it is rounded.
 const MOST_CELLS: f64 = 9.2e18;
 
-/// Returns one point for each occupied cell of a grid of cubes with edges of length `size`: the point nearest
-/// to the mean of the cell's points, the first of those that are equally near.
+/// Returns one point for each occupied cell of a grid of cubes with edges of length `size`.
 ///
-/// The walls of the cells lie at multiples of `size` in the frame of the cloud's input, so equal places of
-/// different clouds fall into equal cells. A cell contains its lower walls.
+/// The point kept is the one nearest to the mean of the cell's points; of equally near points, the
+/// first.
+///
+/// Cell walls are at multiples of `size` in the frame of the cloud's input, so equal positions in
+/// different clouds are in the same cell. A cell contains its lower walls.
 ///
 /// Takes O(n log n) time and 32 bytes a point.
 ///
@@ -28,14 +30,14 @@ const MOST_CELLS: f64 = 9.2e18;
 /// ```
 ///
 /// # Errors
-/// When `size` is not positive and finite, when 64 bits cannot number the cells, or when fewer than 8 points
-/// stay.
+/// Fails if `size` is not positive and finite, if 64 bits cannot number the cells, or if fewer than
+/// 8 points stay.
 pub fn voxel(cloud: &PointCloud, size: f64) -> Result<Vec<u32>, FilterError> {
     positive("voxel size", size)?;
     let bounds = cloud.bounds();
     let farthest = bounds.min.iter().chain(&bounds.max).fold(0.0, |far: f64, x| far.max(x.abs()));
     if farthest / size >= MOST_CELLS {
-        // Rounded up a little.
+        // The recommended size is rounded up slightly.
         return Err(FilterError::VoxelTooSmall { size, least: farthest / (0.99 * MOST_CELLS) });
     }
     let frame = cloud.frame();
@@ -51,10 +53,11 @@ pub fn voxel(cloud: &PointCloud, size: f64) -> Result<Vec<u32>, FilterError> {
     enough(kept, cloud.len(), "choose a smaller voxel size")
 }
 
-/// The point of a cell that is nearest to the mean of its points.
+/// Returns the point of a cell that is nearest to the mean of the cell's points.
 ///
-/// Compares |n p − Σ p| instead of |p − Σ p / n|, with p relative to the cell's first point: in double
-/// precision this is exact for all but the largest cells, so points that are equally near compare equal.
+/// Compares |n p − Σ p| instead of |p − Σ p / n|, with p relative to the cell's first point. In
+/// double precision this is exact for all but the largest cells, so equally near points compare
+/// equal.
 fn most_central(positions: &[[f32; 3]], cell: &[([i64; 3], u32)]) -> u32 {
     let first = cell[0].1;
     let [x, y, z] = positions[first as usize].map(f64::from);

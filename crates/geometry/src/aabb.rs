@@ -1,8 +1,8 @@
-//! Axis-aligned bounding box, closed, in double precision.
+//! Axis-aligned bounding boxes in double precision.
 
 use serde::{Deserialize, Serialize};
 
-/// An axis-aligned box: all x with `min[k] <= x[k] <= max[k]`.
+/// An axis-aligned bounding box, closed: all x with `min[k] <= x[k] <= max[k]`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Aabb {
     /// Least coordinates.
@@ -12,10 +12,10 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    /// The box of no point; growing it by any point gives that point.
+    /// The empty box. Grown by a point, it contains that point alone.
     pub const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
 
-    /// The least box that contains all `points`; [`Aabb::EMPTY`] when there are none.
+    /// Returns the smallest box that contains all `points`; [`Aabb::EMPTY`] if there are no points.
     #[must_use]
     pub fn of(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let mut bounds = Self::EMPTY;
@@ -25,7 +25,7 @@ impl Aabb {
         bounds
     }
 
-    /// Makes the box contain `p`.
+    /// Grows the box until it contains `p`.
     pub fn grow(&mut self, p: [f64; 3]) {
         for (k, &x) in p.iter().enumerate() {
             self.min[k] = self.min[k].min(x);
@@ -33,25 +33,25 @@ impl Aabb {
         }
     }
 
-    /// Whether `p` lies in the box or on its border.
+    /// Returns `true` if `p` is in the box or on its border.
     #[must_use]
     pub fn contains(&self, p: [f64; 3]) -> bool {
         (0..3).all(|k| self.min[k] <= p[k] && p[k] <= self.max[k])
     }
 
-    /// The middle of the box.
+    /// Returns the centre of the box.
     #[must_use]
     pub fn centre(&self) -> [f64; 3] {
         [0, 1, 2].map(|k| 0.5 * self.min[k] + 0.5 * self.max[k])
     }
 
-    /// Half the edge lengths.
+    /// Returns half the edge lengths.
     #[must_use]
     pub fn half_extents(&self) -> [f64; 3] {
         [0, 1, 2].map(|k| 0.5 * self.max[k] - 0.5 * self.min[k])
     }
 
-    /// The eight corners.
+    /// Returns the eight corners.
     #[must_use]
     pub fn corners(&self) -> [[f64; 3]; 8] {
         std::array::from_fn(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { self.min[k] } else { self.max[k] }))

@@ -1,4 +1,4 @@
-//! `PointCloud`: distinct finite points in single precision about a double-precision origin.
+//! `PointCloud`: distinct finite points in single precision, relative to a double-precision origin.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,28 +13,28 @@ mod sealed {
     impl Sealed for f64 {}
 }
 
-/// A number that a cloud can be built from: `f32` or `f64`.
+/// A coordinate type that a cloud can be built from: `f32` or `f64`.
 pub trait Coordinate: sealed::Sealed + Into<f64> {}
 impl Coordinate for f32 {}
 impl Coordinate for f64 {}
 
-/// How many points were left out, and why.
+/// Numbers of dropped points, by reason.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Dropped {
     /// Points with a NaN or infinite coordinate.
     pub not_finite: usize,
-    /// Points at the very place of an earlier one.
+    /// Points at the same position as an earlier point.
     pub duplicate: usize,
-    /// Points that [`PointCloud::select`] left out.
+    /// Points removed by [`PointCloud::select`].
     pub filtered: usize,
 }
 
-/// Samples of a surface: finite, distinct, at least eight, in the order given.
+/// A point cloud: samples of a surface, finite, distinct, at least eight, in the order given.
 ///
-/// Positions are `f32` in a local [`Frame`] whose origin is `f64`, so a cloud in geographic coordinates keeps
-/// its detail; [`PointCloud::step`] says what rounding costs. A point that rounds onto an earlier one is a
-/// duplicate and dropped: it would say nothing new about the surface. [`PointCloud::source`] leads from a
-/// kept point to its index in the input.
+/// Positions are `f32` in a local [`Frame`] whose origin is `f64`, so a cloud in geographic
+/// coordinates keeps its detail. [`PointCloud::step`] is the greatest rounding error. A point that
+/// rounds to the position of an earlier point is a duplicate and is dropped. [`PointCloud::source`]
+/// maps each kept point to its index in the input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointCloud {
     frame: Frame,
@@ -51,12 +51,14 @@ pub struct PointCloud {
 }
 
 impl PointCloud {
-    /// A cloud of all `positions`, each of which must be finite. Exact duplicates are dropped and counted.
+    /// Creates a cloud of all `positions`, each of which must be finite. Duplicates are dropped and
+    /// counted.
     ///
-    /// Costs a sort, O(n log n).
+    /// Takes O(n log n) time, for a sort.
     ///
     /// # Errors
-    /// Names the first point that is not finite or too large; fails on fewer than 8 distinct points.
+    /// Fails if a point is not finite or too large; the error names the first such point. Fails if
+    /// fewer than 8 points are distinct.
     pub fn from_positions<T: Coordinate>(positions: &[[T; 3]]) -> Result<Self, CloudError> {
         match positions.iter().position(|p| !is_finite(*p)) {
             Some(index) => Err(CloudError::NotFinite { index }),
@@ -64,10 +66,12 @@ impl PointCloud {
         }
     }
 
-    /// A cloud of the finite ones of `positions`; the others, and exact duplicates, are dropped and counted.
+    /// Creates a cloud of the finite `positions`. All others, and duplicates, are dropped and
+    /// counted.
     ///
     /// # Errors
-    /// Names the first point that is too large; fails on fewer than 8 distinct points.
+    /// Fails if a finite point is too large; the error names the first such point. Fails if fewer
+    /// than 8 finite points are distinct.
     pub fn cleaned<T: Coordinate>(positions: &[[T; 3]]) -> Result<Self, CloudError> {
         let given = positions.len();
         let mut intake = Intake::default();
@@ -107,56 +111,56 @@ impl PointCloud {
         })
     }
 
-    /// The same cloud with a normal for each point; `normals` are indexed like the input.
+    /// Adds a normal to each point; `normals` are indexed like the input.
     ///
     /// # Errors
-    /// When there is not one normal for each point of the input.
+    /// Fails if the number of normals differs from the number of points in the input.
     pub fn with_normals(mut self, normals: &[[f32; 3]]) -> Result<Self, CloudError> {
         self.normals = Some(self.gathered(normals)?);
         Ok(self)
     }
 
-    /// The same cloud with a colour for each point; `colours` are indexed like the input.
+    /// Adds a colour to each point; `colours` are indexed like the input.
     ///
     /// # Errors
-    /// When there is not one colour for each point of the input.
+    /// Fails if the number of colours differs from the number of points in the input.
     pub fn with_colours(mut self, colours: &[[u8; 3]]) -> Result<Self, CloudError> {
         self.colours = Some(self.gathered(colours)?);
         Ok(self)
     }
 
-    /// The same cloud with an intensity for each point; `intensities` are indexed like the input.
+    /// Adds an intensity to each point; `intensities` are indexed like the input.
     ///
     /// # Errors
-    /// When there is not one for each point that the cloud was made from.
+    /// Fails if the number of intensities differs from the number of points in the input.
     pub fn with_intensities(mut self, intensities: &[f32]) -> Result<Self, CloudError> {
         self.intensities = Some(self.gathered(intensities)?);
         Ok(self)
     }
 
-    /// The same cloud with a class for each point; `classes` are indexed like the input.
+    /// Adds a class to each point; `classes` are indexed like the input.
     ///
     /// # Errors
-    /// When there is not one for each point that the cloud was made from.
+    /// Fails if the number of classes differs from the number of points in the input.
     pub fn with_classes(mut self, classes: &[u8]) -> Result<Self, CloudError> {
         self.classes = Some(self.gathered(classes)?);
         Ok(self)
     }
 
-    /// The same cloud with the places of the scanners that took it; of points in two of their ranges, the
-    /// first counts.
+    /// Adds the positions of the scanners that took the cloud. Where the ranges of two scanners
+    /// overlap, the first scanner counts.
     #[must_use]
     pub fn with_scanners(mut self, scanners: Vec<Scanner>) -> Self {
         self.scanners = scanners;
         self
     }
 
-    /// Returns the cloud of the points with these `ids`, which are indices into [`PointCloud::positions`] in
+    /// Returns the cloud of the points with these `ids`: indices into [`PointCloud::positions`], in
     /// ascending order.
     ///
-    /// Normals, colours, intensities and classes follow their points. The frame and [`PointCloud::step`] stay
-    /// as they are, [`PointCloud::dropped`] counts the other points, and [`PointCloud::source`] still leads
-    /// to indices of the input.
+    /// Normals, colours, intensities and classes follow their points. The frame and
+    /// [`PointCloud::step`] stay the same. [`PointCloud::dropped`] counts the points left out, and
+    /// [`PointCloud::source`] still holds indices of the input.
     ///
     /// ```
     /// # use nearmiss_geometry::PointCloud;
@@ -171,7 +175,8 @@ impl PointCloud {
     /// ```
     ///
     /// # Errors
-    /// Names the first index that is out of range or out of order; fails on fewer than 8 indices.
+    /// Fails if an index is out of range or out of order; the error names the first such index.
+    /// Fails if there are fewer than 8 indices.
     pub fn select(&self, ids: &[u32]) -> Result<Self, CloudError> {
         let points = self.len();
         if let Some(pair) = ids.windows(2).find(|pair| pair[0] >= pair[1]) {
@@ -204,83 +209,84 @@ impl PointCloud {
         Ok(self.source.iter().map(|&i| values[i as usize]).collect())
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a cloud has at least eight points")]
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Positions in the local frame.
+    /// Returns the positions in the local frame.
     #[must_use]
     pub fn positions(&self) -> &[[f32; 3]] {
         &self.positions
     }
 
-    /// Position of the `i`-th kept point in the caller's frame.
+    /// Returns the position of point `i` in the caller's frame.
     ///
     /// # Panics
-    /// When `i` is not below [`PointCloud::len`].
+    /// Panics if `i` is not below [`PointCloud::len`].
     #[must_use]
     pub fn point(&self, i: usize) -> [f64; 3] {
         self.frame.to_world(self.positions[i])
     }
 
-    /// For each kept point its index in the input.
+    /// Returns the index in the input of each kept point.
     #[must_use]
     pub fn source(&self) -> &[u32] {
         &self.source
     }
 
-    /// The frame of the stored positions.
+    /// Returns the local frame of the positions.
     #[must_use]
     pub fn frame(&self) -> Frame {
         self.frame
     }
 
-    /// What was left out of the input.
+    /// Returns the numbers of input points that were dropped.
     #[must_use]
     pub fn dropped(&self) -> Dropped {
         self.dropped
     }
 
-    /// Greatest change of a coordinate by rounding to `f32`, in the caller's units.
+    /// Returns the greatest change of a coordinate by rounding to `f32`, in the caller's units.
     #[must_use]
     pub fn step(&self) -> f64 {
         self.step
     }
 
-    /// Normals as the input had them, if any; neither unit nor consistent unless the input's are.
+    /// Returns the normals of the input, if any. They are unit and consistently oriented only if
+    /// the input's are.
     #[must_use]
     pub fn normals(&self) -> Option<&[[f32; 3]]> {
         self.normals.as_deref()
     }
 
-    /// Colours, red green blue, if any.
+    /// Returns the colours as red, green, blue, if any.
     #[must_use]
     pub fn colours(&self) -> Option<&[[u8; 3]]> {
         self.colours.as_deref()
     }
 
-    /// Intensities in the unit of the input, if any.
+    /// Returns the intensities in the units of the input, if any.
     #[must_use]
     pub fn intensities(&self) -> Option<&[f32]> {
         self.intensities.as_deref()
     }
 
-    /// Classes by the codes of LAS, if any: 2 is ground, 6 is buildings.
+    /// Returns the classes as LAS codes, if any: 2 is ground, 6 is buildings.
     #[must_use]
     pub fn classes(&self) -> Option<&[u8]> {
         self.classes.as_deref()
     }
 
-    /// Where the scanners stood that took the cloud, as far as the input says.
+    /// Returns the positions of the scanners that took the cloud, as far as the input gives them.
     #[must_use]
     pub fn scanners(&self) -> &[Scanner] {
         &self.scanners
     }
 
-    /// Bounds in the caller's frame.
+    /// Returns the bounding box in the caller's frame.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         Aabb::of(self.positions.iter().map(|&p| self.frame.to_world(p)))
@@ -295,7 +301,8 @@ fn is_finite<T: Coordinate>(p: [T; 3]) -> bool {
     p.iter().all(|x| (*x).into().is_finite())
 }
 
-/// The first of each group of equal positions, in the order given. O(n log n), 16 bytes a point.
+/// Returns the first of each group of equal positions, in the order given. Takes O(n log n) time
+/// and 16 bytes a point.
 fn distinct(points: Vec<[f32; 3]>, source: Vec<u32>) -> (Vec<[f32; 3]>, Vec<u32>) {
     let repeated = Repeated::among(&points, &mut vec![0; points.len()]);
     if repeated.count() == 0 {
@@ -335,7 +342,7 @@ mod tests {
 
     #[test]
     fn points_are_told_apart_as_by_a_set() {
-        // So many that hashes of different points are equal too.
+        // With 200,000 points, hashes of different points collide too.
         let mut state = 1_u64;
         let mut coordinate = |of: u64| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -1,8 +1,8 @@
-//! Why points do not make a cloud.
+//! `CloudError`: the reasons why points are rejected as a cloud.
 
 use thiserror::Error;
 
-/// Why points do not make a cloud.
+/// Error of building or changing a [`PointCloud`](crate::PointCloud).
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum CloudError {
@@ -23,36 +23,36 @@ pub enum CloudError {
     /// Too few distinct finite points.
     #[error("{distinct} distinct finite points of {given} given; at least 8 are needed")]
     TooFew {
-        /// How many distinct finite points there are.
+        /// Number of distinct finite points.
         distinct: usize,
-        /// How many were given.
+        /// Number of points given.
         given: usize,
     },
-    /// More points than a 32-bit id can name.
+    /// More points than a 32-bit id can number.
     #[error("{given} points; at most 4294967295 can be told apart by a 32-bit id")]
     TooMany {
-        /// How many were given.
+        /// Number of points given.
         given: usize,
     },
-    /// Attributes, as normals, that do not belong to the points given.
+    /// Attributes, such as normals, whose number differs from the number of points given.
     #[error(
         "expected an attribute for each of {points} points, got {given}; give one for each point of the input"
     )]
     AttributeCount {
-        /// How many attributes were given.
+        /// Number of attributes given.
         given: usize,
-        /// How many points the cloud was made from.
+        /// Number of points in the cloud's input.
         points: usize,
     },
-    /// An index that no point of the cloud has.
+    /// An index out of range.
     #[error("expected indices below {points}, got {index}; use indices of the cloud, not of its input")]
     NoSuchPoint {
-        /// The first such index.
+        /// The first index out of range.
         index: u32,
-        /// How many points the cloud has.
+        /// Number of points in the cloud.
         points: usize,
     },
-    /// Indices out of order or repeated.
+    /// Indices that are out of order or repeated.
     #[error("expected ascending indices, got {index} after {before}; sort them and remove duplicates")]
     NotAscending {
         /// The first index that is out of order.

@@ -2,10 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// world = origin + scale · local; the scale is a power of two, 1 unless the extent leaves 2^±30.
+/// The local frame of a cloud: world = `origin` + `scale` · local.
+///
+/// `scale` is a power of two. It is 1 unless the extent is outside 2^±30.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
-    /// Where the local zero lies, in the caller's frame.
+    /// Origin of the local frame, in the caller's frame.
     pub origin: [f64; 3],
     /// Length of a local unit in the caller's units.
     pub scale: f64,
@@ -17,13 +19,15 @@ impl Default for Frame {
     }
 }
 
-/// Beyond 2^±30 squares of single-precision lengths would leave their range together with what is computed
-/// from them.
+/// Beyond 2^±30, squares of single-precision lengths and values computed from these squares would
+/// leave the range of `f32`.
 const MAX_EXPONENT: i32 = 30;
 
 impl Frame {
-    /// The frame for points within `min..=max`: the caller's own where that loses nothing, else about the
-    /// middle, on a grid so coarse that single-precision input stays exact.
+    /// Returns the frame for points within `min..=max`.
+    ///
+    /// The origin is 0 where that loses no precision. Otherwise it is near the middle of the
+    /// bounds, on a grid so coarse that single-precision input stays exact.
     #[must_use]
     pub fn around(min: [f64; 3], max: [f64; 3]) -> Self {
         let half = (0..3).map(|k| 0.5 * max[k] - 0.5 * min[k]).fold(0.0, f64::max);
@@ -41,29 +45,30 @@ impl Frame {
         Self { origin, scale }
     }
 
-    /// A point of the caller's frame, rounded to the local one.
+    /// Converts a point from the caller's frame to the local frame, rounding to `f32`.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is the purpose")]
     pub fn to_local(&self, p: [f64; 3]) -> [f32; 3] {
-        // Adding zero turns -0 into 0, so that equal points have equal bits.
+        // Adding 0 turns -0 into 0, so that equal points have equal bits.
         [0, 1, 2].map(|k| ((p[k] - self.origin[k]) / self.scale) as f32 + 0.0)
     }
 
-    /// A stored point in the caller's frame.
+    /// Converts a stored point to the caller's frame.
     #[must_use]
     pub fn to_world(&self, p: [f32; 3]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.origin[k] + self.scale * f64::from(p[k]))
     }
 }
 
-/// Floor of the binary logarithm of a positive finite number, at least −1000, so that the power is normal.
+/// Floor of the binary logarithm of a positive finite number, at least −1000 so that its power of
+/// two is normal.
 fn exponent(x: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "between -1075 and 1024")]
     let e = x.log2().floor() as i32;
     e.max(-1000)
 }
 
-/// 2^e, for any exponent of a normal number.
+/// 2^`e`, for `e` in the exponent range of normal numbers.
 fn exp2(e: i32) -> f64 {
     2.0_f64.powi(e)
 }

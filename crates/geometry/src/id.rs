@@ -1,12 +1,13 @@
-//! Ids are newtypes over `u32`, so that a node's number cannot be mistaken for a point's.
+//! Typed ids. They are newtypes over `u32`, so that a node's number cannot be mistaken for a
+//! point's.
 
 use serde::{Deserialize, Serialize};
 
-/// A point, by its index in the input that the caller gave.
+/// Index of a point in the caller's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct PointId(pub u32);
 
-/// A node of a hierarchy, by its index in that hierarchy; 0 is the root.
+/// Index of a node in its hierarchy; 0 is the root.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct NodeId(pub u32);
 

@@ -1,21 +1,21 @@
-//! What has to be known of points before a cloud is made of them: their frame, and which are repeated.
+//! First pass over the input of a cloud: the frame of the points, and which points are repeated.
 
 use crate::cloud_error::CloudError;
 use crate::{Aabb, Frame};
 
-/// Fewer distinct points than this define no surface worth asking about.
+/// Least number of distinct points in a cloud. Fewer points define no useful surface.
 pub const LEAST_POINTS: usize = 8;
 
-/// Beyond this a squared distance leaves the range of double precision.
+/// Coordinates beyond this have squared distances outside the range of double precision.
 const FARTHEST: f64 = 1e150;
 
-/// Bounds and counts of points that are given piece by piece.
+/// Bounds and counts of points that are given one by one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intake {
     bounds: Aabb,
     given: usize,
     not_finite: usize,
-    /// The first point that is too far from the origin.
+    /// Index of the first point that is too far from the origin.
     too_far: Option<usize>,
 }
 
@@ -26,7 +26,7 @@ impl Default for Intake {
 }
 
 impl Intake {
-    /// Takes another point into account.
+    /// Adds a point.
     pub fn add(&mut self, p: [f64; 3]) {
         if p.iter().all(|x| x.is_finite()) {
             if self.too_far.is_none() && p.iter().any(|x| x.abs() > FARTHEST) {
@@ -39,22 +39,22 @@ impl Intake {
         self.given += 1;
     }
 
-    /// How many points were given.
+    /// Returns the number of points added.
     #[must_use]
     pub const fn given(&self) -> usize {
         self.given
     }
 
-    /// How many of them have a coordinate that is not finite.
+    /// Returns the number of added points with a NaN or infinite coordinate.
     #[must_use]
     pub const fn not_finite(&self) -> usize {
         self.not_finite
     }
 
-    /// The frame of a cloud of these points.
+    /// Returns the frame for a cloud of the added points.
     ///
     /// # Errors
-    /// When they are too many, or one is too far from the origin.
+    /// Fails if there are more than 2³² − 1 points, or if a coordinate is beyond ±1e150.
     pub fn frame(&self) -> Result<Frame, CloudError> {
         match self.too_far {
             _ if u32::try_from(self.given).is_err() => Err(CloudError::TooMany { given: self.given }),
@@ -64,29 +64,32 @@ impl Intake {
     }
 }
 
-/// Which points are at the very place of an earlier one.
+/// The set of points that have the same position as an earlier point.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Repeated {
-    /// A bit a point.
+    /// One bit for each point.
     bits: Vec<u64>,
     count: usize,
 }
 
-/// Records that are sorted together: so many fit a cache.
+/// Number of records that are sorted together; they fit into a cache.
 const TOGETHER: usize = 1 << 17;
 
-/// Most groups of records are two to this power.
+/// Binary logarithm of the greatest number of groups of records.
 const MOST_GROUPS: u32 = 8;
 
-/// Records of a group that are written together, some pages of memory.
+/// Number of records of a group that are written at once: 64 KiB.
 const RUN: usize = 1 << 12;
 
 impl Repeated {
-    /// Finds them. `records` is scratch with an element a point, and may be larger than memory: it is written
-    /// in runs of 64 KiB, and then sorted part by part. O(n log n), and up to 16 MiB.
+    /// Finds the repeated points among `points`.
+    ///
+    /// `records` is scratch memory with one element for each point. It may be larger than main
+    /// memory: it is written in runs of 64 KiB, and then sorted group by group. Takes O(n log n)
+    /// time and up to 16 MiB.
     ///
     /// # Panics
-    /// When `records` is shorter than `points`.
+    /// Panics if `records` is shorter than `points`.
     #[must_use]
     pub fn among(points: &[[f32; 3]], records: &mut [u128]) -> Self {
         let records = &mut records[..points.len()];
@@ -96,7 +99,7 @@ impl Repeated {
             repeated.find(records);
             return repeated;
         }
-        // Equal points have equal hashes, and so come into the same group.
+        // Equal points have equal hashes, so they are in the same group.
         let bits = (points.len() / TOGETHER).checked_ilog2().map_or(0, |log| (log + 1).min(MOST_GROUPS));
         let group = |p: &[f32; 3]| (hash(*p) >> 1 >> (63 - bits)) as usize;
         let mut starts = vec![0_usize; (1 << bits) + 1];
@@ -131,9 +134,9 @@ impl Repeated {
         Self { bits: vec![0; points.div_ceil(64)], count: 0 }
     }
 
-    /// Adds the later ones of equal points among these.
+    /// Adds the points of `records` that repeat an earlier point.
     fn find(&mut self, records: &mut [u128]) {
-        // Half of a record is sorted faster, and tells nearly all points apart.
+        // The upper half of a record is faster to sort, and differs for nearly all distinct points.
         let half = |record: u128| (record >> 64) as u64;
         records.sort_unstable_by_key(|record| half(*record));
         for alike in records.chunk_by_mut(|a, b| half(*a) == half(*b)).filter(|alike| alike.len() > 1) {
@@ -147,27 +150,27 @@ impl Repeated {
         }
     }
 
-    /// Returns `true` if the `i`-th point is one of them.
+    /// Returns `true` if point `i` repeats an earlier point.
     #[must_use]
     pub fn contains(&self, i: usize) -> bool {
         self.bits[i / 64] >> (i % 64) & 1 == 1
     }
 
-    /// How many there are.
+    /// Returns the number of repeated points.
     #[must_use]
     pub const fn count(&self) -> usize {
         self.count
     }
 }
 
-/// The hash of a point, its z, and its index: equal points are equal but for that, others are not, and the
-/// first of equal ones comes first.
+/// The hash of a point, its z coordinate and its index, from high bits to low. Records of equal
+/// points differ in the index alone, so sorting puts the first of equal points first.
 fn record(p: [f32; 3], i: u32) -> u128 {
     u128::from(hash(p)) << 64 | u128::from(p[2].to_bits()) << 32 | u128::from(i)
 }
 
-/// The bits of a point, mixed: the highest bits of the result tell most points apart, and no two points of
-/// equal z have the same, for each step can be undone.
+/// Mixes the bits of a point. Each step is invertible, so distinct points of equal z have distinct
+/// hashes. The highest bits of the hash differ for most distinct points.
 fn hash(p: [f32; 3]) -> u64 {
     let [x, y, z] = p.map(|x| u64::from(x.to_bits()));
     let mixed = (x << 32 | y).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
@@ -180,7 +183,7 @@ mod tests {
 
     use super::*;
 
-    /// Few or many groups, points that are repeated often, and zeros of either sign.
+    /// Covers few and many groups, points that are repeated often, and zeros of either sign.
     #[test]
     fn the_later_ones_of_equal_points_are_repeated() {
         for (count, places) in [(0, 1), (1, 1), (1000, 7), (3000, 1), (5 * TOGETHER, 3 * TOGETHER)] {

@@ -1,4 +1,4 @@
-//! Where an object is: rotation, translation and uniform scale, object → world.
+//! Poses of objects: rotation, translation and uniform scale, object → world.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use crate::Aabb;
 
-/// Why a 4×4 matrix is not a pose.
+/// Error of making a [`Pose`] from a 4×4 matrix.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PoseError {
@@ -27,13 +27,13 @@ pub enum PoseError {
         "the last row of the pose is not 0 0 0 1; matrices are row-major, translation in the last column"
     )]
     NotAffine,
-    /// The linear part mirrors, or flattens space.
+    /// A linear part that mirrors or flattens space.
     #[error("the pose has determinant {determinant}; a rotation with uniform scale has a positive one")]
     NotProper {
         /// Determinant of the linear part.
         determinant: f64,
     },
-    /// The matrix shears or scales unevenly, and nothing is known of the object.
+    /// A linear part that shears or scales unevenly, where the size of the object is unknown.
     #[error(
         "expected a rotation with uniform scale, got a pose with an entry that is {off} of the scale away from \
          the nearest one; give its translation and a quaternion instead"
@@ -42,7 +42,7 @@ pub enum PoseError {
         /// Greatest difference of an entry of the linear part, as a share of the scale.
         off: f64,
     },
-    /// The matrix shears or scales unevenly.
+    /// A linear part that shears or scales unevenly.
     #[error(
         "the pose is not a rotation with uniform scale: the nearest one moves the object's bounds by {moved}, \
          more than {tolerance} (a tenth of the sampling radius)"
@@ -50,15 +50,15 @@ pub enum PoseError {
     NotRigid {
         /// Greatest move of a corner of the object's bounds, in world units.
         moved: f64,
-        /// What was allowed, in world units.
+        /// Greatest move allowed, in world units.
         tolerance: f64,
     },
 }
 
-/// Beyond this squares and cubes leave the range of double precision.
+/// Beyond this, squares and cubes leave the range of double precision.
 const FARTHEST: f64 = 1e100;
 
-/// world = scale · rotation · object + translation, in double precision.
+/// A pose: world = scale · rotation · object + translation, in double precision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     rotation: Matrix3<f64>,
@@ -73,20 +73,21 @@ impl Default for Pose {
 }
 
 impl Pose {
-    /// The pose that moves nothing.
+    /// The identity.
     pub const IDENTITY: Self = Self {
         rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
         translation: Vector3::new(0.0, 0.0, 0.0),
         scale: 1.0,
     };
 
-    /// A shift by `t`.
+    /// Creates a translation by `t`.
     #[must_use]
     pub fn from_translation(t: [f64; 3]) -> Self {
         Self { translation: t.into(), ..Self::IDENTITY }
     }
 
-    /// A turn by `angle` radians about `axis`, which needs no unit length; no turn when it has none at all.
+    /// Creates a rotation by `angle` radians about `axis`, which need not be a unit vector. Returns
+    /// the identity for a zero axis.
     #[must_use]
     pub fn from_axis_angle(axis: [f64; 3], angle: f64) -> Self {
         let axis = nalgebra::Unit::try_new(Vector3::from(axis), 0.0);
@@ -96,7 +97,8 @@ impl Pose {
         Self { rotation: rotation.into_inner(), ..Self::IDENTITY }
     }
 
-    /// The turn of a quaternion (x, y, z, w) of any length but zero; no turn for zero.
+    /// Creates the rotation of a quaternion (x, y, z, w) of any length. Returns the identity for
+    /// length zero.
     #[must_use]
     pub fn from_quaternion(q: [f64; 4]) -> Self {
         let q = nalgebra::Quaternion::from(q);
@@ -104,8 +106,8 @@ impl Pose {
         Self { rotation: unit.to_rotation_matrix().into_inner(), ..Self::IDENTITY }
     }
 
-    /// The turn of a quaternion (x, y, z, w), as [`Self::from_quaternion`], then the shift by `translation`:
-    /// what engines call an isometry.
+    /// Creates the rotation of a quaternion (x, y, z, w), as [`Self::from_quaternion`] does,
+    /// followed by `translation`. Physics engines call this an isometry.
     ///
     /// ```
     /// use nearmiss_geometry::Pose;
@@ -121,10 +123,13 @@ impl Pose {
         Self::from_quaternion(quaternion).with_translation(translation)
     }
 
-    /// The pose of a row-major 4×4 matrix whose linear part is a rotation with uniform scale to 1e-5 of the
-    /// scale, as single precision leaves it: the nearest one, in the sense of the polar decomposition.
+    /// Creates a pose from a row-major 4×4 matrix whose linear part is a rotation with uniform
+    /// scale.
     ///
-    /// [`Self::from_row_major`] accepts what is further off, if it moves an object little.
+    /// Rounding to single precision is tolerated: entries may be off by 1e-5 of the scale. The
+    /// result is the nearest pose, in the sense of the polar decomposition.
+    ///
+    /// [`Self::from_row_major`] accepts greater errors if they move an object little.
     ///
     /// ```
     /// use nearmiss_geometry::{Pose, PoseError};
@@ -144,21 +149,26 @@ impl Pose {
     /// ```
     ///
     /// # Errors
-    /// When the matrix is not finite, not affine, mirrors, shears or scales unevenly.
+    /// Fails if the matrix is not finite, has an entry beyond ±1e100, is not affine, mirrors,
+    /// shears or scales unevenly.
     pub fn from_matrix(m: &[f64; 16]) -> Result<Self, PoseError> {
-        /// Some eighty roundings of single precision.
+        /// About eighty roundings of single precision.
         const MOST_OFF: f64 = 1e-5;
         let (pose, linear) = decomposed(m)?;
         let off = (linear / pose.scale - pose.rotation).amax();
-        // Written so that a NaN is refused.
+        // Written so that NaN is rejected.
         if off <= MOST_OFF { Ok(pose) } else { Err(PoseError::Skewed { off }) }
     }
 
-    /// The pose of a row-major 4×4 matrix: the nearest rotation and uniform scale, in the sense of the polar
-    /// decomposition, provided it moves no corner of `bounds` by more than `tolerance` (world units).
+    /// Creates a pose from a row-major 4×4 matrix: the nearest rotation and uniform scale, in the
+    /// sense of the polar decomposition.
+    ///
+    /// That pose may move each corner of `bounds` by at most `tolerance` world units from where the
+    /// matrix moves it.
     ///
     /// # Errors
-    /// When the matrix is not finite, not affine, mirrors, or differs too much from a pose.
+    /// Fails if the matrix is not finite, has an entry beyond ±1e100, is not affine, mirrors, or is
+    /// further than `tolerance` from a pose.
     pub fn from_row_major(m: &[f64; 16], bounds: &Aabb, tolerance: f64) -> Result<Self, PoseError> {
         let (pose, linear) = decomposed(m)?;
         let Self { rotation, scale, .. } = pose;
@@ -170,11 +180,11 @@ impl Pose {
             })
             .into_iter()
             .fold(0.0, f64::max);
-        // Written so that a NaN is refused.
+        // Written so that NaN is rejected.
         if moved <= tolerance { Ok(pose) } else { Err(PoseError::NotRigid { moved, tolerance }) }
     }
 
-    /// The row-major 4×4 matrix.
+    /// Returns the pose as a row-major 4×4 matrix.
     #[must_use]
     pub fn to_row_major(&self) -> [f64; 16] {
         let mut m = [0.0; 16];
@@ -188,70 +198,70 @@ impl Pose {
         m
     }
 
-    /// The same pose about another scale of the object.
+    /// Replaces the scale.
     #[inline]
     #[must_use]
     pub fn with_scale(self, scale: f64) -> Self {
         Self { scale, ..self }
     }
 
-    /// The same pose, moved to `t`.
+    /// Replaces the translation.
     #[inline]
     #[must_use]
     pub fn with_translation(self, t: [f64; 3]) -> Self {
         Self { translation: t.into(), ..self }
     }
 
-    /// The rotation.
+    /// Returns the rotation.
     #[inline]
     #[must_use]
     pub fn rotation(&self) -> &Matrix3<f64> {
         &self.rotation
     }
 
-    /// Where the object's zero lies in the world.
+    /// Returns the translation: the position of the object's origin in the world.
     #[inline]
     #[must_use]
     pub fn translation(&self) -> [f64; 3] {
         self.translation.into()
     }
 
-    /// The uniform scale, positive.
+    /// Returns the uniform scale, which is positive.
     #[inline]
     #[must_use]
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// A point of the object in the world.
+    /// Maps a point from the object to the world.
     #[inline]
     #[must_use]
     pub fn apply(&self, p: [f64; 3]) -> [f64; 3] {
         (self.scale * (self.rotation * Vector3::from(p)) + self.translation).into()
     }
 
-    /// A point of the world in the object.
+    /// Maps a point from the world to the object.
     #[inline]
     #[must_use]
     pub fn apply_inverse(&self, p: [f64; 3]) -> [f64; 3] {
         (self.rotation.tr_mul(&(Vector3::from(p) - self.translation)) / self.scale).into()
     }
 
-    /// A direction of the object in the world, of the same length.
+    /// Maps a direction from the object to the world; its length stays the same.
     #[inline]
     #[must_use]
     pub fn rotate(&self, v: [f64; 3]) -> [f64; 3] {
         (self.rotation * Vector3::from(v)).into()
     }
 
-    /// A direction of the world in the object, of the same length.
+    /// Maps a direction from the world to the object; its length stays the same.
     #[inline]
     #[must_use]
     pub fn rotate_inverse(&self, v: [f64; 3]) -> [f64; 3] {
         self.rotation.tr_mul(&Vector3::from(v)).into()
     }
 
-    /// `self` after `inner`: x ↦ self(inner(x)).
+    /// Composes two poses: `inner` first, then `self`.
     #[inline]
     #[must_use]
     pub fn after(&self, inner: &Self) -> Self {
@@ -262,7 +272,7 @@ impl Pose {
         }
     }
 
-    /// The pose that undoes this one.
+    /// Returns the inverse pose.
     #[inline]
     #[must_use]
     pub fn inverse(&self) -> Self {
@@ -272,7 +282,7 @@ impl Pose {
     }
 }
 
-/// The pose nearest to a row-major 4×4 matrix, and its linear part.
+/// Returns the pose nearest to a row-major 4×4 matrix, and the linear part of the matrix.
 fn decomposed(m: &[f64; 16]) -> Result<(Pose, Matrix3<f64>), PoseError> {
     if let Some(index) = m.iter().position(|x| !x.is_finite()) {
         return Err(PoseError::NotFinite { index });
@@ -292,11 +302,11 @@ fn decomposed(m: &[f64; 16]) -> Result<(Pose, Matrix3<f64>), PoseError> {
     Ok((Pose { rotation, translation, scale }, linear))
 }
 
-/// The orthogonal factor of the polar decomposition, by Newton's iteration R ← (R + R⁻ᵀ)/2, which converges
-/// quadratically for any regular matrix. `None` when an iterate cannot be inverted.
+/// Returns the orthogonal factor of the polar decomposition, by Newton's iteration R ← (R + R⁻ᵀ)/2,
+/// which converges quadratically for any regular matrix. `None` if an iterate cannot be inverted.
 fn nearest_rotation(m: Matrix3<f64>) -> Option<Matrix3<f64>> {
-    /// From a condition number of 1e6 the iteration halves the gap to 1 some twenty times before it
-    /// converges.
+    /// From a condition number of 1e6, the iteration halves the distance to 1 about twenty times
+    /// before quadratic convergence sets in.
     const STEPS: usize = 40;
     let mut r = m;
     for _ in 0..STEPS {

@@ -1,12 +1,12 @@
-//! Where scanners stood.
+//! Positions of the scanners that took a cloud.
 
 use std::ops::Range;
 
-/// Where a scanner stood while it took some points of a cloud's input.
+/// Position of a scanner while it took some points of a cloud's input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scanner {
-    /// Its position in the caller's frame.
+    /// Position of the scanner in the caller's frame.
     pub position: [f64; 3],
-    /// Its points, by their indices in the input.
+    /// Indices of the scanner's points in the input.
     pub points: Range<usize>,
 }

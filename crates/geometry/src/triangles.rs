@@ -1,24 +1,24 @@
-//! `TriangleMesh`: vertices and triangles that name them.
+//! `TriangleMesh`: vertices, and triangles that index them.
 
 use thiserror::Error;
 
-/// Why vertices and triangles do not make a mesh.
+/// Error of [`TriangleMesh::new`].
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// A triangle names a vertex that is not there.
+    /// A triangle with a vertex index out of range.
     #[error("triangle {triangle} names vertex {vertex}, but there are {vertices} vertices")]
     NoSuchVertex {
         /// Index of the triangle.
         triangle: usize,
-        /// The vertex it names.
+        /// The vertex index.
         vertex: u32,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
 }
 
-/// Triangles over shared vertices. Nothing is promised about orientation, closedness or manifoldness.
+/// Triangles over shared vertices. Orientation, closedness and manifoldness are not guaranteed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TriangleMesh {
     vertices: Vec<[f64; 3]>,
@@ -26,10 +26,11 @@ pub struct TriangleMesh {
 }
 
 impl TriangleMesh {
-    /// A mesh of the given parts.
+    /// Creates a mesh of `vertices` and `triangles`, which hold vertex indices.
     ///
     /// # Errors
-    /// Names the first triangle that refers to a vertex which is not there.
+    /// Fails if a vertex index is out of range. The error names the first triangle with such an
+    /// index.
     pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         for (triangle, corners) in triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices.len()) {
@@ -39,22 +40,22 @@ impl TriangleMesh {
         Ok(Self { vertices, triangles })
     }
 
-    /// Positions of the vertices.
+    /// Returns the positions of the vertices.
     #[must_use]
     pub fn vertices(&self) -> &[[f64; 3]] {
         &self.vertices
     }
 
-    /// Vertex indices of each triangle.
+    /// Returns the vertex indices of each triangle.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Length of the `i`-th triangle's longest edge, in the units of the vertices.
+    /// Returns the length of the longest edge of triangle `i`, in the units of the vertices.
     ///
     /// # Panics
-    /// When there is no such triangle.
+    /// Panics if `i` is not below the number of triangles.
     #[must_use]
     pub fn longest_edge(&self, i: usize) -> f64 {
         let corners = self.triangles[i].map(|v| self.vertices[v as usize]);

@@ -1,19 +1,20 @@
-//! Who is joined to whom.
+//! Adjacency lists.
 
 use nearmiss_store::Array;
 
 use crate::options::GraphError;
 
-/// An undirected graph over points by their indices: each edge stands with both of its ends.
+/// An undirected graph over points, which are identified by index. Each edge is stored at both
+/// ends.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adjacency {
-    /// Where the neighbours of each point begin, and where the last ones' end.
+    /// Start of each point's neighbours, and the end of the last point's.
     pub(crate) starts: Array<u32>,
-    /// The neighbours of all points, those of each ascending.
+    /// Neighbours of all points, ascending for each point.
     pub(crate) neighbours: Array<u32>,
 }
 
-/// The neighbours of some consecutive points, each ascending.
+/// Neighbours of consecutive points, ascending for each point.
 #[derive(Debug, Default)]
 pub(crate) struct Lists {
     ends: Vec<usize>,
@@ -21,7 +22,7 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// Adds those of the next point.
+    /// Adds the neighbours of the next point.
     pub(crate) fn push(&mut self, neighbours: impl Iterator<Item = u32>) {
         self.neighbours.extend(neighbours);
         self.ends.push(self.neighbours.len());
@@ -29,11 +30,11 @@ impl Lists {
 }
 
 impl Adjacency {
-    /// The graph of `count` points with these edges, in any order, each once and never from a point to
-    /// itself.
+    /// Creates a graph of `count` points from edges in any order. Each edge must occur once, and
+    /// must not join a point to itself.
     ///
     /// # Panics
-    /// When an edge leads to a point that is not there, or there are 2³¹ edges.
+    /// Panics if an edge leads to a point out of range, or if there are 2³¹ edges or more.
     #[must_use]
     pub fn from_edges(count: usize, edges: &[[u32; 2]]) -> Self {
         let mut ends: Vec<[u32; 2]> = edges.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
@@ -50,8 +51,8 @@ impl Adjacency {
         Self { starts: starts.into(), neighbours: neighbours.into() }
     }
 
-    /// The graph whose lists of neighbours these are, one part after the other; each edge stands in both
-    /// lists.
+    /// Creates a graph from neighbour lists, one part after the other. Each edge must be in the
+    /// lists of both ends.
     pub(crate) fn from_lists(parts: Vec<Lists>) -> Result<Self, GraphError> {
         let ends = parts.iter().map(|part| part.neighbours.len()).sum();
         if u32::try_from(ends).is_err() {
@@ -68,10 +69,10 @@ impl Adjacency {
         Ok(Self { starts: starts.into(), neighbours: neighbours.into() })
     }
 
-    /// The edges of both graphs, which have the same points and no edge in common.
+    /// Returns the edges of both graphs, which must have the same points and no common edge.
     ///
     /// # Panics
-    /// When there are not as many points in either.
+    /// Panics if the numbers of points differ.
     #[must_use]
     pub(crate) fn union(&self, other: &Self) -> Self {
         assert_eq!(self.len(), other.len(), "both over the same points");
@@ -88,25 +89,25 @@ impl Adjacency {
         Self { starts: starts.into(), neighbours: neighbours.into() }
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether there are no points.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Number of edges.
+    /// Returns the number of edges.
     #[must_use]
     pub fn edge_count(&self) -> usize {
         self.neighbours.len() / 2
     }
 
-    /// All edges once, the lesser end first, ascending.
+    /// Returns each edge once, lesser end first, ascending.
     pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> {
         (0_u32..).zip(0..self.len()).flat_map(|(a, i)| {
             let later = self.of(i).iter().copied().filter(move |&b| a < b);
@@ -114,22 +115,22 @@ impl Adjacency {
         })
     }
 
-    /// Bytes of its arrays.
+    /// Returns the size of all arrays in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of_val::<[_]>(&self.starts) + size_of_val::<[_]>(&self.neighbours)
     }
 
-    /// The neighbours of point `i`, ascending.
+    /// Returns the neighbours of point `i`, ascending.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `i` is not below [`Self::len`].
     #[must_use]
     pub fn of(&self, i: usize) -> &[u32] {
         &self.neighbours[self.starts[i] as usize..self.starts[i + 1] as usize]
     }
 
-    /// Where the neighbours of each point begin among all, and they: to be taken once, outside of loops.
+    /// Returns the starts of the neighbour lists, and the lists. Call this once, outside of loops.
     #[must_use]
     pub(crate) fn slices(&self) -> (&[u32], &[u32]) {
         (&self.starts, &self.neighbours)

@@ -1,25 +1,26 @@
-//! Points at the border of a surface: their neighbours lie to one side.
+//! Points at the border of a surface, whose neighbours are on one side.
 //!
-//! The mean of what is two edges away or less, each place counted as often as walks lead there, lies off the
-//! point, along the surface, by a share of those places' standard deviation. Inside a surface that share is
-//! sampling noise, at a straight border it is about a half (docs/theory/graph.md). The part of it along the
-//! normal, the least principal direction of these places, is curvature's and not counted. "Approximating
-//! Bounded, Non-orientable Surfaces from Points" (Adamson & Alexa 2004) tell borders by the weighted mean
-//! too, for places off the points.
+//! Consider the points at most two edges away, weighted by the number of walks that lead to them.
+//! Their mean deviates from the centre point along the surface by some fraction of their standard
+//! deviation. Inside a surface that fraction is sampling noise; at a straight border it is about
+//! 0.5 (docs/theory/graph.md). The deviation along the normal, the least principal direction of
+//! these points, is due to curvature and is ignored. "Approximating Bounded, Non-orientable
+//! Surfaces from Points" (Adamson & Alexa 2004) also uses the weighted mean to find borders, for
+//! positions off the points.
 
 use nearmiss_lanes::parallel::{map, ranges};
 use nearmiss_surface::symmetric_eigen;
 
 use crate::adjacency::Adjacency;
 
-/// From which share on a point is at the border. The outermost of points half a spacing and more apart show
-/// 0.41 to 0.77 at a straight border, those of closed shapes at most 0.33.
+/// Fraction from which a point is at the border. If points are at least half a spacing apart, the
+/// outermost ones at a straight border have 0.41 to 0.77, and points of closed shapes at most 0.33.
 const SHARE: f64 = 0.4;
 
-/// Fewer neighbours surround nothing.
+/// Fewer neighbours cannot surround a point.
 const LEAST_NEIGHBOURS: usize = 3;
 
-/// Which points are at a border.
+/// Returns 1 for each point at a border, 0 for others.
 pub(crate) fn borders(positions: &[[f32; 3]], graph: &Adjacency) -> Vec<u8> {
     let sums = map(graph.len(), |i| {
         let near = graph.of(i).iter().map(|&j| Sums::at(minus(positions[j as usize], positions[i])));
@@ -43,7 +44,7 @@ fn minus(a: [f32; 3], b: [f32; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| f64::from(a[k]) - f64::from(b[k]))
 }
 
-/// Number, sum and sum of squares, as xx xy xz yy yz zz, of some places.
+/// Number, sum and sum of squares (xx xy xz yy yz zz) of some vectors.
 #[derive(Debug, Clone, Copy)]
 struct Sums {
     count: f64,
@@ -52,7 +53,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Those of one place.
+    /// Returns the sums of one vector.
     fn at(d: [f64; 3]) -> Self {
         let [x, y, z] = d;
         Self { count: 1.0, first: d, second: [x * x, x * y, x * z, y * y, y * z, z * z] }
@@ -69,7 +70,7 @@ impl Sums {
         self
     }
 
-    /// Those of the same places, each moved by `d`.
+    /// Returns the sums of the same vectors, each shifted by `d`.
     fn moved(&self, d: [f64; 3]) -> Self {
         let mut sums = *self;
         for (k, (a, b)) in [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].into_iter().enumerate() {
@@ -81,7 +82,8 @@ impl Sums {
         sums
     }
 
-    /// How far the mean is off zero along the surface, in standard deviations of the places along it.
+    /// Returns the length of the mean along the surface, in standard deviations of the vectors
+    /// along the surface.
     fn eccentricity(&self) -> f64 {
         let [x, y, z] = self.first.map(|c| c / self.count);
         let [xx, xy, xz, yy, yz, zz] = self.second.map(|c| c / self.count);
@@ -103,7 +105,7 @@ mod tests {
     use nearmiss_testdata::arbitrary::{CloudKind, cloud};
     use nearmiss_testdata::oracle;
 
-    /// The share, from every walk of two steps.
+    /// Computes the fraction from every walk of two steps.
     fn naive(positions: &[[f32; 3]], graph: &Adjacency, i: usize) -> f64 {
         let stay_or_step = |i: usize| {
             let mut all = vec![i];

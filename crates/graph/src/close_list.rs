@@ -1,59 +1,62 @@
-//! Lists of close pairs as they are stored: four bytes a pair.
+//! Compressed lists of close pairs, four bytes a pair.
 //!
-//! Points stand in the order of the hierarchy's leaves, so most that are heard at a point have indices near
-//! its own: two bytes hold the difference. Two more hold the distance, rounded to 14 bits (13 of them stored)
-//! of which eight binades from one that the list chooses can be told: a relative error of 2⁻¹⁴ = 6.1e-5 at
-//! most. The few pairs that do not fit stand whole beside.
+//! Points are in the order of the hierarchy's leaves, so most close points have indices near each
+//! other. Two bytes hold the difference of the indices. Two more bytes hold the distance, rounded
+//! to 14 significant bits (13 of them stored), with an exponent from a window of eight binades that
+//! each list chooses. The relative error is at most 2⁻¹⁴ = 6.1e-5. The few pairs that do not fit
+//! are stored separately, at full size.
 
 use std::ops::Range;
 use std::slice::Iter;
 
 use bytemuck::{Pod, Zeroable};
 
-/// A point that is heard, and how far it is along the graph.
+/// A close point and its distance along the graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Close {
-    /// Its index.
+    /// Index of the point.
     pub point: u32,
-    /// The length of a shortest path from there, within 2⁻¹⁴ of it.
+    /// Length of a shortest path from the point, with a relative error of at most 2⁻¹⁴.
     pub distance: f32,
 }
 
-/// A pair that does not fit four bytes.
+/// A pair that does not fit into four bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Beside {
-    /// Where among all pairs it belongs.
+    /// Index of the pair among all pairs.
     pub(crate) pair: u32,
     pub(crate) point: u32,
     pub(crate) distance: f32,
 }
 
-/// The offset of a pair that stands beside.
+/// Offset that marks a pair stored separately.
 pub(crate) const BESIDE: i16 = i16::MIN;
 
-/// Bits of a single-precision number that are not kept.
+/// Number of low bits of a single-precision number that are dropped.
 const DROPPED: u32 = 10;
-/// What of its mantissa is.
+/// Number of bits of its mantissa that are kept.
 const KEPT: u32 = f32::MANTISSA_DIGITS - 1 - DROPPED;
-/// Binades that a code tells apart.
+/// Number of binades that a code can represent.
 const BINADES: u32 = 1 << (16 - KEPT);
-/// The lowest of them is no lower, so that all numbers are normal, and no higher, so that all are finite.
+/// Exponents of the lowest binade: at least 1, so that all numbers are normal, and low enough that
+/// all are finite.
 const FLOORS: std::ops::RangeInclusive<u32> = 1..=255 - BINADES;
 
-/// The leading bits of a distance, rounded to nearest: exponent and mantissa.
+/// Returns the leading bits of a distance, rounded to nearest: exponent and mantissa.
 #[inline]
 fn leading(distance: f32) -> u32 {
     let bits = distance.to_bits();
     (bits >> DROPPED) + (bits >> (DROPPED - 1) & 1)
 }
 
-/// A distance as it is after packing. Those that stand beside are rounded too, so that all stay in order.
+/// Returns a distance rounded as by packing. Distances stored separately are rounded too, so that
+/// all stay in order.
 pub(crate) fn kept(distance: f32) -> f32 {
     f32::from_bits(leading(distance) << DROPPED)
 }
 
-/// The greatest that a distance of at most `most` is after packing.
+/// Returns the greatest value that a distance of at most `most` can have after packing.
 pub(crate) fn rounded(most: f32) -> f32 {
     most.max(kept(most))
 }
@@ -62,13 +65,14 @@ pub(crate) fn is_floor(floor: u8) -> bool {
     FLOORS.contains(&u32::from(floor))
 }
 
-/// The floor from which most of these, by distance and the first at none, fit; of several the highest.
+/// Returns the floor, the exponent of the lowest binade, with which most distances of `list` fit.
+/// Of several such floors, the highest is returned. `list` is sorted by distance and starts with 0.
 pub(crate) fn floor(list: &[Close]) -> u8 {
     let exponent = |close: &Close| leading(close.distance) >> KEPT;
     let below = |top: u32| (top + 1).saturating_sub(BINADES).clamp(*FLOORS.start(), *FLOORS.end());
     let highest = below(list.last().map_or(0, exponent));
     let (mut first, mut best) = (0, (0, highest));
-    // All fit almost always.
+    // Almost always all distances fit.
     if list.get(1).is_some_and(|nearest| exponent(nearest) < highest) {
         for (k, close) in list.iter().enumerate() {
             let floor = below(exponent(close));
@@ -81,11 +85,11 @@ pub(crate) fn floor(list: &[Close]) -> u8 {
     u8::try_from(best.1).unwrap_or(u8::MAX)
 }
 
-/// What is stored of `close` in the list of point `own`: the difference of indices and the code of the
-/// distance; where these do not fit, that it stands beside.
+/// Packs `close` for the list of point `own`: the difference of indices and the code of the
+/// distance. If it does not fit, the difference is [`BESIDE`].
 #[inline]
 pub(crate) fn pack(own: u32, floor: u8, close: Close) -> (i16, u16) {
-    // Modulo 2³², as they are added again.
+    // Modulo 2³², as unpacking adds modulo 2³².
     let difference = close.point.wrapping_sub(own).cast_signed();
     let code = leading(close.distance).wrapping_sub(u32::from(floor) << KEPT);
     #[expect(clippy::cast_possible_truncation, reason = "whether they fit is seen below")]
@@ -103,7 +107,7 @@ fn unpack(floor: u8, code: u16) -> f32 {
     f32::from_bits(if code == 0 { 0 } else { bits })
 }
 
-/// Where `wanted` stands first, many compared at a time.
+/// Returns the first position of `wanted`. Compares 16 offsets at a time.
 fn position(offsets: &[i16], wanted: i16) -> Option<usize> {
     let (chunks, rest) = offsets.as_chunks::<16>();
     let is_in = |chunk: &[i16; 16]| chunk.iter().fold(false, |found, &offset| found | (offset == wanted));
@@ -143,7 +147,7 @@ impl<'a> Lists<'a> {
         }
     }
 
-    /// Fills `closes` with the list of `i`: as [`Self::of`], many at a time.
+    /// Fills `closes` with the list of `i`, as [`Self::of`] would, but many at a time.
     pub(crate) fn read(&self, i: usize, closes: &mut Vec<Close>) {
         closes.clear();
         let list = self.of(i);
@@ -158,7 +162,7 @@ impl<'a> Lists<'a> {
         }
     }
 
-    /// Where among all pairs that of `i` with `j` stands, and how far they are from each other.
+    /// Returns the index among all pairs of the pair of `i` with `j`, and their distance.
     pub(crate) fn find(&self, i: u32, j: u32) -> Option<(usize, f32)> {
         let range = self.range(i as usize);
         let offsets = &self.offsets[range.clone()];
@@ -175,26 +179,27 @@ impl<'a> Lists<'a> {
     }
 }
 
-/// The points heard at one, nearest first.
+/// The close points of a point, nearest first.
 #[derive(Debug, Clone)]
 pub struct CloseList<'a> {
     own: u32,
     floor: u8,
-    /// Where among all pairs the list ends.
+    /// Index among all pairs of the end of the list.
     end: u32,
     offsets: Iter<'a, i16>,
     codes: Iter<'a, u16>,
-    /// All pairs that stand beside; of the list's own what is left, once one was met.
+    /// All pairs stored separately; after the first of this list was read, only those that follow
+    /// it.
     beside: &'a [Beside],
 }
 
 impl CloseList<'_> {
-    /// The pair that stands beside before the `left` last ones of the list.
+    /// Returns the pair that is stored separately and precedes the last `left` pairs of the list.
     #[cold]
     fn unfit(&mut self, left: usize) -> Close {
         let pair = (self.end as usize).wrapping_sub(left + 1);
         let is_before = |beside: &Beside| (beside.pair as usize) < pair;
-        // The next one, but for the first.
+        // Except for the first, the next pair is at the front.
         if self.beside.first().is_some_and(is_before) {
             self.beside = &self.beside[self.beside.partition_point(is_before)..];
         }
@@ -203,7 +208,7 @@ impl CloseList<'_> {
                 self.beside = rest;
                 Close { point, distance }
             }
-            // Only in a file that lies: no point is there, or anywhere.
+            // Happens with a forged file only: returns a point out of range at infinite distance.
             _ => Close { point: u32::MAX, distance: f32::INFINITY },
         }
     }
@@ -263,7 +268,7 @@ mod tests {
         assert!([40_000 + 32_767, 40_000 - 32_767].into_iter().all(|p| !far(p)), "as far as two bytes reach");
         assert!([40_000 + 32_768, 40_000 - 32_768, 0, u32::MAX].into_iter().all(far), "further");
         let lost = |floor: u8, distance: f32| pack(0, floor, close(1, distance)) == (BESIDE, 0);
-        // From 1 to below 256, but for what is rounded to either.
+        // The range is 1 to below 256, except for values that round to either end.
         assert!(!lost(127, 1.000_2) && lost(127, 1.000_01) && lost(127, 0.5));
         assert!(!lost(127, 255.98) && lost(127, 255.999) && lost(127, 256.0));
         assert!(lost(1, 1e-45) && lost(247, f32::MAX) && !lost(247, 3.4e38));

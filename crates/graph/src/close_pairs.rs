@@ -1,15 +1,16 @@
-//! The close-pairs shortest-paths map: for every point the points that are heard there, and how far they are
-//! along the graph.
+//! The close-pairs shortest-paths map: for each point, its close points and their distances along
+//! the graph.
 //!
-//! Klein & Zachmann 2005 (§3.2): shortest paths from each point, only as far as its influence reaches. How
-//! far that is differs from point to point here, so a search goes out from the one that is heard, to its own
-//! horizon, and what it finds is entered with those that hear it. O(N) in time and space where each point
-//! hears a bounded number.
+//! Klein & Zachmann 2005, §3.2: shortest paths from each point, only as far as its support radius.
+//! A point j is close to i if the distance from j to i is at most the support radius of j, which
+//! differs from point to point here. Searches therefore start at j, and enter their results in the
+//! lists of the points reached. Takes O(N) time and memory if the number of close points of each
+//! point is bounded.
 //!
-//! Paths need not be stored: every point on the way from i to j hears j too, and says how far it still is.
-//! Distances are rounded, though, so neither do they grow along each edge, nor is the neighbour over which
-//! the way looks shortest always on a shortest one. Where the way that they show may be longer than promised,
-//! a search looks at all that might be shorter.
+//! Paths need not be stored: every point on the path from i to j has j in its list, with the
+//! remaining distance. But distances are rounded. They need not decrease along each edge, and the
+//! neighbour that seems best is not always on a shortest path. If the resulting path may be longer
+//! than promised, a search among all points that could be on a shorter path follows.
 
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::{for_each, ranges, ranges_with};
@@ -20,59 +21,61 @@ use crate::geodesic::{GeodesicScratch, Reached};
 use crate::length::{Network, step};
 use crate::options::Paths;
 
-/// No more stretches than this are searched from: memory is made for each.
+/// Greatest number of parts searched separately, each of which needs memory of its own.
 const STRETCHES: usize = 64;
 
-/// Lists that are sorted together.
+/// Number of lists that are sorted as one unit of work.
 const SORTED: usize = 1024;
 
-/// Points that are reached are sorted into as many shells.
+/// Number of distance buckets in a search.
 const SHELLS: usize = 32;
 const SHELLS_F32: f32 = 32.0;
 
-/// Where the way goes on is not stored: it stands among too many neighbours.
+/// Marks a next point whose rank among the neighbours does not fit into a byte.
 const ELSEWHERE: u8 = u8::MAX;
 
-/// Distances are rounded by this share of them at most.
+/// Greatest relative rounding error of distances.
 const ROUNDING: f32 = 1.0 / 16384.0;
 
-/// A way that is no longer than the rounded distance by more is longer than the shortest by 1e-4 at most.
+/// A path that exceeds the rounded distance by at most this fraction is at most 1e-4 longer than
+/// the shortest.
 const SURE: f32 = 1e-4 - ROUNDING;
 
-/// And a shortest one seems no longer by more, from any of its points: once for the whole, once for what is
-/// left, once for sums.
+/// Greatest relative excess with which a point of a shortest path can appear: one rounding for the
+/// whole distance, one for the remaining distance, one for sums.
 const DOUBT: f32 = 3.0 * ROUNDING;
 
-/// For every point the points that are heard there, nearest first.
+/// For each point its close points, nearest first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClosePairs {
-    /// Where the list of each point begins, and where the last one ends.
+    /// Start of the list of each point, and the end of the last list.
     pub(crate) starts: Array<u32>,
-    /// The exponent of the least distance that fits the list of each point.
+    /// Exponent of the least distance that fits the list of each point.
     pub(crate) floors: Array<u8>,
-    /// All lists, each by exact distance, then index: by how much the index is more than that of the list's
-    /// point.
+    /// All lists, sorted by exact distance, then index. An offset is the index of the close point
+    /// minus that of the list's point.
     pub(crate) offsets: Array<i16>,
-    /// Beside each offset the distance.
+    /// Code of the distance of each offset.
     pub(crate) codes: Array<u16>,
-    /// The pairs that do not fit, in order.
+    /// Pairs that do not fit, in order.
     pub(crate) beside: Array<Beside>,
-    /// Beside each pair the rank of where the path goes on; or none at all.
+    /// Rank of the next point of the path, for each pair; or empty.
     pub(crate) onward: Array<u8>,
 }
 
-/// By distance, then index.
+/// Sorts by distance, then index.
 #[inline]
 fn rank(close: &Close) -> u64 {
     u64::from(close.distance.to_bits()) << 32 | u64::from(close.point)
 }
 
 impl ClosePairs {
-    /// The pairs of points (i, j) with a way from j to i no longer than the horizon of j, on all cores; the
-    /// result does not depend on how many there are.
+    /// Builds the map of all pairs of points (i, j) where the distance from j to i is at most the
+    /// support radius of j. Uses all cores; the result does not depend on their number.
     ///
     /// # Panics
-    /// When there is not a horizon for each point, or there are 2³² pairs.
+    /// Panics if the number of support radii differs from the number of points, or if there are 2³²
+    /// pairs or more.
     #[must_use]
     pub fn build(network: Network<'_>, horizons: &[f32], paths: Paths) -> Self {
         let count = network.len();
@@ -129,67 +132,71 @@ impl ClosePairs {
         built
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether there are no points.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Number of pairs.
+    /// Returns the number of pairs.
     #[must_use]
     pub fn pair_count(&self) -> usize {
         self.offsets.len()
     }
 
-    /// Whether paths are stored.
+    /// Returns the data stored for paths.
     #[must_use]
     pub fn paths(&self) -> Paths {
         if self.onward.is_empty() { Paths::Rebuilt } else { Paths::Stored }
     }
 
-    /// What all of it takes, in bytes.
+    /// Returns the size of all arrays in bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
         let lists = size_of_val(&*self.starts) + self.floors.len();
         lists + 4 * self.pair_count() + size_of_val(&*self.beside) + self.onward.len()
     }
 
-    /// The points heard at `i`, itself first, by distance; of equal ones those that were nearer before
-    /// rounding, then those of lesser index first.
+    /// Returns the close points of `i`, sorted by distance, `i` itself first. Distances that are
+    /// equal after rounding are in the order before rounding, then in the order of indices.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `i` is not below [`Self::len`].
     #[must_use]
     pub fn of(&self, i: usize) -> CloseList<'_> {
         self.view().of(i)
     }
 
-    /// How far `j` is from `i`, within 2⁻¹⁴ of it, if it is heard there. A pass over the list of `i`.
+    /// Returns the distance of `j` from `i`, with a relative error of at most 2⁻¹⁴, if `j` is close
+    /// to `i`. Scans the list of `i`.
     ///
     /// # Panics
-    /// When there is no point `i`.
+    /// Panics if `i` is not a point.
     #[must_use]
     pub fn distance(&self, i: u32, j: u32) -> Option<f32> {
         Some(self.view().find(i, j)?.1)
     }
 
-    /// The length of a path from `i` to `j`, if `j` is heard at `i`, longer than the shortest by 1e-4 of it
-    /// at most; `path` holds its points afterwards, both included, or none. Given the graph with the lengths
-    /// that the map was built from. No allocation once warm.
+    /// Returns the length of a path from `i` to `j` if `j` is close to `i`, and sets `path` to its
+    /// points, both ends included. `path` is empty if there is none.
     ///
-    /// Klein & Zachmann 2005 (Algorithm 2) go to the neighbour nearest to the target, keeping a queue of all
-    /// that are nearer than those they leave; what they find need not be shortest. We go where the edge and
-    /// the distance left are shortest together. Should the sum of the edges be too long then, which is one
-    /// time in twenty or fewer, a search finds a shortest path.
+    /// The path is longer than the shortest by at most a fraction of 1e-4. `network` must hold the
+    /// graph and the lengths that the map was built from. Does not allocate once warm.
+    ///
+    /// Algorithm 2 of Klein & Zachmann 2005 goes to the neighbour nearest to the target and keeps a
+    /// queue of all neighbours that are nearer than the point left. Its result need not be a
+    /// shortest path. Here the path goes to the neighbour with the least sum of edge and remaining
+    /// distance. If the sum of the edges then is too long, which happens in at most 5 % of all
+    /// cases, a search finds a shortest path.
     ///
     /// # Panics
-    /// When there is no point `i`.
+    /// Panics if `i` is not a point.
     pub fn path(
         &self,
         network: Network<'_>,
@@ -208,7 +215,7 @@ impl ClosePairs {
             return Some(length);
         }
         path.clear();
-        // Sums of a thousand edges that vanish in them may err by more.
+        // Sums of a thousand edges that are lost in rounding may exceed the first limit.
         let length = [(1.0 + DOUBT) * whole, f32::INFINITY].into_iter().find_map(|most| {
             let is_on_the_way = |k, along| view.find(k, j).is_some_and(|(_, left)| along + left <= most);
             scratch.search(network, [(i, 0.0)], f32::MAX, is_on_the_way, |k| k == j);
@@ -219,7 +226,7 @@ impl ClosePairs {
         Some(length)
     }
 
-    /// Follows the ranks that are stored, if all are.
+    /// Follows the stored ranks, if they are stored for the whole path.
     fn stored_path(&self, network: Network<'_>, [i, j]: [u32; 2], path: &mut Vec<u32>) -> Option<f32> {
         let (view, mut at, mut length) = (self.view(), i, 0.0);
         path.push(i);
@@ -228,7 +235,7 @@ impl ClosePairs {
             let (next, edge) = network.edges(at as usize).nth(rank.into())?;
             (at, length) = (next, step(length, edge));
             path.push(at);
-            // Only in a file that lies it goes round.
+            // A cycle occurs with a forged file only.
             if path.len() > self.len() {
                 return None;
             }
@@ -236,8 +243,9 @@ impl ClosePairs {
         Some(length)
     }
 
-    /// Goes from neighbour to neighbour where the whole way looks shortest, each nearer to `j` than the one
-    /// before, if that is possible and short enough for the distance that is stored.
+    /// Goes to the neighbour with the least sum of edge and remaining distance, always nearer to
+    /// `j`. Returns `None` if that is impossible, or if the path is too long for the stored
+    /// distance.
     fn walked_path(
         &self,
         network: Network<'_>,
@@ -264,7 +272,7 @@ impl ClosePairs {
         (length <= (1.0 + SURE) * whole).then_some(length)
     }
 
-    /// The arrays, taken once.
+    /// Returns the arrays. Call this once, outside of loops.
     pub(crate) fn view(&self) -> Lists<'_> {
         Lists {
             starts: &self.starts,
@@ -276,8 +284,9 @@ impl ClosePairs {
     }
 }
 
-/// Where paths go on, beside each pair of lists of exact distances: there is a neighbour that the search
-/// reached before, whose distance plus the edge is that of the pair, to the last bit; of several the first.
+/// Returns the rank of the next point of the path, for each pair of lists of exact distances. The
+/// search reached that neighbour before, and its distance plus the edge equals the distance of the
+/// pair, to the last bit. Of several, the first counts.
 fn ranks_onward(network: Network<'_>, starts: &[u32], pairs: &[Close]) -> Vec<u8> {
     let count = network.len();
     let list_of = |i: usize| &pairs[starts[i] as usize..starts[i + 1] as usize];
@@ -313,7 +322,7 @@ fn ranks_onward(network: Network<'_>, starts: &[u32], pairs: &[Close]) -> Vec<u8
     stretches.concat()
 }
 
-/// Lists of exact distances as they are stored, without starts and steps of paths.
+/// Packs lists of exact distances; starts and ranks of paths are left empty.
 fn pack_lists(starts: &[u32], pairs: &[Close]) -> ClosePairs {
     let is_beside = |(_, (offset, _)): &(u32, (&i16, &Close))| **offset == BESIDE;
     let stretches = ranges(starts.len() - 1, |points| {
@@ -352,14 +361,15 @@ fn pack_lists(starts: &[u32], pairs: &[Close]) -> ClosePairs {
 }
 
 /// Searches that reach the same points at the same distances as
-/// [`GeodesicScratch::within`](crate::GeodesicScratch::within), in any order. A shortest distance is the
-/// least over all ways, in whichever order they are tried; so nothing has to be kept sorted but roughly, and
-/// a point whose way is improved after it was left is left once more.
+/// [`GeodesicScratch::within`](crate::GeodesicScratch::within), in any order. A shortest distance
+/// is a minimum over all paths, whatever the order of the search. Sorting points into coarse
+/// buckets is therefore enough; a point whose distance improves after it was expanded is expanded
+/// again.
 struct Spread {
-    /// The least distance known; infinite between searches.
+    /// Least distance known of each point; infinite between searches.
     least: Vec<f32>,
     touched: Vec<u32>,
-    /// Points to be left, by their distances.
+    /// Points to expand, bucketed by distance.
     shells: [Vec<Reached>; SHELLS],
 }
 

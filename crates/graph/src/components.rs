@@ -1,11 +1,11 @@
-//! Which points hang together.
+//! Connected components.
 
 use crate::adjacency::Adjacency;
 
-/// For each point the least of its component, and how many components there are.
+/// Returns for each point the least point of its component, and the number of components.
 #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 points")]
 pub(crate) fn components(graph: &Adjacency) -> (Vec<u32>, usize) {
-    // Roots are least points, so a parent is never greater than its child.
+    // Roots are the least points of their sets, so a parent is never greater than its child.
     let mut parents: Vec<u32> = (0..graph.len() as u32).collect();
     for i in 0..graph.len() {
         for &j in graph.of(i).iter().take_while(|&&j| (j as usize) < i) {
@@ -17,14 +17,14 @@ pub(crate) fn components(graph: &Adjacency) -> (Vec<u32>, usize) {
     let mut count = 0;
     for i in 0..graph.len() {
         let parent = parents[i] as usize;
-        // The parent comes first and has its root already.
+        // The parent comes first, so its root is already known.
         parents[i] = parents[parent];
         count += usize::from(parent == i);
     }
     (parents, count)
 }
 
-/// The root of `i`; halves the way there.
+/// Returns the root of `i`, with path halving.
 fn root(parents: &mut [u32], mut i: u32) -> u32 {
     while parents[i as usize] != i {
         let grandparent = parents[parents[i as usize] as usize];

@@ -1,14 +1,16 @@
-//! The r-SIG of points that come, go and move, one at a time.
+//! The r-SIG of a changing set of points.
 //!
-//! A point's sphere of influence changes when its r-th nearest does: when a point comes nearer than that or
-//! one as near goes. So those are asked for whose spheres contain the place; their radii are found anew, then
-//! their edges and the new point's. After every update the graph is what a build of all points would give,
-//! bit for bit.
+//! A point's sphere of influence changes when its r-th nearest neighbour does: when a nearer point
+//! is inserted, or a point that is not further is removed. An update therefore finds the points
+//! whose spheres contain the position, recomputes their radii, and then their edges and those of
+//! the new point. After every update the graph equals that of a fresh build over all points, bit
+//! for bit.
 //!
-//! S1 §6 states O(log³ N) a step. Here an update touches a number of points that does not grow with N where
-//! density is bounded (each point is among the r nearest of O(r) others, and of as many is it a neighbour),
-//! and each costs a search in an R*-tree ("The R*-tree: an efficient and robust access method for points and
-//! rectangles", Beckmann et al. 1990).
+//! Klein & Zachmann 2005, §6, state O(log³ N) for an update. Here the number of points that an
+//! update touches does not grow with N where density is bounded: each point is among the r nearest
+//! of O(r) others, and has as many neighbours. Each touched point costs a search in an R*-tree
+//! ("The R*-tree: an efficient and robust access method for points and rectangles", Beckmann et al.
+//! 1990).
 
 use nearmiss_lanes::vector::distance_sq;
 use rstar::primitives::{GeomWithData, Rectangle};
@@ -20,32 +22,34 @@ use crate::options::{GraphError, GraphOptions, check_positions};
 type Point = GeomWithData<[f32; 3], u32>;
 type Ball = GeomWithData<Rectangle<[f32; 3]>, u32>;
 
-/// How much an update changed. A move is a removal and an insertion: what both touch counts twice.
+/// Numbers of points that an update changed. A move is a removal and an insertion; points that both
+/// change count twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Touched {
-    /// Points whose sphere of influence was found anew.
+    /// Number of points whose sphere of influence was recomputed.
     pub spheres: usize,
-    /// Points whose neighbours changed, or whose sphere was found anew.
+    /// Number of points whose neighbours changed, or whose sphere was recomputed.
     pub points: usize,
 }
 
-/// The r-SIG of a changing set of points, without pruning. A point keeps its id until it is removed; ids are
-/// not used again.
+/// The r-SIG of a changing set of points, without pruning. A point keeps its id until it is
+/// removed. Ids are not reused.
 #[derive(Debug, Clone)]
 pub struct DynamicGraph {
     neighbours: usize,
-    /// `None` where a point was removed.
+    /// `None` for removed points.
     positions: Vec<Option<[f32; 3]>>,
     count: usize,
     radii_sq: Vec<f32>,
     lists: Vec<Vec<u32>>,
     points: RTree<Point>,
-    /// Boxes about the spheres of influence.
+    /// Bounding boxes of the spheres of influence.
     balls: RTree<Ball>,
 }
 
 impl DynamicGraph {
-    /// The graph of distinct `positions`, whose ids are their indices. Of the options it uses r.
+    /// Creates the graph of distinct `positions`, whose ids are their indices. Of the options, only
+    /// r is used.
     ///
     /// # Errors
     /// As [`PointGraph::build`](crate::PointGraph::build).
@@ -68,40 +72,41 @@ impl DynamicGraph {
         })
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there are no points.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Where a point is; `None` if it was removed or never there.
+    /// Returns the position of a point; `None` if it was removed or never existed.
     #[must_use]
     pub fn position(&self, id: u32) -> Option<[f32; 3]> {
         *self.positions.get(id as usize)?
     }
 
-    /// The neighbours of a point, ascending; none if it is not there.
+    /// Returns the neighbours of a point, ascending; empty if there is no such point.
     #[must_use]
     pub fn of(&self, id: u32) -> &[u32] {
         self.lists.get(id as usize).map_or(&[], Vec::as_slice)
     }
 
-    /// `d_i`, the distance of a point from its r-th nearest; `None` if it is not there.
+    /// Returns `d_i`, the distance of a point from its r-th nearest neighbour; `None` if there is
+    /// no such point.
     #[must_use]
     pub fn radius(&self, id: u32) -> Option<f32> {
         self.position(id).map(|_| self.radii_sq[id as usize].sqrt())
     }
 
-    /// Adds a point at a place of its own; returns its id.
+    /// Adds a point at a position distinct from all others, and returns its id.
     ///
     /// # Errors
-    /// When a coordinate is not finite or beyond ±1e18, or ids are used up.
+    /// Fails if a coordinate is not finite or beyond ±1e18, or if all ids are used.
     pub fn insert(&mut self, position: [f32; 3]) -> Result<(u32, Touched), GraphError> {
         check_positions(&[position])?;
         let index = self.positions.len();
@@ -113,17 +118,17 @@ impl DynamicGraph {
         Ok((id, self.place(id, position)))
     }
 
-    /// Removes a point; `None` if it is not there.
+    /// Removes a point; `None` if there is no such point.
     pub fn remove(&mut self, id: u32) -> Option<Touched> {
         let (orphans, mut touched) = self.take(id)?;
         let spheres = self.refresh(&orphans, &mut touched);
         Some(tally(spheres, touched))
     }
 
-    /// Moves a point to another place of its own; `None` if it is not there.
+    /// Moves a point to a position distinct from all others; `None` if there is no such point.
     ///
     /// # Errors
-    /// When a coordinate is not finite or beyond ±1e18; the point stays where it was.
+    /// Fails if a coordinate is not finite or beyond ±1e18. The point then stays in place.
     pub fn relocate(&mut self, id: u32, position: [f32; 3]) -> Result<Option<Touched>, GraphError> {
         check_positions(&[position])?;
         let Some(gone) = self.remove(id) else { return Ok(None) };
@@ -131,9 +136,9 @@ impl DynamicGraph {
         Ok(Some(Touched { spheres: gone.spheres + come.spheres, points: gone.points + come.points }))
     }
 
-    /// Puts a point that is nowhere at a place.
+    /// Inserts a removed or new point at a position.
     fn place(&mut self, id: u32, position: [f32; 3]) -> Touched {
-        // Who has fewer than r others has one more.
+        // A point with fewer than r others gains a neighbour, wherever it is.
         let mut nearer: Vec<u32> = if self.count <= self.neighbours {
             self.points.iter().map(|point| point.data).collect()
         } else {
@@ -153,8 +158,8 @@ impl DynamicGraph {
         tally(spheres, touched)
     }
 
-    /// Takes a point out with its edges. Returns those that had it among their r nearest, and all whose lists
-    /// changed.
+    /// Removes a point with its edges. Returns the points that had it among their r nearest, and
+    /// all points whose lists changed.
     fn take(&mut self, id: u32) -> Option<(Vec<u32>, Vec<u32>)> {
         let position = self.positions.get_mut(id as usize)?.take()?;
         let list = std::mem::take(&mut self.lists[id as usize]);
@@ -169,8 +174,8 @@ impl DynamicGraph {
         Some((orphans, list))
     }
 
-    /// Finds radii, then edges of some points anew; adds all whose lists changed to `touched`. Returns how
-    /// many the former are.
+    /// Recomputes the radii, then the edges of some points. Adds all points whose lists changed to
+    /// `touched`. Returns the number of points recomputed.
     fn refresh(&mut self, ids: &[u32], touched: &mut Vec<u32>) -> usize {
         for &i in ids {
             let Some(position) = self.position(i) else { continue };
@@ -199,14 +204,14 @@ impl DynamicGraph {
         ids.len()
     }
 
-    /// The squared distance of point `i` from a place.
+    /// Returns the squared distance of point `i` from a position.
     fn sq(&self, i: u32, place: [f32; 3]) -> Option<f32> {
         Some(distance_sq(self.position(i)?, place))
     }
 
-    /// `d_i²` of a point.
+    /// Returns `d_i²` of a point.
     fn radius_sq(&self, id: u32, position: [f32; 3]) -> f32 {
-        // The tree may round otherwise, so some more are looked at than are wanted.
+        // The tree may round differently, so the search goes slightly beyond the r-th nearest.
         let mut nearest: Vec<f32> = Vec::with_capacity(self.neighbours + 1);
         for (point, rough) in self.points.nearest_neighbor_iter_with_distance_2(position) {
             if nearest.len() >= self.neighbours && rough > nearest[self.neighbours - 1] * (1.0 + 1e-5) + 1e-38
@@ -222,7 +227,7 @@ impl DynamicGraph {
         nearest.last().copied().unwrap_or(0.0)
     }
 
-    /// The neighbours of a point, by the radii.
+    /// Returns the neighbours of a point, given the radii.
     fn list(&self, id: u32, position: [f32; 3]) -> Vec<u32> {
         let radius = |i: u32| f64::from(self.radii_sq[i as usize]).sqrt();
         let own = radius(id);
@@ -239,10 +244,10 @@ impl DynamicGraph {
     }
 }
 
-/// A box about a sphere of influence.
+/// Returns the bounding box of a sphere of influence.
 fn about(position: [f32; 3], radius_sq: f32) -> Rectangle<[f32; 3]> {
     let reach = horizon(radius_sq);
-    // Next to a large coordinate the reach itself may be rounded away.
+    // Beside a large coordinate, the radius itself may be lost in rounding.
     let low = position.map(|c| (c - reach).next_down());
     Rectangle::from_corners(low, position.map(|c| (c + reach).next_up()))
 }

@@ -1,9 +1,9 @@
-//! Shortest paths from a point along the edges of a graph (Dijkstra 1959).
+//! Shortest paths along the edges of a graph (Dijkstra 1959).
 //!
-//! Lengths add up in single precision, from the source outwards, each sum rounded to nearest and greater than
-//! the one before: after m edges the relative error is at most (m + 3) 6e-8. Of ways that come out equally
-//! long the one stands whose last point but one was reached first, of points equally far the one with the
-//! lesser index.
+//! Lengths are summed in single precision from the source outwards. Each sum is rounded to nearest
+//! and greater than the previous one, so after m edges the relative error is at most (m + 3) 6e-8.
+//! Of equally long paths, the one whose last but one point was reached first is kept. Equally
+//! distant points are reached in the order of their indices.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,67 +13,68 @@ use crate::length::{Network, step};
 /// A point that a search reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reached {
-    /// Its index.
+    /// Index of the point.
     pub point: u32,
-    /// How far it is along the graph.
+    /// Distance along the graph.
     pub distance: f32,
 }
 
-/// What a search knows of a point.
+/// State of a point during a search.
 #[derive(Debug, Clone, Copy)]
 struct Known {
-    /// The length of the shortest way found.
+    /// Length of the shortest path found.
     distance: f32,
-    /// The point before it on that way; itself at a source.
+    /// Previous point on that path; a source points to itself.
     before: u32,
 }
 
 const UNKNOWN: Known = Known { distance: f32::INFINITY, before: 0 };
 
-/// Memory for searches, used again by the next. Twelve bytes a point of the largest graph, and what a search
-/// reaches.
+/// Scratch memory for searches: twelve bytes for each point of the largest graph, plus the points
+/// reached. Reuse it for later searches.
 #[derive(Debug, Clone, Default)]
 pub struct GeodesicScratch {
     known: Vec<Known>,
-    /// Distance and point, the nearest on top; a point may stand there several times, the first counts.
+    /// Distance and point, nearest on top. Of several entries of a point, the first counts.
     queue: BinaryHeap<Reverse<u64>>,
-    /// Points of which something is known.
+    /// Points with a known distance.
     touched: Vec<u32>,
     reached: Vec<Reached>,
 }
 
-/// Distances are not negative, so that they order like their bits.
+/// Distances are not negative, so they sort like their bits.
 #[inline]
 fn key(distance: f32, point: u32) -> Reverse<u64> {
     Reverse(u64::from(distance.to_bits()) << 32 | u64::from(point))
 }
 
 impl GeodesicScratch {
-    /// All points within `reach` of `source`, itself first, by distance, then index.
+    /// Returns all points within `reach` of `source`, sorted by distance, then index; `source`
+    /// comes first.
     ///
-    /// O(m log m) for m edges at these points; no allocation once warm.
+    /// Takes O(m log m) time for m edges at these points. Does not allocate once warm.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `source` is not a point.
     pub fn within(&mut self, network: Network<'_>, source: u32, reach: f32) -> &[Reached] {
         self.search(network, [(source, 0.0)], reach, |_, _| true, |_| false);
         &self.reached
     }
 
-    /// The distance from `a` to `b`, or nothing where no way leads there.
+    /// Returns the distance from `a` to `b`; `None` if they are not connected.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `a` or `b` is not a point.
     pub fn distance(&mut self, network: Network<'_>, a: u32, b: u32) -> Option<f32> {
         self.search(network, [(a, 0.0)], f32::MAX, |_, _| true, |i| i == b);
         self.found(b)
     }
 
-    /// As [`Self::distance`]; `path` holds the points of a shortest path from `a` to `b` afterwards, both
-    /// included, or none.
+    /// Returns the distance as [`Self::distance`] does, and sets `path` to the points of a shortest
+    /// path from `a` to `b`, both included. `path` is empty if there is none.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `a` or `b` is not a point.
     pub fn path(&mut self, network: Network<'_>, a: u32, b: u32, path: &mut Vec<u32>) -> Option<f32> {
         path.clear();
         let distance = self.distance(network, a, b)?;
@@ -82,14 +83,15 @@ impl GeodesicScratch {
         Some(distance)
     }
 
-    /// How many points the last search reached.
+    /// Returns the number of points that the last search reached.
     #[must_use]
     pub fn reached(&self) -> usize {
         self.reached.len()
     }
 
-    /// Goes out from `sources`, which begin at the distances beside them, through points that are `open` to a
-    /// way of some length there, as far as `reach` or until a point is reached that is the `goal`.
+    /// Searches from `sources`, each with an initial distance, until it reaches a point for which
+    /// `goal` returns `true`. Only points that are `open` at their distance and within `reach` are
+    /// visited.
     pub(crate) fn search(
         &mut self,
         network: Network<'_>,
@@ -134,7 +136,7 @@ impl GeodesicScratch {
         self.queue.push(key(known.distance, point));
     }
 
-    /// Makes ready for the next search.
+    /// Clears the state for the next search.
     fn forget(&mut self) {
         for point in self.touched.drain(..) {
             self.known[point as usize] = UNKNOWN;
@@ -143,24 +145,24 @@ impl GeodesicScratch {
         self.reached.clear();
     }
 
-    /// What the last search found of `point`, if it came there: its distance.
+    /// Returns the distance of `point` in the last search; `None` if it was not reached.
     pub(crate) fn found(&self, point: u32) -> Option<f32> {
         let known = self.known[point as usize].distance;
         (known < f32::INFINITY).then_some(known)
     }
 
-    /// The point before `point` on the way the last search found there; itself at a source.
+    /// Returns the point before `point` on its path in the last search; a source returns itself.
     #[inline]
     pub(crate) fn before(&self, point: u32) -> u32 {
         self.known[point as usize].before
     }
 
-    /// The points the last search reached, in order.
+    /// Returns the points that the last search reached, in order.
     pub(crate) fn all_reached(&self) -> &[Reached] {
         &self.reached
     }
 
-    /// Appends the points from `point`, which the last search found, back to the source.
+    /// Appends the path from `point`, which the last search reached, back to its source.
     pub(crate) fn trace(&self, mut point: u32, path: &mut Vec<u32>) {
         path.push(point);
         while self.before(point) != point {

@@ -1,4 +1,4 @@
-//! The proximity graph of a scan, with what follows from it.
+//! The proximity graph of a scan, with components, borders and densities.
 
 use nearmiss_lanes::parallel::map;
 use nearmiss_store::Array;
@@ -11,10 +11,11 @@ use crate::influence::{distance, influence, radii_sq};
 use crate::options::{GraphError, GraphOptions, Prune, check_positions};
 use crate::prune::split;
 
-/// Who is whose neighbour on the surface: the r-SIG of S1 §3.2 without its long edges.
+/// A proximity graph: the r-SIG of Klein & Zachmann 2005, §3.2, without its long edges.
 ///
-/// Long edges are kept as *virtual* (S1 §4.5): a search may follow them, the surface does not. Points go by
-/// their place in the order that the graph was built from; lengths are in the units of those positions.
+/// Long edges are kept as *virtual* edges (Klein & Zachmann 2005, §4.5), which searches may follow
+/// but which do not belong to the surface. A point is identified by its index among the positions
+/// that the graph was built from. Lengths are in the units of these positions.
 #[derive(Debug, Clone)]
 pub struct PointGraph {
     pub(crate) options: GraphOptions,
@@ -27,30 +28,31 @@ pub struct PointGraph {
     pub(crate) component_count: u32,
 }
 
-/// What there is to say of a graph in numbers.
+/// Numbers of points, edges and components of a graph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GraphCounts {
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// Edges on the surface.
+    /// Number of edges, without virtual ones.
     pub edges: usize,
-    /// Edges that were pruned from it.
+    /// Number of virtual edges, which were pruned.
     pub virtual_edges: usize,
-    /// Parts that no edge joins, virtual ones not counted.
+    /// Number of connected components, ignoring virtual edges.
     pub components: usize,
-    /// Points at a border.
+    /// Number of points at a border.
     pub border: usize,
 }
 
 impl PointGraph {
-    /// The graph over distinct `positions`, in an order in which near ones are mostly near, as a hierarchy's
-    /// is; in others it is the same and takes longer.
+    /// Builds the graph over distinct `positions`. The build is fastest if consecutive positions
+    /// are mostly near each other, as in the order of a hierarchy.
     ///
-    /// O(n log n) in such orders, as the number of edges is O(r n); on all cores with the feature `rayon`,
-    /// and the same on any number of them.
+    /// Takes O(n log n) time in such an order, as the number of edges is O(r n). With the feature
+    /// `rayon` the build uses all cores; the result is the same for any number of cores.
     ///
     /// # Errors
-    /// When an option is out of range, a coordinate not finite or beyond ±1e18, or there are too many edges.
+    /// Fails if an option is out of range, if a coordinate is not finite or beyond ±1e18, or if
+    /// there are too many edges.
     pub fn build(positions: &[[f32; 3]], options: &GraphOptions) -> Result<Self, GraphError> {
         options.check()?;
         check_positions(positions)?;
@@ -83,74 +85,78 @@ impl PointGraph {
         })
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.edges.len()
     }
 
-    /// Whether there are no points.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.edges.is_empty()
     }
 
-    /// What it was built with.
+    /// Returns the options that the graph was built with.
     #[must_use]
     pub fn options(&self) -> &GraphOptions {
         &self.options
     }
 
-    /// Who is joined to whom on the surface.
+    /// Returns the edges on the surface.
     #[must_use]
     pub fn edges(&self) -> &Adjacency {
         &self.edges
     }
 
-    /// Who is joined to whom in the r-SIG by an edge too long for the surface.
+    /// Returns the virtual edges: edges of the r-SIG that are too long for the surface.
     #[must_use]
     pub fn virtual_edges(&self) -> &Adjacency {
         &self.virtual_edges
     }
 
-    /// `d_i` of each point: the distance of its r-th nearest neighbour.
+    /// Returns `d_i` of each point, the distance to its r-th nearest neighbour.
     #[must_use]
     pub fn radii(&self) -> &[f32] {
         &self.radii
     }
 
-    /// `r_i` of each point: the length of its longest edge on the surface; zero where it has none.
+    /// Returns `r_i` of each point, the length of its longest edge, ignoring virtual edges; zero
+    /// without edges.
     #[must_use]
     pub fn reaches(&self) -> &[f32] {
         &self.reaches
     }
 
-    /// Points per unit of area about point `i`: r over the area of a disc of radius `d_i`.
+    /// Returns the number of points per unit of area near point `i`: r over the area of a disc of
+    /// radius `d_i`.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `i` is not below [`Self::len`].
     #[must_use]
     pub fn density(&self, i: usize) -> f64 {
         let d = f64::from(self.radii[i]);
         f64::from(self.options.neighbours) / (std::f64::consts::PI * d * d)
     }
 
-    /// For each point the least of those it is joined to by edges on the surface, over any number of them.
+    /// Returns for each point the least index of a point in its connected component, ignoring
+    /// virtual edges.
     #[must_use]
     pub fn components(&self) -> &[u32] {
         &self.components
     }
 
-    /// Whether point `i` is at a border of the surface: what is near it on the graph lies to one side.
+    /// Returns `true` if point `i` is at a border of the surface, where its neighbours are on one
+    /// side.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `i` is not below [`Self::len`].
     #[must_use]
     pub fn is_border(&self, i: usize) -> bool {
         self.borders[i] != 0
     }
 
-    /// How many there are of what.
+    /// Returns the numbers of points, edges and components.
     #[must_use]
     pub fn counts(&self) -> GraphCounts {
         GraphCounts {
@@ -162,7 +168,7 @@ impl PointGraph {
         }
     }
 
-    /// Bytes of all its arrays.
+    /// Returns the size of all arrays in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.edges.bytes()

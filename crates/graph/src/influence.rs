@@ -1,11 +1,13 @@
-//! The sphere-of-influence graph to the r-th neighbour (S1 §3.2).
+//! The sphere-of-influence graph to the r-th neighbour (Klein & Zachmann 2005, §3.2).
 //!
-//! `d_i` is the distance of point i from its r-th nearest other point, or from the furthest where there are
-//! fewer; i and j are joined iff `‖p_i − p_j‖ ≤ d_i + d_j`. What is compared is √ in double precision of
-//! squared distances in single, `(x−x')² + (y−y')² + (z−z')²` rounded at each operation in this order. That
-//! is one predicate for all who ask it, symmetric, and it joins every point with its r nearest whatever the
-//! rounding. Equal distances on a grid stay equal where the differences are: at such a tie the points are
-//! joined. Distances below 1e-19 are none.
+//! `d_i` is the distance of point i from its r-th nearest other point, or from the furthest if
+//! there are fewer. Points i and j are joined if and only if `‖p_i − p_j‖ ≤ d_i + d_j`.
+//!
+//! The comparison uses double-precision roots of single-precision squared distances
+//! `(x−x')² + (y−y')² + (z−z')²`, rounded after each operation in this order. This predicate is the
+//! same for the build and for updates. It is symmetric, and joins every point with its r nearest
+//! whatever the rounding. Equal distances on a grid stay equal if the differences are exact, and
+//! points at such a tie are joined. Distances below 1e-19 count as zero.
 
 use nearmiss_index::{BlockBoxes, Heard, Nearest, PointBlock};
 use nearmiss_lanes::parallel::ranges;
@@ -17,20 +19,20 @@ use crate::options::GraphError;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// ‖a − b‖.
+/// Returns ‖a − b‖.
 #[inline]
 pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
     f64::from(distance_sq(a, b)).sqrt()
 }
 
-/// How far a point of this `d_i²` is heard: further than `d_i`, by more than rounding, so that no neighbour
-/// is missed.
+/// Returns a search radius slightly greater than `d_i`, given `d_i²`, so that rounding does not
+/// lose a neighbour.
 #[inline]
 pub(crate) fn horizon(radius_sq: f32) -> f32 {
     radius_sq.sqrt() * (1.0 + 1e-6) + 1e-19
 }
 
-/// The spheres of influence: `d_i²` of each point.
+/// Returns `d_i²` of each point, which defines its sphere of influence.
 pub(crate) fn radii_sq(positions: &[[f32; 3]], neighbours: u32) -> Vec<f32> {
     let blocks = blocks(positions, |_| 0.0);
     let boxes = BlockBoxes::new(&blocks, positions.len());
@@ -48,7 +50,7 @@ pub(crate) fn radii_sq(positions: &[[f32; 3]], neighbours: u32) -> Vec<f32> {
     parts.into_iter().flatten().collect()
 }
 
-/// The graph, given the spheres.
+/// Returns the graph, given the spheres.
 pub(crate) fn influence(positions: &[[f32; 3]], radii_sq: &[f32]) -> Result<Adjacency, GraphError> {
     let blocks = blocks(positions, |i| horizon(radii_sq[i]));
     let boxes = BlockBoxes::new(&blocks, positions.len());
@@ -73,7 +75,7 @@ pub(crate) fn influence(positions: &[[f32; 3]], radii_sq: &[f32]) -> Result<Adja
     Adjacency::from_lists(parts)
 }
 
-/// The points in blocks, with their horizons.
+/// Returns the points in blocks, with `horizon` as support radius.
 fn blocks(positions: &[[f32; 3]], horizon: impl Fn(usize) -> f32) -> Vec<PointBlock> {
     let mut blocks = vec![PointBlock::EMPTY; positions.len().div_ceil(WIDTH)];
     for (i, p) in positions.iter().enumerate() {

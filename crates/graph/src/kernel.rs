@@ -1,16 +1,18 @@
-//! The geodesic kernel: f with distances along the graph instead of straight ones.
+//! The geodesic kernel: f with distances along the graph instead of straight-line distances.
 //!
-//! Klein & Zachmann 2005, eq. 5, and off the cloud as in their "Proximity graphs for defining surfaces over
-//! point clouds" (2004): x is replaced by its foot on the edge that is nearest to it, of those at its nearest
-//! point p1, and distances from the foot are interpolated between those from the two ends. So they do not
-//! jump where another point becomes the nearest, and x stays as near as the foot however high it is above the
-//! cloud; its domain ends that (`nearmiss_surface::Status`).
+//! Klein & Zachmann 2005, eq. 5. Away from the cloud, x is replaced by a foot point, as in their
+//! "Proximity graphs for defining surfaces over point clouds" (2004). The foot is the nearest point
+//! to x on the edges of p1, the point nearest to x. Distances from the foot are interpolated
+//! between the distances from the two ends of its edge. They are therefore continuous where the
+//! nearest point changes. They do not grow with the height of x above the cloud; the domain of f
+//! ends the surface there (`nearmiss_surface::Status`).
 //!
-//! Two things we do otherwise. The ways from the foot to both ends are not added before interpolating: with
-//! them the foot half way between two points would be a whole edge from either, and from everything else by
-//! half an edge too far. And where only one of the ends is heard by a point, the other end takes its distance
-//! from there along the edge, instead of none: or points would fall silent as soon as x left p1, those too
-//! that weigh a tenth.
+//! Two things differ from the papers. The distances from the foot to both ends are not added before
+//! interpolating. If they were, a foot halfway between two points would be a whole edge away from
+//! either, and half an edge too far from all other points. And where only one end is within the
+//! support radius of a point, the distance of the other end is extended along the edge instead of
+//! being infinite. Otherwise points with weights up to a tenth would drop out as soon as x leaves
+//! p1.
 
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Level, MeasuredBlock, Moments, SurfacePlan};
@@ -20,18 +22,19 @@ use crate::close_list::{Close, Lists};
 use crate::close_pairs::ClosePairs;
 use crate::length::distance;
 
-/// The place on an edge of the graph that stands for x.
+/// The position on an edge of the graph that stands for x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Foot {
-    /// The points that the edge joins, the nearest to x first; twice that where it has no edge.
+    /// The points that the edge joins, nearest to x first; the same point twice if it has no edge.
     pub ends: [u32; 2],
-    /// Where between them: 0 at the first, 1 at the second, and never nearer to that.
+    /// Position between the ends: 0 at the first, 1 at the second. At most 0.5, because the first
+    /// end is nearer to x.
     pub share: f64,
-    /// The length of the edge.
+    /// Length of the edge.
     pub length: f32,
 }
 
-/// What is needed to evaluate f with the geodesic kernel, borrowed.
+/// Borrowed data to evaluate f with the geodesic kernel.
 #[derive(Debug, Clone, Copy)]
 pub struct GeodesicKernel<'a> {
     plan: &'a SurfacePlan,
@@ -42,23 +45,24 @@ pub struct GeodesicKernel<'a> {
     lists: Lists<'a>,
 }
 
-/// What one of two points is heard at.
+/// A point's distances from the two ends of an edge.
 #[derive(Debug, Clone, Copy)]
 struct Both {
     point: u32,
-    /// Distance to the first end and to the second; infinite where it is not heard.
+    /// Distance to the first and to the second end; infinite beyond the point's support radius.
     distances: [f32; 2],
 }
 
-/// Memory for evaluations, used again by the next: four bytes a point, and what is heard.
+/// Scratch memory for evaluations: four bytes a point, plus the points found. Reuse it for later
+/// evaluations.
 #[derive(Debug, Clone)]
 pub struct KernelScratch {
-    /// The instructions that weigh.
+    /// Instruction set of the weighted sums.
     level: Level,
-    /// One more than where a point stands among `both`, 0 for none.
+    /// Index in `both` plus one, for each point; 0 if it is not in `both`.
     place: Vec<u32>,
     both: Vec<Both>,
-    /// What is heard at the ends of an edge.
+    /// Close lists of the ends of an edge.
     ends: [Vec<Close>; 2],
     heard: Vec<Close>,
     blocks: Vec<MeasuredBlock>,
@@ -71,7 +75,8 @@ impl Default for KernelScratch {
 }
 
 impl KernelScratch {
-    /// For evaluations by the instructions of `level`, which change no bit.
+    /// Creates scratch memory for evaluations with the instruction set `level`, which does not
+    /// affect the results.
     #[must_use]
     pub fn at(level: Level) -> Self {
         let (place, both, ends) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
@@ -80,11 +85,11 @@ impl KernelScratch {
 }
 
 impl<'a> GeodesicKernel<'a> {
-    /// Given positions, local sampling radii, a graph over them, and the map of close pairs with the horizons
-    /// of `plan`.
+    /// Creates a kernel from positions, local sampling radii, a graph over the points, and a map of
+    /// close pairs with the support radii of `plan`.
     ///
     /// # Panics
-    /// When these are not of equally many points.
+    /// Panics if the numbers of points differ.
     #[must_use]
     pub fn new(
         plan: &'a SurfacePlan,
@@ -102,11 +107,11 @@ impl<'a> GeodesicKernel<'a> {
         &self.neighbours[self.starts[i as usize] as usize..self.starts[i as usize + 1] as usize]
     }
 
-    /// The place on the edges at `nearest` that is nearest to `x`; of several edges the one to the least
-    /// index.
+    /// Returns the foot of `x`: the nearest position on the edges of the point `nearest`. Of
+    /// equally near edges, the one to the least index counts.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `nearest` is not a point.
     #[must_use]
     pub fn foot(&self, x: [f64; 3], nearest: u32) -> Foot {
         let from = self.positions[nearest as usize].map(f64::from);
@@ -128,16 +133,18 @@ impl<'a> GeodesicKernel<'a> {
         best.1
     }
 
-    /// The points that are heard at `foot` and how far they are from there along the graph: in the order of
-    /// the list of its first end, then the others in that of its second.
+    /// Finds the points whose support radius, along the graph, contains `foot`, and their
+    /// distances. Points come in the order of the list of the foot's first end, followed by the
+    /// remaining points of its second end.
     ///
     /// # Panics
-    /// When its ends are no points.
+    /// Panics if an end of `foot` is not a point.
     pub fn hear<'s>(&self, foot: &Foot, scratch: &'s mut KernelScratch) -> &'s [Close] {
         let KernelScratch { place, both, ends: [first, second], heard, .. } = scratch;
         both.clear();
         heard.clear();
-        // No distance, not even one that a file makes up, is less than that of a point that is not there.
+        // No distance, not even one from a forged file, is less than this support radius of a
+        // missing point.
         let horizon =
             |point: u32| self.radii.get(point as usize).map_or(f32::NEG_INFINITY, |&r| self.plan.horizon(r));
         self.lists.read(foot.ends[0] as usize, first);
@@ -176,37 +183,39 @@ impl<'a> GeodesicKernel<'a> {
         heard
     }
 
-    /// f at `x`, whose nearest point is `nearest`.
+    /// Evaluates f at `x`, whose nearest point is `nearest`.
     ///
-    /// O(points heard there); no allocation once warm.
+    /// Takes time proportional to the number of points within support distance. Does not allocate
+    /// once warm.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `nearest` is not a point.
     pub fn evaluate(&self, x: [f64; 3], nearest: u32, scratch: &mut KernelScratch) -> Evaluation {
         let foot = self.foot(x, nearest);
         self.hear(&foot, scratch);
         self.sum(x, scratch)
     }
 
-    /// f at the point `i` itself, and the points that are heard there: as [`Self::evaluate`] at its position.
+    /// Evaluates f at point `i`, as [`Self::evaluate`] does at its position, and returns the points
+    /// that contribute.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `i` is not a point.
     pub fn evaluate_at<'s>(&self, i: u32, scratch: &'s mut KernelScratch) -> (Evaluation, &'s [Close]) {
-        // Its list is all, whatever edge it is at the end of.
+        // The foot is the point itself, so its own list suffices.
         self.hear(&Foot { ends: [i; 2], share: 0.0, length: 0.0 }, scratch);
         let at = self.sum(self.positions[i as usize].map(f64::from), scratch);
         (at, &scratch.heard)
     }
 
-    /// f at `x`, at which is heard what was heard last.
+    /// Evaluates f at `x` with the points of the last [`Self::hear`].
     fn sum(&self, x: [f64; 3], scratch: &mut KernelScratch) -> Evaluation {
         let KernelScratch { level, heard, blocks, .. } = scratch;
         blocks.clear();
         for some in heard.chunks(PointBlock::WIDTH) {
             let mut block = MeasuredBlock::EMPTY;
             for (lane, close) in some.iter().enumerate() {
-                // What is heard has a radius, so it has a position.
+                // Points found have a radius, so they have a position.
                 let i = close.point as usize;
                 let horizon = self.plan.horizon(self.radii[i]);
                 self.plan.put(&mut block.points, lane, self.positions[i], horizon);
@@ -217,11 +226,12 @@ impl<'a> GeodesicKernel<'a> {
         Moments::measured(*level, self.plan, x, &*blocks).evaluate(self.plan, x)
     }
 
-    /// The local sampling radius that the graph alone suggests at `foot`: the longest edges at its ends,
-    /// interpolated. It stands for r in [`SurfacePlan::bandwidth`], the bandwidth of Klein & Zachmann 2004.
+    /// Returns the local sampling radius that the graph suggests at `foot`: the longest edges at
+    /// its ends, interpolated. It can replace r in [`SurfacePlan::bandwidth`], the bandwidth of
+    /// Klein & Zachmann 2004.
     ///
     /// # Panics
-    /// When its ends are no points.
+    /// Panics if an end of `foot` is not a point.
     #[must_use]
     pub fn radius(&self, foot: &Foot) -> f32 {
         let longest = foot.ends.map(|end| {

@@ -1,82 +1,83 @@
-//! A path between two points of which only those are known that someone looks at.
+//! Paths whose points are computed on demand.
 //!
-//! A search along a path looks at few of its points, and the path of two far points has many: O(√n) of a
-//! surface of n. So that it is not rebuilt whole (S1, Algorithm 2), it is put together from edges of
-//! [levels](Levels) as coarse as may be, and only the edge about the place that is looked at is taken apart,
-//! level by level, into the edges of the finer one that it stands for. O(log n) a look, whatever the length.
+//! A search along a path looks at few of its points, while the path between two distant points has
+//! many: O(√n) on a surface of n points. Instead of being rebuilt completely (Klein & Zachmann
+//! 2005, Algorithm 2), the path is composed of edges of the coarsest possible [levels](Levels).
+//! Only the edge around the requested position is expanded, level by level, into edges of the next
+//! finer level. [`LazyPath::look`] takes O(log n) time, however long the path is.
 
 use crate::length::distance;
 use crate::{GeodesicScratch, Levels, Network};
 
-/// A path goes straight on on the first level where the ends are no more than so many local sampling radii of
-/// the next apart.
+/// Greatest distance of the ends, in local sampling radii of the next level, at which a path
+/// continues on a level instead of ascending.
 const SHORT: f32 = 1.5;
 
-/// A point of a path, and the edge by which it goes on.
+/// A point of a path and the edge by which the path continues.
 #[derive(Debug, Clone, Copy)]
 struct Stop {
     point: u32,
-    /// How far from the beginning.
+    /// Distance from the start.
     along: f64,
-    /// The level of that edge, 0 for one between points.
+    /// Level of that edge; 0 for an edge between points.
     level: usize,
-    /// What it joins on that level.
+    /// Ends of that edge, on its level.
     ends: [u32; 2],
 }
 
 /// A point of a path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathPoint {
-    /// Which point.
+    /// Index of the point.
     pub point: u32,
-    /// How far it is from the beginning along the path.
+    /// Distance from the start along the path.
     pub along: f64,
 }
 
-/// A path between two points of a graph, known as far as it was looked at; its memory is used again for the
-/// next.
+/// A path between two points of a graph whose points are computed on demand. Its memory is reused
+/// for the next path.
 ///
-/// It is a path of the graph, on average half as long again as the shortest.
+/// It is a path of the graph, and on average 1.5 times as long as the shortest.
 #[derive(Debug, Clone, Default)]
 pub struct LazyPath {
     stops: Vec<Stop>,
-    /// For the way back from the second point.
+    /// Stops of the part that was found from the second point.
     back: Vec<Stop>,
     ids: Vec<u32>,
     search: GeodesicScratch,
 }
 
-/// The graph of a level, or `points` for level 0.
+/// Returns the graph of a level, or `points` for level 0.
 fn network<'a>(levels: &'a Levels, points: Network<'a>, level: usize) -> Network<'a> {
     level.checked_sub(1).map_or(points, |coarser| levels.cells()[coarser].network())
 }
 
-/// The point at the centre of a cell of a level; itself on level 0.
+/// Returns the point at the centre of a cell; on level 0 the point itself.
 fn point_of(levels: &Levels, level: usize, id: u32) -> u32 {
     level.checked_sub(1).map_or(id, |coarser| levels.cells()[coarser].points[id as usize])
 }
 
-/// Of an edge that a file lies about nothing is known.
+/// Returns the length of an edge, or 0 if it is invalid, as in a forged file.
 fn sound(length: f32) -> f64 {
     if length >= 0.0 && length.is_finite() { f64::from(length) } else { 0.0 }
 }
 
-/// The length of an edge, if there is one.
+/// Returns the length of an edge, if it exists.
 fn edge(network: Network<'_>, [u, v]: [u32; 2]) -> Option<f64> {
     network.length(u as usize, v).map(sound)
 }
 
 impl LazyPath {
-    /// Makes this a path from `a` to `b` in `points`, the graph that `levels` are over, with the points at
-    /// its ends and no more than some of the points between. False, with no path, where no way leads from one
-    /// to the other.
+    /// Sets this path to one from `a` to `b` in `points`, the graph that `levels` are over. Only
+    /// the ends and some of the points between them are computed. Returns `false`, and clears the
+    /// path, if the ends are not connected.
     ///
-    /// From either end it leads inwards, from cell to coarser cell, and straight on where the cells are a few
-    /// times smaller than the ends are apart. O(log n) but where the coarsest level has to be searched; no
-    /// allocation once warm.
+    /// From both ends the path ascends from cell to coarser cell, until the cells are only a few
+    /// times smaller than the distance of the ends. Then it continues on that level. Takes O(log n)
+    /// time, except where the coarsest level has to be searched. Does not allocate once warm.
     ///
     /// # Panics
-    /// When there is no such point, or not a position for each.
+    /// Panics if `a` or `b` is not a point, or if there are fewer positions than points.
     pub fn lead(
         &mut self,
         levels: &Levels,
@@ -132,7 +133,7 @@ impl LazyPath {
             at = [cells.owner[u], cells.owner[v]];
             level += 1;
         }
-        // What `back` knows is how far from b its edges end.
+        // The stops in `back` hold the distances of the ends of their edges from b.
         let whole = along + beyond;
         let mut from = along;
         for stop in self.back.drain(..).rev() {
@@ -143,8 +144,9 @@ impl LazyPath {
         true
     }
 
-    /// Goes on from cell to cell of one level, each time to the one whose centre is nearest to that of the
-    /// last, if it gets there.
+    /// Continues on one level from cell to cell, each time to the one whose centre is nearest to
+    /// the centre of the last cell. Returns `false`, and changes nothing, if that does not lead
+    /// there.
     fn walk(
         &mut self,
         (levels, positions): (&Levels, &[[f32; 3]]),
@@ -171,7 +173,7 @@ impl LazyPath {
         true
     }
 
-    /// Goes on by a shortest path on one level, if there is one.
+    /// Continues on one level by a shortest path. Returns `false` if there is none.
     fn search_level(
         &mut self,
         levels: &Levels,
@@ -189,11 +191,12 @@ impl LazyPath {
         found
     }
 
-    /// Makes this a shortest path from `a` to `b` in `network`, found whole, through points that are `open`:
-    /// for ways that levels do not know, as over virtual edges.
+    /// Sets this path to a complete shortest path from `a` to `b` in `network`, through points that
+    /// are `open`. For paths that levels do not contain, such as those over virtual edges. Returns
+    /// `false` if there is no path.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `a` or `b` is not a point.
     pub fn lead_through(
         &mut self,
         network: Network<'_>,
@@ -223,42 +226,45 @@ impl LazyPath {
         *along += length;
     }
 
-    /// Number of points that are known.
+    /// Returns the number of points computed so far.
     #[must_use]
     pub fn len(&self) -> usize {
         self.stops.len()
     }
 
-    /// How long it is.
+    /// Returns the length of the path.
     #[must_use]
     pub fn length(&self) -> f64 {
         self.stops.last().map_or(0.0, |stop| stop.along)
     }
 
-    /// Whether there is no path.
+    /// Returns `true` if there is no path.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.stops.is_empty()
     }
 
-    /// The `k`-th of the points that are known.
+    /// Returns the `k`-th point computed so far.
     ///
     /// # Panics
-    /// When there are not so many.
+    /// Panics if `k` is not below [`Self::len`].
     #[must_use]
     pub fn point(&self, k: usize) -> PathPoint {
         PathPoint { point: self.stops[k].point, along: self.stops[k].along }
     }
 
-    /// Takes apart what is about the place `along` the path, between the known points of numbers `left` and
-    /// `right`, until an edge between points is there: the number of the end of it nearer to that place, as
-    /// far as it is neither of those two. Their numbers afterwards are `left`, which does not change, and
-    /// `right` more by what the path grew. None if one edge joins them.
+    /// Expands the edges around the position `along`, between the computed points `left` and
+    /// `right`, until that position is on an edge between points. Returns the end of this edge that
+    /// is nearer to the position; if that end is `left` or `right`, the other end. `None` if a
+    /// single edge joins `left` and `right`.
     ///
-    /// O(log n), however long the path is.
+    /// Afterwards the index of the point `left` is the same, and the index of the point `right` has
+    /// grown by the growth of [`Self::len`].
+    ///
+    /// Takes O(log n) time, however long the path is.
     ///
     /// # Panics
-    /// When there are not so many points.
+    /// Panics if `left` or `right` is not below [`Self::len`].
     pub fn look(&mut self, levels: &Levels, left: usize, right: usize, along: f64) -> Option<usize> {
         let end = self.stops.len() - right;
         loop {
@@ -279,11 +285,11 @@ impl LazyPath {
         }
     }
 
-    /// As [`Self::look`], about the first place where `guess`, a function of points, changes its sign between
-    /// those two; nothing where it has the same sign at both.
+    /// As [`Self::look`], but at the first position between `left` and `right` where `guess`, a
+    /// function of points, changes its sign. `None` if `guess` has the same sign at both.
     ///
     /// # Panics
-    /// When there are not so many points.
+    /// Panics if `left` or `right` is not below [`Self::len`].
     pub fn look_where(
         &mut self,
         levels: &Levels,
@@ -297,7 +303,7 @@ impl LazyPath {
         if (here < 0.0) == (value(&self.stops[right]) < 0.0) {
             return None;
         }
-        // It changes further on, until it has changed.
+        // As long as the sign has not changed, a change follows.
         while first + end < self.stops.len() {
             let next = value(&self.stops[first + 1]);
             if (here < 0.0) == (next < 0.0) {
@@ -313,7 +319,7 @@ impl LazyPath {
         None
     }
 
-    /// Replaces an edge between cells by the edges between their points that it stands for.
+    /// Replaces an edge between cells by the edges of the next finer level that it stands for.
     fn take_apart(&mut self, levels: &Levels, k: usize) {
         let Stop { along, level, ends, .. } = self.stops[k];
         let until = self.stops[k + 1].along;
@@ -321,8 +327,8 @@ impl LazyPath {
         self.ids.clear();
         self.ids.push(cells.centres[ends[0] as usize]);
         let crossed = cells.cross(ends, &mut self.ids);
-        // Within a cell ways are as long as the distances from its centre; the one edge between the two takes
-        // the rest.
+        // Within a cell, lengths are the stored distances from its centre. The edge between the
+        // cells takes the rest.
         let (ids, to_centre): (&[u32], &[f32]) = (&self.ids, &cells.to_centre);
         let parts = ids.windows(2).enumerate().map(|(i, two)| {
             let to_centre = sound(to_centre[two[0] as usize]);
@@ -333,7 +339,7 @@ impl LazyPath {
         self.stops.splice(k..=k, parts);
     }
 
-    /// All points of the path.
+    /// Returns all points of the path, expanding every edge.
     pub fn all<'a>(&'a mut self, levels: &Levels) -> impl ExactSizeIterator<Item = PathPoint> + use<'a> {
         let mut k = 0;
         while k < self.stops.len() {

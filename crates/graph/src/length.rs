@@ -1,4 +1,4 @@
-//! Lengths of edges, and of ways along them.
+//! Lengths of edges and of paths.
 
 use crate::Adjacency;
 
@@ -11,11 +11,12 @@ pub struct Network<'a> {
 }
 
 impl<'a> Network<'a> {
-    /// `graph`, with a length for every entry of its neighbours, those of the first point first, as
-    /// [`edge_lengths`] returns them. Lengths are not negative, and the same from both ends.
+    /// Creates a network from `graph` and a length for each entry of its neighbour lists, in order,
+    /// as [`edge_lengths`] returns them. Lengths must not be negative and must be equal from both
+    /// ends.
     ///
     /// # Panics
-    /// When there are more or fewer lengths than entries.
+    /// Panics if the number of lengths differs from the number of entries.
     #[must_use]
     pub fn new(graph: &'a Adjacency, lengths: &'a [f32]) -> Self {
         let (starts, neighbours) = graph.slices();
@@ -23,22 +24,23 @@ impl<'a> Network<'a> {
         Self { starts, neighbours, lengths }
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether there are no points.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// How long the edge between two points is, if there is one. O(log d) for d neighbours.
+    /// Returns the length of the edge between two points, if there is one. Takes O(log d) time for
+    /// d neighbours.
     ///
     /// # Panics
-    /// When there is no point `i`.
+    /// Panics if `i` is not a point.
     #[inline]
     #[must_use]
     pub fn length(&self, i: usize, j: u32) -> Option<f32> {
@@ -47,10 +49,10 @@ impl<'a> Network<'a> {
         self.lengths.get(range.start + place).copied()
     }
 
-    /// The neighbours of point `i`, ascending, and how far they are.
+    /// Returns the neighbours of point `i`, ascending, and the lengths of the edges to them.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `i` is not a point.
     #[inline]
     pub fn edges(&self, i: usize) -> impl Iterator<Item = (u32, f32)> + use<'a> {
         let range = self.starts[i] as usize..self.starts[i + 1] as usize;
@@ -58,14 +60,14 @@ impl<'a> Network<'a> {
     }
 }
 
-/// The Euclidean length of every edge, for [`Network::new`]: of differences in single precision the root of
-/// the sum of squares, each step rounded, within 2e-7 of the true one.
+/// Returns the Euclidean length of every edge, for [`Network::new`]. Computed in single precision
+/// with a relative error of at most 2e-7.
 ///
-/// On one core: graphs make these when first wanted, and where a thread of a pool waits for others of it
-/// meanwhile, it may come to want them again.
+/// Runs on one core, because graphs compute the lengths inside a lock at first use. A pool thread
+/// that waits for others inside that lock might start work that needs the same lengths.
 ///
 /// # Panics
-/// When the graph has a point that has no position.
+/// Panics if there are fewer positions than points.
 #[must_use]
 pub fn edge_lengths(graph: &Adjacency, positions: &[[f32; 3]]) -> Vec<f32> {
     let lengths = (0..graph.len()).flat_map(|i| {
@@ -75,15 +77,16 @@ pub fn edge_lengths(graph: &Adjacency, positions: &[[f32; 3]]) -> Vec<f32> {
     lengths.collect()
 }
 
-/// How far two points are from each other.
+/// Returns the distance of two points.
 #[inline]
 pub(crate) fn distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     let [x, y, z] = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
     (x * x + y * y + z * z).sqrt()
 }
 
-/// What is `along` plus an edge: more than `along`, however short the edge is. So the points of a shortest
-/// path are at ever greater distances, and it can be told from these alone.
+/// Returns `along` plus an edge, but always more than `along`, however short the edge is. The
+/// distances along a shortest path thus increase strictly, so the path can be recovered from
+/// distances alone.
 #[inline]
 pub(crate) fn step(along: f32, edge: f32) -> f32 {
     (along + edge).max(along.next_up())

@@ -1,11 +1,13 @@
 //! Coarser graphs over nested subsets of the points, for distances and paths of any length.
 //!
-//! A level keeps points, centres, no two of which are nearer than a distance along the graph that doubles
-//! from level to level, and of which every other point is within that of one. Each point belongs to the cell
-//! of the nearest centre (a Voronoi diagram along the graph); two cells that an edge joins are joined by an
-//! edge as long as the shortest way through one such edge, which is remembered, so that a path between
-//! centres is a path of points. A shortest path is searched among the few cells of the coarsest level, then,
-//! level by level, only in the cells near the path found on the level before.
+//! Each level selects centres among the points of the finer level. The minimum distance of centres
+//! along the graph doubles from level to level, and every other point is within that distance of a
+//! centre. Each point belongs to the cell of its nearest centre (a Voronoi diagram along the
+//! graph). Two cells are adjacent if an edge joins them. The length of their edge is that of the
+//! shortest path between their centres through one such edge. That edge is stored, so a path
+//! between centres expands to a path of points. A shortest path is first searched among the few
+//! cells of the coarsest level. Each finer level is then searched only in the cells near the
+//! previous path.
 
 use nearmiss_lanes::id32;
 use nearmiss_store::Array;
@@ -14,79 +16,82 @@ use crate::Adjacency;
 use crate::geodesic::{GeodesicScratch, Reached};
 use crate::length::Network;
 
-/// Centres keep 1.2 times the distance of a point's sixth neighbour from each other: a quarter of the points.
+/// Distance between centres over the distance of a point's sixth neighbour. A quarter of the points
+/// become centres.
 const APART: f32 = 1.2;
 
-/// Distances between centres from level to level.
+/// Growth of the distance between centres from level to level.
 const GROWTH: f32 = 2.0;
 
-/// A level of so few cells is searched whole.
+/// Number of cells up to which a level is searched completely and no coarser level is built.
 const FEW: usize = 256;
 
-/// A level that keeps more than this share of the points brings nothing: parts are down to one cell each.
+/// A level that keeps more than this share of the points is useless, because components are down to
+/// one cell each.
 const MOST_KEPT: f64 = 0.7;
 
-/// Ways on the coarsest level that are so much longer than the shortest are looked at again.
+/// Relative excess over the shortest path up to which paths on the coarsest level are refined.
 const DETOUR: f32 = 0.15;
 
-/// And so much of that on the next level.
+/// Factor on that excess for each finer level.
 const SURER: f32 = 0.4;
 
-/// A path is searched in the cells of the coarser one, and so many cells around.
+/// Rings of cells around the coarser path that are searched as well.
 const RINGS: usize = 1;
 
-/// The cells of a level, about some of the points of the finer one.
+/// The cells of a level. Their centres are points of the finer level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cells {
-    /// Of each point of the finer level its cell.
+    /// Cell of each point of the finer level.
     pub(crate) owner: Array<u32>,
-    /// How far it is from the centre of its cell.
+    /// Distance of each point of the finer level from the centre of its cell.
     pub(crate) to_centre: Array<f32>,
-    /// The point after it on the way to the centre; itself there.
+    /// Next point on the path to the centre; a centre points to itself.
     pub(crate) inwards: Array<u32>,
-    /// Of each cell its centre, as a point of the finer level.
+    /// Centre of each cell, as a point of the finer level.
     pub(crate) centres: Array<u32>,
-    /// Which cells touch.
+    /// Adjacency of the cells.
     pub(crate) graph: Adjacency,
-    /// And which point of the graph that all levels are over; not stored.
+    /// Centre of each cell, as a point of the original graph; not stored.
     pub(crate) points: Vec<u32>,
-    /// How far their centres are from each other.
+    /// Distances between the centres of adjacent cells.
     pub(crate) lengths: Array<f32>,
-    /// The edge of the finer level on the way: the end in the cell itself, then that in the other.
+    /// The edge of the finer level that joins two adjacent cells: the end in the cell itself, then
+    /// the end in the other cell.
     pub(crate) crossings: Array<[u32; 2]>,
-    /// The local sampling radii among the centres.
+    /// Local sampling radius of each centre, doubled with each level.
     pub(crate) radii: Array<f32>,
 }
 
-/// Coarser and coarser levels over a graph.
+/// Increasingly coarse levels over a graph.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Levels {
     pub(crate) cells: Vec<Cells>,
 }
 
-/// Memory for searches, used again by the next.
+/// Scratch memory for searches. Reuse it for later searches.
 #[derive(Debug, Clone, Default)]
 pub struct LevelScratch {
     search: GeodesicScratch,
-    /// Which cells are open to a search, by the number of the search.
+    /// Number of the last search that opened each cell.
     open: Vec<u32>,
     number: u32,
-    /// Opened cells.
+    /// Cells that are open in the current search.
     opened: Vec<u32>,
-    /// What is how far from the one end on the coarsest level.
+    /// Cells reached from the first end, with their distances.
     far: Vec<Reached>,
     ancestors: Vec<[u32; 2]>,
     reached: usize,
 }
 
 impl LevelScratch {
-    /// How many points and cells the last search reached, on all levels.
+    /// Returns the number of points and cells that the last search reached, on all levels.
     #[must_use]
     pub fn reached(&self) -> usize {
         self.reached
     }
 
-    /// Opens the cells of `graph` that `self.opened` holds, and those around.
+    /// Opens the cells of `graph` in `self.opened`, and the rings around them.
     fn open_about(&mut self, graph: &Adjacency) {
         if self.open.len() < graph.len() {
             self.open.resize(graph.len(), 0);
@@ -113,9 +118,9 @@ impl LevelScratch {
         }
     }
 
-    /// Searches from `a` and from `b` where it is open, and has those cells opened next by which ways lead
-    /// from the one to the other that are not `detour` longer than the shortest, as a share: which of them
-    /// is, finer levels tell.
+    /// Searches from `a` and from `b` through open cells. Replaces `self.opened` by the cells on
+    /// paths from `a` to `b` whose length exceeds the shortest by at most the fraction `detour`.
+    /// Finer levels decide which of these paths is the shortest.
     fn survey(
         &mut self,
         network: Network<'_>,
@@ -141,7 +146,8 @@ impl LevelScratch {
 }
 
 impl Cells {
-    /// The next level over a graph whose points have these local sampling radii. O(n log n), on one core.
+    /// Builds the next level over a graph whose points have these local sampling radii. Takes
+    /// O(n log n) time on one core.
     fn over(network: Network<'_>, radii: &[f32], scratch: &mut GeodesicScratch) -> Self {
         let centres = centres(network, radii, scratch);
         scratch.search(network, centres.iter().map(|&c| (c, 0.0)), f32::MAX, |_, _| true, |_| false);
@@ -159,7 +165,7 @@ impl Cells {
         let touching = touching(network, &owner, &to_centre, centres.len());
         let edges: Vec<[u32; 2]> = touching.iter().map(|touch| touch.cells).collect();
         let graph = Adjacency::from_edges(centres.len(), &edges);
-        // In the order of the graph's entries.
+        // Sorted like the entries of the graph.
         let mut ends: Vec<Touch> = touching.iter().flat_map(|&touch| [touch, touch.turned()]).collect();
         ends.sort_unstable_by_key(|touch| touch.cells);
         let radii: Vec<f32> = centres.iter().map(|&centre| GROWTH * radii[centre as usize]).collect();
@@ -176,67 +182,69 @@ impl Cells {
         }
     }
 
-    /// Which points the centres are, by those of the finer level.
+    /// Sets `points`, given the finer level.
     pub(crate) fn find_points(&mut self, finer: Option<&Self>) {
         let point = |&id: &u32| finer.map_or(id, |finer| finer.points[id as usize]);
         self.points = self.centres.iter().map(point).collect();
     }
 
-    /// The graph of the cells with the distances of their centres.
+    /// Returns the graph of the cells, with the distances of their centres.
     #[must_use]
     pub fn network(&self) -> Network<'_> {
         Network::new(&self.graph, &self.lengths)
     }
 
-    /// Number of cells.
+    /// Returns the number of cells.
     #[must_use]
     pub fn len(&self) -> usize {
         self.centres.len()
     }
 
-    /// Whether there is no cell.
+    /// Returns `true` if there are no cells.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.centres.is_empty()
     }
 
-    /// Of each cell its centre, as a point of the finer level, ascending.
+    /// Returns the centre of each cell, as a point of the finer level, ascending.
     #[must_use]
     pub fn centres(&self) -> &[u32] {
         &self.centres
     }
 
-    /// Of each point of the finer level its cell.
+    /// Returns the cell of each point of the finer level.
     #[must_use]
     pub fn owners(&self) -> &[u32] {
         &self.owner
     }
 
-    /// How far each point of the finer level is from the centre of its cell, along that level's graph.
+    /// Returns the distance of each point of the finer level from the centre of its cell, along
+    /// that level's graph.
     #[must_use]
     pub fn distances(&self) -> &[f32] {
         &self.to_centre
     }
 
-    /// The local sampling radii of the points at the centres, doubled with each level: times the surface's
-    /// horizon what a [`ClosePairs`](crate::ClosePairs) of this level reaches.
+    /// Returns the local sampling radii of the centres, doubled with each level. Times the support
+    /// radius in sampling radii, they are the support radii of the cells in the
+    /// [`ClosePairs`](crate::ClosePairs) of this level.
     #[must_use]
     pub fn radii(&self) -> &[f32] {
         &self.radii
     }
 
-    /// What all of it takes, in bytes.
+    /// Returns the size of all arrays in bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
         let (starts, neighbours) = self.graph.slices();
         4 * (3 * self.owner.len() + 2 * self.centres.len() + starts.len() + 4 * neighbours.len())
     }
 
-    /// The points of the finer level on the way along a path of cells, from the centre of its first to that
-    /// of its last.
+    /// Expands a path of cells to the points of the finer level, from the centre of the first cell
+    /// to the centre of the last.
     ///
     /// # Panics
-    /// When `cells` is no path of touching cells.
+    /// Panics if consecutive `cells` are not adjacent.
     pub fn expand(&self, cells: &[u32], path: &mut Vec<u32>) {
         path.clear();
         path.extend(cells.first().map(|&cell| self.centres[cell as usize]));
@@ -245,18 +253,18 @@ impl Cells {
         }
     }
 
-    /// Appends the points from the centre of a cell, which is there already, to that of one that touches it;
-    /// tells the place of the first point of that in `path`.
+    /// Appends the path from the centre of one cell, which `path` already ends with, to the centre
+    /// of an adjacent cell. Returns the index in `path` of the first point in that cell.
     ///
     /// # Panics
-    /// When the cells do not touch.
+    /// Panics if the cells are not adjacent.
     pub(crate) fn cross(&self, [from, to]: [u32; 2], path: &mut Vec<u32>) -> usize {
         let (starts, neighbours) = self.graph.slices();
         let first = starts[from as usize] as usize;
         let others = &neighbours[first..starts[from as usize + 1] as usize];
         let Ok(place) = others.binary_search(&to) else { panic!("cells {from} and {to} do not touch") };
         let [near, far] = self.crossings[first + place];
-        // From the centre out, its last point being there already.
+        // The centre, the last point of the walk inwards, is already in `path`.
         let first = path.len();
         self.walk_in(near, path);
         path.pop();
@@ -276,7 +284,8 @@ impl Cells {
     }
 }
 
-/// Each point, in order, that no centre before it is nearer to than its own distance.
+/// Selects, in order, each point that is not nearer to an earlier centre than that centre's own
+/// minimum distance.
 fn centres(network: Network<'_>, radii: &[f32], scratch: &mut GeodesicScratch) -> Vec<u32> {
     let mut is_near = vec![false; network.len()];
     let mut centres = Vec::new();
@@ -293,7 +302,7 @@ fn centres(network: Network<'_>, radii: &[f32], scratch: &mut GeodesicScratch) -
     centres
 }
 
-/// Two cells that touch.
+/// Two adjacent cells.
 #[derive(Debug, Clone, Copy)]
 struct Touch {
     cells: [u32; 2],
@@ -308,8 +317,8 @@ impl Touch {
     }
 }
 
-/// All pairs of cells that an edge joins, the lesser first, ascending, each with the shortest way; of equally
-/// long ones the first.
+/// Returns all pairs of adjacent cells, the lesser cell first, ascending, each with its shortest
+/// path. Of equally short paths the first counts.
 fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize) -> Vec<Touch> {
     let mut starts = vec![0_u32; cells + 1];
     for cell in owner {
@@ -325,7 +334,7 @@ fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize
         next[*cell as usize] += 1;
     }
     let mut all: Vec<Touch> = Vec::new();
-    // Where the pair with each cell stands in `all`, if it is this cell's.
+    // Index in `all` of the pair of the current cell with each other cell.
     let mut place = vec![usize::MAX; cells];
     for cell in 0..id32(cells) {
         let first = all.len();
@@ -352,11 +361,12 @@ fn touching(network: Network<'_>, owner: &[u32], to_centre: &[f32], cells: usize
 }
 
 impl Levels {
-    /// The levels over a graph whose points have these local sampling radii, such as the distances of their
-    /// sixth neighbours, until one has few cells. O(n log n) time, O(n) space.
+    /// Builds the levels over a graph whose points have these local sampling radii, such as the
+    /// distances of their sixth neighbours. Stops at a level with few cells. Takes O(n log n) time
+    /// and O(n) memory.
     ///
     /// # Panics
-    /// When there is not a radius for each point.
+    /// Panics if the number of radii differs from the number of points.
     #[must_use]
     pub fn build(network: Network<'_>, radii: &[f32]) -> Self {
         assert_eq!(network.len(), radii.len(), "a radius a point");
@@ -379,24 +389,26 @@ impl Levels {
         Self { cells }
     }
 
-    /// The levels, the finest first.
+    /// Returns the levels, finest first.
     #[must_use]
     pub fn cells(&self) -> &[Cells] {
         &self.cells
     }
 
-    /// What all of it takes, in bytes.
+    /// Returns the size of all arrays in bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
         self.cells.iter().map(Cells::byte_len).sum()
     }
 
-    /// The length of a path from `a` to `b` in the graph that the levels are over, or nothing where no way
-    /// leads there. No path is shorter in the cells that were searched; how much shorter one elsewhere can be
-    /// is measured (`benches`).
+    /// Returns the length of a path from `a` to `b` in the graph that the levels are over; `None`
+    /// if they are not connected.
+    ///
+    /// The path is the shortest in the cells that were searched. A path elsewhere may be shorter;
+    /// `benches` measures by how much.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `a` or `b` is not a point.
     pub fn distance(&self, network: Network<'_>, a: u32, b: u32, scratch: &mut LevelScratch) -> Option<f32> {
         scratch.reached = 0;
         scratch.ancestors.clear();
@@ -433,10 +445,11 @@ impl Levels {
         scratch.search.found(b)
     }
 
-    /// As [`Self::distance`]; `path` holds the points from `a` to `b` afterwards, both included, or none.
+    /// Returns the length of a path as [`Self::distance`] does, and sets `path` to its points from
+    /// `a` to `b`, both included. `path` is empty if there is none.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// Panics if `a` or `b` is not a point.
     pub fn path(
         &self,
         network: Network<'_>,

@@ -1,50 +1,52 @@
-//! How a graph is built.
+//! Options of a graph.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// What is kept of paths.
+/// The data stored for paths between close pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Paths {
-    /// Nothing: each step is looked for among the neighbours.
+    /// Nothing. Each step of a path is searched among the neighbours.
     #[default]
     Rebuilt,
-    /// A byte a pair: the rank among the neighbours of where the path goes on.
+    /// One byte for each pair: the rank, among the neighbours, of the next point of the path.
     Stored,
 }
 
-/// r of the r-SIG: more would join what lies beside each other on no surface.
+/// Values of r of the r-SIG. A larger r would connect points of unrelated surfaces.
 const NEIGHBOURS: std::ops::RangeInclusive<u32> = 1..=32;
 
-/// How many interquartile ranges an edge may be longer than the third quartile.
+/// Values of k in [`Prune::Quartiles`].
 const FENCE: std::ops::RangeInclusive<f64> = 0.0..=1e6;
 
-/// Coordinates whose squared differences single precision holds.
+/// Greatest coordinate whose squared differences are in the range of single precision.
 const FARTHEST: f32 = 1e18;
 
-/// Whether long edges are taken off the surface.
+/// The pruning of long edges.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Prune {
-    /// All edges stay.
+    /// All edges are kept.
     Never,
-    /// Edges are virtual that at one of their ends are longer than Q3 + k · (Q3 − Q1) and than 1.5 times the
-    /// median, by the lengths of the edges there, if these are five or more. k is given, at least 0; larger
-    /// keeps more.
+    /// Edges that are long at one of their ends become virtual. An edge is long if it is longer
+    /// than Q3 + k · (Q3 − Q1) and than 1.5 times the median of the edge lengths at that end. Ends
+    /// with fewer than five edges are skipped. k is the given number, at least 0; a larger k keeps
+    /// more edges.
     Quartiles(f64),
 }
 
-/// How a graph is built. Plain numbers, checked by the build.
+/// Options of a graph. Building a graph validates them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct GraphOptions {
-    /// r: a point's sphere of influence reaches to its r-th nearest neighbour (S1 §3.2). 1 to 32, default 4.
-    /// Larger bridges wider gaps between samples, joins more that is not joined on the surface, and costs in
-    /// proportion.
+    /// r: a point's sphere of influence extends to its r-th nearest neighbour (Klein & Zachmann
+    /// 2005, §3.2). 1 to 32, default 4. A larger r bridges wider gaps between samples, but also
+    /// joins more points that are not connected on the surface. The cost grows in proportion.
     pub neighbours: u32,
-    /// What becomes of long edges. Default: [`Prune::Quartiles`] with k = 1.
+    /// Pruning of long edges. Default: [`Prune::Quartiles`] with k = 1.
     pub prune: Prune,
-    /// Whether the map of close pairs is made, and what of its paths is kept. Default: made, paths rebuilt.
+    /// The data stored for paths between close pairs; `None` for no map of close pairs. Default: a
+    /// map, with nothing stored for paths.
     pub close_pairs: Option<Paths>,
 }
 
@@ -55,25 +57,25 @@ impl Default for GraphOptions {
 }
 
 impl GraphOptions {
-    /// The same options with this r.
+    /// Sets r.
     #[must_use]
     pub const fn with_neighbours(self, neighbours: u32) -> Self {
         Self { neighbours, ..self }
     }
 
-    /// The same options with this pruning.
+    /// Sets the pruning.
     #[must_use]
     pub const fn with_prune(self, prune: Prune) -> Self {
         Self { prune, ..self }
     }
 
-    /// The same options with this map of close pairs, or none.
+    /// Sets the data stored for paths between close pairs; `None` for no map of close pairs.
     #[must_use]
     pub const fn with_close_pairs(self, close_pairs: Option<Paths>) -> Self {
         Self { close_pairs, ..self }
     }
 
-    /// Checks every range.
+    /// Validates the options.
     pub(crate) fn check(&self) -> Result<(), GraphError> {
         if !NEIGHBOURS.contains(&self.neighbours) {
             return Err(GraphError::Neighbours(self.neighbours));
@@ -85,17 +87,17 @@ impl GraphOptions {
     }
 }
 
-/// Why no graph is built.
+/// Error of building or updating a graph.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GraphError {
-    /// r is not between 1 and 32.
+    /// An r that is not between 1 and 32.
     #[error("spheres of influence up to the neighbour of rank {0}; it must lie between 1 and 32")]
     Neighbours(u32),
-    /// k is not between 0 and a million.
+    /// A k that is not between 0 and a million.
     #[error("a fence of {0} interquartile ranges; it must lie between 0 and 1000000")]
     Prune(f64),
-    /// A coordinate is not finite, or beyond what single precision squares.
+    /// A coordinate that is not finite, or too large to be squared in single precision.
     #[error(
         "point {index} has a coordinate that is not finite or beyond ±1e18; drop it or scale the input down"
     )]
@@ -103,21 +105,21 @@ pub enum GraphError {
         /// Index of the first such point.
         index: usize,
     },
-    /// The place of the scanner is none.
+    /// A scanner position that is not finite.
     #[error("the scanner at {0:?}; its coordinates must be finite")]
     Scanner([f64; 3]),
-    /// More points, or ends of edges, than 32 bits count.
+    /// More points, or more ends of edges, than 32 bits can number.
     #[error("{ends} ends of edges; at most 4294967295 can be stored; choose fewer neighbours")]
     TooLarge {
-        /// How many there are.
+        /// Number of points or of ends of edges.
         ends: usize,
     },
-    /// The geodesic kernel has nothing to measure by.
+    /// A geodesic kernel requested of a graph without a map of close pairs.
     #[error("the geodesic kernel measures by a graph's map of close pairs; build the graph with that map")]
     NoClosePairs,
 }
 
-/// Checks that differences of `positions` can be squared.
+/// Checks that differences of `positions` can be squared in single precision.
 pub(crate) fn check_positions(positions: &[[f32; 3]]) -> Result<(), GraphError> {
     let fits = |p: &[f32; 3]| p.iter().all(|c| c.abs() <= FARTHEST);
     if positions.len() >= u32::MAX as usize {

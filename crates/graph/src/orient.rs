@@ -1,17 +1,19 @@
-//! Which side is out: one sign for each normal, so that neighbours agree.
+//! Orientation of normals: one sign for each normal, so that neighbours agree and normals point
+//! outwards.
 //!
-//! As in Hoppe et al. 1992, a spanning tree of the edges along which normals agree best carries the sign from
-//! point to point. We differ twice.
+//! As in Hoppe et al. 1992, a spanning tree of the edges along which normals agree best propagates
+//! the sign from point to point. Two things differ.
 //!
-//! They hold normals to agree that are parallel, which fails at sharp edges and through thin plates. Ours
-//! mirror each other in the plane half way between the points, as two normals of one circle do, of a sphere,
-//! a plane, of both sides of a ridge, a groove or a plate: with e the direction of the edge, n' is held
-//! against n − 2 (n·e) e.
+//! Hoppe et al. measure agreement by how parallel two normals are, which fails at sharp edges and
+//! across thin plates. Here two normals agree if they mirror each other in the plane halfway
+//! between their points. This holds for normals of a circle, sphere or plane, and for both sides of
+//! a ridge, a groove or a plate. With e the direction of the edge, n' is compared with
+//! n − 2 (n·e) e.
 //!
-//! And their tree lets one edge decide between two sides of a doubtful place. Only along smooth sheets do we
-//! grow it edge by edge (Kruskal's algorithm); the patches that this leaves are joined by what all edges
-//! between two of them say together, each patch to the one that it is surest of, until no edge is left.
-//! `benches` (`geodesics`) counts what comes out wrong.
+//! In their tree a single edge decides between two sides of an ambiguous region. Here the tree
+//! grows edge by edge (Kruskal's algorithm) only along smooth sheets, which yields patches. Patches
+//! are joined by the votes of all edges between two of them, each patch to the one with the
+//! clearest votes, until no edge is left. `benches` (`geodesics`) counts wrong signs.
 
 mod agreement;
 mod outwards;
@@ -27,32 +29,35 @@ use outwards::outwards;
 use patches::{Signed, Tree, Votes};
 pub use sides::{Decision, OrientedPart, Sides, Viewpoint};
 
-/// Normals that agree like this lie on one smooth sheet. If a ring of such edges still turns a normal round,
-/// the sheet has one side only.
+/// Least agreement of normals on one smooth sheet. If the normal is reversed along a cycle of such
+/// edges, the sheet is one-sided.
 const SMOOTH: f32 = 0.95;
 
-/// How well normals could be oriented.
+/// Result of [`orient()`]: confidences and parts. The normals are changed in place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Orientation {
-    /// For each point 255 where its sign is certain, 0 where it might as well be the other: the lesser of the
-    /// agreement of its edges, those against it taken off, and of the doubt in the least certain step by
-    /// which its sign came from the greater part.
+    /// Confidence in the sign of each point's normal: 255 for certain, 0 for arbitrary. It is the
+    /// lesser of two measures: the net agreement along the point's edges, and the certainty of the
+    /// least certain step through which the point got its sign.
     pub confidence: Vec<u8>,
-    /// The connected parts, by their first points.
+    /// Connected parts, by their first points.
     pub parts: Vec<OrientedPart>,
 }
 
-/// Turns `normals` so that neighbours in `graph` agree, and outwards where that can be told: by what `sides`
-/// says, where the greater part of a component follows it, else so that the component encloses a positive
-/// volume about its centre, each point standing for the square of its local sampling radius. What the signs
-/// are beforehand does not matter but where all of that says nothing.
+/// Orients `normals` so that neighbours in `graph` agree, and outwards as far as the outside is
+/// known.
 ///
-/// O(e log e) in the number of edges, of which only those in doubt are sorted, in part on all cores; the
-/// result does not depend on how many there are.
+/// The side of a component is the one that `sides` suggests for most of its points. If `sides`
+/// suggests nothing, the component is oriented to enclose a positive volume about its centre, where
+/// each point stands for an area of the square of its local sampling radius. The initial signs only
+/// matter if none of this decides.
+///
+/// Takes O(e log e) time for e edges, of which only ambiguous ones are sorted. Some of it runs on
+/// all cores; the result does not depend on their number.
 ///
 /// # Panics
-/// When there is not a position, a normal and a radius for each point, and a normal of its own if `sides` has
-/// these.
+/// Panics if the numbers of positions, normals and radii, and of normals in `sides` if any, differ
+/// from the number of points.
 pub fn orient(
     graph: &Adjacency,
     positions: &[[f32; 3]],

@@ -1,4 +1,4 @@
-//! Close pairs and coarser levels in a container, and what must hold of them there.
+//! Storage of close pairs and coarser levels in a container, and the validation of loaded ones.
 
 use bytemuck::Pod;
 use nearmiss_store::{Array, Check, File, Flaw, LoadError, OpenError, WriteError, Writer};
@@ -8,14 +8,14 @@ use crate::close_list::{BESIDE, is_floor, pack, rounded};
 use crate::close_pairs::ClosePairs;
 use crate::levels::{Cells, Levels};
 
-/// Part 0 is of the points, part k of the cells of level k.
+/// Part 0 belongs to the points, part k to the cells of level k.
 const LIST_STARTS: [u8; 4] = *b"CPST";
 const FLOORS: [u8; 4] = *b"CPFL";
 const OFFSETS: [u8; 4] = *b"CPOF";
 const CODES: [u8; 4] = *b"CPDI";
 const BESIDES: [u8; 4] = *b"CPBS";
 const ONWARD: [u8; 4] = *b"CPON";
-/// Part k is what makes level k from the one before.
+/// Part k maps the previous level to level k.
 const OWNERS: [u8; 4] = *b"CELL";
 const TO_CENTRE: [u8; 4] = *b"CDST";
 const INWARDS: [u8; 4] = *b"CWAY";
@@ -31,10 +31,10 @@ const CELL: &str = "the cell of point";
 const EDGES: &str = "the edges of cell";
 
 impl ClosePairs {
-    /// Adds the arrays to a container, `part` telling several maps apart.
+    /// Adds the arrays to a container; `part` distinguishes several maps.
     ///
     /// # Errors
-    /// When the container has sections of these names already.
+    /// Fails if the container already has sections of these names.
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>, part: u32) -> Result<(), WriteError> {
         writer
             .section(LIST_STARTS, part, &self.starts)?
@@ -48,13 +48,17 @@ impl ClosePairs {
         Ok(())
     }
 
-    /// The map in `file` of so many points with these horizons, its arrays in place. With either `check`
-    /// every list is there, so that no use of it fails. [`Check::Full`] also checks the contents: a list
-    /// names existing points in ascending distance, begins with the point itself, and ends within the
-    /// horizons; exact distances kept beside the list belong to entries that cannot hold them.
+    /// Loads the map of `points` points with these support radii from `file`. Arrays stay in the
+    /// file.
+    ///
+    /// With either `check` the structure of the lists is validated, so that no method fails
+    /// afterwards. [`Check::Full`] also validates the contents: a list names existing points in
+    /// ascending distance, begins with the point itself, and ends within the support radii. Pairs
+    /// stored separately must belong to entries that cannot hold them.
     ///
     /// # Errors
-    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    /// Fails if a section is missing, holds values that no build writes, or contradicts another
+    /// section.
     pub fn load(
         file: &File,
         part: u32,
@@ -84,7 +88,7 @@ impl ClosePairs {
         if !self.onward.is_empty() {
             Flaw::length("steps of paths", self.onward.len(), self.pair_count())?;
         }
-        // No code leads to what is no distance then.
+        // With valid floors, every code is a valid distance.
         Flaw::length("floors of close pairs", self.floors.len(), points)?;
         Flaw::first(LISTS, self.floors.iter().position(|&floor| !is_floor(floor)))?;
         let starts: &[u32] = &self.starts;
@@ -129,7 +133,7 @@ impl Levels {
     /// Adds the arrays to a container.
     ///
     /// # Errors
-    /// When the container has sections of these names already.
+    /// Fails if the container already has sections of these names.
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
         for (part, cells) in (1..).zip(&self.cells) {
             put(writer, OWNERS, part, &cells.owner)?;
@@ -145,12 +149,15 @@ impl Levels {
         Ok(())
     }
 
-    /// The levels over `points` points in `file`, their arrays in place. With either `check` everything that
-    /// is named is there, every way inwards ends at the centre of its cell, and edges cross between the cells
-    /// they join, so that no search fails. With [`Check::Full`] distances also are such as a build writes.
+    /// Loads the levels over `points` points from `file` without copying arrays.
+    ///
+    /// With either `check`, all indices are in range, every path inwards ends at the centre of its
+    /// cell, and edges cross between the cells that they join, so that no search fails.
+    /// [`Check::Full`] also validates the distances.
     ///
     /// # Errors
-    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    /// Fails if a section is missing, holds values that no build writes, or contradicts another
+    /// section.
     pub fn load(file: &File, points: usize, check: Check) -> Result<Self, LoadError> {
         let mut cells: Vec<Cells> = Vec::new();
         let mut finer = points;
@@ -160,7 +167,8 @@ impl Levels {
             if check == Check::Full {
                 next.check_contents()?;
             }
-            // Each level is smaller than the one before, so that they end.
+            // Each level must be smaller than the previous one, so that the number of levels is
+            // bounded.
             if next.len() >= finer {
                 return Err(Flaw::Metadata { what: "the number of cells" }.into());
             }
@@ -201,7 +209,8 @@ impl Cells {
             .zip(centres)
             .position(|(cell, &centre)| !is_owned(centre, cell) || inwards[centre as usize] != centre);
         Flaw::first("the centre of cell", stray)?;
-        // The way inwards comes nearer with every step, so it ends; only at a centre it may.
+        // A path inwards must get nearer with every step, so that it ends, and may only end at a
+        // centre.
         let to_centre: &[f32] = &self.to_centre;
         let lost = (0..).zip(owner).position(|(point, &cell)| {
             let next = inwards[point as usize];

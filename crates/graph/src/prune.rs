@@ -1,8 +1,8 @@
-//! Which edges are long: outliers among the lengths about their ends.
+//! Pruning of long edges: outliers among the edge lengths at their ends.
 //!
-//! S1 §3.2 prunes "long" edges by an outlier test of the reader's choice. This is Tukey's fence with a
-//! tighter k and two guards (docs/theory/graph.md): lengths on a grid have no spread, and of fewer than five
-//! nothing is an outlier.
+//! Klein & Zachmann 2005, §3.2, prune "long" edges by an outlier test of the reader's choice. This
+//! is Tukey's fence with a tighter k and two guards (docs/theory/graph.md): lengths on a grid have
+//! no spread, and fewer than five lengths have no outliers.
 
 use nearmiss_lanes::parallel::ranges;
 
@@ -13,12 +13,12 @@ use crate::options::GraphError;
 /// Fewer edges have no outliers.
 const LEAST_EDGES: usize = 5;
 
-/// An edge up to so many times the median is not long: the diagonals of a square grid are 1.41 times its
-/// edges.
+/// An edge up to this multiple of the median is not long. The diagonals of a square grid are 1.41
+/// times as long as its edges.
 const ORDINARY: f64 = 1.5;
 
-/// Splits `graph` into the edges that stay and those that are long at one of their ends, which become
-/// virtual.
+/// Splits `graph` into the edges to keep and the virtual edges, which are long at one of their
+/// ends.
 pub(crate) fn split(
     positions: &[[f32; 3]],
     graph: &Adjacency,
@@ -52,13 +52,13 @@ pub(crate) fn split(
     Ok((Adjacency::from_lists(kept)?, Adjacency::from_lists(long)?))
 }
 
-/// The length beyond which one of these is long; sorts them.
+/// Returns the length beyond which an edge is long. Sorts `lengths`.
 fn limit(lengths: &mut [f64], k: f64) -> f64 {
     if lengths.len() < LEAST_EDGES {
         return f64::INFINITY;
     }
     lengths.sort_unstable_by(f64::total_cmp);
-    // Linear between order statistics.
+    // Linear interpolation between order statistics.
     let quantile = |quarters: usize| {
         let (low, rest) = (quarters * (lengths.len() - 1) / 4, quarters * (lengths.len() - 1) % 4);
         let share = [0.0, 0.25, 0.5, 0.75][rest];

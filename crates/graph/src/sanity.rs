@@ -1,5 +1,5 @@
-//! What must hold of a stored graph: what its users need to stay within its arrays whenever one is loaded,
-//! what their answers need when the whole file is checked.
+//! Validation of a loaded graph. The structure, which keeps accesses within the arrays, is always
+//! checked. The contents, which answers depend on, are checked on request.
 
 use nearmiss_store::Flaw;
 
@@ -11,8 +11,8 @@ const VIRTUAL: &str = "the virtual edges of point";
 const COMPONENT: &str = "the component of point";
 
 impl Adjacency {
-    /// Checks that lists are there for `points` points, each ascending, of other points that are there. One
-    /// pass.
+    /// Checks that there are lists for `points` points, each of them ascending and holding indices
+    /// of other points in range. Takes one pass.
     pub(crate) fn check_structure(&self, points: usize, what: &'static str) -> Result<(), Flaw> {
         let wrong = |index| Err(Flaw::Value { what, index });
         Flaw::length(what, self.starts.len(), points + 1)?;
@@ -31,9 +31,9 @@ impl Adjacency {
         Ok(())
     }
 
-    /// Checks that each edge stands with both of its ends, given the structure. One pass.
+    /// Checks that each edge is stored at both ends. Requires a valid structure. Takes one pass.
     fn check_symmetry(&self, what: &'static str) -> Result<(), Flaw> {
-        // Ascending i come to each list of theirs in the order of that list.
+        // Ascending points i reach each list of their neighbours in the order of that list.
         let mut next: Vec<u32> = self.starts[..self.len()].to_vec();
         for (i, point) in (0..self.len()).zip(0_u32..) {
             for &j in self.of(i) {
@@ -49,7 +49,8 @@ impl Adjacency {
 }
 
 impl PointGraph {
-    /// What users of the graph need to stay within its arrays. One pass over points and edges.
+    /// Checks everything that keeps accesses within the arrays. Takes one pass over points and
+    /// edges.
     pub(crate) fn check_structure(&self, points: usize) -> Result<(), Flaw> {
         let lengths = [
             ("the radii of influence", self.radii.len()),
@@ -62,7 +63,7 @@ impl PointGraph {
         }
         self.edges.check_structure(points, EDGES)?;
         self.virtual_edges.check_structure(points, VIRTUAL)?;
-        // The name of a component is its first point's.
+        // A component is named by its first point.
         let mut count = 0;
         for (i, &least) in self.components.iter().enumerate() {
             let named = self.components[..=i].get(least as usize);
@@ -77,7 +78,8 @@ impl PointGraph {
         Ok(())
     }
 
-    /// What their answers need besides, given the structure. One pass over points and edges.
+    /// Checks everything else that answers depend on. Requires a valid structure. Takes one pass
+    /// over points and edges.
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
         let wrong = |what, index| Err(Flaw::Value { what, index });
         self.edges.check_symmetry(EDGES)?;

@@ -1,4 +1,4 @@
-//! The graph in a container: one section an array, the rest in the metadata.
+//! Storage of the graph in a container: one section for each array, the rest in the metadata.
 
 use nearmiss_store::{Check, File, Flaw, LoadError, WriteError, Writer};
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use crate::adjacency::Adjacency;
 use crate::graph::PointGraph;
 use crate::options::GraphOptions;
 
-/// Part 0 is of edges on the surface, part 1 of virtual ones.
+/// Part 0 holds edges on the surface, part 1 virtual edges.
 const STARTS: [u8; 4] = *b"ESTA";
 const NEIGHBOURS: [u8; 4] = *b"EDGE";
 const RADII: [u8; 4] = *b"INFL";
@@ -15,7 +15,7 @@ const REACHES: [u8; 4] = *b"RECH";
 const COMPONENTS: [u8; 4] = *b"COMP";
 const BORDERS: [u8; 4] = *b"BORD";
 
-/// What a graph stores beside its arrays.
+/// Metadata of a graph: everything except the arrays.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GraphMeta {
     options: GraphOptions,
@@ -23,7 +23,7 @@ pub struct GraphMeta {
 }
 
 impl PointGraph {
-    /// What is stored beside the arrays.
+    /// Returns the metadata.
     #[must_use]
     pub fn meta(&self) -> GraphMeta {
         GraphMeta { options: self.options, components: self.component_count }
@@ -32,7 +32,7 @@ impl PointGraph {
     /// Adds the arrays to a container.
     ///
     /// # Errors
-    /// When the container has sections of these names already.
+    /// Fails if the container already has sections of these names.
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
         for (part, adjacency) in [(0, &self.edges), (1, &self.virtual_edges)] {
             writer.section(STARTS, part, &adjacency.starts)?.section(
@@ -49,13 +49,15 @@ impl PointGraph {
         Ok(())
     }
 
-    /// The graph over `points` points in `file`, its arrays in place. With either `check` the structure is
-    /// looked through: lengths agree, and every point and edge named is there, so that no use of the graph
-    /// can fail. With [`Check::Full`] each edge also stands with both of its ends, and numbers are such as a
-    /// build writes.
+    /// Loads the graph over `points` points from `file` without copying arrays.
+    ///
+    /// With either `check` the structure is validated in one pass: lengths agree, and all indices
+    /// are in range, so that no method fails afterwards. [`Check::Full`] also checks that each edge
+    /// is stored at both ends, and that numbers are such as a build writes.
     ///
     /// # Errors
-    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    /// Fails if a section is missing, holds values that no build writes, or contradicts another
+    /// section.
     pub fn load(file: &File, meta: GraphMeta, points: usize, check: Check) -> Result<Self, LoadError> {
         meta.options.check().map_err(Flaw::options)?;
         let adjacency = |part| -> Result<Adjacency, LoadError> {

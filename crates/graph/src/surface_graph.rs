@@ -1,4 +1,4 @@
-//! All that a scan keeps of its graph.
+//! The complete graph of a scan: proximity graph, orientation, close pairs and levels.
 
 use std::sync::OnceLock;
 
@@ -15,63 +15,63 @@ use crate::{
     Levels, Network, Paths, PointGraph, edge_lengths,
 };
 
-/// Ways over virtual edges stay where the sum of the distances from both ends is at most so many times their
-/// distance.
+/// Paths over virtual edges may pass through a point if the sum of its distances from both ends is
+/// at most this multiple of the distance of the ends.
 const NARROW: f32 = 1.5;
 
 const CONFIDENCE: [u8; 4] = *b"CNFD";
 const PARTS: [u8; 4] = *b"PART";
 
-/// The samples of a surface that a graph is made of, in the order of the hierarchy's leaves.
+/// The samples of a surface that a graph is built over, in the order of the hierarchy's leaves.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
-    /// What defines the surface.
+    /// Options that define the surface.
     pub plan: &'a SurfacePlan,
-    /// Where they are.
+    /// Positions of the samples.
     pub positions: &'a [[f32; 3]],
-    /// Their local sampling radii.
+    /// Local sampling radii of the samples.
     pub radii: &'a [f32],
 }
 
-/// How far samples of these radii are heard.
+/// Returns the support radii of samples with these local sampling radii.
 fn horizons(plan: &SurfacePlan, radii: &[f32]) -> Vec<f32> {
     radii.iter().map(|&r| plan.horizon(r)).collect()
 }
 
-/// Who is whose neighbour on a surface, which side of it is out, and how far it is along it.
+/// The proximity graph of a scan, with orientation, geodesic distances and coarser levels.
 #[derive(Debug, Clone)]
 pub struct SurfaceGraph {
     points: PointGraph,
     confidence: Array<u8>,
     parts: Array<StoredPart>,
-    /// Of the points, then of the cells of each level; none, or all.
+    /// Maps of the points, then of the cells of each level; empty, or all of these.
     close_pairs: Vec<ClosePairs>,
-    /// There and stored with the map of close pairs, or made when first wanted.
+    /// Stored with the map of close pairs, otherwise computed at first use.
     levels: OnceLock<Levels>,
-    /// Made when first wanted.
+    /// Computed at first use, as are the fields below.
     lengths: OnceLock<Vec<f32>>,
     areas: OnceLock<Vec<f64>>,
     bridged: OnceLock<(Adjacency, Vec<f32>)>,
 }
 
-/// What is stored of a graph beside arrays.
+/// Metadata of a graph: everything except the arrays.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceGraphMeta {
     points: GraphMeta,
     has_close_pairs: bool,
 }
 
-/// A part as it is stored.
+/// An oriented part in its stored form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 struct StoredPart {
     first: u32,
     points: u32,
-    /// 1 if orientable, and twice the number of the decision.
+    /// Bit 0: 1 if orientable. Higher bits: index in [`DECISIONS`].
     flags: u32,
 }
 
-/// By number.
+/// All decisions, by their stored number.
 const DECISIONS: [Decision; 4] =
     [Decision::Normals, Decision::Scanner, Decision::Volume, Decision::Convention];
 
@@ -88,16 +88,19 @@ impl StoredPart {
 }
 
 impl SurfaceGraph {
-    /// The graph of `samples`, whose `normals`, of any sign, are turned so that they agree along it, and
-    /// outwards as far as that can be told (see [`orient`]). O(n log n), on all cores with the feature
-    /// `rayon`; the same on any number of them.
+    /// Builds the graph of `samples` and orients their `normals` along it: consistently, and
+    /// outwards as far as the outside is known (see [`orient`]).
+    ///
+    /// The signs of `normals` may be arbitrary before. Takes O(n log n) time, on all cores with the
+    /// feature `rayon`. The result is the same for any number of cores.
     ///
     /// # Errors
-    /// When an option is out of range, a coordinate is no number that can be squared, or there is too much to
-    /// number.
+    /// Fails if an option is out of range, if a coordinate is not finite or beyond ±1e18, or if
+    /// there are too many points or edges.
     ///
     /// # Panics
-    /// When there is not a radius and a normal for each point, and one of its own if `sides` has these.
+    /// Panics if the numbers of positions, radii and normals, including those of `sides` if any,
+    /// differ.
     pub fn build(
         samples: Samples<'_>,
         sides: Sides<'_>,
@@ -126,7 +129,7 @@ impl SurfaceGraph {
     fn with_close_pairs(self, samples: Samples<'_>, paths: Paths) -> Self {
         let network = self.network(samples.positions);
         let map = |network, radii: &[f32]| ClosePairs::build(network, &horizons(samples.plan, radii), paths);
-        // Levels are made on one core.
+        // Building levels uses one core only.
         let (of_points, levels) =
             both(|| map(network, samples.radii), || self.levels(samples.positions, samples.radii));
         let of_cells = levels.cells().iter().map(|cells| map(cells.network(), cells.radii()));
@@ -134,55 +137,55 @@ impl SurfaceGraph {
         Self { close_pairs, ..self }
     }
 
-    /// Who is joined to whom.
+    /// Returns the proximity graph.
     #[must_use]
     pub fn points(&self) -> &PointGraph {
         &self.points
     }
 
-    /// For each point 255 where the side of its normal is certain, 0 where it might as well be the other.
+    /// Returns the confidence in the sign of each point's normal: 255 for certain, 0 for arbitrary.
     #[must_use]
     pub fn confidence(&self) -> &[u8] {
         &self.confidence
     }
 
-    /// The parts that edges connect, by their first points.
+    /// Returns the connected components, by their first points.
     pub fn parts(&self) -> impl ExactSizeIterator<Item = OrientedPart> {
         self.parts.iter().map(|part| part.part())
     }
 
-    /// The map of close pairs, if it was asked for.
+    /// Returns the map of close pairs, if it was requested.
     #[must_use]
     pub fn close_pairs(&self) -> Option<&ClosePairs> {
         self.close_pairs.first()
     }
 
-    /// The map of close pairs of the cells of a level, from 0 for the finest of [`Self::levels`], whose reach
-    /// grows with the cells; `None` where there is no such level, or no map.
+    /// Returns the map of close pairs of cells; `level` 0 is the finest of [`Self::levels`].
+    /// Support radii grow with the cells. `None` if there is no such level or no map.
     #[must_use]
     pub fn close_cells(&self, level: usize) -> Option<&ClosePairs> {
         self.close_pairs.get(level.checked_add(1)?)
     }
 
-    /// Coarser graphs over ever fewer of the points. With a map of close pairs they are there; without they
-    /// are made when first wanted, some second for a million points.
+    /// Returns coarser graphs over subsets of the points. They are stored with a map of close
+    /// pairs. Otherwise they are computed at first use, in about a second for a million points.
     ///
     /// # Panics
-    /// When there is not a position and a radius for each point.
+    /// Panics if the number of positions or of radii differs from the number of points.
     #[must_use]
     pub fn levels(&self, positions: &[[f32; 3]], radii: &[f32]) -> &Levels {
         self.levels.get_or_init(|| Levels::build(self.network(positions), radii))
     }
 
-    /// The edges with their lengths, for searches; these are made when first wanted.
+    /// Returns the edges with their lengths, for searches. The lengths are computed at first use.
     #[must_use]
     pub fn network(&self, positions: &[[f32; 3]]) -> Network<'_> {
         let lengths = self.lengths.get_or_init(|| edge_lengths(self.points.edges(), positions));
         Network::new(self.points.edges(), lengths)
     }
 
-    /// The edges with the virtual ones, which bridge small holes (S1 §4.5), and their lengths; made when
-    /// first wanted.
+    /// Returns the edges and virtual edges, which bridge small holes (Klein & Zachmann 2005, §4.5),
+    /// with their lengths. They are computed at first use.
     #[must_use]
     pub fn bridged_network(&self, positions: &[[f32; 3]]) -> Network<'_> {
         let (graph, lengths) = self.bridged.get_or_init(|| {
@@ -193,9 +196,11 @@ impl SurfaceGraph {
         Network::new(graph, lengths)
     }
 
-    /// For each point the areas of all before it, in units of π, and last that of all, for drawing points by
-    /// area: one stands for the square of its local sampling radius. Made when first wanted, eight bytes a
-    /// point.
+    /// Returns the prefix sums of the points' areas in units of π, for drawing points by area: a 0,
+    /// then for each point the sum up to and including it.
+    ///
+    /// The area of a point is the square of its local sampling radius. Computed at first use; takes
+    /// eight bytes a point.
     #[must_use]
     pub fn areas(&self, radii: &[f32]) -> &[f64] {
         self.areas.get_or_init(|| {
@@ -211,30 +216,35 @@ impl SurfaceGraph {
         })
     }
 
-    /// Makes what searches along the graph make when they first want it: lengths, [areas](Self::areas),
-    /// [bridges](Self::bridged_network) and [levels](Self::levels). O(e log e) for e edges. For those who
-    /// want the first search to be as fast as the next.
+    /// Computes everything that searches along the graph otherwise compute at first use: lengths,
+    /// [areas](Self::areas), [bridges](Self::bridged_network) and [levels](Self::levels). Takes
+    /// O(e log e) time for e edges. The first search is then as fast as later ones.
     pub fn make_ready(&self, samples: Samples<'_>) {
         let _ = self.levels(samples.positions, samples.radii);
         let _ = self.bridged_network(samples.positions);
         let _ = self.areas(samples.radii);
     }
 
-    /// Makes `path` one from `a` to `b` along the surface, as [`LazyPath::lead`] does. False, with no path,
-    /// where none leads there.
+    /// Sets `path` to a path along the surface between `ends`, as [`LazyPath::lead`] does. Returns
+    /// `false`, and clears `path`, if the ends are not connected.
     ///
     /// # Panics
-    /// When there is no such point, or not a position and a radius for each.
+    /// Panics if an end is not a point, or if the number of positions or of radii differs from the
+    /// number of points.
     pub fn lead(&self, positions: &[[f32; 3]], radii: &[f32], ends: [u32; 2], path: &mut LazyPath) -> bool {
         path.lead(self.levels(positions, radii), self.network(positions), positions, ends)
     }
 
-    /// Makes `path` a shortest one from `a` to `b` over virtual edges too, as far as it stays near both: the
-    /// sum of the distances from them no more than half as much again as their own. For points that are near
-    /// each other, with a hole between (S1 §4.5). Takes time by the number of points there.
+    /// Sets `path` to a shortest path from `a` to `b` that may use virtual edges but stays near
+    /// both ends. At each of its points, the sum of the distances from the ends is at most 1.5
+    /// times the distance of the ends.
     ///
+    /// For points that are near each other with a hole between them (Klein & Zachmann 2005, §4.5).
+    /// The time is proportional to the number of points in that region. Returns `false`, and clears
+    /// `path`, if there is no such path.
     /// # Panics
-    /// When there is no such point, or not a position for each.
+    /// Panics if an end is not a point, or if the number of positions differs from the number of
+    /// points.
     pub fn lead_across(&self, positions: &[[f32; 3]], [a, b]: [u32; 2], path: &mut LazyPath) -> bool {
         let place = |i: u32| positions[i as usize];
         let apart = distance(place(a), place(b));
@@ -242,10 +252,10 @@ impl SurfaceGraph {
         path.lead_through(self.bridged_network(positions), [a, b], near)
     }
 
-    /// The geodesic kernel over these samples, if there is a map of close pairs.
+    /// Returns the geodesic kernel over these samples, if there is a map of close pairs.
     ///
     /// # Panics
-    /// When these are not the samples that the graph is of.
+    /// Panics if `samples` are not the samples that the graph was built over.
     #[must_use]
     pub fn kernel<'a>(&'a self, samples: Samples<'a>) -> Option<GeodesicKernel<'a>> {
         let Samples { plan, positions, radii } = samples;
@@ -253,13 +263,14 @@ impl SurfaceGraph {
         Some(GeodesicKernel::new(plan, positions, radii, self.points.edges(), pairs))
     }
 
-    /// How many there are of what.
+    /// Returns the numbers of points, edges and components.
     #[must_use]
     pub fn counts(&self) -> GraphCounts {
         self.points.counts()
     }
 
-    /// Bytes of all its arrays: of the graph with its orientation, of the maps, and of the levels.
+    /// Returns the sizes in bytes of the graph with its orientation, of the maps, and of the
+    /// levels.
     #[must_use]
     pub fn byte_lens(&self) -> [usize; 3] {
         let graph = self.points.bytes() + self.confidence.len() + size_of_val::<[_]>(&self.parts);
@@ -270,7 +281,7 @@ impl SurfaceGraph {
         ]
     }
 
-    /// What is stored beside the arrays.
+    /// Returns the metadata.
     #[must_use]
     pub fn meta(&self) -> SurfaceGraphMeta {
         SurfaceGraphMeta { points: self.points.meta(), has_close_pairs: !self.close_pairs.is_empty() }
@@ -279,7 +290,7 @@ impl SurfaceGraph {
     /// Adds the arrays to a container.
     ///
     /// # Errors
-    /// When the container has sections of these names already.
+    /// Fails if the container already has sections of these names.
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
         self.points.add_to(writer)?;
         writer.section(CONFIDENCE, 0, &self.confidence)?.section(PARTS, 0, &self.parts)?;
@@ -292,13 +303,15 @@ impl SurfaceGraph {
         }
     }
 
-    /// The graph in `file` of points with these radii, its arrays in place. With either `check` no use of it
-    /// fails. With [`Check::Full`] arrays also agree with each other, lists are in order and lengths are
-    /// lengths; whether a distance is the shortest there is, or a confidence deserved, only a build could
-    /// tell.
+    /// Loads the graph of points with these radii from `file` without copying arrays.
+    ///
+    /// With either `check`, no method of the graph fails afterwards. [`Check::Full`] also verifies
+    /// that arrays agree with each other, lists are ordered and lengths are valid. It cannot verify
+    /// that a distance is the shortest, or that a confidence is justified.
     ///
     /// # Errors
-    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    /// Fails if a section is missing, holds values that no build writes, or contradicts another
+    /// section.
     pub fn load(
         file: &File,
         meta: SurfaceGraphMeta,
@@ -343,7 +356,7 @@ impl SurfaceGraph {
     }
 }
 
-/// Checks that there is a part for each component, in order, with as many points.
+/// Checks that there is one part for each component, in order and with the right number of points.
 fn check_parts(parts: &[StoredPart], components: &[u32]) -> Result<(), Flaw> {
     let mut sizes = vec![0_u32; components.len()];
     for &first in components {

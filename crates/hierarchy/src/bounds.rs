@@ -1,4 +1,4 @@
-//! Bounding volumes: oriented boxes, how far enclosures exceed them, and relative motion.
+//! Bounding volumes: oriented boxes, growths from boxes to enclosures, and relative poses.
 
 pub(crate) mod boxes;
 pub(crate) mod growth;

@@ -1,5 +1,5 @@
-//! The descent of a pair of trees: one loop, sixteen pairs of nodes in one pass. What differs between
-//! questions is the visitor, how nodes are compared, and in which order pairs are looked at.
+//! The descent of a pair of trees: one loop that compares sixteen node pairs per pass. Queries
+//! differ in their visitor, in the comparison of nodes and in the order of pairs.
 
 mod frontier;
 mod single;
@@ -19,34 +19,34 @@ use crate::tree::wide::{LANES, Lanes, Siblings, Tree, lanes_of, rows, whole};
 pub use frontier::{Frontier, Heap, Open, Plunging, Stack};
 pub use single::PlaceVisitor;
 
-/// The callbacks of every descent over pairs of nodes. `K` is the key by which pairs are ordered.
+/// The callbacks of every descent over node pairs. Pairs are ordered by keys of type `K`.
 pub trait PairVisitor<K = f32> {
-    /// So many pairs of nodes were compared; may end the descent.
+    /// Called after each comparison with the number of node pairs compared. May end the descent.
     fn compared(&mut self, pairs: u32) -> ControlFlow<()>;
 
-    /// Two leaves, by their numbers, that were not found to be apart; `open` has their nodes.
+    /// Visits two leaves, by their numbers, that were not pruned. `open` has their nodes.
     fn leaf_pair(&mut self, leaves: [usize; 2], open: &Open<K>) -> ControlFlow<()>;
 
-    /// Returns `true` if a pair is still to be looked at; asked when its turn has come.
+    /// Returns `true` if a pair still has to be visited. Called when its turn has come.
     fn is_wanted(&mut self, open: &Open<K>) -> bool {
         let _ = open;
         true
     }
 
-    /// Returns `true` if a leaf and an inner node, whose boxes are not apart, are known to hold nothing that
-    /// meets.
+    /// Returns `true` if a leaf and an inner node, whose boxes are not disjoint, are known to have
+    /// no contact.
     fn is_apart(&mut self, pair: NodePair) -> bool {
         let _ = pair;
         false
     }
 
-    /// Which nodes of a pair are not to be split although they may have children.
+    /// Returns which nodes of a pair must not be split although they may have children.
     fn is_fine(&self, pair: NodePair) -> [bool; 2] {
         let _ = pair;
         [false; 2]
     }
 
-    /// Two nodes that are not to be split, of which one or both have children.
+    /// Visits two nodes that must not be split, at least one of which has children.
     fn fine_pair(&mut self, pair: NodePair) -> ControlFlow<()> {
         let _ = pair;
         ControlFlow::Continue(())
@@ -55,45 +55,45 @@ pub trait PairVisitor<K = f32> {
 
 /// The callbacks of a descent that compares boxes along their face normals ([`TreePair`]).
 pub trait BoxVisitor: PairVisitor {
-    /// Whether [`Self::least_apart`] is called.
+    /// `true` if [`Self::least_apart`] is called.
     const NOTES_GAPS: bool = false;
 
-    /// Whether [`Self::apart`] is called.
+    /// `true` if [`Self::apart`] is called.
     const NOTES_PAIRS: bool = false;
 
-    /// Whether [`Self::urgency`] is called.
+    /// `true` if [`Self::urgency`] is called.
     const LOOKS_CLOSER: bool = false;
 
-    /// `gap` is a lower bound of the gaps of all pairs that the last comparison pruned.
+    /// Called with a lower bound `gap` on the gaps of all pairs that the last comparison pruned.
     fn least_apart(&mut self, gap: f32) {
         let _ = gap;
     }
 
-    /// A pair whose boxes are apart by this gap, or that [`Self::urgency`] left out.
+    /// Called with a pair whose boxes have this gap, or that [`Self::urgency`] pruned.
     fn apart(&mut self, pair: NodePair, gap: f32) {
         let _ = (pair, gap);
     }
 
-    /// The priority of a pair, the lowest first. `share` is the distance of the two centres divided by the
-    /// sum of the half extents, the maximum over six axes: 0 for concentric boxes, 1 for boxes that just
-    /// touch. `None` prunes the pair.
+    /// Returns the priority of a pair, the lowest first. `share` is the distance of the two centres
+    /// divided by the sum of the half extents, the maximum over six axes: 0 for concentric boxes, 1
+    /// for boxes that just touch. `None` prunes the pair.
     fn urgency(&mut self, pair: NodePair, share: f32) -> Option<f32> {
         let _ = pair;
         Some(share)
     }
 }
 
-/// How the pairs that take the place of a pair of nodes are compared: sixteen in one pass.
+/// A comparison of the node pairs that replace a split pair, sixteen in one pass.
 pub trait Comparison<V, K = f32> {
-    /// The trees of a and of b.
+    /// Returns the trees of a and of b.
     fn trees(&self) -> [&Tree<'_>; 2];
 
-    /// Length in a's frame of a unit of b's.
+    /// Returns the length in a's frame of a unit of b's.
     fn scale(&self) -> f32;
 
-    /// Compares the pairs below `open`, whose `whole` nodes are not split, and puts those that are near into
-    /// the frontier. Returns how many were compared, and the pair to look at next unless that is the
-    /// frontier's business.
+    /// Compares the pairs below `open`, in which the nodes marked by `whole` are not split, and
+    /// pushes those that are near to the frontier. Returns the number of pairs compared, and the
+    /// next pair unless the frontier is to choose it.
     fn put_near<S: Simd, F: Frontier<K>>(
         &self,
         simd: S,
@@ -104,12 +104,12 @@ pub trait Comparison<V, K = f32> {
     ) -> (u32, Option<Open<K>>);
 }
 
-/// The most urgent of some siblings, kept back while the others are pushed.
+/// The most urgent of some siblings, held back while the others are pushed.
 #[derive(Debug, Clone, Copy)]
 pub struct MostUrgent<K>(Option<Open<K>>);
 
 impl<K: PartialOrd + Copy> MostUrgent<K> {
-    /// None so far.
+    /// Creates an empty list of siblings.
     #[inline(always)]
     #[must_use]
     pub const fn new() -> Self {
@@ -129,8 +129,8 @@ impl<K: PartialOrd + Copy> MostUrgent<K> {
         }
     }
 
-    /// Ends the list of siblings. Returns the most urgent one if the descent continues with it. Without any
-    /// sibling, reports to the frontier that nothing is left below the last pair.
+    /// Ends the list of siblings. Returns the most urgent one if the descent continues with it.
+    /// Without any sibling, reports to the frontier that nothing is left below the last pair.
     #[inline(always)]
     pub fn finish<S: Simd, F: Frontier<K>>(self, simd: S, frontier: &mut F) -> Option<Open<K>> {
         match self.0 {
@@ -149,20 +149,22 @@ impl<K: PartialOrd + Copy> Default for MostUrgent<K> {
     }
 }
 
-/// Two trees in relative motion, and which of their boxes are near each other.
+/// Two trees in a relative pose. The boxes within `reach` of each other are near.
 #[derive(Debug, Clone, Copy)]
 pub struct TreePair<'a> {
-    /// The tree whose frame is that of lengths.
+    /// The tree in whose frame lengths are measured.
     pub a: &'a Tree<'a>,
     /// The other tree.
     pub b: &'a Tree<'a>,
-    /// The motion of b's frame into a's.
+    /// The relative pose of b in a's frame.
     pub relative: &'a Relative,
-    /// Boxes no further apart than this are near. Includes the slack of the motion ([`Relative::slack`]).
+    /// The greatest gap of boxes that are near. Includes the slack of the relative pose
+    /// ([`Relative::slack`]).
     pub reach: f32,
 }
 
-/// Visits the pairs of leaves whose boxes are near, from the pair of the roots down, until `visitor` ends it.
+/// Visits the leaf pairs whose boxes are near, from the pair of roots down, until `visitor` ends
+/// the descent.
 pub fn descend<V: BoxVisitor, F: Frontier>(
     pair: TreePair<'_>,
     level: Level,
@@ -173,9 +175,9 @@ pub fn descend<V: BoxVisitor, F: Frontier>(
     resume(&pair, level, frontier, visitor)
 }
 
-/// Visits the pairs of leaves that are near by this comparison, from the pairs that the frontier holds down,
-/// until `visitor` ends it. The frontier then holds what is left, a pair that was not looked at to the end
-/// included.
+/// Visits the leaf pairs that are near according to `comparison`, from the pairs in the frontier
+/// down, until `visitor` ends the descent. The frontier then holds the remaining pairs, including
+/// one whose visit was interrupted.
 pub fn resume<K: Copy, C: Comparison<V, K>, F: Frontier<K>, V: PairVisitor<K>>(
     comparison: &C,
     level: Level,
@@ -188,7 +190,7 @@ pub fn resume<K: Copy, C: Comparison<V, K>, F: Frontier<K>, V: PairVisitor<K>>(
     ))
 }
 
-/// The loop of all questions about a pair of trees.
+/// The loop of all queries about a pair of trees.
 #[inline(always)]
 fn resume_by<S: Simd, K: Copy, C: Comparison<V, K>, F: Frontier<K>, V: PairVisitor<K>>(
     simd: S,
@@ -213,7 +215,7 @@ fn resume_by<S: Simd, K: Copy, C: Comparison<V, K>, F: Frontier<K>, V: PairVisit
                 visitor.fine_pair(pair)
             };
             if flow.is_break() {
-                // It was not looked at to the end, so it is still open.
+                // Its visit was interrupted, so the pair is still open.
                 frontier.push(open);
                 return flow;
             }
@@ -236,10 +238,10 @@ fn resume_by<S: Simd, K: Copy, C: Comparison<V, K>, F: Frontier<K>, V: PairVisit
     ControlFlow::Continue(())
 }
 
-/// The boxes that stand for one node of a pair: those of its children, or its own.
+/// The boxes that represent one node of a pair: its own, or those of its children.
 struct Side<'a> {
     boxes: &'a Siblings,
-    /// The lanes that count, as bits.
+    /// The lanes in use, as bits.
     lanes: u32,
     /// The node in lane `i` is `first + i * step`.
     first: u32,
@@ -253,7 +255,8 @@ impl<'a> Side<'a> {
         Self { boxes: &tree.siblings[id.index()], lanes: lanes_of(children), first: children.first, step: 1 }
     }
 
-    /// The box of a node stands among those of its siblings; that of a root is written to `alone`.
+    /// Returns the node's own box, found among those of its siblings. A root's box is written to
+    /// `alone`.
     #[inline(always)]
     fn whole(tree: &'a Tree<'_>, id: NodeId, alone: &'a mut Option<Siblings>) -> Self {
         let (boxes, lane) = if let Some((parent, lane)) = tree.topology.parent(id) {
@@ -266,7 +269,7 @@ impl<'a> Side<'a> {
         Self { boxes, lanes: 1 << lane, first: id.0, step: 0 }
     }
 
-    /// The node in a lane.
+    /// Returns the node in a lane.
     #[inline(always)]
     fn id(&self, lane: u32) -> NodeId {
         NodeId(self.first + lane * self.step)
@@ -340,7 +343,8 @@ impl<V: BoxVisitor> Comparison<V> for TreePair<'_> {
 }
 
 impl TreePair<'_> {
-    /// As [`Relative::gap`] and [`Relative::overlap`], in the same order of operations.
+    /// Computes [`Relative::gap`] and [`Relative::overlap`] of all lanes, in the same order of
+    /// operations.
     #[inline(always)]
     fn compare<S: Simd>(&self, simd: S, [a, b]: [&Siblings; 2], there: u32, notes_gaps: bool) -> Near<S> {
         let boxes_a = Boxes {
@@ -398,18 +402,19 @@ impl TreePair<'_> {
 /// The near pairs among sixteen pairs of boxes. Lane 4j + i is child i of a and child j of b.
 #[derive(Debug, Clone, Copy)]
 struct Near<S: Simd> {
-    /// Those that are not apart, as bits.
+    /// The lanes of pairs that are near, as bits.
     lanes: u32,
-    /// The one of these that overlaps most.
+    /// The near lane with the greatest overlap.
     most: u32,
-    /// How far their centres are from each other, as shares of how far the boxes reach.
+    /// Distances of the centres, divided by the sum of the half extents; infinite for pairs that
+    /// are not near.
     shares: [f32; LANES],
     gaps: f32x16<S>,
-    /// How far those that are apart are at least, if that is wanted.
+    /// The least gap of the pairs that are not near; infinite if not requested.
     apart: f32,
 }
 
-/// For each set of four lanes of b the lanes of its pairs.
+/// For each set of lanes of b, the lanes of its pairs.
 const EACH_IN_FOUR: [u32; LANES] = {
     let mut each = [0; LANES];
     let mut lanes = 0;

@@ -1,4 +1,4 @@
-//! Sections of a saved scan, and the checks of what is read.
+//! Sections of a saved scan, and the validation of loaded ones.
 
 pub(crate) mod sanity;
 pub(crate) mod sections;

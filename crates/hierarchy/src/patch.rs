@@ -1,4 +1,4 @@
-//! What is known of the points of a node: tangent discs, samples, coverings, enclosures.
+//! Data of the points of a node: tangent discs, samples, coverings, enclosures.
 
 pub(crate) mod centres;
 pub(crate) mod classes;

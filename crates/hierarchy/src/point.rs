@@ -1,4 +1,4 @@
-//! What is known of each point: spacing, kind, support, leaf records.
+//! Data of single points: spacing, kind, support, leaf records.
 
 pub(crate) mod disc;
 pub(crate) mod gather;

@@ -1,4 +1,4 @@
-//! A prepared scan: how it is built, and what it answers alone.
+//! A prepared scan: its construction, and the queries about it alone.
 
 pub(crate) mod apart;
 pub(crate) mod build;

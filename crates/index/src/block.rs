@@ -1,31 +1,32 @@
-//! Points side by side.
+//! Blocks of sixteen points.
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f32x16, mask32x16, u32x16};
 use nearmiss_lanes::wide::WIDTH;
 
-/// Points side by side: those of a scan whose index divided by [`Self::WIDTH`] is the same.
+/// Sixteen consecutive points of a scan, stored by coordinate. Point `i` is in block `i` /
+/// [`Self::WIDTH`].
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct PointBlock {
-    /// Coordinates; 1e30 where there is no point, which is nobody's neighbour.
+    /// Coordinates of the points; 1e30, too far to be a neighbour, in unused lanes.
     pub position: [[f32; WIDTH]; 3],
-    /// How far a point is heard; zero where there is none.
+    /// Support radius of each point; zero in unused lanes.
     pub horizon: [f32; WIDTH],
 }
 
 impl PointBlock {
-    /// How many points fit.
+    /// The number of points in a full block.
     pub const WIDTH: usize = WIDTH;
 
-    /// No points.
+    /// A block without points.
     pub const EMPTY: Self = Self { position: [[1e30; Self::WIDTH]; 3], horizon: [0.0; Self::WIDTH] };
 
-    /// The `i`-th of the points in some blocks.
+    /// Returns the position of point `i` of `blocks`.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline(always)]
     #[must_use]
     pub fn position_in(blocks: &[Self], i: usize) -> [f32; 3] {
@@ -33,10 +34,10 @@ impl PointBlock {
         [block.position[0][lane], block.position[1][lane], block.position[2][lane]]
     }
 
-    /// These points, at most [`Self::WIDTH`], of which none is heard.
+    /// Returns a block of at most [`Self::WIDTH`] points with support radius zero.
     ///
     /// # Panics
-    /// When there are more.
+    /// If there are more points.
     #[must_use]
     pub fn of(positions: &[[f32; 3]]) -> Self {
         let mut block = Self::EMPTY;
@@ -48,7 +49,7 @@ impl PointBlock {
         block
     }
 
-    /// All points of a scan as long as none is heard.
+    /// Returns the blocks of all points of a scan, with support radius zero.
     #[must_use]
     pub fn silent(positions: &[[f32; 3]]) -> impl ExactSizeIterator<Item = Self> {
         positions.chunks(Self::WIDTH).map(Self::of)
@@ -56,9 +57,10 @@ impl PointBlock {
 }
 
 impl PointBlock {
-    /// Writes the lanes of the points that are heard within `distance` of `x`, ascending and each added to
-    /// `first`, to the front of `lanes`; what follows them there means nothing. Returns how many they are. No
-    /// branch depends on the outcome, which no processor could predict.
+    /// Finds the points whose distance from `x` is less than `distance` plus their support radius.
+    /// Writes `first` plus the lane of each, ascending, to the front of `lanes` and returns their
+    /// number; the rest of `lanes` is unspecified. No branch depends on the outcome, which would be
+    /// unpredictable.
     #[inline(always)]
     pub fn heard<S: Simd>(
         &self,
@@ -95,7 +97,7 @@ impl PointBlock {
 
 const LANES: [u32; WIDTH] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
-/// The places of the bits of each byte, ascending; zeros follow.
+/// The positions of the set bits of each byte, ascending, followed by zeros.
 const BITS: [[u8; 8]; 256] = {
     let mut places = [[0; 8]; 256];
     let mut byte = 0;

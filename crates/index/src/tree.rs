@@ -1,13 +1,15 @@
-//! A tree of boxes over blocks of points: who is near the points of a block, all sixteen at once.
+//! A tree of boxes over blocks of points, for proximity queries of all sixteen points of a block at
+//! once.
 //!
-//! Sixteen boxes stand side by side, level over level, until one group of them is left; the order of the
-//! points is the tree. It serves an order in which near points are mostly near, as that of a hierarchy's
-//! leaves; in any other it is as right and slow.
+//! Sixteen boxes form a group, and each level bounds the groups of the level below, up to a single
+//! group. The order of the points determines the tree. Queries are fast if points that follow each
+//! other are mostly close, as in the leaves of a hierarchy; any other order gives the same results
+//! more slowly.
 //!
-//! Distances are what single precision makes of `(x−x')² + (y−y')² + (z−z')²`, each operation rounded, in
-//! this order, underflow included. Rounding keeps order, so the distance of a box, computed alike from its
-//! nearest corner, face or edge, exceeds no distance to a point in it, and what is found depends on nothing
-//! but the points.
+//! Distances are `(x−x')² + (y−y')² + (z−z')²` in single precision, with each operation rounded, in
+//! this order, underflow included. Rounding is monotonic, so the distance of a box, computed alike
+//! from its nearest corner, face or edge, never exceeds the distance of a point in it. The results
+//! therefore depend on the points alone.
 
 mod cells;
 mod cones;
@@ -34,10 +36,10 @@ use nearmiss_store::{Room, WorkError, Workspace};
 
 use crate::block::PointBlock;
 
-/// 2³² points fill so many levels of groups.
+/// The number of levels of groups over 2³² points.
 const MOST_LEVELS: usize = 8;
 
-/// Boxes side by side, with the greatest horizon in each.
+/// Sixteen boxes side by side, with the greatest support radius in each.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 struct Boxes {
@@ -47,14 +49,14 @@ struct Boxes {
 }
 
 impl Boxes {
-    /// Boxes without a point, which contain any others' union with them no less.
+    /// Empty boxes, neutral in unions.
     const EMPTY: Self = Self {
         min: [[f32::INFINITY; WIDTH]; 3],
         max: [[f32::NEG_INFINITY; WIDTH]; 3],
         horizon: [0.0; WIDTH],
     };
 
-    /// The boxes of a group, of `count` in all.
+    /// Returns the boxes of a group. `count` is the number of boxes of the level.
     fn of(group: usize, count: usize, bounds: impl Fn(usize) -> Bounds) -> Self {
         let mut boxes = Self::EMPTY;
         for (lane, i) in (group * WIDTH..count.min(group * WIDTH + WIDTH)).enumerate() {
@@ -80,7 +82,7 @@ impl Boxes {
         }
     }
 
-    /// Squared distances of all from one box; infinite where there is none.
+    /// Returns the squared distance of each box from `from`; infinite in unused lanes.
     #[inline(always)]
     fn distances_sq<S: Simd>(&self, simd: S, from: &Bounds) -> f32x16<S> {
         let mut apart = [f32x16::simd_from(simd, 0.0); 3];
@@ -93,7 +95,7 @@ impl Boxes {
     }
 }
 
-/// One box.
+/// One box, with the greatest support radius in it.
 #[derive(Debug, Clone, Copy)]
 struct Bounds {
     min: [f32; 3],
@@ -102,13 +104,13 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// That of the first `count` points of a block.
+    /// Returns the box of the first `count` points of a block.
     fn of_block(block: &PointBlock, count: usize) -> Self {
         let of = |k: usize| &block.position[k][..count];
         Self::of(of, of, &block.horizon[..count])
     }
 
-    /// That of all boxes of a group.
+    /// Returns the box of all boxes of a group.
     fn of_group(group: &Boxes) -> Self {
         Self::of(|k| &group.min[k], |k| &group.max[k], &group.horizon)
     }
@@ -121,7 +123,7 @@ impl Bounds {
         }
     }
 
-    /// Squared distances of points from this box.
+    /// Returns the squared distances of points from this box.
     #[inline(always)]
     fn distances_sq<S: Simd>(&self, simd: S, points: &[f32x16<S>; 3]) -> f32x16<S> {
         let mut apart = [f32x16::simd_from(simd, 0.0); 3];
@@ -134,32 +136,34 @@ impl Bounds {
     }
 }
 
-/// The boxes of a tree over points in blocks, which they do not hold: a 16th of their memory and a little
-/// more.
+/// The boxes of a tree over blocks of points. They do not hold the points, and take slightly more
+/// than a sixteenth of their memory.
 #[derive(Debug)]
 pub struct BlockBoxes {
-    /// How many points there are.
+    /// The number of points.
     points: usize,
-    /// The box of block `i` stands in lane `i` % 16 of group `i` / 16 of the first level, that of such a
-    /// group likewise in the next. The last has one group.
+    /// The box of block `i` is in lane `i` % 16 of group `i` / 16 of the first level. Each further
+    /// level holds the boxes of the groups below in the same way. The last level has one group.
     levels: Vec<Room<Boxes>>,
 }
 
 impl BlockBoxes {
-    /// The boxes over the first `points` points of `blocks`, with the horizons that they have there. O(n).
+    /// Computes the boxes over the first `points` points of `blocks`, with the support radii of the
+    /// points. O(n).
     ///
     /// # Panics
-    /// When there are fewer, or a block more than hold them, or 2³² − 1 points.
+    /// If `points` points do not fill exactly these blocks (the last one possibly in part), or if
+    /// there are 2³² − 1 points or more.
     #[must_use]
     pub fn new(blocks: &[PointBlock], points: usize) -> Self {
         Self::with(blocks, points, |groups| Ok::<_, Infallible>(vec![Boxes::EMPTY; groups].into()))
             .unwrap_or_else(|never| match never {})
     }
 
-    /// The same in a workspace.
+    /// Like [`Self::new`], in a workspace.
     ///
     /// # Errors
-    /// When that has no room.
+    /// If the workspace cannot provide the memory.
     ///
     /// # Panics
     /// As [`Self::new`].
@@ -189,10 +193,10 @@ impl BlockBoxes {
         Ok(Self { points, levels })
     }
 
-    /// The tree over `blocks`, of which these are the boxes.
+    /// Returns the tree over `blocks`, which must be the blocks that the boxes were computed from.
     ///
     /// # Panics
-    /// When they are more or fewer.
+    /// If the number of blocks differs.
     #[inline]
     #[must_use]
     pub fn over<'a>(&'a self, blocks: &'a [PointBlock]) -> BlockTree<'a> {
@@ -200,61 +204,62 @@ impl BlockBoxes {
         BlockTree { blocks, points: self.points, levels: &self.levels }
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.points
     }
 
-    /// Whether there are no points.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.points == 0
     }
 }
 
-/// A tree of boxes over points in blocks, from [`BlockBoxes::over`]. See [`Self::nearest`] and
+/// A tree of boxes over blocks of points, from [`BlockBoxes::over`]. See [`Self::nearest`] and
 /// [`Self::heard`].
 #[derive(Debug, Clone, Copy)]
 pub struct BlockTree<'a> {
     blocks: &'a [PointBlock],
-    /// How many points there are.
+    /// The number of points.
     points: usize,
     levels: &'a [Room<Boxes>],
 }
 
 impl<'a> BlockTree<'a> {
-    /// How many points there are.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.points
     }
 
-    /// Whether there are no points.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.points == 0
     }
 
-    /// The blocks.
+    /// Returns the blocks.
     #[must_use]
     pub fn blocks(&self) -> &'a [PointBlock] {
         self.blocks
     }
 
-    /// How many points a block has.
+    /// Returns the number of points in a block.
     #[inline(always)]
     fn count(&self, block: usize) -> usize {
         (self.points - block * WIDTH).min(WIDTH)
     }
 
-    /// The box of node `id` of a level: of a block in level 0, of a group of the level below in others.
+    /// Returns the box of node `id` of a level: of a block in level 0, of a group of the level
+    /// below in other levels.
     #[inline(always)]
     fn bounds(&self, level: usize, id: usize) -> Bounds {
         self.levels[level][id / WIDTH].get(id % WIDTH)
     }
 
-    /// How many nodes there are in a level.
+    /// Returns the number of nodes of a level.
     #[inline(always)]
     fn nodes(&self, level: usize) -> usize {
         if level == 0 { self.blocks.len() } else { self.levels[level - 1].len() }

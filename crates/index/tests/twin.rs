@@ -1,4 +1,4 @@
-//! Neighbours of blocks of points against all points, in the same arithmetic.
+//! Queries of blocks compared with brute force over all points in the same arithmetic.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_index::{BlockBoxes, Heard, Nearest, PointBlock};
@@ -7,7 +7,8 @@ use nearmiss_testdata::instructions::levels;
 
 type Point = [f32; 3];
 
-/// Every point of `cloud` once, along the axis they differ most in: what an order of places is good for.
+/// Returns every distinct point of `cloud`, sorted by coordinates so that points that follow each
+/// other are mostly close.
 #[expect(clippy::cast_possible_truncation, reason = "points are stored in single precision")]
 fn points(kind: CloudKind, n: u32, seed: u64, scale: f64) -> Vec<Point> {
     let mut points: Vec<Point> =
@@ -83,7 +84,7 @@ fn neither_size_nor_an_order_without_places_changes_an_answer() {
     let mut scattered = points(CloudKind::Sphere, 1200, 2, 1.0);
     scattered.sort_by_key(|p| p[0].to_bits().reverse_bits());
     compare_nearest(&scattered, &[6], "scattered");
-    // Distinct points on three places.
+    // Distinct points that are clustered at three positions.
     let close: Vec<Point> = (1_u16..100).map(|i| [f32::from(i % 3), 1e-30 * f32::from(i), 0.0]).collect();
     compare_nearest(&close, &[1, 5, 40], "distances that underflow");
 }
@@ -164,7 +165,7 @@ fn cones_are_those_of_all_points() {
             for slope in [0.0, 0.3, 4.0] {
                 compare_cones(&points, &radii, &radii, slope, &format!("{kind:?}, {n}, slope {slope}"));
             }
-            // Some tell nothing, some know nothing, one is far below all others.
+            // Infinite tips, tips equal to the heights, and tips far below.
             let tips = |i: usize| [f32::INFINITY, radii[i], 1e-3 * radii[i]][i % 7 % 3];
             let tips: Vec<f32> = (0..points.len()).map(tips).collect();
             let own = |i: usize| if i.is_multiple_of(5) { f32::MAX } else { radii[i] };

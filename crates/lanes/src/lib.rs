@@ -6,7 +6,7 @@ pub mod parallel;
 pub mod vector;
 pub mod wide;
 
-/// An index as it is stored. There are fewer than 2³² of anything that is numbered.
+/// Converts an index to the 32 bits it is stored in. Nothing that is indexed has 2³² or more items.
 #[inline(always)]
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32")]

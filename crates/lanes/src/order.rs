@@ -1,8 +1,8 @@
-//! Numbers in a total order, and what a heap holds by them.
+//! Total order of floating-point numbers, and heap items ordered by distance.
 
 use std::cmp::Ordering;
 
-/// The bits of `x`, reordered so that they compare as [`f32::total_cmp`] does.
+/// Returns the bits of `x`, reordered so that they compare as [`f32::total_cmp`] does.
 ///
 /// ```
 /// use nearmiss_lanes::order::{ascending, from_ascending};
@@ -17,20 +17,20 @@ pub const fn ascending(x: f32) -> u32 {
     if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
 }
 
-/// The number that [`ascending`] makes these bits of.
+/// Returns the number whose [`ascending`] bits are `bits`.
 #[inline]
 #[must_use]
 pub const fn from_ascending(bits: u32) -> f32 {
     f32::from_bits(if bits >> 31 == 0 { !bits } else { bits & !(1 << 31) })
 }
 
-/// An item and how near it is. The nearest is the greatest, so that a heap gives it first; of those equally
-/// near, the least item.
+/// An item and its distance. The nearest compares greatest, so that a max-heap pops it first. Among
+/// items at the same distance, the least compares greatest.
 #[derive(Debug, Clone, Copy)]
 pub struct Near<T> {
-    /// How near, less is nearer.
+    /// The distance of the item.
     pub distance: f32,
-    /// What is.
+    /// The item.
     pub item: T,
 }
 

@@ -1,12 +1,13 @@
-//! The same work on one thread, or with the feature `rayon` on all threads of the current pool. Results come
-//! in order, so they are the same on any number of threads.
+//! Data-parallel loops: on one thread, or with the feature `rayon` on all threads of the current
+//! pool. Results come in order, so they are the same for any number of threads.
 
 use std::ops::Range;
 
-/// Items of a microsecond or less that a thread takes at once: enough to hide the hand-over.
+/// The number of items of at most a microsecond that a thread takes at once, enough to hide the
+/// cost of scheduling.
 const AT_ONCE: usize = 1024;
 
-/// `f` of each number below `count`: light work, many at once.
+/// Maps each number below `count`. For cheap `f`: a thread takes many numbers at once.
 pub fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "rayon")]
     {
@@ -17,23 +18,24 @@ pub fn map<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> Vec<R
     (0..count).map(f).collect()
 }
 
-/// `f` of each item: light work, many at once.
+/// Maps each item. For cheap `f`: a thread takes many items at once.
 pub fn map_all<T: Sync, R: Send>(items: &[T], f: impl Fn(&T) -> R + Sync + Send) -> Vec<R> {
     map(items.len(), |i| f(&items[i]))
 }
 
-/// `f` of some items at a time: heavy work.
+/// Maps consecutive chunks of items. For expensive `f`.
 pub fn chunks<T: Sync, R: Send>(items: &[T], f: impl Fn(&[T]) -> R + Sync + Send) -> Vec<R> {
     const LENGTH: usize = 16;
     ranges_with(items.len(), LENGTH, || (), |(), range| f(&items[range]))
 }
 
-/// `f` of each number below `count`: heavy work, one by one.
+/// Maps each number below `count`. For expensive `f`: the numbers are scheduled one by one.
 pub fn map_each<R: Send>(count: usize, f: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
     map_with(count, || (), |(), i| f(i))
 }
 
-/// `f` of each number below `count`, with scratch that is made now and then and must not change a result.
+/// Maps each number below `count`, with scratch memory. `scratch` is called a few times for each
+/// thread; its contents must not affect the results.
 pub fn map_with<S, R: Send>(
     count: usize,
     scratch: impl Fn() -> S + Sync + Send,
@@ -51,13 +53,13 @@ pub fn map_with<S, R: Send>(
     }
 }
 
-/// `f` of consecutive ranges of some thousand numbers that make up `0..count`.
+/// Maps consecutive ranges of 1024 numbers that partition `0..count`.
 pub fn ranges<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Send) -> Vec<R> {
     ranges_with(count, AT_ONCE, || (), |(), range| f(range))
 }
 
-/// As [`ranges`], each `length` long but the last, with scratch that is made now and then and must not change
-/// a result.
+/// Like [`ranges`], with ranges of `length` numbers (the last may be shorter) and scratch memory.
+/// `scratch` is called a few times for each thread; its contents must not affect the results.
 pub fn ranges_with<S, R: Send>(
     count: usize,
     length: usize,
@@ -68,11 +70,11 @@ pub fn ranges_with<S, R: Send>(
     map_with(count.div_ceil(length), scratch, |scratch, k| f(scratch, range(k)))
 }
 
-/// Runs that wait to be taken by [`in_order`], at most.
+/// The maximum number of results of [`in_order`] that are held at once.
 const WAVE: usize = 1 << 12;
 
-/// `f` of consecutive runs of numbers that make up `0..count`: heavy work. `take` gets what it gives, in
-/// order, and soon: never more than some thousand results exist.
+/// Maps consecutive ranges that partition `0..count`, for expensive `f`. `take` receives the
+/// results in order. At most 4096 results are held at once.
 pub fn in_order<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Send, mut take: impl FnMut(R)) {
     const LENGTH: usize = 16;
     let runs = count.div_ceil(LENGTH);
@@ -82,11 +84,11 @@ pub fn in_order<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync + Se
     }
 }
 
-/// Sets the items of `out` to what `f` gives of consecutive runs of numbers that make up `0..count`, one
-/// after the other: heavy work.
+/// Writes the items that `f` returns for consecutive ranges of `0..count` into `out`, one after the
+/// other. For expensive `f`.
 ///
 /// # Panics
-/// When it gives more items than there are.
+/// If `f` returns more items in all than `out` has.
 pub fn collect_into<T: Copy + Send>(
     out: &mut [T],
     count: usize,
@@ -99,12 +101,13 @@ pub fn collect_into<T: Copy + Send>(
     });
 }
 
-/// Sets every item of `out` to `f` of its number: light work, many at once.
+/// Sets every item of `out` to `f` of its index. For cheap `f`: a thread takes many items at once.
 pub fn fill<T: Send>(out: &mut [T], f: impl Fn(usize) -> T + Sync + Send) {
     change_each(out, AT_ONCE, |i, item| *item = f(i));
 }
 
-/// `f` of consecutive runs of `length` items where they stand, with their numbers: light work, many at once.
+/// Passes each run of `length` items and its number to `f`, which fills it in place; the last run
+/// may be shorter. For cheap `f`: a thread takes many runs at once.
 pub fn fill_runs<T: Send>(out: &mut [T], length: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
     #[cfg(feature = "rayon")]
     {
@@ -116,7 +119,7 @@ pub fn fill_runs<T: Send>(out: &mut [T], length: usize, f: impl Fn(usize, &mut [
     out.chunks_mut(length).enumerate().for_each(|(number, run)| f(number, run));
 }
 
-/// `f` of every item.
+/// Passes every item to `f`.
 pub fn for_each<T: Send>(items: Vec<T>, f: impl Fn(T) + Sync + Send) {
     #[cfg(feature = "rayon")]
     {
@@ -127,7 +130,8 @@ pub fn for_each<T: Send>(items: Vec<T>, f: impl Fn(T) + Sync + Send) {
     items.into_iter().for_each(f);
 }
 
-/// `f` of every item where it stands, with its number. A thread takes `at_once` or more of them.
+/// Passes every item and its index to `f`, which changes it in place. A thread takes at least
+/// `at_once` items.
 pub fn change_each<T: Send>(all: &mut [T], at_once: usize, f: impl Fn(usize, &mut T) + Sync + Send) {
     #[cfg(feature = "rayon")]
     {
@@ -141,7 +145,8 @@ pub fn change_each<T: Send>(all: &mut [T], at_once: usize, f: impl Fn(usize, &mu
     }
 }
 
-/// `f` of every pair of items where they stand, with its number. A thread takes `at_once` or more of them.
+/// Passes every pair of items and its index to `f`, which changes both in place. A thread takes at
+/// least `at_once` pairs.
 pub fn change_both<A: Send, B: Send>(
     a: &mut [A],
     b: &mut [B],
@@ -161,7 +166,7 @@ pub fn change_both<A: Send, B: Send>(
     }
 }
 
-/// What both give, each on a thread of its own where there are several.
+/// Runs both closures, in parallel if there are several threads, and returns both results.
 pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
     #[cfg(feature = "rayon")]
     return rayon::join(a, b);
@@ -169,7 +174,7 @@ pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> 
     (a(), b())
 }
 
-/// Sorts values that are all different.
+/// Sorts values, which must be distinct.
 pub fn sort<T: Ord + Send>(values: &mut [T]) {
     #[cfg(feature = "rayon")]
     {
@@ -180,11 +185,11 @@ pub fn sort<T: Ord + Send>(values: &mut [T]) {
     values.sort_unstable();
 }
 
-/// `work` on so many threads, or on those of the current pool if that is 0. Without the feature `rayon` there
-/// is one.
+/// Runs `work` on `threads` threads, or on those of the current pool if `threads` is 0. Without the
+/// feature `rayon` it always runs on the calling thread.
 ///
 /// # Errors
-/// When so many threads cannot be started.
+/// If the threads cannot be started.
 pub fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> Result<R, NoThreads> {
     #[cfg(feature = "rayon")]
     if threads > 0 {
@@ -195,7 +200,7 @@ pub fn on_threads<R: Send>(threads: usize, work: impl FnOnce() -> R + Send) -> R
     Ok(work())
 }
 
-/// The threads asked for cannot be started.
+/// The error of [`on_threads`] if the threads cannot be started.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoThreads;
 

@@ -1,4 +1,4 @@
-//! Vectors of three numbers in single precision, as scans store them.
+//! Three-dimensional vectors in single precision, as scans store them.
 
 /// a · b, summed in the order of the coordinates.
 #[inline]
@@ -29,8 +29,8 @@ pub const fn distance_sq(a: [f32; 3], b: [f32; 3]) -> f32 {
     dot(d, d)
 }
 
-/// Two unit vectors that complete the unit vector `normal` to a right-handed frame (Duff et al., "Building an
-/// orthonormal basis, revisited", JCGT 6(1), 2017).
+/// Returns two unit vectors that complete the unit vector `normal` to a right-handed frame (Duff et
+/// al., "Building an orthonormal basis, revisited", JCGT 6(1), 2017).
 #[inline]
 #[must_use]
 pub const fn tangents([x, y, z]: [f32; 3]) -> ([f32; 3], [f32; 3]) {

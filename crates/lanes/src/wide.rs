@@ -1,27 +1,27 @@
-//! Sixteen vectors side by side.
+//! Sixteen vectors side by side, one in each SIMD lane.
 //!
-//! Sums of products have the order of [`vector::dot`](crate::vector::dot), so each lane has the bits that it
-//! would have alone, by any instructions.
+//! Products are summed in the order of [`vector::dot`](crate::vector::dot). Each lane therefore has
+//! the same bits as the scalar computation, with any instruction set.
 
 use std::ops::Range;
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, mask32x16};
 
-/// How many lanes there are: a register of AVX-512, two of AVX2, four of SSE2 or NEON.
+/// The number of lanes: one register of AVX-512, two of AVX2, four of SSE2 or NEON.
 pub const WIDTH: usize = 16;
 
-/// Sixteen vectors, by their coordinates.
+/// Sixteen vectors, as one array of lanes for each coordinate.
 pub type Vectors<S> = [f32x16<S>; 3];
 
-/// The vectors with these coordinates.
+/// Loads vectors from their coordinates.
 #[inline(always)]
 #[must_use]
 pub fn load<S: Simd>(simd: S, [x, y, z]: &[[f32; WIDTH]; 3]) -> Vectors<S> {
     [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
 }
 
-/// The points with these coordinates as seen from `p`.
+/// Loads points relative to `p`.
 #[inline(always)]
 #[must_use]
 pub fn seen_from<S: Simd>(simd: S, points: &[[f32; WIDTH]; 3], p: [f32; 3]) -> Vectors<S> {
@@ -29,35 +29,36 @@ pub fn seen_from<S: Simd>(simd: S, points: &[[f32; WIDTH]; 3], p: [f32; 3]) -> V
     [x - p[0], y - p[1], z - p[2]]
 }
 
-/// How far each vector goes along `axis`.
+/// Returns the component of each vector along `axis`.
 #[inline(always)]
 #[must_use]
 pub fn along<S: Simd>([x, y, z]: Vectors<S>, axis: [f32; 3]) -> f32x16<S> {
     x * axis[0] + y * axis[1] + z * axis[2]
 }
 
-/// The scalar product of each vector in `a` with that in the same lane of `b`, for any number of lanes.
+/// Returns the dot product of each vector in `a` with the vector in the same lane of `b`, for any
+/// number of lanes.
 #[inline(always)]
 #[must_use]
 pub fn product<S: Simd, V: SimdBase<S>>(a: [V; 3], b: [V; 3]) -> V {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The square of the length of each vector.
+/// Returns the squared length of each vector.
 #[inline(always)]
 #[must_use]
 pub fn squared<S: Simd, V: SimdBase<S>>(vectors: [V; 3]) -> V {
     product(vectors, vectors)
 }
 
-/// Four numbers four times, one after the other: number i in lanes i, 4 + i, 8 + i and 12 + i.
+/// Repeats four numbers four times: number i in lanes i, 4 + i, 8 + i and 12 + i.
 #[inline(always)]
 #[must_use]
 pub fn repeated<S: Simd>(four: f32x4<S>) -> f32x16<S> {
     f32x16::block_splat(four)
 }
 
-/// Each of four numbers in four lanes: number i in lanes 4i to 4i + 3.
+/// Puts each of four numbers into four consecutive lanes: number i in lanes 4i to 4i + 3.
 #[inline(always)]
 #[must_use]
 pub fn spread<S: Simd>(four: f32x4<S>) -> f32x16<S> {
@@ -66,7 +67,7 @@ pub fn spread<S: Simd>(four: f32x4<S>) -> f32x16<S> {
     row.zip_low(row)
 }
 
-/// The lanes that are set, as bits.
+/// Returns the set lanes as bits.
 #[inline(always)]
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "sixteen bits")]
@@ -74,7 +75,8 @@ pub fn bits<S: Simd>(mask: mask32x16<S>) -> u32 {
     mask.to_bitmask() as u32
 }
 
-/// The lanes of a block that hold any of `points`, as bits: point i stands in lane i % 16 of block i / 16.
+/// Returns the lanes of `block` that hold any of `points`, as bits. Point i is in lane i % 16 of
+/// block i / 16.
 #[inline(always)]
 #[must_use]
 pub fn lanes_of(block: usize, points: &Range<usize>) -> u32 {
@@ -83,14 +85,14 @@ pub fn lanes_of(block: usize, points: &Range<usize>) -> u32 {
     below(points.end) & !below(points.start)
 }
 
-/// The blocks that hold any of `points`, which are not none.
+/// Returns the blocks that hold any of `points`, which must not be empty.
 #[inline(always)]
 #[must_use]
 pub fn blocks_of(points: &Range<usize>) -> Range<usize> {
     points.start / WIDTH..points.end.div_ceil(WIDTH)
 }
 
-/// The places of the bits that are set, ascending.
+/// An iterator over the positions of the set bits, ascending.
 #[derive(Debug, Clone, Copy)]
 pub struct Bits(pub u32);
 
@@ -105,21 +107,22 @@ impl Iterator for Bits {
     }
 }
 
-/// The least of all lanes and `least`, none of which is NaN.
+/// Returns the minimum of all lanes and `least`. None of them may be NaN.
 #[inline(always)]
 #[must_use]
 pub fn least<S: Simd>(lanes: f32x16<S>, least: f32) -> f32 {
     fold(lanes, least, |a, b| if a < b { a } else { b })
 }
 
-/// The greatest of all lanes and `greatest`, none of which is NaN.
+/// Returns the maximum of all lanes and `greatest`. None of them may be NaN.
 #[inline(always)]
 #[must_use]
 pub fn greatest<S: Simd>(lanes: f32x16<S>, greatest: f32) -> f32 {
     fold(lanes, greatest, |a, b| if a > b { a } else { b })
 }
 
-/// Halves onto each other, for all orders give the same.
+/// Folds the upper half of the lanes onto the lower until one is left; minima and maxima do not
+/// depend on the order.
 #[inline(always)]
 fn fold<S: Simd>(lanes: f32x16<S>, with: f32, f: impl Fn(f32, f32) -> f32) -> f32 {
     let mut lanes = lanes.to_array();

@@ -1,13 +1,13 @@
-//! Samples in every box of a lattice that a triangle passes.
+//! Samples of a triangle in every box of a lattice that the triangle passes through.
 
 /// A triangle has three corners, and each of the six walls of a box adds at most one.
 const MOST_CORNERS: usize = 9;
 
-/// By this share of the way to the middle of its piece a corner is drawn inwards, so that it lies inside its
-/// box and not on a wall.
+/// Fraction of the distance to the centre of its piece by which a corner is moved inwards, so that
+/// the corner is inside its box and not on a wall.
 const INWARDS: f64 = 1.0 / 1_048_576.0;
 
-/// A convex polygon in the lattice's own coordinates, in which boxes have side 1.
+/// A convex polygon in lattice coordinates, in which boxes have side 1.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     corners: [[f64; 3]; MOST_CORNERS],
@@ -18,7 +18,8 @@ impl Piece {
     const EMPTY: Self = Self { corners: [[0.0; 3]; MOST_CORNERS], count: 0 };
 
     fn push(&mut self, corner: [f64; 3]) {
-        // Rounding may find one more where a corner touches a wall; it repeats another.
+        // Rounding may yield one corner too many where a corner touches a wall; that corner repeats
+        // another.
         if self.count < MOST_CORNERS {
             self.corners[self.count] = corner;
             self.count += 1;
@@ -29,13 +30,14 @@ impl Piece {
         &self.corners[..self.count]
     }
 
-    /// Least and greatest coordinate along an axis.
+    /// Returns the least and the greatest coordinate along `axis`.
     fn extent(&self, axis: usize) -> [f64; 2] {
         let along = self.corners().iter().map(|c| c[axis]);
         along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
     }
 
-    /// What lies below a wall, and what above; what lies in it is in both.
+    /// Splits the polygon into the part below a wall and the part above it. Points on the wall are
+    /// in both parts.
     fn split(&self, axis: usize, wall: f64) -> [Self; 2] {
         let mut parts = [Self::EMPTY; 2];
         let corners = self.corners();
@@ -58,8 +60,8 @@ impl Piece {
         parts
     }
 
-    /// What lies from the first wall across `axis` to the last, cut at every wall; hands out what lies
-    /// between two.
+    /// Cuts the polygon at every wall across `axis`, and calls `each` with the part in every box.
+    /// Parts before the first wall or beyond the last are dropped.
     fn cut(mut self, axis: usize, boxes: u32, mut each: impl FnMut(Self)) {
         let boxes = f64::from(boxes);
         let [low, high] = self.extent(axis);
@@ -82,33 +84,34 @@ impl Piece {
     }
 }
 
-/// Boxes side by side, the first of which has its least corner at an origin.
+/// A lattice of equal boxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
-    /// The corner.
+    /// Least corner of the first box.
     pub origin: [f64; 3],
-    /// Of a box along each axis, above 0.
+    /// Side lengths of a box, positive.
     pub sides: [f64; 3],
-    /// How many boxes there are along each axis.
+    /// Number of boxes along each axis.
     pub counts: [u32; 3],
 }
 
-/// In sides of boxes; coordinates further out may overflow on the way to where they are cut.
+/// Limit of coordinates in box sides. Coordinates beyond it may overflow before they are cut.
 const FARTHEST: f64 = 1e150;
 
-/// Cuts a triangle along the walls of a lattice and hands out the corners of the pieces, each drawn a
-/// millionth of the way to the middle of its piece. Tells whether the whole triangle lies in the lattice:
-/// what does not is left out, and all of a triangle with a corner that is not finite, or further out than
-/// 1e150 boxes.
+/// Cuts a triangle along the walls of a lattice and calls `each` with the corners of the pieces.
+/// Each corner is first moved towards the centre of its piece by a millionth of the distance.
 ///
-/// So every box that holds more of the surface than rounding gets a sample, and its least and greatest
-/// coordinates are those of the surface in it, to a millionth. Boxes are half open: what lies in a wall
-/// belongs to the box above. Costs some ten nanoseconds a sample, and a step a box along each axis, however
-/// far the triangle reaches.
+/// Returns `true` if the whole triangle is in the lattice. Parts outside the lattice are skipped. A
+/// triangle is skipped entirely if a corner is not finite or more than 1e150 boxes away.
+///
+/// Every box that holds more of the triangle than rounding error gets a sample. The least and
+/// greatest sample coordinates in a box are those of the triangle's part in that box, to a
+/// millionth. Boxes are half open: a point on a wall belongs to the box above. Takes about 10 ns a
+/// sample, and one step for each box along an axis, however far the triangle extends.
 pub fn lattice_samples(triangle: [[f64; 3]; 3], lattice: &Lattice, mut each: impl FnMut([f64; 3])) -> bool {
     let Lattice { origin, sides, counts } = *lattice;
     let corners = triangle.map(|corner| [0, 1, 2].map(|k| (corner[k] - origin[k]) / sides[k]));
-    // Written so that what is not a number is left out.
+    // Written so that NaN is rejected.
     if !corners.iter().flatten().all(|x| x.abs() <= FARTHEST) {
         return false;
     }
@@ -134,6 +137,6 @@ pub fn lattice_samples(triangle: [[f64; 3]; 3], lattice: &Lattice, mut each: imp
     corners.iter().all(|corner| (0..3).all(|k| corner[k] >= 0.0 && corner[k] < f64::from(counts[k])))
 }
 
-/// One divided by a number of corners.
+/// Reciprocals of corner counts.
 const COUNTED: [f64; MOST_CORNERS + 1] =
     [0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0, 1.0 / 8.0, 1.0 / 9.0];

@@ -1,4 +1,4 @@
-//! Points on a mesh: at a spacing, or so many.
+//! Sampling of meshes, by spacing or by number of points.
 
 use nearmiss_geometry::TriangleMesh;
 use rand::{RngExt, SeedableRng};
@@ -7,85 +7,91 @@ use thiserror::Error;
 
 use crate::triangle::{Triangle, between, length};
 
-/// More samples than this no cloud can number.
+/// Greatest number of points in a cloud.
 const MOST: f64 = 4_294_967_295.0;
 
-/// Steps of rows whose farthest place is a spacing away: 2/√5, a little less for rounding.
+/// Row step over spacing: 2/√5, reduced slightly for rounding. No point of a triangle is then
+/// further than the spacing from a sample.
 const STEP: f64 = 0.894_427;
 
-/// Samples are jittered by at most this share of the spacing, and laid closer by as much.
+/// Greatest jitter of a sample over spacing. Jittered samples are placed closer by the same
+/// fraction.
 const JITTER: f64 = 0.2;
 
-/// How many samples.
+/// Density or number of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Samples {
-    /// So many that no place of the surface is further than this from one, in the units of the mesh.
+    /// Greatest distance from any point of the surface to its nearest sample, in the units of the
+    /// mesh.
     Spacing(f64),
-    /// So many in all, at random, as densely everywhere as the area says.
+    /// Total number of samples, at random, with uniform density by area.
     Count(u32),
 }
 
-/// How a mesh is sampled. Plain values, checked by [`sample`].
+/// Options of [`sample`], which validates them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct SampleOptions {
-    /// How many.
+    /// Density or number of samples.
     pub samples: Samples,
-    /// What is random depends on it. Without, samples at a spacing lie in rows; with one, each is moved at
-    /// random, which takes a little over half as many again. A count is random always, of seed 0 if none is
-    /// given.
+    /// Seed of the random numbers.
+    ///
+    /// Without a seed, samples at a spacing form regular rows. With a seed, each sample is
+    /// jittered, which takes 56 % more samples. A number of samples is always drawn at random, with
+    /// seed 0 by default.
     pub seed: Option<u64>,
 }
 
 impl SampleOptions {
-    /// So many samples, without a seed.
+    /// Creates options without a seed.
     #[must_use]
     pub const fn new(samples: Samples) -> Self {
         Self { samples, seed: None }
     }
 
-    /// The same with this seed.
+    /// Sets the seed.
     #[must_use]
     pub const fn with_seed(self, seed: u64) -> Self {
         Self { seed: Some(seed), ..self }
     }
 }
 
-/// Why a mesh is not sampled.
+/// Error of [`sample`].
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SampleError {
-    /// A spacing that is none.
+    /// A spacing that is not positive and finite.
     #[error("a spacing of {spacing} is none; give a length above 0")]
     Spacing {
-        /// As given.
+        /// The spacing given.
         spacing: f64,
     },
-    /// A vertex without a place.
+    /// A vertex with a NaN or infinite coordinate.
     #[error("vertex {vertex} has a coordinate that is not finite; repair the mesh")]
     NotFinite {
-        /// Its index.
+        /// Index of the vertex.
         vertex: usize,
     },
-    /// No surface to lay a number of samples on.
+    /// A number of samples requested of a mesh without area.
     #[error("the mesh has no area to spread points over; sample it at a spacing")]
     NoArea,
-    /// More samples than can be numbered.
+    /// More samples than 32-bit ids can number.
     #[error("about {count:e} samples would be needed, more than 2^32; give a larger spacing")]
     TooMany {
-        /// How many.
+        /// Approximate number of samples.
         count: f64,
     },
 }
 
-/// Points on the triangles of a mesh.
+/// Returns points on the triangles of a mesh.
 ///
-/// At a spacing, each triangle is sampled by itself, in rows along its longest side; what two triangles share
-/// is sampled twice. So many in all are drawn triangle by triangle, each getting as many as its area is
-/// worth, give or take one.
+/// At a spacing, each triangle is sampled separately, in rows along its longest side, so edges that
+/// triangles share are sampled twice. A number of samples is divided among the triangles in
+/// proportion to their areas, to within one sample.
 ///
 /// # Errors
-/// When the options make no sense, or the mesh is not finite.
+/// Fails if the options are invalid, if a vertex is not finite, if a number of samples is requested
+/// and the mesh has no area, or if there would be too many samples.
 pub fn sample(mesh: &TriangleMesh, options: &SampleOptions) -> Result<Vec<[f64; 3]>, SampleError> {
     let vertices = mesh.vertices();
     let broken = |v: &[f64; 3]| v.iter().any(|x| !x.is_finite());
@@ -122,11 +128,11 @@ fn spaced(triangles: &[Triangle], spacing: f64, seed: Option<u64>) -> Result<Vec
     Ok(points)
 }
 
-/// From `p` towards a place of the same triangle, at most so far.
+/// Moves `p` towards `towards`, a point of the same triangle, by at most `most`.
 fn moved(p: [f64; 3], towards: [f64; 3], most: f64) -> [f64; 3] {
     let way = between(p, towards);
     let share = (most / length(way)).min(1.0);
-    // No way to go gives no share.
+    // If the two points coincide, `share` is NaN.
     if share.is_nan() { p } else { [0, 1, 2].map(|k| p[k] + share * way[k]) }
 }
 

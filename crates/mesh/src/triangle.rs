@@ -1,13 +1,14 @@
-//! A triangle with its longest side below, in rows.
+//! A triangle in the frame of its longest side, and its sampling in rows.
 
-/// Corners, and the frame in which its longest side lies along the first axis and its tip above.
+/// A triangle in a frame whose first axis runs along the longest side, the base. The tip is above
+/// the base.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Triangle {
     corner: [f64; 3],
     /// Unit directions along the longest side and away from it, in the triangle's plane.
     axes: [[f64; 3]; 2],
     base: f64,
-    /// Of the tip.
+    /// Distance from `corner` to the foot of the height, along the base.
     foot: f64,
     height: f64,
 }
@@ -31,35 +32,38 @@ impl Triangle {
         0.5 * self.base * self.height
     }
 
-    /// The place so far along the base and so high.
+    /// Returns the point at `x` along the base and `y` above it.
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 3] {
         [0, 1, 2].map(|k| self.corner[k] + x * self.axes[0][k] + y * self.axes[1][k])
     }
 
-    /// The place with these shares, both from 0 to 1: evenly spread ones give evenly spread places.
+    /// Maps two fractions from 0 to 1 to a point of the triangle. Uniform fractions give uniform
+    /// points.
     pub(crate) fn spread(&self, [s, t]: [f64; 2]) -> [f64; 3] {
-        // The farther from the tip, the more room.
+        // Rows are wider further from the tip.
         let from_tip = s.sqrt();
         let y = (1.0 - from_tip) * self.height;
         let [left, right] = self.row(y);
         self.at([left + t * (right - left), y])
     }
 
-    /// From where to where the triangle reaches at this height.
+    /// Returns the interval along the base that the triangle covers at height `y`.
     fn row(&self, y: f64) -> [f64; 2] {
         let up = if self.height > 0.0 { y / self.height } else { 0.0 };
         [up * self.foot, self.base + up * (self.foot - self.base)]
     }
 
-    /// How many places [`Self::rows`] hands out, about.
+    /// Returns an estimate of the number of points from [`Self::rows`].
     pub(crate) fn count(&self, step: f64) -> f64 {
         (self.base / step + 1.0) * (self.height / step + 1.0)
     }
 
-    /// Places in rows along the base, both at most `step` apart, corners and sides included.
+    /// Calls `each` with points in rows along the base. Points and rows are at most `step` apart
+    /// and include corners and sides.
     ///
-    /// No place of the triangle is further than √5/2 steps from one: below it is a row, at most a step away,
-    /// that reaches at least as far to both sides, as the angles at the longest side are no wider than right.
+    /// No point of the triangle is further than √5/2 steps from a sample. The row below the point
+    /// is at most a step away. It extends at least as far to both sides, because the angles at the
+    /// longest side are at most right.
     pub(crate) fn rows(&self, step: f64, mut each: impl FnMut([f64; 3])) {
         let rows = (self.height / step).ceil();
         for i in whole(rows) {
@@ -74,7 +78,7 @@ impl Triangle {
     }
 }
 
-/// 0, 1, … up to and including `last`, which is whole.
+/// Yields 0, 1, … up to and including `last`, which is a whole number.
 fn whole(last: f64) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(0.0), |i| Some(i + 1.0)).take_while(move |i| *i <= last)
 }

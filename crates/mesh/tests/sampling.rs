@@ -1,10 +1,10 @@
-//! Samples lie on the mesh, as dense as asked for everywhere.
+//! Samples are on the mesh and as dense as requested everywhere.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::TriangleMesh;
 use nearmiss_mesh::{Lattice, SampleError, SampleOptions, Samples, lattice_samples, sample};
 
-/// Shapes of triangles: right, flat, needle-thin, obtuse, tiny, huge, without area, a point.
+/// Triangles of many shapes: right, flat, needle-thin, obtuse, tiny, huge, without area, a point.
 const CORNERS: [[[f64; 3]; 3]; 9] = [
     [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
     [[0.0, 0.0, 1.0], [2.0, 0.3, 1.0], [1.0, 0.1, 1.5]],
@@ -23,7 +23,7 @@ fn mesh() -> TriangleMesh {
     TriangleMesh::new(vertices, triangles).unwrap()
 }
 
-/// Places of a triangle: its corners, sides and inside.
+/// Points on a grid over a triangle: corners, sides and inside.
 fn places([a, b, c]: [[f64; 3]; 3], n: u16) -> impl Iterator<Item = [f64; 3]> {
     (0..=n).flat_map(move |i| {
         (0..=n - i).map(move |j| {
@@ -37,7 +37,8 @@ fn distance(p: [f64; 3], q: [f64; 3]) -> f64 {
     (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// From a place to the nearest of a dense lattice of places of any triangle, at most half a step off.
+/// Returns the distance from `p` to the nearest point of a dense grid on the triangles, which
+/// exceeds the distance to the mesh by at most half a grid step.
 fn off_the_mesh(p: [f64; 3]) -> f64 {
     CORNERS
         .iter()
@@ -78,7 +79,7 @@ fn no_place_is_further_from_a_sample_than_asked() {
 
 #[test]
 fn a_number_of_samples_is_spread_by_area() {
-    // Two squares, one of nine times the area, in four triangles.
+    // Two squares, one with nine times the area of the other, in four triangles.
     let square =
         |x: f64, side: f64| [[x, 0.0, 0.0], [x + side, 0.0, 0.0], [x + side, side, 0.0], [x, side, 0.0]];
     let vertices = [square(0.0, 1.0), square(5.0, 3.0)].concat();
@@ -88,7 +89,8 @@ fn a_number_of_samples_is_spread_by_area() {
         assert_eq!(points.len(), 10_000);
         let small = points.iter().filter(|p| p[0] <= 1.0).count();
         assert!(small.abs_diff(1000) <= 2, "{small} of 10000 on a tenth of the area");
-        // Even within a triangle: 300 on each of 9 equal squares, within five deviations of a random count.
+        // Samples are uniform within a triangle too: about 1000 in each of 9 equal cells, within
+        // five standard deviations.
         for cell in 0..9_u32 {
             let [x, y] = [f64::from(cell % 3), f64::from(cell / 3)];
             let here = |p: &&[f64; 3]| {
@@ -149,7 +151,7 @@ fn of_what_reaches_beyond_the_lattice_the_part_inside_is_sampled_in_bounded_time
         let (is_within_wide, all) = sampled(triangle, &wide);
         assert!(is_within_wide);
         assert_eq!(whole, triangle.iter().all(|c| is_within(*c)), "{triangle:?}");
-        // The same boxes as those of the larger lattice, as far as they are in the smaller one.
+        // The boxes with samples are those of the larger lattice, restricted to the smaller one.
         let of = |samples: &[[f64; 3]]| {
             let within = samples.iter().filter(|p| is_within(**p));
             let mut cells: Vec<[u64; 3]> = within.map(|p| cell(*p).map(f64::to_bits)).collect();
@@ -158,13 +160,14 @@ fn of_what_reaches_beyond_the_lattice_the_part_inside_is_sampled_in_bounded_time
             cells
         };
         assert_eq!(of(&samples), of(&all), "{triangle:?}");
-        // But for rounding of what ends in the last wall.
+        // Samples on the last wall may be outside by rounding.
         let inwards = |p: [f64; 3]| [0, 1, 2].map(|k| p[k] + 1e-9 * (1.0 - p[k]).signum() * sides[k]);
         assert!(samples.iter().all(|p| is_within(*p) || is_within(inwards(*p))), "nothing outside");
         inside += samples.len();
     }
     assert!(inside > 1000, "{inside} samples");
-    // A plane as wide as doubles allow still passes every box once; what is nowhere passes none.
+    // A plane as wide as doubles allow still passes through every box once. A triangle with a NaN,
+    // infinite or extreme corner gets no samples.
     for reach in [1e3, 1e9, 1e18, 1e100, 1e148] {
         let z = 0.8;
         let huge = [[-reach, -reach, z], [3.0 * reach, -reach, z], [-reach, 3.0 * reach, z]];

@@ -1,4 +1,4 @@
-//! A robot's planned path: which poses are free, on all cores, and where the first collision is.
+//! A robot's planned path: finds the free poses on all cores, and the first collision.
 //!
 //! `cargo run --release -p nearmiss --example batch [ROOM.ply [PART.ply]]`
 #![expect(clippy::print_stdout, reason = "a program for people")]
@@ -21,8 +21,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let (room, part) = (build(&first)?, build(&second)?);
 
-    // 10,000 poses on a circle about the room, which gets narrower; 1 % of the part's spacing counts as
-    // contact.
+    // 10,000 poses on a shrinking circle around the room. A gap of 1 % of the part's spacing counts
+    // as contact.
     let size = room.bounds().half_extents().into_iter().fold(0.0, f64::max);
     let path: Vec<Pose> = (0..10_000_u32)
         .map(|i| {

@@ -1,5 +1,5 @@
-//! The clearance of two scans: bounds of their distance, the nearest points, and the curves where they
-//! intersect.
+//! The clearance of two scans: bounds on their distance, the nearest points, and the curves of
+//! intersection.
 //!
 //! `cargo run --release -p nearmiss --example distance [A.ply [B.ply]]`
 #![expect(clippy::print_stdout, reason = "a program for people")]

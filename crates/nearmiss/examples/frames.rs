@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let first = files.next().unwrap_or_else(|| DRAGON.into());
     let second = files.next().unwrap_or_else(|| first.clone());
 
-    // Prepare once. Programs that start often open a prepared file instead: `Scan::open`.
+    // Preprocess once. Programs that start often should open a saved scan instead, with
+    // `Scan::open`.
     let build = |path: &PathBuf| -> Result<Scan, Box<dyn Error>> {
         Ok(Scan::build(&nearmiss::io::read(path, None)?.cloud, &BuildOptions::default())?)
     };
@@ -27,10 +28,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = CollideOptions::default().with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&options, &a, &b)?;
 
-    // Keep these from frame to frame: queries then allocate nothing.
+    // Keep these from frame to frame, so that queries do not allocate.
     let (mut scratch, mut hint, mut manifold) = (Scratch::default(), PairHint::default(), Vec::new());
 
-    // b comes nearer along x, a hundredth of its size a frame, until it touches.
+    // b approaches along x by a hundredth of the total size per frame, until it touches.
     let size = a.bounds().half_extents()[0] + b.bounds().half_extents()[0];
     let [from, to] = [b.bounds().centre(), a.bounds().centre()];
     for frame in 0..200 {

@@ -1,4 +1,5 @@
-//! An avatar that walks through a building: here a floor with a staircase, from generated points.
+//! An avatar that walks through a building; here the building is a generated floor with a
+//! staircase.
 //!
 //! `cargo run --release -p nearmiss --example walker`
 #![expect(clippy::print_stdout, reason = "a program for people")]
@@ -9,7 +10,7 @@ use nearmiss::Aabb;
 use nearmiss::slices::{Avatar, AvatarOptions, Pixel, Route, SliceBuilder, SliceOptions, SlicePlan, Slide};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Ten metres of floor, with ten steps of 0.15 m from x = 3 on.
+    // Ten metres of floor, with ten steps of 0.15 m starting at x = 3.
     let grid =
         (0..500_u16).flat_map(|i| (0..100_u16).map(move |j| [0.02 * f64::from(i), 0.02 * f64::from(j)]));
     let height = |x: f64| 0.15 * ((x - 3.0) / 0.3).floor().clamp(0.0, 10.0);

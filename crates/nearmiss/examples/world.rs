@@ -1,4 +1,5 @@
-//! A hundred copies of a scan in one world: which touch each other, and which touch a gripper.
+//! A hundred copies of a scan in one world: counts the copies that touch each other and those that
+//! touch a gripper.
 //!
 //! `cargo run --release -p nearmiss --example world [SCAN.ply]`
 #![expect(clippy::print_stdout, reason = "a program for people")]
@@ -16,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let plan = CollidePlan::new(&CollideOptions::default(), &scan, &scan)?;
     let size = scan.bounds().half_extents();
 
-    // A clone of a scan costs a reference count.
+    // Cloning a scan only costs a reference count.
     let mut world = World::new();
     for i in 0..100_u32 {
         let turned = Pose::from_axis_angle([0.0, 1.0, 0.0], 0.7 * f64::from(i));

@@ -3,7 +3,7 @@
 
 mod scan;
 
-/// The front page's example compiles.
+/// Compiles the example in the repository's README.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct FrontPage;

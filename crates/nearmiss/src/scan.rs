@@ -1,4 +1,4 @@
-//! `Scan`: a prepared scan, in memory or in a file.
+//! `Scan`: a preprocessed scan, in memory or in a file.
 
 use std::io::Write;
 use std::ops::Deref;
@@ -18,17 +18,18 @@ use serde::{Deserialize, Serialize};
 
 pub use nearmiss_store::{LoadError, WriteError as SaveError};
 
-/// What a container of ours holds.
+/// Kind of the container of a scan.
 const KIND: [u8; 4] = *b"SCAN";
 
 /// Version of the layout of a scan's sections and metadata.
 const VERSION: u32 = 10;
 
-/// The oldest layout version that is read; older files are refused by name. Raise it together with
-/// [`VERSION`] whenever a section or a field of the metadata is added or changes, and record a golden file.
+/// The oldest layout version that can be read; the error for an older file names its version.
+/// Whenever a section or a metadata field is added or changes, raise this together with [`VERSION`]
+/// and record a golden file.
 const OLDEST: u32 = 10;
 
-/// What a scan's file holds beside arrays.
+/// Metadata of a scan's file: everything except the arrays.
 #[derive(Debug, Serialize, Deserialize)]
 struct ScanMeta {
     hierarchy: HierarchyMeta,
@@ -36,18 +37,19 @@ struct ScanMeta {
     density: Option<Density>,
 }
 
-/// How densely to draw points of a scan for [`Interpolation`](crate::Interpolation) without hierarchy.
+/// Sampling density at which [`Interpolation`](crate::Interpolation) without hierarchy draws points
+/// of a scan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Density {
-    /// Into how many surfels its surface is thought to be cut.
+    /// Number of surfels that the surface is taken to consist of.
     pub surfels: u32,
-    /// The share of wrong verdicts that was measured with as many.
+    /// Measured rate of wrong verdicts with this number of surfels.
     pub error: f64,
 }
 
-/// A scan prepared for queries. A clone costs a reference count; it may be shared between threads.
+/// A scan preprocessed for queries. Cloning it costs a reference count. Threads can share it.
 ///
-/// Derefs to its [`PointHierarchy`].
+/// Dereferences to its [`PointHierarchy`].
 #[derive(Debug, Clone)]
 pub struct Scan {
     hierarchy: Arc<PointHierarchy>,
@@ -69,16 +71,17 @@ impl Scan {
         Self { hierarchy: Arc::new(hierarchy), graph, shapes: None, density: None }
     }
 
-    /// Prepares `cloud`: about a second and a half for a million points on two cores.
+    /// Preprocesses `cloud`. Takes about 1.5 s for a million points on two cores.
     ///
     /// # Errors
-    /// Names the option that is out of range.
+    /// Fails if an option is out of range; the error names it.
     pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
         Ok(Self::of(PointHierarchy::build(cloud, options)?, None))
     }
 
-    /// Prepares points that may lie in files, with what is made of them in a workspace: so a scan may be
-    /// larger than memory. The result is the same.
+    /// Preprocesses points that may be stored in files, and keeps intermediate and final arrays in
+    /// a workspace. The scan may thus be larger than memory. The result is the same as that of
+    /// [`Scan::build`].
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, GatheredPoints, Intake, PointCloud, PointGatherer, Scan, Workspace};
@@ -104,7 +107,8 @@ impl Scan {
     /// ```
     ///
     /// # Errors
-    /// Names the option that is out of range; or the workspace has no room.
+    /// Fails if an option is out of range, in which case the error names it, or if the workspace is
+    /// full.
     pub fn build_in(
         points: &ScanPoints<'_>,
         options: &BuildOptions,
@@ -113,10 +117,13 @@ impl Scan {
         Ok(Self::of(PointHierarchy::build_in(points, options, work)?, None))
     }
 
-    /// The same scan, which is of `cloud`, with a graph over its points, by which normals are turned to one
-    /// side: that of the cloud's own normals where it has some; towards `scanner`, a place in the frame of
-    /// the cloud, or else towards the cloud's own [scanners](PointCloud::scanners); or outwards. Takes some
-    /// three times as long as [`Scan::build`], without the map of close pairs half as long.
+    /// Adds a proximity graph over the points of `cloud`, the cloud that the scan was built from,
+    /// and orients the normals along the graph.
+    ///
+    /// The side of the normals is that of the cloud's own normals if it has any. Otherwise normals
+    /// point towards `scanner`, a position in the frame of the cloud, or towards the cloud's own
+    /// [scanners](PointCloud::scanners). Without a scanner they point outwards. Takes about three
+    /// times as long as [`Scan::build`], and half of that without the map of close pairs.
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, GraphOptions, PointCloud, Scan};
@@ -132,9 +139,9 @@ impl Scan {
     /// ```
     ///
     /// # Errors
-    /// Names the option that is out of range. [`GraphError::NoClosePairs`] where the scan [is for the
-    /// geodesic kernel](Self::with_geodesic_kernel), for which it is then fitted again, and the map is not
-    /// wanted.
+    /// Fails if an option is out of range; the error names it. [`GraphError::NoClosePairs`] if the
+    /// scan [uses the geodesic kernel](Self::with_geodesic_kernel), which is then fitted again, and
+    /// `options` exclude the map of close pairs.
     pub fn with_graph(
         self,
         cloud: &PointCloud,
@@ -161,10 +168,11 @@ impl Scan {
         }
     }
 
-    /// The same scan for the geodesic kernel: its normals, discs and boxes are those of f with distances
-    /// along its graph, which keeps sheets apart that straight distances merge, and so are the answers of
-    /// queries (Klein & Zachmann 2005, §3). Nothing is certified of it but witnesses. What it is for is kept
-    /// in the file.
+    /// Fits the scan for the geodesic kernel (Klein & Zachmann 2005, §3).
+    ///
+    /// Its normals, discs and boxes become those of f with distances along the graph, which keeps
+    /// apart sheets that straight-line distances merge. Queries use the same distances. Only
+    /// contacts can be certified then, never separations. [`Scan::save`] stores the metric.
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, GraphOptions, Metric, PointCloud, Scan};
@@ -178,7 +186,7 @@ impl Scan {
     /// ```
     ///
     /// # Errors
-    /// [`GraphError::NoClosePairs`] without a graph that has their map.
+    /// [`GraphError::NoClosePairs`] if the scan has no graph, or one without a map of close pairs.
     pub fn with_geodesic_kernel(self) -> Result<Self, GraphError> {
         let Self { hierarchy, graph, density, .. } = self;
         let graph = graph.ok_or(GraphError::NoClosePairs)?;
@@ -195,8 +203,8 @@ impl Scan {
         Ok(Self { density, ..Self::of(hierarchy, Some(graph)) })
     }
 
-    /// The same scan with a shape index, for thousands of queries with [`Placed::touches`] and
-    /// [`Placed::nearest`]. Takes some milliseconds for 100,000 points. The index is not saved.
+    /// Adds a shape index, which speeds up large numbers of queries with [`Placed::touches`] and
+    /// [`Placed::nearest`]. Takes a few milliseconds for 100,000 points. The index is not saved.
     ///
     /// ```
     /// # use nearmiss::{BuildOptions, PointCloud, Pose, Scan, Shape};
@@ -215,53 +223,57 @@ impl Scan {
         Self { shapes: Some(Arc::new(ShapeIndex::new(&self.hierarchy))), ..self }
     }
 
-    /// The graph over the points, if one was built.
+    /// Returns the proximity graph over the points, if one was built.
     #[must_use]
     pub fn graph(&self) -> Option<&SurfaceGraph> {
         self.graph.as_deref()
     }
 
-    /// f with distances along the graph (Klein & Zachmann 2005, eq. 5) in the frame of the stored positions;
-    /// `None` without a graph or its map of close pairs.
+    /// Returns f with distances along the graph (Klein & Zachmann 2005, eq. 5), in the frame of the
+    /// stored positions. `None` without a graph with a map of close pairs.
     #[must_use]
     pub fn geodesic_kernel(&self) -> Option<GeodesicKernel<'_>> {
         self.graph.as_ref()?.kernel(samples(&self.hierarchy))
     }
 
-    /// Saves the scan, replacing a file that is there in one step; returns its length in bytes.
+    /// Saves the scan to a file and returns the file's length in bytes. An existing file is
+    /// replaced atomically.
     ///
     /// # Errors
-    /// When the file cannot be written; one that was there before is then whole.
+    /// Fails if the file cannot be written. An existing file then stays intact.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<u64, SaveError> {
         let meta = self.meta();
         self.writer(&meta)?.save(path)
     }
 
-    /// Makes what searches along the graph make when they first want it, if there is a graph: some tenths of
-    /// a second for a million points with a map of close pairs, some second and a half without. So the first
-    /// [`Interpolation`](crate::Interpolation) takes no longer than the next, and keeps its deadline.
+    /// Computes everything that searches along the graph otherwise compute at first use, if there
+    /// is a graph.
+    ///
+    /// Takes some tenths of a second for a million points with a map of close pairs, and about
+    /// 1.5 s without. The first [`Interpolation`](crate::Interpolation) is then as fast as later
+    /// ones, and keeps its deadline.
     pub fn make_ready(&self) {
         if let Some(graph) = &self.graph {
             graph.make_ready(samples(&self.hierarchy));
         }
     }
 
-    /// The same scan with a density for searches that draw its points.
+    /// Sets the density for searches that draw points of the scan.
     #[must_use]
     pub fn with_density(self, density: Density) -> Self {
         Self { density: Some(density), ..self }
     }
 
-    /// That density, if one was measured.
+    /// Returns the density, if one was set.
     #[must_use]
     pub fn density(&self) -> Option<Density> {
         self.density
     }
 
-    /// Writes what [`Scan::save`] would; returns its length in bytes.
+    /// Writes the contents of a file of [`Scan::save`] to `out` and returns their length in bytes.
     ///
     /// # Errors
-    /// When `out` fails.
+    /// Fails if `out` fails.
     pub fn write_to(&self, out: impl Write) -> Result<u64, SaveError> {
         let meta = self.meta();
         self.writer(&meta)?.write_to(out)
@@ -285,33 +297,34 @@ impl Scan {
         Ok(writer)
     }
 
-    /// Opens a saved scan by mapping it: nothing is copied, and memory is read when a query looks at it.
+    /// Opens a saved scan by mapping its file. Nothing is copied, and pages are read when a query
+    /// needs them.
     ///
-    /// [`Check::Structure`] looks at the metadata and the lengths of arrays, for files one has written
-    /// oneself: a damaged number may then give a wrong answer. Without a graph it takes the same time for any
-    /// scan. [`Check::Full`], for all others, compares checksums too, and looks at every number of every
-    /// point: what it lets pass could have been written by [`Scan::save`]. Either way a query ends, and never
-    /// leaves its arrays.
+    /// [`Check::Structure`] checks the metadata and the lengths of arrays, and is for files from a
+    /// trusted source: a damaged number may cause a wrong answer. Without a graph it takes the same
+    /// time for any scan. [`Check::Full`], for all other files, also compares checksums and checks
+    /// every number. Files that pass could have been written by [`Scan::save`]. With either check,
+    /// queries terminate and never index out of bounds.
     ///
-    /// The file must not be changed in place while it is open (see `nearmiss_store::File::open`); replacing
-    /// it by [`Scan::save`] is fine.
+    /// The file must not be modified in place while it is open (see `nearmiss_store::File::open`).
+    /// Replacing it with [`Scan::save`] is fine.
     ///
     /// # Errors
-    /// When the file cannot be opened, is no prepared scan, of another version, damaged, or contradicts
-    /// itself.
+    /// Fails if the file cannot be opened, is not a preprocessed scan, has another version, is
+    /// damaged or is inconsistent.
     pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Self, LoadError> {
         Self::load(&File::open(path, check)?, check)
     }
 
     /// Reads a saved scan into memory.
     ///
-    /// # Errors
+    /// As [`Scan::open`].
     /// As [`Scan::open`].
     pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Self, LoadError> {
         Self::load(&File::read(path, check)?, check)
     }
 
-    /// A scan from the bytes that [`Scan::save`] or [`Scan::write_to`] wrote.
+    /// Loads a scan from bytes written by [`Scan::save`] or [`Scan::write_to`].
     ///
     /// # Errors
     /// As [`Scan::open`].
@@ -333,8 +346,8 @@ impl Scan {
         Ok(Self { density: meta.density, ..Self::of(hierarchy, graph.map(Arc::new)) })
     }
 
-    /// Places the scan at `pose`, which maps the frame of its input to the world, with its graph and its
-    /// shape index.
+    /// Places the scan at `pose`, which maps the frame of its input to the world. The graph and the
+    /// shape index are included.
     #[inline]
     #[must_use]
     pub fn at(&self, pose: &Pose) -> Placed<'_> {
@@ -350,13 +363,14 @@ impl Prepared for Scan {
     }
 }
 
-/// The points as a graph wants them.
+/// Returns the points as the graph needs them.
 fn samples(hierarchy: &PointHierarchy) -> Samples<'_> {
     Samples { plan: hierarchy.plan(), positions: hierarchy.positions(), radii: hierarchy.radii() }
 }
 
-/// For each point in the order of the hierarchy where its scanner stood, in its frame, or the point itself
-/// where that is not known; `None` if it is known of no point.
+/// Returns for each point, in the order of the hierarchy, the position of its scanner in the local
+/// frame, or of the point itself if its scanner is unknown. `None` if the scanners of all points
+/// are unknown.
 fn viewpoints(hierarchy: &PointHierarchy, cloud: &PointCloud) -> Option<Vec<[f32; 3]>> {
     let finite = |scanner: &&Scanner| scanner.position.iter().all(|c| c.is_finite());
     let scanners: Vec<&Scanner> = cloud.scanners().iter().filter(finite).collect();
@@ -371,9 +385,10 @@ fn viewpoints(hierarchy: &PointHierarchy, cloud: &PointCloud) -> Option<Vec<[f32
     Some(hierarchy.source().iter().zip(hierarchy.positions()).map(of).collect())
 }
 
-/// The normals of a cloud in the order of the hierarchy over it; zero for points that it has not.
+/// Returns the normals of a cloud in the order of the hierarchy over it; zero for points that the
+/// cloud lacks.
 fn in_order_of(hierarchy: &PointHierarchy, cloud: &PointCloud, normals: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    // Places in the input ascend in a cloud.
+    // Input indices ascend in a cloud.
     let place = |source: &u32| cloud.source().binary_search(source).ok();
     let normal = |source: &u32| place(source).and_then(|place| normals.get(place)).copied();
     hierarchy.source().iter().map(|source| normal(source).unwrap_or_default()).collect()

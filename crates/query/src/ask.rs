@@ -1,4 +1,4 @@
-//! What is asked and answered: values alone.
+//! The options and answers of queries, as plain values.
 
 pub(crate) mod answer;
 pub(crate) mod budget;

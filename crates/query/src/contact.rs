@@ -1,4 +1,4 @@
-//! Whether two scans meet: the search, its certificates, and what is remembered of it.
+//! Contact queries: the search, its certificates, and the hints kept between queries.
 
 pub(crate) mod ball_leaves;
 pub(crate) mod balls;

@@ -1,10 +1,11 @@
-//! All of `{x | f_A(x) = f_B(x) = 0}`: the curves in which two surfaces cut each other, as polylines.
+//! Intersection curves `{x | f_A(x) = f_B(x) = 0}` of two surfaces, as polylines.
 //!
-//! All contacts of the two scans say where discs of either scan cross. From the first of these places that no
-//! curve has passed, Newton's method leads onto both surfaces, and from there the curve is followed both ways
-//! (`follow`): ahead along `n_A × n_B`, back onto both surfaces by Newton's method, in steps that get shorter
-//! where the curve turns. Crossings that it passed start no other (`trail`). Places where the surfaces cross
-//! steeply come first: where they graze, first order says little (docs/theory/curves.md).
+//! The contacts of the two scans give the points where their discs cross. From the first crossing
+//! that no curve has passed, Newton's method finds a point on both surfaces, and the curve is
+//! followed in both directions (`follow`). Each step goes ahead along `n_A × n_B` and returns to
+//! both surfaces by Newton's method; steps get shorter where the curve turns. Crossings that a
+//! curve has passed start no other (`trail`). Steep crossings come first, as grazing ones are
+//! unreliable to first order (docs/theory/curves.md).
 
 mod follow;
 mod line;
@@ -23,26 +24,28 @@ use follow::{Follower, LONGEST, SAME_TURN};
 pub use line::{Curve, CurveEnd};
 use trail::{Place, Trail};
 
-/// Tolerances below this share of the lesser sampling radius are not reached by single-precision sums.
+/// The smallest tolerance, as a share of the lesser sampling radius, that sums in single precision
+/// can reach.
 const LEAST_TOLERANCE: f64 = 1e-5;
 
-/// Evaluations along curves, in steps of a sampling radius, for each of the pairs of leaves that sound scans
-/// may have at most, of which few are on a curve: a tenth of what it takes to follow one through.
+/// Evaluations per leaf pair, for the limit without a budget and a step of one sampling radius. Few
+/// of the leaf pairs are on a curve, so this is a tenth of what following a curve through a leaf
+/// pair takes.
 const EVALUATIONS: f64 = 10.0;
 
-/// Crossings of discs at angles with a sine from this on start curves before all others.
+/// The least sine of the angle of crossing discs from which curves are started before all others.
 const STEEP: f64 = 0.3;
 
-/// How curves are to be drawn; lengths in the world.
+/// Options of a curve query. Lengths are in world units.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct CurveOptions {
-    /// The wanted distance of points that follow each other; they are nearer where a chord would leave its
-    /// curve by more than a fortieth of that, or of two sampling radii. None: twice the lesser of the scans'
-    /// sampling radii.
+    /// The desired distance of successive points. Points are closer where a chord would deviate
+    /// from its curve by more than 1/40 of that distance, or of two sampling radii if that is less.
+    /// Default: `None`, twice the lesser sampling radius of the scans.
     pub spacing: Option<f64>,
-    /// The greatest |f| of either surface at a point. None: a thousandth of that radius; never less than a
-    /// hundredth of that.
+    /// The greatest |f| of either surface at a point. Default: `None`, a thousandth of the lesser
+    /// sampling radius. Values below 1e-5 of that radius are raised to it.
     pub tolerance: Option<f64>,
 }
 
@@ -71,8 +74,8 @@ impl CurvePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// [`PlanError::CurveLength`] for a spacing or tolerance that is not positive; [`PlanError::Metrics`] for
-    /// scans that are prepared for different kernels.
+    /// Returns [`PlanError::CurveLength`] for a spacing or tolerance that is not positive and
+    /// finite, and [`PlanError::Metrics`] if the scans were prepared for different kernels.
     pub fn new(options: &CurveOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         let given = [options.spacing, options.tolerance].into_iter().flatten();
         if let Some(length) = given.into_iter().find(|&l| !(l > 0.0 && l.is_finite())) {
@@ -94,23 +97,23 @@ impl CurvePlan {
     }
 }
 
-/// The curves in which two surfaces cut each other, in the world.
+/// The intersection curves of two surfaces, in the world.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Curves {
-    /// The points of all, curve after curve, each in order.
+    /// The points of all curves, curve after curve, each in order.
     pub points: Vec<[f64; 3]>,
     /// The curves, in the order in which they were found.
     pub curves: Vec<Curve>,
     /// The greatest |f| of either surface at any of the points.
     pub max_residual: f64,
-    /// Whether the budget lasted, and the poses are some.
+    /// `true` if the budget was not spent and the poses are valid.
     pub complete: bool,
-    /// What that cost.
+    /// The cost of the query.
     pub statistics: Statistics,
 }
 
 impl Curves {
-    /// The length of all curves together.
+    /// Returns the total length of all curves.
     #[must_use]
     pub fn length(&self) -> f64 {
         let between =
@@ -118,21 +121,21 @@ impl Curves {
         self.curves.iter().flat_map(Curve::edges).map(between).fold(0.0, |sum, length| sum + length)
     }
 
-    /// How many of the curves are loops.
+    /// Returns the number of closed curves.
     #[must_use]
     pub fn closed(&self) -> usize {
         self.curves.iter().filter(|curve| curve.is_closed()).count()
     }
 }
 
-/// Reused between queries.
+/// Memory that is reused between queries.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CurveScratch {
     contacts: Contacts,
     trail: Trail,
 }
 
-/// Leaves in `found` the curves in which two surfaces cut each other. See
+/// Writes the intersection curves of two surfaces to `found`. See
 /// [`Pair::curves`](crate::Pair::curves).
 pub(crate) fn curves(
     views: [&Placed<'_>; 2],
@@ -185,7 +188,7 @@ pub(crate) fn curves(
     found.statistics = follower.meter.spent;
 }
 
-/// Two crossing discs as a place.
+/// Converts a contact of crossing discs to a place.
 fn crossing(contact: &Contact) -> Place {
     let normals = contact.normals.map_or([Vector3::zeros(); 2], |normals| normals.map(Vector3::from));
     Place::between(contact.point.into(), normals, contact.residual)

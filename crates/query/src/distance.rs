@@ -1,9 +1,9 @@
-//! How far two scans are apart.
+//! Bounds on the distance of two scans.
 //!
-//! Branch and bound over both trees, the nearest pair of nodes first: by the boxes about the points for the
-//! two nearest points, by the enclosures, which provably contain the surfaces, for a bound from below. It is
-//! worth what it found whenever a budget ends it. From the nearest points on, points of the surfaces
-//! themselves approach each other.
+//! Branch and bound over both trees, the nearest pair of nodes first. The boxes about the points
+//! give the two nearest points; the enclosures, which provably contain the surfaces, give a lower
+//! bound. This is an anytime algorithm: both bounds are valid whenever a budget stops it. Starting
+//! from the nearest points, points on the surfaces themselves then approach each other.
 
 mod approach;
 mod search;
@@ -26,16 +26,17 @@ use approach::{Approach, Feet};
 pub(crate) use search::Frontier;
 use search::Search;
 
-/// What is asked. Plain values; [`DistancePlan::new`] validates them.
+/// Options of a distance query. Plain values; [`DistancePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct DistanceOptions {
-    /// What is to be apart. Default: obstacles.
+    /// The geometry whose distance is measured. Default: obstacles.
     pub semantics: Semantics,
-    /// Of obstacles, how far below the upper bound the lower one may be left, as a share of it: 0 to less
-    /// than 1, default 0.1.
+    /// Relative precision of the lower bound between obstacles, 0 to less than 1, default 0.1. The
+    /// lower bound may stay below the upper one by this share of the upper one.
     pub relative: f64,
-    /// By which distances surfaces are defined. None, the default: as both scans were prepared.
+    /// The metric that defines the surfaces. Default: `None`, the metric that both scans were
+    /// prepared for.
     pub metric: Option<Metric>,
 }
 
@@ -58,7 +59,7 @@ impl DistanceOptions {
         Self { semantics, ..self }
     }
 
-    /// The same options by this metric.
+    /// The same options with this metric.
     #[must_use]
     pub const fn with_metric(self, metric: Metric) -> Self {
         Self { metric: Some(metric), ..self }
@@ -70,9 +71,9 @@ impl DistanceOptions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistancePlan {
     options: DistanceOptions,
-    /// Whether they touch.
+    /// The contact test.
     touching: CollidePlan,
-    /// Nothing is too far off to be looked at.
+    /// The options with an unlimited reach, so that no pair is too far away to be searched.
     boundless: CollidePlan,
 }
 
@@ -80,8 +81,11 @@ impl DistancePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// [`PlanError::Radius`] for one that is no length; [`PlanError::Relative`]; [`PlanError::Metric`]
-    /// and [`PlanError::Metrics`] for scans whose surfaces are not defined as it is asked, or not alike.
+    /// Returns:
+    /// - [`PlanError::Radius`] for a negative or non-finite radius,
+    /// - [`PlanError::Relative`] for a relative precision out of range,
+    /// - [`PlanError::Metric`] if a scan was prepared for another metric than the options ask for,
+    /// - [`PlanError::Metrics`] if the metrics of the scans differ.
     pub fn new(options: &DistanceOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         if !(0.0..1.0).contains(&options.relative) {
             return Err(PlanError::Relative(options.relative));
@@ -103,33 +107,35 @@ impl DistancePlan {
     }
 }
 
-/// How far two scans are apart, in the world.
+/// Bounds on the distance of two scans, in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distance {
-    /// They are no nearer than this: proven.
+    /// A proven lower bound of the distance.
     pub lower: f64,
-    /// The band at the nearest places: the greater of the local radii of the two points there, at most the
-    /// greater reach, in the world. Nothing is promised of where the scanned things themselves are within it.
+    /// The band at the nearest points: the greater local radius of the two samples there, at most
+    /// the greater reach, in world units. Nothing is claimed about where the scanned things
+    /// themselves are within it.
     pub band: f64,
-    /// They are no further apart than this; see [`Self::evidence`]. Infinite if a pose is invalid.
+    /// An upper bound of the distance; see [`Self::evidence`]. Infinite if a pose is invalid.
     pub upper: f64,
-    /// A place of either scan: of the surfaces those that show [`Self::upper`], of points the samples.
+    /// A point of each scan at distance [`Self::upper`]: points on the surfaces, or samples if
+    /// points are compared.
     pub points: [[f64; 3]; 2],
-    /// A sample of either scan near these.
+    /// A sample of each scan near these points.
     pub sources: [PointId; 2],
-    /// Of [`Self::upper`]. Certified: the places were verified to lie on the surfaces; where it is zero they
-    /// are one. Estimated: the surfaces cross to first order, or no surface was found, or looked for, below
-    /// the samples; then half a local radius of either is added to their distance. Of points always
-    /// certified.
+    /// The evidence for [`Self::upper`]. Certified: the points were verified to lie on the
+    /// surfaces; at distance zero they coincide. Estimated: the surfaces cross to first order, or
+    /// no surface point was found or searched for near the samples, and half a local radius of each
+    /// sample was added to their distance. Always certified if points are compared.
     pub evidence: Evidence,
-    /// Whether the budget lasted: of points both bounds are then the distance, of surfaces no further work
-    /// would bring them nearer to each other.
+    /// `true` if the search ended before the budget did. Between points, both bounds then equal the
+    /// distance; between surfaces, further work would not improve them.
     pub complete: bool,
-    /// What that cost.
+    /// The cost of the query.
     pub statistics: Statistics,
 }
 
-/// How far two scans are apart, as `plan` means it, within `budget`. See
+/// Bounds the distance of two scans, with the meaning of `plan`, within `budget`. See
 /// [`Pair::distance`](crate::Pair::distance).
 pub(crate) fn distance(
     views: [&Placed<'_>; 2],
@@ -159,16 +165,16 @@ pub(crate) fn distance(
     if let Semantics::Thickened(radius) = semantics {
         return Apart { plan, budget, search: Search::new(pair, &motion, false) }.balls(radius, open);
     }
-    // By the geodesic metric enclosures prove nothing.
+    // Enclosures prove nothing about geodesic surfaces.
     let is_bounded = plan.options.metric != Some(Metric::Geodesic);
     Apart { plan, budget, search: Search::new(pair, &motion, is_bounded) }.surfaces(open, contact)
 }
 
-/// Beyond so many bands feet on the surfaces of obstacles are hardly nearer than the points: by a hundredth
-/// at most, where points are within 0.6 bands of them.
+/// Distance, in bands, beyond which the feet on the surfaces of obstacles are at most 1 % nearer to
+/// each other than the samples. (Samples are within 0.6 bands of the surfaces.)
 const FAR_FEET: f64 = 6.0;
 
-/// The search for a distance.
+/// A running search for a distance.
 struct Apart<'a> {
     plan: &'a DistancePlan,
     budget: &'a Budget,
@@ -176,7 +182,7 @@ struct Apart<'a> {
 }
 
 impl Apart<'_> {
-    /// Balls of this radius about the points.
+    /// The distance of balls of this radius about the points.
     fn balls(mut self, radius: f64, open: &mut Frontier) -> Distance {
         self.search.near_enough = 2.0 * radius;
         let flow = self.search.run(open);
@@ -197,7 +203,7 @@ impl Apart<'_> {
         if self.of_obstacles() {
             self.search.share = Some(1.0 - self.plan.options.relative);
         }
-        // Whether they touch costs a hundredth of the rest. A budget is spent on bounds first.
+        // The contact test costs 1 % of the rest. Under a budget, the bounds come first.
         let is_asked = self.budget.work.is_none() && self.budget.deadline.is_none();
         if (is_asked || self.search.may_touch())
             && let Some(touching) = self.touch(contact)
@@ -237,8 +243,7 @@ impl Apart<'_> {
         self.search.pair.band(self.search.best.points)
     }
 
-    /// The places of the balls about the nearest points, which lie at `centres`, that are nearest to each
-    /// other.
+    /// The nearest points of the balls about the two nearest samples, whose centres are `centres`.
     fn places_of_balls(&self, centres: [[f64; 3]; 2]) -> [[f64; 3]; 2] {
         let [p, q] = centres.map(Vector3::from);
         let balls = self.search.pair.balls(self.search.best.points);
@@ -247,19 +252,19 @@ impl Apart<'_> {
         if both == 0.0 || length == 0.0 {
             return centres;
         }
-        // Balls that overlap share a place.
+        // Overlapping balls share a point.
         let shares =
             if both < length { balls.map(|ball| ball / length) } else { [balls[0] / both, balls[1] / both] };
         [(p + way * shares[0]).into(), (q - way * shares[1]).into()]
     }
 
-    /// Whether both feet belong to their obstacles.
+    /// Returns `true` if both feet belong to their obstacles.
     fn are_obstacle(&self, feet: &Feet) -> bool {
         let views = self.search.pair.views;
         (0..2).all(|k| views[k].is_obstacle(self.search.best.points[k], feet.points[k]))
     }
 
-    /// The answer if the surfaces meet.
+    /// Tests for contact. Returns the answer if the surfaces meet.
     fn touch(&mut self, scratch: &mut ContactScratch) -> Option<Distance> {
         let meter = &mut self.search.pair.meter;
         let spent = meter.spent;
@@ -281,7 +286,7 @@ impl Apart<'_> {
         })
     }
 
-    /// Points of the surfaces, from the nearest samples on.
+    /// Moves points along the surfaces towards each other, starting at the nearest samples.
     fn approach(&mut self, gathers: &mut [ViewScratch; 2]) -> Option<Feet> {
         let [a, b] = self.search.pair.views;
         if !(a.verifies() && b.verifies()) {
@@ -291,7 +296,7 @@ impl Apart<'_> {
         Approach { views: [a, b], samples: self.search.best.points, gathers, meter }.run()
     }
 
-    /// What the nearest points so far tell.
+    /// The answer that the nearest samples so far support.
     fn samples(&self) -> Distance {
         let PointPair { distance, points } = self.search.best;
         let views = self.search.pair.views;

@@ -1,4 +1,4 @@
-//! The points of two leaves against each other.
+//! Comparison of the points of two leaves.
 
 pub(crate) mod ball_pair;
 pub(crate) mod crossing;

@@ -1,4 +1,4 @@
-//! Many questions and many scans.
+//! Batches of questions and worlds of many scans.
 
 pub(crate) mod batch;
 pub(crate) mod world;

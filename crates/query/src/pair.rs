@@ -1,4 +1,4 @@
-//! Placed scans, two of them in relative motion, and what a search through them has cost.
+//! Placed scans, pairs of them under a relative pose, and the cost of a search.
 
 pub(crate) mod bounds;
 pub(crate) mod likelihood;

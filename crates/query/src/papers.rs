@@ -1,9 +1,13 @@
-//! The papers' own ways to search, for comparison: test points (S0 §5.3), searches along the graph (S1 §4),
-//! nodes by sample points on either side (S0 §5.2) and by sphere coverings (S0 §5.1), and a resolution (S0
-//! §1).
+//! The search methods of Klein & Zachmann's papers, for comparison:
 //!
-//! They are visitors of the same descent as the default search, whose contacts and certificates they share,
-//! and nothing of it depends on them.
+//! - test points (2004, §5.3);
+//! - searches along the graph (2005, §4);
+//! - priorities by sample points on either side (2004, §5.2);
+//! - sphere coverings (2004, §5.1);
+//! - a resolution (2004, §1).
+//!
+//! They are visitors of the same descent as the default search and share its contacts and
+//! certificates. The default search does not depend on them.
 
 mod interpolation;
 pub(crate) mod pacer;
@@ -23,30 +27,30 @@ use crate::contact::search::Surfaces;
 use crate::pair::meter::NODE_PAIRS_A_LEAF_PAIR;
 use interpolation::InterpolationScratch;
 
-/// Reused between queries.
+/// Memory that is reused between queries.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PapersScratch {
     interpolation: InterpolationScratch,
-    /// The points of a that lie in the box of b.
+    /// The points of a in the box of b.
     members: Vec<u32>,
 }
 
-/// A search for a crossing by one of the papers' ways.
+/// A search for a crossing by one of the papers' methods.
 struct Papers<'p, 'a> {
     search: &'p mut Surfaces<'a>,
     scratch: &'p mut PapersScratch,
     method: Method,
     order: Order,
     coverings: bool,
-    /// Nodes whose samples are no further from their surface than this, in a's stored frame, are not split;
-    /// less than 0: all are.
+    /// Nodes whose samples are within this distance of their surface, in a's stored frame, are not
+    /// split. Negative: all are split.
     resolution: f32,
     /// The least |f_A| + |f_B| of any test point, in the world.
     estimate: f64,
 }
 
-/// The answer to a question that [is asked by one of the papers' ways](crate::CollidePlan::is_of_papers). A
-/// hint is neither used nor changed.
+/// Answers a question that [uses a method of the papers](crate::CollidePlan::is_of_papers). A hint
+/// is neither used nor changed.
 pub(crate) fn collide(
     asked: Asked<'_>,
     (scratch, papers): (&mut ContactScratch, &mut PapersScratch),

@@ -16,9 +16,11 @@ use crate::distance::{Distance, DistancePlan};
 use crate::pair::placed::Placed;
 use crate::papers::PapersScratch;
 
-/// Working memory of queries, one per thread. Reuse it: a query does not allocate once its scratch is warm.
+/// Working memory of queries, one per thread. Reuse it: a query does not allocate once its scratch
+/// is warm.
 ///
-/// A scratch serves every kind of question about any scans. It holds no answers and never changes one.
+/// A scratch serves every kind of question about any scans. It holds no answers and never changes
+/// one.
 #[derive(Debug, Clone)]
 pub struct Scratch {
     contact: ContactScratch,
@@ -34,8 +36,8 @@ impl Default for Scratch {
 }
 
 impl Scratch {
-    /// A scratch whose queries run with the SIMD instructions of `level` instead of the best available ones,
-    /// for comparisons. Answers do not depend on it.
+    /// A scratch whose queries run with the SIMD instructions of `level` instead of the best
+    /// available ones, for comparisons. Answers do not depend on it.
     #[must_use]
     pub fn by_level(level: Level) -> Self {
         Self {
@@ -46,8 +48,8 @@ impl Scratch {
         }
     }
 
-    /// The longest interval between two looks at the clock in the last collision query with a deadline; zero
-    /// without a deadline. A query overruns its deadline by about this much at most.
+    /// Returns the longest interval between two clock reads in the last collision query with a
+    /// deadline; zero without a deadline. A query overruns its deadline by about this much at most.
     #[must_use]
     pub fn longest_stretch(&self) -> Duration {
         self.contact.longest_stretch
@@ -55,9 +57,9 @@ impl Scratch {
 }
 
 impl Placed<'_> {
-    /// Evaluates the implicit function at `x`, all in world coordinates, with the kernel of the scan's
-    /// [metric](nearmiss_hierarchy::PointHierarchy::metric). The signs of f and of the normal follow the
-    /// oriented normals if the scan has them.
+    /// Evaluates the implicit function at `x`, all in world coordinates, with the kernel of the
+    /// scan's [metric](nearmiss_hierarchy::PointHierarchy::metric). The signs of f and of the
+    /// normal follow the oriented normals if the scan has them.
     pub fn evaluate(&self, x: [f64; 3], scratch: &mut Scratch) -> Evaluation {
         let [gather, _] = &mut scratch.contact.gathers;
         self.evaluate_with(x, gather)
@@ -68,8 +70,8 @@ impl Placed<'_> {
 ///
 /// The questions are methods: [`collide`](Self::collide), [`distance`](Self::distance) and
 /// [`curves`](Self::curves). A collision query can produce more than its answer: request a
-/// [`manifold`](Self::manifold), all [`contacts`](Self::contacts) or a [`proof`](Self::proof), and reuse what
-/// the last query found ([`hinted`](Self::hinted)), in any combination.
+/// [`manifold`](Self::manifold), all [`contacts`](Self::contacts) or a [`proof`](Self::proof), and
+/// reuse what the last query found ([`hinted`](Self::hinted)), in any combination.
 ///
 /// ```
 /// use nearmiss_geometry::{PointCloud, Pose};
@@ -132,8 +134,8 @@ impl<'a> Pair<'a> {
 
     /// Decides whether the scans meet, with the meaning of `plan`.
     ///
-    /// Does not allocate once `scratch` is warm. Deterministic: a question without a deadline always has the
-    /// same answer.
+    /// Does not allocate once `scratch` is warm. Deterministic: a question without a deadline
+    /// always has the same answer.
     #[inline]
     pub fn collide(&self, plan: &CollidePlan, scratch: &mut Scratch) -> Answer {
         self.question().collide(plan, scratch)
@@ -167,18 +169,20 @@ impl<'a> Pair<'a> {
         self.question().proof(proof)
     }
 
-    /// Bounds the distance of the scans: lower ≤ distance ≤ upper. Both bounds are valid whenever the budget
-    /// ends the search.
+    /// Bounds the distance of the scans: lower ≤ distance ≤ upper. Both bounds are valid whenever
+    /// the budget ends the search.
     ///
-    /// With [`Semantics::Thickened`](crate::Semantics::Thickened) the distance is that of the two nearest
-    /// points less both radii, and both bounds equal it once the search is complete. With surfaces, `lower`
-    /// is proven by enclosures (docs/theory/certificates.md): it is a few sampling radii less than the
-    /// distance, and 0 for scans of the geodesic metric. `upper` is the distance of two points on the
-    /// surfaces near the two nearest samples. Surfaces that [`collide`](Self::collide) have distance 0.
+    /// With [`Semantics::Thickened`](crate::Semantics::Thickened) the distance is that of the two
+    /// nearest points less both radii, and both bounds equal it once the search is complete. With
+    /// surfaces, `lower` is proven by enclosures (docs/theory/certificates.md): it is a few
+    /// sampling radii less than the distance, and 0 for scans of the geodesic metric. `upper` is
+    /// the distance of two points on the surfaces near the two nearest samples. Surfaces that
+    /// [`collide`](Self::collide) have distance 0.
     ///
-    /// Ignores the resolution of the budget. Does not allocate once `scratch` is warm. Takes 0.1 to 0.2 ms
-    /// for separated scans of 100,000 points and 10 µs for surfaces that meet (benches/record). Thickened
-    /// scans that interpenetrate cost a comparison of every pair of leaves that overlap.
+    /// Ignores the resolution of the budget. Does not allocate once `scratch` is warm. Takes 0.1 to
+    /// 0.2 ms for separated scans of 100,000 points and 10 µs for surfaces that meet
+    /// (benches/record). Thickened scans that interpenetrate cost a comparison of every pair of
+    /// leaves that overlap.
     pub fn distance(&self, plan: &DistancePlan, scratch: &mut Scratch) -> Distance {
         crate::distance::distance(
             self.scans.each_ref(),
@@ -189,26 +193,28 @@ impl<'a> Pair<'a> {
         )
     }
 
-    /// Traces the curves in which the two surfaces intersect and writes them to `found`, as far as the budget
-    /// lasts.
+    /// Traces the curves in which the two surfaces intersect and writes them to `found`, as far as
+    /// the budget lasts.
     ///
-    /// At each point both |f| are within the tolerance. A chord deviates from its curve by at most a fortieth
-    /// of the spacing, or of two sampling radii if that is less: 0.05 radii by default where curves are as
-    /// smooth as arcs; on a rough scan one chord in a hundred deviates by 0.06 to 0.16. The curve of the true
-    /// surfaces may be off by the bias of both surfaces, h²H/2 each, over the sine of their angle.
+    /// At each point both |f| are within the tolerance. A chord deviates from its curve by at most
+    /// 1/40 of the spacing, or of two sampling radii if that is less. By default that is 0.05 radii
+    /// where curves are as smooth as arcs; on a rough scan one chord in a hundred deviates by 0.06
+    /// to 0.16 radii. The curve of the true surfaces may differ by the bias of both surfaces, h²H/2
+    /// each, divided by the sine of their angle.
     ///
-    /// Every curve is found on which the discs of two leaves cross. A curve shorter than a leaf and nearer to
-    /// another one than a sampling radius may be taken for that. Swapped scans give the same curves with
-    /// other points on them. Scans of the geodesic metric need [their graph](Placed::with_graph).
+    /// Every curve on which the discs of two leaves cross is found. A curve that is shorter than a
+    /// leaf and within a sampling radius of another curve may be mistaken for that one. Swapping
+    /// the scans gives the same curves with other points on them. Scans of the geodesic metric need
+    /// [their graph](Placed::with_graph).
     ///
-    /// Costs as much as [all contacts](Self::contacts) and three pairs of evaluations per sampling radius of
-    /// length. Does not allocate once `found` and `scratch` are warm.
+    /// Costs as much as [all contacts](Self::contacts) plus three pairs of evaluations per sampling
+    /// radius of length. Does not allocate once `found` and `scratch` are warm.
     pub fn curves(&self, plan: &CurvePlan, found: &mut Curves, scratch: &mut Scratch) {
         let beside = (&mut scratch.contact, &mut scratch.curve);
         crate::curve::curves(self.scans.each_ref(), plan, &self.budget, found, beside);
     }
 
-    /// A question about the pair, to be given outputs one by one.
+    /// Starts a question about the pair, to which outputs can be added one by one.
     #[inline]
     #[must_use]
     pub fn question(&self) -> Question<'_> {
@@ -224,17 +230,18 @@ pub struct Question<'q> {
 }
 
 impl<'q> Question<'q> {
-    /// Starts from `hint`, which remembers where the scans met or what separated them, and updates it.
+    /// Starts from `hint`, which stores where the scans met or what separated them, and updates it.
     ///
-    /// A hint pays off when poses change little between queries: a step of a tenth of a sampling radius takes
-    /// a fraction of a query. It never changes a verdict, except one that a budget cuts short. Evidence may
-    /// differ: a certified gap may be smaller than without a hint, and about one separation in a thousand is
-    /// certified with a hint and estimated without, or the reverse.
+    /// A hint pays off when poses change little between queries: a step of a tenth of a sampling
+    /// radius takes a fraction of a query. It never changes a verdict, except one that a budget
+    /// cuts short. Evidence may differ: a certified gap may be smaller than without a hint, and
+    /// about one separation in a thousand is certified with a hint and estimated without, or the
+    /// reverse.
     ///
-    /// Combined with [all contacts](Self::contacts), a hint speeds up separations alone; combined with a
-    /// [proof](Self::proof), contacts alone. The methods of the papers ignore hints
-    /// ([`Method::Sampling`](crate::Method), [`Method::Interpolation`](crate::Method), orders by sides,
-    /// coverings, resolutions).
+    /// Combined with [all contacts](Self::contacts), a hint speeds up only separations; combined
+    /// with a [proof](Self::proof), only contacts. The methods of the papers ignore hints
+    /// ([`Method::Sampling`](crate::Method), [`Method::Interpolation`](crate::Method), orders by
+    /// sides, coverings, resolutions).
     #[inline]
     #[must_use]
     pub fn hinted(mut self, hint: &'q mut PairHint) -> Self {
@@ -242,8 +249,8 @@ impl<'q> Question<'q> {
         self
     }
 
-    /// Writes up to eight contact points to `points`, for a physics solver: the deepest first, then always
-    /// the one furthest from all before it. Leaves `points` empty unless the scans meet.
+    /// Writes up to eight contact points to `points`, for a physics solver: the deepest first, then
+    /// always the one furthest from all previous ones. Leaves `points` empty unless the scans meet.
     #[inline]
     #[must_use]
     pub fn manifold(mut self, points: &'q mut Vec<ManifoldPoint>) -> Self {
@@ -252,8 +259,9 @@ impl<'q> Question<'q> {
     }
 
     /// Continues after the first contact and writes one contact per pair of intersecting leaves to
-    /// `contacts`, to first order. The contact of the answer is the first certified one of the first few, or
-    /// else the first. Without this output, a query stops at any contact and may report another one.
+    /// `contacts`, accurate to first order. The contact of the answer is the first certified one of
+    /// the first few, or else the first. Without this output, a query stops at any contact and may
+    /// report another one.
     ///
     /// Costs a descent to all intersecting leaves. Does not allocate once `contacts` is warm.
     #[inline]
@@ -263,8 +271,8 @@ impl<'q> Question<'q> {
         self
     }
 
-    /// Writes the node pairs that prove a certified separation of surfaces or obstacles to `proof`. Leaves it
-    /// empty after any other answer.
+    /// Writes the node pairs that prove a certified separation of surfaces or obstacles to `proof`.
+    /// Leaves it empty after any other answer.
     #[inline]
     #[must_use]
     pub fn proof(mut self, proof: &'q mut Proof) -> Self {

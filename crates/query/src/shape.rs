@@ -1,9 +1,9 @@
-//! Spheres, capsules and boxes against the points of a scan.
+//! Spheres, capsules and boxes tested against the points of a scan.
 //!
-//! A shape touches a scan if a point of it is in the shape: what a robot of spheres asks of a depth frame.
-//! Points are held in blocks of sixteen, with bounds about blocks, about sixteen of these, and so on
-//! ([`nearmiss_index::BlockTree`]); the blocks are those of the scan. A grid tells which blocks are near
-//! small spheres ([`nearmiss_index::Cells`]).
+//! A shape touches a scan if it contains a point of it, for example when a robot made of spheres is
+//! tested against a depth frame. Points are stored in blocks of sixteen, with bounds about the
+//! blocks, about groups of sixteen blocks, and so on ([`nearmiss_index::BlockTree`]); the blocks
+//! are those of the scan. A grid lists the blocks near small spheres ([`nearmiss_index::Cells`]).
 
 use std::ops::ControlFlow;
 
@@ -16,30 +16,31 @@ use nearmiss_index::Skeleton;
 use crate::pair::placed::Placed;
 use crate::pair::shape_index::ShapeIndex;
 
-/// A shape in the world. Radii and half edge lengths are zero or more; nothing touches one that is less, or
-/// no number.
+/// A shape in world coordinates. Radii and half edge lengths must not be negative: a shape with a
+/// negative or NaN size touches nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Shape {
-    /// All within `radius` of `centre`.
+    /// All points within `radius` of `centre`.
     Sphere {
-        /// The middle.
+        /// The centre.
         centre: [f64; 3],
-        /// How far it reaches.
+        /// The radius.
         radius: f64,
     },
-    /// All within `radius` of a segment.
+    /// All points within `radius` of a segment.
     Capsule {
-        /// The ends of the segment.
+        /// The end points of the segment.
         ends: [[f64; 3]; 2],
-        /// How far it reaches from there.
+        /// The radius about the segment.
         radius: f64,
     },
     /// A solid box.
     Box {
-        /// From the box about the origin, along the axes, to the world; its scale counts.
+        /// The pose of the box, which maps an axis-aligned box about the origin to the world. Its
+        /// scale applies.
         pose: Pose,
-        /// Half the edge lengths before that.
+        /// Half the edge lengths, before the pose is applied.
         half: [f64; 3],
     },
 }
@@ -48,7 +49,7 @@ impl Shape {
     /// A bounding box of the shape in the world, rounding included; `None` if a size is negative or NaN.
     #[must_use]
     pub fn bounds(&self) -> Option<Aabb> {
-        /// Of the coordinates: what double precision may lose of a corner.
+        /// Relative rounding error of a corner's coordinates in double precision.
         const ROUNDING: f64 = 4e-15;
         let (centres, half): ([[f64; 3]; 2], [f64; 3]) = match *self {
             Self::Sphere { centre, radius } => ([centre; 2], [radius; 3]),
@@ -72,22 +73,25 @@ impl Shape {
 /// The point of a scan nearest to a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearestPoint {
-    /// Which point, as the caller numbered them.
+    /// The point, as the caller numbered it.
     pub source: PointId,
-    /// Where it is in the world.
+    /// The position of the point in the world.
     pub point: [f64; 3],
-    /// How far from the shape, in the world; negative within a sphere or capsule, 0 within a box.
+    /// The distance from the shape, in world units. Negative inside a sphere or capsule, 0 inside a
+    /// box.
     pub gap: f64,
 }
 
 impl Placed<'_> {
-    /// Returns `true` if a point of the scan is inside `shape` or on its boundary. Exact: the same as testing
-    /// each point in double precision in the stored frame of the scan ([`Skeleton::distance_sq`]).
+    /// Returns `true` if a point of the scan is inside `shape` or on its boundary. Exact: the
+    /// result equals that of testing each point in double precision in the stored frame of the scan
+    /// ([`Skeleton::distance_sq`]).
     ///
-    /// With [a shape index](Self::with_shapes) a small sphere compares some five blocks of points, and other
-    /// shapes some ten groups of boxes (benches/record). Without one, the search descends the tree of the
-    /// scan, which suits a few shapes, or a file of which little should be read. That search prunes with a
-    /// ball about the shape, so a long capsule visits more nodes. Does not allocate.
+    /// With [a shape index](Self::with_shapes) a small sphere compares about five blocks of points,
+    /// and other shapes about ten groups of boxes (benches/record). Without one, the search
+    /// descends the tree of the scan, which suits a few shapes, or a file of which little should be
+    /// read. That search prunes with a ball about the shape, so a long capsule visits more nodes.
+    /// Does not allocate.
     #[inline]
     #[must_use]
     pub fn touches(&self, shape: &Shape) -> bool {
@@ -98,9 +102,10 @@ impl Placed<'_> {
         }
     }
 
-    /// The point nearest to `shape` within `reach` of it, in world units; of equally near ones the first in
-    /// the order of the scan. Exact, and at the cost, of [`Self::touches`]. Inside a sphere or capsule, the
-    /// nearest point is the one nearest to the centre or the segment.
+    /// Returns the point nearest to `shape` within `reach` of it, in world units; among equally
+    /// near ones the first in the order of the scan. Exact, and as costly as [`Self::touches`].
+    /// Inside a sphere or capsule, the nearest point is the one nearest to the centre or the
+    /// segment.
     #[must_use]
     pub fn nearest(&self, shape: &Shape, reach: f64) -> Option<NearestPoint> {
         let (skeleton, radius) = self.stored(shape);
@@ -117,10 +122,11 @@ impl Placed<'_> {
         Some(NearestPoint { source: self.scan().id(i), point: self.point(i), gap })
     }
 
-    /// Writes to `answers[i]` whether `shapes[i]` [touches](Self::touches) the scan, on the threads of the
-    /// current rayon pool. If the slices differ in length, the rest of the longer one is ignored.
+    /// Tests each of `shapes` on the threads of the current rayon pool: sets `answers[i]` to `true`
+    /// if `shapes[i]` [touches](Self::touches) the scan. If the slices differ in length, the rest
+    /// of the longer one is ignored.
     pub fn touch_each(&self, shapes: &[Shape], answers: &mut [bool]) {
-        /// Shapes that a thread takes at once: some 50 µs of work.
+        /// Shapes per task of a thread: about 50 µs of work.
         #[cfg(feature = "rayon")]
         const AT_ONCE: usize = 1024;
         let count = shapes.len().min(answers.len());
@@ -136,7 +142,8 @@ impl Placed<'_> {
     }
 
     fn touch_in_turn(&self, shapes: &[Shape], answers: &mut [bool]) {
-        /// So many are looked up before they are asked: their cells are fetched at the same time.
+        /// Shapes whose cells are looked up before the first of them is tested, so that the memory
+        /// accesses overlap.
         const TOGETHER: usize = 16;
         let Some(index) = self.shapes() else {
             for (shape, answer) in shapes.iter().zip(answers) {
@@ -156,7 +163,8 @@ impl Placed<'_> {
         }
     }
 
-    /// Whether a point, of these blocks if they are known, is within `radius` of a skeleton.
+    /// Returns `true` if a point is within `radius` of the skeleton. Tests only the blocks `near`,
+    /// if they are known.
     #[inline]
     fn holds(&self, index: &ShapeIndex, (skeleton, radius): (&Skeleton, f64), near: Option<&[u32]>) -> bool {
         let tree = index.tree(self.scan());
@@ -167,22 +175,22 @@ impl Placed<'_> {
             }
     }
 
-    /// The point nearest to a skeleton within `reach`, the first of equals, with its squared distance; or any
-    /// such point.
+    /// Finds the point nearest to a skeleton within `reach`, the first among equals, with its
+    /// squared distance. With `any`, returns any point within reach.
     fn nearest_within(&self, skeleton: &Skeleton, reach: f64, any: bool) -> Option<(usize, f64)> {
-        /// Squares of longer distances leave single precision.
+        /// Coordinates beyond this have squares outside the range of single precision.
         const FARTHEST: f64 = 1e15;
         let (centre, radius) = skeleton.ball();
         let (middle, bounds) = (Vector3::from(centre), self.scan().root_box());
         let far = middle.amax() + f64::from(Vector3::from(bounds.centre).amax() + bounds.radius());
-        // All boxes matter to what is too far away to be told from them.
+        // Too far away, single precision cannot tell the boxes apart: all of them are searched.
         let (place, radius) = if far > FARTHEST { ([0.0; 3], f64::INFINITY) } else { (centre, radius) };
         let slices = self.scan().slices();
         let mut search = Search {
             slices: &slices,
             skeleton,
             any,
-            // What single precision may lose of the distance of a box.
+            // Rounding error of the distance of a box in single precision.
             beyond: radius * (1.0 + 1e-9) + 4e-6 * far,
             best: (reach * reach, usize::MAX),
             most_sq: 0.0,
@@ -190,14 +198,14 @@ impl Placed<'_> {
         search.limit();
         #[expect(clippy::cast_possible_truncation, reason = "counted in `beyond`")]
         let place = place.map(|c| c as f32);
-        // Whether it was ended says no more than that something was found.
+        // An early end means only that a point was found.
         let _ended = slices.tree.descend_to(Level::new(), place, &mut search);
         let (distance_sq, i) = search.best;
         (i != usize::MAX).then_some((i, distance_sq))
     }
 
-    /// A shape in the stored frame of the scan: what it is about, and how thick; less than nothing for a box
-    /// that has a negative edge.
+    /// Converts a shape to the stored frame of the scan: its skeleton and radius. The radius is
+    /// negative for a box with a negative or NaN edge.
     #[inline]
     fn stored(&self, shape: &Shape) -> (Skeleton, f64) {
         let placed = self.placed();
@@ -220,14 +228,15 @@ impl Placed<'_> {
                     half: half.map(|h| h * per_scale),
                     axes: [axis(0), axis(1), axis(2)],
                 };
-                // Written so that what is no number touches nothing.
+                // This comparison is false for NaN, so that a NaN edge touches nothing.
                 (skeleton, if half.iter().all(|&h| h >= 0.0) { 0.0 } else { -1.0 })
             }
         }
     }
 }
 
-/// The blocks that may have a point within `radius` of a skeleton, if the cells know.
+/// Returns the blocks that may have a point within `radius` of a skeleton, if the grid covers that
+/// radius.
 #[inline]
 fn near<'a>(index: &'a ShapeIndex, skeleton: &Skeleton, radius: f64) -> Option<&'a [u32]> {
     match *skeleton {
@@ -236,21 +245,22 @@ fn near<'a>(index: &'a ShapeIndex, skeleton: &Skeleton, radius: f64) -> Option<&
     }
 }
 
-/// The search for the point nearest to a skeleton, within a ball about which boxes are looked into.
+/// The search for the point nearest to a skeleton, which visits the boxes near a ball about it.
 struct Search<'a> {
     slices: &'a Slices<'a>,
     skeleton: &'a Skeleton,
-    /// Whether any point within reach will do.
+    /// `true` if any point within reach will do.
     any: bool,
-    /// How much further a box that matters may be from the middle than from the skeleton.
+    /// Excess of a relevant box's distance from the centre of the ball over its distance from the
+    /// skeleton.
     beyond: f64,
-    /// The least squared distance so far, at first that of the reach, and which point has it.
+    /// The least squared distance so far and its point. Starts with the squared reach.
     best: (f64, usize),
     most_sq: f32,
 }
 
 impl Search<'_> {
-    /// Boxes further away than the best point do not matter.
+    /// Updates the limit beyond which boxes cannot improve on the best point.
     #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
     fn limit(&mut self) {
         let most = ((self.best.0.sqrt() + self.beyond) as f32).next_up();

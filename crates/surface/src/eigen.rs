@@ -1,34 +1,36 @@
 //! Eigenpairs of a symmetric 3×3 matrix in closed form, in double precision.
 //!
-//! A is the matrix less a third of its trace, in units in which tr A² = 2; its characteristic polynomial is
-//! y³ − y = det A. Of the roots only that of largest magnitude is computed: it is 1 or more away from both
-//! others, so that it and its eigenvector are as exact as the matrix, however close the others are. Across
-//! that eigenvector a 2×2 problem is left, which one rotation solves. This is the order of Eberly, "A Robust
-//! Eigensolver for 3 × 3 Symmetric Matrices", 2014; we differ in that the other two eigenvalues are those of
-//! the 2×2 problem, not roots of the cubic, and in having a polynomial in place of arc cosine and cosine.
-//! docs/theory/eigen.md has the argument for the error.
+//! Let A be the matrix minus a third of its trace, scaled so that tr A² = 2. Its characteristic
+//! polynomial is y³ − y = det A. Only the root of largest magnitude is computed. It differs from
+//! both other roots by at least 1, so this root and its eigenvector are as exact as the matrix,
+//! however close the other two are. Perpendicular to that eigenvector a 2×2 problem remains, which
+//! one rotation solves. This is the order of Eberly, "A Robust Eigensolver for 3 × 3 Symmetric
+//! Matrices", 2014. Two things differ: the other two eigenvalues are those of the 2×2 problem
+//! instead of roots of the cubic, and a polynomial replaces arc cosine and cosine.
+//! docs/theory/eigen.md derives the error bound.
 //!
-//! There is no branch and no call: the same lines solve one matrix and, lane by lane, eight of them
+//! There are no branches and no calls, so the same code solves one matrix, or eight in SIMD lanes
 //! ([`symmetric_eigen_batch`](crate::symmetric_eigen_batch)).
 
 use crate::lane::Lane;
 
-/// Eigenvalues in ascending order with unit eigenvectors, a right-handed frame.
+/// Eigenvalues in ascending order with unit eigenvectors, which form a right-handed frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Eigen3 {
-    /// Ascending.
+    /// The eigenvalues, ascending.
     pub values: [f64; 3],
-    /// `vectors[i]` belongs to `values[i]`.
+    /// The unit eigenvectors; `vectors[i]` belongs to `values[i]`.
     pub vectors: [[f64; 3]; 3],
 }
 
-/// The eigenpairs of the symmetric matrix with rows [xx xy xz], [xy yy yz], [xz yz zz].
+/// Returns the eigenpairs of the symmetric matrix with rows [xx xy xz], [xy yy yz], [xz yz zz].
 ///
-/// ‖Bn − λn‖ is some units in the last place of the largest entry, and vectors are orthonormal to rounding,
-/// for every finite matrix: any magnitudes, eigenvalues that coincide or nearly do. A multiple of the
-/// identity gives some frame. Where an eigenvalue is beyond the range of `f64` it is its end. A matrix that
-/// is not finite gives NaN throughout. The same bits on every machine; what the caller does not use is not
-/// computed, as this is inlined.
+/// For every finite matrix, ‖Bn − λn‖ is a few units in the last place of the largest entry, and
+/// the vectors are orthonormal to rounding. This includes any magnitude, and equal or nearly equal
+/// eigenvalues. A multiple of the identity yields an arbitrary frame. Eigenvalues beyond the range
+/// of `f64` are clamped to it. A matrix that is not finite yields NaN throughout. The result has
+/// the same bits on every machine. The function is inlined, so results that the caller does not use
+/// are not computed.
 #[must_use]
 #[inline]
 pub fn symmetric_eigen(matrix: [f64; 6]) -> Eigen3 {
@@ -36,13 +38,13 @@ pub fn symmetric_eigen(matrix: [f64; 6]) -> Eigen3 {
     Eigen3 { values, vectors }
 }
 
-/// Below this sum of squares, of a matrix whose largest entry is about 1, all directions are eigenvectors:
-/// eigenvalues are 10⁻⁴ units in the last place apart. (Entries that are subnormal are scaled to 2⁻⁵² at
-/// least, and differ by as much.)
+/// Below this sum of squares, of a matrix whose largest entry is about 1, every direction is
+/// accepted as an eigenvector: eigenvalues differ by at most 10⁻⁴ units in the last place.
+/// (Subnormal entries are scaled to at least 2⁻⁵², and differ by as much.)
 const ISOTROPIC: f64 = 1e-40;
 
-/// Eigenvalues and eigenvectors as [`symmetric_eigen`], of one matrix or of several side by side. It is
-/// compiled for the instruction set of whoever calls it.
+/// Returns eigenvalues and eigenvectors as [`symmetric_eigen`] does, of one matrix or of one in
+/// each lane. Compiled for the instruction set of the caller.
 #[inline(always)]
 pub(crate) fn solve<L: Lane>(matrix: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     let (down, up) = largest(matrix).powers_of_two();
@@ -54,15 +56,15 @@ pub(crate) fn solve<L: Lane>(matrix: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
     (values, vectors)
 }
 
-/// Three times the eigenvalues, and the eigenvectors, of a matrix in units in which its largest entry is
-/// about 1, or much less where all directions may be eigenvectors.
+/// Returns three times the eigenvalues, and the eigenvectors, of a matrix scaled so that its
+/// largest entry is about 1, or much less where every direction may be an eigenvector.
 #[inline(always)]
 pub(crate) fn solve_scaled<L: Lane>([xx, xy, xz, yy, yz, zz]: [L; 6]) -> ([L; 3], [[L; 3]; 3]) {
-    // Three times the matrix less a third of its trace. Differences first: their errors are relative to how
-    // far the matrix is from a multiple of the identity.
+    // Three times the matrix minus its trace times I. Differences come first, so that errors are
+    // relative to the distance of the matrix from a multiple of the identity.
     let (x_y, y_z, z_x) = (xx - yy, yy - zz, zz - xx);
     let a = [x_y - z_x, xy * 3.0, xz * 3.0, y_z - x_y, yz * 3.0, z_x - y_z];
-    // Half the sum of its squares, as its trace is zero.
+    // Half the sum of squares of `a`, whose trace is zero.
     let squares = (a[3] * a[3] - a[0] * a[5]) + ((a[1] * a[1] + a[2] * a[2]) + a[4] * a[4]);
 
     // In units of √squares the characteristic polynomial is y³ − y = det.
@@ -90,7 +92,8 @@ pub(crate) fn solve_scaled<L: Lane>([xx, xy, xz, yy, yz, zz]: [L; 6]) -> ([L; 3]
     (values, vectors)
 }
 
-/// The largest magnitude, in the range in which powers of two and their inverses are normal numbers.
+/// Returns the largest magnitude, clamped so that its power of two and the inverse of that are
+/// normal.
 #[inline(always)]
 pub(crate) fn largest<L: Lane>([a, b, c, d, e, f]: [L; 6]) -> L {
     /// 2¹⁰²².
@@ -105,11 +108,12 @@ pub(crate) fn determinant<L: Lane>([xx, xy, xz, yy, yz, zz]: [L; 6]) -> L {
     xx * (yy * zz - yz * yz) + (xy * (xz * yz - xy * zz) + xz * (xy * yz - yy * xz))
 }
 
-/// The greatest root of y³ − y = d for d from 0 to 2/√27, which is 2/√3 · cos(acos(√27/2 · d)/3), to
-/// rounding.
+/// Returns the greatest root of y³ − y = d for d from 0 to 2/√27, to rounding. The root is 2/√3 ·
+/// cos(acos(√27/2 · d)/3).
 ///
-/// The polynomial of degree 17 that equals it at Chebyshev's nodes (error 1e-16): in t = √27 d − 1, which
-/// goes from −1 to 1, the root is analytic save for t ≤ −3, so every degree takes off a factor of 3 + √8.
+/// Evaluates the polynomial of degree 17 that interpolates the root at Chebyshev nodes (error
+/// 1e-16). In t = √27 d − 1, which ranges from −1 to 1, the root is analytic except for t ≤ −3, so
+/// each degree reduces the error by a factor of 3 + √8.
 #[inline(always)]
 pub(crate) fn greatest_root<L: Lane>(d: L) -> L {
     const ROOT_27: f64 = 5.196_152_422_706_632;
@@ -133,7 +137,8 @@ pub(crate) fn greatest_root<L: Lane>(d: L) -> L {
         -9.298569745910026e-11,
         2.839563213074071e-11,
     ];
-    // Pairs of pairs (Estrin's scheme): the chain of dependent operations is a third of Horner's.
+    // Estrin's scheme. The chain of dependent operations is a third as long as with Horner's
+    // scheme.
     let t = d * ROOT_27 - 1.0;
     let t2 = t * t;
     let t4 = t2 * t2;
@@ -143,21 +148,23 @@ pub(crate) fn greatest_root<L: Lane>(d: L) -> L {
     low + high * t8
 }
 
-/// The polynomial with these four coefficients, that of t⁰ first.
+/// Evaluates the polynomial with these four coefficients, lowest power first.
 #[inline(always)]
 fn cubic<L: Lane>(c: &[f64], t: L, t2: L) -> L {
     (t * c[1] + c[0]) + (t * c[3] + c[2]) * t2
 }
 
-/// Right-handed unit eigenvectors of `a`, whose trace is 0 and half the sum of whose squares is 1: across
-/// that of the eigenvalue `single`, of the lower and the higher of the other two; then that itself. And those
-/// two.
+/// Returns right-handed unit eigenvectors of `a`, and two eigenvalues. The trace of `a` is 0 and
+/// half its sum of squares is 1.
 ///
-/// The adjugate of A − lI is a multiple of v vᵀ, no less than 1 in norm: its column of the greatest diagonal
-/// entry. Square roots and divisions are put off, so that they run side by side.
+/// `single` is the eigenvalue of the third vector. The first two vectors belong to the lower and
+/// the higher of the other two eigenvalues, which are returned in this order.
+///
+/// The adjugate of A − λI is a multiple of v vᵀ with norm at least 1; v is its column with the
+/// greatest diagonal entry. Square roots and divisions are postponed, so that they run in parallel.
 #[inline(always)]
 fn frame<L: Lane>(a: [L; 6], single: L) -> ([[L; 3]; 3], [L; 2]) {
-    /// Added to a length to keep it from zero; those that matter are above 1e-17.
+    /// Added to a length to keep it above zero; lengths that matter are above 1e-17.
     const TINY: f64 = 1e-30;
     let zero = single.splat(0.0);
     let [xx, xy, xz, yy, yz, zz] = a;
@@ -165,12 +172,13 @@ fn frame<L: Lane>(a: [L; 6], single: L) -> ([[L; 3]; 3], [L; 2]) {
     let (cxx, cyy, czz) = (my * mz - yz * yz, mx * mz - xz * xz, mx * my - xy * xy);
     let (cxy, cxz, cyz) = (xz * yz - xy * mz, xy * yz - my * xz, xy * xz - mx * yz);
     let v = L::select_all(cxx.is_less(cyy), [cxy, cyy, cyz], [cxx, cxy, cxz]);
-    // Where z is the greatest the axes are renamed y z x, so that v is never along the last of them.
+    // Where z is the greatest, the axes are renamed y z x, so that v is never along the last axis.
     let is_z = cxx.is_less(czz) & cyy.is_less(czz);
     let [x, y, z] = L::select_all(is_z, [cyz, czz, cxz], v);
     let [xx, xy, xz, yy, yz] = L::select_all(is_z, [yy, yz, xy, zz, xz], [xx, xy, xz, yy, yz]);
 
-    // Across v are f = [y −x 0] and e = v × f = [xz yz −f·f]. As v is an eigenvector, e·Af = −v·v (Af)z.
+    // f = [y −x 0] and e = v × f = [xz yz −f·f] span the plane perpendicular to v. As v is an
+    // eigenvector, e·Af = −v·v (Af)z.
     let (x_sq, y_sq) = (x * x, y * y);
     let f_sq = x_sq + y_sq;
     let v_sq = f_sq + z * z;
@@ -182,7 +190,7 @@ fn frame<L: Lane>(a: [L; 6], single: L) -> ([[L; 3]; 3], [L; 2]) {
     let v = inverse_v.scale_all([x, y, z]);
     let (ex, ey, ez) = (z * v[0], z * v[1], f_sq * inverse_v);
 
-    // The 2×2 matrix along f and e/|v|, times f·f; its trace is −single.
+    // The 2×2 matrix along f and e/|v|, times f·f. Its trace is −single.
     let half = single * -0.5 * f_sq - faf;
     let long = half.abs() + TINY;
     let spread = (long * long + eaf * eaf * inverse_v_sq).sqrt();
@@ -198,7 +206,7 @@ fn frame<L: Lane>(a: [L; 6], single: L) -> ([[L; 3]; 3], [L; 2]) {
     ([named_back(is_z, low), named_back(is_z, high), named_back(is_z, v)], [mean - spread, mean + spread])
 }
 
-/// The vector in the original order of axes, where they are y z x.
+/// Returns a vector with renamed axes y z x in the original axis order, where `is_z`.
 #[inline(always)]
 fn named_back<L: Lane>(is_z: L::Mask, [x, y, z]: [L; 3]) -> [L; 3] {
     L::select_all(is_z, [z, x, y], [x, y, z])

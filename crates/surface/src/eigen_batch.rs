@@ -1,4 +1,4 @@
-//! Many symmetric 3×3 matrices at once, one in each SIMD lane.
+//! Eigenpairs of many symmetric 3×3 matrices, one in each SIMD lane.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch, f64x8};
@@ -6,10 +6,10 @@ use fearless_simd::{Level, dispatch, f64x8};
 use crate::Eigen3;
 use crate::eigen::solve;
 
-/// Matrices side by side: one AVX-512 register of doubles, two of AVX, four of SSE2 or NEON.
+/// Matrices in a block: one AVX-512 register of doubles, two of AVX, four of SSE2 or NEON.
 const LANES: usize = 8;
 
-/// Eight symmetric matrices side by side.
+/// Eight symmetric matrices, one in each lane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(align(64))]
 pub struct MatrixBlock {
@@ -17,13 +17,14 @@ pub struct MatrixBlock {
 }
 
 impl MatrixBlock {
-    /// How many fit.
+    /// Number of matrices in a block.
     pub const WIDTH: usize = LANES;
 
-    /// Puts the matrix with rows [xx xy xz], [xy yy yz], [xz yz zz] into a lane. All are zero at first.
+    /// Sets the matrix in a lane to the one with rows [xx xy xz], [xy yy yz], [xz yz zz]. Initially
+    /// all matrices are zero.
     ///
     /// # Panics
-    /// When there is no such lane.
+    /// Panics if `lane` is not below [`Self::WIDTH`].
     #[inline]
     pub fn put(&mut self, lane: usize, matrix: [f64; 6]) {
         for (entries, x) in self.entries.iter_mut().zip(matrix) {
@@ -32,21 +33,22 @@ impl MatrixBlock {
     }
 }
 
-/// The eigenpairs of eight matrices side by side.
+/// The eigenpairs of eight matrices, one in each lane.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(align(64))]
 pub struct EigenBlock {
-    /// Ascending in each lane.
+    /// The eigenvalues, ascending in each lane.
     pub values: [[f64; LANES]; 3],
-    /// `vectors[i][k]` are the k-th components of the vectors that belong to `values[i]`.
+    /// The unit eigenvectors; `vectors[i][k]` holds the k-th components of the vectors of
+    /// `values[i]`.
     pub vectors: [[[f64; LANES]; 3]; 3],
 }
 
 impl EigenBlock {
-    /// The eigenpairs of the matrix in a lane.
+    /// Returns the eigenpairs of the matrix in a lane.
     ///
     /// # Panics
-    /// When there is no such lane.
+    /// Panics if `lane` is not below [`MatrixBlock::WIDTH`].
     #[inline]
     #[must_use]
     pub fn get(&self, lane: usize) -> Eigen3 {
@@ -57,10 +59,11 @@ impl EigenBlock {
     }
 }
 
-/// The eigenpairs of each block of `matrices`, in the block of `eigen` of the same index, as far as both go;
-/// bit for bit those of [`symmetric_eigen`](crate::symmetric_eigen).
+/// Writes the eigenpairs of each block of `matrices` to the block of `eigen` with the same index,
+/// up to the end of the shorter slice. The results equal those of
+/// [`symmetric_eigen`](crate::symmetric_eigen) bit for bit.
 ///
-/// `level` is the instruction set to use, as `Level::new()` finds it; it changes the time alone.
+/// `level` is the instruction set to use, as `Level::new()` detects it; it affects speed only.
 pub fn symmetric_eigen_batch(level: Level, matrices: &[MatrixBlock], eigen: &mut [EigenBlock]) {
     dispatch!(level, simd => solve_blocks(simd, matrices, eigen));
 }

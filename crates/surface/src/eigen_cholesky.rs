@@ -1,31 +1,32 @@
-//! The least eigenpair as Klein & Zachmann 2004, §5.6, find it: the roots of the cubic characteristic
-//! polynomial, then a Cholesky decomposition of B − λI with full pivoting.
+//! The least eigenpair by the method of Klein & Zachmann 2004, §5.6: the roots of the cubic
+//! characteristic polynomial, then a Cholesky decomposition of B − λI with full pivoting.
 //!
-//! Kept for comparison. The coefficients of the polynomial are of the size of B, so where eigenvalues lie
-//! close together their roots are known to a part in 10⁸ of ‖B‖ (10⁵ where all three do), and so is the
-//! vector: docs/theory/eigen.md has the figures. [`symmetric_eigen`](crate::symmetric_eigen) is faster and
-//! has none of this.
+//! Kept for comparison. The coefficients of the polynomial are as large as B. Where two eigenvalues
+//! are close, their roots are accurate only to 1e-8 of ‖B‖, and to 1e-5 where all three are close.
+//! The eigenvector is no more accurate; docs/theory/eigen.md has the figures.
+//! [`symmetric_eigen`](crate::symmetric_eigen) is faster and has no such loss.
 
 use crate::eigen::{determinant, greatest_root, largest};
 use crate::lane::Lane;
 
-/// Eigenvalues, and the unit eigenvector of the least.
+/// The eigenvalues, and the unit eigenvector of the least eigenvalue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LeastEigen {
-    /// Ascending.
+    /// The eigenvalues, ascending.
     pub values: [f64; 3],
-    /// Belongs to `values[0]`.
+    /// The unit eigenvector of `values[0]`.
     pub vector: [f64; 3],
 }
 
-/// The least eigenpair of the symmetric matrix with rows [xx xy xz], [xy yy yz], [xz yz zz], by the cubic and
-/// pivoted Cholesky.
+/// Returns the eigenvalues and the least eigenvector of the symmetric matrix with rows [xx xy xz],
+/// [xy yy yz], [xz yz zz], by the cubic and pivoted Cholesky.
 ///
-/// Accurate to rounding where the least eigenvalue is well apart, as on a sheet; to some 1e-8 of the largest
-/// entry, values and residual, where it is close to another, 1e-5 where all three are. Finite for every
-/// finite matrix, NaN for others. S0 takes the roots by arc cosine; we take the one of largest magnitude as
-/// [`symmetric_eigen`](crate::symmetric_eigen) does, and the others by the quadratic that it leaves, which is
-/// as accurate and the same on every machine.
+/// Accurate to rounding where the least eigenvalue is well separated, as on a sheet. Where it is
+/// close to another eigenvalue, values and residual are accurate to about 1e-8 of the largest
+/// entry, and to 1e-5 where all three are close. The result is finite for every finite matrix, and
+/// NaN otherwise. Klein & Zachmann 2004 compute the roots by arc cosine. Here the root of largest
+/// magnitude is computed as in [`symmetric_eigen`](crate::symmetric_eigen), and the others from the
+/// quadratic that remains. This is as accurate, and the same on every machine.
 #[must_use]
 pub fn cubic_cholesky_eigen(matrix: [f64; 6]) -> LeastEigen {
     let (down, up) = largest(matrix).powers_of_two();
@@ -35,12 +36,12 @@ pub fn cubic_cholesky_eigen(matrix: [f64; 6]) -> LeastEigen {
     LeastEigen { values: values.map(|x| (x * up).within(f64::MIN, f64::MAX)), vector }
 }
 
-/// The roots of the characteristic polynomial, ascending.
+/// Returns the roots of the characteristic polynomial, ascending.
 fn cubic_roots(b: [f64; 6]) -> [f64; 3] {
     let [xx, xy, xz, yy, yz, zz] = b;
     let trace = xx + yy + zz;
     let minors = (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz);
-    // With λ = trace/3 + s y it reads y³ − y = d.
+    // With λ = trace/3 + s y, the characteristic polynomial reads y³ − y = d.
     let s_sq = trace * trace / 3.0 - minors;
     let mean = trace / 3.0;
     if s_sq <= 0.0 {
@@ -56,13 +57,15 @@ fn cubic_roots(b: [f64; 6]) -> [f64; 3] {
     roots.map(|y| mean + s * y)
 }
 
-/// 2/√27: beyond it two of the roots are not real, which only rounding does.
+/// 2/√27. Beyond it two of the roots are complex, which happens by rounding only.
 const GREATEST_CONSTANT: f64 = 0.384_900_179_459_750_5;
 
-/// A unit vector that B − λI takes to about zero: its Cholesky decomposition with full pivoting ends after as
-/// many steps as its rank, when no pivot is left above 3u times the first (Higham, "Analysis of the Cholesky
-/// decomposition of a semi-definite matrix", 1990); one coordinate that is left is 1, the steps give the
-/// others.
+/// Returns a unit vector that B − λI maps to about zero.
+///
+/// The Cholesky decomposition with full pivoting stops after as many steps as the rank, when no
+/// remaining pivot exceeds 3u times the first pivot (Higham, "Analysis of the Cholesky
+/// decomposition of a semi-definite matrix", 1990). One remaining coordinate is set to 1, and back
+/// substitution yields the others.
 fn null_vector([xx, xy, xz, yy, yz, zz]: [f64; 6], l: f64) -> [f64; 3] {
     let mut m = [[xx - l, xy, xz], [xy, yy - l, yz], [xz, yz, zz - l]];
     let mut order = [0, 1, 2];
@@ -81,7 +84,7 @@ fn null_vector([xx, xy, xz, yy, yz, zz]: [f64; 6], l: f64) -> [f64; 3] {
         if m[step][step] <= enough {
             break;
         }
-        // The row of the factor, here without the root of the pivot, which cancels.
+        // The row of the factor without the square root of the pivot, which cancels.
         for i in step + 1..3 {
             let factor = m[step][i] / m[step][step];
             for j in step + 1..3 {

@@ -1,10 +1,11 @@
-//! f(x) = n(x)·(a(x) − x), and whether x lies where that means something.
+//! The implicit function f(x) = n(x)·(a(x) − x), and the test whether it defines a surface at x.
 //!
-//! Klein & Zachmann 2004, eq. 1–4: a(x) is the weighted mean of the points, n(x) the eigenvector of the least
-//! eigenvalue of their weighted covariance about a(x). We differ in three ways. Each point weighs with its
-//! own bandwidth. The domain is narrower than eq. 6: beside enough support it asks that x be near a(x), which
-//! ends the surface where its samples end, and that the points about x look like one sheet (docs/theory). The
-//! sign of n is fixed by its largest component, until a graph orients normals.
+//! Klein & Zachmann 2004, eq. 1–4: a(x) is the weighted mean of the points. n(x) is the eigenvector
+//! of the least eigenvalue of their weighted covariance about a(x). This implementation differs in
+//! three ways. Each point has its own bandwidth. The domain is narrower than eq. 6: beside enough
+//! support, x must be near a(x), which ends the surface where its samples end, and the points near
+//! x must look like one sheet (docs/theory/surface.md). The sign of n is fixed by its largest
+//! component, until a graph orients the normals.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f64x8};
@@ -14,58 +15,64 @@ use serde::{Deserialize, Serialize};
 use crate::eigen::solve_scaled;
 use crate::{Moments, SurfacePlan};
 
-/// A surface point is within this many bandwidths of a(x). On a half plane the weighted mean is h/√π = 0.564
-/// h away from the border; beyond the border it is further.
+/// Greatest distance of a surface point from a(x), in bandwidths. At the border of a half plane the
+/// distance is h/√π = 0.564 h, and it grows beyond the border.
 pub const BORDER: f64 = 0.56;
 
-/// A surface point is in the inner half of some point's horizon (this is the square): further from every
-/// sample nothing but the rims of holes, or of the horizons themselves, holds a zero of f. It bounds where
-/// the surface nearest to a point can be, on which certificates rest.
+/// Square of the greatest distance of a surface point from some sample, in support radii of that
+/// sample. Further away, zeros of f occur only at the rims of holes or of the supports.
+/// Certificates rely on this limit, because it bounds the distance from a surface point to its
+/// nearest sample.
 const NEAR_SQ: f32 = 0.25;
 
-/// The least eigenvalue over h²/2: about 0 on a clean sheet, 0.14 on either of two sheets 2h apart, 1 between
-/// them, where n turns tangential and f vanishes in a whole slab.
+/// Limit of the least eigenvalue over h²/2. The ratio is about 0 on a clean sheet, 0.14 on either
+/// of two sheets 2h apart, and 1 between them, where n turns tangential and f vanishes in a whole
+/// slab.
 const SHEET_RATIO: f64 = 0.3;
 
-/// (λ2 − λ1)/(λ1 + λ2 + λ3): 0.5 on a sheet, 0 where n is any direction.
+/// Lower limit of (λ2 − λ1)/(λ1 + λ2 + λ3). The ratio is 0.5 on a sheet, and 0 where n is
+/// arbitrary.
 const EIGENVALUE_GAP: f64 = 0.1;
 
-/// Whether f(x) means something.
+/// Validity of f(x).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Status {
-    /// It does.
+    /// f(x) is valid.
     Ok,
-    /// Too few points reach x, or none of them by the inner half of its horizon.
+    /// Fewer points than the least support are within their support radii of x, or none within half
+    /// its support radius.
     Outside,
-    /// x is further from a(x) than 0.56 h: beyond the border of the surface, or far off it.
+    /// x is further from a(x) than 0.56 h: beyond the border of the surface, or far from it.
     Border,
-    /// The points about x do not look like one sheet.
+    /// The points near x do not look like one sheet.
     Ambiguous,
 }
 
-/// The implicit function at a point; lengths and directions in the frame of the scan's stored positions.
+/// The implicit function at a point. Lengths and directions are in the frame of the scan's stored
+/// positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluation {
-    /// n·(a − x); NaN-free, and 0 when nothing reaches x, or what reaches it is no number.
+    /// f(x) = n·(a − x). Never NaN; 0 if no point is within its support radius of x, or if the sums
+    /// are not finite.
     pub f: f64,
-    /// n, unit, its largest component positive.
+    /// n(x), a unit vector whose largest component is positive.
     pub normal: [f64; 3],
-    /// a(x).
+    /// a(x), the weighted mean of the points.
     pub centroid: [f64; 3],
-    /// How many points reach x.
+    /// Number of points within their support radii of x.
     pub support: u32,
     /// h(x), the weighted mean of the points' bandwidths.
     pub bandwidth: f64,
-    /// Eigenvalues of the covariance, ascending.
+    /// Eigenvalues of the weighted covariance, ascending.
     pub eigenvalues: [f64; 3],
-    /// Whether the above is to be trusted.
+    /// Validity of f(x).
     pub status: Status,
 }
 
 impl Moments {
-    /// f at `x`, about which these sums were taken: one eigen solve.
+    /// Evaluates f at `x`, the point about which these sums were taken. Costs one eigen solve.
     #[inline(always)]
     #[must_use]
     pub fn evaluate(&self, plan: &SurfacePlan, x: [f64; 3]) -> Evaluation {
@@ -73,8 +80,9 @@ impl Moments {
         self.conclude(plan, x, thrice, vectors[0])
     }
 
-    /// f at each of `places`, about which `moments` were taken, in order: eight eigen solves at a time, and
-    /// the same bits as by [`Self::evaluate`].
+    /// Evaluates f at each of `places`, about which `moments` were taken, and calls `each` in
+    /// order. Solves eight eigen problems at a time; results equal those of [`Self::evaluate`] bit
+    /// for bit.
     #[inline(always)]
     pub fn evaluate_all<S: Simd>(
         simd: S,
@@ -111,8 +119,8 @@ impl Moments {
         }
     }
 
-    /// The covariance times the square of the weight, over the square of Σw·horizon: these are the units the
-    /// solver wants, and no division waits for another.
+    /// Returns the covariance times the square of the weight, over the square of Σw·horizon. The
+    /// solver needs this scale, and no division depends on another.
     #[inline(always)]
     fn scaled_covariance(&self) -> [f64; 6] {
         let [wx, wy, wz] = self.first;
@@ -122,7 +130,8 @@ impl Moments {
         covariance.map(|c| c * per_square)
     }
 
-    /// f at `x`, given three times the eigenvalues of the scaled covariance, and the vector of the least.
+    /// Evaluates f at `x`, given three times the eigenvalues of the scaled covariance, and the
+    /// eigenvector of the least.
     #[inline(always)]
     fn conclude(&self, plan: &SurfacePlan, x: [f64; 3], thrice: [f64; 3], least: [f64; 3]) -> Evaluation {
         let (m, support) = (self, self.support);
@@ -145,7 +154,7 @@ impl Moments {
         let normal = with_positive_largest(least);
         let f = Vector3::from(normal).dot(&Vector3::from(mean));
         let bandwidth = horizon * f64::from(plan.per_horizon());
-        // Points that are none, as in a damaged file, make sums that are none.
+        // Invalid points, as from a damaged file, yield invalid sums.
         if !(f.is_finite() && bandwidth.is_finite()) {
             return nothing;
         }
@@ -164,12 +173,13 @@ impl Moments {
     }
 }
 
-/// Oriented normals whose weighted mean is shorter than this are of more than one sheet.
+/// Least length of the weighted mean of oriented unit normals of one sheet.
 const AGREEMENT: f64 = 0.5;
 
 impl Evaluation {
-    /// The same with n on the side of `sum`, the sum of oriented normals that weigh `total` together;
-    /// ambiguous where these are not of one side, |`sum`| < `total` / 2.
+    /// Orients n to the side of `sum`, a weighted sum of oriented normals with total weight
+    /// `total`. The status becomes ambiguous if these normals disagree, that is if |`sum`| <
+    /// `total` / 2.
     #[must_use]
     pub fn turned_to(self, sum: [f64; 3], total: f64) -> Self {
         let sum = Vector3::from(sum);
@@ -184,8 +194,8 @@ fn is_one_sheet([l1, l2, l3]: [f64; 3], h: f64) -> bool {
     l1 < SHEET_RATIO * 0.5 * h * h && l2 - l1 > EIGENVALUE_GAP * (l1 + l2 + l3)
 }
 
-/// `v` or −`v`: the one whose component of largest magnitude (the first of equals) is positive. No branch, as
-/// signs cannot be predicted.
+/// Returns `v` or −`v`, so that the component of largest magnitude (the first of equals) is
+/// positive. Branch-free, because signs are unpredictable.
 #[inline(always)]
 pub(crate) fn with_positive_largest([x, y, z]: [f64; 3]) -> [f64; 3] {
     let largest = if y.abs() > x.abs() { y } else { x };

@@ -1,33 +1,35 @@
-//! Kernels: the weight of a point by its distance, as a function of t = d²/h².
+//! Kernels: the weight of a point as a function of t = d²/h².
 //!
-//! * Gaussian, exp(−t), cut at the horizon where it falls to θ_ε (Klein & Zachmann 2004, eq. 5 and §4.1.2).
-//! * Wendland C², (1−q)⁴(4q+1) with q the distance in horizons (Wendland, "Piecewise polynomial, positive
-//!   definite and compactly supported radial functions of minimal degree", Adv. Comput. Math. 4, 1995). It
-//!   reaches zero at the horizon without a step.
+//! * Gaussian, exp(−t), cut off at the support radius, where it falls to θ_ε (Klein & Zachmann
+//!   2004, eq. 5 and §4.1.2).
+//! * Wendland C², (1−q)⁴(4q+1) with q the distance over the support radius (Wendland, "Piecewise
+//!   polynomial, positive definite and compactly supported radial functions of minimal degree",
+//!   Adv. Comput. Math. 4, 1995). It falls to zero at the support radius without a step.
 //!
-//! Both are given the bandwidth h for which an evenly sampled plane has the weighted variance h²/2 along
-//! either of its directions, so that every condition in terms of h means the same for both. For Wendland's
-//! function ∫q³w / ∫qw = 5/36, hence h² = 5/36 of the squared horizon.
+//! For both, h is chosen so that the weighted variance of an evenly sampled plane is h²/2 along any
+//! direction in the plane. Conditions in terms of h therefore mean the same for both. For
+//! Wendland's function ∫q³w / ∫qw = 5/36, hence h² = 5/36 of the squared support radius.
 
 use fearless_simd::{Bytes, Simd, SimdBase, SimdFloat, SimdFrom, f32x8, u32x8};
 use serde::{Deserialize, Serialize};
 
-/// How the weight of a point falls off with its distance.
+/// The weight function of a point's distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Kernel {
-    /// exp(−d²/h²), cut at the horizon: the papers' kernel.
+    /// exp(−d²/h²), cut off at the support radius, as in Klein & Zachmann 2004, eq. 5.
     #[default]
     Gaussian,
     /// Wendland's C² function with compact support.
     Wendland,
 }
 
-/// (horizon/h)² of Wendland's function.
+/// (support radius/h)² of Wendland's function.
 const WENDLAND_REACH_SQ: f64 = 36.0 / 5.0;
 
 impl Kernel {
-    /// (horizon/h)²: the value of t at which the weight ends, given the Gaussian's cut-off weight θ_ε.
+    /// Returns (support radius/h)², the value of t at which the weight ends. `threshold` is θ_ε,
+    /// the Gaussian's weight there.
     #[must_use]
     pub fn reach_sq(self, threshold: f64) -> f64 {
         match self {
@@ -36,7 +38,7 @@ impl Kernel {
         }
     }
 
-    /// The weight at t = d²/h², before the cut at the horizon.
+    /// Returns the weight at t = d²/h², before the cut-off at the support radius.
     #[inline]
     #[must_use]
     pub fn weight(self, t: f32) -> f32 {
@@ -46,7 +48,7 @@ impl Kernel {
         }
     }
 
-    /// [`Self::weight`] in lanes, the same to the last bit for 0 ≤ t ≤ 80.
+    /// Returns [`Self::weight`] in lanes, equal to the last bit for 0 ≤ t ≤ 80.
     #[inline(always)]
     #[must_use]
     pub fn weights<S: Simd>(self, simd: S, t: f32x8<S>) -> f32x8<S> {
@@ -57,7 +59,7 @@ impl Kernel {
     }
 }
 
-/// As [`wendland`].
+/// As [`wendland`], in lanes.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "a constant that f32 holds closely enough")]
 fn wendland_lanes<S: Simd>(simd: S, t: f32x8<S>) -> f32x8<S> {
@@ -68,7 +70,7 @@ fn wendland_lanes<S: Simd>(simd: S, t: f32x8<S>) -> f32x8<S> {
     (s * s) * (s * s) * (q * 4.0 + 1.0)
 }
 
-/// As [`exp_neg`].
+/// As [`exp_neg`], in lanes.
 #[inline(always)]
 fn exp_neg_lanes<S: Simd>(t: f32x8<S>) -> f32x8<S> {
     let y = t * -std::f32::consts::LOG2_E;
@@ -89,28 +91,30 @@ fn wendland(t: f32) -> f32 {
     (s * s) * (s * s) * (4.0 * q + 1.0)
 }
 
-/// Adding this to a number below 2²² rounds it to an integer, which then stands in the low bits.
+/// Added to a number below 2²², this rounds the number to an integer, which is then in the low
+/// bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// 2^r for |r| ≤ 1/2, that of r⁰ first: of the polynomials that are 1 and have the slope ln 2 at 0 the one
-/// whose greatest relative error, 1.1e-7, is least.
+/// Coefficients of 2^r for |r| ≤ 1/2, lowest power first. Of the polynomials with value 1 and slope
+/// ln 2 at 0, this one has the least maximum relative error, 1.1e-7.
 const EXP2: [f32; 6] =
     [1.0, std::f32::consts::LN_2, 0.240_222_83, 0.055_505_585, 0.009_669_691, 0.001_330_060_7];
 
-/// exp(−t) for 0 ≤ t ≤ 80, with a relative error of 2e-7 + 8e-8 t, which is what the rounding of t makes
-/// anyway; the same bits on every machine, and without a call, so that it vectorises. Beyond 80 the value at
-/// 80.
+/// Returns exp(−t) for 0 ≤ t ≤ 80, and the value at 80 beyond.
+///
+/// The relative error is at most 2e-7 + 8e-8 t, about as much as rounding of t causes. The result
+/// has the same bits on every machine. There is no call, so it vectorises.
 #[inline]
 #[must_use]
 pub(crate) fn exp_neg(t: f32) -> f32 {
     let y = t.min(80.0) * -std::f32::consts::LOG2_E;
     let shifted = y + ROUND;
     let r = y - (shifted - ROUND);
-    // By thirds, which leaves shorter chains of operations that wait for each other.
+    // Estrin's scheme shortens the chain of dependent operations.
     let square = r * r;
     let low = (r * EXP2[1] + EXP2[0]) + (r * EXP2[3] + EXP2[2]) * square;
     let p = low + (r * EXP2[5] + EXP2[4]) * (square * square);
-    // Times a power of two: its exponent is added to that of p.
+    // Multiplies p by a power of two by adding to the exponent.
     f32::from_bits(p.to_bits().wrapping_add(shifted.to_bits() << 23))
 }
 

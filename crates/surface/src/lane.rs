@@ -1,14 +1,14 @@
-//! Numbers that closed forms are written in: one double, or eight side by side.
+//! The number type of the closed forms: one double, or eight in SIMD lanes.
 
 use std::ops::{Add, BitAnd, Div, Mul, Neg, Sub};
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f64x8, mask64x8, u64x8};
 
-/// A double, or as many as fit side by side, of which each gets the same bits as if it were alone.
+/// A double, or a vector of doubles. Each lane gets the same bits as a single double would.
 ///
-/// Every operation is one that IEEE 754 rounds exactly, so nothing depends on the instruction set. There is
-/// no branching on a value; [`Lane::select`] takes its place.
+/// Every operation is one that IEEE 754 rounds exactly, so results do not depend on the instruction
+/// set. [`Lane::select`] replaces branches on values.
 pub(crate) trait Lane:
     Copy
     + Add<Output = Self>
@@ -20,24 +20,25 @@ pub(crate) trait Lane:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// One truth value for each number.
+    /// One boolean for each lane.
     type Mask: Copy + BitAnd<Output = Self::Mask>;
 
-    /// `x` in the place of each number.
+    /// Returns `x` in every lane.
     fn splat(self, x: f64) -> Self;
     fn sqrt(self) -> Self;
     fn abs(self) -> Self;
     fn is_less(self, other: Self) -> Self::Mask;
-    /// The greater; anything if either is NaN.
+    /// Returns the greater number; unspecified if either is NaN.
     fn greater(self, other: Self) -> Self;
-    /// The end of the range where x is outside it; NaN stays.
+    /// Clamps to `least..=greatest`; NaN stays NaN.
     fn within(self, least: f64, greatest: f64) -> Self;
-    /// `a` where the mask is true, else `b`.
+    /// Returns `a` where the mask is true, else `b`.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-    /// 2⁻ᵉ and 2ᵉ with 2ᵉ ≤ x < 2ᵉ⁺¹, for a normal positive x below 2¹⁰²³.
+    /// Returns 2⁻ᵉ and 2ᵉ with 2ᵉ ≤ x < 2ᵉ⁺¹, for a normal positive x below 2¹⁰²³.
     fn powers_of_two(self) -> (Self, Self);
 
-    // Loops, as closures given to the standard library are not compiled for the caller's instruction set.
+    // The methods below use loops, because closures passed to the standard library are not compiled
+    // for the caller's instruction set.
 
     #[inline(always)]
     fn select_all<const N: usize>(mask: Self::Mask, a: [Self; N], b: [Self; N]) -> [Self; N] {
@@ -57,7 +58,7 @@ pub(crate) trait Lane:
     }
 }
 
-/// The exponent's bits in a double, and the sum of those of 2⁻ᵉ and 2ᵉ.
+/// The exponent bits of a double, and the sum of the exponent bits of 2⁻ᵉ and 2ᵉ.
 const EXPONENT: u64 = 0x7ff << 52;
 const OPPOSITES: u64 = 2046 << 52;
 
@@ -137,7 +138,7 @@ impl<S: Simd> Lane for f64x8<S> {
 
     #[inline(always)]
     fn within(self, least: f64, greatest: f64) -> Self {
-        // x86 takes the second of two if either is NaN; others take the NaN.
+        // If either operand is NaN, x86 returns the second one and other machines return the NaN.
         Lane::splat(self, least).max(Lane::splat(self, greatest).min(self))
     }
 

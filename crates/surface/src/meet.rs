@@ -1,47 +1,52 @@
-//! A point on two surfaces at once, by Newton's method.
+//! Newton's method for a point on two surfaces.
 
 use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::project::ON_SURFACE;
 use crate::{Evaluation, Status};
 
-/// Where the search for a common point ended.
+/// Result of the search for a common point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meeting {
-    /// The point.
+    /// The last point of the iteration.
     pub point: [f64; 3],
-    /// Either function there.
+    /// The evaluations of both functions at that point.
     pub at: [Evaluation; 2],
-    /// Pairs of evaluations spent.
+    /// Number of pairs of evaluations.
     pub rounds: u32,
-    /// Whether the point lies on both: |f| ≤ 1e-6 h and status ok, for both.
+    /// `true` if the point is on both surfaces: for both, |f| ≤ 1e-6 h and the status is ok.
     pub verified: bool,
 }
 
 impl Meeting {
-    /// The greater of the two distances |f|.
+    /// Returns the greater of the two |f|.
     #[must_use]
     pub fn residual(&self) -> f64 {
         self.at[0].f.abs().max(self.at[1].f.abs())
     }
 }
 
-/// A common zero of two implicit functions near `start`, both evaluated in one frame.
+/// Finds a common zero of two implicit functions near `start`. Both are evaluated in one frame.
 ///
-/// Near its surface ∇f ≈ −n·(1 − 2λ₁/h²) (docs/theory). Each step is the least δ that makes both functions
-/// vanish to that order. Where the normals are nearly parallel, `1 − (n_A·n_B)²` below 1e-3, that is
-/// ill-conditioned and the step goes halfway to either surface instead: the point settles between them, on
-/// both if they touch. Steps are at most h/2. At most 16 rounds, fewer when the distance stops shrinking; a
-/// good start needs three to six. None once `evaluate` gives nothing, as when time is up.
+/// Near its surface ∇f ≈ −n·(1 − 2λ₁/h²) (docs/theory/surface.md). Each step is the shortest δ that
+/// makes both functions vanish to that order. Where the normals are nearly parallel,
+/// `1 − (n_A·n_B)²` below 1e-3, that step is ill-conditioned, and the method goes halfway to either
+/// surface instead. The point then converges between the surfaces, or onto both if they touch.
+/// Steps are at most h/2. There are at most 16 rounds, fewer if the distance stops shrinking. From
+/// a good start, three to six suffice.
+///
+/// Returns `None` as soon as `evaluate` does, for instance when time is up.
 pub fn meet(
     start: [f64; 3],
     mut evaluate: impl FnMut([f64; 3]) -> Option<[Evaluation; 2]>,
 ) -> Option<Meeting> {
     const ROUNDS: u32 = 16;
-    /// So many rounds in a row may bring no point nearer than any before, by at least a fifth.
+    /// Number of consecutive rounds without an improvement of |f| by a fifth, after which the
+    /// search ends.
     const PATIENCE: u32 = 3;
-    /// So near, in bandwidths, a place without the status ok comes to no other that has it: one in six
-    /// starts, at tips and folds.
+    /// If a point is this close to both surfaces, in bandwidths, and a status is not ok, the search
+    /// ends. No point with the status ok would follow. This happens for one in six starts, at tips
+    /// and folds.
     const AT_HAND: f64 = 1e-3;
     let mut point = start;
     let mut at = evaluate(point)?;
@@ -68,13 +73,15 @@ pub fn meet(
     }
 }
 
-/// Where the square of the sine between the normals is less, [`meet`] takes them for parallel: to within
-/// 1.8°.
+/// Where the squared sine of the angle between the normals is less, [`meet`] treats them as
+/// parallel: within 1.8°.
 const PARALLEL: f64 = 1e-3;
 
-/// The step of [`meet`] from a place where the two functions are `at`: the least one that makes both vanish
-/// to first order, at most h/2. Where the square of the sine between the normals is less than `parallel`,
-/// halfway to either instead.
+/// Returns the step of [`meet`] from a point with the evaluations `at`: the shortest step that
+/// makes both functions vanish to first order, at most h/2.
+///
+/// Where the squared sine of the angle between the normals is less than `parallel`, the step goes
+/// halfway to either surface instead.
 #[must_use]
 pub fn step_onto_both(at: &[Evaluation; 2], parallel: f64) -> Vector3<f64> {
     let [a, b] = at;
@@ -92,7 +99,7 @@ pub fn step_onto_both(at: &[Evaluation; 2], parallel: f64) -> Vector3<f64> {
     if length > most { step * (most / length) } else { step }
 }
 
-/// f over the size of its gradient.
+/// Returns f over the length of its gradient.
 fn newton(at: &Evaluation) -> f64 {
     let slope = 1.0 - 2.0 * at.eigenvalues[0] / (at.bandwidth * at.bandwidth);
     at.f / slope.max(0.5)

@@ -1,4 +1,6 @@
-//! The points in whose horizon x lies, as weighted sums relative to x.
+//! Weighted sums over the points near x, relative to x.
+//!
+//! A point contributes if x is within its support radius.
 
 use fearless_simd::{
     Level, Simd, SimdBase, SimdFrom, SimdMask, dispatch, f32x4, f32x8, f32x16, mask32x8, mask32x16,
@@ -8,7 +10,7 @@ use nearmiss_index::PointBlock;
 
 use crate::SurfacePlan;
 
-/// Weighted sums over a neighbourhood, relative to the point x it was gathered about.
+/// Weighted sums over a neighbourhood, relative to the point x for which they were taken.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moments {
     /// Σw.
@@ -21,13 +23,13 @@ pub struct Moments {
     pub(crate) horizon: f64,
     /// The least d²/h².
     pub(crate) nearest: f32,
-    /// How many points there are.
+    /// Number of points.
     pub(crate) support: u32,
 }
 
 impl Moments {
-    /// Those of the points of all `blocks` whose horizon reaches `x`, by the instructions of `level`, which
-    /// change no bit.
+    /// Sums over the points of all `blocks` that have `x` within their support radius. `level` is
+    /// the instruction set to use; it does not affect the result.
     #[must_use]
     pub fn about(
         level: Level,
@@ -49,25 +51,27 @@ impl Moments {
     }
 }
 
-/// Points side by side with distances of their own, such as along a graph.
+/// A block of points with explicit distances, such as distances along a graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredBlock {
-    /// The points; of those that are none the horizon is zero.
+    /// The points; the support radius is zero in unused lanes.
     pub points: PointBlock,
-    /// How far x is from each; a point weighs by this, if it is within its horizon.
+    /// Distance of each point from x, which determines its weight. A point counts if this is less
+    /// than its support radius.
     pub distance: [f32; WIDTH],
 }
 
 impl MeasuredBlock {
-    /// No points.
+    /// A block without points.
     pub const EMPTY: Self = Self { points: PointBlock::EMPTY, distance: [f32::INFINITY; WIDTH] };
 }
 
 impl Moments {
-    /// Those of the points of all `blocks` about `x`, each weighing by the distance given for it. How near
-    /// the nearest is remains a matter of straight distance: it says whether x is where the surface can be,
-    /// and a way along the surface tells no height above it. The instructions of `level` change no bit, the
-    /// order of the points may.
+    /// Sums over the points of all `blocks`, weighted by the given distances from `x`.
+    ///
+    /// The distance to the nearest point remains Euclidean, because it decides whether x can be on
+    /// the surface, and a path along the surface does not measure the height above it. `level` is
+    /// the instruction set to use and does not affect the result; the order of the points may.
     #[must_use]
     pub fn measured<'b>(
         level: Level,
@@ -89,8 +93,8 @@ impl Moments {
     }
 }
 
-/// A point split into the nearest `f32` and the rest, so that differences from stored points keep their
-/// digits: (p − high) is exact for a near p, and the rest is then taken off.
+/// A point split into the nearest `f32` and the remainder. Differences from stored points thus keep
+/// their precision: (p − high) is exact for a near p, and `low` is subtracted afterwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Centre {
     high: [f32; 3],
@@ -98,7 +102,7 @@ pub struct Centre {
 }
 
 impl Centre {
-    /// The split of `x`.
+    /// Splits `x`.
     #[must_use]
     #[inline]
     #[expect(clippy::cast_possible_truncation, reason = "the rest is kept in `low`")]
@@ -108,7 +112,7 @@ impl Centre {
         Self { high, low }
     }
 
-    /// x in single precision.
+    /// Returns x rounded to single precision.
     #[inline]
     #[must_use]
     pub fn rounded(&self) -> [f32; 3] {
@@ -118,25 +122,26 @@ impl Centre {
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Half a block, between the steps of [`Neighbourhood::offer_all`].
+/// Scratch memory for half a block, between the passes of [`Neighbourhood::offer_all`].
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(64))]
 pub struct HalfBlock {
-    /// d²/h² of its points, then their weights.
+    /// d²/h² of the points, then their weights.
     lanes: [f32; HALF],
-    /// The lower half of block b is 2b, the upper one 2b + 1.
+    /// Index of the half block: 2b for the lower half of block b, 2b + 1 for the upper half.
     id: u32,
 }
 
-/// Points of half a block: what a register of AVX2 holds. More of the halves than of the blocks near x hold
-/// no point that reaches it, and so many sums stay in the registers there are.
+/// Number of points in half a block, which fills one AVX2 register. Half blocks are more often
+/// without a contributing point than blocks, and their sums fit into the available registers.
 const HALF: usize = WIDTH / 2;
 
-/// Sums over the points in whose horizon x lies, in the lanes of the half blocks they come in.
+/// Running sums over the points that have x within their support radius.
 ///
-/// A point adds to the lane of its index modulo 8; what does not reach x adds zero. Blocks come in ascending
-/// order, so the sums do not depend on which were offered besides, nor on the width of a machine's registers.
-/// Everything is inlined into a caller that has it compiled for an instruction set.
+/// A point adds to the lane of its index modulo 8; points too far from x add zero. Blocks come in
+/// ascending order, so the sums depend neither on blocks without contributing points, nor on the
+/// register width of the machine. All methods are inlined into a caller compiled for some
+/// instruction set.
 #[derive(Debug, Clone, Copy)]
 pub struct Neighbourhood<'a, S: Simd> {
     plan: &'a SurfacePlan,
@@ -151,7 +156,7 @@ pub struct Neighbourhood<'a, S: Simd> {
 }
 
 impl<'a, S: Simd> Neighbourhood<'a, S> {
-    /// No points about `x`.
+    /// Creates the sums of no points, relative to `x`.
     #[inline(always)]
     #[must_use]
     pub fn new(simd: S, plan: &'a SurfacePlan, x: &Centre) -> Self {
@@ -169,7 +174,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         }
     }
 
-    /// Adds those points of a block whose horizon reaches x.
+    /// Adds the points of a block that have x within their support radius.
     #[inline(always)]
     pub fn offer(&mut self, simd: S, block: &PointBlock) {
         let (t, _) = self.distances(simd, block);
@@ -179,13 +184,13 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         self.add(simd, block, 1, high);
     }
 
-    /// As [`Self::offer`] with every one of `blocks` that `heard` names, ascending; what `halves` holds
-    /// afterwards means nothing.
+    /// Adds the blocks with indices `heard`, ascending, as [`Self::offer`] does. `halves` is
+    /// scratch memory; its contents afterwards are unspecified.
     ///
-    /// Distances come first, for all blocks, then weights, then sums. So no branch is taken by whether half a
-    /// block has a point that reaches x, which every other has not whose block's ball holds x; chains of
-    /// operations that wait for each other are shorter than what processors look ahead; and the constants of
-    /// the kernel and the sums do not compete for registers.
+    /// Computes first the distances for all blocks, then the weights, then the sums. This avoids an
+    /// unpredictable branch on whether a half block contributes: of the blocks near x about every
+    /// other half does not. It also keeps dependency chains short enough for out-of-order
+    /// execution, and the constants of the kernel and the sums do not compete for registers.
     #[inline(always)]
     pub fn offer_all(&mut self, simd: S, blocks: &[PointBlock], heard: &[u32], halves: &mut Vec<HalfBlock>) {
         let most = 2 * heard.len() + 1;
@@ -215,7 +220,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         }
     }
 
-    /// Adds those points of a block that are no further than their horizon by the distances given.
+    /// Adds the points of a block whose given distance is less than their support radius.
     #[inline(always)]
     fn offer_measured(&mut self, simd: S, block: &MeasuredBlock) {
         let distance = f32x16::load_array_ref(simd, &block.distance);
@@ -233,14 +238,15 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         (self.nearest, self.support) = (nearest, support);
     }
 
-    /// 1/h² of the points of a block, by which their weights fall off; infinite where there is none.
+    /// Returns 1/h² of the points of a block; infinite in unused lanes.
     #[inline(always)]
     fn decay(&self, simd: S, block: &PointBlock) -> f32x16<S> {
         let horizon = f32x16::load_array_ref(simd, &block.horizon);
         f32x16::splat(simd, self.plan.reach_sq()) / (horizon * horizon)
     }
 
-    /// d²/h² of the points of a block, and whether any in either half reaches x. Those that do are counted.
+    /// Returns d²/h² of the points of a block, and for each half whether any point contributes.
+    /// Counts the contributing points.
     #[inline(always)]
     fn distances(&mut self, simd: S, block: &PointBlock) -> (f32x16<S>, [bool; 2]) {
         let [px, py, pz] = &block.position;
@@ -255,7 +261,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         (t, [bits & 0xff != 0, bits >> HALF != 0])
     }
 
-    /// The weights of points with these d²/h²; zero of those that do not reach x.
+    /// Returns the weights of points with these d²/h²; zero for points too far from x.
     #[inline(always)]
     fn weights(&mut self, simd: S, t: f32x8<S>) -> f32x8<S> {
         let counts: mask32x8<S> = t.simd_lt(self.plan.reach_sq());
@@ -289,7 +295,7 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
         self.horizon += w * load(&block.horizon);
     }
 
-    /// The sums of all lanes.
+    /// Returns the sums over all lanes.
     #[inline(always)]
     #[must_use]
     pub fn moments(&self, simd: S) -> Moments {
@@ -306,7 +312,8 @@ impl<'a, S: Simd> Neighbourhood<'a, S> {
     }
 }
 
-/// The sum of all lanes of each: halves onto each other, the last four lanes of four registers at once.
+/// Returns the sum over the lanes of each register. The halves are added first, then the last four
+/// lanes of four registers at once.
 #[inline(always)]
 fn totals<S: Simd>(simd: S, [a, b, c, d]: [f32x8<S>; 4]) -> [f64; 4] {
     let (a, b, c, d) = (half(simd, a), half(simd, b), half(simd, c), half(simd, d));

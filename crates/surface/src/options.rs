@@ -1,4 +1,4 @@
-//! What defines the surface: options as plain numbers, and the plan that they validate to.
+//! Options that define the surface, and the validated plan made from them.
 
 use nearmiss_index::PointBlock;
 use std::fmt;
@@ -8,20 +8,20 @@ use thiserror::Error;
 
 use crate::Kernel;
 
-/// How far a point is from where f is asked for.
+/// The distance from x to a point by which the point is weighted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Metric {
-    /// In a straight line: Klein & Zachmann 2004, eq. 1.
+    /// Straight-line distance: Klein & Zachmann 2004, eq. 1.
     #[default]
     Euclidean,
-    /// Along a proximity graph, which does not lead across to a sheet that is near: Klein & Zachmann 2005,
+    /// Distance along a proximity graph, which keeps nearby sheets apart: Klein & Zachmann 2005,
     /// eq. 5.
     Geodesic,
 }
 
 impl Metric {
-    /// The word for it.
+    /// Returns the metric's name in lower case.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -37,34 +37,36 @@ impl fmt::Display for Metric {
     }
 }
 
-/// Whether the kernel's width follows the local spacing.
+/// The choice of the kernel's bandwidth.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Bandwidth {
-    /// Every point weighs with a bandwidth of its own: m · r_i / √(−ln θ_ε).
+    /// A bandwidth for each point, from its local sampling radius: m · r_i / √(−ln θ_ε).
     #[default]
     Local,
-    /// One bandwidth from the scan's sampling radius: Klein & Zachmann 2004, eq. 9.
+    /// One bandwidth for all points, from the scan's sampling radius: Klein & Zachmann 2004, eq. 9.
     Global,
-    /// One bandwidth of this length, in the units of the scan.
+    /// One bandwidth of this length for all points, in the units of the scan.
     Fixed(f64),
 }
 
-/// What defines the surface. Plain numbers; [`SurfacePlan::new`] validates them.
+/// Options that define the surface. [`SurfacePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SurfaceOptions {
-    /// Weight by distance. Default: Gaussian.
+    /// Kernel. Default: Gaussian.
     pub kernel: Kernel,
-    /// Width of the kernel. Default: local.
+    /// Choice of the bandwidth. Default: local.
     pub bandwidth: Bandwidth,
-    /// m, the horizon in sampling radii (S0 eq. 9): 1 to 16, default 3. Larger smooths noise away, rounds
-    /// edges, merges sheets that are close, and costs with its square.
+    /// m, the support radius in sampling radii (Klein & Zachmann 2004, eq. 9): 1 to 16, default 3.
+    /// A larger value smooths noise, rounds edges and merges close sheets. The cost grows with its
+    /// square.
     pub horizon: f64,
-    /// θ_ε, the weight at the horizon, 1e-12 to 0.5, default 1e-4. Smaller narrows the kernel in the same
-    /// horizon. The Gaussian's alone.
+    /// θ_ε, the weight at the support radius: 1e-12 to 0.5, default 1e-4. A smaller value narrows
+    /// the kernel within the same support radius. Only the Gaussian uses it.
     pub threshold: f64,
-    /// Least number of points in whose horizon a surface point must lie, at least 3, default 6.
+    /// Least number of points whose support radius must reach a surface point: at least 3, default
+    /// 6.
     pub support_min: u32,
 }
 
@@ -81,72 +83,73 @@ impl Default for SurfaceOptions {
 }
 
 impl SurfaceOptions {
-    /// The same options with this kernel.
+    /// Sets the kernel.
     #[must_use]
     pub const fn with_kernel(self, kernel: Kernel) -> Self {
         Self { kernel, ..self }
     }
 
-    /// The same options with this bandwidth.
+    /// Sets the bandwidth.
     #[must_use]
     pub const fn with_bandwidth(self, bandwidth: Bandwidth) -> Self {
         Self { bandwidth, ..self }
     }
 
-    /// The same options with this horizon, in sampling radii.
+    /// Sets the support radius, in sampling radii.
     #[must_use]
     pub const fn with_horizon(self, horizon: f64) -> Self {
         Self { horizon, ..self }
     }
 
-    /// The same options with this weight at the horizon.
+    /// Sets the weight at the support radius.
     #[must_use]
     pub const fn with_threshold(self, threshold: f64) -> Self {
         Self { threshold, ..self }
     }
 
-    /// The same options with this least support.
+    /// Sets the least support.
     #[must_use]
     pub const fn with_support_min(self, support_min: u32) -> Self {
         Self { support_min, ..self }
     }
 }
 
-/// Bandwidths, in stored units, whose squares single precision holds.
+/// Bandwidths, in stored units, whose squares are in the range of single precision.
 const REPRESENTABLE: std::ops::RangeInclusive<f64> = 1e-18..=1e18;
 
-/// Which option is out of range.
+/// Error of [`SurfacePlan::new`]: an option out of range.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
-    /// The horizon is not between 1 and 16 sampling radii.
+    /// A support radius that is not between 1 and 16 sampling radii.
     #[error("a horizon of {0} sampling radii; it must lie between 1 and 16")]
     Horizon(f64),
-    /// The weight at the horizon is not between 1e-12 and 0.5.
+    /// A weight at the support radius that is not between 1e-12 and 0.5.
     #[error("a weight of {0} at the horizon; it must lie between 1e-12 and 0.5")]
     Threshold(f64),
-    /// Fewer than three points span no plane.
+    /// A least support below 3, the number of points that span a plane.
     #[error("a least support of {0}; three points are needed to span a plane")]
     Support(u32),
-    /// A fixed bandwidth must be a positive length that single precision can square.
+    /// A fixed bandwidth that is not positive, or whose square is out of the range of single
+    /// precision.
     #[error("a bandwidth of {0}; it must be positive, and neither vanish nor be boundless beside the scan")]
     Bandwidth(f64),
 }
 
-/// Validated options with what follows from them, for one scan.
+/// Validated options and derived quantities, for one scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePlan {
     options: SurfaceOptions,
-    /// `horizon_i = slope · r_i + level`: one of the two is zero.
+    /// `horizon_i = slope · r_i + level`; one of the two is zero.
     slope: f32,
     level: f32,
     reach_sq: f32,
-    /// h/horizon.
+    /// h over the support radius.
     per_horizon: f32,
 }
 
 impl SurfacePlan {
-    /// All points of a scan in blocks, given their positions and local sampling radii.
+    /// Returns blocks of all points of a scan, given their positions and local sampling radii.
     #[must_use]
     pub fn blocks(&self, positions: &[[f32; 3]], radii: &[f32]) -> impl ExactSizeIterator<Item = PointBlock> {
         PointBlock::silent(positions).zip(radii.chunks(PointBlock::WIDTH)).map(|(mut block, radii)| {
@@ -155,10 +158,10 @@ impl SurfacePlan {
         })
     }
 
-    /// Puts a point that is heard as far as `horizon` into a lane of a block.
+    /// Sets the point in a lane of a block; `horizon` is its support radius.
     ///
     /// # Panics
-    /// When there is no such lane.
+    /// Panics if there is no such lane.
     #[inline]
     pub fn put(&self, block: &mut PointBlock, lane: usize, position: [f32; 3], horizon: f32) {
         for k in 0..3 {
@@ -167,18 +170,21 @@ impl SurfacePlan {
         block.horizon[lane] = horizon;
     }
 
-    /// Lets the first points of a block be heard as their local sampling radii want it.
+    /// Sets the support radii of the first points of a block from their local sampling radii.
     pub fn tune(&self, block: &mut PointBlock, radii: &[f32]) {
         for (horizon, radius) in block.horizon.iter_mut().zip(radii) {
             *horizon = self.horizon(*radius);
         }
     }
 
-    /// Validates `options` for a scan with this `sampling_radius`; lengths are in the units of its stored
-    /// positions, `unit` of which make one of the caller's, in which a fixed bandwidth is given.
+    /// Validates `options` for a scan with this `sampling_radius`, in the units of its stored
+    /// positions.
+    ///
+    /// `unit` is the number of stored units in one unit of the caller, in which a fixed bandwidth
+    /// is given.
     ///
     /// # Errors
-    /// Names the option that is out of range.
+    /// Fails if an option is out of range; the error names it.
     pub fn new(options: &SurfaceOptions, sampling_radius: f64, unit: f64) -> Result<Self, SurfaceError> {
         let SurfaceOptions { bandwidth, horizon, threshold, support_min, .. } = *options;
         if !(1.0..=16.0).contains(&horizon) {
@@ -208,46 +214,46 @@ impl SurfacePlan {
         Ok(plan)
     }
 
-    /// The options that were validated.
+    /// Returns the validated options.
     #[must_use]
     pub fn options(&self) -> &SurfaceOptions {
         &self.options
     }
 
-    /// The kernel.
+    /// Returns the kernel.
     #[must_use]
     pub fn kernel(&self) -> Kernel {
         self.options.kernel
     }
 
-    /// How far a point of local sampling radius `radius` is heard.
+    /// Returns the support radius of a point with local sampling radius `radius`.
     #[inline(always)]
     #[must_use]
     pub fn horizon(&self, radius: f32) -> f32 {
         self.slope * radius + self.level
     }
 
-    /// The bandwidth h of a point of local sampling radius `radius`.
+    /// Returns the bandwidth h of a point with local sampling radius `radius`.
     #[inline]
     #[must_use]
     pub fn bandwidth(&self, radius: f32) -> f32 {
         self.horizon(radius) * self.per_horizon
     }
 
-    /// 1/h² of a point that is heard as far as `horizon`.
+    /// Returns 1/h² of a point with support radius `horizon`.
     #[inline(always)]
     #[must_use]
     pub fn decay(&self, horizon: f32) -> f32 {
         self.reach_sq / (horizon * horizon)
     }
 
-    /// h/horizon.
+    /// Returns h over the support radius.
     #[inline]
     pub(crate) fn per_horizon(&self) -> f32 {
         self.per_horizon
     }
 
-    /// (horizon/h)², the value of d²/h² at which weights end.
+    /// Returns (support radius/h)², the value of d²/h² at which weights end.
     #[inline]
     #[must_use]
     pub fn reach_sq(&self) -> f32 {

@@ -1,29 +1,31 @@
-//! The surface point below a point.
+//! Projection of a point onto the surface.
 
 use nearmiss_geometry::nalgebra::Vector3;
 
 use crate::{Evaluation, Status};
 
-/// Where a projection ended.
+/// Result of a projection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
-    /// The foot point.
+    /// The projected point.
     pub point: [f64; 3],
-    /// The implicit function there.
+    /// The implicit function at that point.
     pub at: Evaluation,
-    /// Evaluations spent.
+    /// Number of evaluations.
     pub evaluations: u32,
-    /// Whether |f| ≤ 1e-6 h there and the status is ok.
+    /// `true` if |f| ≤ 1e-6 h at the point and its status is ok.
     pub converged: bool,
 }
 
-/// |f| of a surface point, in bandwidths: ten times the rounding of single-precision sums.
+/// Greatest |f| of a surface point, in bandwidths: ten times the rounding of single-precision sums.
 pub(crate) const ON_SURFACE: f64 = 1e-6;
 
-/// The almost orthogonal projection of `start`: x ← x₀ + ((a(x) − x₀)·n(x)) n(x), until f(x) vanishes (Alexa
-/// & Adamson, "On normals and projection operators for surfaces defined by point sets", SPBG 2004).
+/// Projects `start` onto the surface, almost orthogonally.
 ///
-/// `evaluate` is f; at most 12 evaluations.
+/// Iterates x ← x₀ + ((a(x) − x₀)·n(x)) n(x) until f(x) vanishes (Alexa & Adamson, "On normals and
+/// projection operators for surfaces defined by point sets", SPBG 2004).
+///
+/// `evaluate` is the implicit function, which is called at most 12 times.
 pub fn project(start: [f64; 3], mut evaluate: impl FnMut([f64; 3]) -> Evaluation) -> Projection {
     const STEPS: u32 = 12;
     let x0 = Vector3::from(start);

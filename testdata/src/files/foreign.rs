@@ -15,30 +15,30 @@ use super::model::{colours, normals, points, quads, triangles};
 /// Steps of coordinates in LAS: all points of the model are whole multiples.
 const STEP: f64 = 0.125;
 
-/// Where LAS counts from.
+/// Offset of coordinates in LAS.
 const ORIGIN: [f64; 3] = [4_000_000.0, -500_000.0, 0.0];
 
-/// Bytes of a record, of which so many are extra.
+/// Returns the bytes of a record, of which `extra` are extra bytes.
 fn stride(format: u8, extra: u16) -> u16 {
     [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67][usize::from(format)] + extra
 }
 
-/// The class of the `i`-th point.
+/// Returns the class of the `i`-th point.
 #[must_use]
 pub fn class(i: usize) -> u8 {
     [2, 6, 1][i % 3]
 }
 
-/// The intensity of the `i`-th point.
+/// Returns the intensity of the `i`-th point.
 ///
 /// # Panics
-/// When the parameters name nothing that the format has.
+/// If the parameters are not supported by the format.
 #[must_use]
 pub fn intensity(i: usize) -> u16 {
     u16::try_from(i * 1000).expect("twenty points")
 }
 
-/// Points of the model so far from the origin as a surveyor's.
+/// Returns the points of the model as far from the origin as in a survey.
 #[must_use]
 pub fn far_points() -> Vec<[f64; 3]> {
     points().iter().map(|p| [0, 1, 2].map(|k| f64::from(p[k]) + ORIGIN[k])).collect()
@@ -77,11 +77,11 @@ fn records(format: u8, extra: u16) -> Vec<u8> {
     all
 }
 
-/// LAS of this point format: version 1.4 from format 6 on, 1.2 or 1.3 before. `compressed` makes it LAZ, in
-/// chunks of so many points.
+/// Returns LAS of this point format: version 1.4 from format 6 on, 1.2 or 1.3 before. `compressed`
+/// makes it LAZ, in chunks of the given number of points.
 ///
 /// # Panics
-/// When the parameters name nothing that the format has.
+/// If the parameters are not supported by the format.
 #[must_use]
 pub fn las(format: u8, extra: u16, compressed: Option<u32>) -> Vec<u8> {
     let minor = if format >= 6 { 4 } else { 2 + format / 4 };
@@ -141,7 +141,8 @@ pub fn las(format: u8, extra: u16, compressed: Option<u32>) -> Vec<u8> {
     bytes
 }
 
-/// LAZ of point format 1 whose second time is a million switches from one sequence of times to the next.
+/// Returns LAZ of point format 1 whose second time switches a million times from one sequence of
+/// times to the next.
 ///
 /// # Panics
 /// Never, while memory suffices.
@@ -162,7 +163,7 @@ pub fn laz_of_endless_times() -> Vec<u8> {
     let mut bytes = las(1, 0, Some(50_000));
     let start = u32::from_le_bytes([96, 97, 98, 99].map(|at| bytes[at]));
     bytes.truncate(start as usize);
-    // One chunk, to the end of the file, needs no table.
+    // A single chunk, to the end of the file, needs no table.
     let packing = bytes.windows(LazVlr::USER_ID.len()).position(|at| at == LazVlr::USER_ID.as_bytes());
     let packing = packing.expect("of LAZ") - 2 + 54;
     bytes[packing..packing + 2].copy_from_slice(&1_u16.to_le_bytes());
@@ -177,10 +178,11 @@ pub fn laz_of_endless_times() -> Vec<u8> {
     bytes
 }
 
-/// E57 of two scans of ten points each, with poses; in the second one point is invalid besides.
+/// Returns E57 of two scans of ten points each, with poses; the second scan has an additional
+/// invalid point.
 ///
 /// # Panics
-/// When the parameters name nothing that the format has.
+/// If the parameters are not supported by the format.
 pub fn e57() -> Vec<u8> {
     use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue, Transform};
     let mut out = Cursor::new(Vec::new());
@@ -221,10 +223,10 @@ pub fn e57() -> Vec<u8> {
     out.into_inner()
 }
 
-/// A NumPy array of this type.
+/// Returns a NumPy array of this type.
 ///
 /// # Panics
-/// When the parameters name nothing that the format has.
+/// If the parameters are not supported by the format.
 #[must_use]
 pub fn npy(kind: &str) -> Vec<u8> {
     let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (20, 3), }}");
@@ -245,7 +247,7 @@ pub fn npy(kind: &str) -> Vec<u8> {
     bytes
 }
 
-/// STL as text, or binary.
+/// Returns STL as text, or binary.
 pub fn stl(is_text: bool) -> Vec<u8> {
     let points = points();
     let mut bytes = if is_text { b"solid sheet\n".to_vec() } else { vec![b' '; 80] };
@@ -278,7 +280,7 @@ pub fn stl(is_text: bool) -> Vec<u8> {
     bytes
 }
 
-/// OFF with normals and colours.
+/// Returns OFF with normals and colours.
 #[must_use]
 pub fn off() -> Vec<u8> {
     let mut text = String::from("CNOFF # a sheet\n20 12 0\n\n");
@@ -291,10 +293,11 @@ pub fn off() -> Vec<u8> {
     text.into_bytes()
 }
 
-/// glTF with its buffer in the document, or GLB. A node halves the model and one about it doubles it again.
+/// Returns glTF with its buffer in the document, or GLB. A node halves the model and its parent
+/// doubles it again.
 ///
 /// # Panics
-/// When the parameters name nothing that the format has.
+/// If the parameters are not supported by the format.
 pub fn gltf(is_binary: bool) -> Vec<u8> {
     let mut buffer = Vec::new();
     for p in points() {
@@ -340,7 +343,7 @@ pub fn gltf(is_binary: bool) -> Vec<u8> {
     bytes
 }
 
-/// The normals of the model at unit length, as glTF wants them.
+/// Returns the normals of the model at unit length, as glTF requires.
 #[must_use]
 pub fn unit_normals() -> Vec<[f32; 3]> {
     let unit = |n: [f32; 3]| {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::model::{colours, normals, points, quads};
 
-/// How the numbers of a file are written.
+/// The encoding of the numbers of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// Text.
@@ -15,7 +15,7 @@ pub enum Encoding {
     Big,
 }
 
-/// Writes numbers by the name of their PLY type.
+/// A writer of numbers by the name of their PLY type.
 struct Out {
     encoding: Encoding,
     bytes: Vec<u8>,
@@ -56,7 +56,8 @@ impl Out {
     }
 }
 
-/// PLY with everything that a reader must step over: other elements, other properties, lists among them.
+/// Returns PLY with everything that a reader must skip: other elements, other properties, lists
+/// among them.
 #[must_use]
 pub fn ply(encoding: Encoding, coordinate: &str, index: &str) -> Vec<u8> {
     let name = match encoding {
@@ -106,10 +107,11 @@ pub fn ply(encoding: Encoding, coordinate: &str, index: &str) -> Vec<u8> {
     out.bytes
 }
 
-/// PCD with a field of three values a point and one of an odd size to step over, and NaN points at the end.
+/// Returns PCD with two fields to skip, one of three values a point and one of an odd size, and NaN
+/// points at the end.
 ///
 /// # Panics
-/// When the parameters name nothing that the format has.
+/// If the parameters are not supported by the format.
 #[must_use]
 pub fn pcd(data: &str) -> Vec<u8> {
     let header = format!(
@@ -168,7 +170,7 @@ pub fn pcd(data: &str) -> Vec<u8> {
     out
 }
 
-/// Text with named columns, in an order of its own.
+/// Returns text with named columns, in an unusual order.
 pub fn csv(divider: &str) -> Vec<u8> {
     let names = ["R", "G", "B", "intensity", "x", "y", "z", "nx", "ny", "nz", "label"];
     let mut text = format!("# a comment\n{}\n", names.join(divider));
@@ -182,7 +184,7 @@ pub fn csv(divider: &str) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// OBJ with vertex colours and the four ways of writing a corner.
+/// Returns OBJ with vertex colours and the four ways of writing a corner.
 #[must_use]
 pub fn obj() -> Vec<u8> {
     let mut text = String::from("mtllib a.mtl\no sheet\n# C:\\meshes\\\n");

@@ -1,4 +1,4 @@
-//! Sphere coverings: balls of one radius about some centres, and what they have to contain.
+//! Sphere coverings: balls of one radius about some centres that contain a set.
 
 use nalgebra::Vector3;
 
@@ -14,14 +14,14 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// The point with these coordinates, −1 to 1 along each axis.
+    /// Returns the point with these coordinates, −1 to 1 along each axis.
     #[must_use]
     pub fn at(&self, t: [f64; 3]) -> [f64; 3] {
         let along = |k: usize| Vector3::from(self.axes[k]) * (t[k] * self.half[k]);
         (Vector3::from(self.centre) + along(0) + along(1) + along(2)).into()
     }
 
-    /// The distance of `x`, 0 inside.
+    /// Returns the distance of `x`, 0 inside.
     #[must_use]
     pub fn distance(&self, x: [f64; 3]) -> f64 {
         let d = Vector3::from(x) - Vector3::from(self.centre);
@@ -30,16 +30,16 @@ impl Solid {
     }
 }
 
-/// The distance of `x` from the nearest of `centres`.
+/// Returns the distance of `x` from the nearest of `centres`.
 #[must_use]
 pub fn to_nearest(centres: &[[f64; 3]], x: [f64; 3]) -> f64 {
     let distance = |c: &[f64; 3]| (Vector3::from(*c) - Vector3::from(x)).norm();
     centres.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Bounds of the least radius at which balls about `centres` contain all `solids`: the distance of the point
-/// of a grid of `n` + 1 points an edge that is furthest from them; and that of any point in a cell of the
-/// grid.
+/// Returns bounds of the least radius at which balls about `centres` contain all `solids`. With a
+/// grid of `n` + 1 points an edge, the lower bound is the distance of the furthest grid point. The
+/// upper bound is that of any point in a cell of the grid.
 #[must_use]
 pub fn covering_radius(centres: &[[f64; 3]], solids: &[Solid], n: u32) -> [f64; 2] {
     let mut bounds = [0.0_f64; 2];
@@ -55,10 +55,11 @@ pub fn covering_radius(centres: &[[f64; 3]], solids: &[Solid], n: u32) -> [f64; 
     bounds
 }
 
-/// How far apart the balls of `radius_a` about `a` that are near `volume_b` and those of `radius_b` about `b`
-/// near `volume_a` are at least, each by whichever says more: the distance of a ball from the other volume,
-/// or from all balls of the other that are near its own. More than `reach` means that nothing in both balls
-/// and volume of a is within `reach` of anything in both balls and volume of b.
+/// Returns a lower bound of the distance of two sets of balls: those of `radius_a` about `a` that
+/// are near `volume_b`, and those of `radius_b` about `b` near `volume_a`. It is the greater of two
+/// bounds: by the distances of balls from the other volume, and by the distances from the other's
+/// balls near its own volume. If it exceeds `reach`, nothing in both balls and volume of a is
+/// within `reach` of anything in both balls and volume of b.
 #[must_use]
 pub fn clearance(
     (a, radius_a, volume_a): (&[[f64; 3]], f64, &Solid),

@@ -1,20 +1,20 @@
-//! Whether two flat discs in space cross: what a first-order test of two tangent planes decides.
+//! Crossing of two flat discs in space: a first-order test of two tangent planes.
 
 use nalgebra::Vector3;
 
-/// A flat disc: a point's share of its tangent plane.
+/// A flat disc: a part of the tangent plane about a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
     /// The middle.
     pub centre: [f64; 3],
-    /// Unit normal; its sign means nothing.
+    /// Unit normal; its sign is arbitrary.
     pub normal: [f64; 3],
     /// Radius, in the unit of `centre`.
     pub radius: f64,
 }
 
 impl Disc {
-    /// The greatest distance of a point of the disc from `x`.
+    /// Returns the greatest distance of a point of the disc from `x`.
     #[must_use]
     pub fn furthest(&self, x: [f64; 3]) -> f64 {
         let d = Vector3::from(x) - Vector3::from(self.centre);
@@ -23,26 +23,27 @@ impl Disc {
     }
 }
 
-/// What [`crossing`] finds.
+/// The result of [`crossing`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crossing {
-    /// Whether the closed discs have a point in common.
+    /// `true` if the closed discs have a point in common.
     pub crosses: bool,
-    /// How clearly: positive when they cross, negative when not, small in size where the answer hangs on
-    /// rounding. A length, but not a distance.
+    /// Margin of the decision: positive if the discs cross, negative if not, small in size if
+    /// rounding decides. A length, but not a distance.
     pub slack: f64,
 }
 
-/// Below this sine two planes count as parallel, and discs that far apart, relative to their radii, as
-/// coplanar.
+/// Greatest sine of the angle at which two planes count as parallel, and greatest distance relative
+/// to the radii at which discs count as coplanar.
 const PARALLEL: f64 = 1e-12;
 
-/// Whether `a` and `b` have a point in common.
+/// Tests if `a` and `b` have a point in common.
 ///
-/// Planes that meet, do so in a line with direction u = n × m, ‖u‖ = sin φ. Each disc holds a chord of it:
-/// the centre of `a` is |m·(b − a)|/sin φ away from the line, so the chord's half-length is √(R² − that²),
-/// about the projection of the centre. The discs cross iff both chords exist and overlap. Parallel discs
-/// cross iff they are coplanar and their centres no farther apart than both radii together.
+/// Planes that are not parallel meet in a line with direction u = n × m, ‖u‖ = sin φ. Each disc
+/// contains a chord of it. The centre of `a` is |m·(b − a)|/sin φ away from the line, so the
+/// chord's half-length is √(R² − that²), about the projection of the centre. The discs cross iff
+/// both chords exist and overlap. Parallel discs cross iff they are coplanar and their centres are
+/// no further apart than the sum of the radii.
 #[must_use]
 pub fn crossing(a: &Disc, b: &Disc) -> Crossing {
     let (na, nb) = (Vector3::from(a.normal), Vector3::from(b.normal));
@@ -75,7 +76,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// Points spread over a disc, as fine as `n` rings.
+    /// Returns points spread over a disc, as fine as `n` rings.
     fn samples(d: &Disc, n: u32) -> Vec<Vector3<f64>> {
         let normal = Vector3::from(d.normal);
         let u = normal.cross(&normal.map(|x| if x == normal.amin() { 1.0 } else { 0.3 }));
@@ -92,7 +93,7 @@ mod tests {
         all
     }
 
-    /// How near a dense sampling of `a` comes to the disc `b`.
+    /// Returns the distance of a dense sampling of `a` from the disc `b`.
     fn least_gap(a: &Disc, b: &Disc) -> f64 {
         let n = Vector3::from(b.normal);
         let gap = |x: &Vector3<f64>| {
@@ -117,14 +118,15 @@ mod tests {
             let (a, b) = (disc(0.1), disc(0.9));
             let found = crossing(&a, &b);
             assert_eq!(found.crosses, crossing(&b, &a).crosses, "symmetric");
-            // Samples of a are at most 1/60 of its radius apart, so a crossing leaves a gap below that.
+            // Samples of a are at most 1/60 of its radius apart, so a crossing leaves a gap below
+            // that.
             let gap = least_gap(&a, &b);
             if found.crosses {
                 assert!(gap < a.radius / 60.0, "{a:?} {b:?}: {gap}");
                 yes += 1;
             } else {
                 no += 1;
-                // No crossing may have a tiny gap only when the slack is tiny too.
+                // Without a crossing, a tiny gap implies a tiny slack.
                 assert!(gap > 0.0, "{a:?} {b:?}");
                 if found.slack < -0.02 {
                     assert!(gap > 1e-4, "{a:?} {b:?}: {gap}, {found:?}");

@@ -1,5 +1,5 @@
-//! Eigenvalues of a symmetric 3×3 matrix by cyclic Jacobi rotations (Golub & Van Loan, *Matrix Computations*,
-//! 4th ed. 2013, §8.5). Slow and accurate to rounding, also for eigenvalues that coincide.
+//! Eigenvalues of a symmetric 3×3 matrix by cyclic Jacobi rotations (Golub & Van Loan, *Matrix
+//! Computations*, 4th ed. 2013, §8.5). Slow and accurate to rounding, even for equal eigenvalues.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,14 +8,14 @@ use nalgebra::{Matrix3, Vector3};
 pub struct Eigen {
     /// λ1 ≤ λ2 ≤ λ3.
     pub values: [f64; 3],
-    /// Unit vectors, one for each value; their signs mean nothing.
+    /// Unit vectors, one for each value; their signs are arbitrary.
     pub vectors: [[f64; 3]; 3],
 }
 
-/// Eigenvalues and eigenvectors of `m`, of which only the symmetric part counts.
+/// Returns the eigenvalues and eigenvectors of the symmetric part of `m`.
 #[must_use]
 pub fn symmetric_eigen(m: &Matrix3<f64>) -> Eigen {
-    /// Convergence is quadratic; six sweeps reach rounding, the rest is margin.
+    /// Number of sweeps. Convergence is quadratic; six sweeps reach rounding, the rest is margin.
     const SWEEPS: usize = 20;
     let mut a = 0.5 * (m + m.transpose());
     let mut v = Matrix3::identity();

@@ -1,25 +1,26 @@
 //! The proximity graph of Klein & Zachmann 2005, §3.2, from all pairs of points.
 //!
-//! `d_i` is the distance of the r-th nearest other point, of the furthest where there are fewer. Points are
-//! joined iff `‖p_i − p_j‖ ≤ d_i + d_j`, distances being the square roots in double precision of squared
-//! distances whose every operation is rounded to single. At a point with five edges or more an edge is long
-//! if its length exceeds Q3 + k (Q3 − Q1) and 1.5 times the median, quantiles being interpolated linearly
-//! between order statistics. What is long at either end is virtual.
+//! `d_i` is the distance of the r-th nearest other point, or of the furthest if there are fewer.
+//! Points are joined iff `‖p_i − p_j‖ ≤ d_i + d_j`. Distances are square roots in double precision
+//! of squared distances in single precision, with every operation rounded. At a point with five
+//! edges or more, an edge is long if its length exceeds Q3 + k (Q3 − Q1) and 1.5 times the median.
+//! Quantiles are interpolated linearly between order statistics. An edge that is long at either end
+//! is virtual.
 
-/// A graph, each edge once, the lesser end first, ascending.
+/// A graph. Each edge occurs once, the lesser end first, in ascending order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proximity {
     /// `d_i` of each point.
     pub radii: Vec<f64>,
     /// Edges that are long at neither end.
     pub edges: Vec<[u32; 2]>,
-    /// The others.
+    /// The other edges.
     pub virtual_edges: Vec<[u32; 2]>,
-    /// The least point that edges lead to from each, virtual ones not counted.
+    /// For each point, the least point of its component, without virtual edges.
     pub components: Vec<u32>,
 }
 
-/// The graph of `points` with these r and k; nothing is pruned without k.
+/// Returns the graph of `points` with these r and k; without k nothing is pruned.
 #[must_use]
 pub fn proximity(points: &[[f32; 3]], r: usize, k: Option<f64>) -> Proximity {
     let n = points.len();
@@ -77,7 +78,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
     f64::from(squares[0] + squares[1] + squares[2]).sqrt()
 }
 
-/// Linear between order statistics.
+/// Returns a quantile, linear between order statistics.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

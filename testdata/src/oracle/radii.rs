@@ -1,59 +1,62 @@
-//! The spacing of every point: how far its neighbours are, made smooth.
+//! The spacing of every point: the distance of its neighbours, smoothed.
 //!
-//! Raw: the distance to the K-th nearest other point, K = 6. While the point and its K nearest look like a
-//! line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring), K grows by one, at most to 256, until they do
-//! not and one lies more across their main direction than along it, seen from the point (an arc has none); if
-//! that does not happen, the distance to the 6th counts after all. A point whose own six are no line, but
-//! which is among the six nearest of three or more points whose six are, is a bend in a ring: its distance
-//! says nothing.
+//! Raw spacing: the distance to the K-th nearest other point, K = 6. The point and its K nearest
+//! may look like a line (λ2 < 0.05 λ3 of their covariance, as on a LiDAR ring). Then K grows by
+//! one, at most to 256, until they do not, and one of them is, seen from the point, more across
+//! their main direction than along it (an arc has none). If that does not happen, the distance to
+//! the 6th counts. A point is a bend in a ring if its own six are no line, but it is among the six
+//! nearest of three or more points whose six are a line. Its distance says nothing about a surface.
 //!
-//! Smooth: `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region,
-//! over i itself, unless it is a bend, and all j that are neither lines to the end nor bends.
+//! Smoothed spacing: `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot affect a
+//! dense region. The minimum is over i itself, unless it is a bend, and all j that are neither
+//! lines to the end nor bends.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::eigen::symmetric_eigen;
 
-/// K: how many neighbours spacing reaches over.
+/// K: the rank of the neighbour that defines the spacing.
 pub const RANK: usize = 6;
 
-/// How far K may grow where neighbours look like a line.
+/// The greatest K where neighbours look like a line.
 pub const GREATEST_RANK: usize = 256;
 
-/// Points look like a line when λ2 is less than this share of λ3.
+/// Points look like a line if λ2 is less than this share of λ3.
 pub const LINE_RATIO: f64 = 0.05;
 
-/// How fast smoothed spacing may grow, per unit of distance.
+/// The greatest slope of smoothed spacing, per unit of distance.
 pub const SLOPE: f64 = 0.3;
 
-/// How far a point's neighbours are, and how they lie.
+/// The spacing of a point, and the arrangement of its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spacing {
     /// The distance, in the unit of the points.
     pub radius: f64,
-    /// Whether the first K look like a line.
+    /// `true` if the first K look like a line.
     pub is_ring: bool,
-    /// Whether that distance tells how densely a surface is sampled: not on a line to the end, nor at a bend.
+    /// `true` if the radius measures the density of a surface: not on a line to the end, nor at a
+    /// bend.
     pub speaks: bool,
 }
 
-/// The smoothed spacing of every point: [`smoothed`] of [`spacings`]. In the unit of `points`.
+/// Returns the smoothed spacing of every point: [`smoothed`] of [`spacings`]. In the unit of
+/// `points`.
 #[must_use]
 pub fn radii(points: &[[f64; 3]]) -> Vec<f64> {
     smoothed(points, &spacings(points))
 }
 
-/// The raw spacing of every point, in the unit of `points`.
+/// Returns the raw spacing of every point, in the unit of `points`.
 #[must_use]
 pub fn spacing(points: &[[f64; 3]]) -> Vec<f64> {
     spacings(points).iter().map(|s| s.radius).collect()
 }
 
-/// The raw spacing of every point, and how its neighbours lie.
+/// Returns the raw spacing of every point, and the arrangement of its neighbours.
 ///
-/// Other points at the very same place are not counted, and of several at one place only the first; among
-/// equally far neighbours the one of lower index is the nearer. Where fewer than K others exist, the farthest
-/// counts; without any the spacing is zero.
+/// Other points at the same place are not counted, and of several at one place only the first. Of
+/// equally far neighbours, the one of lower index is the nearer. If fewer than K others exist, the
+/// farthest counts; without any, the spacing is zero.
 #[must_use]
 pub fn spacings(points: &[[f64; 3]]) -> Vec<Spacing> {
     let mut all: Vec<Spacing> = (0..points.len()).map(|i| spacing_of(points, i)).collect();
@@ -69,7 +72,8 @@ pub fn spacings(points: &[[f64; 3]]) -> Vec<Spacing> {
     all
 }
 
-/// Distance and index of the other points, the first at each place, by distance, then index.
+/// Returns distance and index of the other points, the first at each place, by distance, then
+/// index.
 fn others(points: &[[f64; 3]], i: usize) -> Vec<(f64, usize)> {
     let mut all: Vec<(f64, usize)> =
         (0..points.len()).map(|j| (distance(points[i], points[j]), j)).filter(|&(d, _)| d > 0.0).collect();
@@ -101,7 +105,8 @@ fn spacing_of(points: &[[f64; 3]], i: usize) -> Spacing {
     Spacing { radius, is_ring: true, speaks: grown.is_some() }
 }
 
-/// Whether any of `group` lies more across its main direction than along it, seen from the first.
+/// Returns `true` if a point of `group` is more across its main direction than along it, seen from
+/// the first.
 fn lies_across(group: &[[f64; 3]]) -> bool {
     let main: Vector3<f64> = symmetric_eigen(&covariance(group)).vectors[2].into();
     group.iter().any(|&p| {
@@ -110,14 +115,14 @@ fn lies_across(group: &[[f64; 3]]) -> bool {
     })
 }
 
-/// Whether the covariance of `group` about its mean has λ2 < 0.05 λ3.
+/// Returns `true` if the covariance of `group` about its mean has λ2 < 0.05 λ3.
 #[must_use]
 pub fn looks_like_a_line(group: &[[f64; 3]]) -> bool {
     let [_, middle, greatest] = symmetric_eigen(&covariance(group)).values;
     middle < LINE_RATIO * greatest
 }
 
-/// The covariance of `group` about its mean.
+/// Returns the covariance of `group` about its mean.
 fn covariance(group: &[[f64; 3]]) -> Matrix3<f64> {
     let sum: Vector3<f64> = group.iter().map(|&p| Vector3::from(p)).sum();
     let n = count(group.len());
@@ -130,10 +135,11 @@ fn covariance(group: &[[f64; 3]]) -> Matrix3<f64> {
     covariance
 }
 
-/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i, unless it is a bend, and all j that speak.
+/// Returns `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i, unless it is a bend, and all j with
+/// `speaks`.
 ///
 /// # Panics
-/// When there is not one value for each point.
+/// If there is not one value for each point.
 #[must_use]
 pub fn smoothed(points: &[[f64; 3]], raw: &[Spacing]) -> Vec<f64> {
     assert_eq!(points.len(), raw.len(), "one value for each point");
@@ -147,10 +153,10 @@ pub fn smoothed(points: &[[f64; 3]], raw: &[Spacing]) -> Vec<f64> {
     points.iter().zip(raw).map(least).collect()
 }
 
-/// The least of `values` that at least a share `q` of them does not exceed; `q` in (0, 1].
+/// Returns the least of `values` that at least a share `q` of them does not exceed; `q` in (0, 1].
 ///
 /// # Panics
-/// When there is no value.
+/// If there is no value.
 #[must_use]
 pub fn quantile(values: &[f64], q: f64) -> f64 {
     let mut sorted = values.to_vec();
@@ -164,7 +170,7 @@ pub fn quantile(values: &[f64], q: f64) -> f64 {
     sorted[rank - 1]
 }
 
-/// A number of points as a factor.
+/// Converts a number of points to `f64`.
 #[expect(clippy::cast_precision_loss, reason = "far below 2^53 points")]
 pub(crate) fn count(n: usize) -> f64 {
     n as f64

@@ -1,16 +1,16 @@
-//! On which side of a mesh one is: winding numbers, by the solid angles of its triangles.
+//! Sides of a mesh: winding numbers, by the solid angles of its triangles.
 
 use nalgebra::Vector3;
 use nearmiss_geometry::TriangleMesh;
 
 use super::count;
 
-/// How far beside a vertex [`falls`] looks, as a share of the shortest edge there: far above rounding, far
-/// below the surface's features.
+/// Distance from a vertex at which [`falls`] evaluates, as a share of the shortest edge there: far
+/// above rounding, far below the surface's features.
 const BESIDE: f64 = 1e-5;
 
-/// The solid angle of a triangle seen from `x` (Van Oosterom & Strackee 1983), as a share of the whole;
-/// positive from behind.
+/// Returns the solid angle of a triangle seen from `x` (van Oosterom & Strackee 1983), as a share
+/// of the full sphere; positive from behind.
 fn solid_angle(x: [f64; 3], corners: [[f64; 3]; 3]) -> f64 {
     let [a, b, c] = corners.map(|corner| Vector3::from(corner) - Vector3::from(x));
     let [la, lb, lc] = [a.norm(), b.norm(), c.norm()];
@@ -22,22 +22,23 @@ fn corners(mesh: &TriangleMesh, triangle: [u32; 3]) -> [[f64; 3]; 3] {
     triangle.map(|vertex| mesh.vertices()[vertex as usize])
 }
 
-/// The winding number of `mesh` about `x`: 1 inside of a closed surface whose triangles turn left seen from
-/// outside, 0 beyond it.
+/// Returns the winding number of `mesh` about `x`: 1 inside a closed surface whose triangles are
+/// counter-clockwise seen from outside, 0 outside.
 #[must_use]
 pub fn winding(mesh: &TriangleMesh, x: [f64; 3]) -> f64 {
     mesh.triangles().iter().map(|&triangle| solid_angle(x, corners(mesh, triangle))).sum()
 }
 
-/// For each vertex by how much the winding number falls along `normals` there, from just behind the surface
-/// to just before it: 1 where the normal points out, −1 where it points in, 0 where both of its ends are on
-/// one side (of an edge, a fold or a flap of two triangles back to back), whatever its sign; at open borders
-/// some part. 0 where there is no normal or triangle.
+/// Returns for each vertex by how much the winding number falls along `normals` there, from just
+/// behind the surface to just before it. It is 1 if the normal points out, −1 if it points in. It
+/// is 0 if both ends are on one side (of an edge, a fold or a flap of two triangles back to back),
+/// whatever the sign. At open borders it is a fraction. Without a normal or triangle it is 0.
 ///
-/// Only the triangles about a vertex are looked at: of the others the winding number is continuous there.
+/// Only the triangles about a vertex are evaluated: the winding number of the others is continuous
+/// there.
 ///
 /// # Panics
-/// When there is not a normal for each vertex.
+/// If there is not a normal for each vertex.
 #[must_use]
 pub fn falls(mesh: &TriangleMesh, normals: &[[f64; 3]]) -> Vec<f64> {
     let vertices = mesh.vertices();
@@ -68,33 +69,34 @@ pub fn falls(mesh: &TriangleMesh, normals: &[[f64; 3]]) -> Vec<f64> {
     falls
 }
 
-/// What [`falls`] say of the signs of normals.
+/// Counts of the signs of normals by [`falls`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Signs {
-    /// Normals that point out or in.
+    /// Number of normals that point out or in.
     pub judged: usize,
-    /// Of these those that point in.
+    /// Number of judged normals that point in.
     pub wrong: usize,
 }
 
 impl Signs {
-    /// A corner of an open mesh falls by a quarter, what is no side by nothing.
+    /// The least fall that counts as a side. A corner of an open mesh falls by a quarter, a place
+    /// without sides by nothing.
     const CLEAR: f64 = 0.2;
 
-    /// Counts.
+    /// Counts the signs.
     #[must_use]
     pub fn of(falls: &[f64]) -> Self {
         let judged = falls.iter().filter(|fall| fall.abs() > Self::CLEAR).count();
         Self { judged, wrong: falls.iter().filter(|&&fall| Self::is_wrong(fall)).count() }
     }
 
-    /// Whether this fall is that of a normal that points in.
+    /// Returns `true` if this is the fall of a normal that points in.
     #[must_use]
     pub fn is_wrong(fall: f64) -> bool {
         fall < -Self::CLEAR
     }
 
-    /// The share of those judged that point out.
+    /// Returns the share of the judged normals that point out.
     #[must_use]
     pub fn right(self) -> f64 {
         1.0 - count(self.wrong) / count(self.judged)

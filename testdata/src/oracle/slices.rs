@@ -1,9 +1,9 @@
-//! Slice maps from the formulas alone: every level of every point is kept, voxel by voxel, and looked at when
-//! asked.
+//! Slice maps from the formulas alone: every level of every point is kept, voxel by voxel, and
+//! evaluated in each query.
 
 use std::collections::BTreeMap;
 
-/// Levels of a slice.
+/// Number of levels of a slice.
 const LEVELS: f64 = 255.0;
 
 /// The slice map of some points.
@@ -18,19 +18,19 @@ pub struct SliceTwin {
     voxels: BTreeMap<[i64; 3], Vec<i64>>,
 }
 
-/// What a voxel holds.
+/// The contents of a voxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TwinVoxel {
     /// Level of the highest point.
     pub top: i64,
     /// Level of the lowest point.
     pub low: i64,
-    /// Whether it is an obstacle.
+    /// `true` if it is an obstacle.
     pub is_obstacle: bool,
 }
 
 impl SliceTwin {
-    /// Points in coordinates of which the third goes up.
+    /// Creates the map of points in coordinates of which the third points up.
     #[must_use]
     pub fn new(points: &[[f64; 3]], origin: [f64; 3], [t, sigma]: [f64; 2], share: f64) -> Self {
         let sides = [t, t, sigma];
@@ -43,15 +43,15 @@ impl SliceTwin {
         Self { origin, sides, share, voxels }
     }
 
-    /// Every voxel that holds something.
+    /// Returns every occupied voxel.
     pub fn voxels(&self) -> impl Iterator<Item = ([i64; 3], TwinVoxel)> {
         self.voxels.keys().filter_map(|at| Some((*at, self.voxel(*at)?)))
     }
 
-    /// What a voxel holds.
+    /// Returns the contents of a voxel.
     #[must_use]
     pub fn voxel(&self, [c, r, s]: [i64; 3]) -> Option<TwinVoxel> {
-        // Counted through all slices.
+        // Levels counted through all slices.
         let span = |s: i64| {
             let levels = self.voxels.get(&[c, r, s])?;
             Some((255 * s + levels.iter().min()?, 255 * s + levels.iter().max()?))
@@ -70,8 +70,9 @@ impl SliceTwin {
         Some(TwinVoxel { top: high - 255 * s, low: low - 255 * s, is_obstacle })
     }
 
-    /// What a closed box holds: how many voxels with something, whether one is an obstacle; and the heights
-    /// of the floors below it, column by column, where `counts` are the numbers of columns and rows.
+    /// Returns the number of occupied voxels that a closed box meets, `true` if one is an obstacle,
+    /// and the heights of the floors below it, column by column. `counts` are the numbers of
+    /// columns and rows.
     #[must_use]
     pub fn query(&self, min: [f64; 3], max: [f64; 3], counts: [i64; 2]) -> (usize, bool, Vec<f64>) {
         let cell = |p: [f64; 3]| [0, 1, 2].map(|k| ((p[k] - self.origin[k]) / self.sides[k]).floor());

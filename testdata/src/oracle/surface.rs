@@ -1,30 +1,33 @@
 //! The implicit surface of a cloud at one point, by summing over all of it.
 //!
-//! f(x) = n(x)·(a(x) − x), with a(x) the weighted mean of the points and n(x) the eigenvector of least
-//! eigenvalue of their weighted covariance about a(x): Klein & Zachmann, *Point cloud collision detection*,
-//! Computer Graphics Forum 23(3), 2004, eqs. 1–6 and 9. Deviations: a bandwidth of its own for every point,
-//! and conditions for x to lie on the surface besides f(x) = 0 (see [`Status`]).
+//! f(x) = n(x)·(a(x) − x), with a(x) the weighted mean of the points and n(x) the eigenvector of
+//! least eigenvalue of their weighted covariance about a(x): Klein & Zachmann, *Point cloud
+//! collision detection*, Computer Graphics Forum 23(3), 2004, eqs. 1–6 and 9. Deviations: every
+//! point has a bandwidth of its own, and x must satisfy conditions besides f(x) = 0 to be on the
+//! surface (see [`Status`]).
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::eigen::symmetric_eigen;
 use super::radii::{quantile, radii};
 
-/// The border: x may be at most this many h(x) from a(x). At a straight border ‖x − a‖ is 0.53 to 0.564 h.
+/// The border condition: x may be at most this many h(x) from a(x). At a straight border ‖x − a‖ is
+/// 0.53 to 0.564 h.
 pub const BORDER: f64 = 0.56;
 
-/// On a sheet λ1/(h²/2) stays below this; midway between two sheets it is about 1.
+/// The upper limit of λ1/(h²/2) on a sheet; midway between two sheets it is about 1.
 pub const THIN: f64 = 0.3;
 
-/// On a sheet (λ2 − λ1)/(λ1 + λ2 + λ3) is above this.
+/// The lower limit of (λ2 − λ1)/(λ1 + λ2 + λ3) on a sheet.
 pub const GAP: f64 = 0.1;
 
-/// How the weight of a point falls with its distance d, up to its horizon `m·r_i`; zero from there on.
+/// The weight of a point as a function of its distance d, up to its support radius `m·r_i`; zero
+/// beyond.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kernel {
     /// θ(d) = exp(−d²/h²) with `h = m·r_i/√(−ln θ_ε)`.
     Gaussian {
-        /// θ_ε, the weight at the horizon, in (0, 1).
+        /// θ_ε, the weight at the support radius, in (0, 1).
         theta: f64,
     },
     /// θ(d) = (1 − q)⁴(4q + 1), `q = d/(m·r_i)` (Wendland 1995, C²).
@@ -32,10 +35,10 @@ pub enum Kernel {
 }
 
 impl Kernel {
-    /// h_i of a point with this `horizon`, m times its spacing.
+    /// Returns h_i of a point with the support radius `horizon`, m times its spacing.
     ///
-    /// h²/2 is the variance along an axis of the kernel's weights on an evenly sampled plane. That is the
-    /// definition of h for Wendland's: with R = `horizon` and w = (1 − q)⁴(4q + 1),
+    /// h²/2 is the variance along an axis of the kernel's weights on an evenly sampled plane. That
+    /// is the definition of h for Wendland's kernel. With R = `horizon` and w = (1 − q)⁴(4q + 1),
     /// h²/2 = R²/2 · ∫q³w dq / ∫q w dq = R²/2 · (5/504)/(1/14) = R²·5/72.
     #[must_use]
     pub fn bandwidth(&self, horizon: f64) -> f64 {
@@ -45,7 +48,7 @@ impl Kernel {
         }
     }
 
-    /// The weight at distance `d` of a point with `horizon`.
+    /// Returns the weight at distance `d` of a point with the support radius `horizon`.
     #[must_use]
     pub fn weight(&self, d: f64, horizon: f64) -> f64 {
         if d >= horizon {
@@ -61,61 +64,61 @@ impl Kernel {
     }
 }
 
-/// Whether every point has a bandwidth of its own.
+/// The width of the kernel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bandwidth {
     /// h_i from the point's own smoothed spacing r_i.
     Local,
-    /// One h for all, from the 0.9-quantile of the smoothed r_i, as in the papers.
+    /// The same h for all points, from the 0.9-quantile of the smoothed r_i, as in the papers.
     Global,
 }
 
-/// What defines the surface besides its points.
+/// Parameters of the surface besides its points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters {
-    /// m: the horizon of a point is `m·r_i`.
+    /// m: the support radius of a point is `m·r_i`.
     pub reach: f64,
     /// The weights.
     pub kernel: Kernel,
     /// Local or global bandwidth.
     pub bandwidth: Bandwidth,
-    /// Fewer points whose horizon reaches x than this, and x is outside.
+    /// Minimum number of points that support x; with fewer, x is outside.
     pub least_support: usize,
 }
 
-/// Whether a zero of f at x would be a point of the surface; the first that applies.
+/// The first condition that a point x of the surface would violate, besides f(x) = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// Support below the least, or x in the inner half of no point's horizon.
+    /// Support below the minimum, or x not within half the support radius of any point.
     Outside,
     /// ‖x − a‖ > 0.56 h(x): beyond a border.
     Border,
-    /// λ1/(h²/2) ≥ 0.3 or (λ2 − λ1)/(λ1 + λ2 + λ3) ≤ 0.1: no clear sheet, such as between two.
+    /// λ1/(h²/2) ≥ 0.3 or (λ2 − λ1)/(λ1 + λ2 + λ3) ≤ 0.1: no clear sheet, for example between two.
     Ambiguous,
-    /// None of these.
+    /// No condition is violated.
     Ok,
 }
 
-/// Everything known at a point x.
+/// The results at a point x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evaluation {
-    /// f(x) = n·(a − x), a length; its sign goes with that of `normal`.
+    /// f(x) = n·(a − x), a length; its sign depends on that of `normal`.
     pub value: f64,
     /// n: unit, its component of greatest size positive (of equal ones the first).
     pub normal: [f64; 3],
     /// a(x), the weighted mean.
     pub centroid: [f64; 3],
-    /// How many points reach x.
+    /// The number of points that support x.
     pub support: usize,
     /// h(x) = Σ w_i h_i / Σ w_i.
     pub bandwidth: f64,
     /// λ1 ≤ λ2 ≤ λ3 of the covariance about a, normalised by Σ w_i.
     pub eigenvalues: [f64; 3],
-    /// Whether x counts.
+    /// The status of x.
     pub status: Status,
 }
 
-/// A cloud with its horizons, ready to be evaluated anywhere.
+/// A cloud with its support radii, ready for evaluation.
 #[derive(Debug, Clone)]
 pub struct SurfaceTwin {
     points: Vec<[f64; 3]>,
@@ -130,10 +133,10 @@ impl SurfaceTwin {
         Self::with_radii(points, &radii(points), parameters)
     }
 
-    /// The same with smoothed spacings computed elsewhere.
+    /// Creates the surface with smoothed spacings computed elsewhere.
     ///
     /// # Panics
-    /// When there is not one spacing for each point, or no point.
+    /// If there is not one spacing for each point, or no point.
     #[must_use]
     pub fn with_radii(points: &[[f64; 3]], smoothed: &[f64], parameters: Parameters) -> Self {
         assert_eq!(points.len(), smoothed.len(), "one spacing for each point");
@@ -144,19 +147,19 @@ impl SurfaceTwin {
         Self { points: points.to_vec(), radii, parameters }
     }
 
-    /// r_i as used: local, or the quantile for each.
+    /// Returns the r_i in use: local, or the quantile for each point.
     #[must_use]
     pub fn radii(&self) -> &[f64] {
         &self.radii
     }
 
-    /// The points given.
+    /// Returns the points.
     #[must_use]
     pub fn points(&self) -> &[[f64; 3]] {
         &self.points
     }
 
-    /// f and all that goes with it at `x`; `None` where no point reaches.
+    /// Returns f and the other results at `x`; `None` if no point supports it.
     #[must_use]
     pub fn evaluate(&self, x: [f64; 3]) -> Option<Evaluation> {
         let Parameters { reach, kernel, .. } = self.parameters;
@@ -196,7 +199,7 @@ impl SurfaceTwin {
     }
 }
 
-/// The domain conditions other than support. Points without extent are no sheet.
+/// Returns the status by the conditions other than support. Points without extent are no sheet.
 fn status(offset: f64, h: f64, [l1, l2, l3]: [f64; 3]) -> Status {
     let trace = l1 + l2 + l3;
     if offset > BORDER * h {
@@ -225,7 +228,7 @@ mod tests {
 
     const KERNELS: [Kernel; 2] = [Kernel::Gaussian { theta: 1e-5 }, Kernel::Wendland];
 
-    /// A twin whose points all have bandwidth `h`.
+    /// Returns a twin whose points all have bandwidth `h`.
     fn with_bandwidth(points: &[[f64; 3]], kernel: Kernel, h: f64) -> SurfaceTwin {
         let parameters = Parameters {
             reach: 1.0 / kernel.bandwidth(1.0),

@@ -7,14 +7,15 @@ use super::radii::distance;
 /// The nearest points of two clouds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
-    /// How far they are, in world units.
+    /// Their distance, in world units.
     pub distance: f64,
     /// Their indices, in A and in B.
     pub pair: [usize; 2],
 }
 
-/// The least distance between a point of `a` and a point of `b` in the world, every pair tried; `None` when
-/// either is empty. Of equally near pairs the one of lower indices, A's first.
+/// Returns the least distance between a point of `a` and a point of `b` in the world, from all
+/// pairs; `None` if either is empty. Of equally near pairs it takes the one of lower indices, A's
+/// first.
 #[must_use]
 pub fn least_distance(a: &[[f64; 3]], pose_a: &Pose, b: &[[f64; 3]], pose_b: &Pose) -> Option<Nearest> {
     let b: Vec<_> = b.iter().map(|&q| pose_b.apply(q)).collect();
@@ -29,14 +30,14 @@ pub fn least_distance(a: &[[f64; 3]], pose_a: &Pose, b: &[[f64; 3]], pose_b: &Po
     best
 }
 
-/// Whether balls of `radius` about the points of both clouds come within `margin` of each other: iff the
-/// least point distance is at most 2 radius + margin. World units.
+/// Returns `true` if balls of `radius` about the points of both clouds come within `margin` of each
+/// other: iff the least point distance is at most 2 radius + margin. World units.
 #[must_use]
 pub fn touches(least_distance: f64, radius: f64, margin: f64) -> bool {
     least_distance <= 2.0 * radius + margin
 }
 
-/// Index and distance of the point nearest to `x`; of equally near ones the first.
+/// Returns index and distance of the point nearest to `x`; of equally near points the first.
 #[must_use]
 pub fn nearest(points: &[[f64; 3]], x: [f64; 3]) -> Option<(usize, f64)> {
     let all = points.iter().enumerate().map(|(i, &p)| (i, distance(p, x)));

@@ -1,4 +1,4 @@
-//! A ball, or an upright capsule, brought to a wanted distance from any form.
+//! Placements of a ball, or an upright capsule, at a given distance from any form.
 
 use nalgebra::Vector3;
 use nearmiss_geometry::Pose;
@@ -8,7 +8,8 @@ use super::place::{Placed, Stream, Wanted};
 use crate::arbitrary::{rotation, unit_vector};
 use crate::shapes::{Form, Primitive};
 
-/// The sphere `b` with its centre q + gap from the form `a`, on a random ray from a random point of `a`.
+/// Places the sphere `b` with its centre q + gap from the form `a`, on a random ray from a random
+/// point of `a`.
 pub(super) fn ball(a: &Form, b: &Form, wanted: Wanted, rng: &mut Stream) -> Option<Placed> {
     let [Primitive::Sphere { radius, .. }] = b.parts[..] else {
         return None;
@@ -18,7 +19,7 @@ pub(super) fn ball(a: &Form, b: &Form, wanted: Wanted, rng: &mut Stream) -> Opti
         .then(|| Placed { pose_b: rotation(rng).with_translation(centre), gap: a.distance(centre) - radius })
 }
 
-/// The capsule `b`, upright, with its segment q + gap from the form `a`.
+/// Places the capsule `b`, upright, with its segment q + gap from the form `a`.
 pub(super) fn avatar(a: &Form, b: &Form, wanted: Wanted, rng: &mut Stream) -> Option<Placed> {
     let [Primitive::Capsule { half, radius }] = b.parts[..] else {
         return None;
@@ -33,7 +34,8 @@ pub(super) fn avatar(a: &Form, b: &Form, wanted: Wanted, rng: &mut Stream) -> Op
     })
 }
 
-/// A point at which `distance` equals `target`, the first on a random ray from a random point of `a`.
+/// Returns the first point with `distance` equal to `target` on a random ray from a random point of
+/// `a`.
 fn approach(a: &Form, target: f64, rng: &mut Stream, distance: impl Fn([f64; 3]) -> f64) -> Option<[f64; 3]> {
     const STRIDES: u32 = 80;
     const HALVINGS: u32 = 60;
@@ -44,8 +46,8 @@ fn approach(a: &Form, target: f64, rng: &mut Stream, distance: impl Fn([f64; 3])
     let start = Vector3::from(part.random_point(rng));
     let direction = Vector3::from(unit_vector(rng));
     let at = |t: f64| -> [f64; 3] { (start + t * direction).into() };
-    // The distance changes by at most one stride a stride; a coarse walk may step over a narrow place, no
-    // harm.
+    // The distance changes by at most one stride a stride. A coarse walk may step over a narrow
+    // place, which does no harm.
     let stride = (0.2 * target).max(0.02);
     let beyond = (1..=STRIDES).map(|k| stride * f64::from(k)).find(|t| distance(at(*t)) >= target)?;
     let (mut low, mut high) = (beyond - stride, beyond);
@@ -61,8 +63,9 @@ fn approach(a: &Form, target: f64, rng: &mut Stream, distance: impl Fn([f64; 3])
     ((distance(found) - target).abs() < 1e-12).then_some(found)
 }
 
-/// For pairs that intersect: whether what is nearest to `x` also reaches as far from it as `reach`, that is
-/// out of B by the depth wanted, so that it crosses B; and is no corner that smoothing may well take away.
+/// Returns `true` for separated pairs. For intersecting ones, the component of `a` nearest to `x`
+/// must extend at least `reach` from `x`, that is out of B by the wanted depth, so that it crosses
+/// B. And its nearest point must not be a corner that smoothing may remove.
 fn is_fair(a: &Form, x: [f64; 3], reach: f64, wanted: Wanted) -> bool {
     /// Smoothing moves a cube's corner by about 0.8 r.
     const CORNER_DEPTH: f64 = 2.0;
@@ -77,8 +80,8 @@ fn is_fair(a: &Form, x: [f64; 3], reach: f64, wanted: Wanted) -> bool {
     crosses && (depth > CORNER_DEPTH * wanted.r || !nearest.is_nearest_at_corner(x))
 }
 
-/// Distance of the upright segment of half length `half` about `middle` to the rectangles of `a`, and the
-/// point of the segment where it is taken.
+/// Returns the distance of the vertical segment of half length `half` about `middle` to the
+/// rectangles of `a`, and the point of the segment at that distance.
 fn segment_distance(a: &Form, middle: [f64; 3], half: f64) -> (f64, [f64; 3]) {
     // (2/3)^80 of the segment is below rounding.
     const CUTS: u32 = 80;

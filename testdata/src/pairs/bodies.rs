@@ -1,11 +1,12 @@
-//! The forms that pairs are made of, with their sizes.
+//! The forms of the pairs, with their sizes.
 
 use crate::shapes::{self, Form};
 
-/// Spacing of nearly everything; radii of curvature are seven times r ≈ 0.07 and more where they can be.
+/// Spacing of nearly all forms; radii of curvature are at least seven times r ≈ 0.07 where
+/// possible.
 const SPACING: f64 = 0.05;
 
-/// r of a square lattice of that spacing, to which distances of plates refer.
+/// r of a square lattice of that spacing, the unit of the distances of plates.
 const LATTICE_R: f64 = SPACING * std::f64::consts::SQRT_2;
 
 /// A form of one size.
@@ -24,7 +25,7 @@ pub(super) enum Body {
     Avatar,
     Grid,
     Field,
-    /// Two sheets, so many [`LATTICE_R`] apart.
+    /// Two sheets, this many [`LATTICE_R`] apart.
     Plates(f64),
 }
 

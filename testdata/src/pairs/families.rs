@@ -1,11 +1,11 @@
-//! The table of families: which bodies, placed how, and why the answer is known.
+//! The table of families: the bodies, their placement, and the reason why the answer is known.
 
 use super::bodies::Body;
 use super::place::{Placed, Stream, Wanted};
 use super::{ball, sheets, spheres};
 use crate::shapes::Form;
 
-/// `None` when the forms or this draw do not allow the gap wanted.
+/// A placement; `None` if the forms or this draw do not allow the wanted gap.
 type Place = fn(&Form, &Form, Wanted, &mut Stream) -> Option<Placed>;
 
 pub(super) struct Family {

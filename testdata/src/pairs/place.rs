@@ -1,18 +1,18 @@
-//! Where B is to go, and where it went.
+//! Placements of B: wanted and actual.
 
 use nearmiss_geometry::Pose;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 pub(super) type Stream = Xoshiro256PlusPlus;
 
-/// The gap to aim at, and the radius it is judged by.
+/// The wanted gap, and the radius by which it is judged.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wanted {
     pub(super) gap: f64,
     pub(super) r: f64,
 }
 
-/// Where B went in A's frame, and the gap there.
+/// The pose of B in A's frame, and the gap there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Placed {
     pub(super) pose_b: Pose,

@@ -1,4 +1,4 @@
-//! Spheres, tori and bowls against their like.
+//! Pairs of two spheres, two tori or two bowls.
 
 use nalgebra::Vector3;
 use nearmiss_geometry::Pose;
@@ -8,7 +8,7 @@ use super::place::{Placed, Stream, Wanted};
 use crate::arbitrary::{rotation, unit_vector};
 use crate::shapes::{Form, Primitive};
 
-/// Radii of two single spheres.
+/// Returns the radii of two single spheres.
 fn spheres(a: &Form, b: &Form) -> Option<[f64; 2]> {
     match (&a.parts[..], &b.parts[..]) {
         ([Primitive::Sphere { radius, .. }], [Primitive::Sphere { radius: q, .. }]) => Some([*radius, *q]),
@@ -16,18 +16,18 @@ fn spheres(a: &Form, b: &Form) -> Option<[f64; 2]> {
     }
 }
 
-/// Two spheres with centres `d` apart, in a random direction, turned at random; any two.
+/// Places any two spheres with centres `d` apart, in a random direction, turned at random.
 fn at_distance([radius, q]: [f64; 2], d: f64, rng: &mut Stream) -> Placed {
     let centre = d * Vector3::from(unit_vector(rng));
     let (outer, inner) = (d - radius - q, (radius - q).abs() - d);
     Placed {
         pose_b: rotation(rng).with_translation(centre.into()),
-        // At most one of the two is positive; both negative: the surfaces cross.
+        // At most one of the two is positive. If both are negative, the surfaces cross.
         gap: outer.max(inner),
     }
 }
 
-/// Keeps a placement only when it has the gap that was aimed at.
+/// Keeps a placement only if it has the wanted gap.
 fn as_wanted(placed: Placed, wanted: Wanted) -> Option<Placed> {
     ((placed.gap - wanted.gap).abs() < 1e-12).then_some(placed)
 }
@@ -55,7 +55,7 @@ fn torus(form: &Form) -> Option<[f64; 2]> {
     }
 }
 
-/// A turn about the z axis by any angle.
+/// Returns a turn about the z axis by any angle.
 fn spin(rng: &mut Stream) -> Pose {
     Pose::from_axis_angle([0.0, 0.0, 1.0], rng.random_range(0.0..std::f64::consts::TAU))
 }
@@ -66,7 +66,8 @@ pub(super) fn linked(a: &Form, _: &Form, wanted: Wanted, rng: &mut Stream) -> Op
     if !(0.0..=major).contains(&e) {
         return None;
     }
-    // B's circle lies in a plane through A's axis; its middle lies on A's circle and is pushed out by e.
+    // B's circle is in a plane through A's axis. Its middle is on A's circle, and is moved outwards
+    // by e.
     let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
     let out = upright.after(&spin(rng)).with_translation([major + e, 0.0, 0.0]);
     Some(Placed { pose_b: spin(rng).after(&out), gap: major - e - 2.0 * minor })
@@ -75,7 +76,7 @@ pub(super) fn linked(a: &Form, _: &Form, wanted: Wanted, rng: &mut Stream) -> Op
 pub(super) fn stacked(a: &Form, _: &Form, wanted: Wanted, rng: &mut Stream) -> Option<Placed> {
     let [_, minor] = torus(a)?;
     let z = 2.0 * minor + wanted.gap;
-    // Nearer, the two surfaces nearly coincide, which is another matter.
+    // Nearer, the two surfaces nearly coincide, which is another case.
     (z >= 3.0 * wanted.r)
         .then(|| Placed { pose_b: spin(rng).with_translation([0.0, 0.0, z]), gap: z - 2.0 * minor })
 }
@@ -84,7 +85,7 @@ pub(super) fn rims(a: &Form, _: &Form, wanted: Wanted, rng: &mut Stream) -> Opti
     let [Primitive::Bowl { radius }] = a.parts[..] else {
         return None;
     };
-    // Less, and the rims nearly coincide.
+    // With less, the rims nearly coincide.
     let e = rng.random_range(0.4..1.0) * radius;
     let over = Pose::from_axis_angle([1.0, 0.0, 0.0], std::f64::consts::PI);
     let pose = over.after(&spin(rng)).with_translation([e, 0.0, wanted.gap]);

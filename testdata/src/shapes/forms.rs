@@ -1,4 +1,4 @@
-//! The forms: what they look like and where they lie. Lengths in one unit throughout.
+//! The forms, their dimensions and positions. Lengths are in one unit throughout.
 
 use nalgebra::Vector3;
 
@@ -6,7 +6,7 @@ use super::form::Form;
 use super::primitive::Primitive;
 
 impl Form {
-    /// Least and greatest coordinates of a box around it.
+    /// Returns the least and greatest coordinates of a box around the primitive.
     pub(super) fn bounds(&self) -> (Vector3<f64>, Vector3<f64>) {
         let all = self.parts.iter().map(Primitive::bounds);
         all.fold(
@@ -44,39 +44,40 @@ fn rectangle(corner: [f64; 3], u: [f64; 3], v: [f64; 3]) -> Primitive {
     Primitive::Rectangle { corner, u, v }
 }
 
-/// A sphere about the origin.
+/// Returns a sphere about the origin.
 #[must_use]
 pub fn sphere(radius: f64) -> Form {
     let centre = [0.0; 3];
     form("sphere", vec![Primitive::Sphere { centre, radius }])
 }
 
-/// A torus about the z axis: a tube of radius `minor` about a circle of radius `major`.
+/// Returns a torus about the z axis: a tube of radius `minor` about a circle of radius `major`.
 #[must_use]
 pub fn torus(major: f64, minor: f64) -> Form {
     form("torus", vec![Primitive::Torus { major, minor }])
 }
 
-/// The half z ≤ 0 of a sphere about the origin: open above, with a rim.
+/// Returns the half z ≤ 0 of a sphere about the origin: open above, with a rim.
 #[must_use]
 pub fn bowl(radius: f64) -> Form {
     form("bowl", vec![Primitive::Bowl { radius }])
 }
 
-/// An upright capsule about the origin, `height` tall with its caps: whoever walks through a building.
+/// Returns an upright capsule about the origin, `height` tall with its caps: an avatar in a
+/// building.
 #[must_use]
 pub fn avatar(height: f64, radius: f64) -> Form {
     let half = 0.5 * height - radius;
     form("avatar", vec![Primitive::Capsule { half, radius }])
 }
 
-/// A rectangle in the plane z = 0 about the origin.
+/// Returns a rectangle in the plane z = 0 about the origin.
 #[must_use]
 pub fn patch(width: f64, depth: f64) -> Form {
     form("patch", vec![level(width, depth, 0.0)])
 }
 
-/// Two patches one above the other at z = ±`distance`/2.
+/// Returns two patches one above the other at z = ±`distance`/2.
 #[must_use]
 pub fn plates(width: f64, depth: f64, distance: f64) -> Form {
     Form {
@@ -89,8 +90,8 @@ fn level(width: f64, depth: f64, z: f64) -> Primitive {
     rectangle([-0.5 * width, -0.5 * depth, z], [width, 0.0, 0.0], [0.0, depth, 0.0])
 }
 
-/// A floor z = 0 for x ≤ 0 and a floor z = `riser` for x ≥ 0, each `tread` deep, joined by the riser x = 0;
-/// `width` wide, y from −`width`/2.
+/// Returns a floor z = 0 for x ≤ 0 and a floor z = `riser` for x ≥ 0, each `tread` deep, joined by
+/// the riser x = 0; `width` wide, y from −`width`/2.
 #[must_use]
 pub fn step(tread: f64, riser: f64, width: f64) -> Form {
     let across = [0.0, width, 0.0];
@@ -105,7 +106,7 @@ pub fn step(tread: f64, riser: f64, width: f64) -> Form {
     )
 }
 
-/// The six faces of a box about the origin.
+/// Returns the six faces of a box about the origin.
 #[must_use]
 pub fn cuboid(extent: [f64; 3]) -> Form {
     let mut parts = Vec::with_capacity(6);
@@ -125,15 +126,16 @@ pub fn cuboid(extent: [f64; 3]) -> Form {
     form("box", parts)
 }
 
-/// Two spheres about the origin, a ball in a hollow ball.
+/// Returns two spheres about the origin, a ball in a hollow ball.
 #[must_use]
 pub fn shells(inner: f64, outer: f64) -> Form {
     let shell = |radius| Primitive::Sphere { centre: [0.0; 3], radius };
     Form { connected: false, ..form("shells", vec![shell(inner), shell(outer)]) }
 }
 
-/// Spheres of one radius that do not touch, on a lattice with `counts` nodes along the axes, from the origin,
-/// every other layer shifted by half a pitch: S0's *spheres*. Apart when `pitch` exceeds 2 `radius`.
+/// Returns spheres of one radius that do not touch, on a lattice with `counts` nodes along the
+/// axes, from the origin. Every other layer is shifted by half a pitch: the *spheres* of Klein &
+/// Zachmann 2004. They are separated if `pitch` exceeds 2 `radius`.
 #[must_use]
 pub fn field(counts: [u8; 3], pitch: f64, radius: f64) -> Form {
     let mut parts = Vec::new();
@@ -150,11 +152,12 @@ pub fn field(counts: [u8; 3], pitch: f64, radius: f64) -> Form {
     Form { connected: false, ..form("field", parts) }
 }
 
-/// Crossing square bars, `thickness` thick, in a square lattice of `n` by `n` nodes `pitch` apart, about the
-/// origin in the plane z = 0: S0's *grid*.
+/// Returns crossing square bars, `thickness` thick, in a square lattice of `n` by `n` nodes `pitch`
+/// apart, about the origin in the plane z = 0: the *grid* of Klein & Zachmann 2004.
 ///
-/// The four faces of each bar run through the bars it crosses, and ends are open, so it is no manifold.
-/// [`Form::spacing_for`] says how to sample it to a wanted number of points (S0 took 197,000).
+/// The four faces of each bar run through the bars it crosses, and ends are open, so it is no
+/// manifold. [`Form::spacing_for`] gives the sampling for a wanted number of points (197,000 in the
+/// paper).
 #[must_use]
 pub fn bars(n: u8, pitch: f64, thickness: f64) -> Form {
     let length = f64::from(n) * pitch;
@@ -177,11 +180,12 @@ pub fn bars(n: u8, pitch: f64, thickness: f64) -> Form {
     form("bars", parts)
 }
 
-/// Two storeys 2.4 high, 4 by 3 wide, z up from 0: two floors, two outer walls, on the lower floor a wall
-/// with a door, and a staircase of two flights with a landing between them. The other two sides and the top
-/// are open.
+/// Returns a building of two storeys, each 2.4 high, 4 by 3 wide, z up from 0. It has two floors,
+/// two outer walls, on the lower floor a wall with a door, and a staircase of two flights with a
+/// landing between them. The other two sides and the top are open.
 ///
-/// Steps are 0.4 high and 0.6 deep, coarser than people's, so that some thousand points can show them.
+/// Steps are 0.4 high and 0.6 deep, coarser than real ones, so that some thousand points can
+/// represent them.
 #[must_use]
 pub fn building() -> Form {
     const STOREY: f64 = 2.4;
@@ -192,7 +196,7 @@ pub fn building() -> Form {
     let y = |l: f64| [0.0, l, 0.0];
     let z = |l: f64| [0.0, 0.0, l];
     let mut parts = vec![
-        // Lower floor; upper floor beside the well of the stairs, which lies at x 0 to 2, y 1 to 3.
+        // Lower floor; upper floor beside the stairwell, which is at x 0 to 2, y 1 to 3.
         rectangle([0.0; 3], x(4.0), y(3.0)),
         rectangle([0.0, 0.0, STOREY], x(4.0), y(WELL)),
         rectangle([2.0, WELL, STOREY], x(2.0), y(3.0 - WELL)),

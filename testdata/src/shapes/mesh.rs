@@ -1,4 +1,4 @@
-//! Triangles for a form: what an exact test of polygons is asked about.
+//! Triangles for a form: the input of exact tests of polygons.
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,11 +10,12 @@ use super::{Form, Shape};
 use crate::oracle::count;
 
 impl Form {
-    /// The form as triangles with edges of about `edge` where it is curved, whose corners lie on it;
-    /// rectangles are two each. Its parts are not cut where they cross, and share no corners.
+    /// Returns the form as triangles with edges of about `edge` where it is curved, whose corners
+    /// are on it. Each rectangle is two triangles. Parts are not cut where they cross, and share no
+    /// corners.
     ///
     /// # Panics
-    /// When there are 2³² corners.
+    /// If there are 2³² corners.
     #[must_use]
     pub fn tessellated(&self, edge: f64) -> TriangleMesh {
         let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
@@ -37,7 +38,7 @@ impl Form {
 }
 
 impl Shape {
-    /// As [`Form::tessellated`], with edges as long as the samples are apart.
+    /// Returns the same as [`Form::tessellated`], with edges as long as the samples are apart.
     #[must_use]
     pub fn tessellated(&self) -> TriangleMesh {
         self.form.tessellated(self.sampling.spacing)
@@ -45,7 +46,7 @@ impl Shape {
 }
 
 impl Primitive {
-    /// Into how many cells `s` and `t` of [`Self::at`] are divided.
+    /// Returns the numbers of cells into which `s` and `t` of [`Self::at`] are divided.
     fn cells(&self, edge: f64) -> (usize, usize) {
         let around = |radius: f64| steps(TAU * radius, edge).max(3);
         match *self {
@@ -57,7 +58,7 @@ impl Primitive {
         }
     }
 
-    /// Its point with these parameters, which run from 0 to 1.
+    /// Returns the point with these parameters, which run from 0 to 1.
     fn at(&self, [s, t]: [f64; 2]) -> Vector3<f64> {
         let turned =
             |tilt: f64| Vector3::new(tilt.cos() * (TAU * s).cos(), tilt.cos() * (TAU * s).sin(), tilt.sin());
@@ -103,7 +104,7 @@ mod tests {
                     assert!(form.distance(p.into()) < 1e-12, "{}: a corner off it", form.name);
                 }
                 let middle = (a + b + c) / 3.0;
-                // The height of an arc over its chord, of the smallest radius here.
+                // The height of an arc over its chord, for the smallest radius here.
                 let off = form.distance(middle.into());
                 assert!(off < edge * edge / 0.3, "{}: {off} off", form.name);
             }

@@ -1,4 +1,4 @@
-//! The surfaces that forms are made of: distance, evenly spread points with normals, and ends.
+//! The surfaces that make up forms: distance, evenly spread points with normals, and ends.
 
 use std::f64::consts::{PI, TAU};
 
@@ -25,12 +25,12 @@ pub enum Primitive {
     },
     /// A torus about the z axis through the origin.
     Torus {
-        /// Radius of the circle in its middle.
+        /// Radius of the central circle.
         major: f64,
         /// Radius of the tube, less than `major`.
         minor: f64,
     },
-    /// Everything at one distance from the segment (0, 0, ±`half`).
+    /// All points at one distance from the segment (0, 0, ±`half`).
     Capsule {
         /// Half the length of the segment.
         half: f64,
@@ -41,9 +41,9 @@ pub enum Primitive {
     Rectangle {
         /// A corner.
         corner: [f64; 3],
-        /// One edge from there.
+        /// The first edge, from the corner.
         u: [f64; 3],
-        /// The other, perpendicular to `u`.
+        /// The second edge, perpendicular to `u`.
         v: [f64; 3],
     },
 }
@@ -52,7 +52,7 @@ pub enum Primitive {
 pub(super) type Oriented = (Vector3<f64>, Vector3<f64>);
 
 impl Primitive {
-    /// Distance of `x` to the nearest point of it.
+    /// Returns the distance of `x` to the nearest point.
     #[must_use]
     pub fn distance(&self, x: [f64; 3]) -> f64 {
         let p = Vector3::from(x);
@@ -72,7 +72,7 @@ impl Primitive {
         }
     }
 
-    /// Whether the nearest point to `x` is a corner of a rectangle.
+    /// Returns `true` if the nearest point to `x` is a corner of a rectangle.
     pub(crate) fn is_nearest_at_corner(&self, x: [f64; 3]) -> bool {
         let Self::Rectangle { corner, u, v } = *self else {
             return false;
@@ -80,7 +80,7 @@ impl Primitive {
         foot(x, corner, u, v).iter().all(|s| *s <= 0.0 || *s >= 1.0)
     }
 
-    /// Distance from `x` to some point of it that is far away, if not the farthest.
+    /// Returns the distance from `x` to a far point of the primitive, not necessarily the farthest.
     pub(crate) fn reach(&self, x: [f64; 3]) -> f64 {
         let p = Vector3::from(x);
         match *self {
@@ -96,7 +96,7 @@ impl Primitive {
         }
     }
 
-    /// Its area.
+    /// Returns the area.
     #[must_use]
     pub fn area(&self) -> f64 {
         match *self {
@@ -108,7 +108,7 @@ impl Primitive {
         }
     }
 
-    /// A point of it, uniform by area.
+    /// Returns a random point, uniform by area.
     pub fn random_point<R: Rng>(&self, rng: &mut R) -> [f64; 3] {
         self.random_oriented(rng).0.into()
     }
@@ -125,7 +125,7 @@ impl Primitive {
                 (radius * n, n)
             }
             Self::Torus { major, minor } => loop {
-                // Area goes with the distance from the axis.
+                // Area is proportional to the distance from the axis.
                 let tube = rng.random_range(0.0..TAU);
                 let axis_distance = major + minor * tube.cos();
                 if rng.random_range(0.0..major + minor) < axis_distance {
@@ -149,7 +149,7 @@ impl Primitive {
         }
     }
 
-    /// Points about `spacing` apart in a regular pattern, [`Primitive::end`] included.
+    /// Returns points about `spacing` apart in a regular pattern, [`Primitive::end`] included.
     pub(super) fn regular(&self, spacing: f64) -> Vec<Oriented> {
         match *self {
             Self::Sphere { centre, radius } => {
@@ -195,7 +195,8 @@ impl Primitive {
         }
     }
 
-    /// Points about `spacing` apart on the line where the surface ends; none where it has no end.
+    /// Returns points about `spacing` apart on the line where the surface ends; none if it has no
+    /// end.
     pub(super) fn end(&self, spacing: f64) -> Vec<Oriented> {
         match *self {
             Self::Bowl { radius } => {
@@ -215,7 +216,7 @@ impl Primitive {
     }
 }
 
-/// Where on a rectangle the nearest point to `x` lies, in units of its edges.
+/// Returns the position on a rectangle of the nearest point to `x`, in units of its edges.
 fn foot(x: [f64; 3], corner: [f64; 3], u: [f64; 3], v: [f64; 3]) -> [f64; 2] {
     let d = Vector3::from(x) - Vector3::from(corner);
     [u, v].map(|edge| {
@@ -228,7 +229,7 @@ fn length(v: [f64; 3]) -> f64 {
     Vector3::from(v).norm()
 }
 
-/// How many steps of about `spacing` make `length`, at least one.
+/// Returns the number of steps of about `spacing` in `length`, at least one.
 pub(super) fn steps(length: f64, spacing: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
     let n = (length / spacing).round().max(1.0) as usize;
@@ -246,7 +247,8 @@ pub(super) fn torus_point(major: f64, minor: f64, turn: f64, tube: f64) -> Orien
     (major * outwards + minor * n, n)
 }
 
-/// Unit vectors with z from `low` to `high` on a Fibonacci spiral, as many as `spacing` asks on `area`.
+/// Returns unit vectors with z from `low` to `high` on a Fibonacci spiral, with the given `spacing`
+/// on `area`.
 fn spiral(area: f64, spacing: f64, low: f64, high: f64) -> impl Iterator<Item = Vector3<f64>> {
     let golden = PI * (3.0 - 5.0_f64.sqrt());
     let n = steps(area, spacing * spacing);
@@ -258,8 +260,8 @@ fn spiral(area: f64, spacing: f64, low: f64, high: f64) -> impl Iterator<Item = 
     })
 }
 
-/// Points on `rows` circles; `row` gives a circle's radius and its point at an angle. Every other row is
-/// turned by half a step.
+/// Returns points on `rows` circles; `row` gives a circle's radius and its point at an angle. Every
+/// other row is turned by half a step.
 fn rings<F: Fn(f64) -> Oriented>(
     rows: usize,
     spacing: f64,

@@ -1,4 +1,4 @@
-//! How points are taken from a form, and the radius by which answers are scored.
+//! Sampling of forms, and the radius by which answers are scored.
 
 use nalgebra::Vector3;
 
@@ -7,37 +7,38 @@ use super::primitive::{Oriented, Primitive};
 use crate::arbitrary::{gaussian, rng};
 use crate::oracle;
 
-/// Whether samples follow a pattern.
+/// The order of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
     /// Lattices, rings and Fibonacci spirals.
     Regular,
-    /// Thrown darts that keep three quarters of the spacing from each other.
+    /// Dart throwing: points that keep three quarters of the spacing from each other.
     Random,
 }
 
-/// How to sample a form.
+/// Parameters of a sampling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sampling {
-    /// About the square root of the area a point stands for, in the form's unit.
+    /// Approximate square root of the area of a point, in the form's unit.
     pub spacing: f64,
     /// Standard deviation of the noise along the normal, as a share of `spacing`.
     pub noise: f64,
     /// Regular or random.
     pub order: Order,
-    /// Everything random depends on it.
+    /// Seed of all random choices.
     pub seed: u64,
 }
 
 impl Sampling {
-    /// Regular, without noise.
+    /// Returns a regular sampling without noise.
     #[must_use]
     pub fn clean(spacing: f64) -> Self {
         Self { spacing, noise: 0.0, order: Order::Regular, seed: 0 }
     }
 }
 
-/// Points of another part nearer than this share of the spacing are the same point of a shared edge.
+/// Points of another part nearer than this share of the spacing are the same point of a shared
+/// edge.
 const SAME: f64 = 0.25;
 
 pub(super) fn points(form: &Form, sampling: &Sampling) -> Vec<[f64; 3]> {
@@ -67,9 +68,10 @@ pub(super) fn points(form: &Form, sampling: &Sampling) -> Vec<[f64; 3]> {
     noisy.collect()
 }
 
-/// The end of a part evenly, then darts that keep their distance until there are enough or no room.
+/// Returns points on the end of a part, evenly, then darts that keep their distance, until there
+/// are enough or no more fit.
 fn darts(form: &Form, part: &Primitive, sampling: &Sampling, rng: &mut impl rand::Rng) -> Vec<Oriented> {
-    /// Three quarters of the spacing leaves room for one point per spacing² after some ten darts each.
+    /// With three quarters of the spacing, one point per spacing² fits after some ten darts each.
     const KEEP: f64 = 0.75;
     const DARTS_EACH: f64 = 15.0;
     let mut kept = part.end(sampling.spacing);
@@ -90,7 +92,7 @@ fn darts(form: &Form, part: &Primitive, sampling: &Sampling, rng: &mut impl rand
     kept
 }
 
-/// Cells one spacing wide, so that what is nearer than that lies in the 27 cells around.
+/// Cells one spacing wide, so that all points nearer than that are in the 27 cells around.
 struct Cells {
     origin: Vector3<f64>,
     width: f64,
@@ -138,12 +140,12 @@ impl Cells {
     }
 }
 
-/// The radius r of scoring: the 0.9-quantile, over all points, of the distance to the 6th nearest other
-/// distinct point, in the unit of the points. Nothing is smoothed and no rank grows, unlike
-/// [`oracle::radii`].
+/// Returns the radius r of scoring: the 0.9-quantile, over all points, of the distance to the 6th
+/// nearest other distinct point, in the unit of the points. Nothing is smoothed and no rank grows,
+/// unlike in [`oracle::radii`].
 ///
 /// # Panics
-/// When there are not at least seven distinct points.
+/// If there are fewer than seven distinct points.
 #[must_use]
 pub fn scorer_radius(points: &[[f64; 3]]) -> f64 {
     let mut sorted: Vec<Vector3<f64>> = points.iter().map(|&p| p.into()).collect();

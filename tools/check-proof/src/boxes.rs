@@ -1,14 +1,15 @@
-//! Whether two placed boxes are apart, proven.
+//! Proofs that two placed boxes are disjoint.
 //!
-//! A direction is looked for in floating point, any one will do; that it parts the boxes is then shown in
-//! intervals. A box is exactly the set of `centre + Σ t_k axes_k` with `|t_k| ≤ half_k`, whatever the axes.
+//! A separating direction is searched in floating point; any direction is valid. That it separates
+//! the boxes is then shown in intervals. A box is exactly the set of `centre + Σ t_k axes_k` with
+//! `|t_k| ≤ half_k`, for any axes.
 
 use crate::interval::{Interval, dot};
 use crate::proof::{Enclosure, Matrix};
 
 type Vector = [f64; 3];
 
-/// A box in the world: bounds of its exact place, and about where it is.
+/// A box in the world: bounds of its exact place, and its approximate place.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placed {
     centre: [Interval; 3],
@@ -19,7 +20,7 @@ pub(crate) struct Placed {
 }
 
 impl Placed {
-    /// The box of `enclosure` where `matrix` puts it.
+    /// Returns the box of `enclosure` transformed by `matrix`.
     pub(crate) fn new(enclosure: &Enclosure, matrix: &Matrix) -> Self {
         let row = |i: usize| [0, 1, 2].map(|j| Interval::new(matrix[4 * i + j]));
         let exact = |v: [f32; 3]| v.map(|x| Interval::new(f64::from(x)));
@@ -33,7 +34,7 @@ impl Placed {
         Self { centre, axes, half: enclosure.half.map(f64::from), about, directions }
     }
 
-    /// The point of this stored position where `matrix` puts it.
+    /// Returns a stored position transformed by `matrix`.
     pub(crate) fn point(position: [f32; 3], matrix: &Matrix) -> Self {
         Self::new(
             &Enclosure { first: 0, count: 1, centre: position, half: [0.0; 3], axes: [[0.0; 3]; 3] },
@@ -41,20 +42,20 @@ impl Placed {
         )
     }
 
-    /// About how far the box extends from its centre along `d`.
+    /// Returns approximately how far the box extends from its centre along `d`.
     fn extent(&self, d: Vector) -> f64 {
         (0..3).map(|k| self.half[k] * times(d, self.directions[k]).abs()).sum()
     }
 
-    /// A bound of how far it does.
+    /// Returns a bound of how far the box extends from its centre along `d`.
     fn greatest_extent(&self, d: [Interval; 3]) -> Interval {
         let along = |k: usize| Interval::new(self.half[k]) * dot(d, self.axes[k]).magnitude();
         along(0) + along(1) + along(2)
     }
 }
 
-/// About how far apart two boxes are along the direction tried, if it is proven that they are disjoint and at
-/// least `wanted` apart.
+/// Returns the approximate distance of two boxes along the direction tried, if they are proven to
+/// be at least `wanted` apart.
 pub(crate) fn distance(a: &Placed, b: &Placed, wanted: f64) -> Option<f64> {
     let mut candidates = normals(a, b);
     let apart = minus(a.about, b.about);
@@ -67,8 +68,9 @@ pub(crate) fn distance(a: &Placed, b: &Placed, wanted: f64) -> Option<f64> {
     proven.or_else(|| distance_along(a, b, between_nearest(a, b), wanted))
 }
 
-/// About how far two sets of balls are apart, if it is proven that they are disjoint and at least `wanted`
-/// apart: of each its centre, or a box of which every place is a centre, and the radius.
+/// Returns the approximate distance of two sets of balls, if they are proven to be at least
+/// `wanted` apart. A ball is given by its centre, or by a box of which every place is a centre, and
+/// by its radius.
 pub(crate) fn distance_of_balls(a: &[(Placed, f64)], b: &[(Placed, f64)], wanted: f64) -> Option<f64> {
     let mut least = f64::INFINITY;
     for (p, of_a) in a {
@@ -81,7 +83,7 @@ pub(crate) fn distance_of_balls(a: &[(Placed, f64)], b: &[(Placed, f64)], wanted
     Some(least)
 }
 
-/// What `direction`, of any length, proves.
+/// Returns the distance that `direction`, of any length, proves.
 fn distance_along(a: &Placed, b: &Placed, direction: Vector, wanted: f64) -> Option<f64> {
     let d = direction.map(Interval::new);
     let apart = [0, 1, 2].map(|k| a.centre[k] - b.centre[k]);
@@ -92,7 +94,7 @@ fn distance_along(a: &Placed, b: &Placed, direction: Vector, wanted: f64) -> Opt
     holds.then(|| between.low / length.high)
 }
 
-/// The face normals of both boxes and the common normals of their edges.
+/// Returns the face normals of both boxes and the common normals of their edges.
 fn normals(a: &Placed, b: &Placed) -> Vec<Vector> {
     let mut normals = Vec::with_capacity(16);
     for box_ in [a, b] {
@@ -105,8 +107,9 @@ fn normals(a: &Placed, b: &Placed) -> Vec<Vector> {
     normals
 }
 
-/// About the vector from the point of b nearest to a, to the point of a nearest to b: least squares in the
-/// six parameters of the two boxes, one after the other within its bounds, over and over.
+/// Returns approximately the vector from the point of b nearest to a, to the point of a nearest to
+/// b. Minimises the square of its length in the six parameters of the two boxes, one after the
+/// other within its bounds, repeatedly.
 fn between_nearest(a: &Placed, b: &Placed) -> Vector {
     const SWEEPS: usize = 300;
     let mut between = minus(a.about, b.about);
@@ -119,7 +122,7 @@ fn between_nearest(a: &Placed, b: &Placed) -> Vector {
             let step = -times(axis, between) / times(axis, axis);
             let moved = (parameters[k] + step).clamp(-bound(k), bound(k));
             let step = moved - parameters[k];
-            // No step where an axis has no length.
+            // No step where an axis has length zero.
             if step.is_finite() {
                 parameters[k] = moved;
                 between = [0, 1, 2].map(|i| between[i] + step * axis[i]);
@@ -148,7 +151,7 @@ mod tests {
 
     const AXES: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-    /// A matrix that turns about the axes z, then x, and shifts.
+    /// Returns a matrix that turns about the axes z, then x, and shifts.
     fn matrix(turn: [f64; 2], shift: Vector) -> Matrix {
         let [(s, c), (t, d)] = turn.map(f64::sin_cos);
         let [x, y, z] = shift;
@@ -182,7 +185,7 @@ mod tests {
             #[expect(clippy::cast_possible_truncation, reason = "any number will do")]
             let mut half = || [(); 3].map(|()| number().abs() as f32);
             let halves = [half(), half()];
-            // A point of either box; b is moved so that they meet there.
+            // A point of either box; b is moved so that the two points coincide.
             let a = placed(halves[0], turns[0], [0.0; 3]);
             let centred = placed(halves[1], turns[1], [0.0; 3]);
             let mut inside = |p: &Placed| {
@@ -198,7 +201,7 @@ mod tests {
     #[test]
     fn edges_and_corners_are_parted_too() {
         let quarter = std::f64::consts::FRAC_PI_4;
-        // Two edges across each other: only their common normal parts them.
+        // Two edges across each other: only their common normal separates them.
         let a = placed([0.5; 3], [quarter, 0.0], [0.0; 3]);
         let b =
             Placed::new(&Enclosure { first: 0, count: 1, centre: [0.0; 3], half: [0.5; 3], axes: AXES }, &{
@@ -208,12 +211,13 @@ mod tests {
         let exact = 1.5 - 2.0_f64.sqrt();
         assert!((distance(&a, &b, 0.0).unwrap() / exact - 1.0).abs() < 1e-12);
         assert!(distance(&a, &b, exact * (1.0 + 1e-12)).is_none());
-        // Two corners towards each other: no normal of either tells how far apart they are.
+        // Two corners towards each other: no normal of either box gives their distance.
         let (corner, further) = (placed([0.5; 3], [0.0; 2], [0.0; 3]), placed([0.5; 3], [0.0; 2], [2.0; 3]));
         let exact = 3.0_f64.sqrt();
         assert!(distance(&corner, &further, exact * (1.0 - 1e-12)).is_some());
         assert!(distance(&corner, &further, exact * (1.0 + 1e-12)).is_none());
-        // The same without symmetry; the point 0.5 0.5 0.5 is nearest to (2.5, 1.3, 0.9) and its box.
+        // The same without symmetry; the point 0.5 0.5 0.5 is nearest to (2.5, 1.3, 0.9) and its
+        // box.
         let further = placed([0.5; 3], [0.0; 2], [3.0, 1.8, 1.4]);
         let exact = (2.0_f64 * 2.0 + 0.8 * 0.8 + 0.4 * 0.4).sqrt();
         assert!(distance(&corner, &further, exact * (1.0 - 1e-9)).is_some());

@@ -1,4 +1,4 @@
-//! Whether what a line of a proof claims holds.
+//! Checks of the claims of a line of a proof.
 
 use crate::boxes::{Placed, distance, distance_of_balls};
 use crate::cover::{Rectangle, uncovered};
@@ -7,56 +7,56 @@ use crate::proof::{Enclosure, Line, Matrix, Poses, Semantics, Verdict};
 use crate::subject::Subject;
 use crate::witness;
 
-/// A pose may be mended by so many sampling radii, as the command line does.
+/// The greatest correction of a pose, in sampling radii, as in the command line.
 const MENDED: f64 = 0.1;
 
-/// What rounding may do to a residual, in bandwidths.
+/// Rounding error of a residual, in bandwidths.
 const RESIDUAL: f64 = 1e-5;
 
-/// What it may do to a distance in the world, relatively.
+/// Relative rounding error of a distance in the world.
 const ROUNDING: f64 = 1e-6;
 
-/// Nodes of at most so many points are also looked at point by point.
+/// Nodes of at most this many points are also checked point by point.
 const POINT_BY_POINT: u32 = 64;
 
-/// What a line claims.
+/// The claim of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Separated,
     Intersecting,
-    /// An estimate, or nothing.
+    /// An estimate, or no claim.
     Unproven,
 }
 
-/// What was found of a line.
+/// The findings of a line.
 #[derive(Debug, Clone)]
 pub(crate) struct Finding {
     pub(crate) kind: Kind,
     pub(crate) faults: Vec<String>,
-    /// Pairs of nodes seen to be apart.
+    /// Node pairs proven to be disjoint.
     pub(crate) pairs: usize,
-    /// Of these, those whose points show it.
+    /// Number of these pairs that are proven by their points.
     pub(crate) by_points: usize,
-    /// The greatest part of what could be proven of a pair that the gap claims.
+    /// The greatest ratio of the claimed gap to the proven distance of a pair.
     pub(crate) claimed: f64,
-    /// Whether the witness lies between two surfaces nearer than the margin, not on both.
+    /// `true` if the witness is between two surfaces nearer than the margin, not on both.
     pub(crate) between: bool,
     /// The greater |f| at the witness, in bandwidths.
     pub(crate) off: f64,
-    /// Whether a condition of a surface holds at the witness only up to rounding.
+    /// `true` if a condition of a surface holds at the witness only up to rounding.
     pub(crate) on_the_brink: bool,
-    /// How far the poses were mended, in sampling radii.
+    /// The correction of the poses, in sampling radii.
     pub(crate) mended: f64,
 }
 
-/// The scans that a proof is about, and the poses they were asked in, if known.
+/// The scans of a proof, and the poses of the queries, if known.
 pub(crate) struct Checker<'a> {
     pub(crate) subjects: [&'a Subject; 2],
     pub(crate) poses: Option<&'a Poses>,
 }
 
 impl Checker<'_> {
-    /// Checks all that `line` claims.
+    /// Checks all claims of `line`.
     pub(crate) fn check(&self, line: &Line) -> Finding {
         let kind = match line.verdict {
             Verdict::Separated if line.is_certified() => Kind::Separated,
@@ -87,7 +87,7 @@ impl Checker<'_> {
         finding
     }
 
-    /// Both placements are poses, and those asked for.
+    /// Checks that both placements are poses, and those of the query.
     fn placements(&self, line: &Line, finding: &mut Finding) -> Result<[Placement; 2], String> {
         let asked = self.poses.map(|poses| poses.get(&line.query).ok_or("no such line among the poses"));
         let asked: Option<&[Matrix; 2]> = asked.transpose()?;
@@ -95,8 +95,7 @@ impl Checker<'_> {
             let placement = Placement::new(matrix).map_err(|e| format!("{name}: {e}"))?;
             if let Some(poses) = asked {
                 let Subject { scan, bounds, .. } = self.subjects[i];
-                // Of one stored unit is the placement's scale, of one unit of the caller's less by the
-                // frame's.
+                // From the caller's units to stored units, then to the world.
                 let radius = scan.sampling_radius() / scan.frame().scale * placement.scale;
                 let moved = placement.moved(&poses[i], scan.frame(), *bounds) / radius;
                 finding.mended = finding.mended.max(moved);
@@ -109,8 +108,8 @@ impl Checker<'_> {
         Ok([place(0, "placed_a", &line.placed_a)?, place(1, "placed_b", &line.placed_b)?])
     }
 
-    /// The pairs cover all pairs of points, their nodes are the scans', and their enclosures are far enough
-    /// apart.
+    /// Checks that the pairs cover all pairs of points, that their nodes are those of the scans,
+    /// and that their enclosures are far enough apart.
     fn separated(
         &self,
         line: &Line,
@@ -161,8 +160,9 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// About how far the obstacles of a pair of nodes are apart, if their points show that it is at least
-    /// `wanted`: the balls about the points of either, or of both, in which the obstacle lies.
+    /// Returns the approximate distance of the obstacles of a node pair, if their points prove that
+    /// it is at least `wanted`. The proof uses the balls about the points of either node, or of
+    /// both, that contain the obstacle.
     fn by_points(
         &self,
         line: &Line,
@@ -191,8 +191,8 @@ impl Checker<'_> {
         one.or_else(other).or_else(both)
     }
 
-    /// The witness lies on both surfaces; or, if these count as meeting from a margin on, points of either
-    /// are so near to it that they are nearer to each other than the margin.
+    /// Checks that the witness is on both surfaces. With a margin, points of either surface near
+    /// the witness may be within the margin of each other instead.
     fn intersecting(
         &self,
         line: &Line,
@@ -235,8 +235,9 @@ impl Checker<'_> {
         Ok(())
     }
 
-    /// The witness lies in both obstacles, or together no further from them than the margin: on the surface
-    /// in a cell, in a ball, or at a measured point.
+    /// Checks that the witness is in both obstacles, or that its distances from both sum to at most
+    /// the margin. It is in an obstacle if it is on the surface in a cell, in a ball, or at a
+    /// measured point.
     fn obstacles_meet(
         &self,
         line: &Line,
@@ -275,7 +276,7 @@ impl Checker<'_> {
             ));
         }
         if let [a, b] = on_surfaces[..] {
-            // Of balls the residual is half the distance of the points.
+            // For balls the residual is half the distance of the points.
             let residual = a.residual.max(b.residual);
             if (residual - claimed).abs() > RESIDUAL * a.bandwidth.max(b.bandwidth) {
                 return Err(format!("the residual is {residual:.2e}, not {claimed:.2e}"));

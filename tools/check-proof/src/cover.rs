@@ -1,17 +1,17 @@
-//! Whether rectangles cover a square of pairs of points. Nothing is assumed of them: they may overlap, nest,
-//! leave it.
+//! Coverings of a rectangle of pairs of points by rectangles. Nothing is assumed about these: they
+//! may overlap, nest or leave it.
 
 use std::ops::Range;
 
-/// The pairs of some of a's points with some of b's.
+/// The pairs of a range of a's points with a range of b's.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Rectangle {
     pub(crate) a: Range<u64>,
     pub(crate) b: Range<u64>,
 }
 
-/// A pair of points below `size` that lies in none of `rectangles`: a line sweeps over a's points, a tree of
-/// counters tells whether the rectangles that it cuts cover b's.
+/// Returns a pair of points below `size` that is in none of `rectangles`. A line sweeps over a's
+/// points; a tree of counters tells if the rectangles that it cuts cover b's points.
 pub(crate) fn uncovered(rectangles: &[Rectangle], size: [u64; 2]) -> Option<[u64; 2]> {
     let rectangles = rectangles.iter().filter(|r| !r.a.is_empty() && !r.b.is_empty());
     // Where a rectangle starts or ends along a, and its extent along b.
@@ -44,11 +44,12 @@ pub(crate) fn uncovered(rectangles: &[Rectangle], size: [u64; 2]) -> Option<[u64
     None
 }
 
-/// How many rectangles cover each of some slots: counts stand at the fewest nodes that make up a range.
+/// The number of rectangles that cover each slot of a row. Counts are stored at the fewest nodes
+/// that make up a range.
 struct Counters {
     slots: usize,
     count: Vec<u32>,
-    /// Whether all slots below the node are covered, by counts at the node or below.
+    /// `true` if counts at the node or below cover all slots below the node.
     full: Vec<bool>,
 }
 
@@ -103,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_missing_rectangle_is_found() {
-        // A pinwheel: no guillotine cut parts it.
+        // A pinwheel: no guillotine cut separates it.
         let pinwheel = [[0, 6, 0, 3], [6, 9, 0, 6], [3, 9, 6, 9], [0, 3, 3, 9], [3, 6, 3, 6]].map(rectangle);
         assert_eq!(uncovered(&pinwheel, [9, 9]), None);
         for missing in 0..5 {

@@ -1,8 +1,8 @@
 //! Intervals of doubles that contain the exact results of sums and products.
 //!
-//! The rounding error of a sum, and of a product that does not underflow, is a double itself. Its sign tells
-//! which of value and neighbour bounds the exact result, so what is exact stays a point and touching is not
-//! overlapping.
+//! The rounding error of a sum, and of a product that does not underflow, is a double itself. Its
+//! sign tells on which side of the rounded value the exact result is. So exact results remain
+//! points, and touching is not overlapping.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -13,16 +13,16 @@ pub(crate) struct Interval {
     pub(crate) high: f64,
 }
 
-/// Below this the error of a product may be too small for a double.
+/// Below this, the error of a product may be too small for a double.
 const UNDERFLOW: f64 = 1e-280;
 
 impl Interval {
-    /// A double is itself; no number could be anything.
+    /// Returns a double as an interval; NaN gives all numbers.
     pub(crate) fn new(x: f64) -> Self {
         Self::spanned(x, x)
     }
 
-    /// From `low` to `high`; everything if either is no number.
+    /// Returns the interval from `low` to `high`; all numbers if either is NaN.
     fn spanned(low: f64, high: f64) -> Self {
         if low.is_nan() || high.is_nan() {
             return Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
@@ -40,7 +40,7 @@ impl Interval {
         }
     }
 
-    /// The square root of what is not negative; square roots are rounded correctly.
+    /// Returns the square root of non-negative numbers; square roots are rounded correctly.
     pub(crate) fn root(self) -> Self {
         Self::spanned(self.low.max(0.0).sqrt().next_down().max(0.0), self.high.max(0.0).sqrt().next_up())
     }
@@ -78,19 +78,20 @@ impl Mul for Interval {
     }
 }
 
-/// a·b for vectors.
+/// Returns a·b for vectors.
 pub(crate) fn dot(a: [Interval; 3], b: [Interval; 3]) -> Interval {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Bounds of a + b; the error is Knuth's.
+/// Returns bounds of a + b; the error is Knuth's.
 fn sum(a: f64, b: f64) -> [f64; 2] {
     let sum = a + b;
     let part = sum - a;
     bracket(sum, (a - (sum - part)) + (b - part))
 }
 
-/// Bounds of a · b; an endless bound times zero is zero, as no number between is endless.
+/// Returns bounds of a · b. An infinite bound times zero is zero, because no number in the interval
+/// is infinite.
 fn product(a: f64, b: f64) -> [f64; 2] {
     if a == 0.0 || b == 0.0 {
         return [0.0; 2];
@@ -100,7 +101,8 @@ fn product(a: f64, b: f64) -> [f64; 2] {
     bracket(product, error)
 }
 
-/// Bounds of what was rounded to `value`, given the sign of what is missing from it, or no number if unknown.
+/// Returns bounds of a number that was rounded to `value`. The sign of `missing` is that of the
+/// error; NaN if it is unknown.
 fn bracket(value: f64, missing: f64) -> [f64; 2] {
     let low = if missing >= 0.0 { value } else { value.next_down() };
     let high = if missing <= 0.0 { value } else { value.next_up() };
@@ -112,7 +114,7 @@ mod tests {
     use super::*;
     use crate::sample::Source;
 
-    /// An integer of at most 53 bits, often a short one.
+    /// Returns an integer of at most 53 bits, often a short one.
     fn integer(source: &mut Source) -> i64 {
         let bits = source.next() % 53 + 1;
         let size = i64::try_from(source.next() >> (64 - bits)).unwrap();

@@ -1,12 +1,13 @@
 //! Checks the proofs of `nearmiss collide --prove` with none of the code that found them.
 //!
-//! * Apart: the pairs of nodes cover all pairs of points, and their enclosures are apart, in interval
-//!   arithmetic; or, of obstacles, the balls about their points in which the obstacle lies.
-//! * Intersecting: the witness is a zero of both functions, summed over all points in double precision; of
-//!   obstacles a zero in a cell, a place in a ball, or a measured point.
-//! * Of each scan: a million points of its surface lie in the enclosures of the nodes of their nearest
-//!   points, and so do those in cells, and the balls, in the enclosures of the obstacle. That is a trial, not
-//!   a proof; the proofs are docs/theory/certificates.md and docs/theory/obstacle.md.
+//! * Separated: the node pairs cover all pairs of points, and their enclosures are disjoint, in
+//!   interval arithmetic. For obstacles, the balls about their points that contain the obstacle may
+//!   be disjoint instead.
+//! * Intersecting: the witness is a zero of both functions, summed over all points in double
+//!   precision. For obstacles, it is a zero in a cell, a place in a ball, or a measured point.
+//! * Each scan: a million points of its surface are in the enclosures of the nodes of their nearest
+//!   points; those in cells, and the balls, are in the enclosures of the obstacle. This is a test,
+//!   not a proof; the proofs are in docs/theory/certificates.md and docs/theory/obstacle.md.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 mod boxes;
@@ -42,34 +43,34 @@ use surface::Sampled;
 /// Lines that are read before they are checked, on all threads.
 const BATCH: usize = 256;
 
-/// Faults that are named.
+/// The maximum number of faults that are printed.
 const NAMED: usize = 10;
 
-/// Check what `nearmiss collide A B --prove PROOF` wrote; exit status 0 only if everything holds
+/// Check the output of `nearmiss collide A B --prove PROOF`; exit status 0 only if everything holds
 #[derive(Debug, Parser)]
 #[command(name = "check-proof")]
 struct Args {
-    /// The file that `--prove` named
+    /// The file written by `--prove`
     proof: PathBuf,
-    /// The one scan: prepared, or a raw input, prepared on the fly
+    /// The first scan: preprocessed, or a raw input, preprocessed on the fly
     a: PathBuf,
-    /// The other scan
+    /// The second scan
     b: PathBuf,
-    /// The file of poses that was asked about, to see that the proof is about these
+    /// The file of poses of the queries, to check that the proof is about them
     #[arg(long, value_name = "FILE.jsonl")]
     poses: Option<PathBuf>,
     /// Points of each surface to look for in the enclosures
     #[arg(long, default_value_t = 1_000_000)]
     points: u64,
-    /// Of the random places from which they are looked for
+    /// Seed of the random places from which these points are projected
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// 0 for all cores
+    /// Number of threads; 0 for all cores
     #[arg(long, default_value_t = 0)]
     threads: usize,
 }
 
-/// What a check comes to.
+/// The result of a check.
 type Outcome<T = ()> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> ExitCode {
@@ -92,7 +93,7 @@ fn run(args: &Args) -> Outcome {
     Ok(())
 }
 
-/// Prints what was found; returns how many faults there are.
+/// Prints the findings; returns the number of faults.
 fn check(args: &Args) -> Outcome<usize> {
     let a = Subject::open(&args.a)?;
     let other = if args.a == args.b { None } else { Some(Subject::open(&args.b)?) };
@@ -112,7 +113,7 @@ fn check(args: &Args) -> Outcome<usize> {
     Ok(faults.count)
 }
 
-/// What does not hold: all counted, some named.
+/// Faults: all are counted, some printed.
 #[derive(Debug, Default)]
 struct Faults {
     count: usize,
@@ -129,7 +130,7 @@ impl Faults {
     }
 }
 
-/// What was found of all lines.
+/// The findings of all lines.
 #[derive(Debug, Default)]
 struct Tally {
     lines: usize,
@@ -224,7 +225,7 @@ fn print_sampled(path: &Path, sampled: &Sampled) {
     );
 }
 
-/// Looks at points of a surface, with progress on a terminal.
+/// Checks points of a surface, with progress on a terminal.
 fn sample(path: &Path, subject: &Subject, args: &Args) -> Sampled {
     let (done, ended) = (AtomicU64::new(0), AtomicBool::new(false));
     std::thread::scope(|scope| {
@@ -236,12 +237,12 @@ fn sample(path: &Path, subject: &Subject, args: &Args) -> Sampled {
     })
 }
 
-/// Shows how far it is, until it has ended; on a terminal only.
+/// Shows the progress until the end; on a terminal only.
 fn watch(path: &Path, points: u64, done: &AtomicU64, ended: &AtomicBool) {
     let mut out = std::io::stderr();
     let shown = out.is_terminal();
     while shown && !ended.load(Ordering::Relaxed) {
-        // Failing to show progress is nobody's concern.
+        // Progress is optional, so failing to show it is ignored.
         let _ =
             write!(out, "\r{}: {} of {points} surface points", path.display(), done.load(Ordering::Relaxed));
         std::thread::park_timeout(Duration::from_millis(200));

@@ -1,8 +1,8 @@
-//! The nearest of some points, by a tree of this checker's own.
+//! Nearest points, by a tree of this checker's own.
 
 use std::ops::Range;
 
-/// Points of a leaf, at most.
+/// The maximum number of points in a leaf.
 const LEAF: usize = 8;
 
 /// A balanced tree whose nodes are the middles of ranges.
@@ -10,11 +10,11 @@ pub(crate) struct Neighbours<'a> {
     points: &'a [[f32; 3]],
     /// Indices of the points in the order of the tree.
     order: Vec<u32>,
-    /// Across which axis the range about each middle is split.
+    /// The axis across which the range about each middle is split.
     axes: Vec<u8>,
 }
 
-/// The nearest so far.
+/// The nearest point so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Nearest {
     pub(crate) index: u32,
@@ -52,7 +52,7 @@ impl<'a> Neighbours<'a> {
         self.split(middle + 1..range.end);
     }
 
-    /// The point nearest to `x`; of equally near ones that of least index.
+    /// Returns the point nearest to `x`; of equally near ones that of least index.
     pub(crate) fn nearest(&self, x: [f64; 3]) -> Nearest {
         let mut best = Nearest { index: u32::MAX, distance_sq: f64::INFINITY };
         self.search(0..self.order.len(), x, &mut best);
@@ -73,7 +73,7 @@ impl<'a> Neighbours<'a> {
         let (near, far) = (range.start..middle, middle + 1..range.end);
         let (near, far) = if beyond < 0.0 { (near, far) } else { (far, near) };
         self.search(near, x, best);
-        // An equally near one may have a lower index.
+        // An equally near point may have a lower index.
         if beyond * beyond <= best.distance_sq {
             self.search(far, x, best);
         }
@@ -97,7 +97,7 @@ mod tests {
     fn agrees_with_all_points() {
         let mut source = Source::new(7);
         for size in [1, 8, 9, 100, 1000] {
-            // A coarse grid, so that many are equally near.
+            // A coarse grid, so that many points are equally near.
             #[expect(clippy::cast_possible_truncation, reason = "small integers")]
             let points: Vec<[f32; 3]> =
                 (0..size).map(|_| source.in_ball().map(|x| (x * 5.0).round() as f32)).collect();

@@ -1,23 +1,23 @@
-//! Where a proof says that scans are: a turn with one scale, and the one that was asked for.
+//! The placements of scans in a proof: rotations with one scale, compared with those of the query.
 
 use nearmiss::geometry::Frame;
 
 use crate::proof::Matrix;
 
-/// What rounding may do to the turn.
+/// Rounding error of the rotation.
 const ROUNDING: f64 = 1e-12;
 
-/// A scan's map from stored positions to the world, seen to be a similarity.
+/// A scan's map from stored positions to the world, verified to be a similarity.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placement {
     matrix: Matrix,
-    /// Of a stored length in the world.
+    /// Length of a stored unit in the world.
     pub(crate) scale: f64,
 }
 
 impl Placement {
     /// # Errors
-    /// When `matrix` is no turn with one scale and a shift.
+    /// If `matrix` is not a rotation with one scale and a shift.
     pub(crate) fn new(matrix: &Matrix) -> Result<Self, String> {
         if matrix[12..] != [0.0, 0.0, 0.0, 1.0] {
             return Err("the last row is not 0 0 0 1".into());
@@ -39,15 +39,15 @@ impl Placement {
         Ok(Self { matrix: *matrix, scale: square.sqrt() })
     }
 
-    /// A point of the world among the stored positions.
+    /// Maps a point of the world to the stored frame.
     pub(crate) fn stored(&self, x: [f64; 3]) -> [f64; 3] {
         let m = &self.matrix;
         let d = [x[0] - m[3], x[1] - m[7], x[2] - m[11]];
         [0, 1, 2].map(|j| (0..3).map(|i| m[4 * i + j] * d[i]).sum::<f64>() / (self.scale * self.scale))
     }
 
-    /// How far this puts the corners of some bounds of stored positions from where `pose` does, which maps
-    /// the caller's positions.
+    /// Returns the distance between the corners of some bounds of stored positions placed by this
+    /// and by `pose`, which maps the caller's positions.
     pub(crate) fn moved(&self, pose: &Matrix, frame: &Frame, bounds: [[f32; 3]; 2]) -> f64 {
         let mut most = 0.0_f64;
         let mut sum = 0.0;
@@ -59,7 +59,7 @@ impl Placement {
             sum += moved;
             most = most.max(moved);
         }
-        // Unlike a maximum, a sum does not swallow what is no number.
+        // Unlike a maximum, a sum propagates NaN.
         if sum.is_nan() { sum } else { most }
     }
 }

@@ -1,7 +1,8 @@
-//! What `nearmiss collide --prove` writes, read by structs of this checker's own.
+//! The output of `nearmiss collide --prove`, read by structs of this checker's own.
 //!
-//! A number with many digits may be read one unit in the last place off. What is checked is what was read:
-//! poses, gaps and witnesses to 1e-16 of what was written, boxes (single precision) exactly.
+//! A number with many digits may be read one unit in the last place off. The checks apply to the
+//! numbers as read: poses, gaps and witnesses to 1e-16 of what was written, boxes (single
+//! precision) exactly.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -15,7 +16,7 @@ use crate::Outcome;
 /// An affine map as a row-major 4×4 matrix.
 pub(crate) type Matrix = [f64; 16];
 
-/// A line: an answer and what it rests on. Fields unknown are ignored.
+/// A line: an answer and its proof. Unknown fields are ignored.
 #[derive(Debug, Clone, Deserialize)]
 pub(crate) struct Line {
     pub(crate) query: u64,
@@ -34,18 +35,18 @@ pub(crate) struct Line {
     pub(crate) pairs: Vec<[usize; 2]>,
 }
 
-/// What of the scans is enclosed.
+/// The part of the scans that is enclosed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Semantics {
     Obstacle,
-    /// Also of older proofs, which do not say.
+    /// The surface; also for older proofs, which have no such field.
     #[default]
     Surface,
     Points,
 }
 
-/// Whether two scans meet.
+/// The verdict about two scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Verdict {
@@ -54,7 +55,7 @@ pub(crate) enum Verdict {
     Undecided,
 }
 
-/// How sure that is.
+/// The evidence of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Evidence {
@@ -62,8 +63,8 @@ pub(crate) enum Evidence {
     Estimated,
 }
 
-/// A node: its points, and the box that is claimed to contain their part of the surface or obstacle, in the
-/// stored frame.
+/// A node: its points, and the box that is claimed to contain their part of the surface or
+/// obstacle, in the stored frame.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub(crate) struct Enclosure {
     pub(crate) first: u32,
@@ -74,10 +75,10 @@ pub(crate) struct Enclosure {
 }
 
 impl Line {
-    /// The line of this text.
+    /// Parses a line.
     ///
     /// # Errors
-    /// When it is no such line, or a number in it is not finite.
+    /// If the text is not such a line, or a number in it is not finite.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let line: Self = serde_json::from_str(text).map_err(|e| e.to_string())?;
         let scalars = [Some(line.margin), line.gap, line.residual].into_iter().flatten();
@@ -90,7 +91,7 @@ impl Line {
         Ok(line)
     }
 
-    /// Whether the answer claims more than an estimate.
+    /// Returns `true` if the answer claims more than an estimate.
     pub(crate) fn is_certified(&self) -> bool {
         self.evidence == Some(Evidence::Certified)
     }
@@ -115,7 +116,7 @@ impl Lines {
         Ok(Self { reader: BufReader::with_capacity(1 << 16, file), number: 0 })
     }
 
-    /// At most `most` further lines; none at the end.
+    /// Returns at most `most` further lines; none at the end.
     pub(crate) fn batch(&mut self, most: usize) -> Outcome<Vec<(u64, String)>> {
         let mut lines = Vec::new();
         while lines.len() < most {
@@ -132,7 +133,7 @@ impl Lines {
     }
 }
 
-/// The poses of the queries, as asked, by the number of their line.
+/// The poses of the queries, by the number of their line.
 pub(crate) type Poses = BTreeMap<u64, [Matrix; 2]>;
 
 /// A line of the file of poses.
@@ -142,7 +143,7 @@ struct PoseLine {
     b: Matrix,
 }
 
-/// Reads a file of poses, as `nearmiss collide --poses` does.
+/// Reads a file of poses, like `nearmiss collide --poses`.
 pub(crate) fn read_poses(path: &Path) -> Outcome<Poses> {
     let mut lines = Lines::open(path)?;
     let mut poses = Poses::new();

@@ -1,4 +1,4 @@
-//! Random numbers from a seed, the same everywhere: `SplitMix64` (Steele, Lea & Flood 2014).
+//! Random numbers from a seed, the same on every platform: `SplitMix64` (Steele, Lea & Flood 2014).
 
 /// A source of random numbers.
 #[derive(Debug, Clone)]
@@ -9,7 +9,7 @@ impl Source {
         Self(seed)
     }
 
-    /// Sixty-four random bits.
+    /// Returns 64 random bits.
     pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -18,18 +18,18 @@ impl Source {
         z ^ (z >> 31)
     }
 
-    /// An integer below `n`, which is not zero; uneven by n/2^64.
+    /// Returns an integer below `n`, which is not zero; uneven by n/2^64.
     pub(crate) fn below(&mut self, n: u64) -> u64 {
         self.next() % n
     }
 
-    /// Between −1 and 1.
+    /// Returns a number between −1 and 1.
     #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
     pub(crate) fn signed(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// A point of the unit ball, evenly.
+    /// Returns a uniformly distributed point of the unit ball.
     pub(crate) fn in_ball(&mut self) -> [f64; 3] {
         loop {
             let p = [self.signed(), self.signed(), self.signed()];

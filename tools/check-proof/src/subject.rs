@@ -1,4 +1,4 @@
-//! A scan that a proof is about, with what the checks look up in it.
+//! A scan of a proof, with data for the checks.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,26 +13,26 @@ use nearmiss_testdata::oracle::{self, Parameters, SurfaceTwin};
 use crate::Outcome;
 use crate::proof::{Enclosure, Semantics};
 
-/// First bytes of a prepared scan.
+/// The first bytes of a preprocessed scan.
 const MAGIC: &[u8] = b"\x8Enmiss";
 
-/// How far, in local radii, the obstacle goes from the plane of a point on a sheet.
+/// The greatest distance of the obstacle from the plane of a point on a sheet, in local radii.
 const SLAB: f64 = 0.3;
 
-/// A prepared scan.
+/// A preprocessed scan.
 pub(crate) struct Subject {
     pub(crate) scan: Scan,
     pub(crate) twin: SurfaceTwin,
-    /// Of a point, per unit of the twin's radii.
+    /// Support radius of a point, per unit of the twin's radii.
     pub(crate) horizon: f64,
     /// Ids of the nodes by their points.
     ids: BTreeMap<(usize, usize), usize>,
-    /// Of the stored positions.
+    /// Bounds of the stored positions.
     pub(crate) bounds: [[f32; 3]; 2],
 }
 
 impl Subject {
-    /// Opens a prepared scan, or prepares a raw input with default options.
+    /// Opens a preprocessed scan, or preprocesses a raw input with default options.
     pub(crate) fn open(path: &Path) -> Outcome<Self> {
         let mut head = [0; MAGIC.len()];
         let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("nm"));
@@ -47,7 +47,7 @@ impl Subject {
     }
 
     /// # Errors
-    /// When its nodes are no tree over its points, or its surface has no naive twin.
+    /// If the nodes are not a tree over the points, or the surface has no naive twin.
     pub(crate) fn new(scan: Scan) -> Result<Self, String> {
         let nodes = nodes(&scan);
         check_tree(&nodes, scan.len())?;
@@ -63,7 +63,8 @@ impl Subject {
         Ok(Self { scan, twin, horizon, ids, bounds })
     }
 
-    /// The radius of the ball that stands for point `i` in the obstacle; zero if it samples a sheet.
+    /// Returns the radius of the obstacle's ball about point `i`; zero if the point samples a
+    /// sheet.
     pub(crate) fn ball(&self, i: usize) -> f64 {
         if self.is_on_sheet(i) {
             return 0.0;
@@ -72,8 +73,9 @@ impl Subject {
         self.radius(i) * if is_alone { 0.5 } else { 0.325 }
     }
 
-    /// How far the obstacle lies at most from point `i` where that is its nearest point: the radius of its
-    /// ball; or that of its cell, or of its disc with the thickness of a twentieth of its radius.
+    /// Returns an upper bound of the distance from point `i` to the part of the obstacle whose
+    /// nearest point it is. It is the radius of its ball, or of its cell, or of its disc with a
+    /// thickness of a twentieth of the radius.
     pub(crate) fn reach(&self, i: usize) -> f64 {
         let slices = self.scan.slices();
         if self.is_on_sheet(i) {
@@ -83,15 +85,15 @@ impl Subject {
         }
     }
 
-    /// Whether `x`, a place of the surface in the stored frame, belongs to the obstacle, up to rounding: it
-    /// is in the cell of its nearest point, which samples a sheet.
+    /// Returns `true` if `x`, a place of the surface in the stored frame, belongs to the obstacle,
+    /// up to rounding: it is in the cell of its nearest point, which samples a sheet.
     pub(crate) fn is_in_cell(&self, x: [f64; 3]) -> bool {
         let away = |p: &[f32; 3]| [0, 1, 2].map(|k| x[k] - f64::from(p[k]));
         let length_sq = |d: [f64; 3]| d.iter().map(|x| x * x).sum::<f64>();
         let least = |(i, p): (usize, &[f32; 3])| (length_sq(away(p)), i);
         let nearest = self.scan.positions().iter().enumerate().map(least).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((distance_sq, nearest)) = nearest else { return false };
-        // Of places half-way between two points either may be the nearest.
+        // For places half-way between two points, either may be the nearest.
         let is_nearest = |p: &[f32; 3]| length_sq(away(p)) <= rounded(distance_sq);
         self.is_in_cell_of(nearest, x)
             || self
@@ -102,8 +104,8 @@ impl Subject {
                 .any(|(i, p)| is_nearest(p) && self.is_in_cell_of(i, x))
     }
 
-    /// Whether `x` in the stored frame is in the cell of point `i`, up to rounding, if that is its nearest
-    /// point.
+    /// Returns `true` if `x` in the stored frame is in the cell of point `i`, up to rounding,
+    /// assuming that `i` is its nearest point.
     pub(crate) fn is_in_cell_of(&self, i: usize, x: [f64; 3]) -> bool {
         let slices = self.scan.slices();
         let d = [0, 1, 2].map(|k| x[k] - f64::from(slices.position(i)[k]));
@@ -127,7 +129,7 @@ impl Subject {
     }
 
     /// # Errors
-    /// When no node has these points, or its enclosure differs in a bit.
+    /// If no node has these points, or its enclosure differs in a bit.
     pub(crate) fn check_node(&self, claimed: &Enclosure, semantics: Semantics) -> Result<(), String> {
         let Enclosure { first, count, .. } = *claimed;
         let Some(&id) = self.ids.get(&(first as usize, count as usize)) else {
@@ -151,13 +153,13 @@ impl Subject {
     }
 }
 
-/// A little more than `x`, by what rounding may do.
+/// Returns `x` enlarged by rounding.
 fn rounded(x: f64) -> f64 {
     x * (1.0 + 1e-6)
 }
 
-/// Whether every node has the points of its two children, the root all of them: then the nodes that have a
-/// point are its leaf and that leaf's ancestors.
+/// Checks that the points of every node are those of its children, and the root's are all points.
+/// Then the nodes that contain a point are its leaf and that leaf's ancestors.
 fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
     if nodes.first().map(|root| &root.points) != Some(&(0..points)) {
         return Err("the root has not all points".into());
@@ -182,7 +184,7 @@ fn check_tree(nodes: &[Node], points: usize) -> Result<(), String> {
     if parents.iter().skip(1).any(|n| *n != 1) { Err("a node has not one parent".into()) } else { Ok(()) }
 }
 
-/// A node as this tool sees it.
+/// A node as this checker uses it.
 #[derive(Debug, Clone)]
 struct Node {
     points: Range<usize>,
@@ -199,8 +201,8 @@ fn nodes(scan: &Scan) -> Vec<Node> {
     topology.ids().map(node).collect()
 }
 
-/// The scan's surface, by summing over all of it, in the frame of the stored positions; and the horizon per
-/// radius.
+/// Returns the scan's surface, evaluated by summing over all points, in the stored frame, and the
+/// support radius per unit of the radii.
 fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
     let options = scan.plan().options();
     let kernel = match options.kernel {
@@ -212,7 +214,7 @@ fn twin(scan: &Scan) -> Result<(SurfaceTwin, f64), String> {
     let (reach, radii) = match options.bandwidth {
         Bandwidth::Local => (options.horizon, scan.radii().iter().map(|r| f64::from(*r)).collect()),
         Bandwidth::Global => (options.horizon, vec![scan.sampling_radius() / unit; scan.len()]),
-        // The horizon for which the bandwidth is as given.
+        // The support radius for which the bandwidth is the given one.
         Bandwidth::Fixed(h) => (1.0 / kernel.bandwidth(1.0), vec![h / unit; scan.len()]),
         other => return Err(format!("there is no naive twin of the bandwidth {other:?}")),
     };

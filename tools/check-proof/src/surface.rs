@@ -1,6 +1,6 @@
-//! Whether the surface lies in the enclosures: points of the surface, projected from random places, and those
-//! places themselves where their status is ok, each in the enclosures of all nodes that have its nearest
-//! cloud point; and all cloud points likewise.
+//! Checks that the surface is in the enclosures. Points of the surface are projected from random
+//! places. Each of them, and each of these places whose status is ok, must be in the enclosures of
+//! all nodes that have its nearest cloud point. All cloud points must be so too.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,25 +13,25 @@ use crate::neighbour::Neighbours;
 use crate::sample::Source;
 use crate::subject::Subject;
 
-/// Points of the surface that are looked for with one source of random numbers.
+/// Points of the surface that share one source of random numbers.
 const CHUNK: u64 = 4096;
 
-/// Starts for each point wanted, at most: some scans are mostly ambiguous.
+/// The maximum number of starts for each point wanted: some scans are mostly ambiguous.
 const TRIES: u64 = 8;
 
-/// Starts lie so far from a cloud point, in local radii; one in [`FAR_SHARE`] further.
+/// Greatest distance of starts from a cloud point, in local radii; one in [`FAR_SHARE`] is further.
 const REACH: f64 = 1.0;
 const FAR_REACH: f64 = 2.5;
 const FAR_SHARE: u64 = 5;
 
-/// What was found of points of a surface.
+/// The findings about points of a surface.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sampled {
     pub(crate) starts: u64,
     pub(crate) points: u64,
     /// Starts of status ok, on the surface or not.
     pub(crate) places: u64,
-    /// Of all these, those in cells, which belong to the obstacle.
+    /// Starts and points that are in cells, and so belong to the obstacle.
     pub(crate) in_cells: u64,
     /// The greatest `|t_k|/half_k` of a point in an enclosure; above 1 it is outside.
     pub(crate) fill: f64,
@@ -40,7 +40,7 @@ pub(crate) struct Sampled {
     pub(crate) faults: Vec<String>,
 }
 
-/// A box, ready for points.
+/// A box, prepared for testing points.
 struct Inverse {
     centre: [f64; 3],
     half: [f64; 3],
@@ -56,29 +56,30 @@ impl Inverse {
         Self { centre: centre.map(f64::from), half: half.map(f64::from), rows }
     }
 
-    /// How much of the box it takes to hold `x`: above 1 if it is outside.
+    /// Returns the factor by which the box must be scaled to contain `x`: above 1 if `x` is
+    /// outside.
     fn fill(&self, x: [f64; 3]) -> f64 {
         let d = [0, 1, 2].map(|k| x[k] - self.centre[k]);
         let part = |k: usize| {
             let t = dot(self.rows[k], d).abs();
             if t == 0.0 { 0.0 } else { t / self.half[k] }
         };
-        // Unlike a maximum, a sum does not swallow what is no number.
+        // Unlike a maximum, a sum propagates NaN.
         let all = [part(0), part(1), part(2)];
         if all.iter().sum::<f64>().is_nan() { f64::NAN } else { all.into_iter().fold(0.0, f64::max) }
     }
 }
 
-/// The tree of a scan, looked at from its leaves.
+/// The tree of a scan, accessed from its leaves.
 struct Tree<'a> {
     subject: &'a Subject,
     neighbours: Neighbours<'a>,
     boxes: Vec<Inverse>,
-    /// Those about the obstacle.
+    /// Enclosures of the obstacle.
     of_obstacle: Vec<Inverse>,
-    /// Of each node; the root's own.
+    /// Parent of each node; the root is its own.
     parents: Vec<usize>,
-    /// Of each point.
+    /// Leaf of each point.
     leaves: Vec<usize>,
 }
 
@@ -115,7 +116,8 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Checks a place of the ball of `point`, `away` from its centre in its radius, and the point itself.
+    /// Checks a place of the ball of `point`, at `away` from its centre in units of its radius, and
+    /// the point itself.
     fn check_ball(&self, point: usize, away: [f64; 3], sampled: &mut Sampled) {
         let p = self.subject.scan.positions()[point].map(f64::from);
         let radius = self.subject.ball(point);
@@ -123,7 +125,7 @@ impl<'a> Tree<'a> {
         self.check_enclosed(&self.of_obstacle, x, point, "the place of the ball", sampled);
     }
 
-    /// Whether `x`, which belongs to `point`, is in the enclosures of all nodes above.
+    /// Checks that `x`, which belongs to `point`, is in the enclosures of all nodes above.
     fn check_enclosed(
         &self,
         boxes: &[Inverse],
@@ -169,7 +171,8 @@ impl<'a> Tree<'a> {
                 sampled.points += 1;
                 self.check(end.point, &mut sampled);
             }
-            // What the enclosures rest on holds off the surface too, and less narrowly.
+            // The conditions on which the enclosures depend also hold off the surface, and less
+            // narrowly.
             if scan.evaluate_with(start, &mut scratch).status == Status::Ok {
                 sampled.places += 1;
                 self.check(start, &mut sampled);
@@ -179,14 +182,15 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// Looks at so many points of the surface; the same for any number of threads. Counts in `done` as it goes.
+/// Checks this many points of the surface; the result is the same for any number of threads. Counts
+/// in `done`.
 pub(crate) fn check(subject: &Subject, points: u64, seed: u64, done: &AtomicU64) -> Sampled {
     let tree = Tree::new(subject);
     let chunks: Vec<Sampled> = (0..points.div_ceil(CHUNK))
         .into_par_iter()
         .map(|i| {
             let wanted = CHUNK.min(points - i * CHUNK);
-            // Each chunk's seed is a random number from the seed.
+            // The seed of each chunk is a random number from the seed.
             let sampled = tree.chunk(wanted, Source::new(Source::new(seed ^ (i << 32)).next()));
             done.fetch_add(wanted, Ordering::Relaxed);
             sampled

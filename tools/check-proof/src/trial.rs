@@ -1,4 +1,4 @@
-//! The checker on true proofs about a real scan, and on the same, tampered with.
+//! Tests of the checker on true proofs about a real scan, and on tampered ones.
 
 use std::ffi::OsString;
 use std::fs;
@@ -22,8 +22,8 @@ struct Trial {
     lines: Vec<Line>,
 }
 
-/// Shifts of the second scan along y, along which it is 0.143 long, from within the first to far away; it is
-/// turned about that axis.
+/// Shifts of the second scan along y, along which it is 0.143 long, from inside the first to far
+/// away; it is turned about that axis.
 const SHIFTS: [f64; 9] = [0.0, 0.06, 0.1, 0.14, 0.15, 0.175, 0.18, 0.2, 1.0];
 
 static TRIAL: OnceLock<Trial> = OnceLock::new();
@@ -68,7 +68,7 @@ impl Trial {
         self.lines.iter().filter(move |line| line.verdict == verdict && line.is_certified())
     }
 
-    /// The certified separation with the most pairs.
+    /// Returns the certified separation with the most pairs.
     fn separation(&self) -> Line {
         self.certified(Verdict::Separated).max_by_key(|line| line.pairs.len()).unwrap().clone()
     }
@@ -143,7 +143,8 @@ fn gaps_and_margins_are_not_taken_on_trust() {
     assert!(trial.fault(&crossed).contains("away from the pose"), "and moved at all");
 }
 
-/// Near contact the points of leaves part what their enclosures do not. That is a proof of obstacles alone.
+/// Near contact, the points of leaves prove what their enclosures do not. That holds for obstacles
+/// alone.
 #[test]
 fn points_part_obstacles_only() {
     let shifts: Vec<f64> = (0..24_u8).map(|i| 0.15 + 0.001 * f64::from(i)).collect();
@@ -193,7 +194,7 @@ fn witnesses_lie_on_both_surfaces() {
 #[test]
 fn witnesses_between_surfaces_are_within_the_margin() {
     let margin = 0.012;
-    // Some of the places where they come so near verify that they do.
+    // Some of the poses at this distance have verified places.
     let shifts: Vec<f64> = (0..16_u8).map(|i| 0.142 + 0.002 * f64::from(i)).collect();
     let trial = Trial::new(&margin.to_string(), &shifts);
     let mut between = Vec::new();
@@ -202,7 +203,7 @@ fn witnesses_between_surfaces_are_within_the_margin() {
         assert_eq!(finding.faults, Vec::<String>::new(), "line {}", line.query);
         between.extend(finding.between.then_some(line));
     }
-    // Of these the scans furthest apart, which do not meet without a margin.
+    // Of these, the one with the scans furthest apart, which do not meet without a margin.
     let line = between.last().unwrap();
     let mut moved = (*line).clone();
     moved.witness = line.witness.map(|[x, y, z]| [x, y + 5.0 * margin, z]);

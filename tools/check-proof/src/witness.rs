@@ -1,4 +1,5 @@
-//! Whether a point lies on a surface, or near it, by the formulas alone and all of the points.
+//! Checks that a point is on a surface, or near it, by the formulas alone and with all of the
+//! points.
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::surface::project;
@@ -7,20 +8,20 @@ use nearmiss_testdata::oracle::{BORDER, Evaluation, GAP, Status, THIN};
 use crate::placement::Placement;
 use crate::subject::Subject;
 
-/// |f| of a witness, in bandwidths. Its |f| in single precision is at most 1e-6.
+/// Greatest |f| of a witness, in bandwidths. Its |f| in single precision is at most 1e-6.
 const ON_SURFACE: f64 = 1e-5;
 
-/// What single precision may do to a distance beside a horizon, and to what is compared with a condition's
-/// bound.
+/// Single-precision error of a distance relative to a support radius, and of a quantity relative to
+/// a condition's bound.
 const DISTANCE: f64 = 1e-5;
 const CONDITION: f64 = 1e-4;
 
-/// Cloud points from which a surface point near a witness is looked for, and steps from each towards the
-/// witness.
+/// Number of cloud points from which a surface point near a witness is searched, and of steps from
+/// each towards the witness.
 const STARTS: usize = 512;
 const STEPS: usize = 12;
 
-/// A point seen to lie on a surface.
+/// A point verified to be on a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Seen {
     /// |f| in bandwidths.
@@ -28,17 +29,17 @@ pub(crate) struct Seen {
     /// |f| and the bandwidth in the world.
     pub(crate) residual: f64,
     pub(crate) bandwidth: f64,
-    /// Whether some condition of the surface holds only up to rounding.
+    /// `true` if a condition of the surface holds only up to rounding.
     pub(crate) on_the_brink: bool,
 }
 
 /// # Errors
-/// When the point `x` of the world does not lie on the surface.
+/// If the point `x` of the world is not on the surface.
 pub(crate) fn check(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result<Seen, String> {
     check_stored(subject, placement, placement.stored(x))
 }
 
-/// As [`check`], for a point among the stored positions.
+/// Does the same as [`check`], for a point among the stored positions.
 fn check_stored(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result<Seen, String> {
     let Some(at) = subject.twin.evaluate(x) else { return Err("no point reaches the witness".into()) };
     let off = at.value.abs() / at.bandwidth;
@@ -53,12 +54,12 @@ fn check_stored(subject: &Subject, placement: &Placement, x: [f64; 3]) -> Result
     Ok(Seen { off, residual, bandwidth, on_the_brink })
 }
 
-/// A point on the surface as near to the point `x` of the world as can be found, with its distance; anything
-/// within `enough` will do. Steps towards `x` from the cloud points nearest to it need not find what is
-/// nearest, but what they find is seen to lie on the surface.
+/// Returns a point on the surface near the point `x` of the world, with its distance. The search
+/// stops at a distance of `enough`. Steps towards `x` from the cloud points nearest to it need not
+/// find the nearest surface point, but the result is verified to be on the surface.
 ///
 /// # Errors
-/// When none is found.
+/// If no point is found.
 pub(crate) fn check_near(
     subject: &Subject,
     placement: &Placement,
@@ -88,8 +89,8 @@ pub(crate) fn check_near(
     seen.ok_or_else(|| "no point of the surface was found near the witness".into())
 }
 
-/// How far `x` of the world is from the nearest ball that stands for a point in the obstacle; points on
-/// sheets have none, and are places of it themselves.
+/// Returns the distance of `x` of the world from the nearest ball of the obstacle. Points on sheets
+/// have no ball, and are places of the obstacle themselves.
 pub(crate) fn distance_of_balls(subject: &Subject, placement: &Placement, x: [f64; 3]) -> f64 {
     let x = placement.stored(x);
     let away = |(i, p): (usize, &[f32; 3])| (distance(&p.map(f64::from), &x) - subject.ball(i)).max(0.0);
@@ -97,7 +98,7 @@ pub(crate) fn distance_of_balls(subject: &Subject, placement: &Placement, x: [f6
     least * placement.scale
 }
 
-/// Points of the surface from near `start` towards `to`, stepping along the surface.
+/// Returns points of the surface from near `start` towards `to`, stepping along the surface.
 fn walk(subject: &Subject, start: [f64; 3], to: [f64; 3]) -> Vec<[f64; 3]> {
     let mut scratch = GatherScratch::default();
     let mut from = start;
@@ -123,7 +124,7 @@ fn distance(p: &[f64; 3], q: &[f64; 3]) -> f64 {
     (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The conditions of the surface, each relaxed by what rounding may do.
+/// Returns `true` if the conditions of the surface hold, each relaxed by rounding.
 fn is_nearly_ok(subject: &Subject, x: [f64; 3], at: &Evaluation) -> bool {
     let options = subject.scan.plan().options();
     let (mut support, mut is_near) = (0, false);

@@ -1,9 +1,10 @@
-//! How often n changes sides within h of a surface.
+//! Counts how often n changes sides within h of a surface.
 //!
-//! A pair of places, 0.1 h apart, lies about a cloud point p: within the local radius along the tangent
-//! plane, within h along the normal N, of the scan before noise. Both normals are turned to the side of N.
-//! They flip if they still differ by more than a right angle: then no sign serves for both, and signs of f
-//! there do not tell sides. On a sheet smoother than h there is no flip.
+//! A pair of places, 0.1 h apart, is near a cloud point p: within the local radius along the
+//! tangent plane, and within h along the normal N, of the scan before noise. Both normals are
+//! turned to the side of N. They flip if they still differ by more than a right angle. Then no sign
+//! is right for both, and signs of f there do not distinguish sides. On a sheet smoother than h
+//! there is no flip.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::hierarchy::GatherScratch;
@@ -14,22 +15,22 @@ use rayon::prelude::*;
 
 use super::place::{Centre, Place};
 
-/// How far apart the places of a pair are, in bandwidths.
+/// The distance of the places of a pair, in bandwidths.
 const STEP: f64 = 0.1;
 
-/// Pairs that are tried with one source of random numbers.
+/// Pairs drawn from one source of random numbers.
 const CHUNK: u64 = 1 << 12;
 
-/// What was counted.
+/// The counts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Tally {
-    /// Of f, two a pair, where eq. 6 of Klein & Zachmann 2004 defines it.
+    /// Evaluations of f, two a pair, where it is defined by Klein & Zachmann 2004, eq. 6.
     pub(crate) evaluations: u64,
     /// Pairs that flip, with the covariance about x and about a(x).
     pub(crate) flips: [u64; 2],
-    /// The same of pairs whose places are both of status ok: where verdicts rest on f.
+    /// Evaluations in pairs whose places are both of status ok. Verdicts depend on f there.
     pub(crate) trusted: u64,
-    /// Of those.
+    /// Pairs that flip among these.
     pub(crate) trusted_flips: [u64; 2],
 }
 
@@ -44,17 +45,17 @@ impl Tally {
         }
     }
 
-    /// Flips per million evaluations: about x, about a(x).
+    /// Returns the flips per million evaluations: about x, about a(x).
     pub(crate) fn rates(&self) -> [f64; 2] {
         self.flips.map(|flips| per_million(flips, self.evaluations))
     }
 
-    /// The same where the status is ok.
+    /// Returns the same where the status is ok.
     pub(crate) fn trusted_rates(&self) -> [f64; 2] {
         self.trusted_flips.map(|flips| per_million(flips, self.trusted))
     }
 
-    /// The share of evaluations that are in pairs of status ok.
+    /// Returns the share of evaluations in pairs of status ok.
     #[expect(clippy::cast_precision_loss, reason = "for people")]
     pub(crate) fn trusted_share(&self) -> f64 {
         self.trusted as f64 / self.evaluations.max(1) as f64
@@ -66,8 +67,8 @@ fn per_million(flips: u64, evaluations: u64) -> f64 {
     1e6 * flips as f64 / evaluations.max(1) as f64
 }
 
-/// Counts over `pairs` pairs about the points of `clean`, of f over `rough`, whose input is in the former's
-/// stored frame.
+/// Counts over `pairs` pairs about the points of `clean`, with the f of `rough`. The input of
+/// `rough` is in the stored frame of `clean`.
 pub(crate) fn count(clean: &PointHierarchy, rough: &PointHierarchy, pairs: u64, seed: u64) -> Tally {
     let chunks = pairs.div_ceil(CHUNK);
     let origin = Vector3::from(rough.frame().origin);
@@ -86,20 +87,20 @@ pub(crate) fn count(clean: &PointHierarchy, rough: &PointHierarchy, pairs: u64, 
     counted.reduce(Tally::default, Tally::join)
 }
 
-/// Two places near the `i`-th point, and its normal.
+/// Returns two places near the `i`-th point, and its normal.
 fn places(scan: &PointHierarchy, i: usize, rng: &mut impl rand::Rng) -> ([Vector3<f64>; 2], Vector3<f64>) {
     let (slices, plan) = (scan.slices(), scan.plan());
     let up = Vector3::from(slices.normals[i].map(f64::from));
     let (r, h) = (f64::from(slices.radii[i]), f64::from(plan.bandwidth(slices.radii[i])));
     let direction = Vector3::from(unit_vector(rng));
     let along = (direction - up * up.dot(&direction)).try_normalize(1e-9).unwrap_or_default();
-    // The root spreads places evenly over the disc.
+    // The root spreads the places evenly over the disc.
     let (out, height) = (rng.random_range(0.0_f64..1.0).sqrt() * r, rng.random_range(-h..h));
     let x = Vector3::from(slices.position(i).map(f64::from)) + along * out + up * height;
     ([x, x + Vector3::from(unit_vector(rng)) * (STEP * h)], up)
 }
 
-/// What one pair adds; nothing where f is undefined at either place.
+/// Returns the counts of one pair; `None` if f is undefined at either place.
 fn look(
     scan: &PointHierarchy,
     places: [Vector3<f64>; 2],
@@ -139,10 +140,10 @@ mod tests {
             let tally = count(&scan, &scan, 40_000, 1);
             assert!(tally.evaluations > 75_000, "{name}: {tally:?}");
             assert_eq!(tally.flips[1], 0, "{name}, about a(x)");
-            // About x the normal lies down beyond h/√2, on 29 % of the way to h.
+            // About x, the normal is tangential beyond h/√2, on 29 % of the way to h.
             let [about_point, _] = tally.rates();
             assert!((4_000.0..200_000.0).contains(&about_point), "{name}: {about_point} about x");
-            // Where |x − a| ≤ 0.56 h it does not.
+            // Where |x − a| ≤ 0.56 h it is not.
             assert_eq!(tally.trusted_flips, [0, 0], "{name}, where the status is ok");
             assert!(tally.trusted > 30_000, "{name}: {tally:?}");
         }
@@ -150,7 +151,8 @@ mod tests {
 
     #[test]
     fn between_two_sheets_it_flips_and_only_there() {
-        // The radius is √2 spacings, h nearly as much: the sheets are 2 h apart, and midway n lies down.
+        // The radius is √2 spacings, h nearly as much. So the sheets are 2 h apart, and n is
+        // tangential midway.
         let gap = 0.113;
         let plates = scan(plates(1.5, 1.5, gap), 0.0);
         let h = f64::from(plates.plan().bandwidth(plates.radii()[0]));

@@ -1,4 +1,4 @@
-//! The picture: two slices side by side, with what their colours mean.
+//! The picture: two slices side by side, with a legend.
 
 use nearmiss::PointHierarchy;
 use nearmiss_cli::{Area, Canvas, Colour, FINE, Picture};
@@ -6,10 +6,10 @@ use nearmiss_cli::{Area, Canvas, Colour, FINE, Picture};
 use super::place::Centre;
 use super::slice::{Field, Slice, Value};
 
-/// Pixels of a side of either slice.
+/// Side of either slice, in pixels.
 pub(crate) const SIDE: usize = 560;
 
-/// In fine pixels.
+/// Side of either slice, in fine pixels.
 const PANEL: usize = SIDE * FINE;
 const GAP: usize = 14 * FINE;
 const TITLE: usize = 26 * FINE;
@@ -30,28 +30,28 @@ const SCALE: [(f64, Colour); 5] = [
     (1.0, [176, 14, 14]),
 ];
 
-/// f is painted in bands so wide, in bandwidths.
+/// Width of the bands in which f is painted, in bandwidths.
 const BAND: f64 = 1.0 / 16.0;
 
-/// What the surface is not, by the conditions beside f = 0, keeps so much of its colour.
+/// Share of the colour that remains where a condition beside f = 0 fails.
 const FADED: f64 = 0.55;
 
-/// What is painted as zero, in pixels on either side of it.
+/// Half the width of the painted zero set, in pixels.
 const ZERO_WIDTH: f64 = 1.5;
 
-/// Points this near the slice are painted, in sampling radii.
+/// Greatest distance of painted points from the slice, in sampling radii.
 pub(crate) const THICK: f64 = 0.35;
 
-/// What the picture is of.
+/// The subject of the picture.
 pub(crate) struct Subject {
     pub(crate) name: String,
-    /// In spacings.
+    /// Standard deviation of the noise, in spacings.
     pub(crate) noise: f64,
-    /// Length of a stored unit in the caller's.
+    /// Length of a stored unit in the caller's units.
     pub(crate) unit: f64,
 }
 
-/// Both fields over `slice`, about x and about a(x).
+/// Paints both fields over `slice`, about x and about a(x).
 pub(crate) fn paint(scan: &PointHierarchy, slice: &Slice, fields: &[Field; 2], subject: &Subject) -> Picture {
     let height = TITLE + PANEL + LEGEND + GAP;
     let mut canvas = Canvas::new(2 * PANEL + 3 * GAP, height, GROUND);
@@ -69,7 +69,7 @@ pub(crate) fn paint(scan: &PointHierarchy, slice: &Slice, fields: &[Field; 2], s
     canvas.picture()
 }
 
-/// The bandwidth of the middle point by its radius.
+/// Returns the bandwidth of the point with the median radius.
 fn typical_bandwidth(scan: &PointHierarchy) -> f64 {
     let mut radii = scan.radii().to_vec();
     let middle = radii.len() / 2;
@@ -115,7 +115,7 @@ fn mix(below: Colour, above: Colour, share: f64) -> Colour {
     })
 }
 
-/// A dashed line between neighbours whose normals point to opposite sides.
+/// Paints a dashed line between neighbours whose normals point to opposite sides.
 fn cut(canvas: &mut Canvas, area: Area, field: &Field) {
     const DASH: usize = 6;
     for pair in &field.flips {
@@ -147,7 +147,7 @@ fn coordinate(pixels: usize) -> f64 {
     pixels as f64
 }
 
-/// A length of 1, 2 or 5 times a power of ten, and in bandwidths.
+/// Paints a length of 1, 2 or 5 times a power of ten, also given in bandwidths.
 fn scale_bar(canvas: &mut Canvas, area: Area, slice: &Slice, [h, unit]: [f64; 2]) {
     let longest = 0.7 * slice.half * unit;
     let power = longest.log10().floor();

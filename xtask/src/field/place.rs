@@ -1,15 +1,16 @@
 //! f at a place, with the covariance about either centre.
 //!
-//! Klein & Zachmann 2004 centre the covariance at a(x) (eq. 4), where others had centred it at x. Ours is
-//! theirs; what it would be about x exists here alone, to show the difference. Sums are in double precision
-//! and over the points whose horizon reaches x, found by a descent of this module's own.
+//! Klein & Zachmann 2004 centre the covariance at a(x) (eq. 4), where others had centred it at x.
+//! So does nearmiss; the covariance about x is computed here only, to show the difference. Sums are
+//! in double precision, over the points that have x within their support radius. A descent of this
+//! module finds them.
 
 use nearmiss::PointHierarchy;
 use nearmiss::geometry::NodeId;
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::surface::symmetric_eigen;
 
-/// What the covariance is taken about.
+/// The centre of the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Centre {
     /// x itself.
@@ -41,7 +42,8 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// The place `x` of a scan; none where eq. 6 leaves f undefined, because too few points reach x.
+    /// Returns the place `x` of a scan. `None` if too few points support x, so that f is undefined
+    /// (eq. 6).
     pub(crate) fn new(scan: &PointHierarchy, x: Vector3<f64>) -> Option<Self> {
         let (plan, slices) = (scan.plan(), scan.slices());
         let [mut weight, mut bandwidth, mut support] = [0.0, 0.0, 0.0];
@@ -86,7 +88,7 @@ impl Place {
         })
     }
 
-    /// n(x), unit; its sign means nothing.
+    /// Returns n(x), of unit length; its sign is arbitrary.
     pub(crate) fn normal(&self, centre: Centre) -> Vector3<f64> {
         let a = match centre {
             Centre::Point => Vector3::zeros(),
@@ -124,7 +126,7 @@ mod tests {
             let h = library.bandwidth;
             assert!((place.bandwidth - h).abs() < 1e-5 * h, "h at {x:?}");
             let [l1, l2, _] = library.eigenvalues;
-            // Where two eigenvalues are alike, rounding turns the vector.
+            // Where two eigenvalues are nearly equal, rounding turns the vector.
             if l2 - l1 > 0.05 * h * h {
                 sure += 1;
                 let n = place.normal(Centre::Mean);

@@ -1,4 +1,4 @@
-//! A scan with more noise than it came with.
+//! Adding noise to a scan.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{BuildOptions, PointCloud, PointHierarchy, Scan};
@@ -6,12 +6,13 @@ use nearmiss_testdata::arbitrary::{gaussian, rng};
 
 use crate::repository::Outcome;
 
-/// Distance from a point of a square lattice to its sixth neighbour, which is its local radius, in spacings.
+/// Distance from a point of a square lattice to its sixth neighbour, its local radius, in spacings.
 const SIXTH: f64 = std::f64::consts::SQRT_2;
 
-/// The points of `clean`, in its stored frame, each moved along its normal by a normally distributed distance
-/// whose standard deviation is `noise` of the local spacing; prepared with default options. Its own stored
-/// frame may have another origin, but has the same unit: stored positions need no other.
+/// Moves the points of `clean`, in its stored frame, along their normals by a normally distributed
+/// distance, and preprocesses them with default options. The standard deviation is `noise` times
+/// the local spacing. The new stored frame may have another origin, but has the same unit, because
+/// stored positions need no other.
 pub(crate) fn roughened(clean: &PointHierarchy, noise: f64, seed: u64) -> Outcome<Scan> {
     let rng = &mut rng(seed);
     let slices = clean.slices();

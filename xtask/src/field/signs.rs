@@ -1,9 +1,10 @@
-//! One sign for all normals of a grid, as far as there is one.
+//! Consistent signs for all normals of a grid, as far as they exist.
 //!
-//! An eigenvector's sign is arbitrary. As Hoppe et al. 1992 orient the normals of a scan along a spanning
-//! tree, so signs are carried over a grid of places from each to its neighbours, the surest neighbours first.
-//! Every pair of neighbours that closes a loop then either agrees, or its normals point to opposite sides: a
-//! flip. Where the grid has none, f has sides; along a line of flips they change.
+//! The sign of an eigenvector is arbitrary. Signs are propagated over a grid of places from each to
+//! its neighbours, the surest neighbours first, as Hoppe et al. 1992 orient the normals of a scan
+//! along a spanning tree. A pair of neighbours that closes a loop then either agrees, or its
+//! normals point to opposite sides: a flip. Where the grid has no flip, f distinguishes sides;
+//! across a line of flips the sides change.
 
 use nearmiss::geometry::nalgebra::Vector3;
 
@@ -24,7 +25,7 @@ impl Forest {
             sign *= self.signs[top];
             top = self.parents[top];
         }
-        // The path is shortened for those who ask next.
+        // Shorten the path for later calls.
         let (mut at, mut left) = (i, sign);
         while self.parents[at] != top && at != top {
             let (next, own) = (self.parents[at], self.signs[at]);
@@ -37,7 +38,8 @@ impl Forest {
     }
 }
 
-/// The sign of every normal, and the pairs that flip. `pairs` come with a doubt, and are taken in its order.
+/// Returns the sign of every normal, and the pairs that flip. `pairs` come with a doubt, and are
+/// processed in its order.
 pub(crate) fn follow(normals: &[Vector3<f64>], mut pairs: Vec<(f64, Pair)>) -> (Vec<f64>, Vec<Pair>) {
     pairs.sort_by(|(s, p), (t, q)| s.total_cmp(t).then(p.cmp(q)));
     let count = normals.len();
@@ -64,7 +66,7 @@ mod tests {
 
     use super::*;
 
-    /// A square grid's neighbours, without doubt.
+    /// Returns the neighbours of a square grid, with equal doubts.
     fn grid(side: usize) -> Vec<(f64, Pair)> {
         let all = (0..side * side).flat_map(|i| {
             let right = (i % side + 1 < side).then_some((0.0, [i, i + 1]));
@@ -99,7 +101,7 @@ mod tests {
 
     #[test]
     fn about_a_half_turn_there_is_no_sign_and_the_cut_leads_outward() {
-        // Once round the middle the direction has turned by half a turn.
+        // Once around the middle, the direction turns by half a turn.
         let normals = field(20, |x, y| 0.5 * y.atan2(x));
         let (_, flips) = follow(&normals, grid(20));
         let on_ring = |i: usize| [i % 20, i / 20].iter().any(|k| [0, 19].contains(k));

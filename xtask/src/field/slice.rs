@@ -21,14 +21,14 @@ pub(crate) struct Slice {
 /// f at a place of a slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Value {
-    /// In the stored frame.
+    /// The value, in the stored frame.
     pub(crate) f: f64,
     pub(crate) bandwidth: f64,
-    /// Whether a zero there would be a point of the surface.
+    /// `true` if a zero there would be a point of the surface.
     pub(crate) counts: bool,
 }
 
-/// f over a slice, row by row from the top; none where it is undefined.
+/// f over a slice, row by row from the top; `None` where it is undefined.
 #[derive(Debug, Clone)]
 pub(crate) struct Field {
     pub(crate) values: Vec<Option<Value>>,
@@ -36,12 +36,13 @@ pub(crate) struct Field {
     pub(crate) flips: Vec<Pair>,
 }
 
-/// Places that are looked at for the most telling slice.
+/// Number of places tried for the most informative slice.
 const CANDIDATES: usize = 300;
 
 impl Slice {
-    /// The slice about a cloud point, of half side `half`, that cuts the surface as squarely as may be and
-    /// meets the most various directions of it: where it curves, folds, or comes back.
+    /// Returns the slice about a cloud point, of half side `half`, that cuts the surface as
+    /// squarely as possible and contains the greatest variety of its directions: where it curves,
+    /// folds, or comes back.
     pub(crate) fn telling(scan: &PointHierarchy, half: f64) -> Self {
         let stride = scan.len().div_ceil(CANDIDATES);
         let all: Vec<usize> = (0..scan.len()).step_by(stride).collect();
@@ -53,9 +54,9 @@ impl Slice {
         best.map_or_else(|| Self::facing(Vector3::zeros(), Vector3::z(), half), |(slice, _)| slice)
     }
 
-    /// The slice about `middle` that cuts the surface there most squarely, and how telling it is: by Σnnᵀ of
-    /// the normals n within `half`, the least eigenvalue says how obliquely it is cut, the second how it
-    /// turns.
+    /// Returns the slice about `middle` that cuts the surface there most squarely, and its rating.
+    /// Both follow from Σnnᵀ of the normals n within `half`: the least eigenvalue measures how
+    /// obliquely the surface is cut, the second how much it turns.
     fn across(scan: &PointHierarchy, middle: Vector3<f64>, half: f64) -> (Self, f64) {
         let mut sums = [0.0; 6];
         for (p, n) in scan.positions().iter().zip(scan.normals()) {
@@ -71,21 +72,22 @@ impl Slice {
         (Self::facing(middle, eigen.vectors[0].into(), half), turning - 2.0 * oblique)
     }
 
-    /// The slice with this unit normal.
+    /// Returns the slice with this unit normal.
     pub(crate) fn facing(middle: Vector3<f64>, normal: Vector3<f64>, half: f64) -> Self {
         let upward = if normal.y.abs() < 0.9 { Vector3::y() } else { Vector3::z() };
         let right = upward.cross(&normal).normalize();
         Self { middle, axes: [right, normal.cross(&right), normal], half }
     }
 
-    /// The middle of a pixel of a picture of `side` pixels a side.
+    /// Returns the middle of a pixel of a picture of `side` pixels a side.
     fn place(&self, pixel: usize, side: usize) -> Vector3<f64> {
         #[expect(clippy::cast_precision_loss, reason = "pixels")]
         let along = |k: usize| ((2 * k + 1) as f64 / side as f64 - 1.0) * self.half;
         self.middle + self.axes[0] * along(pixel % side) - self.axes[1] * along(pixel / side)
     }
 
-    /// Points at most `thick` out of the slice: to the right of and above its middle.
+    /// Returns the points at most `thick` off the slice, as offsets to the right of and above its
+    /// middle.
     pub(crate) fn points(&self, scan: &PointHierarchy, thick: f64) -> Vec<[f64; 2]> {
         let near = scan.positions().iter().filter_map(|p| {
             let d = Vector3::from(p.map(f64::from)) - self.middle;
@@ -96,7 +98,7 @@ impl Slice {
         near.collect()
     }
 
-    /// f at `side` times `side` places, with the covariance about `centre`.
+    /// Evaluates f at `side` times `side` places, with the covariance about `centre`.
     pub(crate) fn evaluate(&self, scan: &PointHierarchy, centre: Centre, side: usize) -> Field {
         let at = |pixel: usize| {
             let x = self.place(pixel, side);
@@ -108,8 +110,8 @@ impl Slice {
         let normal =
             |found: &Option<(Place, bool)>| found.map_or_else(Vector3::zeros, |p| p.0.normal(centre));
         let normals: Vec<Vector3<f64>> = all.par_iter().map(normal).collect();
-        // From the points outward, and along places whose normals agree first: signs then meet where they
-        // must.
+        // From the points outwards, and first along places whose normals agree. Signs then disagree
+        // only where they must.
         let doubt = |[i, j]: Pair| {
             let away = |(place, _): (Place, bool)| place.offset.norm() / place.bandwidth;
             let furthest = away(all[i]?).max(away(all[j]?));
@@ -181,7 +183,7 @@ mod tests {
         let [right, up, out] = slice.axes;
         let skew = right.dot(&up).abs() + up.dot(&out).abs() + (right.cross(&up) - out).norm();
         assert!(skew < 1e-9, "right-handed axes, {skew} off");
-        // Within 0.9 of a point of the tube lies a stretch of it: cut across, it is round.
+        // A piece of the tube is within 0.9 of one of its points. Cut across, it is round.
         let level = (slice.middle.x.hypot(slice.middle.y), slice.axes[2].z.abs());
         assert!(level.1 < 0.2, "cut across the tube: {slice:?}");
     }

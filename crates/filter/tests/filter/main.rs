@@ -1,4 +1,4 @@
-//! Filters: everything is one program, which links once.
+//! Tests of the filters, in one program so that they link once.
 
 mod threads;
 mod twin;

@@ -1,4 +1,4 @@
-//! The number of threads changes no result.
+//! The number of threads does not change the results.
 #![cfg(feature = "rayon")]
 
 use nearmiss_filter::{min_neighbours, remove_outliers, voxel};

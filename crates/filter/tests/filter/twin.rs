@@ -1,4 +1,4 @@
-//! The filters against naive twins, on random, adversarial and degenerate clouds.
+//! Compares the filters with naive twins on random, adversarial and degenerate clouds.
 #![cfg(test)]
 
 use nearmiss_filter::{FilterError, crop, min_neighbours, remove_outliers, voxel};
@@ -13,7 +13,7 @@ fn distance(a: [f32; 3], b: [f32; 3]) -> f64 {
     (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Of every point the distances to all others, ascending, in the frame of the input.
+/// Distances from each point to all others, ascending, in the frame of the input.
 fn all_distances(cloud: &PointCloud) -> Vec<Vec<f64>> {
     let positions = cloud.positions();
     let of = |i: usize| {
@@ -30,20 +30,21 @@ fn ids(count: usize) -> impl Iterator<Item = u32> {
     0..u32::try_from(count).unwrap()
 }
 
-/// What is clear without regard to rounding: the points that surely stay and those that may.
+/// Bounds on a filter's result in spite of rounding: the points that must stay, and those that may
+/// stay.
 struct Bracket {
     surely: Vec<u32>,
     maybe: Vec<u32>,
 }
 
 impl Bracket {
-    /// By a value for each point, of which those up to `most` stay.
+    /// Creates the bounds for a filter that keeps points with values up to `most`.
     fn new(values: &[f64], most: f64) -> Self {
         let up_to = |most: f64| ids(values.len()).filter(|i| values[*i as usize] <= most).collect();
         Self { surely: up_to(most * (1.0 - 1e-8)), maybe: up_to(most * (1.0 + 1e-8)) }
     }
 
-    /// The clouds here are small, so a filter may find too few.
+    /// Accepts `TooFewLeft`, because the clouds here are small.
     fn check(&self, found: &Result<Vec<u32>, FilterError>) {
         match found {
             Ok(kept) => {
@@ -72,7 +73,8 @@ fn check_neighbours(cloud: &PointCloud, all: &[Vec<f64>], n: usize, radius: f64)
     Bracket::new(&nth, radius).check(&min_neighbours(cloud, n, radius));
 }
 
-/// One point of each cell, each as near to the mean as any, and the first of those of which that is certain.
+/// Checks that one point of each cell is kept, and that no other point of the cell is nearer to the
+/// mean. In a cell of two points, the first must be kept.
 fn check_voxel(cloud: &PointCloud, size: f64) {
     let points: Vec<[f64; 3]> = (0..cloud.len()).map(|i| cloud.point(i)).collect();
     let cell = |p: [f64; 3]| p.map(|x| (x / size).floor());
@@ -125,7 +127,7 @@ fn check_crop(cloud: &PointCloud, min: [f64; 3], max: [f64; 3]) {
     }
 }
 
-/// Numbers without a pattern in 0..1.
+/// Pseudorandom numbers in 0..1.
 fn noise(seed: u64, i: usize) -> f64 {
     let mut x = (i as u64).wrapping_add(seed << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     x = (x ^ x >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -137,7 +139,7 @@ fn noisy(seed: u64, count: usize) -> Vec<[f64; 3]> {
     (0..count).map(|i| [0, 1, 2].map(|k| noise(seed, 3 * i + k))).collect()
 }
 
-/// Clouds that trees and grids find hard.
+/// Clouds that are hard for trees and grids.
 fn hard_clouds() -> Vec<(&'static str, Vec<[f64; 3]>)> {
     let numbers = || (0..300_u16).map(f64::from);
     let far = [4_000_000.0, 5_000_000.0, -300.0];
@@ -188,8 +190,8 @@ fn filters_agree_with_their_twins_on_hard_clouds() {
     }
 }
 
-/// Scan lines and walls hold many points with one coordinate, of which some trees make endless or wrong
-/// leaves.
+/// Scan lines and walls hold many points with one equal coordinate. Some k-d trees form endless or
+/// wrong leaves of such points.
 #[test]
 fn many_equal_coordinates_are_no_trap() {
     for axis in 0..3 {
@@ -197,7 +199,7 @@ fn many_equal_coordinates_are_no_trap() {
         for p in &mut points {
             p[axis] = 1.5;
         }
-        // A few off the plane, which a filter must find.
+        // A few points off the plane, which a filter must find.
         for p in points.iter_mut().step_by(4000) {
             p[axis] = 2.5;
         }
@@ -222,7 +224,7 @@ fn equal_distances_leave_all_points() {
     assert_eq!(remove_outliers(&cloud(&shifted), 7, 1.0).unwrap().len(), 8);
 }
 
-/// A grid at 4,000 km: a voxel, a radius and a box of millimetres still tell millimetres apart.
+/// With a grid at 4,000 km, a voxel size, a radius and a box still resolve millimetres.
 #[test]
 fn far_from_the_origin_millimetres_count() {
     let at = [4_000_000.0, 4_000_000.0, 100.0];
@@ -240,7 +242,7 @@ fn far_from_the_origin_millimetres_count() {
 
 #[test]
 fn ties_in_a_cell_go_to_the_first_point() {
-    // The corners of a square in every cell are equally near to its middle, in whatever order.
+    // The corners of a square in every cell are equally near to its centre, in any order.
     let corners = [[0.75, 0.25], [0.25, 0.25], [0.75, 0.75], [0.25, 0.75]];
     let points: Vec<[f64; 3]> = (0..40_usize)
         .map(|i| [(i / 4) as f64 * 3.0 + corners[(i * 7) % 4][0], corners[(i * 7) % 4][1], 0.5])
@@ -283,7 +285,8 @@ fn bad_parameters_are_named() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Coordinates from few values make equal distances, equal coordinates and points on walls of cells.
+    /// Coordinates with few values produce equal distances, equal coordinates and points on cell
+    /// walls.
     #[test]
     fn filters_agree_with_their_twins(
         points in proptest::collection::vec([-4_i8..5, -4_i8..5, -2_i8..3], 60..200),

@@ -1,4 +1,4 @@
-//! How well two normals agree, and the edges in the order of that.
+//! Agreement of two normals, and the edges sorted by it.
 
 use nearmiss_lanes::id32;
 use nearmiss_lanes::parallel::ranges;
@@ -6,10 +6,11 @@ use nearmiss_lanes::vector::{dot, sub};
 
 use crate::Adjacency;
 
-/// Steps of agreement that are told apart; edges of one step are taken in the order of their points.
+/// Number of levels of agreement. Edges of equal level stay in the order of their points.
 const STEPS: u16 = 1024;
 
-/// Whether two normals agree as they are, how well, and how well along the surface, 0 to 1.
+/// Agreement of two normals: whether the signs match, and from 0 to 1 the strength in general and
+/// the strength along the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Agreement {
     pub(super) same: bool,
@@ -17,7 +18,7 @@ pub(super) struct Agreement {
     along: f32,
 }
 
-/// How the normals `m` at `p` and `n` at `q` agree.
+/// Returns the agreement of the normals `m` at `p` and `n` at `q`.
 #[inline]
 pub(super) fn agreement(p: [f32; 3], m: [f32; 3], q: [f32; 3], n: [f32; 3]) -> Agreement {
     let e = sub(q, p);
@@ -25,19 +26,19 @@ pub(super) fn agreement(p: [f32; 3], m: [f32; 3], q: [f32; 3], n: [f32; 3]) -> A
     let (me, ne) = (dot(m, e), dot(n, e));
     let mirrored = dot(m, n) - 2.0 * me * ne / square;
     let off = (me * me).max(ne * ne) / square;
-    // Points in one place, or normals that are none, say nothing.
+    // Coincident points and invalid normals have no agreement.
     let strength = if mirrored.abs() > 0.0 { mirrored.abs().min(1.0) } else { 0.0 };
     let along = if off < 1.0 { strength * (1.0 - off) } else { 0.0 };
     Agreement { same: mirrored >= 0.0, strength, along }
 }
 
-/// Two points, and how their normals agree.
+/// Two points and the agreement of their normals.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Edge {
     pub(super) ends: [u32; 2],
-    /// The step of how well normals agree, and one bit for opposite ones.
+    /// Level of the strength, shifted left by one; bit 0 is set for opposite normals.
     strength: u16,
-    /// [`STEPS`] − 1 − the step of how well they agree along the surface.
+    /// [`STEPS`] − 1 − the level of the strength along the surface.
     weakness: u16,
 }
 
@@ -62,19 +63,21 @@ impl Edge {
     }
 }
 
-/// What edges weigh when many decide together.
+/// Weights of edges in votes.
 ///
-/// Of two signs that an edge of strength s holds to agree let (1 + s) / 2 be right; of the dragon's edges
-/// with s above 0.95 none is wrong, of those below 0.2 a third. What independent witnesses say is the sum of
-/// their log-odds, ln((1 + s) / (1 − s)). They are whole numbers here, so that no sum depends on its order.
+/// An edge of strength s is taken to be right with probability (1 + s) / 2. Of the dragon's edges
+/// with s above 0.95 none is wrong; of those below 0.2, a third. Votes of independent edges add up
+/// as log-odds, ln((1 + s) / (1 − s)). Weights are integers, so that sums do not depend on their
+/// order.
 #[derive(Debug)]
 pub(super) struct Weights(Vec<i64>);
 
 impl Weights {
-    /// The weight of log-odds of one.
+    /// Weight of log-odds 1.
     const ONE: f64 = 65536.0;
 
-    /// Adds up the slope 2 / (1 − s²), by the middles of the steps: logarithms of machines differ.
+    /// Sums the slope 2 / (1 − s²) at the midpoints of the levels, because logarithms differ
+    /// between machines.
     pub(super) fn new() -> Self {
         let slope = |k: u16| {
             let s = (f64::from(k) + 0.5) / f64::from(STEPS);
@@ -90,14 +93,15 @@ impl Weights {
         Self(weights)
     }
 
-    /// Of this edge, negative if it holds normals to be opposite.
+    /// Returns the weight of an edge, negative for opposite normals.
     pub(super) fn of(&self, edge: Edge) -> i64 {
         let weight = self.0[edge.step()];
         if edge.opposite() { -weight } else { weight }
     }
 }
 
-/// All edges, the best agreement first; of equal steps by their points.
+/// Returns all edges, sorted by strength along the surface, strongest first; edges of equal level
+/// by their points.
 pub(super) fn strongest_first(graph: &Adjacency, positions: &[[f32; 3]], normals: &[[f32; 3]]) -> Vec<Edge> {
     let stretches = ranges(graph.len(), |points| {
         let mut edges = Vec::new();
@@ -140,7 +144,7 @@ mod tests {
             #[expect(clippy::cast_precision_loss, reason = "below 2^20")]
             let found = weights.0[usize::from(k)] as f64 / Weights::ONE;
             let expected = ((1.0 + s) / (1.0 - s)).ln();
-            // The last steps are steep; there is no infinite one.
+            // The last levels are steep, and their weights are finite.
             assert!((found - expected).abs() < if k < STEPS - 32 { 1e-3 } else { 0.1 }, "{found} at {s}");
         }
     }

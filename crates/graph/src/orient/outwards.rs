@@ -1,4 +1,4 @@
-//! What decides which of the two sides of a component is out.
+//! Decision which side of a component is the outside.
 
 use nearmiss_lanes::id32;
 use nearmiss_lanes::vector::{dot, sub};
@@ -6,7 +6,7 @@ use nearmiss_lanes::vector::{dot, sub};
 use super::patches::Signed;
 use super::sides::{Decision, OrientedPart, Sides};
 
-/// What speaks for the normals of a part as they are relative to its root.
+/// Evidence for the current normals of a part, relative to its root.
 #[derive(Debug, Clone, Copy, Default)]
 struct Evidence {
     first: u32,
@@ -14,20 +14,20 @@ struct Evidence {
     normals: f64,
     scanner: f64,
     volume: f64,
-    /// The greatest that the volume could be, were every normal to point away from the centre.
+    /// Greatest possible volume, if every normal pointed away from the centre.
     extent: f64,
-    /// Sums for the centre, and of the normals.
+    /// Sums for the centre, and the sum of the normals.
     area: f64,
     position: [f64; 3],
     normal: [f64; 3],
 }
 
 impl Evidence {
-    /// Volumes beyond this share of what they could be are no accident: a plate a hundred times as wide as it
-    /// is thick has one of 0.013, flat noise on a sheet has none.
+    /// Volumes above this fraction of the greatest possible volume are significant. A plate 100
+    /// times as wide as thick has 0.013; flat noise on a sheet has about 0.
     const VOLUME: f64 = 1e-3;
 
-    /// What decides, and whether normals have to be turned.
+    /// Returns the decisive evidence, and whether the normals must be reversed.
     fn decide(&self) -> (Decision, bool) {
         if self.normals.abs() > 0.0 {
             return (Decision::Normals, self.normals < 0.0);
@@ -43,7 +43,7 @@ impl Evidence {
     }
 }
 
-/// The parts, and for each point whether its part is to be turned.
+/// The parts, and for each point whether its normal must be reversed with its part.
 pub(super) struct Outwards {
     pub(super) parts: Vec<OrientedPart>,
     pub(super) turned: Vec<bool>,

@@ -1,21 +1,22 @@
-//! Patches along smooth sheets, and their signs by what the edges between them say together.
+//! Patches of smooth sheets, and the choice of their signs by the votes of the edges between them.
 
 use nearmiss_lanes::id32;
 
 use super::agreement::{Edge, Weights};
 
-/// A point, and whether the normal of another is turned relative to its own.
+/// A point, and whether another normal is reversed relative to the normal of that point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Signed {
     pub(super) point: u32,
     pub(super) turned: bool,
 }
 
-/// What the edges between two sets say together.
+/// Sum of the votes of the edges between two sets.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Votes {
     sets: [u32; 2],
-    /// [`Weights`] of the edges between normals that agree, less those of the others.
+    /// [`Weights`] of edges between agreeing normals, minus those of edges between opposite
+    /// normals.
     same: i64,
     all: i64,
 }
@@ -27,21 +28,21 @@ impl Votes {
     }
 }
 
-/// The greater part's votes less the others', 0 to 1.
+/// Returns the margin of the majority over the minority, from 0 to 1.
 #[expect(clippy::cast_precision_loss, reason = "a share")]
 fn share(same: i64, all: i64) -> f32 {
     if all > 0 { same.abs() as f32 / all as f32 } else { 0.0 }
 }
 
-/// Sets of points that edges have joined. Each has a root, to which signs are relative.
+/// Sets of points joined by edges. Each set has a root, to which signs are relative.
 pub(super) struct Tree {
-    /// Towards the root.
+    /// Parent of each point, and the sign relative to it.
     above: Vec<Signed>,
-    /// Of a root the size of its set.
+    /// Size of each root's set.
     size: Vec<u32>,
-    /// How a root lost its place: the root it was joined to, and how certain the sign was.
+    /// For each former root, the root it was joined to and the certainty of the sign.
     joined: Vec<(u32, f32)>,
-    /// Of a root: whether a ring of strong edges turns normals round.
+    /// For each root, whether a cycle of smooth edges reverses a normal.
     pub(super) twisted: Vec<bool>,
 }
 
@@ -55,7 +56,7 @@ impl Tree {
         }
     }
 
-    /// The root of the set of `point`, and its sign relative to that.
+    /// Returns the root of the set of `point`, and the sign of `point` relative to it.
     pub(super) fn root(&mut self, mut point: u32) -> Signed {
         let mut turned = false;
         loop {
@@ -81,7 +82,8 @@ impl Tree {
         }
     }
 
-    /// Of votes between points those between the sets that have been joined so far, sorted by these.
+    /// Returns the votes between the sets joined so far, given votes between points; sums votes of
+    /// equal pairs of sets, and sorts by pair.
     pub(super) fn between(&mut self, mut votes: Vec<Votes>) -> Vec<Votes> {
         votes.retain_mut(|vote| {
             let [a, b] = vote.sets.map(|set| self.root(set));
@@ -101,7 +103,8 @@ impl Tree {
         votes
     }
 
-    /// Joins sets by what all edges between two of them say together, each with the one that it is surest of.
+    /// Joins sets by the votes of all edges between two of them, each set with the one that has the
+    /// clearest votes.
     pub(super) fn join_by_votes(&mut self, mut votes: Vec<Votes>) {
         while !votes.is_empty() {
             let by_clarity = |a: &(u32, usize), b: &(u32, usize)| {
@@ -122,9 +125,12 @@ impl Tree {
         }
     }
 
-    /// Whether patches are turned relative to the roots of their components, by their own roots: as they were
-    /// joined, but for each that all its `votes` together speak against. These decide one after the other,
-    /// until none is left; with each the votes that are followed weigh more, so that they come to an end.
+    /// Returns for each patch, by its root, whether it is reversed relative to the root of its
+    /// component.
+    ///
+    /// Starts with the signs from joining. Patches are then visited in turn, and a patch that the
+    /// sum of all its `votes` contradicts is reversed, until there is none. Each reversal increases
+    /// the weight of the votes that are satisfied, so the process terminates.
     pub(super) fn settle(&mut self, votes: &[Votes]) -> Vec<bool> {
         let mut turned: Vec<bool> = (0..id32(self.above.len())).map(|i| self.root(i).turned).collect();
         let mut by_set = by_set(votes);
@@ -160,7 +166,7 @@ impl Tree {
         self.twisted[root as usize] |= self.twisted[leaf as usize];
     }
 
-    /// The least certain step by which the sign of `point` came from the greater part.
+    /// Returns the certainty of the least certain step through which `point` got its sign.
     pub(super) fn weakest(&self, mut point: u32) -> f32 {
         let mut weakest = 1.0_f32;
         loop {
@@ -174,7 +180,7 @@ impl Tree {
     }
 }
 
-/// The indices of `votes`, at either set.
+/// Returns the indices of `votes`, once for each of their sets.
 fn by_set(votes: &[Votes]) -> Vec<(u32, usize)> {
     votes.iter().enumerate().flat_map(|(k, vote)| vote.sets.map(|set| (set, k))).collect()
 }
@@ -187,7 +193,7 @@ mod tests {
         Votes { sets, same, all: same.abs() + 1 }
     }
 
-    /// What is followed of the votes, less what is not.
+    /// Returns the weight of the satisfied votes minus that of the others.
     fn followed(votes: &[Votes], turned: &[bool]) -> i64 {
         let follows = |vote: &Votes| {
             let [a, b] = vote.sets.map(|set| turned[set as usize]);

@@ -1,25 +1,25 @@
-//! What is known about the sides of parts, and what was decided.
+//! Known sides of parts, and the decisions made.
 
-/// Which side is out, where something says so.
+/// Hints on which side of the surface is the outside.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sides<'a> {
-    /// Normals that the scan came with, one a point; zero or NaN where it had none.
+    /// Normals of the scan's input, one for each point; zero or NaN where unknown.
     pub normals: Option<&'a [[f32; 3]]>,
-    /// Where the scanner stood: normals point there.
+    /// Position of the scanner. Normals should point towards it.
     pub scanner: Option<Viewpoint<'a>>,
 }
 
-/// Where points were seen from.
+/// Positions from which points were scanned.
 #[derive(Debug, Clone, Copy)]
 pub enum Viewpoint<'a> {
-    /// All from one place.
+    /// One position for all points.
     One([f32; 3]),
-    /// Each from a place of its own; from itself where that is not known.
+    /// A position for each point; the point itself where it is unknown.
     Each(&'a [[f32; 3]]),
 }
 
 impl Viewpoint<'_> {
-    /// Where point `i` was seen from.
+    /// Returns the position from which point `i` was scanned.
     pub(crate) fn of(&self, i: usize) -> [f32; 3] {
         match self {
             Self::One(place) => *place,
@@ -28,29 +28,30 @@ impl Viewpoint<'_> {
     }
 }
 
-/// What decided the side of a component.
+/// The evidence that decided the side of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Decision {
-    /// The greater part of the scan's own normals.
+    /// The majority of the normals in the scan's input.
     Normals,
-    /// The greater part faces the scanner.
+    /// The majority of the points must face the scanner.
     Scanner,
-    /// The volume it encloses is positive.
+    /// The enclosed volume must be positive.
     Volume,
-    /// Nothing: the sum of the normals has a positive component of largest magnitude.
+    /// Convention: the component of largest magnitude of the sum of all normals is positive.
     Convention,
 }
 
-/// Points that edges connect.
+/// A set of points that edges connect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrientedPart {
-    /// The least index of a point.
+    /// Least index of a point.
     pub first: u32,
     /// Number of points.
     pub points: u32,
-    /// Whether it has two sides: no ring of edges between normals that nearly agree turns a normal round.
+    /// `true` if the part has two sides: no cycle of edges between nearly agreeing normals reverses
+    /// a normal.
     pub orientable: bool,
-    /// What decided which is out.
+    /// The evidence that decided which side is the outside.
     pub decision: Decision,
 }

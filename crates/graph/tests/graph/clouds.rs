@@ -1,5 +1,5 @@
-//! Clouds with graphs for the tests here: the spheres of influence of the fourth neighbour, found in other
-//! ways than ours.
+//! Clouds with graphs for these tests. The graph joins points whose spheres to the fourth neighbour
+//! intersect, and is found by other means than in the library.
 
 use std::num::NonZero;
 
@@ -8,7 +8,7 @@ use nearmiss_graph::{Adjacency, edge_lengths};
 use nearmiss_surface::symmetric_eigen;
 use nearmiss_testdata::shapes::{Form, Order, Sampling};
 
-/// Points, their graph, the lengths of its edges and the distance of each point's sixth neighbour.
+/// Points, their graph, the lengths of its edges, and the distance of each point's sixth neighbour.
 #[derive(Debug, Clone)]
 pub(crate) struct Cloud {
     pub(crate) points: Vec<[f32; 3]>,
@@ -34,7 +34,7 @@ impl Cloud {
         Self::new(single(&form.sample(Sampling { spacing, noise, order, seed }).points))
     }
 
-    /// The least eigenvector about each point and its neighbours in the graph, its sign that of a coin.
+    /// The least eigenvector about each point and its neighbours in the graph, with a random sign.
     pub(crate) fn normals(&self, seed: u64) -> Vec<[f32; 3]> {
         (0..self.points.len())
             .map(|i| {
@@ -63,7 +63,7 @@ impl Cloud {
     }
 }
 
-/// A coin for each index.
+/// A random boolean for each index.
 pub(crate) fn coin(seed: u64, i: usize) -> bool {
     let mixed = (i as u64 ^ seed << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     (mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 63 == 0
@@ -78,7 +78,7 @@ pub(crate) fn distance(a: &[f32; 3], b: &[f32; 3]) -> f64 {
     (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Clouds of no more points are compared each with each.
+/// Greatest number of points for comparisons of all pairs.
 const BRUTE: usize = 1000;
 
 fn all_pairs(points: &[[f32; 3]], radii: &[f64]) -> Vec<[u32; 2]> {
@@ -90,7 +90,7 @@ fn all_pairs(points: &[[f32; 3]], radii: &[f64]) -> Vec<[u32; 2]> {
     ids.flat_map(|j| (0..j).map(move |i| [i, j])).filter(is_edge).collect()
 }
 
-/// As [`all_pairs`]: of two points the one of the greater sphere finds the other.
+/// As [`all_pairs`], with a tree. Of two points, the one with the greater sphere finds the other.
 fn by_tree(points: &[[f32; 3]], radii: &[f64]) -> Vec<[u32; 2]> {
     let tree = tree(points);
     let mut edges = Vec::new();
@@ -111,7 +111,7 @@ fn tree(points: &[[f32; 3]]) -> ImmutableKdTree<f64, 3> {
     ImmutableKdTree::new_from_slice(&points).unwrap()
 }
 
-/// Of every point the distances to its neighbours of these ranks.
+/// Distances of every point to its neighbours of these ranks.
 fn neighbour_distances<const N: usize>(points: &[[f32; 3]], ranks: [usize; N]) -> [Vec<f64>; N] {
     let tree = (points.len() > BRUTE).then(|| tree(points));
     let wanted = NonZero::new(ranks.into_iter().max().unwrap() + 1).unwrap();

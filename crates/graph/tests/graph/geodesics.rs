@@ -1,10 +1,12 @@
-//! Shortest paths and the map of close pairs against relaxing every edge until nothing changes.
+//! Compares shortest paths and the map of close pairs with relaxing every edge until nothing
+//! changes.
 use crate::clouds::{Cloud, single};
 use nearmiss_graph::{Adjacency, ClosePairs, GeodesicScratch, Network, Paths, edge_lengths};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 use nearmiss_testdata::shapes::torus;
 
-/// Bellman and Ford's algorithm, in double precision and in the sums that ours is said to form.
+/// The algorithm of Bellman and Ford, in double precision and with the documented sums of the
+/// library.
 fn relaxed(graph: &Adjacency, points: &[[f32; 3]], source: usize) -> Vec<(f64, f32)> {
     let mut known = vec![(f64::INFINITY, f32::INFINITY); points.len()];
     known[source] = (0.0, 0.0);
@@ -91,7 +93,7 @@ fn paths_are_as_long_as_said_and_go_along_edges() {
         let long: f64 = long.sum();
         assert!((long - f64::from(distance)).abs() < 1e-5, "{long} along a path of {distance}");
     }
-    // Two points on their own.
+    // Points 2 and 3 are not connected to points 0 and 1.
     let graph = Adjacency::from_edges(4, &[[0, 1], [2, 3]]);
     let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]];
     let lengths = edge_lengths(&graph, &points);
@@ -101,10 +103,10 @@ fn paths_are_as_long_as_said_and_go_along_edges() {
     assert_eq!(scratch.distance(network, 2, 3), Some(1.0));
 }
 
-/// No path of more than some hundred edges is in a map; these have thousands.
+/// The paths in other maps have at most some hundred edges; these have thousands.
 #[test]
 fn edges_that_vanish_beside_what_they_add_to_still_make_a_path() {
-    // A long way, then points a billionth apart.
+    // A long edge, then points a billionth apart.
     for n in [40_u16, 4000] {
         let mut points = vec![[0.0, 0.0, 0.0], [1e3, 0.0, 0.0]];
         points.extend((1..n).map(|i| [1e3, f32::from(i) * 1e-9, 0.0]));
@@ -128,7 +130,7 @@ fn edges_that_vanish_beside_what_they_add_to_still_make_a_path() {
     }
 }
 
-/// What distances are rounded by, and a little for sums.
+/// Relative rounding error of distances, and a little for sums.
 const ROUNDED: f64 = 6.2e-5;
 
 fn is_near(distance: f32, exact: f64, share: f64) -> bool {
@@ -169,7 +171,7 @@ fn the_map_holds_every_pair_that_is_heard_and_no_other() {
     }
 }
 
-/// Points along a line, in an order that keeps no two neighbours together, with gaps of all sizes.
+/// Points along a line with gaps of all sizes, in an order that separates all neighbours.
 #[test]
 fn what_four_bytes_do_not_hold_is_as_right() {
     const COUNT: u32 = 70_001;
@@ -180,7 +182,7 @@ fn what_four_bytes_do_not_hold_is_as_right() {
     let id = |k: u32| u32::try_from(name(k)).unwrap();
     let edges: Vec<[u32; 2]> = (1..COUNT).map(|k| [id(k - 1), id(k)]).collect();
     let graph = Adjacency::from_edges(COUNT as usize, &edges);
-    // Lengths from the gaps, as positions would swallow them.
+    // Lengths come from the gaps, because positions would round them away.
     let mut place = vec![0; COUNT as usize];
     for k in 0..COUNT {
         place[id(k) as usize] = k;
@@ -258,8 +260,8 @@ fn stored_and_rebuilt_paths_are_shortest() {
     }
 }
 
-/// Layers of points, each joined to all of the next by edges that differ by less than distances are rounded
-/// by.
+/// Layers of points. Each point is joined to all of the next layer, by edges whose lengths differ
+/// by less than the rounding of distances.
 #[test]
 fn paths_are_short_where_rounding_hides_which_way_is() {
     const WIDTH: u32 = 6;

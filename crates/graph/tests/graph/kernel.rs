@@ -1,4 +1,4 @@
-//! What the surfaces of `nearmiss-surface` must do, with distances along the graph.
+//! Runs the conformance tests of `nearmiss-surface` with distances along the graph.
 use crate::clouds::Cloud;
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{Close, ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, Network, Paths};
@@ -6,7 +6,7 @@ use nearmiss_surface::{Evaluation, Kernel, Level, Moments, Status, SurfaceOption
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::shapes::{patch, plates, sphere, torus};
 
-/// A cloud with the map of its close pairs.
+/// A cloud with its map of close pairs.
 struct Sheet {
     cloud: Cloud,
     plan: SurfacePlan,
@@ -36,7 +36,7 @@ impl Sheet {
         self.kernel().evaluate(x, self.nearest(x), &mut KernelScratch::default())
     }
 
-    /// With straight distances.
+    /// Evaluates f with straight-line distances.
     fn straight_at(&self, x: [f64; 3]) -> Evaluation {
         let blocks = self.plan.blocks(&self.cloud.points, &self.cloud.radii);
         Moments::about(Level::new(), &self.plan, x, blocks).evaluate(&self.plan, x)
@@ -87,7 +87,7 @@ fn a_sphere_shrinks_by_its_curvature() {
             let foot = project(direction.map(|c| 1.01 * c), |x| ball.at(x));
             let radius = foot.point.iter().map(|c| c * c).sum::<f64>().sqrt();
             let shrunk = 1.0 - radius;
-            // Ways along edges are longer than straight ones, so less is heard.
+            // Paths along edges are longer than straight lines, so fewer points contribute.
             assert!((0.5..1.2).contains(&(shrunk / bias)), "{kernel:?}: {shrunk} for {bias}");
         }
     });
@@ -106,7 +106,7 @@ fn it_moves_with_its_points() {
     for i in (0..still.cloud.points.len()).step_by(7) {
         let d = arbitrary::point_in(rng, 0.3 * h);
         let x = [0, 1, 2].map(|k| f64::from(still.cloud.points[i][k]) + d[k]);
-        // Where rounding makes another point or edge the nearest, or drops an edge, f may step.
+        // f may jump where rounding changes the nearest point or edge, or drops an edge.
         let [a, b] = [(&still, x), (&moved, pose.apply(x))]
             .map(|(sheet, x)| (sheet.kernel().foot(x, sheet.nearest(x)).ends, sheet.at(x)));
         if a.0 == b.0 && a.1.support == b.1.support {
@@ -129,12 +129,13 @@ fn distances_from_the_foot_are_those_of_its_ends_and_go_over_smoothly() {
         assert_eq!((foot.ends[0], foot.share), (id, 0.0));
         let at = kernel.evaluate(ring.cloud.points[i].map(f64::from), id, &mut scratch);
         assert_eq!(kernel.evaluate_at(id, &mut scratch).0, at, "at point {i}");
-        // At a point: its list, but for what is just at its horizon.
+        // At a point, the list of the point contributes, except for points exactly at their support
+        // radius.
         let heard = kernel.hear(&foot, &mut scratch).to_vec();
         let strict =
             ring.pairs.of(i).filter(|c| c.distance < ring.plan.horizon(ring.cloud.radii[c.point as usize]));
         assert_eq!(heard, strict.collect::<Vec<_>>());
-        // From either end of an edge the middle hears the same.
+        // The midpoint of an edge yields the same points, whichever end comes first.
         let other = ring.cloud.graph.of(i)[0];
         let there = foot_between(&ring, [id, other], 0.5);
         let back = foot_between(&ring, [other, id], 0.5);
@@ -148,7 +149,7 @@ fn distances_from_the_foot_are_those_of_its_ends_and_go_over_smoothly() {
         assert_eq!(a.iter().map(|c| c.0).collect::<Vec<_>>(), b.iter().map(|c| c.0).collect::<Vec<_>>());
         for (a, b) in a.iter().zip(&b) {
             assert!((a.1 - b.1).abs() < 1e-6, "{a:?} and {b:?}");
-            // Between the distances of the ends, but for what these are rounded by.
+            // The distance is between those of the ends, except for their rounding.
             let [p, q] = [id, other].map(|end| search.distance(network, end, a.0).unwrap());
             assert!(a.1 <= 0.500_05 * (p + q) + there.length, "{} between {p} and {q}", a.1);
             assert!(a.1 >= 0.9999 * p.min(q), "{} between {p} and {q}", a.1);
@@ -206,8 +207,8 @@ fn foot_between(sheet: &Sheet, [a, b]: [u32; 2], share: f64) -> nearmiss_graph::
 fn sheets_that_no_edge_joins_stay_apart() {
     each_kernel(|kernel| {
         let h = Sheet::new(Cloud::of_form(patch(2.0, 2.0), 0.1, 0.0, 1), kernel).h();
-        // No sphere of influence is larger than what the sixth neighbour's is about: 2.2 h joins none of
-        // these.
+        // No sphere of influence is much larger than the sphere to the sixth neighbour, so at 2.2 h
+        // no edge joins the plates.
         for gap in [2.2, 3.0] {
             let pair = Sheet::new(Cloud::of_form(plates(2.0, 2.0, gap * h), 0.1, 0.0, 1), kernel);
             let rng = &mut arbitrary::rng(3);

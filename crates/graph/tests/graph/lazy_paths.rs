@@ -1,4 +1,4 @@
-//! Paths of which only some points are known: whole ones against the graph, and looks against whole ones.
+//! Lazy paths: complete paths are compared with the graph, and looks with complete paths.
 use crate::clouds::Cloud;
 use nearmiss_graph::{GeodesicScratch, LazyPath, Levels, Network, PathPoint};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud, rng};
@@ -9,7 +9,7 @@ fn single(points: Vec<[f64; 3]>) -> Vec<[f32; 3]> {
     crate::clouds::single(&points)
 }
 
-/// Every step is an edge, as long as it says, and the ends are right.
+/// Checks the ends, and that every step is an edge of the stated length.
 fn check(network: Network<'_>, path: &[PathPoint], [a, b]: [u32; 2]) {
     assert_eq!([path[0].point, path[path.len() - 1].point], [a, b], "its ends");
     assert!(path[0].along.abs() < 1e-12, "{:?} is no beginning", path[0]);
@@ -52,8 +52,8 @@ fn a_path_is_one_of_the_graph_and_a_look_finds_its_points() {
                 sum += whole[whole.len() - 1].along / f64::from(shortest);
                 longest = longest.max(whole[whole.len() - 1].along / f64::from(shortest));
             }
-            // Looks at random places find the nearer end of the edge there, and the path between stays as it
-            // is.
+            // Looks at random positions return the nearer end of the edge there, and do not change
+            // the path.
             for _ in 0..8 {
                 let along = random.random_range(-0.1..=1.1) * whole[whole.len() - 1].along;
                 let right = lazy.len() - 1;
@@ -72,7 +72,7 @@ fn a_path_is_one_of_the_graph_and_a_look_finds_its_points() {
             assert_eq!(again, whole.iter().map(|p| p.point).collect::<Vec<u32>>());
         }
     }
-    // No shortest ones, but no odysseys either.
+    // The paths are not shortest, but not much longer either.
     let mean = sum / f64::from(led);
     assert!(
         led > 300 && longest < 12.0 && mean < 1.6,

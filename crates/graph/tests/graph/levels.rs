@@ -1,4 +1,5 @@
-//! Coarser levels: what they promise of centres and cells, and paths against searches of the whole graph.
+//! Coarser levels: guarantees about centres and cells, and paths compared with searches of the
+//! whole graph.
 use crate::clouds::{Cloud, single};
 use nearmiss_graph::{Adjacency, Cells, GeodesicScratch, LevelScratch, Levels, Network};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
@@ -8,12 +9,12 @@ fn torus_cloud() -> Cloud {
     Cloud::of_form(torus(1.0, 0.4), 0.05, 0.1, 3)
 }
 
-/// What is promised of one level.
+/// Checks the guarantees of one level.
 fn check(network: Network<'_>, radii: &[f32], cells: &Cells) {
     let mut scratch = GeodesicScratch::default();
     let n = u32::try_from(network.len()).unwrap();
     assert!(cells.centres().windows(2).all(|two| two[0] < two[1]), "centres ascend");
-    // No centre is nearer to one before it than that one asks for, and none could be added.
+    // Each centre keeps its distance from earlier ones, and no centre can be added.
     let mut nearest = vec![(f32::INFINITY, u32::MAX); n as usize];
     let mut is_near = vec![false; n as usize];
     for (cell, &centre) in (0..).zip(cells.centres()) {
@@ -28,11 +29,12 @@ fn check(network: Network<'_>, radii: &[f32], cells: &Cells) {
     }
     assert!(is_near.iter().all(|&near| near), "a point is far from every centre");
     for point in 0..n as usize {
-        // Which of equally near centres owns it is open, and sums from either end differ in their last bits.
+        // Equally near centres may own the point, and sums from either end differ in their last
+        // bits.
         let (found, best) = (cells.distances()[point], nearest[point].0);
         assert!((found - best).abs() <= 1e-5 * best, "point {point}: {found} for {best}");
     }
-    // Cells touch where an edge joins them, and paths between centres are as long as said.
+    // Cells are adjacent if an edge joins them, and paths between centres have the stated length.
     let mut touching = vec![Vec::new(); cells.len()];
     for i in 0..n {
         let mine = cells.owners()[i as usize];
@@ -59,7 +61,7 @@ fn check(network: Network<'_>, radii: &[f32], cells: &Cells) {
     }
 }
 
-/// The length of a path, each step of which is an edge.
+/// Returns the length of a path. Each step must be an edge.
 fn along(network: Network<'_>, path: &[u32]) -> f32 {
     let step = |two: &[u32]| {
         let edge = network.edges(two[0] as usize).find(|edge| edge.0 == two[1]);
@@ -98,8 +100,8 @@ fn a_level_keeps_about_a_quarter() {
     assert!(finer <= 256);
 }
 
-/// Mean and greatest of how much longer paths are than the shortest ones, and how much of the graph was
-/// looked at.
+/// Returns the mean and the greatest relative excess of paths over the shortest paths, and the
+/// fraction of the graph that was searched.
 fn excess(form: Form, spacing: f64) -> [f64; 3] {
     let cloud = Cloud::of_form(form, spacing, 0.1, 3);
     let network = Network::new(&cloud.graph, &cloud.lengths);
@@ -131,7 +133,7 @@ fn excess(form: Form, spacing: f64) -> [f64; 3] {
 fn paths_are_almost_the_shortest() {
     for (name, form) in [("torus", torus(1.0, 0.4)), ("bowl", bowl(1.0))] {
         let [mean, worst, share] = excess(form, 0.03);
-        // The worst on the torus takes the other way round the tube.
+        // The worst path on the torus goes round the tube on the wrong side.
         assert!(mean < 0.002 && worst < 0.2, "{name}: mean {mean}, worst {worst}");
         assert!(share < 0.5, "{name}: {share} of the points");
     }
@@ -149,7 +151,7 @@ fn no_way_leads_from_part_to_part() {
     let mut scratch = LevelScratch::default();
     assert_eq!(levels.distance(network, above(true), above(false), &mut scratch), None);
     assert_eq!(levels.distance(network, above(true), above(true), &mut scratch), Some(0.0));
-    // All on their own: no level is worth its while.
+    // Without edges no level is useful.
     let graph = Adjacency::from_edges(1000, &[]);
     let lone = Levels::build(Network::new(&graph, &[]), &[1.0; 1000]);
     assert!(lone.cells().is_empty());

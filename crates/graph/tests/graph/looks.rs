@@ -1,10 +1,11 @@
-//! What graphs of known shapes look like: borders, slits, outliers, density.
+//! Graphs of known shapes: borders, slits, outliers, density.
 use nearmiss_graph::{Adjacency, GraphOptions, PointGraph, Prune};
 use nearmiss_testdata::shapes::{self, Form, Order, Sampling};
 
 type Point = [f32; 3];
 
-/// Samples of a form, sorted along its longest axis: order of a kind.
+/// Samples of a form, sorted along its longest axis, so that consecutive points are near each
+/// other.
 #[expect(clippy::cast_possible_truncation, reason = "points are stored in single precision")]
 fn samples(form: Form, order: Order, noise: f64, spacing: f64) -> Vec<Point> {
     let shape = form.sample(Sampling { spacing, noise, order, seed: 5 });
@@ -38,8 +39,8 @@ fn closed_shapes_have_no_border() {
     }
 }
 
-/// Checks that points less than `near` inside a border are found, as far as `share` of them, and none further
-/// than `far`.
+/// Checks that at least the fraction `share` of the points nearer to a border than `near` are
+/// found, and no point further than `far`.
 fn check_border(graph: &PointGraph, depths: &[f64], (near, share, far): (f64, f64, f64), what: &str) {
     let (mut outermost, mut found) = (0_u32, 0_u32);
     for (i, &depth) in depths.iter().enumerate() {
@@ -74,7 +75,7 @@ fn across(adjacency: &Adjacency, points: &[Point]) -> usize {
     adjacency.edges().filter(|&[a, b]| points[a as usize][0] * points[b as usize][0] < 0.0).count()
 }
 
-/// S1 Fig. 5: the surface ends at the slit, a search may cross it.
+/// Klein & Zachmann 2005, fig. 5: the surface ends at the slit, but a search may cross it.
 #[test]
 fn a_slit_is_bridged_by_virtual_edges_alone() {
     let mut points = samples(shapes::patch(60.0, 60.0), Order::Random, 0.1, 1.0);
@@ -86,7 +87,7 @@ fn a_slit_is_bridged_by_virtual_edges_alone() {
     let sides = |i: usize| points[i][0] < 0.0;
     let first = points.iter().position(|p| p[0] > 0.0).unwrap();
     assert!((0..points.len()).all(|i| graph.components()[i] as usize == if sides(i) { 0 } else { first }));
-    // Unpruned it is one.
+    // Without pruning there is one component.
     let all = PointGraph::build(&points, &GraphOptions::default().with_prune(Prune::Never)).unwrap();
     assert_eq!(all.counts().components, 1);
 }

@@ -1,4 +1,4 @@
-//! The graph: everything is one program, which links once.
+//! Tests of the graph, in one program so that they link once.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod clouds;

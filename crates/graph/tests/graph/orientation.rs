@@ -1,4 +1,4 @@
-//! Oriented normals against those of shapes that are known, from arbitrary signs.
+//! Orients normals with random signs, and compares them with the normals of known shapes.
 use crate::clouds::{Cloud, single};
 use nearmiss_geometry::TriangleMesh;
 use nearmiss_graph::{Adjacency, Decision, Orientation, Sides, Viewpoint, orient};
@@ -16,7 +16,7 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Share of the points whose normal points as `expected`.
+/// Fraction of the points whose normal points to the side of `expected`.
 #[expect(clippy::cast_precision_loss, reason = "below 2^24")]
 fn right(normals: &[[f32; 3]], expected: impl Fn(usize) -> [f32; 3]) -> f64 {
     let right = normals.iter().enumerate().filter(|&(i, n)| dot(*n, expected(i)) > 0.0).count();
@@ -40,7 +40,7 @@ fn closed_shapes_point_outwards_from_any_start() {
             let least = found.confidence.iter().min().unwrap();
             assert!(*least > 150, "{least} of 255");
 
-            // Convex: every normal points away from the middle.
+            // Convex shapes: every normal points away from the centre.
             for (name, form, spacing) in [
                 ("sphere", sphere(1.0), 0.07),
                 ("cuboid", cuboid([1.0, 0.8, 0.6]), 0.05),
@@ -49,7 +49,7 @@ fn closed_shapes_point_outwards_from_any_start() {
                 let cloud = Cloud::of_form(form, spacing, noise, seed);
                 let (normals, _) = oriented(&cloud, seed, Sides::default());
                 let share = right(&normals, |i| cloud.points[i]);
-                // Noise turns some normals at edges by a right angle.
+                // Noise rotates some normals at edges by a right angle.
                 let least = if noise > 0.0 { 0.998 } else { 0.999 };
                 assert!(share >= least, "{name}, seed {seed}, noise {noise}: {share}");
             }
@@ -57,7 +57,7 @@ fn closed_shapes_point_outwards_from_any_start() {
     }
 }
 
-/// The vertices of a dragon that its triangles name.
+/// The vertices of a dragon that its triangles use.
 fn dragon(which: Dragon) -> (TriangleMesh, Vec<usize>, Cloud) {
     let mesh = dragon_mesh(which).unwrap();
     let mut used: Vec<usize> = mesh.triangles().iter().flatten().map(|&vertex| vertex as usize).collect();
@@ -70,7 +70,8 @@ fn dragon(which: Dragon) -> (TriangleMesh, Vec<usize>, Cloud) {
 
 #[test]
 fn the_dragon_points_outwards() {
-    // Where its sheets are nearer to each other than samples, points cannot tell what the mesh says.
+    // Where sheets are nearer to each other than samples, the points do not determine the
+    // orientation.
     for (which, least) in [(Dragon::Points23k, 0.998), (Dragon::Points5k, 0.995)] {
         let (mesh, used, cloud) = dragon(which);
         for seed in 0..3 {
@@ -86,8 +87,8 @@ fn the_dragon_points_outwards() {
     }
 }
 
-/// Of an edge from p to q whether normals there mirror each other as they are, how well, and how well along
-/// the surface: the formulas alone, in the steps of 1/1023 that are told apart.
+/// Agreement of the normals at the ends of an edge from p to q: whether the signs match, and the
+/// strength in general and along the surface. By the formulas alone, rounded to steps of 1/1023.
 fn mirrored([p, m, q, n]: [[f32; 3]; 4]) -> (bool, f32, f32) {
     let e = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
     let cosine = dot(m, n) - 2.0 * dot(m, e) * dot(n, e) / dot(e, e);
@@ -132,7 +133,7 @@ fn no_patch_would_rather_be_turned() {
         }
         patches += votes.iter().filter(|&&votes| votes > 0).count();
         for (odds, votes) in odds.iter().zip(votes) {
-            // Ours are told apart in steps.
+            // The library rounds votes to steps.
             assert!(*odds > -0.01 * (1 + votes) as f32, "{odds} of {votes} votes");
         }
     }
@@ -174,11 +175,11 @@ fn open_shapes_are_consistent_and_follow_what_is_known() {
     let (normals, _) = oriented(&cloud, 3, Sides::default());
     let share = right(&normals, outward);
     assert!(share == 0.0 || share == 1.0, "{share} of a bowl");
-    // A scanner above looks into it.
+    // A scanner above looks into the bowl.
     let (normals, found) =
         oriented(&cloud, 3, Sides { scanner: Some(Viewpoint::One([0.0, 0.0, 5.0])), ..Sides::default() });
     assert_eq!((right(&normals, outward), found.parts[0].decision), (0.0, Decision::Scanner));
-    // Normals of the scan, a third of them wrong and some missing, say otherwise.
+    // Normals of the scan's input, a third of them wrong and some missing, override the scanner.
     let given: Vec<[f32; 3]> = (0..cloud.points.len())
         .map(|i| match i % 9 {
             0..3 => cloud.points[i].map(|c| -c),
@@ -190,7 +191,7 @@ fn open_shapes_are_consistent_and_follow_what_is_known() {
     let sides = Sides { normals: Some(&given), scanner: Some(Viewpoint::One([0.0, 0.0, 5.0])) };
     let (normals, found) = oriented(&cloud, 3, sides);
     assert_eq!((right(&normals, outward), found.parts[0].decision), (1.0, Decision::Normals));
-    // Flat: nothing says which side is out.
+    // Flat parts have no outside.
     let flat = Cloud::of_form(plates(1.0, 1.0, 0.5), 0.05, 0.0, 2);
     let (normals, found) = oriented(&flat, 4, Sides::default());
     assert_eq!(found.parts.len(), 2);
@@ -198,7 +199,7 @@ fn open_shapes_are_consistent_and_follow_what_is_known() {
     assert_eq!(right(&normals, |_| [0.0, 0.0, 1.0]), 1.0);
 }
 
-/// A band about a circle of radius 1, half as wide, that is twisted by `halves` half turns.
+/// A band around a circle of radius 1, with width 0.5, twisted by `halves` half turns.
 fn band(halves: u16, spacing: f64) -> Vec<[f32; 3]> {
     let (mut points, mut angle) = (Vec::new(), 0.0_f64);
     while angle < std::f64::consts::TAU - 0.5 * spacing {

@@ -1,4 +1,4 @@
-//! The graph in a container, and containers that lie.
+//! The graph in a container, and forged containers.
 use nearmiss_graph::{GraphOptions, PointGraph};
 use nearmiss_store::{Check, File, Flaw, LoadError, Writer};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
@@ -9,7 +9,7 @@ fn graph() -> PointGraph {
     PointGraph::build(&points, &GraphOptions::default()).unwrap()
 }
 
-/// The container of a graph, as bytes.
+/// Returns the container of a graph as bytes.
 fn stored(graph: &PointGraph) -> Vec<u8> {
     let mut writer = Writer::new(*b"TEST", 1);
     graph.add_to(&mut writer).unwrap();
@@ -35,7 +35,7 @@ fn what_is_stored_comes_back() {
     assert!(matches!(wrong, LoadError::Flaw(Flaw::Length { expected: 301, found: 300, .. })), "{wrong}");
 }
 
-/// What a use of the graph reads.
+/// Reads everything that a user of the graph could read.
 fn walk(graph: &PointGraph) -> usize {
     let lists = |i| graph.edges().of(i).iter().chain(graph.virtual_edges().of(i));
     let ends = (0..graph.len()).flat_map(lists);
@@ -56,7 +56,7 @@ fn no_byte_changed_leads_out_of_the_arrays() {
             for flip in [1, 0x80] {
                 let mut changed = bytes.clone();
                 changed[place] ^= flip;
-                // Checksums are not looked at here.
+                // Opens without comparing checksums.
                 let file = File::from_bytes(changed, Check::Structure).unwrap();
                 tried += 1;
                 match PointGraph::load(&file, graph.meta(), 300, Check::Structure) {

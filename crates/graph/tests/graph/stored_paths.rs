@@ -1,4 +1,4 @@
-//! Close pairs and levels in a container, and containers that lie.
+//! Close pairs and levels in a container, and forged containers.
 use crate::clouds::Cloud;
 use nearmiss_graph::{
     Adjacency, ClosePairs, GeodesicKernel, GeodesicScratch, KernelScratch, LevelScratch, Levels, Network,
@@ -50,8 +50,8 @@ fn what_is_stored_comes_back() {
     ));
 }
 
-/// Points on a line, half of which come much later: on either side of the seam pairs of almost the same
-/// distances stand in the list and beside it.
+/// Points on a line, half of which come much later in the order. On both sides of the seam, pairs
+/// of nearly equal distances are stored in the list and separately.
 #[test]
 fn lists_of_near_and_far_points_stay_in_order() {
     const COUNT: usize = 70_000;
@@ -97,7 +97,7 @@ fn no_byte_changed_leads_out_of_the_arrays() {
         for place in (first..last).step_by(step) {
             let mut changed = bytes.clone();
             changed[place] ^= 0x81;
-            // Checksums are not looked at here.
+            // Opens without comparing checksums.
             let file = File::from_bytes(changed, Check::Structure).unwrap();
             tried += 1;
             match ClosePairs::load(&file, 0, (horizons.len(), |i: usize| horizons[i]), Check::Structure) {
@@ -130,7 +130,7 @@ fn no_byte_changed_leads_out_of_the_arrays() {
 fn ways_that_go_round_are_refused() {
     let Stored { cloud, levels, bytes, .. } = stored();
     let cells = &levels.cells()[0];
-    // Two points of one cell, neither of them its centre, that send each other.
+    // Two points of one cell that point to each other, neither of them the centre.
     let is_centre = |i: u32| cells.centres().contains(&i);
     let n = u32::try_from(cloud.points.len()).unwrap();
     let owner = |i: u32| cells.owners()[i as usize];

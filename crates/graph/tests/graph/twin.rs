@@ -1,4 +1,4 @@
-//! The graph against all pairs of points.
+//! Compares the graph with a search of all pairs of points.
 
 use nearmiss_graph::{GraphOptions, PointGraph, Prune};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
@@ -6,7 +6,7 @@ use nearmiss_testdata::oracle::proximity;
 
 type Point = [f32; 3];
 
-/// The distinct points of a cloud, in no order worth mentioning.
+/// The distinct points of a cloud, in arbitrary order.
 #[expect(clippy::cast_possible_truncation, reason = "points are stored in single precision")]
 fn points(kind: CloudKind, n: u32, seed: u64, scale: f64) -> Vec<Point> {
     let mut points: Vec<Point> =

@@ -1,4 +1,4 @@
-//! Points that come, go and move, against all pairs of those that are there.
+//! Inserts, removes and moves points, and compares the graph with a search of all pairs.
 use nearmiss_graph::{DynamicGraph, GraphError, GraphOptions};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud, rng};
 use nearmiss_testdata::oracle::proximity;
@@ -12,7 +12,7 @@ fn points(kind: CloudKind, n: u32, seed: u64) -> Vec<Point> {
     cloud(kind, n, seed).iter().map(|p| p.map(|x| x as f32 + 0.0)).collect()
 }
 
-/// Compares every list and radius with those of all pairs.
+/// Compares every list and radius with those of a search of all pairs.
 fn compare(graph: &DynamicGraph, ids: u32, r: usize, what: &str) {
     let there: Vec<u32> = (0..ids).filter(|&id| graph.position(id).is_some()).collect();
     let positions: Vec<Point> = there.iter().map(|&id| graph.position(id).unwrap()).collect();
@@ -31,7 +31,7 @@ fn compare(graph: &DynamicGraph, ids: u32, r: usize, what: &str) {
     }
 }
 
-/// Some updates at random, each compared.
+/// Makes random updates and compares the graph after each.
 fn play(kind: CloudKind, n: u32, seed: u64, r: u32) {
     let pool: Vec<Point> = points(kind, 3 * n, seed);
     let rng = &mut rng(seed);

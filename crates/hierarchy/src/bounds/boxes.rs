@@ -1,8 +1,8 @@
-//! Oriented boxes, and whether two of them in relative motion overlap.
+//! Oriented boxes, and the overlap test of two of them in a relative pose.
 //!
-//! The separating-axis test of Gottschalk, Lin & Manocha ("`OBBTree`", SIGGRAPH 1996) with the six face
-//! normals only: the nine edge axes exclude few further pairs of thin patches and cost more than they save
-//! (benches/record).
+//! The test is the separating-axis test of Gottschalk, Lin & Manocha ("`OBBTree`", SIGGRAPH 1996)
+//! with the six face normals only. The nine edge axes separate few further pairs of thin patches
+//! and cost more than they save (benches/record).
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Simd, f32x4, f32x16};
@@ -13,11 +13,12 @@ use serde::{Deserialize, Serialize};
 
 type Axes = [[f32; 3]; 3];
 
-/// A box about `centre` with half edge lengths `half` along the orthonormal `axes`. One cache line.
+/// A box around `centre` with half edge lengths `half` along the orthonormal `axes`. One cache
+/// line.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable, Serialize, Deserialize)]
 #[repr(C, align(64))]
 pub struct OrientedBox {
-    /// The middle.
+    /// The centre.
     pub centre: [f32; 3],
     /// Half the edge lengths.
     pub half: [f32; 3],
@@ -27,19 +28,21 @@ pub struct OrientedBox {
     pub reach: f32,
 }
 
-/// What rounding can do to an interval of a box, relative to the greatest coordinate along its axes. In units
-/// of 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 7 for axes that are orthonormal to
-/// rounding only, √3 between coordinates and lengths; together below 30.
+/// Bound on the rounding error of an interval of a box, relative to the greatest coordinate along
+/// its axes. In units of 2⁻²⁴: 3 for each coordinate, 3 and 2 for the centre and its sums, 7 for
+/// axes that are orthonormal only up to rounding, √3 between coordinates and lengths; below 30 in
+/// all.
 pub(crate) const ROUNDING: f32 = 2e-6;
 
-/// The same for a gap between boxes in motion, relative to the sum of all lengths involved: 12 for the centre
-/// of the box that is moved, 4 for the distance of the centres along an axis, 18 for the half lengths, each
-/// less than 8 off in its cosine; together below 40.
+/// Bound on the rounding error of a gap between boxes in a relative pose, relative to the sum of
+/// all lengths involved. In units of 2⁻²⁴: 12 for the centre of the transformed box, 4 for the
+/// distance of the centres along an axis, 18 for the half lengths, each less than 8 off in its
+/// cosine; below 40 in all.
 pub const SLACK: f32 = 4e-6;
 
 impl OrientedBox {
-    /// The least box along `axes` that contains all `intervals`, given per axis; grown by what rounding may
-    /// have cost.
+    /// Returns the smallest box along `axes` that contains an interval on each axis, grown by the
+    /// rounding error.
     pub(crate) fn spanned(axes: Axes, low: [f32; 3], high: [f32; 3], reach: f32) -> Self {
         let middle = [0, 1, 2].map(|k| 0.5 * low[k] + 0.5 * high[k]);
         let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
@@ -49,7 +52,7 @@ impl OrientedBox {
         Self { centre, half, axes, reach }
     }
 
-    /// Least and greatest coordinate along each of `axes`.
+    /// Returns the interval of the box along each of `axes`.
     pub(crate) fn along(&self, axes: &Axes) -> [[f32; 2]; 3] {
         axes.map(|axis| {
             let middle = dot(axis, self.centre);
@@ -58,7 +61,7 @@ impl OrientedBox {
         })
     }
 
-    /// Squared distance of `p` from the box, 0 inside.
+    /// Returns the squared distance of `p` from the box, 0 inside.
     #[inline]
     #[must_use]
     pub fn distance_sq(&self, p: [f32; 3]) -> f32 {
@@ -68,18 +71,18 @@ impl OrientedBox {
         x * x + y * y + z * z
     }
 
-    /// Distance from the centre to a corner.
+    /// Returns the distance from the centre to a corner.
     #[must_use]
     pub fn radius(&self) -> f32 {
         dot(self.half, self.half).sqrt()
     }
 }
 
-/// The motion of one scan's stored frame into another's, in single precision for the hot path, with a bound
-/// on what rounding costs there.
+/// The relative pose of two scans, from one stored frame to the other, in single precision for the
+/// hot path. Includes a bound on the rounding error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relative {
-    /// Rows of scale · rotation.
+    /// Rows of the scaled rotation.
     linear: Axes,
     /// Rows of the rotation.
     rotation: Axes,
@@ -90,7 +93,8 @@ pub struct Relative {
 }
 
 impl Relative {
-    /// The motion `pose` from b's stored frame to a's; `reach` bounds the coordinates of both in a's frame.
+    /// Creates the relative pose `pose` of b's stored frame in a's. `reach` bounds the coordinates
+    /// of both scans in a's frame.
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
     pub fn new(pose: &Pose, reach: f64) -> Self {
@@ -109,7 +113,7 @@ impl Relative {
         }
     }
 
-    /// A point of b's frame in a's.
+    /// Transforms a point of b's frame to a's.
     #[inline]
     #[must_use]
     pub fn point(&self, p: [f32; 3]) -> [f32; 3] {
@@ -118,7 +122,7 @@ impl Relative {
         [dot(rx, p) + tx, dot(ry, p) + ty, dot(rz, p) + tz]
     }
 
-    /// Four points of b's frame in a's.
+    /// Transforms four points of b's frame to a's.
     #[inline(always)]
     pub(crate) fn points_of_four<S: Simd>(&self, p: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
         let [x, y, z] = turned(&self.linear, p);
@@ -126,13 +130,13 @@ impl Relative {
         [x + tx, y + ty, z + tz]
     }
 
-    /// Four directions of b's frame in a's.
+    /// Transforms four directions of b's frame to a's.
     #[inline(always)]
     pub(crate) fn directions_of_four<S: Simd>(&self, v: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
         turned(&self.rotation, v)
     }
 
-    /// A direction of b's frame in a's.
+    /// Transforms a direction of b's frame to a's.
     #[inline]
     #[must_use]
     pub fn direction(&self, v: [f32; 3]) -> [f32; 3] {
@@ -140,7 +144,7 @@ impl Relative {
         [dot(rx, v), dot(ry, v), dot(rz, v)]
     }
 
-    /// Points of a's frame in b's.
+    /// Transforms sixteen points of a's frame to b's.
     #[inline(always)]
     #[must_use]
     pub fn points_back<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
@@ -155,7 +159,7 @@ impl Relative {
         ]
     }
 
-    /// Sixteen points of b's frame in a's.
+    /// Transforms sixteen points of b's frame to a's.
     #[inline(always)]
     #[must_use]
     pub fn points<S: Simd>(&self, points: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
@@ -168,7 +172,7 @@ impl Relative {
         ]
     }
 
-    /// A point of a's frame in b's.
+    /// Transforms a point of a's frame to b's.
     #[inline]
     #[must_use]
     pub fn point_back(&self, p: [f32; 3]) -> [f32; 3] {
@@ -177,7 +181,7 @@ impl Relative {
         [x * self.scale_back, y * self.scale_back, z * self.scale_back]
     }
 
-    /// A direction of a's frame in b's.
+    /// Transforms a direction of a's frame to b's.
     #[inline]
     #[must_use]
     pub fn direction_back(&self, v: [f32; 3]) -> [f32; 3] {
@@ -189,30 +193,30 @@ impl Relative {
         ]
     }
 
-    /// Length in b's frame of a unit of a's.
+    /// Returns the length in b's frame of a unit of a's.
     #[inline]
     #[must_use]
     pub fn scale_back(&self) -> f32 {
         self.scale_back
     }
 
-    /// Length in a's frame of a unit of b's.
+    /// Returns the length in a's frame of a unit of b's.
     #[inline]
     #[must_use]
     pub fn scale(&self) -> f32 {
         self.scale
     }
 
-    /// A bound on the error of a transformed coordinate.
+    /// Returns a bound on the error of a transformed coordinate.
     #[inline]
     #[must_use]
     pub fn slack(&self) -> f32 {
         self.slack
     }
 
-    /// How far a box of a and one of b are apart along the face normal that parts them most. Negative when
-    /// they overlap along all six. A positive value, less [`Relative::slack`], is a lower bound of their
-    /// distance.
+    /// Returns the gap of a box of a and a box of b: their separation along a face normal, the
+    /// maximum over all six. Negative if the boxes overlap along all six. A positive gap less
+    /// [`Relative::slack`] is a lower bound of their distance.
     #[inline]
     #[must_use]
     pub fn gap(&self, a: &OrientedBox, b: &OrientedBox) -> f32 {
@@ -221,9 +225,10 @@ impl Relative {
         gap
     }
 
-    /// How much of each other two boxes overlap, with `margin` about them: 1 less the distance of their
-    /// centres along a face normal as a share of how far the two and `margin` reach along that, the least of
-    /// the six. 1 where they share a centre, 0 where they are just so far apart.
+    /// Returns the overlap of two boxes with `margin` around them. Along a face normal it is 1 − d
+    /// / (e + `margin`), with the distance d of the centres and the sum e of the half extents; the
+    /// result is the minimum over all six normals. 1 for concentric boxes, 0 for boxes exactly
+    /// `margin` apart.
     #[inline]
     #[must_use]
     pub fn overlap(&self, a: &OrientedBox, b: &OrientedBox, margin: f32) -> f32 {
@@ -232,8 +237,8 @@ impl Relative {
         1.0 - share
     }
 
-    /// Tells along each of the six face normals of two boxes the distance of their centres and how far both
-    /// reach.
+    /// Passes the distance of the centres and the sum of the half extents to `tell`, along each of
+    /// the six face normals of two boxes.
     #[inline]
     fn along_normals(&self, a: &OrientedBox, b: &OrientedBox, mut tell: impl FnMut(f32, f32)) {
         let b = self.moved(b);
@@ -253,7 +258,7 @@ impl Relative {
         }
     }
 
-    /// A box of b's frame in a's.
+    /// Transforms a box of b's frame to a's.
     #[inline]
     #[must_use]
     pub fn moved(&self, b: &OrientedBox) -> OrientedBox {
@@ -274,13 +279,13 @@ fn turned<S: Simd>(rows: &Axes, [x, y, z]: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
     [x * rx[0] + y * rx[1] + z * rx[2], x * ry[0] + y * ry[1] + z * ry[2], x * rz[0] + y * rz[1] + z * rz[2]]
 }
 
-/// The greater of `x` and `y`; `y` if either is NaN.
+/// Returns the greater of `x` and `y`; `y` if either is NaN.
 #[inline]
 fn greater(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
 
-/// Three unit vectors in single precision.
+/// Returns the normalized vectors in single precision.
 #[expect(clippy::cast_possible_truncation, reason = "box axes are single precision")]
 pub(crate) fn to_axes(vectors: [[f64; 3]; 3]) -> Axes {
     vectors.map(|v| Vector3::from(v).normalize().map(|x| x as f32).into())

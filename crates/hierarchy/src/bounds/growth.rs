@@ -1,30 +1,31 @@
-//! How much larger an enclosure is than the box of its node: both have the same axes, so six lengths say it.
+//! The growth from the box of a node to its enclosure. Both have the same axes, so six lengths
+//! suffice.
 //!
-//! Kept short, for a certificate looks at many enclosures whose boxes it has looked at before: single
-//! precision without the lower half of its digits, rounded up.
+//! Stored compactly, because a certificate reads many enclosures whose boxes it has already read:
+//! the upper halves of single-precision numbers, rounded up.
 
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::boxes::{OrientedBox, ROUNDING};
 
-/// By how much an enclosure sticks out of the box of its node, along either side of each axis.
+/// The lengths by which an enclosure exceeds the box of its node, on both sides along each axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable, Serialize, Deserialize)]
 #[repr(C)]
 pub struct Growth {
-    /// Against the axes: the upper halves of single-precision numbers.
+    /// Against the axes, as the upper halves of single-precision numbers.
     low: [u16; 3],
     /// Along the axes.
     high: [u16; 3],
 }
 
-/// The upper half of a length that is no shorter; boundless for what is no number.
+/// Returns the upper half of a length, rounded up; [`BOUNDLESS`] for NaN.
 fn up(length: f32) -> u16 {
     let bits = if length <= f32::MAX { length.max(0.0).to_bits() } else { f32::INFINITY.to_bits() };
     u16::try_from(bits.saturating_add(0xffff) >> 16).unwrap_or(BOUNDLESS).min(BOUNDLESS)
 }
 
-/// Infinity: a box that grows so much is apart from nothing.
+/// Infinity: a box with this growth is disjoint from nothing.
 const BOUNDLESS: u16 = 0x7f80;
 
 #[inline]
@@ -33,12 +34,12 @@ fn length(half: u16) -> f32 {
 }
 
 impl Growth {
-    /// What `bounds` must grow by to contain these intervals along its axes.
+    /// Returns the growth of `bounds` that makes it contain these intervals along its axes.
     pub(crate) fn new(bounds: &OrientedBox, low: [f32; 3], high: [f32; 3]) -> Self {
         let own = bounds.along(&bounds.axes);
         let far = (0..3).fold(0.0_f32, |m, k| m.max(low[k].abs()).max(high[k].abs()));
         let more = ROUNDING * far;
-        // Not `max`, which would make nothing of what is no number.
+        // Not `max`, which would turn NaN into zero.
         let side = |beyond: f32| up(if beyond < 0.0 { more } else { beyond + more });
         let in_order = |k: usize, beyond: f32| if low[k] <= high[k] { beyond } else { f32::NAN };
         Self {
@@ -47,7 +48,7 @@ impl Growth {
         }
     }
 
-    /// `bounds` grown. Lengths without bound leave the centre where it is.
+    /// Returns `bounds` grown. Infinite lengths do not move the centre.
     #[inline]
     #[must_use]
     pub fn of(&self, bounds: &OrientedBox) -> OrientedBox {
@@ -64,21 +65,22 @@ impl Growth {
         grown
     }
 
-    /// By how much the enclosure reaches further against the axes, and along them.
+    /// Returns the lengths against the axes and along them.
     #[inline]
     pub(crate) fn lengths(&self) -> ([f32; 3], [f32; 3]) {
         (self.low.map(length), self.high.map(length))
     }
 
-    /// Against the first axis and the second, against the third and along the first, along the second and the
-    /// third: of each pair the first in the lower half.
+    /// Returns the six halves packed in pairs, the first of each pair in the lower half: against
+    /// the first and the second axis; against the third and along the first; along the second and
+    /// the third.
     #[inline]
     pub(crate) fn pairs(&self) -> [u32; 3] {
         let ([a, b, c], [d, e, f]) = (self.low, self.high);
         [[a, b], [c, d], [e, f]].map(|[first, second]| u32::from(second) << 16 | u32::from(first))
     }
 
-    /// That of [`Self::pairs`].
+    /// Unpacks the result of [`Self::pairs`].
     #[inline]
     #[expect(clippy::cast_possible_truncation, reason = "halves of the number")]
     pub(crate) fn from_pairs(pairs: [u32; 3]) -> Self {
@@ -86,7 +88,7 @@ impl Growth {
         Self { low: [a, b, c], high: [d, e, f] }
     }
 
-    /// Whether all lengths are lengths, if boundless ones.
+    /// Returns `true` if every length is valid: not negative and not NaN. Infinity is valid.
     pub(crate) fn is_sound(&self) -> bool {
         self.low.iter().chain(&self.high).all(|&half| half <= BOUNDLESS)
     }

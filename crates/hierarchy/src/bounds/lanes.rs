@@ -1,10 +1,10 @@
-//! Boxes in lanes.
+//! Oriented boxes in SIMD lanes.
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 use nearmiss_lanes::wide::product;
 
-/// Boxes in lanes: their middles, half their edge lengths and the directions of these.
+/// Oriented boxes in lanes: centres, half edge lengths and the directions of the edges.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Boxes<V> {
     pub(crate) centre: [V; 3],
@@ -12,8 +12,9 @@ pub(crate) struct Boxes<V> {
     pub(crate) axes: [[V; 3]; 3],
 }
 
-/// Tells of boxes of a and b in each lane, along each of the six face normals, the distance of their centres
-/// and how far both reach: in the order of operations of [`Relative::gap`](crate::Relative::gap).
+/// Passes the distances of the centres and the sums of the half extents of boxes of a and b to
+/// `tell`, along each of the six face normals. Uses the order of operations of
+/// [`Relative::gap`](crate::Relative::gap).
 #[inline(always)]
 pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>, mut tell: impl FnMut(V, V)) {
     let d = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];
@@ -30,8 +31,8 @@ pub(crate) fn along_normals<S: Simd, V: SimdBase<S>>(a: &Boxes<V>, b: &Boxes<V>,
     tell(product(b.axes[2], d).abs(), reach_b[2]);
 }
 
-/// The distance of the centres along an axis of a, and how far both boxes reach along it; adds what a's half
-/// edge length there adds to how far a reaches along the axes of b.
+/// Returns the distance of the centres along an axis of a and the sum of the half extents there.
+/// Adds the contribution of this edge of a to the half extents along the axes of b.
 #[inline(always)]
 fn along_axis<S: Simd, V: SimdBase<S>>(
     axis: &[V; 3],

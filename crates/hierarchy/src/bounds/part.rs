@@ -1,6 +1,6 @@
-//! Surface or obstacle.
+//! The two parts of a scan that enclosures contain.
 
-/// What an enclosure of a node holds beside its points and their discs.
+/// The set that an enclosure contains in addition to the node's points and discs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// The node's part of the implicit surface.

@@ -1,4 +1,4 @@
-//! The pairs of nodes still to be looked at, and which of them comes next.
+//! Frontiers: the open node pairs, and the order in which they are visited.
 
 use std::collections::BinaryHeap;
 
@@ -9,13 +9,13 @@ use nearmiss_lanes::wide::bits;
 
 use crate::tree::topology::NodePair;
 
-/// A pair whose boxes are near each other.
+/// A pair of nodes whose boxes are near each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Open<K = f32> {
     /// The nodes.
     pub pair: NodePair,
-    /// The less the more urgent: the distance of the centres as a share of how far the boxes reach, unless
-    /// the visitor says otherwise.
+    /// The priority, the lowest first. Unless the visitor chooses another, the distance of the
+    /// centres divided by the sum of the half extents.
     pub key: K,
 }
 
@@ -29,48 +29,49 @@ impl Open {
     }
 }
 
-/// The pairs still to be looked at.
+/// The open node pairs.
 pub trait Frontier<K = f32> {
-    /// Adds a pair. Of siblings the most urgent comes last.
+    /// Adds a pair. The most urgent of siblings is added last.
     fn push(&mut self, open: Open<K>);
 
-    /// The pair to look at next.
+    /// Removes and returns the next pair.
     fn pop(&mut self) -> Option<Open<K>>;
 
-    /// Adds the most urgent of some siblings, after all others, or returns it if it comes next.
+    /// Adds the most urgent of some siblings, after all others, or returns it if it is next.
     #[inline(always)]
     fn push_last(&mut self, open: Open<K>) -> Option<Open<K>> {
         Some(open)
     }
 
-    /// Nothing is left below the pair that was looked at last.
+    /// Called when nothing is left below the pair that was visited last.
     #[inline(always)]
     fn settle<S: Simd>(&mut self, simd: S) {
         let _ = simd;
     }
 }
 
-/// Depth first, of siblings the most urgent first: for all pairs that are near.
+/// Depth-first order, with the most urgent of siblings first. For queries that visit all near
+/// pairs.
 #[derive(Debug, Clone, Default)]
 pub struct Stack {
     pairs: Vec<NodePair>,
-    /// Of the same pairs, apart from them, for all are looked at.
+    /// The keys of the pairs, in an array of their own because all of them are scanned.
     keys: Vec<f32>,
 }
 
 impl Stack {
-    /// Forgets all pairs.
+    /// Removes all pairs.
     pub fn clear(&mut self) {
         self.pairs.clear();
         self.keys.clear();
     }
 
-    /// The pairs still there, the next first.
+    /// Returns the remaining pairs, the next first.
     pub fn iter(&self) -> impl Iterator<Item = NodePair> {
         self.pairs.iter().rev().copied()
     }
 
-    /// The place of the least key, the first of equals; 0 if none is less than infinite.
+    /// Returns the index of the least key, the first of equals; 0 if no key is finite.
     #[inline(always)]
     fn most_urgent<S: Simd>(&self, simd: S) -> usize {
         const LANES: usize = 16;
@@ -106,15 +107,16 @@ impl Frontier for Stack {
     }
 }
 
-/// How often a descent turns to the best pair of all.
+/// The number of times a descent continues with the best open pair.
 pub(super) const TURNS: u32 = 64;
 
-/// Depth first, but where nothing is found below a pair the next is the most urgent of all that are left: for
-/// any pair that meets.
+/// Depth-first order that continues with the most urgent of all open pairs whenever nothing is left
+/// below a pair. For queries that stop at the first contact.
 ///
-/// The neighbours of leaves that do not meet seldom do (plunging, as branch and bound calls it;
-/// docs/decisions). After so many turns, the others are looked at depth first: what meets would have been
-/// found, and looking for the best would take longer than looking at all.
+/// Next to leaves without contact there is seldom one. Branch and bound calls this plunging
+/// (docs/decisions/0018-plunging.md). After 64 such turns the order is purely depth first: a
+/// contact would have been found by then, and searching for the best pair would take longer than
+/// visiting all.
 #[derive(Debug)]
 pub struct Plunging<'s> {
     stack: &'s mut Stack,
@@ -122,7 +124,7 @@ pub struct Plunging<'s> {
 }
 
 impl<'s> Plunging<'s> {
-    /// In the memory of a stack.
+    /// Creates a frontier in the memory of a stack.
     #[inline]
     pub fn new(stack: &'s mut Stack) -> Self {
         Self { stack, turns: TURNS }
@@ -140,7 +142,7 @@ impl Frontier for Plunging<'_> {
         self.stack.pop()
     }
 
-    /// Brings the most urgent pair to the top, of several the first, if there are turns left.
+    /// Brings the most urgent pair to the top (of several the first), unless all turns are used up.
     #[inline(always)]
     fn settle<S: Simd>(&mut self, simd: S) {
         let Some(left) = self.turns.checked_sub(1) else { return };
@@ -153,36 +155,36 @@ impl Frontier for Plunging<'_> {
     }
 }
 
-/// The most urgent of all pairs first: for searches that a budget may end. Pairs equally urgent come in the
-/// order of their nodes, so the order never depends on anything else.
+/// Best-first order, for searches that a budget may end. Equally urgent pairs come in the order of
+/// their nodes, so the order is deterministic.
 #[derive(Debug, Clone, Default)]
 pub struct Heap {
     pairs: BinaryHeap<Near<NodePair>>,
 }
 
 impl Heap {
-    /// Forgets all pairs.
+    /// Removes all pairs.
     pub fn clear(&mut self) {
         self.pairs.clear();
     }
 
-    /// Adds pairs, all at once.
+    /// Adds several pairs at once.
     pub fn extend(&mut self, pairs: impl Iterator<Item = Open>) {
         self.pairs.extend(pairs.map(Open::near));
     }
 
-    /// The most urgent pair.
+    /// Returns the most urgent pair.
     #[must_use]
     pub fn peek(&self) -> Option<Open> {
         self.pairs.peek().copied().map(Open::of)
     }
 
-    /// Takes all pairs out, in no order.
+    /// Removes all pairs and returns them in no particular order.
     pub fn drain(&mut self) -> impl Iterator<Item = Open> {
         self.pairs.drain().map(Open::of)
     }
 
-    /// The pairs still there, the most urgent first, and then in no order.
+    /// Returns the remaining pairs: the most urgent first, the others in no particular order.
     pub fn iter(&self) -> impl Iterator<Item = NodePair> {
         self.pairs.iter().map(|near| near.item)
     }

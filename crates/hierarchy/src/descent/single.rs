@@ -1,4 +1,4 @@
-//! The descent of one tree towards a place: the loop of all questions about what is near.
+//! The descent of one tree towards a position: the loop of all proximity queries.
 
 use std::ops::ControlFlow;
 
@@ -9,34 +9,35 @@ use nearmiss_geometry::NodeId;
 use crate::tree::topology::{FAN, TREE_STACK};
 use crate::tree::wide::{Siblings, Tree, lanes_of};
 
-/// What a descent towards a place does with what it finds. Distances are squares in single precision.
+/// The callbacks of a descent towards a position. Distances are squared, in single precision.
 pub trait PlaceVisitor {
-    /// Whether leaves are to come in their order; otherwise the nearest of siblings comes first.
+    /// `true` if leaves are visited in order; otherwise siblings are visited nearest first.
     const IN_ORDER: bool = false;
 
-    /// Boxes further away than this are not looked into.
+    /// Returns the squared distance beyond which boxes are skipped.
     fn most_sq(&self) -> f32;
 
-    /// The same for each of four siblings.
+    /// Returns the same limit for each of four siblings.
     #[inline(always)]
     fn most_sq_of<S: Simd>(&self, simd: S, siblings: &Siblings) -> f32x4<S> {
         let _ = siblings;
         f32x4::splat(simd, self.most_sq())
     }
 
-    /// Returns `true` if a node, whose box is at this distance, is to be looked into; asked just before.
+    /// Returns `true` if a node, whose box is at this squared distance, is to be visited. Called
+    /// immediately before the visit.
     #[inline(always)]
     fn is_wanted(&mut self, node: NodeId, least_sq: f32) -> bool {
         let _ = node;
         least_sq <= self.most_sq()
     }
 
-    /// A leaf, by its number, whose box is near; may end the descent.
+    /// Visits a leaf, by its number, whose box is near. May end the descent.
     fn leaf<S: Simd>(&mut self, simd: S, number: usize) -> ControlFlow<()>;
 }
 
 impl Tree<'_> {
-    /// Visits the leaves whose boxes are near a place until `visitor` ends it.
+    /// Visits the leaves whose boxes are near a position, until `visitor` ends the descent.
     pub fn descend_to<V: PlaceVisitor>(
         &self,
         level: Level,
@@ -49,7 +50,7 @@ impl Tree<'_> {
         ))
     }
 
-    /// [`Self::descend_to`] by the instructions of the caller.
+    /// Does the same as [`Self::descend_to`] with the instruction set of the caller.
     #[inline(always)]
     pub(crate) fn descend_to_by<S: Simd, V: PlaceVisitor>(
         &self,
@@ -75,7 +76,7 @@ impl Tree<'_> {
             let near: mask32x4<S> = distances.simd_le(visitor.most_sq_of(simd, siblings));
             let near = near.to_bitmask() & u64::from(lanes_of(children));
             if V::IN_ORDER {
-                // The first on top.
+                // First on top.
                 for lane in (0..children.len()).rev() {
                     stack[top] = (0.0, children.lanes()[lane]);
                     top += usize::from(near >> lane & 1 != 0);
@@ -87,7 +88,7 @@ impl Tree<'_> {
                 let lane = left.trailing_zeros() as usize;
                 left &= left - 1;
                 let (own, child) = (distances[lane % FAN], children.lanes()[lane % FAN]);
-                // The nearest on top.
+                // Nearest on top.
                 let mut at = top;
                 while at > bottom && stack[at - 1].0 < own {
                     stack[at] = stack[at - 1];

@@ -11,7 +11,7 @@ use crate::scan::build::PointHierarchy;
 use crate::scan::options::BuildOptions;
 use crate::tree::topology::Grandchildren;
 
-/// A blob, a sheet or a line of so many points.
+/// A scan of `count` points in a ball that is scaled along y and z by `flat`.
 fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) -> PointHierarchy {
     let point = |_| {
         let p = point_in(rng, 1.0);
@@ -22,7 +22,7 @@ fn scan(rng: &mut impl rand::Rng, count: usize, flat: [f64; 3], leaf_size: u32) 
     PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(leaf_size)).unwrap()
 }
 
-/// Notes all leaves, and ends after so many.
+/// Records leaf pairs, and ends the descent after `most` of them.
 #[derive(Default)]
 struct All {
     leaves: Vec<[usize; 2]>,
@@ -47,7 +47,7 @@ impl PairVisitor for All {
 
 impl BoxVisitor for All {}
 
-/// The points of a leaf, in a's frame by `place`.
+/// Returns the points of a leaf, transformed by `place`.
 fn points(scan: &PointHierarchy, leaf: usize, place: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<[f32; 3]> {
     scan.topology().points_of_leaf(leaf).map(|i| place(scan.positions()[i])).collect()
 }
@@ -64,7 +64,7 @@ fn leaves_in_lanes_are_their_points() {
             let bounds = scan.tree().bounds(topology.leaf(number));
             for (block, first, points) in leaves.blocks(number) {
                 assert_eq!((block.centre, block.half, block.axes), (bounds.centre, bounds.half, bounds.axes));
-                // Sixteen bits of each number, and the lanes as one by one.
+                // Sixteen bits per number; all lanes at once equal one by one.
                 let off = |x: [f32; 3], y: [f32; 3]| (0..3).fold(0.0_f32, |m, k| m.max((x[k] - y[k]).abs()));
                 let step = bounds.radius() / 32767.0;
                 for lane in 0..points {
@@ -171,7 +171,7 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
         let leaf_size = [16, 16, 7, 33][round % 4];
         let a = scan(rng, [9, 40, 300, 800][round / 2 % 4], [1.0, 1.0, 0.1], leaf_size);
         let b = scan(rng, [300, 9, 700, 47][round / 3 % 4], [1.0, 0.7, 0.7], leaf_size);
-        // Of very different sizes, and leaves at different depths.
+        // Very different sizes, and leaves at different depths.
         let scale = [1.0, 0.05, 20.0][round % 3];
         let pose = Pose::from_axis_angle(unit_vector(rng), 2.0).with_scale(scale);
         let shift = point_in(rng, if round % 7 == 0 { 9.0 } else { 0.3 });
@@ -199,7 +199,7 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
                 }
             }
         }
-        // Ended and gone on with from the open pairs, nothing is lost.
+        // If a descent is interrupted and resumed from the open pairs, no pair is lost.
         let mut first = All { most: found.len() / 2, ..All::default() };
         let flow = descend(pair, Level::new(), stack, &mut first);
         assert_eq!(flow.is_break(), !found.is_empty());
@@ -216,7 +216,7 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
         assert!(resume(&pair, Level::new(), stack, &mut rest).is_continue());
         let all: BTreeSet<[usize; 2]> = first.leaves.iter().chain(&rest.leaves).copied().collect();
         assert_eq!(all, found, "round {round}: gone on with");
-        // In whatever order.
+        // The order does not matter.
         let mut best = All { most: usize::MAX, ..All::default() };
         assert!(descend(pair, Level::new(), &mut Heap::default(), &mut best).is_continue());
         let by_heap: BTreeSet<[usize; 2]> = best.leaves.iter().copied().collect();
@@ -225,7 +225,7 @@ fn all_leaves_with_points_within_reach_are_found_and_none_twice() {
     assert!(found_any > 200, "{found_any}");
 }
 
-/// The leaves that are near in the order of the descent, one pair of boxes after the other.
+/// The near leaf pairs in the order of the descent, with one pair of boxes compared at a time.
 fn plunged([a, b]: [&PointHierarchy; 2], relative: &Relative, reach: f32, mut turns: u32) -> Vec<[usize; 2]> {
     let is_leaf = |scan: &PointHierarchy, id: NodeId| scan.topology().is_leaf(id);
     let below = |scan: &PointHierarchy, id: NodeId| scan.topology().children(id).iter().collect::<Vec<_>>();
@@ -255,7 +255,7 @@ fn plunged([a, b]: [&PointHierarchy; 2], relative: &Relative, reach: f32, mut tu
                 }
             }
         }
-        // The first of those that overlap most.
+        // The first of the pairs with the greatest overlap.
         let best = |pairs: &[(NodeId, NodeId, f32)]| {
             (0..pairs.len()).rev().max_by(|&i, &j| pairs[i].2.total_cmp(&pairs[j].2))
         };
@@ -331,7 +331,7 @@ fn children_and_grandchildren_in_lanes_have_the_bounds_of_their_nodes() {
                     }
                 });
             }
-            // In the place of each child stand its own children, or a leaf itself.
+            // Each child is represented by its own children, or by itself if it is a leaf.
             let found: Vec<NodeId> =
                 (0..LANES).filter(|lane| lanes >> lane & 1 != 0).map(|lane| below.id(lane)).collect();
             let of_child = |&child: &NodeId| match topology.is_leaf(child) {

@@ -1,6 +1,7 @@
-//! What must hold of a hierarchy. What queries rely on for safety and for a bounded cost is checked whenever
-//! one is loaded, what their answers rely on too when the whole file is compared with its checksums
-//! ([`Check`](nearmiss_store::Check)), and all of it by [`PointHierarchy::sanity_check`].
+//! The invariants of a hierarchy. Those that queries need for memory safety and bounded cost are
+//! checked on every load. Those that correct answers need are checked when the whole file is
+//! compared with its checksums ([`Check`](nearmiss_store::Check)). [`PointHierarchy::sanity_check`]
+//! checks all of them.
 
 mod leaves;
 #[cfg(test)]
@@ -21,15 +22,16 @@ pub(crate) use metadata::checked_topology;
 use crate::scan::build::PointHierarchy;
 
 impl PointHierarchy {
-    /// What queries need to stay within their arrays and to end: lengths, and the metadata. O(1).
+    /// Checks what queries need to stay within their arrays and to terminate: lengths and metadata.
+    /// O(1).
     pub(crate) fn check_structure(&self) -> Result<(), Flaw> {
         self.check_lengths()?;
         self.check_metadata()
     }
 
-    /// What their answers need besides, given the structure: each box lies within its parent's, every number
-    /// of every point is one that a build writes, and lies within what its leaf says, and what follows from
-    /// points is what is stored. One pass over the whole.
+    /// Checks what correct answers need in addition, given a valid structure. Each box is within
+    /// its parent's, every number of every point is one that a build can write and is within the
+    /// bounds of its leaf, and derived data match the points. One pass over the whole.
     pub(crate) fn check_contents(&self) -> Result<(), Flaw> {
         nodes::check(self)?;
         points::check(self)?;
@@ -39,12 +41,12 @@ impl PointHierarchy {
         self.check_summary()
     }
 
-    /// Checks every invariant: what a load checks, that each box of each node holds the discs of all points
-    /// under it, that neighbour lists are complete, and that no point of the input is stored twice. O(n log
-    /// n); for tests.
+    /// Checks every invariant: those that a load checks, that the box of each node contains the
+    /// discs of all points under it, that neighbour lists are complete, and that no point of the
+    /// input is stored twice. O(n log n); for tests.
     ///
     /// # Errors
-    /// Names the first that does not hold.
+    /// Names the first invariant that does not hold.
     pub fn sanity_check(&self) -> Result<(), Flaw> {
         let wrong = |what, index| Err(Flaw::Value { what, index });
         self.check_structure()?;
@@ -70,7 +72,7 @@ impl PointHierarchy {
         }
     }
 
-    /// Whether the box of node `id` holds the disc and the ball of point `i`.
+    /// Returns `true` if the box of node `id` contains the disc and the ball of point `i`.
     fn box_holds(&self, id: NodeId, i: usize) -> bool {
         let bounds = self.tree().bounds(id);
         let double = |v: [f32; 3]| Vector3::from(v.map(f64::from));

@@ -1,4 +1,4 @@
-//! The hierarchy in a container: one section an array, the rest in the metadata.
+//! The hierarchy in a container: one section for each array, the rest in the metadata.
 //!
 //! The sections are declared in `scan/data.rs`. The version of their layout is `VERSION` in
 //! `nearmiss/src/scan.rs`.
@@ -13,7 +13,7 @@ use crate::scan::build::PointHierarchy;
 use crate::scan::data::{Arrays, HierarchyMeta};
 
 impl PointHierarchy {
-    /// What is stored beside the arrays.
+    /// Returns the metadata that are stored beside the arrays.
     #[must_use]
     pub fn meta(&self) -> &HierarchyMeta {
         &self.meta
@@ -22,18 +22,18 @@ impl PointHierarchy {
     /// Adds the arrays to a container.
     ///
     /// # Errors
-    /// When the container has sections of these names already.
+    /// If the container already has sections of these names.
     pub fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
         self.arrays.add_to(writer)
     }
 
-    /// The hierarchy in `file`, its arrays in place: nothing is made that grows with the scan. With
-    /// [`Check::Structure`] the metadata and the lengths of arrays are looked at, so that no query leaves
-    /// them; damaged numbers can give wrong answers. With [`Check::Full`] every number is compared with what
-    /// a build writes.
+    /// Loads the hierarchy in `file`, with its arrays in place: the memory allocated does not grow
+    /// with the scan. [`Check::Structure`] validates the metadata and the lengths of arrays, so
+    /// that queries stay within them; damaged numbers can give wrong answers. [`Check::Full`] also
+    /// validates every number.
     ///
     /// # Errors
-    /// When a section is missing, holds what no build writes, or the sections contradict each other.
+    /// If a section is missing, holds values that a build never writes, or contradicts another.
     pub fn load(file: &File, meta: HierarchyMeta, check: Check) -> Result<Self, LoadError> {
         let arrays = Arrays::load(file)?;
         let topology = checked_topology(arrays.source.len(), meta.leaf_size, meta.dense)?;

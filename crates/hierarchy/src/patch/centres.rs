@@ -1,13 +1,13 @@
-//! Places side by side, to ask for the nearest of them.
+//! Positions side by side, for nearest-distance queries.
 
 use nearmiss_lanes::vector::dot;
 
 use crate::tree::topology::MOST_LEAF_POINTS;
 
-/// Samples that are worked on together.
+/// The number of samples processed together.
 pub(crate) const WIDTH: usize = 16;
 
-/// Places side by side; where there are fewer than lanes, places infinitely far away.
+/// Positions side by side; unused lanes are infinitely far away.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Centres {
     blocks: [[[f32; WIDTH]; 3]; MOST_LEAF_POINTS / WIDTH],
@@ -21,7 +21,7 @@ impl Default for Centres {
 }
 
 impl Centres {
-    /// Adds a place; there must be room.
+    /// Adds a position. There must be a free lane.
     #[inline]
     pub(crate) fn push(&mut self, p: [f32; 3]) {
         let (block, lane) = (self.len / WIDTH, self.len % WIDTH);
@@ -51,7 +51,7 @@ impl Centres {
         &self.blocks[..self.len.div_ceil(WIDTH)]
     }
 
-    /// The squared distance of the nearest; infinite if there is none.
+    /// Returns the squared distance of the nearest position; infinite if there is none.
     #[inline(always)]
     pub(crate) fn nearest_sq(&self, p: [f32; 3]) -> f32 {
         let mut least = [f32::INFINITY; WIDTH];

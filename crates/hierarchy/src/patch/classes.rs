@@ -1,9 +1,11 @@
-//! Which points sample a sheet, and which stand for themselves as balls (`docs/theory/obstacle.md`).
+//! Classification of points: some sample a sheet, the others are balls in the obstacle
+//! (`docs/theory/obstacle.md`).
 //!
-//! The fit at a point gives its class. A vote of its neighbours then corrects single flips: a noisy point in
-//! the plane of the sheet about it belongs to that sheet, and a plane fitted to a few points of a blob is
-//! none. Sparse points come last in the order of the points and have a subtree of their own, so that a stray
-//! never widens the bounds of a wall. Noisy points have others all around them: they stay among these.
+//! The fit at a point gives its class. A vote of its neighbours then corrects single errors: a
+//! noisy point in the plane of the surrounding sheet belongs to that sheet, and a plane fitted to a
+//! few points of a blob is not a sheet. Sparse points come last in the order of the points and have
+//! their own subtree, so that a stray point never enlarges the bounds of a wall. Noisy points stay
+//! among the points around them.
 
 use std::ops::Range;
 
@@ -20,21 +22,23 @@ use crate::tree::split::Item;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Neighbours that vote.
+/// The number of neighbours that vote.
 const VOTERS: usize = 8;
 
-/// So many of them, of about one normal, make a noisy point one of their sheet: half.
+/// The number of voters with similar normals, half of them, that makes a noisy point one of their
+/// sheet.
 const MAJORITY: usize = VOTERS / 2;
 
-/// A sheet point with fewer sheet points of about its normal among its neighbours is noisy: one may be a
-/// chance.
+/// A sheet point is noisy if fewer of its neighbours are sheet points with a similar normal: one
+/// can be a coincidence.
 const ALONE: usize = 2;
 
-/// The cosine of the angle between the normals of neighbours on a sheet is no less. On a sphere of the
-/// greatest curvature that a slab holds they differ by 40° at most.
+/// The least cosine of the angle between the normals of neighbours on one sheet. On a sphere of the
+/// greatest curvature that fits a slab they differ by 40° at most.
 const AGREEING: f32 = 0.5;
 
-/// Corrects the classes of single points by those of their neighbours. O(n) where all points are on sheets.
+/// Corrects the classes of single points by those of their neighbours. O(n) if all points are on
+/// sheets.
 pub(crate) fn vote(tree: &BlockTree<'_>, positions: &[[f32; 3]], radii: &[f32], fits: &mut [Fit]) {
     let (level, before) = (Level::new(), &*fits);
     let of_block = |block: usize| block * WIDTH..(block * WIDTH + WIDTH).min(positions.len());
@@ -64,7 +68,7 @@ fn agree(n: [f32; 3], m: [f32; 3]) -> bool {
     dot(n, m).abs() >= AGREEING
 }
 
-/// The fit of point `i` by the vote of its neighbours, if that is another.
+/// Returns the fit of point `i` after the vote of its neighbours, if it changes.
 fn corrected(
     i: usize,
     near: impl Iterator<Item = usize>,
@@ -90,9 +94,10 @@ fn corrected(
     }
 }
 
-/// The points in their order again, the sparse ones last, and how many come before these: as many as fill
-/// leaves. Points that are left over stand for themselves among the sparse ones, noisy ones before those at
-/// edges and others, the last before the first. `None` if no point is sparse.
+/// Returns the points in their order, but with the sparse ones last, and the number of points
+/// before these: as many as fill whole leaves. The remainder is moved to the sparse points: noisy
+/// ones first, then those at edges, then others, and of each kind the last ones. Returns `None` if
+/// no point is sparse.
 pub(crate) fn dense_first(
     positions: &[[f32; 3]],
     fits: &[Fit],
@@ -112,7 +117,7 @@ pub(crate) fn dense_first(
     }
     let mut over = all % leaf_size;
     let dense = all - over;
-    // So many of each kind stay, the first.
+    // Of each kind, the first `count` stay.
     for count in &mut counts {
         let left = over.min(*count);
         (over, *count) = (over - left, *count - left);

@@ -1,10 +1,12 @@
-//! Sphere coverings: the radius at which balls about a node's samples contain its part of the surface.
+//! Sphere coverings: the radius at which balls around a node's samples contain its part of the
+//! surface.
 //!
-//! Klein & Zachmann 2004, §4.2.2, let the radius grow with random test points and stop when enough of them
-//! are inside; what no test point found stays outside. Here it is the least at which one ball each contains
-//! the solids of the node's points: the cells in which the surface nearest to them provably is, with their
-//! discs and balls (docs/theory/coverings.md). As in the paper the radius grows with what it finds outside,
-//! the furthest parts first, so that most of what is under a node is never looked at: a box about it is
+//! Klein & Zachmann 2004, §4.2.2, increase the radius by random test points and stop when enough of
+//! them are inside; parts that no test point hits stay outside. Here it is the least radius at
+//! which each solid of the node's points is in a single ball. The solids contain the cells in which
+//! the surface nearest to the points provably is, and their discs and balls
+//! (docs/theory/coverings.md). As in the paper, the radius grows with the parts found outside. The
+//! furthest parts come first, so most of a node is skipped because a box around it is already
 //! inside.
 
 use bytemuck::{Pod, Zeroable};
@@ -23,32 +25,32 @@ use crate::point::kind::THICKNESS;
 use crate::point::spacing::fold_nodes;
 use crate::tree::topology::{TREE_STACK, Topology};
 
-/// What is known of a node's sample as a whole; lengths in stored units.
+/// Properties of a node's sample as a whole, in stored units.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Covering {
-    /// The covering radius: balls of this radius about the samples contain the node's part of the surface,
-    /// its points, their discs and balls. Infinite where nothing is proven.
+    /// The covering radius: balls of this radius around the samples contain the node's part of the
+    /// surface, its points, their discs and balls. Infinite if nothing is proven.
     pub radius: f32,
-    /// r(P') of Klein & Zachmann 2004, Definition 4, measured on what shows of the surface to first order:
-    /// each tangent disc under the node, with its thickness, and the ball of each sparse point lie in a ball
-    /// of this radius. At most [`radius`](Self::radius).
+    /// r(P') of Klein & Zachmann 2004, Definition 4, measured to first order: each tangent disc
+    /// under the node, with its thickness, and the ball of each sparse point is in a ball of this
+    /// radius. At most [`radius`](Self::radius).
     pub sampling: f32,
-    /// r(P): the root of the mean square of the local radii of all points under the node, for then the areas
-    /// that eq. 10 equates are the sums of the points' own.
+    /// r(P): the root mean square of the local radii of all points under the node. With it the
+    /// areas that eq. 10 equates are the sums of the points' own areas.
     pub spacing: f32,
 }
 
-/// What single precision may cost here, relatively: as much as for enclosures, which rest on the same cells.
+/// Allowance for the relative rounding error: the same as for enclosures, which use the same cells.
 const GROWN: f32 = 1.0 + 1e-4;
 
-/// The same for the difference of two squares, relative to the greater.
+/// Allowance for the rounding error of the difference of two squares, relative to the greater.
 const CANCELLED: f32 = 1.0 + 2e-6;
 
-/// What squares may lose below the least normal number, as a length.
+/// The length that squares may lose to underflow.
 const LOST: f32 = 1e-20;
 
-/// The samples of a node.
+/// Returns the positions of the samples of a node.
 pub(crate) fn centres_of(samples: Samples<'_>, positions: &[[f32; 3]]) -> Centres {
     let mut centres = Centres::default();
     for i in samples.iter() {
@@ -58,8 +60,8 @@ pub(crate) fn centres_of(samples: Samples<'_>, positions: &[[f32; 3]]) -> Centre
 }
 
 impl Centres {
-    /// The square of the least radius at which one ball alone contains the box; infinite if anything is no
-    /// number.
+    /// Returns the square of the least radius at which a single ball contains the box; infinite if
+    /// anything is NaN.
     #[inline(always)]
     fn far_sq(&self, bounds: &OrientedBox) -> f32 {
         let OrientedBox { centre: c, half, axes, .. } = bounds;
@@ -79,7 +81,7 @@ impl Centres {
         fold_min(&least)
     }
 
-    /// For each solid the square of the least radius at which one ball alone contains it.
+    /// Returns for each solid the square of the least radius at which a single ball contains it.
     #[inline(always)]
     fn each_far_sq(&self, solids: &Solids) -> [f32; WIDTH] {
         let Solids { middle: [px, py, pz], normal: [nx, ny, nz], across, height } = solids;
@@ -100,7 +102,7 @@ impl Centres {
     }
 }
 
-/// As by [`f32::max`], which makes nothing of what is no number.
+/// Returns the greatest of the lanes and 0, ignoring NaN as [`f32::max`] does.
 #[inline(always)]
 fn fold_max(lanes: &[f32; WIDTH]) -> f32 {
     let mut greatest = 0.0_f32;
@@ -110,24 +112,24 @@ fn fold_max(lanes: &[f32; WIDTH]) -> f32 {
     greatest
 }
 
-/// A flat cylinder about a point and its normal.
+/// A flat cylinder around a point and its normal.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Solid {
-    /// Radius.
+    /// The radius.
     across: f32,
     /// Half the height.
     height: f32,
 }
 
 impl Solid {
-    /// Contains the disc of a point with its thickness, and the ball about it.
+    /// Returns a solid that contains the disc of a point with its thickness, and its ball.
     pub(crate) fn of_disc(disc: f32, ball: f32) -> Self {
         let thickness = disc * THICKNESS;
         Self { across: (disc + thickness).max(ball), height: thickness.max(ball) }
     }
 
-    /// Contains the cell of a point as well.
+    /// Returns a solid that contains the cell of a point as well.
     pub(crate) fn of_cell(cell: &Cell, disc: Self) -> Self {
         Self { across: cell.across.max(disc.across), height: cell.height().max(disc.height) }
     }
@@ -141,7 +143,7 @@ struct Solids {
     height: [f32; WIDTH],
 }
 
-/// What coverings are to contain.
+/// The data that coverings must contain.
 #[derive(Clone, Copy)]
 pub(crate) struct Ground<'a> {
     pub(crate) topology: &'a Topology,
@@ -150,9 +152,9 @@ pub(crate) struct Ground<'a> {
     pub(crate) positions: &'a [[f32; 3]],
     pub(crate) normals: &'a [[f32; 3]],
     pub(crate) radii: &'a [f32],
-    /// About the disc and the ball of each point.
+    /// Solids around the disc and the ball of each point.
     pub(crate) discs: &'a [Solid],
-    /// About its cell as well.
+    /// Solids around the cell of each point as well.
     pub(crate) cells: &'a [Solid],
 }
 
@@ -185,25 +187,26 @@ pub(crate) fn coverings<'a>(
     });
 }
 
-// Inlined into a caller that has it compiled for an instruction set.
+// Inlined into a caller that is compiled for an instruction set.
 impl Ground<'_> {
-    /// A radius at which balls about `centres` contain the surface whose nearest points are under `node`, and
-    /// their discs and balls.
+    /// Returns a radius at which balls around `centres` contain the surface whose nearest points
+    /// are under `node`, and the discs and balls of these points.
     #[inline(always)]
     fn covering_radius(&self, node: NodeId, centres: &Centres) -> f32 {
         let about = |id: NodeId| self.growths[id.index()].of(&self.boxes[id.index()]);
         self.greatest(node, centres, about, self.cells)
     }
 
-    /// A radius at which each disc and ball of a point under `node` lies in one of the balls about `centres`.
+    /// Returns a radius at which each disc and ball of a point under `node` is in one of the balls
+    /// around `centres`.
     #[inline(always)]
     fn sampling_radius(&self, node: NodeId, centres: &Centres) -> f32 {
         self.greatest(node, centres, |id| self.boxes[id.index()], self.discs)
     }
 
-    /// The least radius at which under `node` each box `about` a node, or else each of the `solids` of
-    /// points, lies in one of the balls about `centres`. Of siblings the furthest comes first, so that little
-    /// is left to look at.
+    /// Returns the least radius at which the parts under `node` are each in one of the balls around
+    /// `centres`. A part is the box `about` a node, or else each of the `solids` of its points. The
+    /// furthest of siblings comes first, so that little is left to visit.
     #[inline(always)]
     fn greatest(
         &self,
@@ -237,7 +240,7 @@ impl Ground<'_> {
             let bottom = top;
             for child in self.topology.children(id).iter() {
                 let far = far_sq(child);
-                // The furthest on top.
+                // Furthest on top.
                 let mut at = top;
                 while at > bottom && stack[at - 1].1 > far {
                     stack[at] = stack[at - 1];
@@ -250,7 +253,7 @@ impl Ground<'_> {
         radius_sq.sqrt() * GROWN + LOST
     }
 
-    /// The solids from that of point `start` on; if there are too few, the last again.
+    /// Returns the solids from point `start` on, padded with the last one.
     #[inline(always)]
     fn side_by_side(&self, of: &[Solid], start: usize, end: usize) -> Solids {
         let none = [0.0; WIDTH];

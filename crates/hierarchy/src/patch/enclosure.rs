@@ -1,20 +1,23 @@
 //! Enclosures: boxes that provably contain the surface.
 //!
-//! A surface point x belongs to the leaf of its nearest cloud point p. With J the points whose horizon
-//! reaches x, three facts bound where it can be (docs/theory/certificates.md has the argument step by step):
+//! A surface point x belongs to the leaf of its nearest cloud point p. Let J be the points that
+//! have x within their support radius. Three facts bound x (docs/theory/certificates.md has the
+//! proof):
 //!
-//! 1. a(x) is in the hull of J and ‖x − a(x)‖ ≤ 0.56 h(x), so x is in the hull of J grown by 0.56 of J's
-//!    greatest h;
-//! 2. x is in the inner half of the horizon of one of J, and p is not further from x than that: x is within
-//!    half the greatest horizon of those that reach p;
-//! 3. x is on p's side of the plane half-way between p and any other point.
+//! 1. a(x) is in the hull of J and ‖x − a(x)‖ ≤ 0.56 h(x), so x is in the hull of J grown by 0.56
+//!    of J's greatest h;
+//! 2. x is within half the support radius of a point of J, and p is no further from x than that
+//!    point. The distance of x from p is therefore at most half the greatest support radius of the
+//!    points that have p within their support radius;
+//! 3. x is on p's side of the bisecting plane of p and any other point.
 //!
 //! None of them uses f(x) = 0: every x of status ok is enclosed.
 //!
-//! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a cylinder about
-//! its normal, and the leaf's part is in the box about these as well; whichever is less counts. The enclosure
-//! of an inner node is the least box along its own axes about those of its leaves. The paper's claim that x
-//! is in the hull of J itself (Klein & Zachmann 2004, §4.2) does not hold (docs/theory).
+//! Facts 1 and 2 bound a leaf along the axes of its box. All three give each point a cell, a
+//! cylinder around its normal. The leaf's part is also in the box around these cells; the smaller
+//! bound counts. The enclosure of an inner node is the smallest box along its own axes around those
+//! of its leaves. The claim of Klein & Zachmann 2004, §4.2, that x is in the hull of J itself is
+//! wrong (docs/theory).
 
 use std::ops::Range;
 
@@ -37,10 +40,10 @@ use crate::point::gather::Index;
 use crate::point::neighbours::Locality;
 use crate::tree::topology::Topology;
 
-/// Sectors of a tangent plane in which a cell is bounded one by one.
+/// The number of sectors of a tangent plane in which a cell is bounded separately.
 const SECTORS: usize = 16;
 
-/// Unit vectors between the sectors, 22.5 degrees apart.
+/// Unit vectors between the sectors, 22.5° apart.
 const RAYS: [[f32; SECTORS]; 2] = {
     const A: f32 = 0.923_879_5;
     const B: f32 = 0.707_106_77;
@@ -51,7 +54,7 @@ const RAYS: [[f32; SECTORS]; 2] = {
     ]
 };
 
-/// At the place of each ray the next.
+/// For each ray the next one.
 const NEXT_RAYS: [[f32; SECTORS]; 2] = {
     let mut next = RAYS;
     let mut k = 0;
@@ -62,29 +65,31 @@ const NEXT_RAYS: [[f32; SECTORS]; 2] = {
     next
 };
 
-/// Neighbours further than this many local radii bound a cell only beside holes; what is missed there makes
-/// it wider, never wrong.
+/// The distance, in local radii, up to which neighbours bound a cell. Further ones do so only
+/// beside holes; ignoring them makes the cell wider, never wrong.
 const NEIGHBOURS: f32 = 1.75;
 
-/// What single precision may cost here, relatively: some hundred roundings in differences of nearby numbers.
+/// Allowance for the relative rounding error: about a hundred roundings in differences of nearby
+/// numbers.
 const GROWN: f32 = 1.0 + 1e-4;
 
-/// Points that are worked on together.
+/// The number of points processed together.
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// What may reach a leaf's part of the surface, relative to a point of the leaf, in lanes.
+/// The points that may support a leaf's part of the surface, relative to a point of the leaf, in
+/// lanes.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Surroundings {
     origin: [f32; 3],
     blocks: Vec<PointBlock>,
-    /// How far a surface point can be from its nearest point: fact 2.
+    /// The maximum distance of a surface point from its nearest point, by fact 2.
     reach: f32,
-    /// 0.56 h over the horizon.
+    /// 0.56 h over the support radius.
     border: f32,
 }
 
 impl Surroundings {
-    /// Those of a leaf with a point `origin`.
+    /// Sets the surroundings of a leaf; `origin` is a point of the leaf.
     #[inline(always)]
     pub(crate) fn fill(&mut self, index: &Index<'_>, origin: [f32; 3], locality: &Locality) {
         self.origin = origin;
@@ -103,7 +108,8 @@ impl Surroundings {
         }
     }
 
-    /// Where the surface points nearest to the point `p` can be, whose neighbours are in the blocks `near`.
+    /// Returns the cell of the point `p`: a cylinder that contains the surface points nearest to
+    /// it. The blocks `near` contain its neighbours.
     #[inline(always)]
     pub(crate) fn cell<'a, S: Simd>(
         &self,
@@ -122,7 +128,8 @@ impl Surroundings {
         cell
     }
 
-    /// Fact 1 along the normal of `p`: the least and greatest height of a surface point within `reach` of it.
+    /// Applies fact 1 along the normal of `p`: returns the least and greatest height of a surface
+    /// point within `reach` of it.
     #[inline(always)]
     fn heights<S: Simd>(&self, simd: S, p: [f32; 3], normal: [f32; 3], reach: f32) -> (f32, f32) {
         let zero = f32x16::splat(simd, 0.0);
@@ -141,8 +148,9 @@ impl Surroundings {
     }
 }
 
-/// Fact 3: how far from its axis a surface point in the cell of `p` can be. Of the points in the blocks
-/// `near` those `within` some distance of it are looked at; the last axis is the normal.
+/// Applies fact 3: returns the maximum distance from the axis of a surface point in the cell of
+/// `p`. Of the points in the blocks `near`, those `within` some distance of `p` are used. The last
+/// of `axes` is the normal.
 #[inline(always)]
 fn across<'a, S: Simd>(
     simd: S,
@@ -152,7 +160,7 @@ fn across<'a, S: Simd>(
     within: f32,
     near: impl Iterator<Item = &'a PointBlock>,
 ) -> f32 {
-    // Per sector the greatest reciprocal of a bound.
+    // For each sector, the greatest reciprocal of a bound.
     let mut closed = f32x16::splat(simd, 0.0);
     for block in near {
         let d = seen_from(simd, &block.position, p);
@@ -161,8 +169,8 @@ fn across<'a, S: Simd>(
         if !counts.any_true() {
             continue;
         }
-        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal of a neighbour q, and any height
-        // z.
+        // t·q ≤ ‖q‖²/2 − z·height for the part t of x − p across the normal, a neighbour q and any
+        // height z.
         let height = along(d, axes[2]);
         let bound = d_sq * 0.5 + (-(height * cell.low)).max(-(height * cell.high)).max(0.0);
         let (x, y) = ((along(d, axes[0]) / bound).to_array(), (along(d, axes[1]) / bound).to_array());
@@ -171,11 +179,11 @@ fn across<'a, S: Simd>(
         while bits != 0 {
             let i = bits.trailing_zeros() as usize % WIDTH;
             bits &= bits - 1;
-            // What holds at both rays of a sector holds between them.
+            // A bound that holds at both rays of a sector holds between them.
             let (side, next) = (rays(simd, &RAYS, x[i], y[i]), rays(simd, &NEXT_RAYS, x[i], y[i]));
             let is_less: mask32x16<S> = side.simd_lt(next);
             let least = simd.select_f32x16(is_less, side, next);
-            // What is no number, or a zero of either sign, leaves a sector open.
+            // NaN, or a zero of either sign, leaves a sector unbounded.
             let is_more: mask32x16<S> = least.simd_gt(closed);
             closed = simd.select_f32x16(is_more, least, closed);
         }
@@ -184,16 +192,16 @@ fn across<'a, S: Simd>(
     if least > 0.0 { GROWN / least } else { f32::INFINITY }
 }
 
-/// How far a vector goes along each of some rays.
+/// Returns the component of a vector along each ray.
 #[inline(always)]
 fn rays<S: Simd>(simd: S, rays: &[[f32; SECTORS]; 2], x: f32, y: f32) -> f32x16<S> {
     f32x16::load_array_ref(simd, &rays[0]) * x + f32x16::load_array_ref(simd, &rays[1]) * y
 }
 
-/// Where the surface points nearest to a point can be: a cylinder about its normal.
+/// A cylinder around the normal of a point that contains the surface points nearest to it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Cell {
-    /// Radius.
+    /// The radius.
     pub(crate) across: f32,
     /// Least (not positive) and greatest (not negative) height along the normal.
     low: f32,
@@ -201,18 +209,19 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// The part of it no further than `across` from the axis and `height` from the plane.
+    /// Returns the part no further than `across` from the axis and `height` from the plane.
     pub(crate) fn within(&self, across: f32, height: f32) -> Self {
         Self { across: self.across.min(across), low: self.low.max(-height), high: self.high.min(height) }
     }
 
-    /// The greatest height to either side.
+    /// Returns the greatest height on either side.
     pub(crate) fn height(&self) -> f32 {
         self.high.max(-self.low)
     }
 }
 
-/// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of its own.
+/// Bounds of a leaf's part of the surface along the axes of its box, relative to a point of the
+/// leaf.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct LeafBounds {
@@ -223,7 +232,7 @@ pub(crate) struct LeafBounds {
 }
 
 impl LeafBounds {
-    /// Facts 1 and 2 for a leaf with these points and box.
+    /// Applies facts 1 and 2 to a leaf with these points and box.
     #[inline(always)]
     pub(crate) fn new<S: Simd>(
         simd: S,
@@ -266,17 +275,17 @@ impl LeafBounds {
         bounds
     }
 
-    /// Begins to bound the leaf by its points' cells.
+    /// Starts to bound the leaf by its points' cells.
     pub(crate) fn cells(&self) -> Cells {
         Cells { leaf: *self, low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] }
     }
 
-    /// The same axes without an extent: what is enclosed lies in the box already.
+    /// Returns the same axes with zero extent: the leaf's box already contains everything.
     pub(crate) fn empty(&self) -> Self {
         Self { low: [0.0; 3], high: [0.0; 3], ..*self }
     }
 
-    /// What `bounds`, a box of the same axes, must grow by.
+    /// Returns the growth of `bounds`, a box of the same axes, that contains these bounds.
     fn growth(&self, bounds: &OrientedBox) -> Growth {
         let at = self.axes.map(|axis| dot(axis, self.origin));
         Growth::new(
@@ -311,11 +320,11 @@ impl Cells {
         }
     }
 
-    /// The bounds of the leaf with the cells of all its points included.
+    /// Returns the bounds of the leaf, after the cells of all its points have been included.
     pub(crate) fn close(self) -> LeafBounds {
         let Self { mut leaf, low, high } = self;
         for k in 0..3 {
-            // Nothing but numbers in order may take anything off.
+            // Only ordered numbers may reduce the bounds.
             if low[k] <= high[k] {
                 leaf.low[k] = leaf.low[k].max(low[k]);
                 leaf.high[k] = leaf.high[k].min(high[k]);
@@ -325,8 +334,8 @@ impl Cells {
     }
 }
 
-/// What the boxes about the discs of all nodes must grow by to be enclosures, given the bounds of the leaves
-/// in order.
+/// Returns the growths from the boxes of all nodes to their enclosures, given the bounds of the
+/// leaves in order.
 pub(crate) fn growths(
     topology: &Topology,
     boxes: &[OrientedBox],
@@ -384,7 +393,8 @@ impl BoxBlock {
     }
 }
 
-/// How far these of the boxes reach along some axes, either way: what is [`OrientedBox::along`] of one.
+/// Returns the least and greatest coordinates of the boxes in `range` along `axes`, as
+/// [`OrientedBox::along`] does for one box.
 #[inline(always)]
 fn extents<S: Simd>(
     simd: S,

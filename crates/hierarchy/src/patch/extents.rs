@@ -1,4 +1,4 @@
-//! Boxes about the discs of all nodes, sixteen discs at a time.
+//! Boxes around the discs of all nodes, computed for sixteen discs at a time.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ use crate::tree::topology::Topology;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Nodes that a thread takes at once.
+/// The number of nodes that a thread takes at once.
 const AT_ONCE: usize = 16;
 
 /// The discs of a block of points, side by side.
@@ -30,7 +30,7 @@ pub(crate) struct DiscBlock {
     ball: [f32; WIDTH],
 }
 
-/// The discs of all points, and the balls about those that have one.
+/// The discs of all points, and the radii of their balls, zero where there is none.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Discs<'a> {
     pub(crate) normals: &'a [[f32; 3]],
@@ -38,8 +38,8 @@ pub(crate) struct Discs<'a> {
     pub(crate) balls: &'a [f32],
 }
 
-/// Makes of the box about each node the least along its axes that contains the discs of the node's points
-/// with their thickness, and their balls. `points` has the positions. O(n log n).
+/// Replaces the box of each node by the smallest one along its axes that contains the discs of the
+/// node's points with their thickness, and their balls. `points` has the positions. O(n log n).
 pub(crate) fn boxes_of_discs(
     topology: &Topology,
     boxes: &mut [OrientedBox],
@@ -57,7 +57,7 @@ pub(crate) fn boxes_of_discs(
 }
 
 impl Discs<'_> {
-    /// Those in block `number`.
+    /// Returns the discs of block `number`.
     pub(crate) fn block(&self, number: usize) -> DiscBlock {
         let zero = [0.0; WIDTH];
         let mut block = DiscBlock { normal: [zero; 3], disc: zero, ball: zero };
@@ -73,7 +73,7 @@ impl Discs<'_> {
     }
 }
 
-/// How far these of the discs reach along some axes, either way.
+/// Returns the least and greatest coordinates of the discs in `range` along `axes`.
 #[inline(always)]
 fn extents<S: Simd>(
     simd: S,

@@ -1,10 +1,11 @@
 //! The sample P' of a node: some of its points, spread over it (Klein & Zachmann 2004, §4.2.1).
 //!
-//! As there, a quasi-random number chooses a leaf under the node, random weights a mean of its points, and
-//! the nearest of them is drawn. We differ in three ways, none of which a covering rests on: the mean is that
-//! of three random points of the leaf, for means of all gather in its middle; the nearest point is looked for
-//! in that leaf alone; and of several draws the one furthest from the samples so far is kept (Mitchell 1991),
-//! which makes the distances between them of the same order, as the paper wants them.
+//! As in the paper, a quasi-random number chooses a leaf under the node, random weights a mean of
+//! its points, and the nearest point is drawn. There are three differences, none of which affects
+//! the correctness of coverings. The mean is that of three random points of the leaf, because means
+//! of all points gather in its centre. The nearest point is searched for in that leaf only. Of
+//! several draws the one furthest from the samples so far is kept (Mitchell 1991), so that
+//! distances between samples are of the same order, as the paper requires.
 
 use std::ops::Range;
 
@@ -17,47 +18,47 @@ use nearmiss_store::{Room, WorkError, Workspace};
 use crate::patch::centres::Centres;
 use crate::tree::topology::Topology;
 
-/// How many samples a node may have.
+/// The valid numbers of samples of a node.
 pub(crate) const SAMPLES: std::ops::RangeInclusive<u32> = 8..=32;
 
-/// The most of them.
+/// The maximum number of samples of a node.
 pub(crate) const MOST_SAMPLES: usize = 32;
 
-/// The list of an inner node; the first of its entries are used.
+/// The list of an inner node; only its first entries are used.
 pub(crate) type List = [u32; MOST_SAMPLES];
 
-/// Draws for each sample: two make the covering radii of large nodes 7 % smaller than one
-/// (docs/decisions/0009).
+/// The number of draws for each sample. With two the covering radii of large nodes are 7 % smaller
+/// than with one (docs/decisions/0009-coverings-from-cells.md).
 const DRAWS: usize = 2;
 
-/// 2⁶⁴ over the golden ratio: its multiples are spread evenly over all of 2⁶⁴, however many there are.
+/// 2⁶⁴ over the golden ratio. Any number of its multiples modulo 2⁶⁴ are spread evenly.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The sample of a node, as indices of points in leaf order, ascending.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
-    /// All points from here on, where there is no list.
+    /// The first of the points, all of which are samples if there is no list.
     first: usize,
     len: usize,
     list: &'a [u32],
-    /// No point is beyond this one, whatever a file says.
+    /// The last point of the node. Larger indices, as in a damaged file, are clamped to it.
     last: usize,
 }
 
 impl<'a> Samples<'a> {
-    /// All these points of a node.
+    /// Returns all points of a node as its sample.
     #[inline]
     pub(crate) fn all(points: &Range<usize>) -> Self {
         Self { first: points.start, len: points.len(), list: &[], last: points.end - 1 }
     }
 
-    /// Those in a list, of a node of these points.
+    /// Returns the sample in `list` of a node with these points.
     #[inline]
     pub(crate) fn listed(list: &'a [u32], points: &Range<usize>) -> Self {
         Self { first: points.start, len: list.len(), list, last: points.end - 1 }
     }
 
-    /// How many there are; at least one.
+    /// Returns the number of samples, at least one.
     #[inline]
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "every node has a sample")]
@@ -65,7 +66,7 @@ impl<'a> Samples<'a> {
         self.len
     }
 
-    /// The points.
+    /// Returns the indices of the samples.
     #[inline]
     #[must_use]
     pub fn iter(&self) -> impl ExactSizeIterator<Item = usize> + use<'a> {
@@ -74,7 +75,7 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// The sample of a node.
+/// Returns the sample of a node.
 #[inline]
 pub(crate) fn samples<'a>(lists: &'a [u32], topology: &Topology, id: NodeId, count: u32) -> Samples<'a> {
     let points = topology.points(id);
@@ -85,8 +86,8 @@ pub(crate) fn samples<'a>(lists: &'a [u32], topology: &Topology, id: NodeId, cou
     Samples::listed(&lists[id.index() * count..][..count], &points)
 }
 
-/// `count` distinct points of the inner node `id`, ascending; all of them, and then the last again, if there
-/// are no more.
+/// Draws `count` distinct points of the inner node `id`, ascending. If the node has no more,
+/// returns all of them, padded with the last.
 pub(crate) fn draw(positions: &[[f32; 3]], topology: &Topology, id: NodeId, count: usize) -> List {
     let (points, leaf_size) = (topology.points(id), id32(topology.leaf_size()));
     let (first, end) = (id32(points.start), id32(points.end));
@@ -100,7 +101,8 @@ pub(crate) fn draw(positions: &[[f32; 3]], topology: &Topology, id: NodeId, coun
     let leaves = u64::from((end - first).div_ceil(leaf_size));
     let mut random = Random::new(id.0);
     let mut chosen = Centres::default();
-    // The leaves of one draw after the other lie far from each other, those of the next sample between them.
+    // The leaves of successive draws are far from each other; those of later samples are between
+    // them.
     let mut turn = random.next();
     for known in 0..count {
         let (mut furthest, mut best) = (-1.0, None);
@@ -125,7 +127,7 @@ pub(crate) fn draw(positions: &[[f32; 3]], topology: &Topology, id: NodeId, coun
     list
 }
 
-/// The lists of all inner nodes, in their order.
+/// Returns the lists of all inner nodes, in order.
 pub(crate) fn lists(
     positions: &[[f32; 3]],
     topology: &Topology,
@@ -140,7 +142,7 @@ pub(crate) fn lists(
     Ok(lists)
 }
 
-/// Numbers that look random: the sequence of `SplitMix64` from a node's id.
+/// A pseudorandom sequence: `SplitMix64`, seeded with a node's id.
 pub(crate) struct Random(u64);
 
 impl Random {
@@ -156,7 +158,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Which of `points` is nearest to a weighted mean of three of them.
+    /// Returns the index of the point nearest to a weighted mean of three of `points`.
     fn point(&mut self, points: &[[f32; 3]]) -> u32 {
         let (which, weights) = (self.next(), self.next());
         #[expect(clippy::cast_possible_truncation, reason = "a quarter of the bits")]

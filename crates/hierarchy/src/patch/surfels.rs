@@ -1,9 +1,9 @@
-//! Tangent discs ("surfels"): what each point says of the surface to first order.
+//! Tangent discs ("surfels"): the first-order approximation of the surface at each point.
 //!
-//! A point's normal is that of the weighted least-squares fit at the point itself. Its disc is as wide as it
-//! must be for the discs of neighbours to close the surface, and narrower at a border, which shows as a wide
-//! sector of the tangent plane without a neighbour: the discs of two scans whose borders face each other a
-//! sampling radius apart must not meet.
+//! A point's normal is that of the weighted least-squares fit at the point itself. Its disc is wide
+//! enough that the discs of neighbours close the surface, and narrower at a border, because the
+//! discs of two scans whose borders face each other a sampling radius apart must not meet. A border
+//! shows as a wide sector of the tangent plane without a neighbour.
 
 use std::ops::Range;
 
@@ -27,10 +27,10 @@ use crate::point::kind::{PointKind, SLAB, ball, cell_radius, obstacle_ball};
 use crate::point::neighbours::Locality;
 use crate::point::spacing::{Look, Spacing};
 
-/// Sectors into which the tangent plane is divided, equal on a diamond: of 11 to 18 degrees.
+/// The number of sectors of the tangent plane. They are equal on a diamond: 11 to 18 degrees.
 const SECTORS: u32 = 24;
 
-/// λ2 < 0.05 λ3: the neighbourhood is a line, its normal any direction across.
+/// If λ2 < 0.05 λ3 the neighbourhood is a line, and its normal is any direction across.
 const LINE: f64 = 0.05;
 
 /// The surface at a point to first order, and the point's class.
@@ -54,12 +54,12 @@ impl Fit {
     }
 }
 
-/// A point's disc, whose radius follows from its code.
+/// The disc of a point. Its radius follows from the code.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surfel {
     pub(crate) normal: [f32; 3],
     pub(crate) code: PointCode,
-    /// Where the surface nearest to the point is.
+    /// The cell that contains the surface nearest to the point.
     pub(crate) cell: Cell,
 }
 
@@ -71,32 +71,32 @@ pub(crate) struct Surfels {
     /// The radius of each point's ball: the greater of [`Slices::ball`](crate::Slices::ball) and
     /// [`Slices::obstacle_ball`](crate::Slices::obstacle_ball).
     pub(crate) balls: Room<f32>,
-    /// About the disc, the ball and the cell of each point.
+    /// Solids around the disc, the ball and the cell of each point.
     pub(crate) cells: Room<Solid>,
     pub(crate) leaves: Room<LeafBounds>,
     /// Bounds of the leaves' parts of the obstacle.
     pub(crate) obstacles: Room<LeafBounds>,
 }
 
-/// Those of a few leaves.
+/// The discs and bounds of a few leaves.
 #[derive(Debug, Default)]
 struct Some {
     discs: Vec<(Surfel, f32, f32)>,
     leaves: Vec<[LeafBounds; 2]>,
 }
 
-/// Reused from leaf to leaf.
+/// Scratch memory for leaves.
 #[derive(Debug, Default)]
 struct LeafScratch {
     locality: Locality,
     surroundings: Surroundings,
-    /// The blocks that are heard at a point.
+    /// The blocks whose support may contain a point.
     near: Vec<u32>,
     halves: Vec<HalfBlock>,
     fits: Vec<Moments>,
 }
 
-/// What is known of all points before their discs, in order.
+/// The inputs for the discs of all points, in order.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Known<'a> {
     pub(crate) positions: &'a [[f32; 3]],
@@ -105,11 +105,11 @@ pub(crate) struct Known<'a> {
     pub(crate) ordinary: f32,
     /// The scan's reach.
     pub(crate) reach: f32,
-    /// Sparse points come from here on.
+    /// The number of dense points; sparse points follow.
     pub(crate) dense: usize,
 }
 
-/// The surface at every point, and the class that follows from it. O(n).
+/// Fits the surface at every point and classifies the points. O(n).
 pub(crate) fn fits(
     index: &Index<'_>,
     positions: &[[f32; 3]],
@@ -133,13 +133,13 @@ pub(crate) fn fits(
     Ok(all)
 }
 
-/// The points of a leaf, and the box about them.
+/// Returns the points of a leaf, and the box around them.
 fn leaf(index: &Index<'_>, number: usize) -> (Range<usize>, OrientedBox) {
     let topology = index.tree.topology;
     (topology.points_of_leaf(number), index.tree.bounds(topology.leaf(number)))
 }
 
-/// The discs of all points and the bounds of all leaves, in order.
+/// Computes the discs of all points and the bounds of all leaves, in order.
 pub(crate) fn surfels(
     index: &Index<'_>,
     known: &Known<'_>,
@@ -182,7 +182,7 @@ pub(crate) fn surfels(
 }
 
 impl Surfels {
-    /// Puts what `give` gives in its place.
+    /// Stores the results that `give` passes on, one after the other.
     fn fill(&mut self, give: impl FnOnce(&mut dyn FnMut(Some))) {
         let Self { normals, codes, balls, cells, leaves, obstacles } = self;
         let (normals, codes): (&mut [_], &mut [_]) = (normals, codes);
@@ -203,7 +203,7 @@ impl Surfels {
     }
 }
 
-/// The points of a leaf, and the box about them.
+/// The points of a leaf, and the box around them.
 #[derive(Debug, Clone, Copy)]
 struct Leaf<'a> {
     positions: &'a [[f32; 3]],
@@ -212,7 +212,7 @@ struct Leaf<'a> {
 }
 
 impl Leaf<'_> {
-    /// The surface at every point.
+    /// Evaluates f at every point.
     #[inline(always)]
     fn fit<S: Simd>(
         &self,
@@ -239,8 +239,8 @@ impl Leaf<'_> {
         );
     }
 
-    /// The discs of the points, narrowed at borders, and bounds of their part of the surface and of the
-    /// obstacle.
+    /// Computes the discs of the points, narrowed at borders, and the bounds of the leaf's part of
+    /// the surface and of the obstacle.
     #[inline(always)]
     fn look_about<S: Simd>(
         &self,
@@ -254,7 +254,7 @@ impl Leaf<'_> {
             #[inline(always)]
             || {
                 let LeafScratch { locality, surroundings, near, .. } = scratch;
-                // Radii grow by at most 0.3 per length, and few as fast.
+                // Radii grow by at most 0.3 per length, and few of them as fast.
                 locality.collect(simd, index, self.positions, self.about.centre, 1.3 * self.about.reach);
                 surroundings.fill(index, self.positions[0], locality);
                 let bounds = LeafBounds::new(simd, self.positions, self.about, surroundings);
@@ -284,15 +284,15 @@ impl Leaf<'_> {
     }
 }
 
-/// What f at a point says of it.
+/// Returns the fit of a point from f there.
 pub(crate) fn fitted(at: &Evaluation, look: Look) -> Fit {
     #[expect(clippy::cast_possible_truncation, reason = "stored in single precision")]
     let normal = at.normal.map(|c| c as f32);
     Fit::new(normal, kind(at, look))
 }
 
-/// The disc of the point `p`, narrowed where the sectors about it are empty of the points in `near`, whose
-/// support radii reach `p`.
+/// Returns the disc of the point `p`, narrowed if adjacent sectors around it contain none of the
+/// points in `near`, whose support radii reach `p`.
 pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], near: &[PointBlock]) -> Surfel {
     let gap = dispatch!(Level::new(), simd => simd.vectorize(
         #[inline(always)]
@@ -301,8 +301,8 @@ pub(crate) fn surfel_of(fit: &Fit, p: [f32; 3], near: &[PointBlock]) -> Surfel {
     Surfel { normal: fit.normal, code: PointCode::new(fit.kind(), gap), cell: Cell::default() }
 }
 
-/// The greatest number of neighbouring sectors of the tangent plane in which no point lies that is heard at
-/// `p`; such points are in the blocks `near`.
+/// Returns the greatest number of adjacent sectors of the tangent plane without a point that
+/// supports `p`. The blocks `near` contain such points.
 #[inline(always)]
 fn widest_gap<'a, S: Simd>(
     simd: S,
@@ -316,7 +316,8 @@ fn widest_gap<'a, S: Simd>(
         let d = seen_from(simd, &block.position, p);
         let (x, y) = (along(d, u), along(d, v));
         let length = x.abs() + y.abs();
-        // The angle of the diamond |x| + |y| = 1, 0 to 4: a quarter turn each 1, without trigonometry.
+        // The angle on the diamond |x| + |y| = 1, from 0 to 4, one for each quarter turn, without
+        // trigonometry.
         let share = x / length;
         let quarter = simd.select_f32x16(y.simd_ge(0.0), -(share - 1.0), share + 3.0);
         let turn = quarter * (SECTORS as f32 / 4.0);
@@ -326,9 +327,9 @@ fn widest_gap<'a, S: Simd>(
         taken |= simd.select_i32x16(counts, bit(sector), i32x16::splat(simd, 0));
     }
     let taken = taken.to_array().into_iter().fold(0, |all, bits| all | u64::from(bits.cast_unsigned()));
-    // Twice round, so that a run across the start counts whole.
+    // Repeated, so that a run across the start counts whole.
     let round = taken | taken << SECTORS;
-    // Runs of k are left where k − 1 more follow.
+    // After k steps a bit remains for each run longer than k.
     let (mut runs, mut widest) = (!round & ((1 << (2 * SECTORS)) - 1), 0);
     while runs != 0 {
         runs &= runs >> 1;
@@ -337,7 +338,8 @@ fn widest_gap<'a, S: Simd>(
     widest.min(SECTORS)
 }
 
-/// The bit of each number from 0 to 30, rounded down: two to its power, made as a floating-point number.
+/// Returns the bit of each number from 0 to 30, rounded down: the power of two, made as a
+/// floating-point number.
 #[inline(always)]
 fn bit<S: Simd>(number: f32x16<S>) -> i32x16<S> {
     const ONE: i32 = 127;
@@ -359,7 +361,8 @@ fn kind(at: &Evaluation, look: Look) -> PointKind {
     }
 }
 
-/// Turns a leaf's `normals` to one side: that of their main axis, whose largest component is positive.
+/// Flips a leaf's `normals` to one side: that of their main axis, whose largest component is
+/// positive.
 pub(crate) fn align(normals: &mut [[f32; 3]]) {
     let mut s = [0.0_f64; 6];
     for n in &*normals {

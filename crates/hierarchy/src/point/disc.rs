@@ -1,33 +1,35 @@
-//! The radii of tangent discs, and the byte of a point that they follow from.
+//! The radii of tangent discs, and the byte of a point that determines them.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::point::kind::{PointKind, ball, ball_share};
 
-/// Disc radius over local sampling radius in the interior. The sixth neighbour is √2 spacings away on a
-/// square lattice, whose covering radius is 1/√2 spacings, 0.5; on a triangular one 1 and 1/√3, 0.58.
+/// Disc radius over local radius in the interior. It exceeds the ratio of the covering radius to
+/// the distance of the sixth neighbour: 0.5 on a square lattice (1/√2 and √2 spacings), 0.58 on a
+/// triangular one (1/√3 and 1 spacing).
 const DISC: f32 = 0.65;
 
-/// Disc radius over local sampling radius at a border. Local radii grow there, to some 1.3 times those
+/// Disc radius over local radius at a border. Local radii grow there, to about 1.3 times those
 /// inside, and two discs must not bridge a sampling radius.
 const DISC_AT_BORDER: f32 = 0.35;
 
-/// So many empty sectors side by side occur in the interior, even of random samples.
+/// This many adjacent empty sectors occur in the interior, even of random samples.
 const INTERIOR_GAP: u32 = 6;
 
-/// So many mean a border: about 135 degrees. A straight one leaves 180, a right-angled notch 90.
+/// This many adjacent empty sectors, about 135°, mean a border. A straight border leaves 180°
+/// empty, a right-angled notch 90°.
 const BORDER_GAP: u32 = 9;
 
-/// Bits of a [`PointCode`] below those of the border.
+/// The number of bits of a [`PointCode`] below those of the border.
 const KIND_BITS: u32 = 3;
 
-/// A point's kind, and how near to a border it lies, in a byte.
+/// A point's kind and its nearness to a border, in one byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub(crate) struct PointCode(pub(crate) u8);
 
 impl PointCode {
-    /// The code of a point about which so many sectors of the tangent plane are empty side by side.
+    /// Returns the code of a point with `gap` adjacent empty sectors of the tangent plane.
     pub(crate) fn new(kind: PointKind, gap: u32) -> Self {
         let border = gap.clamp(INTERIOR_GAP, BORDER_GAP) - INTERIOR_GAP;
         #[expect(clippy::cast_possible_truncation, reason = "at most 3")]
@@ -35,39 +37,39 @@ impl PointCode {
         Self(kind.code() | border << KIND_BITS)
     }
 
-    /// The point's kind.
+    /// Returns the point's kind.
     #[inline]
     pub(crate) const fn kind(self) -> PointKind {
         PointKind::from_code(self.0 & ((1 << KIND_BITS) - 1))
     }
 
-    /// Returns `true` if [`Self::new`] may have made this code.
+    /// Returns `true` if [`Self::new`] can return this code.
     #[inline]
     pub(crate) const fn is_sound(self) -> bool {
         self.0 & ((1 << KIND_BITS) - 1) <= PointKind::LAST && self.0 >> KIND_BITS <= LAST_BORDER
     }
 
-    /// The radius of the disc of a point with this local radius, in a scan with this reach and this sampling
-    /// radius.
+    /// Returns the disc radius of a point with this local radius, in a scan with this reach and
+    /// this sampling radius.
     #[inline]
     pub(crate) fn disc(self, radius: f32, reach: f32, sampling_radius: f32) -> f32 {
         let (kind, disc) = (self.kind(), self.disc_of_sheet(radius, reach));
         if kind.is_sparse() { disc.min(ball(kind, radius, sampling_radius)) } else { disc }
     }
 
-    /// [`Self::disc`] of a point that is not sparse.
+    /// Returns [`Self::disc`] for a point that is not sparse.
     #[inline]
     pub(crate) fn disc_of_sheet(self, radius: f32, reach: f32) -> f32 {
-        // What is further than half the reach from all points is a hole.
+        // Anything further than half the reach from all points is a hole.
         (radius * SHARES[usize::from(self.0)]).min(0.5 * reach)
     }
 }
 
-/// The code of a point at a border.
+/// The greatest border value of a code: at a border.
 #[expect(clippy::cast_possible_truncation, reason = "3")]
 const LAST_BORDER: u8 = (BORDER_GAP - INTERIOR_GAP) as u8;
 
-/// The radius of a disc over the local sampling radius, by the code of its point.
+/// The disc radius over the local radius, by the code of the point.
 const SHARES: [f32; 256] = {
     let mut shares = [DISC_AT_BORDER; 256];
     let mut code = 0;
@@ -83,7 +85,7 @@ const SHARES: [f32; 256] = {
     shares
 };
 
-/// The ball of a point before [`crate::Slices::dense`] by its code, in its local radius.
+/// The ball radius of a point before [`crate::Slices::dense`] in local radii, by its code.
 pub(crate) const DENSE_SHARES: [f32; 256] = {
     let mut shares = [0.0; 256];
     let mut code = 0;
@@ -96,7 +98,7 @@ pub(crate) const DENSE_SHARES: [f32; 256] = {
     shares
 };
 
-/// The radii of the discs of all points, computed as they are read.
+/// The radii of the discs of all points, computed on access.
 #[derive(Debug, Clone, Copy)]
 pub struct DiscRadii<'a> {
     pub(crate) codes: &'a [PointCode],
@@ -106,17 +108,17 @@ pub struct DiscRadii<'a> {
 }
 
 impl DiscRadii<'_> {
-    /// The radius of the `i`-th point's disc.
+    /// Returns the disc radius of the `i`-th point.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn get(&self, i: usize) -> f32 {
         self.codes[i].disc(self.radii[i], self.reach, self.sampling_radius)
     }
 
-    /// The radii of all discs, in the order of the points.
+    /// Returns the radii of all discs, in the order of the points.
     pub fn iter(&self) -> impl Iterator<Item = f32> + '_ {
         (0..self.codes.len()).map(|i| self.get(i))
     }

@@ -1,5 +1,6 @@
-//! The points that f(x) needs: those whose horizon reaches x, from the neighbour list of a leaf near x, or by
-//! a descent where no list holds.
+//! Gathers the points that f(x) needs, those within their support radius of x: from the neighbour
+//! list of a block near x, or by a descent where no list is complete. The support of a block or
+//! group is the union of the support balls of its points.
 
 use std::ops::ControlFlow;
 
@@ -15,35 +16,37 @@ use nearmiss_surface::{Centre, Evaluation, HalfBlock, Moments, Neighbourhood, Su
 use crate::descent::PlaceVisitor;
 use crate::tree::wide::{Siblings, Tree};
 
-/// Points of a group of blocks.
+/// The number of points in a group of blocks.
 pub(crate) const GROUP: usize = PointBlock::WIDTH * PointBlock::WIDTH;
 
-/// What rounding may cost a comparison of distances, relatively.
+/// Bound on the relative rounding error of a comparison of distances.
 pub(crate) const GROWN: f32 = 1.0 + 1e-5;
 
-/// Which entries of the array of all lists are a block's, and where they are complete.
+/// The slice of the array of all lists that is the list of a block, and the ball in which the list
+/// is complete.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct NeighbourList {
-    /// At places no further than this from the middle of the block's ball; negative where there is no list.
+    /// The list is complete at positions up to this distance from the centre of the block's ball.
+    /// Negative if there is no list.
     pub within: f32,
     /// The first entry.
     pub first: u32,
-    /// Number of entries.
+    /// The number of entries.
     pub count: u32,
 }
 
-/// Reused between evaluations; never influences a result.
+/// Scratch memory of evaluations. Never influences a result.
 #[derive(Debug, Clone)]
 pub struct GatherScratch {
     pub(crate) level: Level,
     /// The block near which f was evaluated last.
     pub(crate) block: usize,
-    /// Groups that a descent found.
+    /// The groups that a descent found.
     pub(crate) found: Vec<u32>,
-    /// Blocks that are heard at x.
+    /// The blocks whose support may contain x.
     heard: Vec<u32>,
-    /// How near they are.
+    /// Intermediate values of half blocks.
     halves: Vec<HalfBlock>,
 }
 
@@ -54,14 +57,15 @@ impl Default for GatherScratch {
 }
 
 impl GatherScratch {
-    /// One whose evaluations use the instructions of `level`: no result depends on it.
+    /// Creates scratch memory for evaluations with the instruction set `level`, which does not
+    /// affect results.
     #[must_use]
     pub fn at(level: Level) -> Self {
         Self { level, block: 0, found: Vec::new(), heard: Vec::new(), halves: Vec::new() }
     }
 }
 
-/// What a search for neighbours reads.
+/// The arrays that a search for neighbours reads.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Index<'a> {
     pub(crate) tree: Tree<'a>,
@@ -73,7 +77,7 @@ pub(crate) struct Index<'a> {
 }
 
 impl<'a> Index<'a> {
-    /// One by which lists are made: all is found by descent.
+    /// Creates an index without lists, for the construction of the lists: every search descends.
     pub(crate) fn without_lists(
         tree: Tree<'a>,
         (blocks, groups): (&'a [PointBlock], &'a [PointBlock]),
@@ -84,7 +88,7 @@ impl<'a> Index<'a> {
 }
 
 impl<'a> Index<'a> {
-    /// f at `x`.
+    /// Evaluates f at `x`.
     pub(crate) fn evaluate(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let centre = Centre::new(x);
         let place = centre.rounded();
@@ -104,8 +108,8 @@ impl<'a> Index<'a> {
         ))
     }
 
-    /// The groups of which a point may be heard within `distance` of `x`, if the list of this block is
-    /// complete there.
+    /// Returns the groups whose support may come within `distance` of `x`, if the list of `block`
+    /// is complete there.
     #[inline]
     pub(crate) fn list(&self, block: usize, x: [f32; 3], distance: f32) -> Option<&'a [u32]> {
         let list = self.lists.get(block)?;
@@ -116,7 +120,7 @@ impl<'a> Index<'a> {
         if complete { self.listed.get(first..first + list.count as usize) } else { None }
     }
 
-    /// The middle of the ball about a block.
+    /// Returns the centre of the ball around a block.
     #[inline]
     pub(crate) fn middle(&self, block: usize) -> Option<[f32; 3]> {
         let [x, y, z] = &self.groups.get(block / PointBlock::WIDTH)?.position;
@@ -124,12 +128,12 @@ impl<'a> Index<'a> {
         Some([x[lane], y[lane], z[lane]])
     }
 
-    /// Of the blocks that are heard near `block` the one with the middle nearest to `x`.
+    /// Returns the listed block near `block` whose centre is nearest to `x`.
     pub(crate) fn next_block(&self, block: usize, x: [f32; 3]) -> Option<usize> {
         const LANES: usize = PointBlock::WIDTH;
         let list = self.lists.get(block)?;
         let first = list.first as usize;
-        // Lane by lane, as they stand side by side.
+        // Lane by lane, as in memory.
         let (mut least, mut nearest) = ([f32::INFINITY; LANES], [0_u32; LANES]);
         for &group in self.listed.get(first..first + list.count as usize)? {
             let [px, py, pz] = &self.groups.get(group as usize)?.position;
@@ -144,14 +148,14 @@ impl<'a> Index<'a> {
         Some(nearest[lane] as usize * LANES + lane)
     }
 
-    /// A block of the leaf whose box is near `x`: always into the nearest child.
+    /// Returns a block of the leaf near `x` that is found by descending to the nearest child.
     fn nearest_block(&self, level: Level, x: [f32; 3]) -> usize {
         let mut first = FirstLeaf(0);
         let _found = self.tree.descend_to(level, x, &mut first);
         self.tree.topology.points_of_leaf(first.0).start / PointBlock::WIDTH
     }
 
-    /// The groups of which a point may be heard within `distance` of `x`, ascending.
+    /// Finds the groups whose support may come within `distance` of `x`, ascending.
     pub(crate) fn collect(&self, level: Level, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -159,17 +163,17 @@ impl<'a> Index<'a> {
         ));
     }
 
-    /// [`Self::collect`] by the instructions of the caller.
+    /// Does the same as [`Self::collect`] with the instruction set of the caller.
     #[inline(always)]
     pub(crate) fn collect_by<S: Simd>(&self, simd: S, x: [f32; 3], distance: f32, found: &mut Vec<u32>) {
         found.clear();
-        // Nothing ends it.
+        // The visitor never breaks.
         let mut groups = Groups { tree: &self.tree, plan: self.plan, distance, found, next: 0 };
         let _whole = self.tree.descend_to_by(simd, x, &mut groups);
     }
 
-    /// The blocks of these groups, which ascend, that may be heard within `distance` of `x`: written to the
-    /// front of `heard`, of which they are returned.
+    /// Finds the blocks of `groups`, which must ascend, whose support may come within `distance` of
+    /// `x`. Writes them to the front of `heard` and returns that part.
     #[inline(always)]
     pub(crate) fn heard<'b, S: Simd>(
         &self,
@@ -194,7 +198,7 @@ impl<'a> Index<'a> {
         &mut heard[..count]
     }
 
-    /// The sums over all points of `groups`, which ascend, about x.
+    /// Returns the sums over all points of `groups`, which must ascend, around x.
     #[inline(always)]
     pub(crate) fn moments<S: Simd>(
         &self,
@@ -211,18 +215,18 @@ impl<'a> Index<'a> {
     }
 }
 
-/// The search for all groups with a point whose horizon may reach within some distance of a place.
+/// The search for all groups whose support may come within some distance of a position.
 struct Groups<'a> {
     tree: &'a Tree<'a>,
     plan: &'a SurfacePlan,
     distance: f32,
     found: &'a mut Vec<u32>,
-    /// The first group not yet visited: groups ascend.
+    /// The first group not visited yet: groups ascend.
     next: usize,
 }
 
 impl PlaceVisitor for Groups<'_> {
-    /// Many leaves share a group; in order, each group is found once.
+    /// Several leaves share a group; in order, each group is found once.
     const IN_ORDER: bool = true;
 
     #[inline(always)]
@@ -254,7 +258,7 @@ impl PlaceVisitor for Groups<'_> {
     }
 }
 
-/// The leaf that a descent comes to first.
+/// The first leaf that a descent visits.
 struct FirstLeaf(usize);
 
 impl PlaceVisitor for FirstLeaf {

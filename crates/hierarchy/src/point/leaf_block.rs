@@ -1,5 +1,5 @@
-//! What two leaves are compared by, in one place: a query comes to a leaf that no other has lately come to,
-//! and waits for each part of memory that it needs.
+//! The data that leaves are compared by, in one place. A query rarely finds its leaves in the
+//! cache, and would wait for each separate piece of memory.
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
@@ -11,37 +11,38 @@ use crate::point::disc::DiscRadii;
 use crate::point::kind::is_on_sheet;
 use crate::tree::topology::Topology;
 
-/// Lanes of a block.
+/// The number of lanes of a block.
 const WIDTH: usize = 16;
 
-/// Unit vectors are told in so many steps.
+/// The number of steps between 0 and 1 in a component of a unit vector.
 const STEPS: f32 = 32767.0;
 
 /// Up to sixteen points of a leaf as tangent discs, and the leaf's box.
 ///
-/// Of places and radii sixteen bits are kept, in steps of a 2⁻¹⁵th of the leaf, and of directions as many:
-/// off by less than a thousandth of a local radius and of a degree, where discs say no more than that
-/// surfaces cross to first order; in half the memory.
+/// Positions and radii are stored in 16 bits, in steps of a 2⁻¹⁵th of the leaf's radius, and
+/// normals in 16 bits per component. The errors are below a thousandth of a local radius and of a
+/// degree, while discs show crossings to first order only. This halves the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct LeafBlock {
     positions: [[i16; WIDTH]; 3],
     normals: [[i16; WIDTH]; 3],
     discs: [i16; WIDTH],
-    /// The box of the leaf: its centre, half its edges, their directions.
+    /// The centre of the leaf's box.
     pub centre: [f32; 3],
-    /// Half its edge lengths.
+    /// Half the edge lengths of the leaf's box.
     pub half: [f32; 3],
-    /// Unit directions of the edges.
+    /// Unit directions of the edges of the leaf's box.
     pub axes: [[f32; 3]; 3],
     step: f32,
 }
 
 impl LeafBlock {
-    /// How many points fit.
+    /// The number of points in a full block.
     pub const WIDTH: usize = WIDTH;
 
-    /// Without points. `bounds` is to hold the discs of all that are [set](Self::set).
+    /// Creates a block without points. `bounds` must contain the discs of all points that are
+    /// [set](Self::set).
     #[must_use]
     pub fn new(bounds: &OrientedBox) -> Self {
         let OrientedBox { centre, half, axes, .. } = *bounds;
@@ -57,10 +58,10 @@ impl LeafBlock {
         }
     }
 
-    /// Puts a disc into a lane.
+    /// Writes a disc to a lane.
     ///
     /// # Panics
-    /// When there is no such lane.
+    /// If there is no such lane.
     #[expect(clippy::cast_possible_truncation, reason = "a cast of floats keeps within the range")]
     pub fn set(&mut self, lane: usize, position: [f32; 3], normal: [f32; 3], disc: f32) {
         let nearest = |x: f32| (x + 0.5_f32.copysign(x)) as i16;
@@ -74,10 +75,10 @@ impl LeafBlock {
         }
     }
 
-    /// The position in a lane.
+    /// Returns the position in a lane.
     ///
     /// # Panics
-    /// When there is no such lane, as all here.
+    /// If there is no such lane. The same holds for the other methods.
     #[inline]
     #[must_use]
     pub fn position(&self, lane: usize) -> [f32; 3] {
@@ -86,7 +87,7 @@ impl LeafBlock {
         [x + steps[0] * self.step, y + steps[1] * self.step, z + steps[2] * self.step]
     }
 
-    /// The normal in a lane.
+    /// Returns the normal in a lane.
     #[inline]
     #[must_use]
     pub fn normal(&self, lane: usize) -> [f32; 3] {
@@ -95,14 +96,14 @@ impl LeafBlock {
         [f32::from(x[lane]) * per_step, f32::from(y[lane]) * per_step, f32::from(z[lane]) * per_step]
     }
 
-    /// The radius of the disc in a lane.
+    /// Returns the radius of the disc in a lane.
     #[inline]
     #[must_use]
     pub fn disc(&self, lane: usize) -> f32 {
         f32::from(self.discs[lane]) * self.step
     }
 
-    /// All positions; the centre of the box where there is no point.
+    /// Returns all positions; the centre of the box in unused lanes.
     #[inline(always)]
     pub fn positions<S: Simd>(&self, simd: S) -> [f32x16<S>; 3] {
         let [x, y, z] = &self.positions;
@@ -110,7 +111,7 @@ impl LeafBlock {
         [steps(simd, x) * self.step + cx, steps(simd, y) * self.step + cy, steps(simd, z) * self.step + cz]
     }
 
-    /// All normals.
+    /// Returns all normals.
     #[inline(always)]
     pub fn normals<S: Simd>(&self, simd: S) -> [f32x16<S>; 3] {
         let [x, y, z] = &self.normals;
@@ -118,7 +119,7 @@ impl LeafBlock {
         [steps(simd, x) * unit, steps(simd, y) * unit, steps(simd, z) * unit]
     }
 
-    /// The radii of all discs.
+    /// Returns the radii of all discs.
     #[inline(always)]
     pub fn discs<S: Simd>(&self, simd: S) -> f32x16<S> {
         steps(simd, &self.discs) * self.step
@@ -131,17 +132,17 @@ fn steps<S: Simd>(simd: S, steps: &[i16; WIDTH]) -> f32x16<S> {
     f32x16::float_from(low.combine(high))
 }
 
-/// Whether some point of a leaf is sparse, as a bit.
+/// Mark of a leaf with a sparse point.
 const SPARSE: u8 = 1;
 
-/// Whether some point of a leaf stands in the obstacle as a ball.
+/// Mark of a leaf with a point that is a ball in the obstacle.
 const BALLS: u8 = 2;
 
-/// Whether a leaf is loose, as a bit.
+/// Mark of a loose leaf.
 const LOOSE: u8 = 4;
 
-/// A leaf longer than so many of its greatest local radii is not a patch of a sheet. Half the length of a
-/// patch of 16 points is some two.
+/// The half length, in its greatest local radius, from which a leaf is loose, that is, not a patch
+/// of a sheet. Half the length of a patch of 16 points is about two.
 const LOOSE_FROM: f32 = 3.0;
 
 /// The arrays that leaf blocks are built from.
@@ -150,17 +151,17 @@ pub(crate) struct LeafParts<'a> {
     pub(crate) positions: &'a [[f32; 3]],
     pub(crate) normals: &'a [[f32; 3]],
     pub(crate) discs: DiscRadii<'a>,
-    /// Points before this are dense.
+    /// The number of dense points, which come first.
     pub(crate) dense: usize,
 }
 
 impl LeafParts<'_> {
-    /// How many blocks a leaf has.
+    /// Returns the number of blocks in a leaf.
     pub(crate) fn blocks_a_leaf(topology: &Topology) -> usize {
         topology.leaf_size().div_ceil(WIDTH)
     }
 
-    /// The block with this number of all leaves'; `bounds` is the box of its leaf.
+    /// Returns block `number`, counted over all leaves. `bounds` is the box of its leaf.
     pub(crate) fn block(&self, topology: &Topology, number: usize, bounds: &OrientedBox) -> LeafBlock {
         let blocks_a_leaf = Self::blocks_a_leaf(topology);
         let (leaf, part) = (number / blocks_a_leaf, number % blocks_a_leaf);
@@ -172,7 +173,7 @@ impl LeafParts<'_> {
         block
     }
 
-    /// What kinds of points a leaf has, and whether it is loose; `bounds` is its box.
+    /// Returns the marks of a leaf; `bounds` is its box.
     pub(crate) fn marks(&self, topology: &Topology, leaf: usize, bounds: &OrientedBox) -> u8 {
         let kind = |i: usize| self.discs.codes[i].kind();
         let points = topology.points_of_leaf(leaf);
@@ -188,31 +189,31 @@ impl LeafParts<'_> {
 #[derive(Debug, Clone, Copy)]
 pub struct Leaves<'a> {
     pub(crate) topology: &'a Topology,
-    /// As many for each leaf as a full one needs.
+    /// The blocks of all leaves; each leaf has as many as a full one needs.
     pub(crate) blocks: &'a [LeafBlock],
-    /// What kinds of points each has, and whether it is loose.
+    /// The marks of each leaf.
     pub(crate) marks: &'a [u8],
 }
 
 impl<'a> Leaves<'a> {
-    /// The points of a leaf, by its number.
+    /// Returns the points of a leaf, by its number.
     #[inline]
     #[must_use]
     pub fn points(&self, leaf: usize) -> std::ops::Range<usize> {
         self.topology.points_of_leaf(leaf)
     }
 
-    /// The leaf of a point.
+    /// Returns the leaf of a point.
     #[inline]
     #[must_use]
     pub fn leaf_of(&self, i: usize) -> usize {
         i / self.topology.leaf_size()
     }
 
-    /// The block with a point, its first point and how many it has.
+    /// Returns the block of a point, the first point of the block and the number of its points.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn block_with(&self, i: usize) -> (&'a LeafBlock, usize, usize) {
@@ -227,29 +228,29 @@ impl<'a> Leaves<'a> {
     /// Returns `true` if some points of a leaf are [sparse](crate::PointKind::is_sparse).
     ///
     /// # Panics
-    /// When there is no such leaf, as below.
+    /// If there is no such leaf. The same holds for the methods below.
     #[inline]
     #[must_use]
     pub fn is_sparse(&self, leaf: usize) -> bool {
         self.marks[leaf] & SPARSE != 0
     }
 
-    /// Returns `true` if some of them stand in the obstacle as balls.
+    /// Returns `true` if some points of a leaf are balls in the obstacle.
     #[inline]
     #[must_use]
     pub fn has_balls(&self, leaf: usize) -> bool {
         self.marks[leaf] & BALLS != 0
     }
 
-    /// Returns `true` if its points may tell more of its obstacle than its box: it is longer than a patch of
-    /// a sheet would be.
+    /// Returns `true` if a leaf is longer than a patch of a sheet would be. Its points may then
+    /// bound its obstacle better than its box.
     #[inline]
     #[must_use]
     pub fn is_loose(&self, leaf: usize) -> bool {
         self.marks[leaf] & LOOSE != 0
     }
 
-    /// Its points in blocks, with the first point of each block and how many it has.
+    /// Returns the blocks of a leaf, each with its first point and its number of points.
     #[inline]
     pub fn blocks(&self, leaf: usize) -> impl Iterator<Item = (&'a LeafBlock, usize, usize)> + use<'a> {
         let points = self.points(leaf);

@@ -1,11 +1,12 @@
-//! Neighbour lists: for each block of points, the groups of blocks whose horizons reach near it, so that f is
-//! evaluated there without a descent.
+//! Neighbour lists: for each block of points, the groups of blocks with support near it, so that f
+//! can be evaluated there without a descent.
 //!
-//! The lists of molecular dynamics (Verlet 1967), kept for blocks of points instead of particles. About every
-//! block there is a ball that contains the horizons of all its points; the balls of [`PointBlock::WIDTH`]
-//! blocks, a group, stand side by side like points with horizons. The list of a block names groups. It is
-//! complete for every place within some distance of the middle of the block's ball, far enough for every
-//! surface point whose nearest stored point is the block's (`docs/theory/certificates.md`, fact 2).
+//! These are the lists of molecular dynamics (Verlet 1967), for blocks of points instead of
+//! particles. A ball around each block contains the support balls of all its points. The balls of
+//! [`PointBlock::WIDTH`] blocks, a group, are stored side by side like points with support radii.
+//! The list of a block contains groups. It is complete at all positions within some distance of the
+//! centre of the block's ball. That is far enough for every surface point whose nearest stored
+//! point is in the block (`docs/theory/certificates.md`, fact 2).
 
 use std::ops::Range;
 
@@ -21,18 +22,19 @@ use nearmiss_surface::SurfacePlan;
 use crate::bounds::boxes::ROUNDING;
 use crate::point::gather::{GROWN, Index, NeighbourList};
 
-/// No list is longer; a block that hears more has none, and f near it is found by descent. Blocks on surfaces
-/// hear some seven; where the scan is sparse beside dense, or a bandwidth large, lists would be of
-/// everything.
+/// The maximum length of a list. A block with more neighbours has no list, and f near it is found
+/// by descent. Blocks on surfaces have about seven. Where sparse and dense regions meet, or
+/// bandwidths are large, lists would contain everything.
 pub(crate) const MOST_LISTED: usize = 64;
 
-/// Entries that there is room for at first, a block: on surfaces lists have some seven.
+/// The number of entries per block for which memory is reserved; lists on surfaces have about
+/// seven.
 const USUAL_ENTRIES: usize = 10;
 
-/// Steps towards the least ball about a block (Bădoiu & Clarkson 2003).
+/// The number of steps towards the smallest ball around a block (Bădoiu & Clarkson 2003).
 const CENTRING: u8 = 12;
 
-/// Sets `out` to the points in blocks, with their horizons. O(n), on all cores.
+/// Sets `out` to the points in blocks, with their support radii. O(n), on all cores.
 pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32], out: &mut [PointBlock]) {
     fill(out, |number| {
         let start = number * PointBlock::WIDTH;
@@ -42,7 +44,7 @@ pub(crate) fn blocks(plan: &SurfacePlan, positions: &[[f32; 3]], radii: &[f32], 
     });
 }
 
-/// For every group of blocks the balls outside of which no point of a block is heard, given the blocks.
+/// Returns the balls around `blocks` and their support, in groups.
 pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<PointBlock>, WorkError> {
     const WIDTH: usize = PointBlock::WIDTH;
     let level = Level::new();
@@ -65,7 +67,7 @@ pub(crate) fn groups(blocks: &[PointBlock], work: &Workspace) -> Result<Room<Poi
     Ok(groups)
 }
 
-/// A ball outside of which no point of a block is heard.
+/// Returns a ball that contains the support balls of all points of a block.
 #[inline(always)]
 fn ball<S: Simd>(simd: S, block: &PointBlock) -> ([f32; 3], f32) {
     let PointBlock { position: [x, y, z], horizon, .. } = block;
@@ -76,7 +78,8 @@ fn ball<S: Simd>(simd: S, block: &PointBlock) -> ([f32; 3], f32) {
         }
     }
     let mut centre = [sum[0] / count, sum[1] / count, sum[2] / count];
-    // From the mean ever less far towards whoever is heard furthest: the least ball of balls.
+    // The smallest ball of balls: from the mean, ever smaller steps towards the point whose support
+    // ball extends furthest.
     let horizons = f32x16::load_array_ref(simd, horizon);
     let is_there: mask32x16<S> = horizons.simd_gt(0.0);
     let mut best = (centre, f32::INFINITY);
@@ -100,7 +103,7 @@ fn ball<S: Simd>(simd: S, block: &PointBlock) -> ([f32; 3], f32) {
     (centre, radius * GROWN + ROUNDING * far)
 }
 
-/// The lists of all blocks, as they are found one after the other.
+/// The lists of some blocks, in order.
 #[derive(Debug, Default)]
 pub(crate) struct Lists {
     pub(crate) lists: Vec<NeighbourList>,
@@ -108,7 +111,7 @@ pub(crate) struct Lists {
 }
 
 impl Lists {
-    /// The list of the next block, complete `within` some distance of the middle of its ball.
+    /// Adds the list of the next block, complete `within` some distance of the centre of its ball.
     pub(crate) fn push(&mut self, within: f32, entries: impl ExactSizeIterator<Item = u32>) {
         let end = |entries: &[u32]| u32::try_from(entries.len()).unwrap_or(u32::MAX);
         let first = end(&self.entries);
@@ -121,22 +124,23 @@ impl Lists {
     }
 }
 
-/// What is heard near some points. Reused.
+/// The points whose support is near some points. Can be reused.
 #[derive(Debug, Default)]
 pub(crate) struct Locality {
     /// The groups, ascending.
     pub(crate) groups: Vec<u32>,
-    /// Their blocks that are heard, ascending.
+    /// The blocks of these groups with support near the points, ascending.
     pub(crate) blocks: Vec<u32>,
-    /// What is not among them is not heard within this distance of the middle.
+    /// The supports of all other blocks are further than this from the centre.
     pub(crate) within: f32,
-    /// No surface point whose nearest point is one of the points is further from that than this.
+    /// No surface point is further than this from its nearest point, if that is one of the points.
     pub(crate) reach: f32,
 }
 
 impl Locality {
-    /// Collects all that is heard where surface points can be whose nearest point is one of `points`, about
-    /// their `middle`; `guess` is what the greatest local radius heard there may be.
+    /// Collects all blocks with support where there can be surface points whose nearest point is
+    /// one of `points`, around their `middle`. `guess` estimates the greatest local radius among
+    /// them.
     #[inline(always)]
     pub(crate) fn collect<S: Simd>(
         &mut self,
@@ -162,7 +166,8 @@ impl Locality {
         }
     }
 
-    /// The greatest horizon of a point that is heard within `distance` of `x`.
+    /// Returns the greatest support radius of the points whose support ball comes within `distance`
+    /// of `x`.
     #[inline(always)]
     fn greatest_heard(&self, index: &Index<'_>, x: [f32; 3], distance: f32) -> f32 {
         let mut greatest = [0.0_f32; PointBlock::WIDTH];
@@ -179,7 +184,7 @@ impl Locality {
     }
 }
 
-/// The neighbour lists of all blocks, and the entries of these.
+/// Returns the neighbour lists of all blocks, and their entries.
 pub(crate) fn neighbours(
     index: &Index<'_>,
     positions: &[[f32; 3]],
@@ -204,7 +209,7 @@ pub(crate) fn neighbours(
     };
     let blocks = index.blocks.len();
     let mut lists = work.room(blocks)?;
-    // Room for more than most scans need; moved where a scan needs more.
+    // More memory than most scans need; it grows if a scan needs more.
     let mut entries = work.room(blocks * USUAL_ENTRIES)?;
     let (mut list, mut end, mut failed) = (0, 0, None);
     in_order(blocks, some, |some| {

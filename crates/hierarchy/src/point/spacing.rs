@@ -1,9 +1,10 @@
 //! Local sampling radii.
 //!
-//! A point's spacing is the distance to its K-th nearest neighbour, with K growing up to 256 while those
-//! neighbours look like a line, as the returns of one LiDAR ring do. It is then made smooth, `r_i := min_j
-//! (r_j + 0.3 ‖p_i − p_j‖)`, so that a lone point cannot bleed over a dense region; lines without another
-//! beside them and bends in rings, whose distances say nothing of a surface, are no such j.
+//! The spacing of a point is the distance to its K-th nearest neighbour. K grows up to 256 while
+//! those neighbours look like a line, as the returns of one LiDAR ring do. Spacings are then
+//! smoothed, `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)`, so that an isolated point cannot affect a
+//! dense region. Lines without another beside them and bends in rings are excluded as j, because
+//! their distances do not measure the spacing of a surface.
 
 use std::ops::Range;
 
@@ -18,43 +19,45 @@ use crate::tree::topology::Topology;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// How many neighbours are looked at where the first look like a line; doubled while they all do.
+/// The number of neighbours examined first if the first K look like a line; doubled while all of
+/// them do.
 const LINE_NEIGHBOURS: usize = 32;
 
-/// Points along a ring may be so many times nearer than the next ring is, twice over: 256 neighbours reach a
-/// ring a hundred spacings away, as sixteen beams 2° apart, 0.2° along, leave it on a floor met at a slope of
-/// one in ten. What is alone for longer is a wire, or stands for itself.
+/// The maximum number of neighbours. 256 neighbours along a ring reach another ring a hundred
+/// spacings away, as sixteen beams 2° apart, 0.2° along, leave it on a floor with a slope of one in
+/// ten. Points alone for longer are a wire, or isolated.
 const MOST_NEIGHBOURS: usize = 256;
 
-/// λ2 < 0.05 λ3 is what a line of points with noise looks like.
+/// Points look like a line if λ2 < 0.05 λ3, which tolerates noise.
 const LINE: f64 = 0.05;
 
-/// How fast radii may grow with distance. 0.3 lets them double over some three spacings.
+/// The maximum growth of radii per distance. With 0.3 they can double over about three spacings.
 const GROWTH: f32 = 0.3;
 
-/// A spacing, and what the neighbours looked like.
+/// The spacing of a point, and the appearance of its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Spacing {
     pub(crate) radius: f32,
-    /// The distance of the K-th neighbour, which is less than the radius along a ring.
+    /// The distance of the K-th neighbour, which along a ring is less than the radius.
     plain: f32,
-    /// The code of the look.
+    /// The appearance, as a number.
     look: u32,
 }
 
-/// What the neighbours of a point look like.
+/// The appearance of the neighbours of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u32)]
 pub(crate) enum Look {
     /// The first K spread over an area.
     #[default]
     Area = 0,
-    /// The first K are a line, more of them are not: a ring among others.
+    /// The first K are on a line, more of them are not: a ring among others.
     Ring = 1,
-    /// A line as far as was looked.
+    /// All examined neighbours are on a line.
     Line = 2,
-    /// The first K spread, but only because a ring bends there or is jagged: most points about see a ring.
+    /// The first K spread only because a ring bends there or is jagged: most points around see a
+    /// ring.
     Bend = 3,
     /// The spacing exceeds the reach of the scan.
     Sparse = 4,
@@ -65,7 +68,7 @@ impl Spacing {
         Self { radius, plain, look: look as u32 }
     }
 
-    /// What the neighbours look like.
+    /// Returns the appearance of the neighbours.
     pub(crate) const fn look(&self) -> Look {
         match self.look {
             1 => Look::Ring,
@@ -77,7 +80,7 @@ impl Spacing {
     }
 }
 
-/// The spacing of every one of the distinct `points`, those of the `tree`.
+/// Returns the spacings of `points`, which must be distinct and those of `tree`.
 pub(crate) fn spacings(
     points: &[[f32; 3]],
     tree: &BlockTree<'_>,
@@ -105,7 +108,7 @@ pub(crate) fn spacings(
     if spacings.iter().all(|s| s.look() == Look::Area) {
         return Ok(room);
     }
-    // As many votes are needed as a byte can count.
+    // A byte can count more votes than are needed.
     let mut votes = work.room::<u8>(points.len())?;
     let counted: &mut [u8] = &mut votes;
     let found = &*spacings;
@@ -140,9 +143,10 @@ struct Search<'a> {
     level: Level,
     block: usize,
     found: Nearest,
-    /// How many neighbours of each point of the block `found` has.
+    /// The number of neighbours in `found` for each point of the block.
     count: usize,
-    /// Squared distance and index of a point itself and of its nearest others, by distance, then index.
+    /// Squared distance and index of a point itself and its nearest neighbours, by distance, then
+    /// index.
     near: Vec<(f64, usize)>,
 }
 
@@ -152,13 +156,13 @@ impl<'a> Search<'a> {
         Self { tree, points, level: Level::new(), block: 0, found, count: 0, near }
     }
 
-    /// Turns to a block.
+    /// Continues with another block.
     fn start(&mut self, block: usize) {
         (self.block, self.count) = (block, 0);
     }
 
-    /// The points of the block that surely see an area, as bits: those of which [`Self::spacing`] says so at
-    /// once. All are looked at together.
+    /// Returns the points of the block whose neighbours certainly spread over an area, as bits:
+    /// [`Self::spacing`] would give [`Look::Area`]. All points are examined at once.
     fn plain(&mut self, neighbours: usize) -> u64 {
         self.tree.nearest(self.level, self.block, neighbours, &mut self.found);
         self.count = neighbours;
@@ -206,21 +210,21 @@ impl<'a> Search<'a> {
         plain
     }
 
-    /// The spacing of point `i` of the block, which sees an area.
+    /// Returns the spacing of point `i` of the block, whose neighbours spread over an area.
     fn area(&self, i: usize, neighbours: usize) -> Spacing {
         let last = self.found.ranked(i % WIDTH, neighbours - 1);
         let radius = last.map_or(0.0, |last| length(&self.exact(i, last.id as usize)));
         Spacing::new(radius, radius, Look::Area)
     }
 
-    /// The squared distance of point `j` from point `i` in double precision, and its index.
+    /// Returns the squared distance of points `i` and `j` in double precision, and `j`.
     fn exact(&self, i: usize, j: usize) -> (f64, usize) {
         let d = [0, 1, 2].map(|k| f64::from(self.points[j][k]) - f64::from(self.points[i][k]));
         (d[0] * d[0] + d[1] * d[1] + d[2] * d[2], j)
     }
 
-    /// Makes `near` hold point `i` of the block and the nearest `count` others. Those of the whole block are
-    /// found at once.
+    /// Fills `near` with point `i` of the block and its nearest `count` neighbours. Those of the
+    /// whole block are found at once.
     fn look(&mut self, i: usize, count: usize) {
         if count > self.count {
             self.tree.nearest(self.level, self.block, count, &mut self.found);
@@ -233,7 +237,7 @@ impl<'a> Search<'a> {
         self.near = near;
     }
 
-    /// The spacing of point `i` of the block: as many neighbours are looked at as are needed.
+    /// Returns the spacing of point `i` of the block, examining as many neighbours as needed.
     fn spacing(&mut self, i: usize, neighbours: usize) -> Spacing {
         self.look(i, neighbours);
         let radius = self.near.last().map_or(0.0, length);
@@ -261,7 +265,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The distance of a neighbour: at least 1e-18, whose square single precision still holds.
+/// Returns the distance of a neighbour, at least 1e-18, whose square is still a normal number in
+/// single precision.
 #[expect(clippy::cast_possible_truncation, reason = "radii are stored in single precision")]
 fn length(near: &(f64, usize)) -> f32 {
     near.0.sqrt().max(1e-18) as f32
@@ -285,7 +290,7 @@ impl Sums {
         self.count += 1;
     }
 
-    /// The covariance about their mean as xx xy xz yy yz zz.
+    /// Returns the covariance around the mean as xx xy xz yy yz zz.
     #[inline(always)]
     fn covariance(&self) -> [f64; 6] {
         #[expect(clippy::cast_precision_loss, reason = "at most 257")]
@@ -294,8 +299,8 @@ impl Sums {
         [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
     }
 
-    /// Whether any of the points `near` lies more across the main direction than along it, seen from the
-    /// first: an arc grows wide too, but the next ring alone has points beside it.
+    /// Returns `true` if a point of `near`, seen from the first, is more across the main direction
+    /// than along it. An arc spreads too, but only a neighbouring ring has points to the side.
     fn lies_across(&self, points: &[[f32; 3]], near: &[(f64, usize)]) -> bool {
         let main = symmetric_eigen(self.covariance()).vectors[2];
         let origin = points[near[0].1];
@@ -305,7 +310,8 @@ impl Sums {
         })
     }
 
-    /// Whether the points look like a line: the covariance about their mean has λ2 < 0.05 λ3.
+    /// Returns `true` if the points look like a line: the covariance around their mean has λ2 <
+    /// 0.05 λ3.
     fn is_line(&self) -> bool {
         self.is_surely_line().unwrap_or_else(|| {
             let [_, l2, l3] = symmetric_eigen(self.covariance()).values;
@@ -313,12 +319,12 @@ impl Sums {
         })
     }
 
-    /// The same where it is decided without a solve, as most neighbourhoods are.
+    /// Returns the same if it can be decided without an eigensolver, as for most neighbourhoods.
     #[inline(always)]
     fn is_surely_line(&self) -> Option<bool> {
         let c = self.covariance();
-        // The sum of the principal minors is λ1λ2 + λ3(λ1 + λ2). For a line it is less than
-        // (0.05² + 2·0.05) λ3², for anything else at least 0.05/1.05² of the trace's square.
+        // The sum of the principal minors is λ1λ2 + λ3(λ1 + λ2). For a line it is less than (0.05²
+        // + 2·0.05) λ3², otherwise at least 0.05/1.05² of the squared trace.
         let minors = c[0] * c[3] - c[1] * c[1] + c[0] * c[5] - c[2] * c[2] + c[3] * c[5] - c[4] * c[4];
         let trace_sq = (c[0] + c[3] + c[5]).powi(2);
         if minors > (LINE * LINE + 2.0 * LINE) * trace_sq * (1.0 + 1e-9) {
@@ -328,13 +334,14 @@ impl Sums {
     }
 }
 
-/// `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines and bends.
+/// Returns `r_i := min_j (r_j + 0.3 ‖p_i − p_j‖)` over i and all j but lines, bends and sparse
+/// points.
 pub(crate) fn smooth(
     tree: &BlockTree<'_>,
     spacings: &[Spacing],
     work: &Workspace,
 ) -> Result<Room<f32>, WorkError> {
-    // How near points are along a line says nothing of the surface about it.
+    // Distances along a line do not measure the spacing of the surface around it.
     let tip = |i: usize| match spacings[i].look() {
         Look::Area | Look::Ring => spacings[i].radius,
         Look::Line | Look::Bend | Look::Sparse => f32::INFINITY,
@@ -360,11 +367,11 @@ pub(crate) fn smooth(
     Ok(radii)
 }
 
-/// Limits `radii`, the smoothed `spacings`, to `reach`. A ring whose next ring is further away than that is a
-/// line, with its K-th neighbour's distance; any other point with a greater spacing is [`Look::Sparse`].
+/// Limits `radii`, the smoothed `spacings`, to `reach`. A ring whose next ring is further away
+/// becomes a line, with the distance of its K-th neighbour. Any other point with a greater spacing
+/// becomes [`Look::Sparse`].
 ///
-/// The least of the spacings about a point and the reach is the least of the limited spacings about it, so
-/// this equals a limit before smoothing.
+/// Minima can be taken in any order, so this equals a limit before smoothing.
 pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
     for (spacing, radius) in spacings.iter_mut().zip(radii) {
         if spacing.radius > reach {
@@ -379,8 +386,8 @@ pub(crate) fn limit(spacings: &mut [Spacing], radii: &mut [f32], reach: f32) {
     }
 }
 
-/// A value of each node, in the order of their ids: of leaves from their points, of others from those of
-/// their children.
+/// Computes a value for each node, in the order of ids: for leaves from their points, for other
+/// nodes from the values of their children.
 pub(crate) fn fold_nodes<T: Copy + Default>(
     topology: &Topology,
     leaf: impl Fn(Range<usize>) -> T,

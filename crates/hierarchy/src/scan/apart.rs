@@ -1,4 +1,4 @@
-//! Whether the coverings of two nodes are apart (Klein & Zachmann 2004, §5.1).
+//! The disjointness test for the coverings of two nodes (Klein & Zachmann 2004, §5.1).
 
 use nearmiss_geometry::NodeId;
 
@@ -8,30 +8,30 @@ use crate::patch::centres::Centres;
 use crate::scan::slices::Slices;
 use crate::tree::topology::NodePair;
 
-/// What motion and arithmetic may do to the distance of two places, in units of [`Relative::slack`], each of
-/// which bounds a coordinate: √3 for either of two places in motion, as much again for the distance itself
-/// and for the radii.
+/// Bound on the rounding error of the distance of two positions, in units of [`Relative::slack`],
+/// which bounds the error of a coordinate: √3 for either of two transformed positions, the same
+/// again for the distance itself and for the radii.
 const ROUNDINGS: f32 = 8.0;
 
-/// What of two nodes is to be apart.
+/// The contents of two nodes that are tested.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
-    /// Tangent discs with their thickness, and the balls of sparse points: what leaf tests look at.
+    /// Tangent discs with their thickness, and the balls of sparse points, as in leaf tests.
     Discs,
-    /// The surface as well: what certificates speak of.
+    /// The surface as well, as in certificates.
     Surface,
 }
 
-/// Whether what two nodes have is further apart than `reach`, as far as their coverings show: `motion` takes
-/// the frame of `b` into that of `a`, in which `reach` is given.
+/// Returns `true` if the coverings show that the contents of two nodes are further than `reach`
+/// apart. `motion` is the relative pose of `b` in the frame of `a`, in which `reach` is measured.
 ///
-/// As in the paper, balls that are further than that from the volume of the other node are dropped first: its
-/// box for discs, its [enclosure](Slices::enclosure) for the surface. Rounding is included: what is excluded
-/// has nothing within `reach` of each other. Compares each ball of one that is left with sixteen of the other
-/// at a time; does not allocate.
+/// As in the paper, balls further than that from the volume of the other node are dropped first.
+/// The volume is the box for discs, the [enclosure](Slices::enclosure) for the surface. Rounding is
+/// included: excluded nodes have nothing within `reach` of each other. Each remaining ball of one
+/// node is compared with sixteen of the other at a time. Does not allocate.
 ///
 /// # Panics
-/// When there are no such nodes.
+/// If there are no such nodes.
 #[must_use]
 pub fn apart(
     a: &Slices<'_>,
@@ -56,7 +56,7 @@ pub fn apart(
 }
 
 impl Extent {
-    /// The radius of a node's balls, and its volume.
+    /// Returns the radius of a node's balls, and its volume.
     #[inline]
     fn of(self, slices: &Slices<'_>, node: NodeId) -> (f32, OrientedBox) {
         match self {
@@ -68,12 +68,12 @@ impl Extent {
     }
 }
 
-/// Those of `places` that are not further than `distance` from the box.
+/// Returns the positions that are within `distance` of the box.
 #[inline]
 fn within(places: impl Iterator<Item = [f32; 3]>, bounds: &OrientedBox, distance: f32) -> Centres {
     let mut near = Centres::default();
     for p in places {
-        // What is no number is near.
+        // NaN counts as near.
         if bounds.distance_sq(p) > distance * distance {
             continue;
         }

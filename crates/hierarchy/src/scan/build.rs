@@ -1,4 +1,4 @@
-//! `PointHierarchy`: a scan's points in leaf order with everything that does not depend on a query.
+//! [`PointHierarchy`]: a scan's points in leaf order, with everything that does not depend on a query.
 
 use std::sync::OnceLock;
 
@@ -25,14 +25,16 @@ use crate::scan::slices::Slices;
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Tree, siblings};
 
-/// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree over them.
+/// A scan prepared for queries: points in leaf order, their radii, normals and discs, and the tree
+/// over them.
 ///
-/// All lengths and directions are in the frame of the stored positions ([`PointHierarchy::frame`]). Arrays
-/// stand apart from each other, so that a moving scan can replace its bounds and keep its topology.
+/// All lengths and directions are in the frame of the stored positions ([`PointHierarchy::frame`]).
+/// Arrays are stored separately, so that a moving scan can replace its bounds and keep its
+/// topology.
 #[derive(Debug, Clone)]
 pub struct PointHierarchy {
     pub(crate) meta: HierarchyMeta,
-    /// The surface of `meta`, at the scale of the stored positions.
+    /// The surface definition of `meta`, at the scale of the stored positions.
     pub(crate) plan: SurfacePlan,
     pub(crate) topology: Topology,
     pub(crate) arrays: Arrays,
@@ -41,18 +43,20 @@ pub struct PointHierarchy {
 }
 
 impl PointHierarchy {
-    /// Prepares `cloud`. O(n log n), on all cores unless told otherwise; the result does not depend on them.
+    /// Prepares `cloud`. O(n log n), on all cores by default. The result does not depend on the
+    /// number of threads.
     ///
     /// # Errors
-    /// Names the option that is out of range.
+    /// If an option is out of range, or the threads cannot be started.
     pub fn build(cloud: &PointCloud, options: &BuildOptions) -> Result<Self, BuildError> {
         Self::build_in(&cloud.into(), options, &Workspace::in_memory())
     }
 
-    /// The same of points that may lie in files, with what is made of them in a workspace: the same scan.
+    /// Like [`Self::build`], for points that may be in files, with the intermediate arrays in a
+    /// workspace. The result is the same.
     ///
     /// # Errors
-    /// Names the option that is out of range; or the workspace has no room.
+    /// If an option is out of range, the threads cannot be started, or the workspace fails.
     pub fn build_in(
         points: &ScanPoints<'_>,
         options: &BuildOptions,
@@ -63,7 +67,7 @@ impl PointHierarchy {
             .or(Err(BuildError::Threads(options.threads)))?
     }
 
-    /// The arrays that a query reads.
+    /// Returns the arrays that a query reads.
     #[inline]
     #[must_use]
     pub fn slices(&self) -> Slices<'_> {
@@ -90,51 +94,52 @@ impl PointHierarchy {
         }
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a cloud has at least eight points")]
     pub fn len(&self) -> usize {
         self.arrays.source.len()
     }
 
-    /// The frame of the stored positions in the caller's.
+    /// Returns the frame of the stored positions.
     #[must_use]
     pub fn frame(&self) -> &Frame {
         &self.meta.frame
     }
 
-    /// Bounds of the points in the caller's frame.
+    /// Returns the bounds of the points in the caller's frame.
     #[must_use]
     pub fn bounds(&self) -> &Aabb {
         &self.meta.bounds
     }
 
-    /// What was left out of the input.
+    /// Returns the numbers of input points that were dropped.
     #[must_use]
     pub fn dropped(&self) -> Dropped {
         self.meta.dropped
     }
 
-    /// Greatest change of a coordinate by rounding to `f32`, in the caller's units.
+    /// Returns the greatest change of a coordinate by rounding to `f32`, in the caller's units.
     #[must_use]
     pub fn step(&self) -> f64 {
         self.meta.step
     }
 
-    /// The 0.9-quantile of the local radii, in the caller's units.
+    /// Returns the 0.9-quantile of the local radii, in the caller's units.
     #[must_use]
     pub fn sampling_radius(&self) -> f64 {
         f64::from(self.meta.sampling_radius) * self.meta.frame.scale
     }
 
-    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and
-    /// no local radius exceeds it.
+    /// Returns L, how far the scan may be interpolated, in the caller's units. No gap wider than
+    /// this is bridged, and no local radius exceeds it.
     #[must_use]
     pub fn reach(&self) -> f64 {
         f64::from(self.meta.reach) * self.meta.frame.scale
     }
 
-    /// Share of the points that stand in the obstacle by a sheet; the others stand there as balls.
+    /// Returns the share of points that are represented by a sheet in the obstacle; the others are
+    /// balls.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     pub fn sheet_share(&self) -> f64 {
@@ -142,32 +147,32 @@ impl PointHierarchy {
         (0..self.len()).filter(|&i| slices.is_on_sheet(i)).count() as f64 / self.len() as f64
     }
 
-    /// What defines the surface.
+    /// Returns the definition of the surface, at the scale of the stored positions.
     #[must_use]
     pub fn plan(&self) -> &SurfacePlan {
         &self.plan
     }
 
-    /// Points of a full leaf.
+    /// Returns the number of points in a full leaf.
     #[must_use]
     pub fn leaf_size(&self) -> u32 {
         self.meta.leaf_size
     }
 
-    /// K of the local radii.
+    /// Returns K of the local radii.
     #[must_use]
     pub fn radius_neighbours(&self) -> u32 {
         self.meta.radius_neighbours
     }
 
-    /// Samples of an inner node.
+    /// Returns the number of samples of an inner node.
     #[must_use]
     pub fn samples_a_node(&self) -> u32 {
         self.meta.samples
     }
 
-    /// Positions in leaf order. A scan from a file makes them when they are first wanted, in O(n):
-    /// [`Slices::position`] gives one without.
+    /// Returns the positions in leaf order. A scan from a file unpacks them on first use, in O(n);
+    /// [`Slices::position`] reads a single position without that.
     #[must_use]
     pub fn positions(&self) -> &[[f32; 3]] {
         self.positions.get_or_init(|| {
@@ -176,25 +181,26 @@ impl PointHierarchy {
         })
     }
 
-    /// Unit normals: of either sign, within a leaf all on one side, until they [are
-    /// turned](Self::turn_normals).
+    /// Returns the unit normals. Until they [are oriented](Self::turn_normals) their signs are
+    /// arbitrary, but consistent within a leaf.
     #[must_use]
     pub fn normals(&self) -> &[[f32; 3]] {
         &self.arrays.normals
     }
 
-    /// Whether neighbouring normals are on the same side.
+    /// Returns `true` if neighbouring normals are on the same side.
     #[must_use]
     pub fn is_oriented(&self) -> bool {
         self.meta.is_oriented
     }
 
-    /// Turns normals round that `oriented`, which differs from them in signs alone, has the other way. So
-    /// neighbours are on the same side afterwards, as a graph over the points can tell it; f takes its sign
-    /// from them ([`Self::evaluate_oriented_with`]), and no box, nor any verdict, depends on it.
+    /// Flips the normals whose sign differs in `oriented`, which must have the same directions
+    /// otherwise. In `oriented`, neighbours must be on the same side, as a graph over the points
+    /// determines it. The sign of f follows from the normals ([`Self::evaluate_oriented_with`]);
+    /// boxes and verdicts do not depend on it.
     ///
     /// # Panics
-    /// When there is not one for each point.
+    /// If `oriented` does not have one normal for each point.
     pub fn turn_normals(&mut self, oriented: &[[f32; 3]]) {
         assert_eq!(oriented.len(), self.len(), "a normal a point");
         for (normal, to) in self.arrays.normals.to_mut().iter_mut().zip(oriented) {
@@ -206,8 +212,8 @@ impl PointHierarchy {
         self.renew_leaves();
     }
 
-    /// Replaces the boxes of all nodes, given in the order of the nodes' ids; then recomputes leaf blocks,
-    /// marks and outline. The growths stay: valid only if the enclosures are the same.
+    /// Replaces the boxes of all nodes, given in the order of their ids; then recomputes leaf
+    /// blocks, marks and outline. The growths stay: valid only if the enclosures are the same.
     pub(crate) fn bound(&mut self, boxes: &[OrientedBox]) {
         self.meta.root.bounds = boxes[NodeId::ROOT.index()];
         siblings(&self.topology, boxes, self.arrays.siblings.to_mut());
@@ -215,7 +221,7 @@ impl PointHierarchy {
         self.meta.outline = self.outlined();
     }
 
-    /// Makes what leaves are compared by from the points and the boxes about them.
+    /// Recomputes leaf blocks and marks from the points and boxes.
     fn renew_leaves(&mut self) {
         let (mut blocks, mut marks) =
             (std::mem::take(&mut self.arrays.leaf_blocks), std::mem::take(&mut self.arrays.marks));
@@ -231,7 +237,7 @@ impl PointHierarchy {
         fill(marks, |leaf| leaves.marks(topology, leaf, &bounds(leaf)));
     }
 
-    /// The arrays that leaf blocks are built from.
+    /// Returns the arrays that leaf blocks are built from.
     pub(crate) fn leaf_parts(&self) -> LeafParts<'_> {
         LeafParts {
             positions: self.positions(),
@@ -241,7 +247,7 @@ impl PointHierarchy {
         }
     }
 
-    /// The hash that identifies this scan, and its bounding balls.
+    /// Computes the hash that identifies this scan, and its bounding balls.
     pub(crate) fn outlined(&self) -> Outline {
         let slices = self.slices();
         let mut hash = Xxh3::new();
@@ -260,13 +266,13 @@ impl PointHierarchy {
         }
     }
 
-    /// Local sampling radii r_i.
+    /// Returns the local sampling radii r_i.
     #[must_use]
     pub fn radii(&self) -> &[f32] {
         &self.arrays.radii
     }
 
-    /// Radii of the points' tangent discs.
+    /// Returns the radii of the points' tangent discs.
     #[must_use]
     pub fn discs(&self) -> DiscRadii<'_> {
         DiscRadii {
@@ -277,23 +283,23 @@ impl PointHierarchy {
         }
     }
 
-    /// What the neighbourhood of the `i`-th stored point looks like.
+    /// Returns the kind of the `i`-th stored point.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn kind(&self, i: usize) -> PointKind {
         self.arrays.codes[i].kind()
     }
 
-    /// Share of the points that sample a sheet.
+    /// Returns the share of points that sample a sheet.
     #[must_use]
     pub fn usable(&self) -> f64 {
         self.share(PointKind::Sheet) + self.share(PointKind::Edge)
     }
 
-    /// Share of the points of this kind.
+    /// Returns the share of points of this kind.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts below 2^32 are exact")]
     pub fn share(&self, kind: PointKind) -> f64 {
@@ -301,23 +307,23 @@ impl PointHierarchy {
         count as f64 / self.len() as f64
     }
 
-    /// For each stored point its index in the caller's input.
+    /// Returns the index of each stored point in the caller's input.
     #[must_use]
     pub fn source(&self) -> &[u32] {
         &self.arrays.source
     }
 
-    /// The caller's id of the `i`-th stored point.
+    /// Returns the caller's id of the `i`-th stored point.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn id(&self, i: usize) -> PointId {
         PointId(self.arrays.source[i])
     }
 
-    /// The nodes, and the boxes about them.
+    /// Returns the nodes and their bounding boxes.
     #[must_use]
     pub fn tree(&self) -> Tree<'_> {
         let (surface, obstacle) = (&self.arrays.surface_growths, &self.arrays.obstacle_growths);
@@ -329,45 +335,46 @@ impl PointHierarchy {
         }
     }
 
-    /// The box about all points.
+    /// Returns the box around all points.
     #[inline]
     #[must_use]
     pub fn root_box(&self) -> &OrientedBox {
         &self.meta.root.bounds
     }
 
-    /// The hash that identifies this scan, and its bounding balls.
+    /// Returns the hash that identifies this scan, and its bounding balls.
     #[inline]
     #[must_use]
     pub fn outline(&self) -> &Outline {
         &self.meta.outline
     }
 
-    /// Which nodes there are, and which points lie under them.
+    /// Returns the topology of the tree: its nodes and the points under each.
     #[inline]
     #[must_use]
     pub fn topology(&self) -> &Topology {
         &self.topology
     }
 
-    /// A box about the discs of each node's points, and about their [balls](Slices::ball), in the order of
-    /// the nodes' ids.
+    /// Returns the box of each node around the discs and [balls](Slices::ball) of its points, in
+    /// the order of the nodes' ids.
     #[must_use]
     pub fn boxes(&self) -> impl ExactSizeIterator<Item = OrientedBox> {
         let tree = self.tree();
         self.topology.ids().map(move |id| tree.bounds(id))
     }
 
-    /// A box about each node's part of the surface, proven to contain it (docs/theory/certificates.md): every
-    /// surface point whose nearest stored point is the node's.
+    /// Returns a box for each node that provably contains its part of the surface
+    /// (docs/theory/certificates.md): every surface point whose nearest stored point is the node's.
     #[must_use]
     pub fn enclosures(&self) -> impl ExactSizeIterator<Item = OrientedBox> {
         let tree = self.tree();
         self.topology.ids().map(move |id| tree.enclosure(Part::Surface, id))
     }
 
-    /// Bytes stored for nodes: boxes, enclosures, samples and coverings. Klein & Zachmann 2004, §6.1, report
-    /// the same; arrays with an entry a point, and neighbour lists, are not counted.
+    /// Returns the bytes stored for nodes: boxes, enclosures, samples and coverings. Klein &
+    /// Zachmann 2004, §6.1, report the same. Arrays with one entry per point and neighbour lists
+    /// are not counted.
     #[must_use]
     pub fn bytes_of_nodes(&self) -> usize {
         size_of_val::<[_]>(&self.arrays.siblings)
@@ -376,21 +383,23 @@ impl PointHierarchy {
             + size_of_val::<[_]>(&self.arrays.coverings)
     }
 
-    /// The points in blocks: `i` stands in lane `i` % 16 of block `i` / 16.
+    /// Returns the points in blocks: point `i` is in lane `i` % 16 of block `i` / 16.
     #[must_use]
     pub fn blocks(&self) -> &[PointBlock] {
         &self.arrays.blocks
     }
 
-    /// For each block of points, a ball that contains the supports of all its points, with the ball's radius
-    /// in place of a horizon. The ball of block `i` is in lane `i` % 16 of group `i` / 16.
+    /// Returns a ball for each block of points that contains the supports of all its points, with
+    /// the ball's radius in place of a support radius. The ball of block `i` is in lane `i` % 16 of
+    /// group `i` / 16.
     #[must_use]
     pub fn groups(&self) -> &[PointBlock] {
         &self.arrays.groups
     }
 
-    /// The groups of which a point may be heard within some distance of the middle of the ball of `block`,
-    /// ascending, with that distance; `None` where they are too many, or there is no such block.
+    /// Returns the neighbour list of `block`: a distance, and the groups, ascending, that may have
+    /// support within that distance of the centre of the block's ball. Returns `None` if the list
+    /// would be too long or there is no such block.
     #[must_use]
     pub fn neighbours(&self, block: usize) -> Option<(f32, &[u32])> {
         let list = self.arrays.lists.get(block).filter(|list| list.within > 0.0)?;

@@ -1,5 +1,5 @@
-//! The data of a prepared scan: metadata, and arrays that are each a section of a file. Raise `VERSION` in
-//! `nearmiss/src/scan.rs` with every change here.
+//! The data of a prepared scan: metadata, and arrays that are each a section of a file. Increase
+//! `VERSION` in `nearmiss/src/scan.rs` with every change here.
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_index::PointBlock;
@@ -14,7 +14,7 @@ use crate::point::leaf_block::LeafBlock;
 use crate::scan::outline::Outline;
 use crate::tree::wide::{Growths, Root, Siblings};
 
-/// The metadata of a hierarchy: everything stored that is no array.
+/// The metadata of a hierarchy: everything stored that is not an array.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HierarchyMeta {
     pub(crate) frame: Frame,
@@ -34,7 +34,8 @@ pub struct HierarchyMeta {
     pub(crate) outline: Outline,
 }
 
-/// Declares the arrays of a scan with the tags and the parts of their sections, in the order of a file.
+/// Declares the arrays of a scan with the tags and the parts of their sections, in the order of a
+/// file.
 macro_rules! arrays {
     ($($(#[$doc:meta])* $name:ident: [$of:ty] = $tag:literal $part:literal,)*) => {
         /// The arrays of a scan.
@@ -44,13 +45,13 @@ macro_rules! arrays {
         }
 
         impl Arrays {
-            /// Adds all to a container, a section each.
+            /// Adds all arrays to a container, one section each.
             pub(crate) fn add_to<'a>(&'a self, writer: &mut Writer<'a>) -> Result<(), WriteError> {
                 $(writer.section(*$tag, $part, &self.$name)?;)*
                 Ok(())
             }
 
-            /// Loads all from a container, in place.
+            /// Loads all arrays from a container, in place.
             pub(crate) fn load(file: &File) -> Result<Self, OpenError> {
                 Ok(Self { $($name: file.array(*$tag, $part)?,)* })
             }
@@ -61,32 +62,33 @@ macro_rules! arrays {
 arrays! {
     /// The boxes of the children of each inner node.
     siblings: [Siblings] = b"TREE" 0,
-    /// The lengths by which their enclosures of the surface exceed those boxes.
+    /// The growths of the children's enclosures of the surface.
     surface_growths: [Growths] = b"GROW" 0,
-    /// The lengths by which their enclosures of the obstacle exceed them.
+    /// The growths of the children's enclosures of the obstacle.
     obstacle_growths: [Growths] = b"GROW" 1,
-    /// The discs of each leaf, as queries compare them.
+    /// The discs of each leaf, in the form that queries compare.
     leaf_blocks: [LeafBlock] = b"LEAF" 0,
-    /// The marks of each leaf: whether it holds sparse points or balls, and whether it is loose.
+    /// The marks of each leaf: it has sparse points, it has balls, it is loose.
     marks: [u8] = b"MARK" 0,
-    /// The positions and the horizons of the points.
+    /// The positions and support radii of the points.
     blocks: [PointBlock] = b"BLCK" 0,
     /// The samples of each inner node.
     sample_lists: [u32] = b"SMPL" 0,
     /// The sphere covering of each node.
     coverings: [Covering] = b"COVR" 0,
-    /// A ball about each block.
+    /// A ball around each block and its support.
     groups: [PointBlock] = b"GRUP" 0,
     /// The neighbour list of each block.
     lists: [NeighbourList] = b"LIST" 0,
-    /// The entries of all lists.
+    /// The entries of all neighbour lists.
     listed: [u32] = b"NEAR" 0,
     /// The normals of the points.
     normals: [[f32; 3]] = b"NRML" 0,
-    /// Their local radii.
+    /// The local radii of the points.
     radii: [f32] = b"RADI" 0,
-    /// Their kinds and the borders near them, from which with the radii those of their discs follow.
+    /// The kinds of the points and the borders near them. With the radii they determine the radii
+    /// of the discs.
     codes: [PointCode] = b"KIND" 0,
-    /// Their indices in the input.
+    /// The indices of the points in the input.
     source: [u32] = b"SRCE" 0,
 }

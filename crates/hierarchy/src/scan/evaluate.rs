@@ -1,4 +1,4 @@
-//! f at a place, and the stored point nearest to it.
+//! Evaluation of f, and the nearest stored point.
 
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Centre, Evaluation};
@@ -7,21 +7,22 @@ use crate::point::gather::{GROUP, GatherScratch, Index};
 use crate::scan::build::PointHierarchy;
 
 impl PointHierarchy {
-    /// f at `x`, in the stored frame.
+    /// Evaluates f at `x`, in the stored frame.
     pub fn evaluate_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         self.index().evaluate(x, scratch)
     }
 
-    /// As [`Self::evaluate_with`], faster where `x` is within a local radius or so of the stored point `i`:
-    /// the list of that point is looked at first.
+    /// Like [`Self::evaluate_with`], but faster if `x` is within about a local radius of the stored
+    /// point `i`: the list of that point's block is tried first.
     pub fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         scratch.block = i / PointBlock::WIDTH;
         self.index().evaluate(x, scratch)
     }
 
-    /// As [`Self::evaluate_with`], faster for places along the surface, each near that which was asked about
-    /// last with this scratch: where the list used there ends, that of the nearest block it names is taken,
-    /// and where that ends too, that of the nearest point, which holds all that is heard on the surface.
+    /// Like [`Self::evaluate_with`], but faster for a sequence of nearby positions along the
+    /// surface that share the same scratch. If the last list is not complete at `x`, the list of
+    /// the nearest block in it is tried. If that is not complete either, the list of the nearest
+    /// point's block is used, which is complete on the surface.
     pub fn evaluate_onward(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let index = self.index();
         let place = Centre::new(x).rounded();
@@ -36,9 +37,10 @@ impl PointHierarchy {
         index.evaluate(x, scratch)
     }
 
-    /// As [`Self::evaluate_with`], with n, and so the sign of f, on the side of Σ wᵢ nᵢ, the stored normals
-    /// of the points that reach x: positive below the surface. Where these disagree, as between two sheets,
-    /// the place is ambiguous; unless they [are oriented](Self::is_oriented) all is as there.
+    /// Like [`Self::evaluate_with`], with n, and therefore the sign of f, on the side of Σ wᵢ nᵢ
+    /// over the stored normals of the points that support x: f is positive below the surface. The
+    /// status is ambiguous where these normals disagree, as between two sheets. Unless normals [are
+    /// oriented](Self::is_oriented) the result is that of [`Self::evaluate_with`].
     pub fn evaluate_oriented_with(&self, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let at = self.evaluate_with(x, scratch);
         if !self.meta.is_oriented || at.support == 0 {
@@ -67,22 +69,23 @@ impl PointHierarchy {
         at.turned_to(sum, total)
     }
 
-    /// The stored point that is nearest to `x`, in the stored frame; of equally near ones the first.
+    /// Returns the stored point nearest to `x`, in the stored frame. Of equally near points it
+    /// returns the first.
     #[must_use]
     pub fn nearest_point(&self, x: [f64; 3]) -> u32 {
         self.nearest_point_near(0, x)
     }
 
-    /// As [`Self::nearest_point`], faster where `x` is near the stored point `i`.
+    /// Like [`Self::nearest_point`], but faster if `x` is near the stored point `i`.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[must_use]
     pub fn nearest_point_near(&self, i: usize, x: [f64; 3]) -> u32 {
         self.nearest_listed(i, x).unwrap_or_else(|| self.nearest_point_within(i, x, f64::INFINITY).0)
     }
 
-    /// f at `x`, in the stored frame; allocates a scratch of its own.
+    /// Evaluates f at `x`, in the stored frame, with a newly allocated scratch.
     #[must_use]
     pub fn evaluate(&self, x: [f64; 3]) -> Evaluation {
         self.evaluate_with(x, &mut GatherScratch::default())

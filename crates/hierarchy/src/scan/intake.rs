@@ -8,33 +8,34 @@ use thiserror::Error;
 
 use crate::scan::points::ScanPoints;
 
-/// The name of the stage.
+/// The name of the stage in the workspace.
 const STAGE: &str = "points";
 
-/// Why no points can be gathered.
+/// The error of gathering points.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum IntakeError {
-    /// They make no cloud.
+    /// The points do not form a cloud.
     #[error(transparent)]
     Cloud(#[from] CloudError),
-    /// The workspace fails.
+    /// The workspace failed.
     #[error(transparent)]
     Work(#[from] WorkError),
-    /// There are not as many points as when they were counted.
+    /// The number of points differs from the first pass.
     #[error("expected {counted} points, got {got}; the input changed while it was read: read it again")]
     Changed {
-        /// How many there were first.
+        /// The number of points in the first pass.
         counted: usize,
-        /// How many came then.
+        /// The number of points in the second pass.
         got: usize,
     },
 }
 
-/// Gathers the points of a scan, larger than memory maybe, in the order in which they are given: the same as
-/// those of a [`PointCloud`](nearmiss_geometry::PointCloud), and a filter before.
+/// Gathers the points of a scan, which may be larger than memory, in the order in which they are
+/// given. The result is that of a filter followed by a
+/// [`PointCloud`](nearmiss_geometry::PointCloud).
 ///
-/// Points are given twice: first to an [`Intake`], which finds their frame, then to this.
+/// Points are given twice: first to an [`Intake`], which determines their frame, then to this.
 #[derive(Debug)]
 pub struct PointGatherer<'w> {
     work: &'w Workspace,
@@ -42,7 +43,7 @@ pub struct PointGatherer<'w> {
     frame: Frame,
     positions: Room<[f32; 3]>,
     source: Room<u32>,
-    /// How many were given, and how many of them are kept.
+    /// The number of points given, and the number of them kept.
     given: usize,
     kept: usize,
     filtered: usize,
@@ -50,10 +51,10 @@ pub struct PointGatherer<'w> {
 }
 
 impl<'w> PointGatherer<'w> {
-    /// For the points that `intake` has seen.
+    /// Creates a gatherer for the points that `intake` has seen.
     ///
     /// # Errors
-    /// When they make no cloud, or the workspace has no room.
+    /// If the points do not form a cloud, or the workspace cannot provide the memory.
     pub fn new(work: &'w Workspace, intake: &Intake) -> Result<Self, IntakeError> {
         let frame = intake.frame()?;
         let finite = intake.given() - intake.not_finite();
@@ -70,8 +71,8 @@ impl<'w> PointGatherer<'w> {
         })
     }
 
-    /// Adds points; of the finite ones those are kept of which `is_wanted` says so, by their places among
-    /// these and their positions as they are kept.
+    /// Adds points. Of the finite ones it keeps those for which `is_wanted` returns `true`, given
+    /// their index in `points` and their position as stored.
     pub fn add(&mut self, points: &[[f64; 3]], is_wanted: impl Fn(usize, [f64; 3]) -> bool) {
         let (positions, source): (&mut [_], &mut [_]) = (&mut self.positions, &mut self.source);
         for (i, &p) in points.iter().enumerate() {
@@ -92,11 +93,11 @@ impl<'w> PointGatherer<'w> {
         }
     }
 
-    /// Leaves out what is repeated.
+    /// Drops repeated points and closes the gatherer.
     ///
     /// # Errors
-    /// When too few points are left, when there are others than `intake` has seen, or when the workspace has
-    /// no room.
+    /// If too few points are left, if their number differs from that of `intake`, or if the
+    /// workspace cannot provide the memory.
     pub fn finish(mut self) -> Result<GatheredPoints, IntakeError> {
         let (work, given) = (self.work, self.given);
         if given != self.intake.given() {
@@ -129,7 +130,7 @@ impl<'w> PointGatherer<'w> {
     }
 }
 
-/// What is known of gathered points.
+/// The metadata of gathered points.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct About {
     count: usize,
@@ -148,10 +149,11 @@ pub struct GatheredPoints {
 }
 
 impl GatheredPoints {
-    /// Those that an ended process has gathered in the workspace, if one has.
+    /// Returns the points that an interrupted process has gathered in the workspace, if there are
+    /// any.
     ///
     /// # Errors
-    /// When they cannot be read.
+    /// If the points cannot be read.
     pub fn kept(work: &Workspace) -> Result<Option<Self>, WorkError> {
         let stage = work.stage(STAGE);
         let Some(about) = stage.done::<About>() else { return Ok(None) };
@@ -160,7 +162,7 @@ impl GatheredPoints {
         Ok(Some(Self { positions, source, about }))
     }
 
-    /// The points for a build.
+    /// Returns the points in the form that a build takes.
     #[must_use]
     pub fn points(&self) -> ScanPoints<'_> {
         let About { frame, bounds, dropped, step, .. } = self.about;

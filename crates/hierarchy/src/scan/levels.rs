@@ -1,5 +1,5 @@
-//! The samples of nodes as the scan seen from further away: which they are, how far they reach, and f' over
-//! them.
+//! The samples of nodes as coarser levels of the scan: the samples, their radii and bandwidths, and
+//! f' over them.
 
 use nearmiss_geometry::NodeId;
 use nearmiss_index::PointBlock;
@@ -12,59 +12,61 @@ use crate::scan::build::PointHierarchy;
 use crate::scan::slices::Slices;
 
 impl<'a> Slices<'a> {
-    /// The sample P' of a node: [`BuildOptions::samples`](crate::BuildOptions::samples) of its points, or all
-    /// if it is a leaf or has no more.
+    /// Returns the sample P' of a node: [`BuildOptions::samples`](crate::BuildOptions::samples) of
+    /// its points, or all if it is a leaf or has no more.
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     #[inline]
     #[must_use]
     pub fn samples(&self, node: usize) -> Samples<'a> {
         samples(self.sample_lists, self.tree.topology, NodeId(id32(node)), self.samples_a_node)
     }
 
-    /// The covering radius: balls of this radius about the samples of a node contain its part of the surface,
-    /// its points and discs, proven so. Infinite where nothing is proven.
+    /// Returns the covering radius: balls of this radius around the samples of a node provably
+    /// contain its part of the surface, its points and discs. Infinite if nothing is proven.
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     #[inline]
     #[must_use]
     pub fn covering_radius(&self, node: usize) -> f32 {
         self.coverings[node].radius
     }
 
-    /// r(P') of Definition 4 (Klein & Zachmann 2004), measured: balls of this radius about the samples of a
-    /// node cover its surface.
+    /// Returns r(P') of Definition 4 (Klein & Zachmann 2004), as measured: balls of this radius
+    /// around the samples of a node cover its surface.
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     #[inline]
     #[must_use]
     pub fn sampling_radius_of(&self, node: usize) -> f32 {
         self.coverings[node].sampling
     }
 
-    /// How far the samples of a node are heard: m·r(P'), with r(P') by eq. 10 of Klein & Zachmann 2004, that
-    /// is the horizon of points with the node's spacing times √(|P|/|P'|).
+    /// Returns the support radius of a node's samples: m·r(P'), with r(P') by eq. 10 of Klein &
+    /// Zachmann 2004. This is the support radius of points with the node's spacing times
+    /// √(|P|/|P'|).
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     #[must_use]
     pub fn node_horizon(&self, node: usize) -> f32 {
         self.plan.horizon(self.coverings[node].spacing) * self.thinning(node)
     }
 
-    /// The bandwidth of the samples of a node, eq. 9 with r(P') by eq. 10; see [`Self::node_horizon`].
+    /// Returns the bandwidth of a node's samples, by eq. 9 of Klein & Zachmann 2004 with r(P') by
+    /// eq. 10; see [`Self::node_horizon`].
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     #[must_use]
     pub fn node_bandwidth(&self, node: usize) -> f32 {
         self.plan.bandwidth(self.coverings[node].spacing) * self.thinning(node)
     }
 
-    /// √(|P|/|P'|).
+    /// Returns √(|P|/|P'|).
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     fn thinning(&self, node: usize) -> f32 {
         let count = self.tree.topology.points(NodeId(id32(node))).len();
@@ -73,11 +75,12 @@ impl<'a> Slices<'a> {
 }
 
 impl PointHierarchy {
-    /// f' of a node at `x`, in the stored frame: f over the node's samples, each with the node's
-    /// [bandwidth](Slices::node_bandwidth) (Klein & Zachmann 2004, §5.5). Costs about as much as f.
+    /// Evaluates f' of a node at `x`, in the stored frame: f over the node's samples, each with the
+    /// node's [bandwidth](Slices::node_bandwidth) (Klein & Zachmann 2004, §5.5). Costs about as
+    /// much as f.
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     pub fn evaluate_node_with(&self, node: usize, x: [f64; 3], scratch: &mut GatherScratch) -> Evaluation {
         let slices = self.slices();
         let (samples, horizon) = (slices.samples(node), slices.node_horizon(node));

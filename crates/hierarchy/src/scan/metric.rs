@@ -1,7 +1,8 @@
-//! A scan's discs for another metric: what follows from f at the points is made anew.
+//! A scan's discs for another metric: recomputes everything that follows from f at the points.
 //!
-//! Boxes are about the new discs, and so are coverings. What was proven of the surface by straight distances
-//! is not proven again: enclosures and covering radii hold the discs, and nothing is to be certified by them.
+//! Boxes and coverings are recomputed from the new discs. The proofs about the surface are not
+//! repeated: they hold for straight distances only. Enclosures and covering radii contain the
+//! discs, but must not be used for certificates.
 
 use std::ops::Range;
 
@@ -25,20 +26,20 @@ use crate::point::spacing::Look;
 use crate::scan::build::PointHierarchy;
 
 impl PointHierarchy {
-    /// How far points are from each other for what is stored: normals, kinds, discs, and all boxes about
-    /// them. Only of the Euclidean metric enclosures and covering radii are proven to contain the surface.
+    /// Returns the metric of the stored normals, kinds, discs and boxes. Enclosures and covering
+    /// radii are proven to contain the surface for the Euclidean metric only.
     #[must_use]
     pub fn metric(&self) -> Metric {
         self.meta.metric
     }
 
-    /// Fits the surface at every point by another `metric`: `fit` gives f at a stored point, and adds the
-    /// points that are heard there to a list that is empty. Normals stay on their sides where they [are
-    /// oriented](Self::is_oriented), and what is [sparse](PointKind::is_sparse) stays so. On all cores with
-    /// the feature `rayon`; the result does not depend on them.
+    /// Fits the surface at every point by another `metric`. `fit` returns f at a stored point, and
+    /// adds the points that support it there to an empty list. Normals stay on their sides if they
+    /// [are oriented](Self::is_oriented), and [sparse](PointKind::is_sparse) points stay sparse. On
+    /// all cores with the feature `rayon`; the result does not depend on their number.
     ///
     /// # Panics
-    /// When a point is heard that is none.
+    /// If `fit` lists a point that does not exist.
     pub fn use_metric<S: Default>(
         &mut self,
         metric: Metric,
@@ -81,7 +82,7 @@ impl PointHierarchy {
         self.replace(&surfels);
     }
 
-    /// Some points in blocks.
+    /// Copies some points into blocks.
     fn gather(&self, points: &[u32], blocks: &mut Vec<PointBlock>) {
         blocks.clear();
         for points in points.chunks(PointBlock::WIDTH) {
@@ -94,7 +95,7 @@ impl PointHierarchy {
         }
     }
 
-    /// The disc of point `i`, at which f is `at` and the points in `near` are heard.
+    /// Returns the disc of point `i`, given f there and the points `near` that support it.
     fn surfel(&self, i: usize, at: &Evaluation, near: &[PointBlock]) -> Surfel {
         let look = match self.kind(i) {
             PointKind::Line => Look::Line,
@@ -106,12 +107,12 @@ impl PointHierarchy {
         Surfel { normal: self.on_its_side(i, surfel.normal), ..surfel }
     }
 
-    /// A normal of point `i`, on the side of that which it has.
+    /// Returns `normal` on the side of the stored normal of point `i`.
     fn on_its_side(&self, i: usize, normal: [f32; 3]) -> [f32; 3] {
         if dot(normal, self.arrays.normals[i]) < 0.0 { normal.map(|c| -c) } else { normal }
     }
 
-    /// Takes these discs for its own, and bounds them.
+    /// Replaces the discs, and recomputes boxes and coverings.
     fn replace(&mut self, surfels: &[Surfel]) {
         let leaf_size = self.meta.leaf_size as usize;
         let mut normals: Vec<[f32; 3]> = surfels.iter().map(|s| s.normal).collect();

@@ -1,4 +1,5 @@
-//! The point nearest to a place: from a neighbour list, or four boxes at a time, the nearest of them first.
+//! The nearest point: from a neighbour list, or by a descent with four boxes at a time, nearest
+//! first.
 
 use std::ops::{ControlFlow, Range};
 
@@ -15,29 +16,29 @@ use crate::descent::PlaceVisitor;
 use crate::point::gather::GROWN;
 use crate::scan::build::PointHierarchy;
 
-/// The number in single precision, or a little more.
+/// Returns the number in single precision, rounded up.
 #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
 fn single_above(x: f64) -> f32 {
     (x as f32).next_up()
 }
 
-/// The nearest point so far to a place.
+/// The nearest point found so far.
 struct Nearest {
     place: [f64; 3],
-    /// The place in single precision.
+    /// The position in single precision.
     rounded: [f32; 3],
-    /// Its squared distance, and its number.
+    /// The squared distance and the index of the nearest point.
     best: (f64, usize),
-    /// What is nearer has no greater distance in single precision.
+    /// The distance in single precision that no nearer point exceeds.
     within: f32,
-    /// The square of that.
+    /// The square of `within`.
     most: f32,
-    /// What single precision may lose of a distance.
+    /// Bound on the rounding error of a distance in single precision.
     lost: f64,
 }
 
 impl Nearest {
-    /// Of no point yet. No coordinate of the scan is greater than `far`.
+    /// Starts without a point. No coordinate of the scan exceeds `far`.
     fn new(place: [f64; 3], far: f64) -> Self {
         let rounded = Centre::new(place).rounded();
         let far = rounded.iter().fold(far, |far, c| far.max(f64::from(c.abs())));
@@ -55,21 +56,22 @@ impl Nearest {
         }
     }
 
-    /// No less than this is the squared distance that came out as `sq` in single precision.
+    /// Returns a lower bound of the squared distance whose value in single precision is `sq`.
     fn least(&self, sq: f32) -> f64 {
         (f64::from(sq.sqrt()) - self.lost).max(0.0).powi(2)
     }
 }
 
-/// The search for a point that is nearest, or nearly so.
+/// The search for a nearest or nearly nearest point.
 struct Search<'a> {
     scan: &'a PointHierarchy,
     nearest: Nearest,
-    /// The leaf that was looked at before.
+    /// The leaf that has been visited already.
     own_leaf: usize,
-    /// The square of the distance beyond which a point may be a quarter further away than the nearest.
+    /// The squared distance beyond which the result may be a quarter further away than the nearest
+    /// point.
     reach_sq: f64,
-    /// How many nodes were looked at.
+    /// The number of visited nodes.
     looked_at: u32,
 }
 
@@ -81,10 +83,11 @@ impl PlaceVisitor for Search<'_> {
 
     #[inline(always)]
     fn is_wanted(&mut self, _: NodeId, least: f32) -> bool {
-        /// The square of how many times as far a point may be beyond reach.
+        /// The square of the factor by which the result may be further than the nearest point,
+        /// beyond the reach.
         const ROUGHLY: f64 = 1.25 * 1.25;
-        // A point within reach is never passed over: one that is further away lets all nodes be looked at
-        // that come so near.
+        // A point within reach is never missed: a result beyond the reach lets all nodes be visited
+        // that may be within it.
         let (reach_sq, best) = (self.reach_sq, self.nearest.best.0);
         let is_rough = |least: f64| least > reach_sq && ROUGHLY * least > best;
         if least > self.nearest.most || (reach_sq < f64::INFINITY && is_rough(self.nearest.least(least))) {
@@ -104,11 +107,12 @@ impl PlaceVisitor for Search<'_> {
 }
 
 impl PointHierarchy {
-    /// As [`Self::nearest_point_near`] if that is within `reach`; else a point that is at most a quarter
-    /// further away, which takes far fewer looks. With the number of nodes that were looked at.
+    /// Like [`Self::nearest_point_near`] if that point is within `reach`. Otherwise returns a point
+    /// at most a quarter further away, which visits far fewer nodes. Also returns the number of
+    /// visited nodes.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[must_use]
     pub fn nearest_point_within(&self, i: usize, x: [f64; 3], reach: f64) -> (u32, u32) {
         dispatch!(Level::new(), simd => simd.vectorize(
@@ -123,16 +127,16 @@ impl PointHierarchy {
         let place = nearest.rounded;
         let own_leaf = i / self.meta.leaf_size as usize;
         let mut search = Search { scan: self, nearest, own_leaf, reach_sq: reach * reach, looked_at: 1 };
-        // Nothing ends it.
+        // The visitor never breaks.
         let _whole = self.tree().descend_to_by(simd, place, &mut search);
         (id32(search.nearest.best.1), search.looked_at)
     }
 
-    /// The point nearest to `x`, from the neighbour list of the stored point `i`; `None` where that may lack
-    /// it.
+    /// Returns the point nearest to `x`, from the neighbour list of the stored point `i`; `None` if
+    /// the list may not contain it.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     pub(crate) fn nearest_listed(&self, i: usize, x: [f64; 3]) -> Option<u32> {
         dispatch!(Level::new(), simd => simd.vectorize(
             #[inline(always)]
@@ -140,8 +144,8 @@ impl PointHierarchy {
         ))
     }
 
-    /// A list that is complete at a place names the group of every point there, and `groups` hold the balls
-    /// about blocks that contain their points.
+    /// A list that is complete at a position contains the group of every point there. `groups`
+    /// holds the balls around blocks, which contain their points.
     #[inline(always)]
     fn nearest_listed_by<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Option<u32> {
         let mut nearest = self.nearest_of_leaf(simd, i, x);
@@ -163,7 +167,7 @@ impl PointHierarchy {
         Some(id32(nearest.best.1))
     }
 
-    /// The nearest point to `x` in the leaf of the stored point `i`.
+    /// Returns the point nearest to `x` in the leaf of the stored point `i`.
     #[inline(always)]
     fn nearest_of_leaf<S: Simd>(&self, simd: S, i: usize, x: [f64; 3]) -> Nearest {
         let mut nearest = Nearest::new(x, self.bounds_radius());
@@ -181,8 +185,8 @@ impl PointHierarchy {
         }
     }
 
-    /// Offers those of `points` that stand in a block. Which may be nearer is told in single precision, all
-    /// at once.
+    /// Offers those of `points` that are in a block. Single precision selects the candidates, all
+    /// lanes at once.
     #[inline(always)]
     fn offer_block<S: Simd>(&self, simd: S, block: usize, points: &Range<usize>, nearest: &mut Nearest) {
         let d = seen_from(simd, &self.arrays.blocks[block].position, nearest.rounded);
@@ -195,7 +199,7 @@ impl PointHierarchy {
         }
     }
 
-    /// No stored coordinate is greater.
+    /// Returns an upper bound of the stored coordinates.
     fn bounds_radius(&self) -> f64 {
         let bounds = self.meta.root.bounds;
         let OrientedBox { centre, .. } = bounds;

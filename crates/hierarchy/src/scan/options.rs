@@ -1,4 +1,4 @@
-//! How a hierarchy is built.
+//! Options of a build, and its errors.
 
 use nearmiss_store::WorkError;
 use nearmiss_surface::{SurfaceError, SurfaceOptions};
@@ -6,29 +6,33 @@ use thiserror::Error;
 
 use crate::patch::samples::SAMPLES;
 
-/// K of the local radii: fewer span no plane, more say nothing of the spacing.
+/// The valid range of K for local radii. Fewer neighbours span no plane; more do not measure the
+/// spacing.
 pub(crate) const RADIUS_NEIGHBOURS: std::ops::RangeInclusive<u32> = 3..=32;
 
-/// How a hierarchy is built. Plain numbers, checked by the build.
+/// The options of a build. Plain numbers, validated by the build.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct BuildOptions {
-    /// What defines the surface.
+    /// The definition of the surface.
     pub surface: SurfaceOptions,
-    /// K: a point's spacing is the distance to its K-th neighbour, more where the first K look like a line.
-    /// 3 to 32, default 6. Larger bridges wider gaps between samples and blurs more detail.
+    /// K: a point's spacing is the distance to its K-th neighbour, or more if the first K look like
+    /// a line. 3 to 32, default 6. A larger K bridges wider gaps between samples and blurs more
+    /// detail.
     pub radius_neighbours: u32,
-    /// Points in a leaf, 4 to 64, default 16. Larger leaves make fewer nodes and dearer leaf tests.
+    /// The number of points in a leaf, 4 to 64, default 16. Larger leaves make fewer nodes and
+    /// slower leaf tests.
     pub leaf_size: u32,
-    /// Sample points of an inner node, 8 to 32, default 16. More make finer levels and tighter coverings, at
-    /// four bytes each.
+    /// The number of sample points of an inner node, 8 to 32, default 16. More samples give finer
+    /// levels and tighter coverings, at four bytes each.
     pub samples: u32,
-    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is bridged, and
-    /// no local radius exceeds it. `None`, the default: twice the sampling radius, so that nothing is
-    /// interpolated further from a measured point than nine tenths of the points have six neighbours. A tenth
-    /// of outliers does not change it.
+    /// L: how far the scan may be interpolated, in the caller's units. No gap wider than this is
+    /// bridged, and no local radius exceeds it. `None`, the default, takes twice the 0.9-quantile
+    /// of the local radii before this limit, usually twice the sampling radius. Up to a tenth of
+    /// outliers does not change it.
     pub reach: Option<f64>,
-    /// Threads to build on; 0, the default, takes what the process's pool has. Never changes the result.
+    /// The number of threads; 0, the default, uses those of the current pool. Never changes the
+    /// result.
     pub threads: usize,
 }
 
@@ -46,37 +50,37 @@ impl Default for BuildOptions {
 }
 
 impl BuildOptions {
-    /// The same options with this surface.
+    /// Sets the definition of the surface.
     #[must_use]
     pub const fn with_surface(self, surface: SurfaceOptions) -> Self {
         Self { surface, ..self }
     }
 
-    /// The same options with this K for local sampling radii.
+    /// Sets K for local radii.
     #[must_use]
     pub const fn with_radius_neighbours(self, radius_neighbours: u32) -> Self {
         Self { radius_neighbours, ..self }
     }
 
-    /// The same options with this many points in a leaf.
+    /// Sets the number of points in a leaf.
     #[must_use]
     pub const fn with_leaf_size(self, leaf_size: u32) -> Self {
         Self { leaf_size, ..self }
     }
 
-    /// The same options with this many samples of an inner node.
+    /// Sets the number of samples of an inner node.
     #[must_use]
     pub const fn with_samples(self, samples: u32) -> Self {
         Self { samples, ..self }
     }
 
-    /// The same options with this reach.
+    /// Sets the reach L.
     #[must_use]
     pub const fn with_reach(self, reach: f64) -> Self {
         Self { reach: Some(reach), ..self }
     }
 
-    /// The same options on this many threads.
+    /// Sets the number of threads.
     #[must_use]
     pub const fn with_threads(self, threads: usize) -> Self {
         Self { threads, ..self }
@@ -99,26 +103,26 @@ impl BuildOptions {
     }
 }
 
-/// Why a hierarchy cannot be built.
+/// The error of a build.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum BuildError {
     /// An option of the surface is out of range.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
-    /// Leaves too small or too large.
+    /// The leaf size is out of range.
     #[error("leaves of {0} points; 4 to 64 are possible")]
     LeafSize(u32),
-    /// Too few or too many neighbours for a radius.
+    /// The number of neighbours for local radii is out of range.
     #[error("a local radius from {0} neighbours; 3 to 32 are possible")]
     RadiusNeighbours(u32),
-    /// Too few or too many samples of a node.
+    /// The number of samples of a node is out of range.
     #[error("{0} samples of a node; 8 to 32 are possible")]
     Samples(u32),
-    /// A reach that is not a length, or vanishes beside the scan's extent.
+    /// The reach is not positive and finite, or vanishes beside the scan's extent.
     #[error("reach must be positive, finite and no less than the rounding of positions, got {0}")]
     Reach(f64),
-    /// The folder that the work is done in fails.
+    /// The workspace failed.
     #[error(transparent)]
     Work(#[from] WorkError),
     /// The threads could not be started.

@@ -1,5 +1,5 @@
-//! The points in the order of their final tree, whose root parts dense from sparse ones, and what is known of
-//! them then.
+//! The points in the order of their final tree, whose root separates dense from sparse points, with
+//! their radii and classes.
 
 use bytemuck::Pod;
 use nearmiss_index::{BlockBoxes, PointBlock};
@@ -25,31 +25,31 @@ use crate::tree::wide::Bare;
 /// Points in order, with their classes.
 pub(crate) struct Ordered {
     pub(crate) topology: Topology,
-    /// About the points alone, in the order of the nodes' ids.
+    /// The boxes around the points alone, in the order of the nodes' ids.
     pub(crate) boxes: Room<OrientedBox>,
     pub(crate) positions: Room<[f32; 3]>,
-    /// Their numbers in the input.
+    /// The indices of the points in the input.
     pub(crate) source: Room<u32>,
     pub(crate) radii: Room<f32>,
     pub(crate) fits: Room<Fit>,
-    /// The points with their horizons.
+    /// The points in blocks, with their support radii.
     pub(crate) blocks: Room<PointBlock>,
     pub(crate) plan: SurfacePlan,
     pub(crate) summary: Summary,
 }
 
-/// What is known of all points.
+/// The scalars of the whole scan.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(crate) struct Summary {
-    /// Sparse points come from here on.
+    /// The number of dense points; sparse points follow.
     pub(crate) dense: usize,
     pub(crate) sampling_radius: f32,
-    /// No radius exceeds it.
+    /// The upper limit of all radii.
     pub(crate) reach: f32,
 }
 
 impl Ordered {
-    /// Orders the points of a scan, or finds them in order where that has been done.
+    /// Orders the points of a scan, or returns the result of an earlier process.
     pub(crate) fn of(
         points: &ScanPoints<'_>,
         options: &BuildOptions,
@@ -86,8 +86,8 @@ impl Ordered {
         Ok(ordered)
     }
 
-    /// Orders them. A first tree of all points tells their spacing and the surface that they sample. If some
-    /// are sparse, a second tree parts these from the others.
+    /// Orders the points. A first tree of all points gives their spacing and the surface that they
+    /// sample. If some points are sparse, a second tree separates them from the others.
     fn new(
         points: &ScanPoints<'_>,
         options: &BuildOptions,
@@ -97,7 +97,8 @@ impl Ordered {
     ) -> Result<Self, BuildError> {
         let count = points.positions.len();
         let mut items = work.room(count)?;
-        // Points ascend by their numbers in the input, so these order them as their places would.
+        // Points ascend by their indices in the input, so these break ties as their positions
+        // would.
         fill(&mut items, |i| Item { position: points.positions[i], index: points.source[i] });
         let mut boxes = work.room(topology.len())?;
         split(&mut items, &topology, count, &mut boxes);
@@ -140,7 +141,7 @@ impl Ordered {
     }
 }
 
-/// The values of points in the order of `items`, whose indices are their places before.
+/// Returns values in the order of `items`, whose indices are the previous positions.
 fn reordered<T: Pod + Send + Sync>(
     items: &[Item],
     values: &[T],

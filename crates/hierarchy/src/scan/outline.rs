@@ -1,4 +1,4 @@
-//! What a query asks of a whole scan before it looks at any node.
+//! The data of a whole scan that a query reads before it visits any node.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,9 +7,9 @@ use crate::bounds::boxes::OrientedBox;
 /// A ball in the stored frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Ball {
-    /// The middle.
+    /// The centre.
     pub centre: [f64; 3],
-    /// Radius.
+    /// The radius.
     pub radius: f64,
 }
 
@@ -22,12 +22,12 @@ impl Ball {
 /// The hash that identifies a scan, and its bounding balls.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Outline {
-    /// A hash of all points, their frame and their discs, and of what the tree is made by.
+    /// A hash of all points, their frame, their discs and the parameters of the tree.
     pub identity: u64,
-    /// About the surface.
+    /// Bounding ball of the surface.
     pub surface: Ball,
-    /// About the obstacle.
+    /// Bounding ball of the obstacle.
     pub obstacle: Ball,
-    /// About the points with their discs.
+    /// Bounding ball of the points with their discs.
     pub discs: Ball,
 }

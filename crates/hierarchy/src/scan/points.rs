@@ -2,8 +2,8 @@
 
 use nearmiss_geometry::{Aabb, Dropped, Frame, PointCloud};
 
-/// The distinct points of a scan, wherever they are: those of a [`PointCloud`], or of a file larger than
-/// memory ([`GatheredPoints`](crate::GatheredPoints)).
+/// The distinct points of a scan: those of a [`PointCloud`], or of a file larger than memory
+/// ([`GatheredPoints`](crate::GatheredPoints)).
 #[derive(Debug, Clone, Copy)]
 pub struct ScanPoints<'a> {
     pub(crate) positions: &'a [[f32; 3]],
@@ -15,14 +15,14 @@ pub struct ScanPoints<'a> {
 }
 
 impl ScanPoints<'_> {
-    /// How many there are.
+    /// Returns the number of points.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a scan has at least eight points")]
     pub const fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Bounds in the caller's frame.
+    /// Returns the bounds in the caller's frame.
     #[must_use]
     pub const fn bounds(&self) -> &Aabb {
         &self.bounds

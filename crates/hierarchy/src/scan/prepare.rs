@@ -1,4 +1,4 @@
-//! From points to the arrays of a scan, all but those that leaves are compared by.
+//! Computes all arrays of a scan from its points, except the leaf blocks.
 
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
@@ -25,7 +25,7 @@ use crate::scan::share;
 use crate::tree::topology::Topology;
 use crate::tree::wide::{Bare, Root, growths_of_siblings, siblings};
 
-/// A scan but for its leaf blocks, marks and outline.
+/// A scan without leaf blocks, marks and outline.
 pub(crate) struct Prepared {
     pub(crate) meta: HierarchyMeta,
     pub(crate) plan: SurfacePlan,
@@ -34,7 +34,7 @@ pub(crate) struct Prepared {
     pub(crate) positions: Room<[f32; 3]>,
 }
 
-/// Orders points, finds what each says of the surface, and bounds that.
+/// Orders the points, fits the surface at each, and bounds the result.
 pub(crate) fn prepare(
     points: &ScanPoints<'_>,
     options: &BuildOptions,
@@ -104,7 +104,7 @@ pub(crate) fn prepare(
     Ok(Prepared { meta, plan, topology, arrays, positions })
 }
 
-/// The arrays of bounds, from those of all nodes in the order of their ids.
+/// Returns the arrays of bounds, given the bounds of all nodes in the order of their ids.
 fn bounds(
     topology: &Topology,
     boxes: &[OrientedBox],

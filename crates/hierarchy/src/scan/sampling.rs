@@ -1,4 +1,4 @@
-//! How densely points lie: local radii, the sampling radius, and the points with their horizons.
+//! The sampling density: local radii, the sampling radius, and the points with their support radii.
 
 use nearmiss_index::{BlockBoxes, PointBlock};
 use nearmiss_lanes::id32;
@@ -12,28 +12,28 @@ use crate::scan::options::{BuildError, BuildOptions};
 use crate::scan::share;
 use crate::tree::topology::Topology;
 
-/// Share of the points whose local radius is at most the scan's sampling radius.
+/// The share of points whose local radius is at most the scan's sampling radius.
 const SAMPLING_QUANTILE: f64 = 0.9;
 
-/// The default reach over the quantile of the radii that it has yet to limit: a gap whose middle is such a
-/// radius from either side is bridged, and no wider one.
+/// The default reach, over the quantile of the radii before they are limited: a gap is bridged if
+/// its middle is no further than that quantile from either side.
 const REACH: f32 = 2.0;
 
-/// How densely points lie, and what follows from it.
+/// The sampling density of a scan, and the quantities derived from it.
 pub(crate) struct Sampling {
     pub(crate) spacings: Room<Spacing>,
     pub(crate) radii: Room<f32>,
     pub(crate) sampling_radius: f32,
-    /// No radius exceeds it.
+    /// The upper limit of all radii.
     pub(crate) reach: f32,
     pub(crate) plan: SurfacePlan,
-    /// The points with their horizons.
+    /// The points in blocks, with their support radii.
     pub(crate) blocks: Room<PointBlock>,
 }
 
 impl Sampling {
-    /// That of points under the nodes of `topology`, in whose boxes the reaches are set; `unit` of the
-    /// points' are one of the caller's.
+    /// Computes the sampling density of points under the nodes of `topology`, and sets the greatest
+    /// radii in `boxes`. `unit` is the caller's unit in units of the points.
     pub(crate) fn of(
         positions: &[[f32; 3]],
         (topology, boxes): (&Topology, &mut [OrientedBox]),
@@ -67,7 +67,7 @@ impl Sampling {
     }
 }
 
-/// Sets in the boxes of all nodes the greatest radius of their points.
+/// Sets the greatest radius of the points in the boxes of all nodes.
 pub(crate) fn set_reaches(topology: &Topology, boxes: &mut [OrientedBox], radii: &[f32]) {
     let reaches = fold_nodes(topology, |range| radii[range].iter().copied().fold(0.0, f32::max), f32::max);
     for (bounds, reach) in boxes.iter_mut().zip(reaches) {
@@ -75,13 +75,13 @@ pub(crate) fn set_reaches(topology: &Topology, boxes: &mut [OrientedBox], radii:
     }
 }
 
-/// The greatest coordinate.
+/// Returns the greatest absolute coordinate.
 fn extent(positions: &[[f32; 3]]) -> f32 {
     positions.iter().flatten().fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// The [sampling radius](sampling_rank) of radii, none of which is negative: their bits are in their order,
-/// and are counted, the upper half first.
+/// Returns the [sampling radius](sampling_rank) of radii, none of which may be negative. The bits
+/// of such numbers are in their order, and are counted, the upper half first.
 fn quantile(radii: &[f32]) -> f32 {
     const HALF: u32 = 16;
     let mut rank = sampling_rank(radii.len());
@@ -102,7 +102,7 @@ fn quantile(radii: &[f32]) -> f32 {
     f32::from_bits(upper << HALF | lower)
 }
 
-/// Which of `count` ascending radii, from 0, is the sampling radius.
+/// Returns the index of the sampling radius among `count` ascending radii.
 #[expect(
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,

@@ -1,4 +1,4 @@
-//! How far a build has come after each of its steps, as shares of the time that it takes.
+//! The progress of a build after each of its steps, as shares of its running time.
 
 pub(crate) const TREE: f64 = 0.15;
 pub(crate) const SPACINGS: f64 = 0.35;

@@ -1,5 +1,4 @@
-//! `Slices`: the arrays of a scan for hot loops, and what of them stands for each point and node in the
-//! obstacle.
+//! [`Slices`]: the arrays of a scan for hot loops, and the parts of points and nodes in the obstacle.
 
 use std::ops::Range;
 
@@ -17,107 +16,110 @@ use crate::point::leaf_block::Leaves;
 use crate::scan::outline::Outline;
 use crate::tree::wide::Tree;
 
-/// The codes and the radii of as many points as a block has lanes.
+/// The codes and the radii of the points of a full block.
 type FullBlock<'a> = (&'a [PointCode; PointBlock::WIDTH], &'a [f32; PointBlock::WIDTH]);
 
-/// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not at every
-/// access.
+/// The arrays that a query reads, as plain slices: an array in a mapped file is checked once, not
+/// at every access.
 #[derive(Debug, Clone, Copy)]
 pub struct Slices<'a> {
     /// Unit normals; see [`crate::PointHierarchy::normals`].
     pub normals: &'a [[f32; 3]],
     /// Local sampling radii.
     pub radii: &'a [f32],
-    /// Radii of the tangent discs.
+    /// The radii of the tangent discs.
     pub discs: DiscRadii<'a>,
-    /// The nodes, and the boxes about them.
+    /// The nodes and their bounding boxes.
     pub tree: Tree<'a>,
-    /// What leaves are compared by.
+    /// The leaf blocks and marks.
     pub leaves: Leaves<'a>,
-    /// What tells the scan from others, and where it is.
+    /// The hash that identifies the scan, and its bounding balls.
     pub outline: &'a Outline,
     /// The points in blocks: see [`crate::PointHierarchy::blocks`].
     pub blocks: &'a [PointBlock],
-    /// The samples of the inner nodes in their order, [`samples_a_node`](Self::samples_a_node) of each; see
-    /// [`Slices::samples`].
+    /// The samples of the inner nodes in order, [`samples_a_node`](Self::samples_a_node) for each;
+    /// see [`Slices::samples`].
     pub sample_lists: &'a [u32],
-    /// How far the samples of each node reach.
+    /// The sphere covering of each node.
     pub coverings: &'a [Covering],
-    /// Points of a full leaf.
+    /// The number of points in a full leaf.
     pub leaf_size: u32,
-    /// Samples of an inner node.
+    /// The number of samples of an inner node.
     pub samples_a_node: u32,
-    /// What defines the surface.
+    /// The definition of the surface.
     pub plan: &'a SurfacePlan,
     /// The scan's sampling radius.
     pub sampling_radius: f32,
     /// The scan's reach L.
     pub reach: f32,
-    /// Points before this are on sheets or, noisy, among others; sparse points come from here on, and stand
-    /// in the obstacle as balls. A leaf has points of one sort alone.
+    /// The number of dense points, which come first: points on sheets, and noisy ones among them.
+    /// The points after them, sparse or left over, are balls in the obstacle. A leaf has points of
+    /// one sort only.
     pub dense: usize,
 }
 
 impl Slices<'_> {
-    /// The `i`-th position in leaf order.
+    /// Returns the `i`-th position in leaf order.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline(always)]
     #[must_use]
     pub fn position(&self, i: usize) -> [f32; 3] {
         PointBlock::position_in(self.blocks, i)
     }
 
-    /// A box about the part of the surface of a node, proven to contain it; it has the axes of the node's
-    /// box, and contains it.
+    /// Returns a box that provably contains a node's part of the surface. It has the axes of the
+    /// node's box, and contains it.
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     #[inline]
     #[must_use]
     pub fn enclosure(&self, node: usize) -> OrientedBox {
         self.tree.enclosure(Part::Surface, NodeId(id32(node)))
     }
 
-    /// A box about the part of the obstacle of a node (`docs/theory/obstacle.md`); it has the axes of the
-    /// node's box, and contains it.
+    /// Returns a box that provably contains a node's part of the obstacle
+    /// (`docs/theory/obstacle.md`). It has the axes of the node's box, and contains it.
     ///
     /// # Panics
-    /// When there is no such node.
+    /// If there is no such node.
     #[inline]
     #[must_use]
     pub fn obstacle_enclosure(&self, node: usize) -> OrientedBox {
         self.tree.enclosure(Part::Obstacle, NodeId(id32(node)))
     }
 
-    /// The radius of the ball that stands for a point in the obstacle: half its local radius, a third where
-    /// it has others all around it, zero for points on sheets.
+    /// Returns the radius of the ball that represents a point in the obstacle: half the local
+    /// radius of a sparse point, about a third of that of other points off sheets, zero for points
+    /// on sheets.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn obstacle_ball(&self, i: usize) -> f32 {
         obstacle_ball(i, self.dense, self.discs.codes[i].kind(), self.radii[i])
     }
 
-    /// Returns `true` if a point stands in the obstacle by the sheet that it samples, and `false` if by a
-    /// ball.
+    /// Returns `true` if a point is represented in the obstacle by the sheet that it samples,
+    /// `false` if by a ball.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn is_on_sheet(&self, i: usize) -> bool {
         is_on_sheet(i, self.dense, self.discs.codes[i].kind())
     }
 
-    /// How far the obstacle may lie from a point that is the nearest to it: the radius of its ball, or of its
-    /// part of a sheet, the lesser of its local radius and half the reach.
+    /// Returns the radius around a point that contains its part of the obstacle: the radius of its
+    /// ball or, on a sheet, the greater of those of its [cell](Self::cell_radius) and its disc with
+    /// its thickness.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn obstacle_reach(&self, i: usize) -> f32 {
@@ -128,10 +130,10 @@ impl Slices<'_> {
         }
     }
 
-    /// [`Self::obstacle_ball`] of the points in a block, in lanes; 0 where there is no point.
+    /// Returns [`Self::obstacle_ball`] for the points in a block; 0 in unused lanes.
     ///
     /// # Panics
-    /// When there is no such block.
+    /// If there is no such block.
     #[inline(always)]
     #[must_use]
     pub fn obstacle_balls(&self, block: usize) -> [f32; PointBlock::WIDTH] {
@@ -148,10 +150,11 @@ impl Slices<'_> {
         balls
     }
 
-    /// No less than [`Self::obstacle_reach`] of the points in a block, in lanes; 0 where there is no point.
+    /// Returns an upper bound of [`Self::obstacle_reach`] for the points in a block; 0 in unused
+    /// lanes.
     ///
     /// # Panics
-    /// When there is no such block.
+    /// If there is no such block.
     #[inline(always)]
     #[must_use]
     pub fn obstacle_reaches(&self, block: usize) -> [f32; PointBlock::WIDTH] {
@@ -170,7 +173,7 @@ impl Slices<'_> {
         reaches
     }
 
-    /// The codes and the radii of a full block without sparse points.
+    /// Returns the codes and the radii of a full block without sparse points.
     #[inline(always)]
     fn dense_block(&self, block: usize) -> Option<FullBlock<'_>> {
         let points = self.points_of(block);
@@ -187,23 +190,23 @@ impl Slices<'_> {
         first..(first + PointBlock::WIDTH).min(self.radii.len())
     }
 
-    /// How far from a point on a sheet the surface belongs to the obstacle: the lesser of its local radius
-    /// and half the reach.
+    /// Returns the distance from a point on a sheet up to which the surface belongs to the
+    /// obstacle: the lesser of its local radius and half the reach.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn cell_radius(&self, i: usize) -> f32 {
         cell_radius(self.radii[i], self.reach)
     }
 
-    /// About a [sparse](crate::PointKind::is_sparse) point, the radius of the ball in which surface may be
-    /// that no disc stands for: the local radius, but no more than the scan's, within which nothing is
-    /// promised of any point. Zero for others.
+    /// Returns the radius of the ball around a [sparse](crate::PointKind::is_sparse) point in which
+    /// there may be surface that no disc represents. It is the local radius, limited to the scan's
+    /// sampling radius, within which nothing is guaranteed for any point. Zero for other points.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If there is no such point.
     #[inline]
     #[must_use]
     pub fn ball(&self, i: usize) -> f32 {

@@ -1,4 +1,4 @@
-//! Spacing, borders and holes of a scan, from a sample of its points.
+//! Spacing, borders and holes of a scan, estimated from a sample of its points.
 
 use std::f64::consts::TAU;
 use std::ops::{ControlFlow, Range};
@@ -14,57 +14,58 @@ use crate::scan::build::PointHierarchy;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// At most so many blocks of points on sheets are sampled, and half as many of other points.
+/// The maximum number of sampled blocks of points on sheets; half as many of other points.
 const BLOCKS: usize = 128;
 
-/// The spacing is the distance to the neighbour of this rank.
+/// The rank of the neighbour whose distance is the spacing.
 const RANK: usize = 6;
 
-/// A point is an outlier if so many of its nearest six lie on sheets and are this many times denser,
-/// and its spacing exceeds the reach.
+/// A point is an outlier if its spacing exceeds the reach and at least this many of its six nearest
+/// neighbours are on sheets and [`DENSER`] times denser.
 const OUTLIER: usize = 2;
 const DENSER: f64 = 4.0;
 
-/// Neighbours about a point that show a border. Of 24 random directions in a plane, one in ten
+/// The number of neighbours that show a border. Of 24 random directions in a plane, one in ten
 /// thousand leaves a sector of 150° empty.
 const RING: usize = 24;
 
 /// A border leaves at least this sector of the tangent plane empty, 150°, ...
 const BORDER: f64 = TAU * 150.0 / 360.0;
 
-/// ... and no second one of more than 100°: between two is a line.
+/// ... and no second one of more than 100°: between two such sectors is a line.
 const LINE: f64 = TAU * 100.0 / 360.0;
 
-/// A hole is looked for no further than this, in reaches.
+/// The maximum width of a hole that is searched for, in reaches.
 const FAR: f64 = 20.0;
 
-/// The cosine of the angle about the outward direction in which the far side of a hole is looked
+/// The cosine of the angle around the outward direction in which the far side of a hole is searched
 /// for: 25°.
 const CONE: f64 = 0.906;
 
-/// The far side of a hole has a normal within the angle of this cosine of that of the near side,
-/// and its height over the near side's tangent plane is at most this share of the width.
+/// The far side of a hole has a normal within the angle of this cosine of that of the near side.
+/// Its height over the near side's tangent plane is at most this share of the width.
 const PARALLEL: f64 = 0.9;
 const LEVEL: f64 = 0.15;
 
-/// What a sample of a scan's points shows. Lengths are in the caller's units.
+/// Estimates from a sample of a scan's points. Lengths are in the caller's units.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Survey {
-    /// Distance of each sampled point but outliers to its sixth neighbour, ascending, and the share
-    /// of all points it stands for.
+    /// The distance of each sampled point except outliers to its sixth neighbour, ascending, and
+    /// the share of all points that it represents.
     pub spacings: Vec<(f64, f64)>,
-    /// Estimated share of the points that lie on no sheet and have much denser points as neighbours.
+    /// The estimated share of points that are on no sheet and have much denser points as
+    /// neighbours.
     pub outliers: f64,
-    /// Estimated share of the points that lie at a border of a sheet.
+    /// The estimated share of points at a border of a sheet.
     pub border: f64,
-    /// The share of all points that each sampled border point stands for.
+    /// The share of all points that each sampled border point represents.
     pub border_weight: f64,
-    /// Widths of the holes wider than the reach that sampled border points face across their sheet,
+    /// The widths of holes wider than the reach that sampled border points face across their sheet,
     /// ascending.
     pub holes: Vec<f64>,
 }
 
-/// What one block shows.
+/// The counts of one block.
 #[derive(Default)]
 struct Seen {
     count: usize,
@@ -75,8 +76,8 @@ struct Seen {
 }
 
 impl PointHierarchy {
-    /// Looks at up to 3,072 points. The same `seed` chooses the same points, whatever the thread
-    /// count.
+    /// Samples up to 3,072 points. The same `seed` chooses the same points, whatever the number of
+    /// threads.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts")]
     pub fn survey(&self, seed: u64) -> Survey {
@@ -109,7 +110,7 @@ impl PointHierarchy {
         survey
     }
 
-    /// Looks at those points of a block that are among `points`.
+    /// Surveys the points of a block that are among `points`.
     fn look(&self, block: usize, points: &Range<usize>) -> Seen {
         let slices = self.slices();
         let mut ring = Ring::of(self);
@@ -150,7 +151,8 @@ impl PointHierarchy {
         self.normals()[i].map(f64::from).into()
     }
 
-    /// The direction in the tangent plane of point `i` in which its sheet ends, if it ends there.
+    /// Returns the direction in the tangent plane of point `i` in which its sheet ends, if it ends
+    /// there.
     fn outward(&self, i: usize, near: impl Iterator<Item = usize>) -> Option<Vector3<f64>> {
         let (p, normal) = (self.place(i), self.normal(i));
         let least = normal.iamin();
@@ -173,8 +175,8 @@ impl PointHierarchy {
         (widest >= BORDER && second <= LINE).then(|| u * middle.cos() + v * middle.sin())
     }
 
-    /// The width of the hole that point `i` faces `outward`, if another part of the same plane is
-    /// beyond it: more than the reach. Stored units.
+    /// Returns the width of the hole that point `i` faces `outward`, in stored units, if it is
+    /// wider than the reach and another part of the same plane is beyond it.
     fn hole(&self, i: usize, outward: Vector3<f64>) -> Option<f64> {
         let slices = self.slices();
         let (p, normal) = (self.place(i), self.normal(i));
@@ -215,15 +217,15 @@ impl PointHierarchy {
     }
 }
 
-/// The nearest other points of a point.
+/// The nearest neighbours of a point.
 struct Ring<'a> {
     scan: &'a PointHierarchy,
-    /// How many of them are wanted.
+    /// The number of neighbours wanted.
     count: usize,
-    /// Their common neighbour, and where it is.
+    /// The point, and its position.
     centre: usize,
     place: [f32; 3],
-    /// Squared distances and numbers, ascending.
+    /// Squared distances and indices, ascending.
     near: Vec<(f32, usize)>,
 }
 
@@ -233,7 +235,7 @@ impl<'a> Ring<'a> {
         Self { scan, count, centre: 0, place: [0.0; 3], near: Vec::with_capacity(count + 1) }
     }
 
-    /// Finds those of the `i`-th point.
+    /// Finds the neighbours of the `i`-th point.
     fn gather(&mut self, i: usize) {
         self.near.clear();
         (self.centre, self.place) = (i, self.scan.positions()[i]);
@@ -247,7 +249,7 @@ impl<'a> Ring<'a> {
 
 impl PlaceVisitor for Ring<'_> {
     fn most_sq(&self) -> f32 {
-        /// More than rounding can make of a distance to a box.
+        /// Allowance for the rounding of a distance to a box.
         const ROUNDED: f32 = 1.0 + 1e-5;
         if self.near.len() < self.count { f32::INFINITY } else { self.near[self.count - 1].0 * ROUNDED }
     }
@@ -267,7 +269,7 @@ impl PlaceVisitor for Ring<'_> {
     }
 }
 
-/// Blocks of `points`, spread evenly: one of each of up to `most` equal runs.
+/// Returns evenly spread blocks of `points`: one of each of up to `most` equal runs.
 fn sample(points: Range<usize>, most: usize, seed: u64) -> Vec<usize> {
     let blocks = points.start / WIDTH..points.end.div_ceil(WIDTH);
     let count = most.min(blocks.len());

@@ -1,9 +1,10 @@
-//! The tree: top-down, each node split so that its children's boxes are small.
+//! Construction of the tree: top-down, with each node split so that its children's boxes are small.
 //!
-//! S0 §4.2 splits to minimise the volume of the children's bounding volumes. Here the candidates are the
-//! medians along the node's three principal axes, and of those long enough to matter the one wins whose
-//! children have the least summed volume of boxes along the same axes. A patch of surface is flat, so every
-//! extent is taken larger by the mean spacing of the points; otherwise all volumes would vanish alike.
+//! Klein & Zachmann 2004, §4.2, minimise the volume of the children's bounding volumes. Here the
+//! candidates are the medians along the node's three principal axes. Of the axes that are long
+//! enough to matter, the one wins whose children have the least summed volume of boxes along the
+//! same axes. A patch of surface is flat, so the mean spacing of the points is added to every
+//! extent; otherwise all volumes would vanish alike.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -19,33 +20,34 @@ use nearmiss_surface::symmetric_eigen;
 use crate::bounds::boxes::{OrientedBox, to_axes};
 use crate::tree::topology::{Half, Topology};
 
-/// A point on its way to its place.
+/// A point during construction.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Item {
     pub(crate) position: [f32; 3],
-    /// A number that no other point has; of equally good orders the one by ascending numbers is taken.
+    /// A number that no other point has. It breaks ties between equally good orders.
     pub(crate) index: u32,
 }
 
-/// Below this many points a task is not worth handing to another thread.
+/// The minimum number of points for which another thread is used.
 const TASK: usize = 4096;
 
-/// An axis shorter than this share of the longest cannot give smaller children.
+/// An axis shorter than this share of the longest is not a candidate, because it cannot give
+/// smaller children.
 const WORTH_A_TRY: f32 = 0.5;
 
-/// Splits need no more than this many points to tell which axis is better.
+/// The number of points from which the candidates are judged.
 const JUDGED_BY: usize = 512;
 
-/// Orders `items` into the leaves of `topology` and sets `boxes` to a box about the points of each node, in
-/// the order of their ids. The first `dense` items, which fill whole leaves unless they are all, stay before
-/// the others. O(n log n).
+/// Orders `items` into the leaves of `topology` and sets `boxes` to the boxes around the points of
+/// all nodes, in the order of their ids. The first `dense` items, which must fill whole leaves
+/// unless they are all, stay before the others. O(n log n).
 pub(crate) fn split(items: &mut [Item], topology: &Topology, dense: usize, boxes: &mut [OrientedBox]) {
     let boxes = Mutex::new(boxes);
     Place { items, dense, half: Half::ALL }.split(topology, &boxes);
 }
 
-/// The box about some points along their principal axes.
+/// Returns the box around some points along their principal axes.
 fn about(level: Level, items: &[Item]) -> OrientedBox {
     let axes = principal_axes(level, items);
     let (low, high) = extents(level, items, &axes);
@@ -55,13 +57,13 @@ fn about(level: Level, items: &[Item]) -> OrientedBox {
 /// The points of some leaves.
 struct Place<'a> {
     items: &'a mut [Item],
-    /// How many of them, the first, are dense.
+    /// The number of dense points, which come first.
     dense: usize,
     half: Half,
 }
 
 impl<'a> Place<'a> {
-    /// Orders them into leaves, and sets the boxes of the nodes that they make.
+    /// Orders the points into leaves and sets the boxes of their nodes.
     fn split(self, topology: &Topology, boxes: &Mutex<&mut [OrientedBox]>) {
         let mut found = Vec::new();
         if self.items.len() <= TASK {
@@ -78,7 +80,7 @@ impl<'a> Place<'a> {
         }
     }
 
-    /// The same on one thread: adds the nodes with their boxes to `found`.
+    /// Does the same on one thread, and adds the nodes with their boxes to `found`.
     fn split_into(self, topology: &Topology, found: &mut Vec<(NodeId, OrientedBox)>) {
         let bounds = about(Level::new(), self.items);
         found.extend(topology.node_of(self.half).map(|id| (id, bounds)));
@@ -93,8 +95,8 @@ impl<'a> Place<'a> {
         right.split_into(topology, found);
     }
 
-    /// Parts them; `bounds` is the box about them. What is dense comes first, so where there are both sorts
-    /// only one of them is parted.
+    /// Splits the points in two; `bounds` is the box around them. Dense points come first, so if
+    /// there are both kinds only one of them has to be partitioned.
     fn halve(self, topology: &Topology, bounds: &OrientedBox) -> [Self; 2] {
         let Place { items, dense, half } = self;
         let ([left, right], all) = (half.halves(), items.len());
@@ -116,13 +118,14 @@ impl<'a> Place<'a> {
     }
 }
 
-/// Sums of coordinates and their products are taken in so many lanes: a fixed order, whatever the machine.
+/// The number of lanes in which coordinates and their products are summed: fixed, so that the order
+/// is the same on every machine.
 const LANES: usize = 4;
 
-/// Items that are looked at together, for the lanes of the widest registers.
+/// The number of items processed together, for the lanes of the widest registers.
 const WIDTH: usize = 16;
 
-/// Up to sixteen items; the first of all where there are fewer.
+/// Returns up to sixteen items, padded with the first of all.
 #[inline(always)]
 fn sixteen(items: &[Item], start: usize) -> [Item; WIDTH] {
     let mut some = [items[0]; WIDTH];
@@ -134,7 +137,7 @@ fn sixteen(items: &[Item], start: usize) -> [Item; WIDTH] {
     some
 }
 
-/// The coordinates of four of them.
+/// Returns the coordinates of four of the items.
 #[inline(always)]
 fn coordinates<S: Simd>(simd: S, items: &[Item; WIDTH], four: usize) -> [f32x4<S>; 3] {
     let floats: &[f32] = bytemuck::cast_slice(&items[four * LANES..][..LANES]);
@@ -142,7 +145,7 @@ fn coordinates<S: Simd>(simd: S, items: &[Item; WIDTH], four: usize) -> [f32x4<S
     [x, y, z]
 }
 
-/// Principal axes of the points, the longest spread first.
+/// Returns the principal axes of the points, the greatest variance first.
 fn principal_axes(level: Level, items: &[Item]) -> [[f32; 3]; 3] {
     let sums = dispatch!(level, simd => simd.vectorize(
         #[inline(always)]
@@ -152,12 +155,12 @@ fn principal_axes(level: Level, items: &[Item]) -> [[f32; 3]; 3] {
     let n = items.len() as f64;
     let [x, y, z, xx, xy, xz, yy, yz, zz] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
     let eigen = symmetric_eigen([xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]);
-    // Longest first; reversing two of three keeps the frame right-handed up to a sign, mended by the third.
+    // The reversed order makes the frame left-handed; negating the last axis mends that.
     let [short, middle, long] = eigen.vectors;
     to_axes([long, middle, short.map(|c| -c)])
 }
 
-/// The sums of x y z xx xy xz yy yz zz of the points relative to the first, in lanes.
+/// Returns the sums of x y z xx xy xz yy yz zz of the points relative to the first, in lanes.
 #[inline(always)]
 fn sums<S: Simd>(simd: S, items: &[Item]) -> [[f64; LANES]; 9] {
     let origin = items[0].position;
@@ -185,7 +188,7 @@ fn sums<S: Simd>(simd: S, items: &[Item]) -> [[f64; LANES]; 9] {
     lanes
 }
 
-/// Least and greatest coordinate of the points along each axis.
+/// Returns the least and greatest coordinate of the points along each axis.
 fn extents(level: Level, items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 3], [f32; 3]) {
     dispatch!(level, simd => simd.vectorize(
         #[inline(always)]
@@ -220,13 +223,15 @@ fn extents_by<S: Simd>(simd: S, items: &[Item], axes: &[[f32; 3]; 3]) -> ([f32; 
     (least_of, greatest_of)
 }
 
-/// Moves the `left` points least along `axis` to the front; equal ones by their index.
+/// Moves the `left` points with the least coordinates along `axis` to the front; ties go to the
+/// lower index.
 fn partition(items: &mut [Item], axis: [f32; 3], left: usize) {
     let key = |item: &Item| dot(axis, item.position);
     items.select_nth_unstable_by(left, |a, b| key(a).total_cmp(&key(b)).then(a.index.cmp(&b.index)));
 }
 
-/// The principal axis whose median split leaves the least volume, judged on an even subset.
+/// Returns the principal axis whose median split gives the least volume, judged on an evenly spaced
+/// subset.
 fn best_axis(level: Level, items: &[Item], bounds: &OrientedBox, left: usize) -> [f32; 3] {
     let axes = &bounds.axes;
     let worth = |k: usize| bounds.half[k] >= WORTH_A_TRY * bounds.half[0];

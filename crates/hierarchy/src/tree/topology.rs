@@ -1,10 +1,11 @@
-//! Which nodes a tree has, and which points lie under each: arithmetic alone, nothing of it is stored.
+//! The nodes of a tree and the points under each. All of it is arithmetic; nothing is stored.
 //!
-//! Points stand in leaf order, and every leaf but the last is full. The leaves are halved again and again: at
-//! binary depth d, part j of 2ᵈ has the leaves from ⌈j m / 2ᵈ⌉ to ⌈(j + 1) m / 2ᵈ⌉ of m. Every other depth is
-//! kept, counted from the bottom. So nodes have four children, but those of the lowest level two to four
-//! leaves, and the root two where the number of depths is even. Nodes are numbered level by level; the
-//! children of a node follow each other.
+//! Points are in leaf order, and every leaf but the last is full. The leaves are halved repeatedly:
+//! at binary depth d, part j of 2ᵈ has the leaves from ⌈j m / 2ᵈ⌉ to ⌈(j + 1) m / 2ᵈ⌉ of m. Every
+//! other depth is kept, counted from the bottom. Nodes therefore have four children, with two
+//! exceptions: nodes of the lowest level have two to four leaves, and the root has two children if
+//! the number of depths is even. Nodes are numbered level by level; the children of a node have
+//! consecutive ids.
 
 use std::ops::Range;
 
@@ -12,48 +13,48 @@ use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
 use serde::{Deserialize, Serialize};
 
-/// Greatest number of points that a leaf may be built with; queries reserve room for so many.
+/// The maximum number of points in a leaf. Queries reserve memory for this many.
 pub const MOST_LEAF_POINTS: usize = 64;
 
-/// Children of a node.
+/// The number of children of a node.
 pub(crate) const FAN: usize = 4;
 
-/// Room for a depth-first descent of one tree: of each level three children wait while the fourth is looked
-/// at. Trees of 2³² points have 16 levels of four children and a root.
+/// Stack size for a depth-first descent of one tree. On each level three children wait while the
+/// fourth is visited; trees of 2³² points have 16 levels of four children and a root.
 pub(crate) const TREE_STACK: usize = 64;
 
-/// A node of either tree, still to be looked at together.
+/// One node of each tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct NodePair {
     /// A node of the first tree.
     pub a: NodeId,
-    /// A node of the second.
+    /// A node of the second tree.
     pub b: NodeId,
 }
 
 impl NodePair {
-    /// The pair of all points.
+    /// The pair of roots.
     pub const ROOTS: Self = Self { a: NodeId::ROOT, b: NodeId::ROOT };
 }
 
 /// Nodes in sixteen lanes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LaneNodes {
-    /// The first node of each four lanes.
+    /// The first node of each group of four lanes.
     starts: [u32; FAN],
-    /// These bits of a lane's number are how far its node is from the first.
+    /// Mask of the bits of a lane's index that give the offset of its node from the first.
     mask: u32,
 }
 
 impl LaneNodes {
-    /// One node in all lanes.
+    /// Returns one node in all lanes.
     #[inline]
     #[must_use]
     pub const fn alone(id: NodeId) -> Self {
         Self { starts: [id.0; FAN], mask: 0 }
     }
 
-    /// Child k in lanes 4k to 4k + 3.
+    /// Returns child k in lanes 4k to 4k + 3.
     #[inline]
     #[must_use]
     pub const fn spread(children: Children) -> Self {
@@ -61,14 +62,14 @@ impl LaneNodes {
         Self { starts: [first, first + 1, first + 2, first + 3], mask: 0 }
     }
 
-    /// Child k in lanes k, 4 + k, 8 + k and 12 + k.
+    /// Returns child k in lanes k, 4 + k, 8 + k and 12 + k.
     #[inline]
     #[must_use]
     pub const fn repeated(children: Children) -> Self {
         Self { starts: [children.first; FAN], mask: 3 }
     }
 
-    /// The node in a lane, of sixteen.
+    /// Returns the node in a lane, of sixteen.
     #[inline]
     #[must_use]
     pub fn id(&self, lane: usize) -> NodeId {
@@ -79,38 +80,39 @@ impl LaneNodes {
 /// The children of the children of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grandchildren {
-    /// Those of child k from lane 4k on; or child k itself in lane 5k, if children are leaves.
+    /// The children of child k from lane 4k on. If the children are leaves, child k itself in lane
+    /// 5k.
     pub nodes: LaneNodes,
-    /// The lanes that are taken, as bits.
+    /// The lanes in use, as bits.
     pub lanes: u32,
-    /// Where their boxes stand: among those of the children of these nodes, four of each.
+    /// For each group of four lanes, the node whose children have the boxes of these lanes.
     pub(crate) parents: [NodeId; FAN],
 }
 
-/// The nodes of a tree. Ids count inner nodes first, from the root, then leaves in the order of their points.
-/// The children of a node have consecutive ids.
+/// The nodes of a tree. Ids count inner nodes first, from the root, then leaves in the order of
+/// their points. The children of a node have consecutive ids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Topology {
     points: u32,
     leaf_size: u32,
     inner: u32,
     leaves: u32,
-    /// The first node with leaves for children.
+    /// The first node whose children are leaves.
     bottom: u32,
-    /// Binary depth of these.
+    /// Binary depth of the nodes whose children are leaves.
     depth: u32,
 }
 
 /// The children of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Children {
-    /// The first of them.
+    /// The first child.
     pub(crate) first: u32,
     pub(crate) count: u32,
 }
 
 impl Children {
-    /// How many there are: one to four.
+    /// Returns the number of children: one to four.
     #[inline(always)]
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "an inner node has children")]
@@ -118,13 +120,13 @@ impl Children {
         self.count as usize
     }
 
-    /// Their ids, ascending.
+    /// Returns the ids of the children, ascending.
     #[inline]
     pub fn iter(self) -> impl DoubleEndedIterator<Item = NodeId> + ExactSizeIterator {
         (self.first..self.first + self.count).map(NodeId)
     }
 
-    /// Their ids, and then others, up to four.
+    /// Returns the ids of the children, followed by other ids up to four.
     #[inline(always)]
     #[must_use]
     pub const fn lanes(self) -> [NodeId; FAN] {
@@ -134,7 +136,7 @@ impl Children {
 }
 
 impl Topology {
-    /// The tree of so many points, which are not none.
+    /// Creates the tree of `points` points, which must not be zero.
     pub(crate) fn new(points: u32, leaf_size: u32) -> Self {
         let leaves = points.div_ceil(leaf_size);
         // At the lowest binary depth each node has two to four leaves.
@@ -144,8 +146,8 @@ impl Topology {
         Self { points, leaf_size, inner, leaves, bottom, depth }
     }
 
-    /// The first node of a level, given whether the root has two children only: one third of what the next
-    /// level has, less rounding.
+    /// Returns the first node of a level: a third of the level's size, rounded. `is_odd` is 1 if
+    /// the root has only two children.
     const fn level_start(is_odd: u32, level: u32) -> u32 {
         if is_odd == 0 || level == 0 {
             ((1 << (2 * level)) - 1) / 3
@@ -154,13 +156,13 @@ impl Topology {
         }
     }
 
-    /// Whether the root has two children only, as a number.
+    /// Returns 1 if the root has only two children, otherwise 0.
     #[inline(always)]
     const fn is_odd(&self) -> u32 {
         self.depth % 2
     }
 
-    /// The leaves of part `j` at a binary depth.
+    /// Returns the leaves of part `j` at a binary depth.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "at most the number of leaves")]
     fn leaves_at(&self, depth: u32, j: u32) -> Range<u32> {
@@ -169,34 +171,34 @@ impl Topology {
         (parts >> depth) as u32..((parts + leaves) >> depth) as u32
     }
 
-    /// Number of nodes, leaves included.
+    /// Returns the number of nodes, leaves included.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "a tree has a root")]
     pub const fn len(&self) -> usize {
         (self.inner + self.leaves) as usize
     }
 
-    /// All nodes.
+    /// Returns all nodes.
     #[must_use]
     pub fn ids(&self) -> impl DoubleEndedIterator<Item = NodeId> + ExactSizeIterator + use<> {
         (0..self.inner + self.leaves).map(NodeId)
     }
 
-    /// Number of nodes that have children.
+    /// Returns the number of nodes that have children.
     #[inline]
     #[must_use]
     pub const fn inner(&self) -> usize {
         self.inner as usize
     }
 
-    /// Number of leaves.
+    /// Returns the number of leaves.
     #[inline]
     #[must_use]
     pub const fn leaves(&self) -> usize {
         self.leaves as usize
     }
 
-    /// Points of a full leaf.
+    /// Returns the number of points in a full leaf.
     #[inline]
     #[must_use]
     pub const fn leaf_size(&self) -> usize {
@@ -217,7 +219,7 @@ impl Topology {
         id.0 < self.inner + self.leaves
     }
 
-    /// The leaf with this number.
+    /// Returns the leaf with this number.
     #[inline(always)]
     #[must_use]
     #[expect(clippy::cast_possible_truncation, reason = "leaves are counted in 32 bits")]
@@ -225,21 +227,21 @@ impl Topology {
         NodeId(self.inner + number as u32)
     }
 
-    /// The number of a leaf.
+    /// Returns the number of a leaf.
     #[inline(always)]
     #[must_use]
     pub const fn leaf_number(&self, leaf: NodeId) -> usize {
         (leaf.0 - self.inner) as usize
     }
 
-    /// The leaf with a point.
+    /// Returns the leaf of a point.
     #[inline]
     #[must_use]
     pub const fn leaf_of(&self, point: usize) -> NodeId {
         self.leaf(point / self.leaf_size as usize)
     }
 
-    /// The points of a leaf, by its number.
+    /// Returns the points of a leaf, by its number.
     #[inline(always)]
     #[must_use]
     pub fn points_of_leaf(&self, number: usize) -> Range<usize> {
@@ -247,7 +249,7 @@ impl Topology {
         first..(self.points as usize).min(first + self.leaf_size())
     }
 
-    /// The children of an inner node.
+    /// Returns the children of an inner node.
     #[inline(always)]
     #[must_use]
     pub fn children(&self, id: NodeId) -> Children {
@@ -261,7 +263,7 @@ impl Topology {
         }
     }
 
-    /// The children of the children of an inner node.
+    /// Returns the grandchildren of an inner node.
     #[inline(always)]
     #[must_use]
     pub fn grandchildren(&self, id: NodeId) -> Grandchildren {
@@ -274,7 +276,7 @@ impl Topology {
             return Grandchildren { nodes: LaneNodes::repeated(children), lanes, parents: [id; FAN] };
         }
         let (starts, lanes) = if first < self.bottom {
-            // They follow each other as their parents do.
+            // They are consecutive, as their parents are.
             let next = self.children(NodeId(first)).first;
             ([next, next + 4, next + 8, next + 12], (1 << (4 * count)) - 1)
         } else {
@@ -292,7 +294,8 @@ impl Topology {
         Grandchildren { nodes, lanes, parents: [parent(0), parent(1), parent(2), parent(3)] }
     }
 
-    /// The parent of a node, and which of its children the node is; `None` of the root.
+    /// Returns the parent of a node and the node's position among its children; `None` for the
+    /// root.
     #[inline]
     #[must_use]
     pub fn parent(&self, id: NodeId) -> Option<(NodeId, usize)> {
@@ -306,12 +309,12 @@ impl Topology {
             return Some((NodeId(self.bottom + j), (number - self.leaves_at(self.depth, j).start) as usize));
         }
         let place = id.0 - 1 + 2 * self.is_odd();
-        // The two children of a root are the last two of four.
+        // If the root has two children, they are the last two of four positions.
         let lane = if place < 4 { place - 2 * self.is_odd() } else { place % 4 };
         Some((NodeId(place / 4), lane as usize))
     }
 
-    /// The leaves under a node, by their numbers.
+    /// Returns the numbers of the leaves under a node.
     #[inline]
     #[must_use]
     pub fn leaves_under(&self, id: NodeId) -> Range<usize> {
@@ -329,7 +332,7 @@ impl Topology {
         leaves.start as usize..leaves.end as usize
     }
 
-    /// The points under a node.
+    /// Returns the points under a node.
     #[inline]
     #[must_use]
     pub fn points(&self, id: NodeId) -> Range<usize> {
@@ -337,13 +340,13 @@ impl Topology {
         leaves.start * self.leaf_size()..(self.points as usize).min(leaves.end * self.leaf_size())
     }
 
-    /// The leaves of a half.
+    /// Returns the leaves of a half.
     pub(crate) fn leaves_of(&self, half: Half) -> Range<usize> {
         let leaves = self.leaves_at(half.depth, half.j);
         leaves.start as usize..leaves.end as usize
     }
 
-    /// The inner node that a half is, if it is one.
+    /// Returns the inner node that corresponds to a half, if there is one.
     pub(crate) fn node_of(&self, Half { depth, j }: Half) -> Option<NodeId> {
         let level = depth.div_ceil(2);
         let is_kept = depth == 0 || depth <= self.depth && depth % 2 == self.depth % 2;
@@ -351,7 +354,7 @@ impl Topology {
     }
 }
 
-/// One of the parts into which halving again and again divides the leaves.
+/// One of the parts into which repeated halving divides the leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Half {
     depth: u32,
@@ -362,7 +365,7 @@ impl Half {
     /// All leaves.
     pub(crate) const ALL: Self = Self { depth: 0, j: 0 };
 
-    /// Its two halves.
+    /// Returns the two halves of this half.
     pub(crate) fn halves(self) -> [Self; 2] {
         [0, 1].map(|k| Self { depth: self.depth + 1, j: 2 * self.j + k })
     }

@@ -1,5 +1,5 @@
-//! The tree as it is stored and read: the boxes of siblings side by side, and what their enclosures reach
-//! further beside them.
+//! The tree as it is stored and read: the boxes of siblings side by side, with their growths in a
+//! separate array.
 
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::prelude::*;
@@ -16,20 +16,20 @@ use crate::bounds::growth::Growth;
 use crate::bounds::part::Part;
 use crate::tree::topology::{Children, FAN, Grandchildren, NodePair, Topology};
 
-/// Pairs of children of two nodes, and grandchildren of one.
+/// The number of pairs of children of two nodes, and of grandchildren of one.
 pub(crate) const LANES: usize = FAN * FAN;
 
-/// A number of each of four siblings.
+/// One number for each of four siblings.
 pub(crate) type Lanes = [f32; FAN];
 
-/// The boxes of up to four children. Lanes without a child are zero.
+/// The boxes of up to four children. Unused lanes are zero.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Siblings {
     pub(crate) centre: [Lanes; 3],
     pub(crate) half: [Lanes; 3],
     pub(crate) axes: [[Lanes; 3]; 3],
-    /// The greatest local radius of the points of each.
+    /// The greatest local radius of the points in each box.
     pub(crate) reach: Lanes,
 }
 
@@ -52,7 +52,7 @@ impl Siblings {
         self.reach[lane] = bounds.reach;
     }
 
-    /// The box in a lane.
+    /// Returns the box in a lane.
     #[inline]
     pub(crate) fn get(&self, lane: usize) -> OrientedBox {
         let of = |rows: &[Lanes; 3]| [rows[0][lane], rows[1][lane], rows[2][lane]];
@@ -64,7 +64,7 @@ impl Siblings {
         }
     }
 
-    /// The squared distances of a place from the four boxes.
+    /// Returns the squared distance of a position from each of the four boxes.
     #[inline(always)]
     pub(crate) fn distances_sq<S: Simd>(&self, simd: S, [x, y, z]: [f32; 3]) -> f32x4<S> {
         let load = f32x4::load_array_ref;
@@ -80,7 +80,7 @@ impl Siblings {
     }
 }
 
-/// What the enclosures of up to four children reach further than their boxes, sixteen bits a length.
+/// The growths of up to four children, sixteen bits for each length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 #[repr(C, align(16))]
 pub struct Growths(pub(crate) [[u32; FAN]; 3]);
@@ -98,36 +98,36 @@ impl Growths {
     }
 }
 
-/// The box of the root, which has no siblings, and what its enclosures reach further, by [`Part`].
+/// The box of the root, which has no siblings, and its growths by [`Part`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct Root {
     pub(crate) bounds: OrientedBox,
     pub(crate) growths: [Growth; 2],
 }
 
-/// The nodes over the points of a scan, and the boxes about them.
+/// The nodes over the points of a scan, and their bounding boxes.
 #[derive(Debug, Clone, Copy)]
 pub struct Tree<'a> {
     pub(crate) topology: &'a Topology,
     pub(crate) root: &'a Root,
     /// The boxes of the children of each inner node.
     pub(crate) siblings: &'a [Siblings],
-    /// What the enclosures of the same children reach further, by [`Part`].
+    /// The growths of the same children, by [`Part`].
     pub(crate) growths: [&'a [Growths]; 2],
 }
 
 impl<'a> Tree<'a> {
-    /// Which nodes there are, and which points lie under them.
+    /// Returns the topology of the tree: its nodes and the points under each.
     #[inline]
     #[must_use]
     pub fn topology(&self) -> &'a Topology {
         self.topology
     }
 
-    /// A box about the discs of a node's points, and about their balls.
+    /// Returns the box around the discs and balls of a node's points.
     ///
     /// # Panics
-    /// When there is no such node, as all here.
+    /// If there is no such node. The same holds for the other methods.
     #[inline]
     #[must_use]
     pub fn bounds(&self, id: NodeId) -> OrientedBox {
@@ -137,7 +137,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// What the box of a node must grow by to contain this part of it.
+    /// Returns the growth that makes the box of a node contain this part of it.
     #[inline]
     pub(crate) fn growth(&self, part: Part, id: NodeId) -> Growth {
         match self.topology.parent(id) {
@@ -146,7 +146,7 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// A box about a node's part of the surface or of the obstacle, proven to contain it
+    /// Returns a box that provably contains a node's part of the surface or of the obstacle
     /// (`docs/theory/certificates.md`, `docs/theory/obstacle.md`). It has the axes of the node's
     /// [box](Self::bounds), and contains it.
     #[inline]
@@ -155,7 +155,7 @@ impl<'a> Tree<'a> {
         self.growth(part, id).of(&self.bounds(id))
     }
 
-    /// The greatest local radius of the points under a node.
+    /// Returns the greatest local radius of the points under a node.
     #[inline]
     #[must_use]
     pub fn reach(&self, id: NodeId) -> f32 {
@@ -165,16 +165,16 @@ impl<'a> Tree<'a> {
         }
     }
 
-    /// Half the length of the longest child of an inner node.
+    /// Returns half the length of the longest child of an inner node.
     #[inline(always)]
     fn longest_below(&self, id: NodeId) -> f32 {
         let [a, b, c, d] = self.siblings[id.index()].half[0];
         let greater = |a: f32, b: f32| if a > b { a } else { b };
-        // Lanes without a child are zero.
+        // Unused lanes are zero.
         greater(greater(a, b), greater(c, d))
     }
 
-    /// Box and enclosure of this part of a node.
+    /// Returns the box and the enclosure of this part of a node.
     #[inline(always)]
     #[must_use]
     pub fn bounds_of(&self, part: Part, id: NodeId) -> NodeBounds<f32> {
@@ -183,17 +183,19 @@ impl<'a> Tree<'a> {
         NodeBounds { centre, half, axes, low, high }
     }
 
-    /// Those of the children of an inner node; what there is in other lanes says nothing.
+    /// Returns the boxes and enclosures of the children of an inner node. Unused lanes are
+    /// unspecified.
     ///
     /// # Panics
-    /// When it is no inner node, as below.
+    /// If the node is not an inner node. The same holds for the next method.
     #[inline(always)]
     #[must_use]
     pub fn bounds_of_children<S: Simd>(&self, simd: S, part: Part, id: NodeId) -> NodeBounds<f32x4<S>> {
         self.siblings(simd, part, id.index())
     }
 
-    /// Those of the grandchildren of a node, in the same order; what there is in other lanes says nothing.
+    /// Returns the boxes and enclosures of the grandchildren of a node, in the same order. Unused
+    /// lanes are unspecified.
     #[inline(always)]
     #[must_use]
     pub fn bounds_of_grandchildren<S: Simd>(
@@ -235,17 +237,18 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// The first lanes of four, as bits: those of children.
+/// Returns the lanes of some children, as bits.
 #[inline(always)]
 pub(crate) fn lanes_of(children: Children) -> u32 {
     (1 << children.len()) - 1
 }
 
-/// Which nodes of a pair that are not both leaves stay whole: leaves, and those that are less than half as
-/// long as the other, of which lengths are `scale` times as long. `leaves`: which are leaves.
+/// Returns which nodes of a pair, not both of them leaves, are not split: leaves, and a node less
+/// than half as long as the other. `leaves` tells which nodes are leaves; `scale` converts lengths
+/// of b to a's frame.
 ///
 /// # Panics
-/// When there are no such nodes.
+/// If there are no such nodes.
 #[inline]
 #[must_use]
 pub fn whole([a, b]: [&Tree<'_>; 2], pair: NodePair, leaves: [bool; 2], scale: f32) -> [bool; 2] {
@@ -253,43 +256,46 @@ pub fn whole([a, b]: [&Tree<'_>; 2], pair: NodePair, leaves: [bool; 2], scale: f
         return leaves;
     }
     let (a, b) = (a.longest_below(pair.a), b.longest_below(pair.b) * scale);
-    // With infinite or NaN lengths neither node is kept whole.
+    // With infinite or NaN lengths both nodes are split.
     let (long_a, long_b) = (a > 2.0 * b, b > 2.0 * a);
     [long_b && !long_a, long_a && !long_b]
 }
 
-// Closures may be compiled apart, without the instruction set of their caller.
+// Functions instead of closures: those may be compiled separately, without the instruction set of
+// their caller.
 
-/// Four vectors by their coordinates.
+/// Loads four vectors from their coordinates.
 #[inline(always)]
 pub(crate) fn rows<S: Simd>(simd: S, [x, y, z]: &[Lanes; 3]) -> [f32x4<S>; 3] {
     [f32x4::load_array_ref(simd, x), f32x4::load_array_ref(simd, y), f32x4::load_array_ref(simd, z)]
 }
 
-/// The lower and the upper halves of four numbers, which are the upper halves of lengths.
+/// Splits four packed pairs of halves into the lengths of the lower and of the upper halves.
 #[inline(always)]
 fn halves<S: Simd>(simd: S, both: &[u32; FAN]) -> (f32x4<S>, f32x4<S>) {
     let both = u32x4::load_array_ref(simd, both);
     ((both << 16).bitcast(), (both & 0xffff_0000).bitcast())
 }
 
-/// Box and enclosure of a node, with `f32` for `V`; of several nodes, a lane each, with a vector.
+/// The box and the enclosure of a node if `V` is `f32`; of several nodes, one in each lane, if it
+/// is a vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NodeBounds<V> {
-    /// The middles of the boxes.
+    /// The centres of the boxes.
     pub centre: [V; 3],
     /// Half their edge lengths.
     pub half: [V; 3],
     /// Unit directions of the edges.
     pub axes: [[V; 3]; 3],
-    /// By how much the enclosures reach further against the axes; infinite where nothing bounds them.
+    /// The lengths by which the enclosures exceed the boxes against the axes; infinite if
+    /// unbounded.
     pub low: [V; 3],
-    /// The same along the axes.
+    /// The lengths by which the enclosures exceed the boxes along the axes; infinite if unbounded.
     pub high: [V; 3],
 }
 
 impl<V: Copy> NodeBounds<V> {
-    /// The same bounds with each number replaced.
+    /// Returns the same bounds with each number replaced.
     #[inline(always)]
     #[must_use]
     pub fn map<W>(&self, replaced: impl Fn(V) -> W) -> NodeBounds<W> {
@@ -309,7 +315,7 @@ fn each<V, W>([x, y, z]: [V; 3], replaced: &impl Fn(V) -> W) -> [W; 3] {
     [replaced(x), replaced(y), replaced(z)]
 }
 
-/// The lanes of four after each other.
+/// Concatenates the lanes of four vectors.
 #[inline(always)]
 fn combined<S: Simd>([a, b, c, d]: [[f32x4<S>; 3]; FAN]) -> [f32x16<S>; 3] {
     [
@@ -319,7 +325,7 @@ fn combined<S: Simd>([a, b, c, d]: [[f32x4<S>; 3]; FAN]) -> [f32x16<S>; 3] {
     ]
 }
 
-/// The tree while it is built: boxes alone.
+/// The tree during a build: boxes without growths.
 pub(crate) struct Bare {
     topology: Topology,
     root: Root,
@@ -327,7 +333,7 @@ pub(crate) struct Bare {
 }
 
 impl Bare {
-    /// With these boxes of all nodes, in the order of their ids.
+    /// Creates a tree with the boxes of all nodes, in the order of their ids.
     pub(crate) fn new(
         work: &Workspace,
         topology: Topology,
@@ -344,7 +350,7 @@ impl Bare {
     }
 }
 
-/// Sets `out` to the boxes of all nodes, which are in the order of their ids, as those of siblings.
+/// Rearranges the boxes of all nodes, in the order of their ids, into those of siblings.
 pub(crate) fn siblings(topology: &Topology, boxes: &[OrientedBox], out: &mut [Siblings]) {
     fill(out, |i| {
         let mut siblings = Siblings::NONE;
@@ -355,7 +361,7 @@ pub(crate) fn siblings(topology: &Topology, boxes: &[OrientedBox], out: &mut [Si
     });
 }
 
-/// The same of what enclosures reach further.
+/// Rearranges the growths of all nodes, in the order of their ids, into those of siblings.
 pub(crate) fn growths_of_siblings(topology: &Topology, growths: &[Growth], out: &mut [Growths]) {
     fill(out, |i| {
         let mut siblings = Growths::default();

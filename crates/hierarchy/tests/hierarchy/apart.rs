@@ -1,4 +1,4 @@
-//! Exclusion by coverings against its naive twin.
+//! Exclusion by coverings compared with a naive implementation.
 use nearmiss_geometry::{NodeId, PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, Extent, NodePair, OrientedBox, PointHierarchy, Relative, apart};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
@@ -17,7 +17,7 @@ fn moved(pose: &Pose, b: &OrientedBox) -> Solid {
     }
 }
 
-/// The balls of a node in a pose, and its volume.
+/// Returns the balls of a node in a pose (centres and radius), and its volume.
 fn covering(scan: &PointHierarchy, node: usize, pose: &Pose, extent: Extent) -> (Vec<[f64; 3]>, f64, Solid) {
     let slices = scan.slices();
     let centres = slices.samples(node).iter().map(|i| pose.apply(slices.position(i).map(f64::from)));
@@ -30,7 +30,8 @@ fn covering(scan: &PointHierarchy, node: usize, pose: &Pose, extent: Extent) -> 
     (centres.collect(), pose.scale() * f64::from(radius), moved(pose, &volume))
 }
 
-/// How many pairs of nodes there are, are excluded, and are not though the twin would.
+/// Returns the number of node pairs, of excluded ones, and of those that only the naive
+/// implementation excludes.
 fn compare(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose, reach: f64, extent: Extent) -> [u32; 3] {
     let motion = Relative::new(pose, 10.0);
     let id = |k: usize| NodeId(u32::try_from(k).unwrap());

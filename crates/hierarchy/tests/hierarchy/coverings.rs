@@ -1,4 +1,4 @@
-//! Samples and coverings against their definitions.
+//! Samples and coverings compared with their definitions.
 use nearmiss_geometry::{NodeId, PointCloud};
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, OrientedBox, PointHierarchy};
 use nearmiss_surface::{Status, project};
@@ -7,7 +7,7 @@ use nearmiss_testdata::oracle::{Disc, Solid, covering_radius, to_nearest};
 
 const OPTIONS: [(u32, u32); 4] = [(16, 16), (4, 32), (64, 8), (16, 24)];
 
-/// The scans of all kinds of clouds, with several sizes of leaves and samples.
+/// Scans of all kinds of clouds, with several sizes of leaves and samples.
 fn scans(points: u32) -> impl Iterator<Item = (CloudKind, PointHierarchy)> {
     let clouds = CloudKind::ALL.into_iter().zip(1_u64..).filter_map(move |(kind, seed)| {
         let cloud = PointCloud::from_positions(&arbitrary::cloud(kind, points, seed)).ok()?;
@@ -29,17 +29,17 @@ fn solid(b: &OrientedBox) -> Solid {
     }
 }
 
-/// The node with an index.
+/// Returns the id of the node with an index.
 fn id(node: usize) -> NodeId {
     NodeId(u32::try_from(node).unwrap())
 }
 
-/// The samples of a node, in double precision.
+/// Returns the samples of a node, in double precision.
 fn centres(scan: &PointHierarchy, node: usize) -> Vec<[f64; 3]> {
     scan.slices().samples(node).iter().map(|i| scan.positions()[i].map(f64::from)).collect()
 }
 
-/// The enclosures of the leaves under a node.
+/// Returns the enclosures of the leaves under a node.
 fn leaves(scan: &PointHierarchy, node: usize) -> Vec<Solid> {
     let topology = scan.topology();
     let under = topology.leaves_under(id(node));
@@ -64,8 +64,8 @@ fn samples_are_distinct_points_of_their_node() {
     assert!(lists > 500, "{lists} lists");
 }
 
-/// Whatever is ok, zero of f or not, is in the coverings of all nodes of its nearest point; and so are the
-/// discs, with room for no more than a box about them asks for.
+/// Every position of status ok, zero of f or not, is in the coverings of all nodes above its
+/// nearest point. Radii are no larger than those that cover the enclosures of leaves.
 #[test]
 fn coverings_contain_what_is_ok_and_are_no_larger_than_boxes_ask_for() {
     let (mut places, mut nodes, mut share) = (0, 0, 0.0);
@@ -74,7 +74,7 @@ fn coverings_contain_what_is_ok_and_are_no_larger_than_boxes_ask_for() {
         let mut x = [0.0; 3];
         for i in 0..4 * scan.len() {
             let i = i % scan.len();
-            // From the last place or from a point, so that some wander to the rim.
+            // Starts from the last position or from a point, so that some walks reach the rim.
             let reach = f64::from(scan.radii()[i]);
             let from = if i % 3 == 0 { scan.positions()[i].map(f64::from) } else { x };
             let away = arbitrary::point_in(&mut random, 1.2 * reach);
@@ -97,7 +97,7 @@ fn coverings_contain_what_is_ok_and_are_no_larger_than_boxes_ask_for() {
     assert!(places > 10_000 && nodes > 2000 && share < 0.7, "{places} places, {nodes} nodes, {share}");
 }
 
-/// Fails unless `x` is in the balls of all nodes that hold its nearest point.
+/// Asserts that `x` is in the balls of all nodes that contain its nearest point.
 fn check_covered(kind: CloudKind, scan: &PointHierarchy, x: [f64; 3]) {
     let positions: Vec<[f64; 3]> = scan.positions().iter().map(|p| p.map(f64::from)).collect();
     let nearest = to_nearest(&positions, x);
@@ -128,13 +128,13 @@ fn surface_points_are_in_the_coverings_of_every_node_of_their_nearest_point() {
     assert!(found > 5000, "{found} surface points");
 }
 
-/// Definition 4 as it is measured: each disc is in one ball, and the radius is no larger than discs with
-/// their thickness, and balls, ask for.
+/// Definition 4 as measured: each disc is in one ball, and the radius is no larger than discs with
+/// their thickness, and balls, require.
 #[test]
 fn sampling_radii_equal_the_twin() {
     let (mut nodes, mut exact) = (0, 0);
     for (kind, scan) in scans(300) {
-        // The least radius at which one ball contains the cylinder about a point.
+        // The least radius at which one ball contains the cylinder around a point.
         let radius_of = |i: usize, centres: &[[f64; 3]], across: f64, height: f64| {
             let [p, n] = [scan.positions()[i], scan.normals()[i]].map(|v| v.map(f64::from));
             let rims = [height, -height].map(|h| Disc {

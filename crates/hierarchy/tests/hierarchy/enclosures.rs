@@ -1,11 +1,12 @@
-//! Enclosures against the surface itself: zeros of f found by projection, and places of status ok, driven
-//! outwards as long as they stay ok, each in the enclosure of every node that holds its nearest point.
+//! Enclosures compared with the surface itself. Zeros of f are found by projection; positions of
+//! status ok are moved outwards as long as they stay ok. Each must be in the enclosures of all
+//! nodes that contain its nearest point.
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, OrientedBox, PointHierarchy};
 use nearmiss_surface::{Bandwidth, Kernel, Status, SurfaceOptions, project};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-/// How far `x` is outside the box, in double precision.
+/// Returns the distance by which `x` is outside the box, in double precision.
 fn outside(bounds: &OrientedBox, x: [f64; 3]) -> f64 {
     let d = [0, 1, 2].map(|k| x[k] - f64::from(bounds.centre[k]));
     let along = |k: usize| (0..3).map(|i| f64::from(bounds.axes[k][i]) * d[i]).sum::<f64>();
@@ -18,7 +19,7 @@ fn nearest(scan: &PointHierarchy, x: [f64; 3]) -> usize {
     least.unwrap().0
 }
 
-/// Fails unless `x` is in the enclosures of all nodes that hold its nearest point.
+/// Asserts that `x` is in the enclosures of all nodes that contain its nearest point.
 fn check_enclosed(scan: &PointHierarchy, enclosures: &[OrientedBox], x: [f64; 3]) {
     let p = nearest(scan, x);
     for id in scan.topology().ids() {
@@ -29,8 +30,8 @@ fn check_enclosed(scan: &PointHierarchy, enclosures: &[OrientedBox], x: [f64; 3]
     }
 }
 
-/// Starts at `count` places near points of `scan` where the status is ok, and takes steps that lead further
-/// out of the leaf's enclosure and keep it ok. How many starts there were.
+/// Starts at `count` positions near points of `scan`, and takes steps that lead further out of the
+/// leaf's enclosure while the status stays ok. Returns the number of starts with status ok.
 fn driven_outwards(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
     let mut scratch = GatherScratch::default();
     let mut random = arbitrary::rng(seed);
@@ -64,7 +65,8 @@ fn driven_outwards(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
     starts
 }
 
-/// A grid with a hole in the plane across the given axis; its borders lie along the others.
+/// Returns a grid with a hole in the plane across the given axis; its borders are along the other
+/// axes.
 fn flat_grid(axis: usize, n: i32) -> Vec<[f64; 3]> {
     let mut points = Vec::new();
     for i in 0..2 * n {
@@ -102,7 +104,8 @@ fn all_that_is_ok_is_enclosed() {
     assert!(starts > 3000, "{starts} starts");
 }
 
-/// Projects `count` places near points of `scan`; how many surface points were found, all of them enclosed.
+/// Projects `count` positions near points of `scan`, and asserts that the surface points found are
+/// enclosed. Returns their number.
 fn enclosed(scan: &PointHierarchy, count: usize, seed: u64) -> usize {
     let mut scratch = GatherScratch::default();
     let mut random = arbitrary::rng(seed);

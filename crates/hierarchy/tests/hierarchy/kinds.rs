@@ -1,4 +1,4 @@
-//! What points are said to be, on clouds whose nature is known.
+//! The kinds of points on clouds of known nature.
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
 use nearmiss_testdata::arbitrary::{gaussian, point_in, rng};
@@ -11,7 +11,7 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     scan
 }
 
-/// A square lattice of n × n points.
+/// Returns a square lattice of n × n points.
 fn lattice(n: u32, spacing: f64, height: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
     let side = |i: u32| f64::from(i) * spacing;
     let all = (0..n).flat_map(|i| (0..n).map(move |j| [side(i), side(j)]));
@@ -42,7 +42,7 @@ fn rings_of_a_scanner_make_a_surface() {
 
 #[test]
 fn quantised_sheets_are_surfaces() {
-    // A slope and a wave, heights rounded to the grid's step.
+    // A slope and a wave, with heights rounded to multiples of a step.
     let rounded = |z: f64| (z / 0.01).round() * 0.01;
     for points in [
         lattice(60, 0.01, |x, _| rounded(0.37 * x)),
@@ -51,7 +51,7 @@ fn quantised_sheets_are_surfaces() {
         let scan = prepared(&points);
         assert!(scan.usable() > 0.97, "{} usable", scan.usable());
     }
-    // Each return twice, an error of a hundredth of the spacing apart.
+    // Each return twice, with a deviation of a hundredth of the spacing.
     let mut rng = rng(4);
     let twice = lattice(50, 0.1, |_, _| 0.0);
     let again: Vec<[f64; 3]> = twice.iter().map(|p| p.map(|x| x + 0.001 * gaussian(&mut rng))).collect();
@@ -86,7 +86,7 @@ fn blobs_wires_and_lone_points_are_named() {
 
 #[test]
 fn nothing_is_interpolated_beyond_the_reach() {
-    // A twentieth of the points, thirty times as far from each other, and too far away to be smoothed.
+    // A twentieth of the points, with thirty times the spacing, too far away to be smoothed.
     let far = lattice(15, 3.0, |_, _| 0.0).into_iter().map(|[x, y, z]| [x + 500.0, y, z]);
     let points: Vec<[f64; 3]> = lattice(70, 0.1, |_, _| 0.0).into_iter().chain(far).collect();
     let scan = prepared(&points);
@@ -103,7 +103,7 @@ fn nothing_is_interpolated_beyond_the_reach() {
             assert!((ball / (0.5 * reach) - 1.0).abs() < 1e-5, "point {i}: {ball}");
         }
     }
-    // A greater reach bridges what the default does not.
+    // A greater reach bridges gaps that the default does not.
     let cloud = PointCloud::from_positions(&points).unwrap();
     let wide = PointHierarchy::build(&cloud, &BuildOptions::default().with_reach(12.0)).unwrap();
     assert!(wide.share(PointKind::Stray) < 1e-9 && wide.share(PointKind::Sheet) > 0.9);

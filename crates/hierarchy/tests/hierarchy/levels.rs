@@ -1,4 +1,4 @@
-//! f' of a node against the naive twin of f over its samples with one bandwidth.
+//! f' of a node compared with a naive implementation of f over its samples with one bandwidth.
 
 use nearmiss_geometry::{NodeId, PointCloud};
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy};
@@ -21,7 +21,7 @@ fn f_of_a_node_equals_the_twin_over_its_samples() {
                 let points = scan.topology().points(NodeId(u32::try_from(id).unwrap()));
                 let count = points.len() as f64;
                 let samples: Vec<usize> = slices.samples(id).iter().collect();
-                // Eq. 10 and 9.
+                // Eq. 10 and 9 of Klein & Zachmann 2004.
                 let thinning = (count / samples.len() as f64).sqrt();
                 let squares = slices.radii[points].iter().map(|&r| f64::from(r).powi(2)).sum::<f64>();
                 let reach = match kernel {

@@ -1,4 +1,4 @@
-//! The hierarchy: everything is one program, which links once.
+//! Tests of the hierarchy, as one program that is linked once.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod apart;

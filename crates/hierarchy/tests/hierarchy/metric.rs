@@ -1,4 +1,4 @@
-//! Discs fitted anew follow from what is told of the surface, as those of a build do.
+//! Discs that are fitted again follow from the given f, as those of a build do.
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy, PointKind};
 use nearmiss_surface::{Evaluation, Metric, Status};
@@ -16,7 +16,7 @@ fn clouds() -> Vec<Vec<[f64; 3]>> {
     clouds
 }
 
-/// f by straight distances, and all points whose horizons reach.
+/// Returns f by straight distances, and adds all points that support it to `heard`.
 fn straight(scan: &PointHierarchy, i: u32, scratch: &mut GatherScratch, heard: &mut Vec<u32>) -> Evaluation {
     let p = scan.positions()[i as usize];
     for (j, (q, &radius)) in (0..).zip(scan.positions().iter().zip(scan.radii())) {
@@ -28,7 +28,7 @@ fn straight(scan: &PointHierarchy, i: u32, scratch: &mut GatherScratch, heard: &
     scan.evaluate_near(i as usize, p.map(f64::from), scratch)
 }
 
-/// The twin of a fit by another metric is the build, which does the same with other loops.
+/// A fit by the Euclidean metric must equal the build, which does the same with other loops.
 #[test]
 fn a_fit_by_straight_distances_changes_nothing() {
     for points in clouds() {
@@ -37,7 +37,7 @@ fn a_fit_by_straight_distances_changes_nothing() {
         again.use_metric(Metric::Euclidean, |i, scratch, heard| straight(&scan, i, scratch, heard));
         assert_eq!(again.sanity_check(), Ok(()), "an invariant");
         assert_eq!(again.meta(), scan.meta(), "metadata");
-        // Planes are fitted before the last tree is made, so sums have another order.
+        // Planes are fitted before the last tree is built, so sums have another order.
         let mut differ = 0;
         let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * a.abs().max(1.0);
         for i in 0..scan.len() {
@@ -50,8 +50,8 @@ fn a_fit_by_straight_distances_changes_nothing() {
             assert!(!same || near(again.discs().get(i), scan.discs().get(i)), "the disc of point {i}");
             differ += usize::from(!same);
         }
-        // A vote is of the nearest, and takes the normal of the nearest of a sheet: of several equally near,
-        // of any.
+        // A vote uses the nearest neighbours, and takes the normal of the nearest one on a sheet;
+        // ties can be broken either way.
         assert!(20 * differ <= scan.len(), "{differ} points");
         if differ > 0 {
             continue;
@@ -75,7 +75,7 @@ fn a_fit_by_straight_distances_changes_nothing() {
 fn what_a_fit_says_is_kept() {
     let mut scan = prepared(&arbitrary::cloud(CloudKind::Sphere, 700, 5));
     let old = scan.clone();
-    // Oriented, though against the axes of cones.
+    // Oriented, but against the leaves' main axes.
     let inwards: Vec<[f32; 3]> = (old.positions().iter().zip(old.normals()))
         .map(|(p, n)| if (0..3).map(|k| p[k] * n[k]).sum::<f32>() > 0.0 { n.map(|c| -c) } else { *n })
         .collect();
@@ -84,7 +84,7 @@ fn what_a_fit_says_is_kept() {
     let [upright, tilted] = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]];
     let oriented = scan.clone();
     scan.use_metric(Metric::Geodesic, |i, _: &mut (), heard| {
-        // Heard by themselves alone, points are at a border.
+        // Points that only support themselves are at a border.
         heard.push(i);
         Evaluation {
             f: 0.0,
@@ -102,8 +102,8 @@ fn what_a_fit_says_is_kept() {
     let mut kept = 0;
     for i in 0..scan.len() {
         if scan.kind(i) != kinds[i % 4] {
-            // The vote of the neighbours: noisy points join a sheet, and sheet points without company are
-            // noisy.
+            // The neighbours' vote: noisy points join a sheet, and sheet points without others
+            // around are noisy.
             let voted = if i % 4 == 2 { PointKind::Sheet } else { PointKind::Noisy };
             assert!(i % 4 < 3 && scan.kind(i) == voted, "point {i}");
             continue;

@@ -1,4 +1,4 @@
-//! What a sample of the points shows of spacing, borders and holes.
+//! Estimates of spacing, borders and holes from a sample of the points.
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_testdata::shapes::{Sampling, sphere};
@@ -7,8 +7,8 @@ fn built(points: &[[f64; 3]]) -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
-/// A plate of 100 by 100 points of spacing 1, without those strictly within a square of side `hole` in its
-/// middle.
+/// Returns a plate of 100 × 100 points of spacing 1, without those strictly within a central square
+/// of side `hole`.
 fn plate(hole: f64) -> Vec<[f64; 3]> {
     let mut points: Vec<[f64; 3]> =
         (0..100_u8).flat_map(|i| (0..100_u8).map(move |j| [f64::from(i), f64::from(j), 0.0])).collect();
@@ -30,12 +30,12 @@ fn a_closed_surface_has_neither_borders_nor_holes() {
 #[test]
 fn a_plate_has_a_border_and_a_hole() {
     let whole = built(&plate(0.0)).survey(0);
-    // 396 of 10,000.
+    // 396 of 10,000 points are at the border.
     assert!((0.025..0.055).contains(&whole.border) && whole.holes.is_empty(), "{whole:?}");
     let scan = built(&plate(24.0));
     let with_hole = scan.survey(0);
     assert!(with_hole.border > whole.border, "{} after {}", with_hole.border, whole.border);
-    // Widths are those across from the points: less near corners, never more than the hole's.
+    // Widths are measured across from the points: smaller near corners, never more than the hole's.
     let widest = with_hole.holes[with_hole.holes.len() - 1];
     assert!((20.0..28.0).contains(&widest), "{:?}", with_hole.holes);
     assert_eq!(with_hole, scan.survey(0), "the same seed, the same points");

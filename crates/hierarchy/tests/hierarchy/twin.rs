@@ -1,4 +1,5 @@
-//! The hierarchy against naive twins: radii, the implicit function everywhere, and its invariants.
+//! The hierarchy compared with naive implementations: radii, the implicit function everywhere, and
+//! invariants.
 use nearmiss_geometry::PointCloud;
 use nearmiss_hierarchy::{BuildOptions, GatherScratch, PointHierarchy, PointKind};
 use nearmiss_index::PointBlock;
@@ -63,14 +64,14 @@ fn radii_equal_the_twin() {
             let is_line = scan.kind(i) == PointKind::Line && found < expected;
             differ += u32::from((found / expected - 1.0).abs() > 1e-5 && !is_line);
         }
-        // Which of several equally near neighbours counts is open; it matters where they are judged as a
-        // line.
+        // Ties between equally near neighbours can be broken either way; this matters if they are
+        // judged as a line.
         let most = if matches!(kind, CloudKind::Lattice | CloudKind::Rings) { 20 } else { 0 };
         assert!(differ <= most, "{kind:?}: {differ} of {} radii differ", expected.len());
     }
 }
 
-/// Whether no threshold is so near that rounding could decide the status.
+/// Returns `true` if no threshold is so near that rounding could decide the status.
 fn is_clear(at: &oracle::Evaluation, x: [f64; 3]) -> bool {
     let [l1, l2, l3] = at.eigenvalues;
     let half = 0.5 * at.bandwidth.powi(2);
@@ -81,7 +82,8 @@ fn is_clear(at: &oracle::Evaluation, x: [f64; 3]) -> bool {
         && clear((l2 - l1) / (l1 + l2 + l3), oracle::GAP)
 }
 
-/// Compares f with the twin at points near the stored ones; returns how many were ok on both sides.
+/// Compares f with the naive implementation at points near the stored ones. Returns the number of
+/// points that are ok in both.
 fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
     let points = stored(scan);
     let radii: Vec<f64> = scan.radii().iter().map(|&r| f64::from(r)).collect();
@@ -97,7 +99,7 @@ fn compare(scan: &PointHierarchy, parameters: Parameters, seed: u64) -> usize {
                 assert_eq!(found.status, Status::Outside, "nothing reaches {x:?}");
                 continue;
             };
-            // A point whose horizon ends just here may fall on either side of it.
+            // A point whose support radius ends here may be on either side.
             if found.support as usize != expected.support {
                 assert!(
                     found.support.abs_diff(u32::try_from(expected.support).unwrap()) <= 2,
@@ -174,7 +176,7 @@ fn near_an_interior_sheet_the_function_is_ok() {
     assert!(ok >= 950, "{ok} of 1000");
 }
 
-/// f at `x` with all points of the scan offered.
+/// Returns f at `x`, with all points of the scan offered.
 fn by_all_points(scan: &PointHierarchy, x: [f64; 3]) -> Evaluation {
     Moments::about(Level::baseline(), scan.plan(), x, scan.blocks().iter().copied()).evaluate(scan.plan(), x)
 }
@@ -196,13 +198,14 @@ fn lists_and_instructions_change_no_bit() {
             let mut rng = arbitrary::rng(6);
             for i in (0..scan.len()).step_by(97) {
                 listed += usize::from(scan.neighbours(i / PointBlock::WIDTH).is_some());
-                // On the surface, near it, beyond what the list is complete for, and far off.
+                // On the surface, near it, beyond the range of the list, and far away.
                 for reach in [0.0, 0.5, 2.0, 6.0, 40.0] {
                     let offset = arbitrary::point_in(&mut rng, reach * f64::from(scan.radii()[i]));
                     let x = [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + offset[k]);
                     let expected = by_all_points(&scan, x);
                     for scratch in &mut scratches {
-                        // The block that the one before left in the scratch is near, or not.
+                        // The block left in the scratch by the previous evaluation may be near or
+                        // not.
                         assert_eq!(scan.evaluate_with(x, scratch), expected, "anywhere, at {x:?}");
                         assert_eq!(scan.evaluate_near(i, x, scratch), expected, "at a leaf, at {x:?}");
                         compared += 1;
@@ -256,7 +259,7 @@ fn where_f_was_asked_about_before_does_not_matter() {
         let mut x = scan.positions()[0].map(f64::from);
         for round in 0..1500 {
             assert_eq!(scan.evaluate_onward(x, &mut scratch), scan.evaluate(x), "{kind:?}, at {x:?}");
-            // From point to point by short steps, and now and then a long one.
+            // From point to point by short steps, with a long one now and then.
             let next = scan.nearest_point(x) as usize + if round % 40 == 0 { 1000 } else { 1 };
             let step = arbitrary::point_in(&mut rng, 0.5 * f64::from(scan.radii()[next % scan.len()]));
             x = [0, 1, 2].map(|k| f64::from(scan.positions()[next % scan.len()][k]) + step[k]);
@@ -286,7 +289,7 @@ fn threads_and_order_of_work_do_not_matter() {
 #[test]
 fn the_nearest_point_is_found_from_anywhere() {
     for kind in CloudKind::ALL {
-        // Many groups of blocks, so that lists name more than the first.
+        // Many groups of blocks, so that lists contain more than the first.
         let points = arbitrary::cloud(kind, 6_000, 6);
         let scan =
             PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default())
@@ -298,11 +301,11 @@ fn the_nearest_point_is_found_from_anywhere() {
             let off = arbitrary::point_in(&mut rng, far * [0.0, 0.01, 0.03, 3.0][k % 4]);
             let x = [0, 1, 2].map(|k| f64::from(scan.positions()[i][k]) + off[k]);
             let away = |p: &[f32; 3]| (0..3).map(|k| (f64::from(p[k]) - x[k]).powi(2)).sum::<f64>();
-            // The first of those as near.
+            // The first of equally near points.
             let nearest =
                 (0..).zip(scan.positions()).min_by(|a, b| away(a.1).total_cmp(&away(b.1))).unwrap().0;
             assert_eq!(scan.nearest_point(x), nearest, "{kind:?}, {x:?}");
-            // From any point, and from one near by, whose list is complete there.
+            // From any point, and from a close one whose list is complete there.
             for from in [k * 31 % scan.len(), i] {
                 assert_eq!(scan.nearest_point_near(from, x), nearest, "{kind:?}, {x:?} from {from}");
             }

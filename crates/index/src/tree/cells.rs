@@ -1,5 +1,5 @@
-//! A grid over the blocks of a tree: a small sphere begins at the blocks near the cell of its centre instead
-//! of at the root.
+//! A grid over the blocks of a tree. Queries with small spheres start at the blocks near the cell
+//! of the centre instead of at the root.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, mask32x16};
@@ -8,46 +8,49 @@ use nearmiss_lanes::wide::{Bits, bits, load, squared};
 
 use super::{BlockTree, Bounds};
 
-/// A cell takes eight bytes.
+/// The maximum number of cells for each point. A cell takes eight bytes.
 const CELLS_A_POINT: f64 = 1.0;
 
-/// Blocks are named by the cells that are so near, in cells: about a local radius where scans are of
-/// surfaces.
+/// The distance, in cell edges, up to which a cell lists blocks: about one local radius if the scan
+/// is of a surface.
 const MARGIN: f64 = 0.5;
 
-/// A cell names no more blocks; where there are more, the tree is as fast. On surfaces there are some six.
+/// The maximum number of blocks that a cell lists; with more, the tree is as fast. On surfaces
+/// there are about six.
 const MOST_NAMED: u32 = 24;
 
-/// What single precision makes of a coordinate and of a difference of two, relatively, on either side.
+/// Bound on the rounding of cell corners and coordinate differences in single precision, relative
+/// to the largest coordinate.
 const ROUNDING: f64 = 5e-7;
 
-/// In the place of a number of blocks: more than that.
+/// Marks a cell with more than [`MOST_NAMED`] blocks in place of their number.
 const CROWDED: u32 = u32::MAX;
 
-/// For each cell of a grid the blocks of a [`BlockTree`] that are near: some twenty bytes a point.
+/// A grid that lists the nearby blocks of a [`BlockTree`] for each cell. Takes about 20 bytes for
+/// each point.
 #[derive(Debug, Clone)]
 pub struct Cells {
     min: [f64; 3],
     per_cell: f64,
     size: [usize; 3],
-    /// Of a place in a cell no point of a block that the cell does not name is within this distance.
+    /// Every block with a point within this distance of a position in a cell is listed by the cell.
     margin: f64,
-    /// The first name of each cell, and how many it has.
+    /// The start of each cell's list in `named`, and its length.
     ranges: Vec<[u32; 2]>,
     named: Vec<u32>,
 }
 
-/// A block that a cell names.
+/// A block that a cell lists.
 #[derive(Debug, Clone, Copy)]
 struct Named {
     cell: u32,
     block: u32,
-    /// The squared distance of its nearest point from the middle of the cell.
+    /// The squared distance between the centre of the cell and the nearest point of the block.
     distance_sq: f32,
 }
 
 impl BlockTree<'_> {
-    /// A grid of cubes over all points, at most one a point. O(n).
+    /// Builds a grid of cubes over all points, with at most one cell for each point. O(n).
     #[must_use]
     pub fn cells(&self, level: Level) -> Cells {
         let mut cells = self.grid();
@@ -76,7 +79,7 @@ impl BlockTree<'_> {
             if *count == CROWDED {
                 continue;
             }
-            // By insertion, the nearest first: they are few.
+            // Insertion sort, nearest first: the lists are short.
             let mut place = (*first + *count) as usize;
             while place > *first as usize && places[place - 1].0 > distance_sq {
                 places[place] = places[place - 1];
@@ -89,7 +92,7 @@ impl BlockTree<'_> {
         cells
     }
 
-    /// Adds the cells that a block is named by.
+    /// Appends an entry to `all` for each cell that lists a block.
     #[inline(always)]
     fn name<S: Simd>(&self, simd: S, block: usize, cells: &Cells, all: &mut Vec<Named>) {
         let points = load(simd, &self.blocks[block].position);
@@ -117,7 +120,7 @@ impl BlockTree<'_> {
         }
     }
 
-    /// The grid, without names.
+    /// Returns the grid with empty lists.
     #[expect(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
@@ -134,7 +137,7 @@ impl BlockTree<'_> {
             }
         }
         let most = CELLS_A_POINT * self.points as f64;
-        // The edge of as many cubes as may be, with the margin about the points, in a few steps.
+        // Shrink the edge until the grid, margin included, has about as many cubes as allowed.
         let longest = (0..3).fold(f64::MIN_POSITIVE, |longest: f64, k| longest.max(max[k] - min[k]));
         let count = |edge: f64| {
             (0..3).map(|k| ((max[k] - min[k]) / edge + 2.0 * MARGIN).floor() + 1.0).product::<f64>()
@@ -150,7 +153,7 @@ impl BlockTree<'_> {
             min: min.map(|c| c - margin),
             per_cell: 1.0 / edge,
             size,
-            // Cells are found, and blocks named, by rounded numbers.
+            // Cell lookup and block lists work with rounded numbers.
             margin: margin * (1.0 - 1e-5) - ROUNDING * far,
             ranges: vec![[0, 0]; size.iter().product()],
             named: Vec::new(),
@@ -159,8 +162,9 @@ impl BlockTree<'_> {
 }
 
 impl Cells {
-    /// The blocks whose points may be within `radius` of `place`, the nearest first more or less; None if
-    /// they are not known: radii are to be less than half a cell, and blocks few. O(1).
+    /// Returns the blocks that may have points within `radius` of `place`, roughly nearest first.
+    /// Returns `None` if the grid cannot tell: `radius` exceeds about half a cell, or more than 24
+    /// blocks are near the cell. O(1).
     #[inline]
     #[must_use]
     pub fn near(&self, place: [f64; 3], radius: f64) -> Option<&[u32]> {
@@ -172,7 +176,7 @@ impl Cells {
             let at = (place[k] - self.min[k]) * self.per_cell;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
             let number = at as usize;
-            // Beyond the grid there are no points within the margin; nor near a place that is none.
+            // No points are within the margin of a place outside the grid, and none are near NaN.
             if at.is_nan() || at < 0.0 || number >= self.size[k] {
                 return Some(&[]);
             }
@@ -182,10 +186,10 @@ impl Cells {
         if count == CROWDED { None } else { self.named.get(first as usize..(first + count) as usize) }
     }
 
-    /// The cells that a box may be within the margin of, along each axis.
+    /// Returns the range of cells along each axis that a box may be within the margin of.
     fn reached(&self, bounds: &Bounds) -> [std::ops::RangeInclusive<usize>; 3] {
         [0, 1, 2].map(|k| {
-            // A little more, for rounding.
+            // Slightly more, because of rounding.
             let reach = (MARGIN + 1e-6) / self.per_cell;
             let cell = |c: f64| (c - self.min[k]) * self.per_cell;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the grid")]
@@ -195,7 +199,7 @@ impl Cells {
         })
     }
 
-    /// The cube of a cell, and the margin about it, both rounded.
+    /// Returns the cube of a cell and the margin around it, both rounded.
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "the margin covers it")]
     fn cube(&self, cell: [usize; 3]) -> (Bounds, f32) {
         let edge = 1.0 / self.per_cell;

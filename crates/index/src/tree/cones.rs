@@ -1,5 +1,5 @@
-//! What cones over points leave free: the greatest values below theirs that nowhere grow faster than the
-//! cones do.
+//! Lower envelopes of cones over points: the greatest values that are below the given ones and
+//! nowhere grow faster than `slope`.
 
 use std::ops::ControlFlow;
 
@@ -10,7 +10,7 @@ use nearmiss_lanes::wide::{WIDTH, bits, load, squared};
 use super::walk::Walker;
 use super::{BlockTree, Bounds};
 
-/// By so much rounding may make a square differ from another, relatively; what is as near as that is
+/// Allowance for the relative rounding error of squares: pairs that are not clearly above are
 /// measured.
 const SURELY: f32 = 1.0 - 4e-6;
 
@@ -19,18 +19,18 @@ const SURELY: f32 = 1.0 - 4e-6;
 pub struct Cones<'a> {
     tree: &'a BlockTree<'a>,
     slope: f32,
-    /// The heights of the tips; infinite where there is no point.
+    /// The heights of the tips; infinite in unused lanes.
     tips: &'a [[f32; WIDTH]],
-    /// The least tip of each box of the tree, level by level.
+    /// The lowest tip in each box of the tree, by level.
     least: Vec<Vec<[f32; WIDTH]>>,
 }
 
 impl<'a> BlockTree<'a> {
-    /// Cones that rise by `slope`, not negative, per length, with their tips at the heights of points, which
-    /// may be infinite, but are numbers. They are kept in `tips`. O(n).
+    /// Returns cones that rise by `slope` (at least 0) per unit length, with their tips at the
+    /// heights of the points. Heights may be infinite but not NaN. They are kept in `tips`. O(n).
     ///
     /// # Panics
-    /// When `tips` has not an item for every block.
+    /// If `tips` does not have one item for each block.
     #[must_use]
     pub fn cones(
         &'a self,
@@ -55,7 +55,7 @@ impl<'a> BlockTree<'a> {
     }
 }
 
-/// Sixteen at a time, infinite ones at the end.
+/// Groups heights by sixteen and pads them with infinity.
 fn rows(heights: &[f32]) -> Vec<[f32; WIDTH]> {
     let row = |heights: &[f32]| {
         let mut row = [f32::INFINITY; WIDTH];
@@ -65,7 +65,8 @@ fn rows(heights: &[f32]) -> Vec<[f32; WIDTH]> {
     heights.chunks(WIDTH).map(row).collect()
 }
 
-/// The points of a block, how low the cones found so far are there, and the highest of these.
+/// The points of a block, the height of the lowest cone found so far at each, and the greatest of
+/// these heights.
 struct Search<'a, S: Simd> {
     cones: &'a Cones<'a>,
     block: usize,
@@ -95,14 +96,14 @@ impl<S: Simd> Walker<S> for Search<'_, S> {
 }
 
 impl Cones<'_> {
-    /// The least of each of `heights` over the points of a block and of all cones there: of height + slope ·
-    /// distance, all rounded.
+    /// Returns the minimum of each of `heights` and all cones at that point of a block: of height +
+    /// slope · distance, rounded.
     ///
-    /// Exactly so, whatever the order of the points; it decides how much is looked at. Lanes without a point
-    /// keep their height. Does not allocate.
+    /// The result is exact for any order of the points, which affects only the running time. Lanes
+    /// without a point keep their height. Does not allocate.
     ///
     /// # Panics
-    /// When there is no such block.
+    /// If there is no such block.
     #[inline]
     #[must_use]
     pub fn below(&self, level: Level, block: usize, heights: &[f32; WIDTH]) -> [f32; WIDTH] {
@@ -122,21 +123,22 @@ impl Cones<'_> {
         let lowest = f32x16::load_array(simd, lowest);
         let mut search = Search { cones: self, block, about, points, lowest, limit: f32::INFINITY };
         self.offer(simd, block, &mut search);
-        // Nothing ends it.
+        // The walker never breaks.
         let _whole = tree.walk(simd, &mut search);
         let mut heights = *heights;
         heights[..count].copy_from_slice(&search.lowest.to_array()[..count]);
         heights
     }
 
-    /// Whether cones may rise by less than the margins over such squared distances.
+    /// Returns the lanes in which a cone may rise by less than the margin over the distance.
     #[inline(always)]
     fn is_below<S: Simd>(&self, distances_sq: f32x16<S>, margins: f32x16<S>) -> mask32x16<S> {
         let rises_sq = distances_sq * (self.slope * self.slope * SURELY);
         margins.simd_gt(0.0) & rises_sq.simd_le(margins * margins)
     }
 
-    /// Whether a cone over a block may be below what is known at one of the points.
+    /// Returns `true` if a cone over a block may be below the lowest known height at one of the
+    /// points.
     #[inline(always)]
     fn may_hold<S: Simd>(&self, simd: S, id: usize, search: &Search<'_, S>) -> bool {
         let bounds = self.tree.bounds(0, id);
@@ -144,7 +146,7 @@ impl Cones<'_> {
         bits(self.is_below(bounds.distances_sq(simd, &search.points), margins)) != 0
     }
 
-    /// Offers the cones over a block.
+    /// Lowers the heights to those of the cones over a block.
     #[inline(always)]
     fn offer<S: Simd>(&self, simd: S, id: usize, search: &mut Search<'_, S>) {
         let [x, y, z] = &self.tree.blocks[id].position;

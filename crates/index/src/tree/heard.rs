@@ -1,4 +1,4 @@
-//! Which points are heard at those of a block.
+//! The points whose support balls meet those of the points of a block.
 
 use std::ops::ControlFlow;
 
@@ -10,17 +10,18 @@ use nearmiss_lanes::wide::{Bits, WIDTH, bits, load};
 use super::walk::Walker;
 use super::{BlockTree, Bounds};
 
-/// What [`BlockTree::heard`] found. Reused.
+/// The result of [`BlockTree::heard`]. Can be reused.
 #[derive(Debug, Clone, Default)]
 pub struct Heard {
     lists: [Vec<u32>; WIDTH],
 }
 
 impl Heard {
-    /// The points heard at the block's point in this lane, itself among them if it has a horizon, ascending.
+    /// Returns the points whose balls meet that of the block's point in this lane, ascending. The
+    /// point itself is among them if its support radius is positive.
     ///
     /// # Panics
-    /// When `lane` is not below 16.
+    /// If `lane` is not below 16.
     #[must_use]
     pub fn at(&self, lane: usize) -> &[u32] {
         &self.lists[lane]
@@ -28,14 +29,15 @@ impl Heard {
 }
 
 impl BlockTree<'_> {
-    /// Finds for each point of a block all points whose balls meet its own: nearer than the sum of their
-    /// horizons.
+    /// Finds for each point of a block all points whose balls meet its own: nearer than the sum of
+    /// the support radii.
     ///
-    /// A node is looked into if for one of the points it may hold an answer, so the cost follows what is
-    /// found even where one lone point with a large horizon lies beside a dense cluster.
+    /// A node is visited only if it may hold a result for one of the points. The cost therefore
+    /// follows the size of the result, even if one isolated point with a large support radius is
+    /// next to a dense cluster.
     ///
     /// # Panics
-    /// When there is no such block.
+    /// If there is no such block.
     #[inline]
     pub fn heard(&self, level: Level, block: usize, found: &mut Heard) {
         dispatch!(level, simd => simd.vectorize(
@@ -58,12 +60,12 @@ impl BlockTree<'_> {
             present: self.present(block),
             lists,
         };
-        // Nothing ends it, and blocks come in their order, so points ascend.
+        // The walker never breaks. It visits blocks in order, so the ids in each list ascend.
         let _whole = self.walk(simd, &mut search);
     }
 
-    /// Adds the points of block `id` that are heard at points of `block` to the lists of these; `lanes` says
-    /// which to ask for.
+    /// Adds the points of block `id` whose balls meet those of points of `block` to the lists of
+    /// the latter, for the given lanes of `block`.
     #[inline(always)]
     fn listen<S: Simd>(&self, simd: S, block: usize, id: usize, lanes: u32, lists: &mut [Vec<u32>; WIDTH]) {
         let own = &self.blocks[block];
@@ -78,7 +80,7 @@ impl BlockTree<'_> {
     }
 }
 
-/// The search for the points heard at the points of a block.
+/// The search for the points whose balls meet those of the points of a block.
 struct Search<'a, S: Simd> {
     tree: &'a BlockTree<'a>,
     block: usize,
@@ -91,7 +93,7 @@ struct Search<'a, S: Simd> {
 }
 
 impl<S: Simd> Search<'_, S> {
-    /// The lanes of the points within the horizon of a box, as bits.
+    /// Returns the lanes of the points whose balls may meet one in a box, as bits.
     #[inline(always)]
     fn lanes_near(&self, simd: S, bounds: &Bounds) -> u32 {
         let far = self.horizons + bounds.horizon;

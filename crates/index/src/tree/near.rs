@@ -1,9 +1,9 @@
-//! Whether points are near a shape, and which is nearest: boxes sixteen at a time down to blocks, blocks
-//! sixteen points at a time.
+//! Points near a shape: existence within a radius, and the nearest. Boxes are tested sixteen at a
+//! time down to blocks, then points sixteen at a time.
 //!
-//! Single precision with slack tells what is surely within, and what is surely not; what is between is
-//! measured again in double precision. So the answers are those of [`Skeleton::distance_sq`] for every point,
-//! whatever the instructions.
+//! Single precision with slack decides the clear cases; the others are measured again in double
+//! precision. The results are therefore those of [`Skeleton::distance_sq`] for every point, with
+//! any instruction set.
 
 use std::ops::ControlFlow;
 
@@ -15,17 +15,17 @@ use super::skeleton::{Block, Lanes, Place, Skeleton, Stretch, single};
 use super::walk::{NearWalker, Stack, Walker};
 use super::{BlockTree, Boxes};
 
-/// Squares that are less may have lost digits.
+/// Squares below this may have lost digits to underflow.
 const LEAST_SURE: f32 = 1e-30;
 
-/// What relative rounding may do to a length in single precision.
+/// Bound on the relative rounding error of a length in single precision.
 const RELATIVE: f64 = 4e-6;
 
 impl BlockTree<'_> {
-    /// Whether a point is within `radius` of a skeleton: exactly if its [distance](Skeleton::distance_sq) is
-    /// at most that in double precision.
+    /// Returns `true` if a point is within `radius` of a skeleton, that is, if its
+    /// [distance](Skeleton::distance_sq) in double precision is at most `radius`.
     ///
-    /// A few lines of memory where nothing is near; does not allocate.
+    /// Reads a few cache lines if nothing is near; does not allocate.
     #[inline]
     #[must_use]
     pub fn any_within(&self, level: Level, skeleton: &Skeleton, radius: f64) -> bool {
@@ -46,11 +46,12 @@ impl BlockTree<'_> {
         ))
     }
 
-    /// As [`Self::any_within`], for a ball about `centre`, given what [`Cells::near`](crate::Cells::near)
-    /// tells of it: a few blocks instead of a descent.
+    /// Like [`Self::any_within`], for a ball around `centre` and the blocks `near` it from
+    /// [`Cells::near`](crate::Cells::near). Tests these few blocks instead of descending from the
+    /// root; with `None` it descends.
     ///
     /// # Panics
-    /// When a block is named that is none.
+    /// If `near` contains an invalid block.
     #[inline]
     #[must_use]
     pub fn any_in_ball(&self, level: Level, near: Option<&[u32]>, centre: [f64; 3], radius: f64) -> bool {
@@ -78,8 +79,9 @@ impl BlockTree<'_> {
         self.walk(simd, &mut any).is_break()
     }
 
-    /// Whether a point of a block is within `radius`: surely if its squared distance is at most `sure`,
-    /// surely not above `most`.
+    /// Returns `true` if a point of a block is within `radius`. Points are certainly within if
+    /// their squared distance in single precision is at most `sure`, and certainly not if it
+    /// exceeds `most`.
     #[inline(always)]
     fn is_within<S: Simd>(
         &self,
@@ -100,8 +102,9 @@ impl BlockTree<'_> {
             || Bits(near).any(|lane| skeleton.distance_sq(self.place(block, lane)) <= radius * radius)
     }
 
-    /// The point nearest to a skeleton and the square of its [distance](Skeleton::distance_sq) in double
-    /// precision, if that is at most `reach`; of equally near ones the first. Does not allocate.
+    /// Returns the point nearest to a skeleton and the square of its
+    /// [distance](Skeleton::distance_sq) in double precision, or `None` if that exceeds `reach`. Of
+    /// equally near points it returns the first. Does not allocate.
     #[inline]
     #[must_use]
     pub fn nearest_to(&self, level: Level, skeleton: &Skeleton, reach: f64) -> Option<(usize, f64)> {
@@ -144,7 +147,7 @@ impl BlockTree<'_> {
         (point < usize::MAX).then_some((point, distance_sq))
     }
 
-    /// The lanes of a block that have points, as bits.
+    /// Returns the lanes of a block that have points, as bits.
     #[inline(always)]
     pub(super) fn present(&self, block: usize) -> u32 {
         (1 << self.count(block)) - 1
@@ -187,7 +190,7 @@ struct NearestTo<'a, L> {
     skeleton: &'a Skeleton,
     /// The squared distance of the nearest point so far, and its index.
     best: (f64, usize),
-    /// The upper limit, in single precision, of the squared distance of any nearer point.
+    /// Upper bound, in single precision, of the squared distance of any nearer point.
     most: f32,
 }
 
@@ -224,12 +227,13 @@ impl<S: Simd, L: Lanes> NearWalker<S> for NearestTo<'_, L> {
     }
 }
 
-/// The squared distances in single precision up to which places are surely within `radius`, and may be.
+/// Returns two squared distances in single precision. A point is certainly within `radius` up to
+/// the first, and certainly not beyond the second.
 #[inline(always)]
 fn limits(skeleton: &Skeleton, radius: f64) -> (f32, f32) {
     let slack = skeleton.slack() + RELATIVE * radius;
     let (sure, most) = (square((radius - slack).max(0.0)), square(radius + slack));
-    // Where squares leave the range of single precision nothing is sure.
+    // Nothing is certain if squares leave the range of single precision.
     (if (LEAST_SURE..=f32::MAX).contains(&sure) { sure } else { -1.0 }, most)
 }
 
@@ -248,7 +252,7 @@ mod tests {
     use crate::block::PointBlock;
     use crate::tree::BlockBoxes;
 
-    /// The nearest point, one by one.
+    /// Finds the nearest point by brute force.
     fn nearest(points: &[[f32; 3]], skeleton: &Skeleton) -> (usize, f64) {
         let all = points.iter().map(|p| skeleton.distance_sq(p.map(f64::from))).enumerate();
         all.min_by(|p, q| p.1.total_cmp(&q.1)).unwrap()
@@ -262,7 +266,7 @@ mod tests {
             let count = [1, 16, 17, 300, 5000][(n % 5) as usize];
             let mut points: Vec<[f32; 3]> =
                 arbitrary::cloud(*kind, count, n).into_iter().map(single).collect();
-            // Near points are near in the order, more or less.
+            // Points that follow each other are mostly close.
             points.sort_unstable_by(|p, q| p[0].total_cmp(&q[0]));
             let size = points.iter().flatten().fold(0.0, |far: f64, c| far.max(f64::from(c.abs())));
             let blocks: Vec<PointBlock> = PointBlock::silent(&points).collect();
@@ -293,7 +297,7 @@ mod tests {
                         Some(expected),
                         "{skeleton:?}"
                     );
-                    // Just so much, and the least that is more or less.
+                    // The distance itself, and its neighbours in double precision.
                     for radius in [
                         0.0,
                         0.5 * distance,

@@ -9,51 +9,51 @@ use super::walk::{NearWalker, Stack};
 use super::{BlockTree, Bounds, Boxes};
 use crate::block::PointBlock;
 
-/// Half a register's worth of keys each.
+/// The number of keys in one register.
 const HALF: usize = WIDTH / 2;
 
-/// The number of each lane.
+/// The index of each lane.
 const ORDINALS: [f32; WIDTH] =
     [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
-/// What stands where there is no neighbour: further than any, after any id.
+/// The key of a missing neighbour: infinite distance and greatest id, so it sorts last.
 const NONE: f64 = f64::from_bits(0x7f80_0000_ffff_ffff);
 
 /// A neighbour of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbour {
-    /// Which point.
+    /// The index of the point.
     pub id: u32,
-    /// The square of its distance.
+    /// The squared distance of the point.
     pub distance_sq: f32,
 }
 
-/// What [`BlockTree::nearest`] found. Reused.
+/// The result of [`BlockTree::nearest`]. Can be reused.
 ///
-/// Distance and id of a neighbour are kept as one double: its upper half has the bits of the squared
-/// distance, its lower those of the id. Such doubles are positive and finite, and ascend by distance, then
-/// id, so that the lesser of two is one instruction everywhere.
+/// Squared distance and id of a neighbour are packed into one double: the distance's bits in the
+/// upper half, the id in the lower. Such doubles are positive and finite, and ascend by distance,
+/// then id, so that the lesser of two takes one instruction on every processor.
 #[derive(Debug, Clone, Default)]
 pub struct Nearest {
-    /// A rank each, of all lanes.
+    /// The keys of all lanes, by rank.
     keys: Vec<[[f64; HALF]; 2]>,
 }
 
 impl Nearest {
-    /// The neighbours of the block's point in this lane by distance, then id: as many as were asked for, or
-    /// all. Anything where the lane has no point.
+    /// Returns the neighbours of the block's point in this lane by distance, then id: the requested
+    /// number, or all if there are fewer. Unspecified if the lane has no point.
     ///
     /// # Panics
-    /// When `lane` is not below 16.
+    /// If `lane` is not below 16.
     pub fn of(&self, lane: usize) -> impl Iterator<Item = Neighbour> {
         self.keys.iter().map_while(move |keys| neighbour(keys[lane / HALF][lane % HALF]))
     }
 
-    /// The one of a rank, from 0 for the nearest; `None` where the points are fewer, or so many were not
-    /// asked for.
+    /// Returns the neighbour of a rank, from 0 for the nearest. Returns `None` if there are too few
+    /// points or fewer neighbours were requested.
     ///
     /// # Panics
-    /// When `lane` is not below 16.
+    /// If `lane` is not below 16.
     #[must_use]
     pub fn ranked(&self, lane: usize, rank: usize) -> Option<Neighbour> {
         neighbour(self.keys.get(rank)?[lane / HALF][lane % HALF])
@@ -67,29 +67,30 @@ fn neighbour(key: f64) -> Option<Neighbour> {
     (id != u32::MAX).then(|| Neighbour { id, distance_sq: f32::from_bits(distance) })
 }
 
-/// The points of a block, and how near those found so far are.
+/// The points of a block and the neighbours found so far.
 struct Search<'a, S: Simd> {
     tree: &'a BlockTree<'a>,
-    /// As [`Nearest`] keeps them.
+    /// The lists of neighbours, as in [`Nearest`].
     keys: &'a mut [[[f64; HALF]; 2]],
     about: Bounds,
     points: [f32x16<S>; 3],
     present: mask32x16<S>,
-    /// Squared distances of the last of the lists, less than any where there is no point.
+    /// The squared distance of the last neighbour in each list; negative in lanes without a point.
     last: f32x16<S>,
-    /// The greatest of those.
+    /// The greatest of `last`.
     limit: f32,
 }
 
 impl BlockTree<'_> {
-    /// Finds for each point of a block its `count` nearest others, ties by lower id.
+    /// Finds the `count` nearest other points of each point of a block; ties go to the lower id.
     ///
-    /// Six of each take 80 to 190 ns a point on scans with AVX-512, by a kd-tree five to ten times that
-    /// (`benches/src/bin/graph.rs`). A rank more costs four instructions for each point that improves a list;
-    /// the less the order is one of places, the more are looked at.
+    /// Six neighbours take 80 to 190 ns per point on scans with AVX-512, five to ten times less
+    /// than with a kd-tree (`benches/src/bin/graph.rs`). Each further rank costs four instructions
+    /// for each point that improves a list. The less the order of the points follows their
+    /// positions, the more points are examined.
     ///
     /// # Panics
-    /// When there is no such block.
+    /// If there is no such block.
     #[inline]
     pub fn nearest(&self, level: Level, block: usize, count: usize, found: &mut Nearest) {
         found.keys.clear();
@@ -117,8 +118,8 @@ impl BlockTree<'_> {
             limit: f32::INFINITY,
         };
         search.offer(simd, block, true);
-        // From the block up, what lies beside it first: so the limit is low before anything far is looked
-        // into.
+        // Search from the block up, neighbouring subtrees first, so that the limit is low before
+        // distant nodes are visited.
         let (mut below, mut stack) = (block, Stack::new());
         for level in 0..self.levels.len() {
             let group = below / WIDTH;
@@ -153,7 +154,8 @@ impl<S: Simd> NearWalker<S> for Search<'_, S> {
 }
 
 impl<S: Simd> Search<'_, S> {
-    /// Offers the points of block `id`, which is the points' `own` or another, to the lists.
+    /// Offers the points of block `id` to the lists. `own` tells that it is the block of the query
+    /// points themselves.
     #[inline(always)]
     fn offer(&mut self, simd: S, id: usize, own: bool) {
         let tree = self.tree;
@@ -170,7 +172,7 @@ impl<S: Simd> Search<'_, S> {
             let mut ids = u32x16::simd_from(simd, id32(id * WIDTH + lane));
             let mut distances = d_sq;
             if own {
-                // Nobody is its own neighbour.
+                // A point is not its own neighbour.
                 let this: mask32x16<S> = f32x16::load_array_ref(simd, &ORDINALS).simd_eq(ORDINALS[lane]);
                 ids = simd.select_u32x16(this, u32x16::simd_from(simd, u32::MAX), ids);
                 distances = simd.select_u32x16(this, u32x16::simd_from(simd, 0x7f80_0000), d_sq);

@@ -1,4 +1,4 @@
-//! What shapes are balls about: a point, a segment, a box.
+//! Shapes that queries measure distances from: points, segments and boxes.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16};
@@ -7,17 +7,18 @@ use nearmiss_lanes::wide::squared;
 
 use super::Boxes;
 
-/// A shape without its thickness. A point of it, and balls about it: a sphere; of a segment: a capsule.
+/// A shape without thickness. Points within a radius of a point form a sphere, of a segment a
+/// capsule.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Skeleton {
     /// A point.
     Point([f64; 3]),
-    /// All between two points, which may be one.
+    /// A segment between two points, which may coincide.
     Segment([[f64; 3]; 2]),
     /// A solid box about `centre`, with half edge lengths `half` along the orthonormal `axes`.
     Box {
-        /// The middle.
+        /// The centre.
         centre: [f64; 3],
         /// Half the edge lengths.
         half: [f64; 3],
@@ -27,7 +28,8 @@ pub enum Skeleton {
 }
 
 impl Skeleton {
-    /// The square of the distance of `p`, in double precision: what searches are exact about.
+    /// Returns the squared distance of `p` in double precision. Searches are exact with respect to
+    /// it.
     #[must_use]
     pub fn distance_sq(&self, p: [f64; 3]) -> f64 {
         let p = Vector3::from(p);
@@ -48,7 +50,7 @@ impl Skeleton {
         }
     }
 
-    /// The middle and the radius of a ball that holds all of it.
+    /// Returns the centre and the radius of a ball that contains the shape.
     #[must_use]
     pub fn ball(&self) -> ([f64; 3], f64) {
         match *self {
@@ -61,10 +63,11 @@ impl Skeleton {
         }
     }
 
-    /// How far single precision may be off the distance of a place that is near.
+    /// Returns a bound on the error of distances in single precision, for points near the shape.
     pub(super) fn slack(&self) -> f64 {
-        /// Of 2⁻²⁴ each: one for a coordinate of the place, of the shape and of their difference, three for
-        /// products and sums, as many for directions that are rounded; together below 40.
+        /// In units of 2⁻²⁴: one each for a coordinate of the point, of the shape and of their
+        /// difference, three for products and sums, the same again for rounded directions; below 40
+        /// in all.
         const ROUNDING: f64 = 2.5e-6;
         let far = |v: [f64; 3]| v[0].abs() + v[1].abs() + v[2].abs();
         let reach = match *self {
@@ -76,12 +79,12 @@ impl Skeleton {
     }
 }
 
-/// A skeleton in single precision, and distances in lanes.
+/// A skeleton in single precision that computes distances in lanes.
 pub(super) trait Lanes: Copy {
-    /// Lower bounds of the squared distances of boxes; infinite where there is none.
+    /// Returns lower bounds of the squared distances of boxes; infinite in unused lanes.
     fn of_boxes<S: Simd>(self, simd: S, boxes: &Boxes) -> f32x16<S>;
 
-    /// The squared distances of points.
+    /// Returns the squared distances of points.
     fn of_points<S: Simd>(self, simd: S, points: [f32x16<S>; 3]) -> f32x16<S>;
 }
 
@@ -106,7 +109,7 @@ impl Lanes for Place {
     }
 }
 
-/// Bounds along the axes.
+/// An axis-aligned box.
 #[derive(Clone, Copy)]
 struct Span {
     min: [f32; 3],
@@ -126,7 +129,7 @@ impl Span {
     }
 }
 
-/// The middles of boxes, and how far they reach from there.
+/// Returns the centres and radii of the boxes' bounding spheres.
 #[inline(always)]
 fn balls<S: Simd>(simd: S, boxes: &Boxes) -> ([f32x16<S>; 3], f32x16<S>) {
     let mut middle = [f32x16::simd_from(simd, 0.0); 3];
@@ -140,11 +143,12 @@ fn balls<S: Simd>(simd: S, boxes: &Boxes) -> ([f32x16<S>; 3], f32x16<S>) {
     (middle, squared(half).sqrt())
 }
 
-/// What is sure of boxes whose middles are so far from a skeleton, and which its span shows to be `apart_sq`
-/// at least.
+/// Returns lower bounds of the squared distances of boxes from a skeleton: the greater of
+/// `apart_sq`, from the skeleton's AABB, and the bound by the boxes' bounding spheres, whose
+/// centres have squared distance `middle_sq`.
 #[inline(always)]
 fn outside<S: Simd>(middle_sq: f32x16<S>, radius: f32x16<S>, apart_sq: f32x16<S>) -> f32x16<S> {
-    // Of boxes that are none, middle and radius are no numbers; their bounds alone tell.
+    // Centre and radius are NaN in unused lanes, where `apart_sq` is selected.
     let beyond = (middle_sq.sqrt() - radius * (1.0 + 1e-6)) * (1.0 - 1e-6);
     let beyond_sq = beyond.max(0.0) * beyond;
     let is_more = beyond_sq.simd_gt(apart_sq);
@@ -156,7 +160,7 @@ fn outside<S: Simd>(middle_sq: f32x16<S>, radius: f32x16<S>, apart_sq: f32x16<S>
 pub(super) struct Stretch {
     from: [f32; 3],
     along: [f32; 3],
-    /// One over the squared length, or 0.
+    /// The reciprocal of the squared length, or 0.
     per_length_sq: f32,
     span: Span,
 }

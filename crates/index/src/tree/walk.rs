@@ -1,4 +1,4 @@
-//! The two walks through a tree: in the order of the points, and the nearest first.
+//! The two traversals of a tree: in the order of the points, and nearest first.
 
 use std::ops::ControlFlow;
 
@@ -9,34 +9,35 @@ use nearmiss_lanes::wide::{Bits, WIDTH, bits};
 
 use super::{BlockTree, Boxes, MOST_LEVELS};
 
-/// The callbacks of a walk in the order of the points.
+/// The callbacks of a traversal in the order of the points.
 pub(super) trait Walker<S: Simd> {
-    /// The boxes of a group of a level that are to be looked into, as bits. Lanes without a box do not count.
+    /// Returns the boxes of a group to descend into, as bits. Unused lanes are ignored.
     fn wanted(&mut self, simd: S, level: usize, group: usize) -> u32;
 
-    /// A block that was wanted; may end the walk.
+    /// Visits a block. May end the traversal.
     fn block(&mut self, simd: S, id: usize) -> ControlFlow<()>;
 }
 
-/// The callbacks of a walk that takes the nearest boxes first.
+/// The callbacks of a traversal that takes the nearest boxes first.
 pub(super) trait NearWalker<S: Simd> {
-    /// The squared distances of the boxes of a group.
+    /// Returns the squared distances of the boxes of a group.
     fn distances_sq(&self, simd: S, boxes: &Boxes) -> f32x16<S>;
 
-    /// The squared distance beyond which boxes are skipped.
+    /// Returns the squared distance beyond which boxes are skipped.
     fn most_sq(&self) -> f32;
 
-    /// Returns `true` if node `id` of a level is to be looked into; asked just before.
+    /// Returns `true` if node `id` of a level is to be visited. Called immediately before the
+    /// visit.
     fn is_wanted(&mut self, simd: S, level: usize, id: usize) -> bool {
         let _ = (simd, level, id);
         true
     }
 
-    /// A block that was wanted.
+    /// Visits a block.
     fn block(&mut self, simd: S, id: usize);
 }
 
-/// A node to look into.
+/// A node to be visited.
 #[derive(Debug, Clone, Copy)]
 struct Open {
     distance_sq: f32,
@@ -44,7 +45,7 @@ struct Open {
     id: u32,
 }
 
-/// The nodes that a walk keeps while it takes the nearest first.
+/// The nodes still to be visited by a traversal that takes the nearest first.
 #[derive(Debug)]
 pub(super) struct Stack([Open; MOST_LEVELS * WIDTH]);
 
@@ -56,10 +57,10 @@ impl Stack {
 }
 
 impl BlockTree<'_> {
-    /// Visits the wanted blocks in their order, until the walker ends it.
+    /// Visits the wanted blocks in order, until the walker ends the traversal.
     #[inline(always)]
     pub(super) fn walk<S: Simd>(&self, simd: S, walker: &mut impl Walker<S>) -> ControlFlow<()> {
-        // Of each level a group, and its boxes still to be looked into.
+        // A group of each level, and its boxes still to be visited.
         let mut open = [(0_usize, 0_u32); MOST_LEVELS];
         let top = self.levels.len();
         let (mut level, mut id) = (top, 0);
@@ -82,7 +83,7 @@ impl BlockTree<'_> {
         }
     }
 
-    /// Visits the blocks under these lanes of a group of a level, of boxes side by side the nearest first.
+    /// Visits the blocks below the given lanes of a group of a level, siblings nearest first.
     #[inline(always)]
     pub(super) fn walk_near<S: Simd>(
         &self,
@@ -101,7 +102,7 @@ impl BlockTree<'_> {
                 let first = top;
                 for lane in Bits(bits(near) & lanes & self.filled(level, group)) {
                     let distance_sq = distances[lane];
-                    // By insertion, the nearest on top: they are few.
+                    // Insertion sort, nearest on top: there are at most sixteen.
                     let mut place = top;
                     while place > first && stack[place - 1].distance_sq < distance_sq {
                         stack[place] = stack[place - 1];
@@ -128,7 +129,7 @@ impl BlockTree<'_> {
         }
     }
 
-    /// The lanes of a group that have boxes, as bits.
+    /// Returns the lanes of a group that have boxes, as bits.
     #[inline(always)]
     fn filled(&self, level: usize, group: usize) -> u32 {
         (1 << (self.nodes(level) - group * WIDTH).min(WIDTH)) - 1

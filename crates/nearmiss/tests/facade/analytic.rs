@@ -1,8 +1,8 @@
-//! Verdicts on shapes with known answers: nothing wrong outside the band of a sampling radius.
+//! Verdicts on shapes with known answers: none may be wrong beyond a band of one sampling radius.
 use nearmiss::{BuildOptions, CollideOptions, CollidePlan, Pair, PointCloud, Reason, Scan, Scratch, Verdict};
 use nearmiss_testdata::pairs::{AnalyticSet, SetOptions, analytic_set};
 
-/// Wrong verdicts and undecided ones outside the band, with what they were asked.
+/// Returns descriptions of the wrong and of the undecided verdicts outside the band.
 fn score(set: &AnalyticSet) -> (Vec<String>, Vec<String>, usize) {
     let scans: Vec<Scan> = (set.shapes.iter())
         .map(|shape| {

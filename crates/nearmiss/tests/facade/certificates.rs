@@ -1,4 +1,4 @@
-//! Certified separations against exact distances, and what the proof of one consists of.
+//! Certified separations compared with exact distances, and the contents of their proofs.
 use nearmiss::{
     Bandwidth, BuildOptions, Check, CollideOptions, CollidePlan, Detail, Evidence, Pair, PointCloud, Pose,
     Proof, Scan, Scratch, Semantics, SurfaceOptions, Verdict,
@@ -78,8 +78,9 @@ fn a_proof_covers_all_pairs_of_points() {
     assert!(proven > 20 && most > 20, "{proven} proofs of up to {most} pairs");
 }
 
-/// A bowl of few points, a lot of nothing, and a small patch inside the bowl whose discs miss the bowl's,
-/// though the leaves are compared: other pairs being proven apart says nothing of these.
+/// A sparse bowl, a large empty space, and a small patch inside the bowl whose discs miss the
+/// bowl's discs, although the leaves are compared. Proofs for other pairs of leaves prove nothing
+/// for these.
 #[test]
 fn leaves_that_were_compared_are_not_certified() {
     let lattice = |step: f64, height: &dyn Fn(f64, f64) -> f64| -> Vec<[f64; 3]> {
@@ -107,8 +108,8 @@ fn leaves_that_were_compared_are_not_certified() {
     }
 }
 
-/// Two grids along the axes that meet at a rim, where a neighbour of a rim point lies exactly across: a zero
-/// of either sign once made its cell vanish.
+/// Two grids along the axes that meet at a rim, where a neighbour of a rim point is exactly
+/// perpendicular. There a zero of either sign once made the cell of the point vanish.
 #[test]
 fn grids_along_the_axes_are_enclosed_to_their_rims() {
     let grid: Vec<[f64; 3]> =
@@ -165,7 +166,7 @@ fn bandwidths_beyond_measure_are_saved_and_certify_nothing() {
         };
         let nothing = Verdict::Separated { gap: 0.0, evidence: Evidence::Estimated };
         assert_eq!(asked(Semantics::Surface), nothing, "{h}");
-        // Cells end where no point vouches for the surface, whatever its bandwidth.
+        // Cells end at a limited distance from the points, whatever the bandwidth.
         let Verdict::Separated { gap, evidence: Evidence::Certified } = asked(Semantics::Obstacle) else {
             panic!("{h}: obstacles are apart");
         };

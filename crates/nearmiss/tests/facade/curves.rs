@@ -1,4 +1,4 @@
-//! Curves by the kernel of the view, and of scans that were saved.
+//! Curves with the kernel of the placed scan, and curves of saved scans.
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{
     BuildOptions, Check, Curve, CurveOptions, CurvePlan, Curves, GraphOptions, Pair, PlanError, PointCloud,
@@ -14,7 +14,7 @@ fn draw(a: &Scan, b: &Scan, pose: &Pose) -> Curves {
     found
 }
 
-/// By straight distances and by those along the graph.
+/// The scan with straight-line distances, and with distances along its graph.
 fn both(points: &[[f64; 3]]) -> [Scan; 2] {
     let cloud = PointCloud::from_positions(points).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
@@ -44,21 +44,23 @@ fn either_kernel_follows_the_same_circle() {
 
 #[test]
 fn along_the_graph_near_plates_are_cut_one_by_one() {
-    // 1.8 bandwidths: nearer each other than straight distances can tell well.
+    // The plates are 1.8 bandwidths apart, too close for straight-line distances to separate them
+    // well.
     let spacing = 0.05;
     let plates = both(&plates(2.0, 2.0, 2.5 * spacing).sample(Sampling::clean(spacing)).points);
     let walls = both(&nearmiss_testdata::shapes::patch(2.6, 2.6).sample(Sampling::clean(spacing)).points);
     let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
     let found = draw(&plates[1], &walls[1], &upright);
     let points_of = |curve: &Curve| &found.points[curve.first..curve.first + curve.count];
-    // Edges of the graph join the plates at their rims, where the surface may lead from one to the other.
+    // Edges of the graph join the plates at their rims, where the surface may lead from one plate
+    // to the other.
     let is_at_rim = |curve: &&Curve| points_of(curve).iter().all(|p| p[0].abs() > 0.95);
     let (at_rims, across): (Vec<&Curve>, Vec<&Curve>) = found.curves.iter().partition(is_at_rim);
     assert!(across.len() == 2 && at_rims.len() <= 2, "{:?}", found.curves);
     for curve in across {
         let points = points_of(curve);
         let side = points[0][2].signum();
-        // Ways along the graph bend about the rims.
+        // Paths along the graph bend around the rims.
         for p in points.iter().filter(|p| p[0].abs() < 0.8) {
             assert!(
                 (p[2] - side * 1.25 * spacing).abs() < 0.02 * spacing && p[1].abs() < 0.02 * spacing,

@@ -1,5 +1,5 @@
-//! Scans for the geodesic kernel: what they keep apart, where they agree with straight distances, and what is
-//! kept of them.
+//! Scans for the geodesic kernel: the sheets they keep apart, agreement with straight-line
+//! distances, and storage.
 use std::sync::Arc;
 
 use nearmiss::graph::SurfaceGraphMeta;
@@ -15,7 +15,7 @@ use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use nearmiss_testdata::shapes::{Order, Sampling, plates, sphere, torus};
 use serde::Serialize;
 
-/// A scan by straight distances, with a graph, and the same for the geodesic kernel.
+/// A scan with a graph and straight-line distances, and the same scan for the geodesic kernel.
 fn both(points: &[[f64; 3]]) -> [Scan; 2] {
     let cloud = PointCloud::from_positions(points).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
@@ -34,7 +34,7 @@ fn ask(a: &Scan, b: &Scan, pose: &Pose, scratch: &mut Scratch) -> Verdict {
     Pair::new(a.at(&Pose::IDENTITY), b.at(pose)).collide(&plan, scratch).verdict
 }
 
-/// How many verdicts are separated, certified hits, other hits, and none.
+/// Counts verdicts: separated, certified contacts, other contacts, undecided.
 fn tally(a: &Scan, b: &Scan, poses: &[Pose]) -> [usize; 4] {
     let mut counts = [0; 4];
     let mut scratch = Scratch::default();
@@ -52,7 +52,7 @@ fn tally(a: &Scan, b: &Scan, poses: &[Pose]) -> [usize; 4] {
 
 const SPACING: f64 = 0.05;
 
-/// The mean bandwidth of plates that are far from each other.
+/// The mean bandwidth of plates that are far apart.
 fn bandwidth() -> f64 {
     let flat = plates(2.0, 2.0, 10.0).sample(Sampling { order: Order::Random, ..Sampling::clean(SPACING) });
     let scan =
@@ -63,13 +63,14 @@ fn bandwidth() -> f64 {
     sum / count * scan.frame().scale
 }
 
-/// Two plates as far apart, sampled at random, and clean.
+/// Two plates at this distance, sampled at random without noise.
 fn pair_of_plates(distance: f64) -> [Scan; 2] {
     let sampling = Sampling { order: Order::Random, seed: 1, ..Sampling::clean(SPACING) };
     both(&plates(2.0, 2.0, distance).sample(sampling).points)
 }
 
-/// How much the normals lean, in degrees, ascending: of points further from the border than edges reach.
+/// Angles in degrees, ascending, between the plates and the normals of points further from the
+/// border than edges reach.
 fn leaning(scan: &Scan) -> Vec<f32> {
     let inner = |p: &[f32; 3]| p[0].abs().max(p[1].abs()) < 0.7;
     let mut angles: Vec<f32> = (scan.positions().iter().zip(scan.normals()))
@@ -80,12 +81,13 @@ fn leaning(scan: &Scan) -> Vec<f32> {
     angles
 }
 
-/// Klein & Zachmann 2005, fig. 4 and 5: straight distances hear the other sheet.
+/// Klein & Zachmann 2005, fig. 4 and 5: with straight-line distances, points of the other sheet
+/// contribute.
 #[test]
 fn discs_of_close_plates_lie_on_them() {
     let h = bandwidth();
-    // In h: the distance; ambiguous points, and the median angle, at most by the geodesic and at least by the
-    // straight kernel.
+    // The distance in h; then the fraction of ambiguous points and the median angle, each as an
+    // upper limit for the geodesic kernel and a lower limit for straight-line distances.
     for (s, ambiguous, angle) in
         [(1.5, [0.25, 0.8], [2.0, 2.5]), (1.8, [0.05, 0.15], [0.1, 1.2]), (2.0, [0.02, 0.015], [0.1, 0.7])]
     {
@@ -100,7 +102,7 @@ fn discs_of_close_plates_lie_on_them() {
     }
 }
 
-/// A ball between two plates that touches neither, and one that cuts both.
+/// A ball between two plates that touches neither, and one that intersects both.
 #[test]
 fn what_passes_between_close_plates_is_apart_and_what_cuts_them_is_certain() {
     let h = bandwidth();
@@ -111,7 +113,7 @@ fn what_passes_between_close_plates_is_apart_and_what_cuts_them_is_certain() {
         .collect();
     let [straight, geodesic] = pair_of_plates(1.5 * h);
     let ball = |radius: f64| both(&sphere(radius).sample(Sampling::clean(radius / 10.0)).points);
-    // A tenth of a bandwidth from either plate.
+    // The ball is a tenth of a bandwidth from either plate.
     let thin = ball(0.65 * h);
     let [of_straight, of_geodesic] = [tally(&straight, &thin[0], &poses), tally(&geodesic, &thin[1], &poses)];
     assert_eq!(of_geodesic, [400, 0, 0, 0], "apart");
@@ -123,13 +125,14 @@ fn what_passes_between_close_plates_is_apart_and_what_cuts_them_is_certain() {
     assert!(of_straight[1] <= 4, "nothing is certain by straight distances: {of_straight:?}");
 }
 
-/// Along random ways the two agree but for a fifth of a sampling radius about first touch.
+/// On random lines of motion, verdicts agree except within a fifth of a sampling radius of first
+/// contact.
 #[test]
 fn where_no_other_sheet_is_near_verdicts_agree() {
     let dragon: Vec<[f64; 3]> = dragon_mesh(Dragon::Points5k).unwrap().vertices().to_vec();
     let sampling = Sampling { seed: 2, ..Sampling::clean(0.08) };
     let (mut rng, mut scratch) = (arbitrary::rng(3), Scratch::default());
-    // The dragon has edges and clefts: of its ways some may end at such.
+    // The dragon has edges and clefts, where the verdicts may differ.
     for (name, points, most) in [
         ("sphere", sphere(1.0).sample(sampling).points, 0),
         ("torus", torus(1.0, 0.4).sample(sampling).points, 0),
@@ -141,7 +144,7 @@ fn where_no_other_sheet_is_near_verdicts_agree() {
         let (mut asked, mut differ) = (0, 0);
         for _ in 0..40 {
             let (turn, direction) = (arbitrary::rotation(&mut rng), arbitrary::unit_vector(&mut rng));
-            // About the middle of the scan.
+            // Rotates about the centre of the scan.
             let middle = straight.bounds().centre();
             let at = |t: f64| {
                 let turned = turn.apply(middle);
@@ -194,7 +197,7 @@ fn the_metric_is_kept_and_a_plan_holds_to_it() {
     let balls = CollideOptions::default().with_semantics(Semantics::Thickened(0.1));
     assert!(CollidePlan::new(&balls, &straight, &geodesic).is_ok(), "points know no kernel");
 
-    // Nothing is certified of scans that are apart, however sure one wants to be.
+    // Separated scans are never certified, whatever evidence is requested.
     let far = Pose::from_translation([9.0, 0.0, 0.0]);
     for (scan, evidence) in [(&straight, Evidence::Certified), (&geodesic, Evidence::Estimated)] {
         let plan = plan(None, scan, scan).unwrap();
@@ -206,7 +209,7 @@ fn the_metric_is_kept_and_a_plan_holds_to_it() {
     }
 }
 
-/// Views that were made without the kernel see the same discs, and verify nothing.
+/// Placed scans without a graph have the same discs, but do not verify contacts.
 #[test]
 fn a_witness_is_verified_by_the_scans_own_kernel_alone() {
     let [_, geodesic] = both(&arbitrary::cloud(CloudKind::Sphere, 600, 3));
@@ -232,7 +235,7 @@ fn a_witness_is_verified_by_the_scans_own_kernel_alone() {
     }
 }
 
-/// What a scan's file holds beside arrays.
+/// Metadata of a scan's file.
 #[derive(Serialize)]
 struct Meta {
     hierarchy: HierarchyMeta,
@@ -252,13 +255,13 @@ fn without_the_map_there_is_no_such_scan() {
     for scan in [&bare, &without] {
         assert_eq!(scan.clone().with_geodesic_kernel().unwrap_err(), GraphError::NoClosePairs);
     }
-    // Another graph is measured by, if it can be.
+    // A new graph replaces the old one in the kernel if it has a map of close pairs.
     let other = whole.clone().with_graph(&cloud, &GraphOptions::default(), None).unwrap();
     assert_eq!(other.metric(), Metric::Geodesic);
     let options = GraphOptions::default().with_close_pairs(None);
     assert_eq!(whole.clone().with_graph(&cloud, &options, None).unwrap_err(), GraphError::NoClosePairs);
 
-    // Files that claim it.
+    // Files whose metadata claim the geodesic kernel.
     for scan in [&bare, &without] {
         let meta =
             Meta { hierarchy: whole.meta().clone(), graph: scan.graph().map(|g| g.meta()), density: None };
@@ -311,7 +314,7 @@ fn worlds_and_batches_keep_graph_and_kernel() {
         let ids = [world.insert(Arc::clone(&geodesic), a), world.insert(Arc::clone(&geodesic), b)];
         let pair = world.pair(ids).unwrap();
         assert_eq!(pair.collide(&plan, &mut Scratch::default()), alone, "a world");
-        // Without the kernel no place is verified.
+        // Without the kernel, no contact is verified.
         let is_certified =
             matches!(alone.verdict, Verdict::Intersecting { evidence: Evidence::Certified, .. });
         certified += usize::from(is_certified);

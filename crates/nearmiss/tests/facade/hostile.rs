@@ -1,5 +1,5 @@
-//! Files that were damaged by accident or on purpose: an error or an answer, in bounded time, and never a
-//! wrong answer where checksums are compared.
+//! Files damaged by accident or on purpose. Opening one yields an error or a scan that answers in
+//! bounded time. Answers are never wrong if checksums are compared.
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tell what it counted")]
 
 mod cost;

@@ -1,5 +1,5 @@
-//! The same scene elsewhere, turned, larger or smaller, is the same scene; so it is with its scans exchanged,
-//! their points in another order, given twice, or more of them.
+//! Verdicts do not change if a scene is moved, rotated or scaled, if its scans are exchanged, or if
+//! their points are reordered, repeated or denser.
 use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Evidence, GraphOptions, Pair, PointCloud, Pose, Reason, Scan,
     Scratch, Semantics, Verdict,
@@ -8,7 +8,7 @@ use nearmiss_testdata::arbitrary::{self, CloudKind};
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
 use nearmiss_testdata::shapes::{Sampling, scorer_radius, sphere, torus};
 
-/// Motions of a scan's points, whose inverses are put before the poses.
+/// Motions of a scan's points, which are undone by their inverses in the poses.
 fn motions() -> Vec<(&'static str, Pose)> {
     let mut rng = arbitrary::rng(4);
     let turn = arbitrary::rotation(&mut rng);
@@ -92,7 +92,7 @@ fn exchanged_or_moved_together_they_are_as_far_apart() {
             let verdict = ask(a, b, [pose_a, pose_b], options);
             let exchanged = ask(b, a, [pose_b, pose_a], options);
             let moved = ask(a, b, [motion.after(&pose_a), motion.after(&pose_b)], options);
-            // A margin, like a contact, may be met within the band only.
+            // With a margin, as for contacts, verdicts within the band may differ.
             let by = pair.gap - options.margin;
             if options.semantics == Semantics::Surface && by.abs() <= pair.r {
                 continue;
@@ -128,7 +128,7 @@ fn duplicates_change_nothing_and_order_only_names() {
         assert_eq!(twice.source(), scan.source(), "{kind:?}");
         assert_eq!(twice.dropped().duplicate - scan.dropped().duplicate, 700, "{kind:?}");
 
-        // A permutation: 271 and 700 have no common divisor.
+        // A permutation, because 271 and 700 are coprime.
         let order: Vec<usize> = (0..points.len()).map(|i| (271 * i + 5) % points.len()).collect();
         let other = build(&order.iter().map(|&i| points[i]).collect::<Vec<_>>());
         let by_place = |scan: &Scan| {
@@ -143,7 +143,8 @@ fn duplicates_change_nothing_and_order_only_names() {
         };
         assert_eq!(other.sampling_radius().to_bits(), scan.sampling_radius().to_bits(), "{kind:?}");
         let differ = by_place(&other).iter().zip(by_place(&scan)).filter(|(a, b)| **a != *b).count();
-        // Sums over neighbours round in another order, which may move a point across a threshold.
+        // Sums over neighbours are rounded in another order, which may move a point across a
+        // threshold.
         assert!(differ * 100 <= scan.len(), "{kind:?}: {differ} of {} points differ", scan.len());
     }
 }
@@ -174,7 +175,7 @@ fn powers_of_two_scale_every_number() {
     }
 }
 
-/// Vertices of a torus in a lattice of `n` by `n / 2` quadrilaterals, as a mesher would leave them.
+/// Vertices of a torus in a lattice of `n` by `n / 2` quadrilaterals, as in a mesh.
 fn torus_vertices(n: u32) -> Vec<[f64; 3]> {
     let turn = |i: u32, of: u32| std::f64::consts::TAU * f64::from(i) / f64::from(of);
     let vertex = |i: u32, j: u32| {
@@ -198,7 +199,7 @@ fn a_finer_mesh_answers_as_the_coarser_did() {
     for _ in 0..400 {
         let centre = arbitrary::point_in(&mut rng, 1.8);
         let gap = exact.distance(centre) - 0.5;
-        // Deeper inside, the ball is wholly within the tube.
+        // Deeper inside, the ball is entirely within the tube.
         if gap.abs() <= r || gap < -0.45 {
             continue;
         }
@@ -214,8 +215,8 @@ fn a_finer_mesh_answers_as_the_coarser_did() {
     assert!(hits > 50 && apart > 100, "{hits} hits, {apart} apart");
 }
 
-/// A graph turns normals, and no verdict looks at their signs: the same bits but for the sides of a contact's
-/// normals.
+/// A graph orients normals, and no verdict depends on their signs: the bits are equal, except for
+/// the sides of a contact's normals.
 #[test]
 fn a_graph_changes_no_verdict() {
     let mut rng = arbitrary::rng(12);

@@ -1,4 +1,4 @@
-//! The facade: everything is one program, which links once.
+//! Tests of the facade, in one program so that they link once.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod analytic;

@@ -1,5 +1,5 @@
-//! The obstacle of a scan: what is certified, how far the band goes, and how distances bracket, against brute
-//! force.
+//! The obstacle of a scan: certificates, the width of the band, and bounds on distances, compared
+//! with brute force.
 use nearmiss::{
     Answer, BuildOptions, CollideOptions, CollidePlan, Detail, Distance, DistanceOptions, DistancePlan,
     Evidence, Pair, Placed, PointCloud, PointKind, Pose, Scan, Scratch, Verdict,
@@ -24,8 +24,9 @@ fn how_far(a: &Placed<'_>, b: &Placed<'_>) -> Distance {
     Pair::new(*a, *b).distance(&plan, &mut Scratch::default())
 }
 
-/// The points of a scan in the world, each with the radius of its ball and the radius within which its part
-/// of the obstacle lies: from the definition in `docs/theory/obstacle.md` alone.
+/// Returns the points of a scan in the world. Each has the radius of its ball, and the radius of a
+/// ball that contains its part of the obstacle. Computed only from the definition in
+/// `docs/theory/obstacle.md`.
 fn matter(view: &Placed<'_>) -> Vec<([f64; 3], f64, f64)> {
     let (slices, scale) = (view.scan().slices(), view.placed().scale());
     let part = |i: usize| {
@@ -44,8 +45,9 @@ fn matter(view: &Placed<'_>) -> Vec<([f64; 3], f64, f64)> {
     (0..view.scan().len()).map(part).collect()
 }
 
-/// Bounds of the distance of two obstacles by all pairs of points: by balls from above, and by what holds
-/// each part from below. And the distance of the nearest points.
+/// Returns a lower and an upper bound on the distance of two obstacles, and the distance of their
+/// nearest points, from all pairs of points. The lower bound uses the balls that contain each part,
+/// the upper bound the balls of the points.
 fn brute_force(a: &Placed<'_>, b: &Placed<'_>) -> [f64; 3] {
     let (of_a, of_b) = (matter(a), matter(b));
     let mut bounds = [f64::INFINITY; 3];
@@ -80,7 +82,7 @@ fn clouds() -> Vec<Vec<[f64; 3]>> {
     clouds
 }
 
-/// A plate of 2 × 2 at z = 0, `ratio` times as sparse where x is positive.
+/// A plate of 2 × 2 at z = 0, with spacing `ratio` times as large where x is positive.
 fn uneven_plate(spacing: f64, ratio: f64) -> Vec<[f64; 3]> {
     let mut points = Vec::new();
     for (from, to, step) in [(-1.0, 0.0, spacing), (0.0, 1.0, spacing * ratio)] {
@@ -120,7 +122,7 @@ fn answers_hold_against_brute_force() {
                     Verdict::Separated { gap, evidence } => {
                         assert!(of_balls > -rounding, "balls overlap by {}", -of_balls);
                         assert!(gap <= of_balls.max(0.0) + rounding, "{gap} of {of_balls}");
-                        // Points prove whatever boxes do not.
+                        // Balls about the points prove separations that boxes do not.
                         assert!(below < rounding || evidence == Evidence::Certified, "{below} apart");
                         certified += usize::from(evidence == Evidence::Certified);
                     }
@@ -149,7 +151,7 @@ fn answers_hold_against_brute_force() {
     assert!(certified > 100 && touching > 60 && bracketed > 100, "{certified}, {touching}, {bracketed}");
 }
 
-/// On a plate of two densities the band is that of the place, and no contact is told beyond it.
+/// On a plate of two densities the band is local, and no contact is reported beyond it.
 #[test]
 fn the_band_of_uneven_plates_is_local_and_no_wider_than_the_reach() {
     let spacing = 0.04;
@@ -159,7 +161,7 @@ fn the_band_of_uneven_plates_is_local_and_no_wider_than_the_reach() {
         let (mut contacts, mut certified, mut beyond) = (0, 0, 0);
         let mut rng = arbitrary::rng(5);
         for _ in 0..150 {
-            // About the border of the plate, all round.
+            // Positions around the border of the plate.
             let angle = rng.random_range(0.0..std::f64::consts::TAU);
             let (s, c) = angle.sin_cos();
             let edge = 1.0 / s.abs().max(c.abs());
@@ -173,7 +175,7 @@ fn the_band_of_uneven_plates_is_local_and_no_wider_than_the_reach() {
                 assert!(nearest <= answer.band * (1.0 + 1e-5), "{ratio}: {nearest}, band {}", answer.band);
                 contacts += 1;
             }
-            // A band beyond the nearest points there is nothing to meet.
+            // Further apart than the band, nothing can touch.
             if nearest > 1.05 * plate.reach() {
                 let proven =
                     matches!(answer.verdict, Verdict::Separated { evidence: Evidence::Certified, .. });
@@ -186,8 +188,8 @@ fn the_band_of_uneven_plates_is_local_and_no_wider_than_the_reach() {
     }
 }
 
-/// A wall, a second one half a spacing behind it, one point in a hundred anywhere: strays are met, and widen
-/// nothing.
+/// Two walls half a spacing apart, and one stray point in a hundred. Strays are obstacles, but do
+/// not widen the walls.
 #[test]
 fn strays_are_obstacles_and_widen_no_wall() {
     let spacing = 0.05;
@@ -211,8 +213,8 @@ fn strays_are_obstacles_and_widen_no_wall() {
     let (mut met, mut proven, mut asked) = (0, 0, 0);
     for stray in &strays {
         let views = [room.at(&Pose::IDENTITY), probe.at(&Pose::from_translation(*stray))];
-        // The middle of the probe is hollow: the ball about the stray reaches its shell, or the stray is
-        // within it.
+        // The interior of the probe is empty. The ball about the stray touches its shell, or the
+        // stray is inside it.
         let Distance { lower, upper, .. } = how_far(&views[0], &views[1]);
         assert!(upper <= 0.05 && lower <= upper, "{stray:?}: {lower} to {upper}");
         met += usize::from(upper == 0.0);
@@ -238,7 +240,7 @@ fn strays_are_obstacles_and_widen_no_wall() {
     assert!(met > strays.len() / 2, "{met} of {}", strays.len());
 }
 
-/// Of what a scanner's beams hit, nearly all lies in the obstacle or within the band of it.
+/// Nearly all surface points hit by a scanner's beams are in the obstacle, or within its band.
 #[test]
 fn a_scanned_hall_is_covered() {
     for (beams, steps, noise) in [(64, 900, 0.0), (32, 900, 0.01), (64, 450, 0.02)] {
@@ -246,7 +248,7 @@ fn a_scanned_hall_is_covered() {
         let hall = scan(&points);
         let view = hall.at(&Pose::IDENTITY);
         let parts = matter(&view);
-        // Finer beams see the surface between the rings.
+        // A finer scanner hits the surface between the rings.
         let seen = scanner::frame(&Frame { beams: 4 * beams - 3, steps: 311, noise: 0.0, seed: 1 });
         let mut rng = arbitrary::rng(2);
         let (mut covered, mut asked) = (0, 0);
@@ -264,7 +266,7 @@ fn a_scanned_hall_is_covered() {
     }
 }
 
-/// The reach is kept in the file, and one that is none is refused by name.
+/// The reach is stored in the file, and an invalid reach is rejected with an error that names it.
 #[test]
 fn the_reach_is_stored_and_checked() {
     let cloud = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 500, 1)).unwrap();

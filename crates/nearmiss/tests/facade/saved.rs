@@ -1,4 +1,5 @@
-//! A saved scan is the scan, and a file of an earlier release opens or is refused by name.
+//! A saved scan equals the original. Files of earlier releases open, or the error names their
+//! version.
 use nearmiss::graph::ClosePairs;
 use nearmiss::store::Fault;
 use nearmiss::{
@@ -57,11 +58,12 @@ fn golden_files_of_older_versions_are_refused_by_name() {
     }
 }
 
-/// The golden file of the version that is written today.
+/// The golden file of the current version.
 const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sphere-v10.nm");
 
-/// After a change of the format: raise `VERSION` in `src/scan.rs`, name the new file in [`GOLDEN`], add the
-/// old version to the list above, and run `cargo test -p nearmiss --test facade record_golden -- --ignored`.
+/// After a change of the format: raise `VERSION` in `src/scan.rs`, name the new file in [`GOLDEN`],
+/// add the old version to the list above, and run
+/// `cargo test -p nearmiss --test facade record_golden -- --ignored`.
 #[test]
 #[ignore = "writes the golden file"]
 fn record_golden() {
@@ -75,7 +77,7 @@ fn the_golden_file_of_this_version_opens() {
     same(&golden, &small());
 }
 
-/// Without a graph, with one and no map, with paths or without.
+/// Scans without a graph, and with a graph that has no map, a map without paths, or one with paths.
 #[test]
 fn a_graph_is_kept_as_it_was_asked_for() {
     let cloud = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 500, 3)).unwrap();
@@ -105,8 +107,8 @@ fn a_graph_is_kept_as_it_was_asked_for() {
     assert!(sizes.is_sorted_by(|a, b| a < b), "{sizes:?}");
 }
 
-/// Whatever sign normals had: those of a closed surface point outwards, those of an open one to the scanner,
-/// or as the cloud's own; and f has their sign.
+/// Whatever their initial signs, normals of a closed surface point outwards, those of an open one
+/// towards the scanner or as in the input. f has the same sign.
 #[test]
 fn normals_are_turned_outwards_to_the_scanner_or_as_given() {
     let ball = PointCloud::from_positions(&arbitrary::cloud(CloudKind::Sphere, 2000, 5)).unwrap();
@@ -137,7 +139,7 @@ fn normals_are_turned_outwards_to_the_scanner_or_as_given() {
         for share in [0.95, 1.03] {
             let x = p.map(|c| c * share);
             for at in [view.evaluate(x, &mut scratch), view.evaluate_by(&kernel, x, &mut geodesic)] {
-                // Beside a gap between samples there is no surface.
+                // In a gap between samples there is no surface.
                 if at.status == Status::Ok {
                     assert_eq!(at.f > 0.0, share < 1.0, "positive within: {at:?}");
                     let along: f64 = (0..3).map(|k| at.normal[k] * p[k]).sum();
@@ -168,7 +170,7 @@ fn another_version_is_refused_by_name() {
     );
 }
 
-/// Points, normals and discs that no build would write must not lead a query out of its arrays.
+/// Invalid points, normals and discs must not make a query index out of bounds.
 #[test]
 fn absurd_numbers_do_not_panic() {
     let points = arbitrary::cloud(CloudKind::Sphere, 101, 1);

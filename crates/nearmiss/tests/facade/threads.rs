@@ -1,4 +1,4 @@
-//! Many threads of a pool that want at once what is made when first wanted.
+//! Many threads of a pool that simultaneously need data computed at first use.
 #![expect(clippy::expect_used, reason = "a test may panic")]
 
 use std::sync::mpsc;
@@ -9,7 +9,7 @@ use nearmiss::{BuildOptions, GraphOptions, PointCloud, Scan};
 use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use rayon::prelude::*;
 
-/// Graphs that are searched.
+/// Number of graphs that are searched.
 const ROUNDS: usize = 256;
 
 #[test]
@@ -22,11 +22,11 @@ fn threads_of_a_pool_that_want_levels_at_once_do_not_wait_for_each_other_for_eve
         let pool = rayon::ThreadPoolBuilder::new().num_threads(16).build().unwrap();
         let n = u32::try_from(scan.len()).unwrap();
         for round in 0..ROUNDS {
-            // Nothing of the clone has been made yet: the scan itself is never searched.
+            // The clone has computed nothing yet, because the original is never searched.
             let graph = scan.graph().unwrap().clone();
             let length = |i: u32| {
                 let (u, v) = (i * 91 % n, (i * 91 + n / 3) % n);
-                // Lengths of edges alone take so little that threads often meet.
+                // Edge lengths alone are computed so fast that threads often collide.
                 if round % 32 != 0 {
                     return graph
                         .network(scan.positions())

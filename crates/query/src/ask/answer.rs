@@ -1,98 +1,101 @@
-//! What a query answers.
+//! The answer of a query.
 
 use nearmiss_geometry::PointId;
 use serde::{Deserialize, Serialize};
 
-/// Whether two scans meet.
+/// The verdict on whether two scans meet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Verdict {
-    /// They do, and this is where.
+    /// The scans meet.
     Intersecting {
-        /// A place where they meet.
+        /// A point where the scans meet.
         contact: Contact,
-        /// How sure that is.
+        /// The certainty of the contact.
         evidence: Evidence,
     },
-    /// They do not.
+    /// The scans are separated.
     Separated {
-        /// If certified, a proven lower bound of the distance in world units of their surfaces, or of their
-        /// balls; else 0.
+        /// A proven lower bound of the distance of the surfaces, or of the balls, in world units if
+        /// the separation is certified; 0 otherwise.
         gap: f64,
-        /// How sure that is.
+        /// The certainty of the separation.
         evidence: Evidence,
     },
-    /// That cannot be told.
+    /// The query could not decide.
     Undecided(Reason),
 }
 
 impl Verdict {
-    /// Whether the verdict is that they meet.
+    /// Returns `true` if the scans meet.
     #[must_use]
     pub const fn is_intersecting(&self) -> bool {
         matches!(self, Self::Intersecting { .. })
     }
 
-    /// Whether the verdict is that they are apart.
+    /// Returns `true` if the scans are separated.
     #[must_use]
     pub const fn is_separated(&self) -> bool {
         matches!(self, Self::Separated { .. })
     }
 }
 
-/// How sure a verdict is.
+/// The certainty of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Evidence {
-    /// Separated: volumes that contain the surfaces are disjoint, rounding included. Intersecting: a verified
-    /// point on both surfaces.
+    /// A separation: volumes that contain the surfaces are disjoint, rounding included. An
+    /// intersection: a point on both surfaces was verified.
     Certified,
-    /// The search was exhaustive, or found the surfaces crossing to first order, but proves nothing.
+    /// The search was exhaustive, or found that the surfaces cross to first order, but it proves
+    /// nothing.
     Estimated,
 }
 
-/// Why there is no verdict.
+/// The reason for an undecided verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Reason {
-    /// The budget was spent first; without one, so much that a file must be damaged
-    /// ([`Budget`](crate::Budget)).
+    /// The budget was spent first. Without a budget, the query exceeded a limit that only damaged
+    /// files reach ([`Budget`](crate::Budget)).
     Budget {
-        /// An estimate of the probability that they meet, 0 to 1, from how deeply the volumes still open
-        /// overlap.
+        /// An estimate of the probability that the scans meet, 0 to 1, from how deeply the open
+        /// volumes overlap.
         likelihood: f64,
     },
-    /// They come near each other only where a scan's points lie on lines or too sparsely.
+    /// The scans come near each other only where the points of one are on lines or too sparse.
     Undersampled,
-    /// They come near each other only where a scan's points do not look like one sheet.
+    /// The scans come near each other only where the points of one do not fit a single sheet.
     Ambiguous,
-    /// [`Method::Interpolation`](crate::Method) searches along the graph of the one scan, which has none, or
-    /// was placed [without](crate::Placed::with_graph).
+    /// [`Method::Interpolation`](crate::Method) needs the graph of the first scan, which has none
+    /// or was placed [without it](crate::Placed::with_graph).
     NoGraph,
-    /// A pose is not finite, no rotation, has no positive scale, leads further than squares of double
-    /// precision reach, or makes one scan's frame more than 2⁶⁰ times as large as the other's.
+    /// A pose is invalid: it is not finite, not a rotation or has no positive scale, or its lengths
+    /// have squares outside double precision. Also returned if one scan's frame is more than 2⁶⁰
+    /// times as large as the other's.
     Pose,
 }
 
-/// A place where two scans meet, in the world.
+/// A point where two scans meet, in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// The place.
+    /// The position.
     pub point: [f64; 3],
-    /// Unit normals of both surfaces there, of arbitrary sign; none where points are compared, not surfaces.
+    /// Unit normals of both surfaces at the point, of arbitrary sign. `None` if points are compared
+    /// instead of surfaces.
     pub normals: Option<[[f64; 3]; 2]>,
-    /// How far off the place may be, in world units. Certified: the greater |f| of the two surfaces there.
-    /// Estimated: the greater distance of either point from the other's tangent plane. Balls, and
-    /// surfaces nearer than a margin: half the distance of the two points.
+    /// The uncertainty of the position, in world units. Certified: the greater |f| of the two
+    /// surfaces. Estimated: the greater distance of either source point from the other's tangent
+    /// plane. For balls, and for surfaces within a margin: half the distance of the two points.
     pub residual: f64,
-    /// The points whose discs (or balls) meet there, as the caller numbered them.
+    /// The points whose discs or balls meet there, as the caller numbered them.
     pub sources: [PointId; 2],
 }
 
-/// The places where two scans meet, beside the [`Answer`].
+/// All contacts of two scans, an output beside the [`Answer`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Contacts {
-    /// One of every pair of leaves that meets, unrefined, in the order of the search.
+    /// A contact of each pair of intersecting leaves, unrefined, in the order of the search.
     pub contacts: Vec<Contact>,
-    /// Whether these are all: the budget lasted.
+    /// `true` if the list is complete: the budget was not spent.
     pub complete: bool,
 }
 
@@ -102,54 +105,56 @@ impl Contacts {
     }
 }
 
-/// One place of a contact, in the world.
+/// A point of a contact manifold, in the world.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ManifoldPoint {
-    /// Midway between the surfaces, or the balls.
+    /// The point midway between the surfaces, or between the balls.
     pub point: [f64; 3],
-    /// The unit direction in which a leaves b.
+    /// The unit direction in which a moves out of b.
     pub normal: [f64; 3],
-    /// How far apart they are along it: less than zero where one is in the other. No deeper than the greater
-    /// sampling radius, for what is further behind a surface is not seen from its points.
+    /// The distance along the normal; negative for penetration. Never deeper than the greater
+    /// sampling radius, as points further behind a surface are not recognised as being behind it.
     pub gap: f64,
-    /// The points of a and b that are nearest there, as the caller numbered them.
+    /// The nearest points of a and b there, as the caller numbered them.
     pub sources: [PointId; 2],
 }
 
-/// What a query cost.
+/// The cost of a query.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Evaluations of an implicit function.
     pub evaluations: u64,
     /// Node pairs whose boxes were compared.
     pub node_pairs: u64,
-    /// Pairs of leaves whose points were compared.
+    /// Leaf pairs whose points were compared.
     pub leaf_pairs: u64,
-    /// Nodes looked at to find nearest points, by [`Method::Interpolation`](crate::Method).
+    /// Nodes visited by nearest-point searches of [`Method::Interpolation`](crate::Method).
     pub neighbour_steps: u64,
 }
 
-/// A verdict and what it cost.
+/// A verdict and its cost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// Whether they meet.
+    /// The verdict.
     pub verdict: Verdict,
-    /// The band, a length in the world: nothing is promised of where the scanned things themselves are within
-    /// it. Where scans meet, the greater local radius of the two points that show it; otherwise that of all
-    /// points near the narrowest gap that was proven, or of the scans. Never more than the greater
+    /// The band, a length in world units: nothing is claimed about where the scanned things
+    /// themselves are within it. If the scans meet, it is the greater local radius of the two
+    /// points that show the contact. Otherwise it is the greatest local radius near the narrowest
+    /// proven gap, or of the scans. Never more than the greater
     /// [reach](nearmiss_hierarchy::PointHierarchy::reach); infinite for invalid poses.
     pub band: f64,
-    /// By [`Method::Sampling`](crate::Method), the least |f_A| + |f_B| of all test points on which both mean
-    /// something, in world units (S0 eq. 8): an estimate, from above, of the distance of the surfaces. By a
-    /// flat [`Method::Interpolation`](crate::Method) the least distance of any point drawn of a from b. None
-    /// otherwise, and where there was no such point.
+    /// An estimate of the distance of the surfaces from above, in world units. For
+    /// [`Method::Sampling`](crate::Method), the least |f_A| + |f_B| of all test points at which
+    /// both functions are defined (Klein & Zachmann 2004, eq. 8). For a flat
+    /// [`Method::Interpolation`](crate::Method), the least distance of any drawn point of a from b.
+    /// `None` otherwise, and if there was no such point.
     pub distance_estimate: Option<f64>,
-    /// What that cost.
+    /// The cost of the query.
     pub statistics: Statistics,
 }
 
 impl Answer {
-    /// The answer to a question that was not asked: nothing was spent, and nothing is known.
+    /// A placeholder for a question that was not asked: nothing was spent and nothing is known.
     pub const UNASKED: Self = Self {
         verdict: Verdict::Undecided(Reason::Budget { likelihood: 0.5 }),
         band: f64::INFINITY,

@@ -1,77 +1,79 @@
-//! How much a query may cost. The only clock of the libraries.
+//! Limits on the cost of a query. The only module of the libraries that reads a clock.
 
 use std::time::{Duration, Instant};
 
-/// A point in time at which to stop; absolute, so that one can span all queries of a frame.
+/// A point in time at which to stop. Absolute, so that one deadline can span all queries of a
+/// frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Deadline(pub(crate) Instant);
 
 impl Deadline {
-    /// This long from now.
+    /// Returns the deadline `time` from now.
     #[must_use]
     pub fn within(time: Duration) -> Self {
         let now = now();
-        // A time too long to represent is as good as a year.
+        // A time too long to represent is replaced by a year.
         Self(now.checked_add(time).unwrap_or(now + Duration::from_secs(31_536_000)))
     }
 
-    /// At this instant.
+    /// Returns the deadline at `instant`.
     #[must_use]
     pub const fn at(instant: Instant) -> Self {
         Self(instant)
     }
 }
 
-/// What the clock says.
+/// Reads the clock.
 #[expect(clippy::disallowed_methods, reason = "this module is where clocks are read")]
 pub(crate) fn now() -> Instant {
     Instant::now()
 }
 
-/// How much a query may cost; whatever ends first ends it. The default has no limit but one, and reads no
-/// clock.
+/// Limits on the cost of a query, which stops at the first limit it reaches. The default has a
+/// single limit, and reads no clock.
 ///
-/// That one keeps a damaged file, whose boxes all overlap, from holding a query up for hours: without `work`,
-/// a query ends undecided after some 128 leaf pairs for each leaf of the two scans, seven times what the
-/// worst honest scans were found to need. Only [`Semantics::Thickened`](crate::Semantics) with a radius of
-/// many spacings can come so far, where large parallel sheets are just not near enough; `with_work(u64::MAX)`
-/// lifts the limit.
+/// That limit keeps a damaged file, whose boxes all overlap, from occupying a query for hours.
+/// Without `work`, a query ends undecided after about 128 leaf pairs per leaf of the two scans,
+/// seven times the need of the worst valid scans that were tested. Only
+/// [`Semantics::Thickened`](crate::Semantics) with a radius of many spacings can reach it, for
+/// large parallel sheets that are just too far apart to touch. `with_work(u64::MAX)` removes the
+/// limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Budget {
-    /// Work units: evaluations of an implicit function and node pairs. Reproducible. None: what no sound
-    /// scans need.
+    /// The limit of work units: evaluations of an implicit function plus node pairs. Reproducible.
+    /// `None`: the limit that no valid scans need.
     pub work: Option<u64>,
-    /// When to stop. Not reproducible.
+    /// The time at which to stop. Not reproducible.
     pub deadline: Option<Deadline>,
-    /// How fine to look, a length in the world: nodes whose samples are no further from their surface than
-    /// this answer for all that is below them (S0 §1). Reproducible; the evidence is then estimated. None: to
-    /// the last point.
+    /// The finest resolution, a length in the world. A node whose samples cover its surface within
+    /// this length is compared by its samples instead of its children (Klein & Zachmann 2004, §1).
+    /// Reproducible; the evidence is then estimated. `None`: compare all points.
     pub resolution: Option<f64>,
 }
 
 impl Budget {
-    /// No limit but that for damaged files, down to the last point.
+    /// Full resolution, with no limit except the one for damaged files.
     pub const UNLIMITED: Self = Self { work: None, deadline: None, resolution: None };
 
-    /// The same budget with this many work units.
+    /// The same budget with a limit of `units` work units.
     #[must_use]
     pub const fn with_work(self, units: u64) -> Self {
         Self { work: Some(units), ..self }
     }
 
-    /// The same budget until `deadline`.
+    /// The same budget with this deadline.
     #[must_use]
     pub const fn with_deadline(self, deadline: Deadline) -> Self {
         Self { deadline: Some(deadline), ..self }
     }
 
-    /// Returns `true` if work or time may end a query before it is done.
+    /// Returns `true` if work or time may end a query early.
     pub(crate) const fn may_end(&self) -> bool {
         self.work.is_some() || self.deadline.is_some()
     }
 
-    /// The same budget with nothing looked at more finely than `length`.
+    /// The same budget with the resolution `length`.
     #[must_use]
     pub const fn with_resolution(self, length: f64) -> Self {
         Self { resolution: Some(length), ..self }

@@ -1,73 +1,78 @@
-//! What an interpolation search asks for.
+//! Options of an interpolation search.
 
 use serde::{Deserialize, Serialize};
 
 use crate::ask::occupancy::points_to_draw;
 
-/// The search for intersections along paths of a's graph (S1 §4): points of a are drawn at random, those on
-/// different sides of b are joined by a path, and on it the place is looked for where the side changes. Where
-/// b's sides are not known, and where no drawn points lie on either side though some are near, points are
-/// drawn towards each other instead.
+/// A search for intersections along paths of a's graph (Klein & Zachmann 2005, §4). Points of a are
+/// drawn at random, points on different sides of b are joined by a path, and the search finds where
+/// the side changes along it. If the sides of b are unknown, or no bracket is found although some
+/// drawn points are near b, these step towards b instead.
 ///
-/// What a graph makes for such searches it makes when the first wants it, whatever that's deadline, unless it
-/// was [made ready](nearmiss_graph::SurfaceGraph::make_ready).
+/// A graph builds the tables for such searches on first use, ignoring the deadline of that query,
+/// unless [`make_ready`](nearmiss_graph::SurfaceGraph::make_ready) was called before.
 ///
-/// Wants the graph of a, and for brackets that of b, which says which side is out.
+/// Needs the graph of a. Brackets also need the graph of b, which orients its normals.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[non_exhaustive]
 pub struct Interpolation {
-    /// Into how many surfels the surface of a is thought to be cut where b may be.
+    /// The notional partition into surfels of the part of a's surface that is near b.
     pub surfels: Surfels,
-    /// The probability that each of them has a drawn point (S1, Lemma 1): above 0 and below 1; default 0.97.
+    /// The probability that every surfel contains a drawn point (Klein & Zachmann 2005, Lemma 1):
+    /// above 0 and below 1; default 0.97.
     pub probability: f64,
-    /// How the other end of a bracket is found.
+    /// The method that finds the other end of a bracket.
     pub brackets: Brackets,
-    /// How a place on both surfaces is found from there, if [`Detail::Witness`](crate::Detail) asks for one.
+    /// The method that finds a point on both surfaces from there, if
+    /// [`Detail::Witness`](crate::Detail) asks for one.
     pub refinement: Refinement,
-    /// Where brackets led nowhere: so many of the drawn points nearest to b are drawn towards it, from
-    /// nearest point to nearest point, and the discs there compared. Finds small contacts between drawn
-    /// points, which no bracket holds, and those where sides are not known; S1 does without. Default: 64.
+    /// If no bracket yields an intersection, this many of the drawn points nearest to b step
+    /// towards it, from nearest point to nearest point, and the discs there are compared. Finds
+    /// small contacts between drawn points, which no bracket contains, and contacts where sides are
+    /// unknown. Klein & Zachmann 2005 has no such step. Default: 64.
     pub approaches: u32,
-    /// What the random numbers come from.
+    /// The seed of the random numbers.
     pub seed: u64,
-    /// Without hierarchy: points drawn from all of a that lie in the box of b. With it, pairs of leaves are
-    /// compared: each edge of a's graph there, whether its ends are on different sides of b, and where none
-    /// crosses, all discs.
+    /// `true`: no hierarchy; points are drawn from all points of a in the box of b. `false`: leaf
+    /// pairs are compared. For each edge of a's graph there, the search tests whether its ends are
+    /// on different sides of b; if no edge crosses b, it compares all discs.
     pub flat: bool,
 }
 
-/// How large surfels are.
+/// The size of surfels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Surfels {
-    /// So many, however many points there are: 1 to 65,536. Default: 30, for some 200 points (S1 §4.1).
+    /// This many surfels, whatever the number of points: 1 to 65,536. Default: 30, for about 200
+    /// points (Klein & Zachmann 2005, §4.1).
     Count(u32),
-    /// So many sampling radii wide (S3: adapted to the sampling density): 1 to 1024. The number of points
-    /// drawn grows with that of the cloud's.
+    /// Surfels this many sampling radii wide, adapted to the sampling density (Zachmann's slides):
+    /// 1 to 1024. The number of drawn points grows with that of the cloud.
     Radius(f64),
 }
 
-/// Where the other end of a bracket comes from.
+/// The source of the other end of a bracket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Brackets {
-    /// From the drawn points: the nearest on the other side, within two surfel radii (S3).
+    /// The drawn points: the nearest one on the other side within two surfel radii (Zachmann's
+    /// slides).
     #[default]
     Drawn,
-    /// From the map of close pairs: some points about two surfel radii away along the surface (S1 §4.3), as
-    /// far as it reaches; beyond, from the drawn points.
+    /// The map of close pairs: some points about two surfel radii away along the surface (Klein &
+    /// Zachmann 2005, §4.3), as far as the map reaches; beyond that, the drawn points.
     Annulus,
 }
 
-/// How a place on both surfaces is found from an approximate one.
+/// The method that finds a point on both surfaces from an approximate one.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub enum Refinement {
-    /// By Newton's method on both surfaces.
+    /// Newton's method on both surfaces.
     #[default]
     Newton,
-    /// By random points in a sphere, until one is as near to both surfaces as this, in sampling radii (S1
-    /// §4.6): above 0.01, at most 1.
+    /// Random points in a sphere, until one is within this distance of both surfaces, in sampling
+    /// radii (Klein & Zachmann 2005, §4.6): above 0.01, at most 1.
     Sphere(f64),
-    /// By the points of a regular grid in that sphere (S3).
+    /// Points of a regular grid in that sphere (Zachmann's slides).
     Grid(f64),
 }
 
@@ -86,7 +91,7 @@ impl Default for Interpolation {
 }
 
 impl Interpolation {
-    /// The same search with such surfels.
+    /// The same search with these surfels.
     #[must_use]
     pub const fn with_surfels(self, surfels: Surfels) -> Self {
         Self { surfels, ..self }
@@ -98,25 +103,25 @@ impl Interpolation {
         Self { probability, ..self }
     }
 
-    /// The same search with brackets like these.
+    /// The same search with these brackets.
     #[must_use]
     pub const fn with_brackets(self, brackets: Brackets) -> Self {
         Self { brackets, ..self }
     }
 
-    /// The same search, refined like this.
+    /// The same search with this refinement.
     #[must_use]
     pub const fn with_refinement(self, refinement: Refinement) -> Self {
         Self { refinement, ..self }
     }
 
-    /// The same search with so many approaches.
+    /// The same search with this number of approaches.
     #[must_use]
     pub const fn with_approaches(self, approaches: u32) -> Self {
         Self { approaches, ..self }
     }
 
-    /// The same search with other random numbers.
+    /// The same search with another seed.
     #[must_use]
     pub const fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
@@ -128,12 +133,13 @@ impl Interpolation {
         Self { flat, ..self }
     }
 
-    /// How many points to draw for so many surfels.
+    /// The number of points to draw for this many surfels.
     pub(crate) fn draws(&self, surfels: f64) -> u32 {
         points_to_draw(surfels, self.probability)
     }
 
-    /// How many points are drawn where surfels are [counted](Surfels::Count); none where their size is given.
+    /// Returns the number of points drawn if surfels are [counted](Surfels::Count); `None` if their
+    /// size is given.
     #[must_use]
     pub fn points(&self) -> Option<u32> {
         match self.surfels {

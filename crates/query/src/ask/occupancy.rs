@@ -1,11 +1,12 @@
-//! How many points to draw so that every surfel gets one.
+//! The number of points to draw so that every surfel contains one.
 
-/// The probability that each of `surfels` surfels of one size gets one of `points` points that are drawn
-/// evenly and independently: Σₖ (−1)ᵏ C(a, k) (1 − k/a)ⁿ, by inclusion and exclusion, to 1e-7. S1's Lemma 1
-/// has its limit for many surfels.
+/// Returns the probability that each of `surfels` equal surfels contains one of `points` points
+/// drawn uniformly and independently, to 1e-7. By inclusion–exclusion it is Σₖ (−1)ᵏ C(a, k) (1 −
+/// k/a)ⁿ; Klein & Zachmann 2005, Lemma 1 gives the limit for many surfels.
 #[must_use]
 pub fn occupancy(surfels: u32, points: u32) -> f64 {
-    /// With so many surfels expected to stay empty all are occupied once in 10⁸ times.
+    /// If this many surfels are expected to stay empty, all are occupied with a probability of
+    /// 10⁻⁸.
     const HOPELESS: f64 = 18.0;
     let (a, n) = (f64::from(surfels), f64::from(points));
     if points < surfels || a * (n * (-1.0 / a).ln_1p()).exp() > HOPELESS {
@@ -24,10 +25,9 @@ pub fn occupancy(surfels: u32, points: u32) -> f64 {
     sum.clamp(0.0, 1.0)
 }
 
-/// The fewest points to draw so that with a probability of at most `error` some of `surfels` surfels gets
-/// none.
+/// Returns the fewest points to draw so that the probability of an empty surfel is at most `error`.
 ///
-/// O(log n) times what [`occupancy`] takes. 2³² − 1 if that does not suffice.
+/// O(log n) times the cost of [`occupancy`]. Returns 2³² − 1 if fewer points do not suffice.
 #[must_use]
 pub fn points_for(surfels: u32, error: f64) -> u32 {
     let (mut few, mut enough) = (surfels.saturating_sub(1), surfels.max(1));
@@ -47,8 +47,9 @@ pub fn points_for(surfels: u32, error: f64) -> u32 {
     enough
 }
 
-/// n = a ln a + c a points, of which each of a surfels gets one with probability `exp(−exp(−c))` (S1, Lemma
-/// 1); for ten surfels and more the true probability is greater.
+/// Returns n = a ln a + c a points, with which each of a surfels contains one with probability
+/// `exp(−exp(−c))` (Klein & Zachmann 2005, Lemma 1). For ten surfels and more the true probability
+/// is greater.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it saturates")]
 pub(crate) fn points_to_draw(surfels: f64, probability: f64) -> u32 {
     let c = -(-probability.ln()).ln();
@@ -59,7 +60,7 @@ pub(crate) fn points_to_draw(surfels: f64, probability: f64) -> u32 {
 mod tests {
     use super::{occupancy, points_for, points_to_draw};
 
-    /// Ball by ball: the probabilities of how many surfels are occupied.
+    /// The distribution of the number of occupied surfels, updated point by point.
     fn ball_by_ball(surfels: u32, points: u32) -> f64 {
         let a = f64::from(surfels);
         let mut occupied = vec![0.0; surfels as usize + 1];
@@ -86,7 +87,7 @@ mod tests {
                 assert!((found - expected).abs() < 1e-7, "{found} for {expected}, {points} in {surfels}");
             }
         }
-        // docs/theory: Lemma 1 with c = 3.5 promises 0.970, the true probabilities are these.
+        // docs/theory: Lemma 1 with c = 3.5 promises 0.970; these are the true probabilities.
         for (surfels, expected) in [(10, 0.980), (30, 0.974), (100, 0.972)] {
             let a = f64::from(surfels);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few hundred")]
@@ -104,7 +105,8 @@ mod tests {
                 assert!(points == 1 || 1.0 - occupancy(surfels, points - 1) > error, "{points} are too many");
             }
         }
-        // S1 §4.1: some 200 points for 30 surfels; Lemma 1 asks for a few more than it takes.
+        // Klein & Zachmann 2005, §4.1: about 200 points for 30 surfels. Lemma 1 requires a few more
+        // than necessary.
         let asked = points_to_draw(30.0, 0.97);
         assert_eq!((asked, points_for(30, 0.03)), (207, 204), "Lemma 1, and exactly");
     }

@@ -1,4 +1,4 @@
-//! What is asked: options as plain numbers, and the plan that they validate to.
+//! Options of a collision query as plain values, and the plan that validates them.
 
 use nearmiss_hierarchy::{Part, PointHierarchy};
 use nearmiss_surface::Metric;
@@ -9,25 +9,27 @@ use crate::ask::answer::Evidence;
 use crate::ask::budget::Budget;
 use crate::ask::interpolation::{Interpolation, Refinement, Surfels};
 
-/// What it means that two scans meet.
+/// The meaning of "two scans meet".
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Semantics {
-    /// Their obstacles have a point in common (`docs/theory/obstacle.md`). The obstacle of a scan is its
-    /// surface where points sample a sheet, a ball about every other point, and every measured point itself;
-    /// none of it is further from a measured point than that point's local radius or half the scan's reach.
-    /// Two-sided: a ball wholly inside a hollow ball does not meet it.
+    /// The obstacles of the scans have a point in common (`docs/theory/obstacle.md`). The obstacle
+    /// of a scan consists of its surface where points sample a sheet, a ball about every other
+    /// point, and every measured point itself. None of it is further from a measured point than
+    /// that point's local radius or half the scan's reach. Surfaces are two-sided: a ball entirely
+    /// inside a hollow ball does not meet it.
     #[default]
     Obstacle,
-    /// Their implicit surfaces have a point in common, as the papers define them: points that sample no sheet
-    /// are no obstacles. Two-sided likewise.
+    /// The implicit surfaces have a point in common, as in Klein & Zachmann's papers. Points that
+    /// do not sample a sheet are not obstacles. Two-sided as well.
     Surface,
-    /// Balls of this radius (world units, zero or more) about the points of both overlap or touch: exact.
+    /// Balls of this radius (world units, zero or more) about the points of both scans overlap or
+    /// touch. Exact.
     Thickened(f64),
 }
 
 impl Semantics {
-    /// What the volumes of nodes must hold for a certificate of these semantics.
+    /// The part of the scan that node volumes must contain to certify these semantics.
     pub(crate) const fn part(self) -> Part {
         match self {
             Self::Obstacle => Part::Obstacle,
@@ -35,58 +37,62 @@ impl Semantics {
         }
     }
 
-    /// Returns `true` if surfaces are compared, alone or as parts of obstacles, not points alone.
+    /// Returns `true` if surfaces are compared, alone or as parts of obstacles, instead of points
+    /// alone.
     pub(crate) const fn is_of_surfaces(self) -> bool {
         matches!(self, Self::Obstacle | Self::Surface)
     }
 }
 
-/// How much to say of a contact.
+/// The amount of detail about a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Detail {
-    /// Where the points' tangent discs cross: fastest; the evidence is estimated.
+    /// Crossing tangent discs. Fastest; the evidence is estimated.
     Verdict,
-    /// A point on both surfaces, verified where that can be had.
+    /// A point on both surfaces, verified if possible.
     #[default]
     Witness,
 }
 
-/// How two leaves are compared.
+/// The method that compares two leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Method {
-    /// Whether tangent discs of their points cross.
+    /// Tests whether tangent discs of their points cross.
     #[default]
     Traversal,
-    /// How near both surfaces come to random test points: S0 §5.3, for comparison. Slower, and misses what
-    /// lies between the test points.
+    /// Measures how near both surfaces come to random test points (Klein & Zachmann 2004, §5.3),
+    /// for comparison. Slower, and misses contacts between the test points.
     Sampling(Sampling),
-    /// By searches along the graph of a: S1 §4. Slower than [`Self::Traversal`]; without hierarchy it does
-    /// without volumes, and may miss small contacts.
+    /// Searches along the graph of a (Klein & Zachmann 2005, §4). Slower than [`Self::Traversal`].
+    /// Without hierarchy it uses no bounding volumes, and may miss small contacts.
     Interpolation(Interpolation),
 }
 
-/// The random test of two leaves (S0 §5.3, eq. 8): test points in the sphere covering of a's leaf, in which
-/// an intersection is seen when |f_A| + |f_B| is less than a tolerance in any.
+/// The random test of two leaves (Klein & Zachmann 2004, §5.3, eq. 8). Test points are drawn in the
+/// sphere covering of a's leaf; the leaves intersect if |f_A| + |f_B| is below a tolerance at any
+/// of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[non_exhaustive]
 pub struct Sampling {
-    /// Test points for each pair of leaves, or, [flat](Sampling::flat), for each leaf's worth of points; 1 to
+    /// Test points per leaf pair or, if [flat](Sampling::flat), per leaf's worth of points; 1 to
     /// 65,536, default 128.
     pub test_points: u32,
-    /// `d_ε` in sampling radii (of the scan with the greater one): above 0, at most 4; default 0.4.
+    /// `d_ε` in sampling radii, of the scan with the greater one: above 0, at most 4; default 0.4.
     pub tolerance: f64,
-    /// What the random numbers come from, together with the ids of the leaves.
+    /// The seed of the random numbers, combined with the ids of the leaves.
     pub seed: u64,
-    /// Without hierarchy: test points about those points of a that lie in the box of b.
+    /// `true`: no hierarchy; test points are drawn about those points of a that are in the box of
+    /// b.
     pub flat: bool,
-    /// Without hierarchy: no more test points than this in all, as S1 §5.2 has them. Default: 2³² − 1.
+    /// The limit of test points in total without hierarchy (Klein & Zachmann 2005, §5.2). Default:
+    /// 2³² − 1.
     pub most: u32,
 }
 
-/// Greatest number of test points.
+/// The greatest number of test points.
 pub(crate) const MOST_TEST_POINTS: u32 = 65_536;
 
 impl Default for Sampling {
@@ -96,7 +102,7 @@ impl Default for Sampling {
 }
 
 impl Sampling {
-    /// The same test with so many test points.
+    /// The same test with this number of test points.
     #[must_use]
     pub const fn with_test_points(self, test_points: u32) -> Self {
         Self { test_points, ..self }
@@ -108,13 +114,13 @@ impl Sampling {
         Self { tolerance, ..self }
     }
 
-    /// The same test with other random numbers.
+    /// The same test with another seed.
     #[must_use]
     pub const fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
 
-    /// The same test with no more test points than this in all.
+    /// The same test with at most this many test points in total.
     #[must_use]
     pub const fn with_most(self, most: u32) -> Self {
         Self { most, ..self }
@@ -127,51 +133,55 @@ impl Sampling {
     }
 }
 
-/// Which pairs of nodes are looked at first. Changes no verdict unless a budget ends the search.
+/// The order in which node pairs are visited. It changes no verdict unless a budget ends the
+/// search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Order {
-    /// Depth first, of siblings the one whose boxes overlap most: fastest to the end.
+    /// Depth first; among siblings the pair whose boxes overlap most. Fastest to completion.
     DepthFirst,
-    /// Of all pairs the one whose boxes overlap most of each other: best under budgets.
+    /// By overlap: of all pairs the one whose boxes overlap most. Best under budgets.
     Overlap,
-    /// The pair with most sample points of a's node on either side of f′ of b's, further from it than its
-    /// covering radius (S0 §5.2).
+    /// The pair with most sample points of a's node on both sides of f′ of b's node. Only points
+    /// further from f′ than the covering radius of b's node count (Klein & Zachmann 2004, §5.2).
     Sides,
-    /// The same, each sample point weighing with the eigenvalue gap of f′ where it is (S0 §7).
+    /// The same, with each sample point weighted by the eigenvalue gap of f′ there (Klein &
+    /// Zachmann 2004, §7).
     SidesByGap,
 }
 
-/// What is asked. Plain values; [`CollidePlan::new`] validates them.
+/// Options of a collision query. Plain values; [`CollidePlan::new`] validates them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[non_exhaustive]
 pub struct CollideOptions {
-    /// What it means to meet. Default: obstacles.
+    /// The meaning of contact. Default: obstacles.
     pub semantics: Semantics,
-    /// How much to say of a contact. Default: a witness.
+    /// The amount of detail about a contact. Default: a witness.
     pub detail: Detail,
-    /// What nearer than this, in world units, counts as meeting; zero or more. Default: 0, nothing but
-    /// contact.
+    /// Scans nearer than this, in world units, count as meeting; zero or more. Default: 0, only
+    /// contact counts.
     ///
-    /// Never too small: two points nearer than it are never separated.
+    /// The margin is conservative: scans with two points nearer than it are never separated.
     pub margin: f64,
-    /// How sure a separation of surfaces should be. Default: estimated. Certified costs half as much again,
-    /// near contact two to three times as much, and says a proven distance; where the proof fails, the
-    /// separation is still answered as estimated. By the geodesic kernel it always is, for enclosures are
-    /// proven of straight distances alone.
+    /// The evidence wanted for a separation of surfaces. Default: estimated. Certified costs half
+    /// as much again, near contact two to three times as much, and yields a proven distance. If the
+    /// proof fails, the separation is still reported, as estimated. With the geodesic kernel
+    /// separations are always estimated, as enclosures are proven for Euclidean distances only.
     pub evidence: Evidence,
-    /// By which distances surfaces are defined; balls about points know none. None, the default: as both
-    /// scans were prepared.
+    /// The metric that defines the surfaces; ignored for balls about points. Default: `None`, the
+    /// metric that both scans were prepared for.
     pub metric: Option<Metric>,
-    /// How two leaves are compared. Default: by tangent discs. Any other method compares surfaces alone.
+    /// The method that compares two leaves. Default: tangent discs. Every other method compares
+    /// only surfaces.
     pub method: Method,
-    /// Which pairs of nodes are looked at first, of surfaces and obstacles. None, the default: what measuring
-    /// found best (benches/record), depth first, or by overlap where a budget of work or time may end the
-    /// search.
+    /// The order in which node pairs of surfaces and obstacles are visited. Default: `None`, the
+    /// fastest order measured (benches/record): depth first, or by overlap if a budget of work or
+    /// time may end the search.
     pub order: Option<Order>,
-    /// Whether nodes whose boxes overlap are also parted by their sphere coverings (S0 §5.1), of surfaces and
-    /// obstacles. Default: no, for that costs more than it saves (benches/record).
+    /// `true` if node pairs of surfaces and obstacles whose boxes overlap are also tested by their
+    /// sphere coverings (Klein & Zachmann 2004, §5.1). Default: `false`, as the test costs more
+    /// than it saves (benches/record).
     pub coverings: bool,
 }
 
@@ -203,19 +213,19 @@ impl CollideOptions {
         Self { margin, ..self }
     }
 
-    /// The same options with this evidence of separations.
+    /// The same options with this evidence for separations.
     #[must_use]
     pub const fn with_evidence(self, evidence: Evidence) -> Self {
         Self { evidence, ..self }
     }
 
-    /// The same options by this metric.
+    /// The same options with this metric.
     #[must_use]
     pub const fn with_metric(self, metric: Metric) -> Self {
         Self { metric: Some(metric), ..self }
     }
 
-    /// Whether separations are to be proven; of points they always are.
+    /// Returns `true` if separations of surfaces must be proven. Separations of points always are.
     pub(crate) fn certifies(&self) -> bool {
         self.semantics.is_of_surfaces() && self.evidence == Evidence::Certified
     }
@@ -226,7 +236,7 @@ impl CollideOptions {
         Self { method, ..self }
     }
 
-    /// The same options in this order.
+    /// The same options with this order.
     #[must_use]
     pub const fn with_order(self, order: Order) -> Self {
         Self { order: Some(order), ..self }
@@ -245,62 +255,62 @@ impl CollideOptions {
     }
 }
 
-/// Why a question cannot be asked.
+/// An invalid question.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// A radius that is no length.
+    /// The radius is negative, infinite or NaN.
     #[error("a radius of {0} about the points; it must be finite and not negative")]
     Radius(f64),
-    /// A margin that is no length.
+    /// The margin is negative, infinite or NaN.
     #[error("a margin of {0}; it must be finite and not negative")]
     Margin(f64),
-    /// A relative precision out of range.
+    /// The relative precision is out of range.
     #[error("relative must be at least 0 and less than 1, got {0}")]
     Relative(f64),
     /// Too few or too many test points.
     #[error("{0} test points; 1 to 65536 are possible")]
     TestPoints(u32),
-    /// A tolerance that is none.
+    /// The tolerance is out of range.
     #[error("a tolerance of {0} sampling radii; it must be more than 0 and at most 4")]
     Tolerance(f64),
     /// Too few or too many surfels.
     #[error("{0} surfels; 1 to 65536 are possible, or 1 to 1024 sampling radii for each")]
     Surfels(f64),
-    /// A probability that none can have.
+    /// The probability is not between 0 and 1.
     #[error("a probability of {0} that each surfel has a point; it must be more than 0 and less than 1")]
     Probability(f64),
-    /// A tolerance in a sphere that is none.
+    /// The tolerance of a refinement in a sphere is out of range.
     #[error("a tolerance of {0} sampling radii in a sphere; it must be more than 0.01 and at most 1")]
     Refinement(f64),
-    /// A spacing or tolerance of curves that is no length.
+    /// The spacing or tolerance of curves is not positive and finite.
     #[error("a spacing or tolerance of {0}; it must be finite and more than 0")]
     CurveLength(f64),
-    /// Test points say whether surfaces cross, not how far apart they are.
+    /// Sampling and interpolation decide whether surfaces cross, not how far apart they are.
     #[error(
         "the methods `sampling` and `interpolation` compare surfaces, without a margin; leave the margin and the thickness out"
     )]
     SamplingAlone,
-    /// The surfaces of the two scans are not defined alike.
+    /// The surfaces of the two scans are defined by different metrics.
     #[error(
         "one scan is prepared for the {} kernel, the other for the {} one; prepare both for the same",
         .0[0], .0[1]
     )]
     Metrics([Metric; 2]),
-    /// A scan's surface is not defined as it is asked for.
+    /// A scan was prepared for another metric than the options ask for.
     #[error(
         "asked by the {asked} kernel of a scan that is prepared for the {stored} one; prepare it for the {asked} kernel, or \
          ask by the {stored} one"
     )]
     Metric {
-        /// By which metric it was asked.
+        /// The metric that was asked for.
         asked: Metric,
-        /// For which the scan is.
+        /// The metric that the scan was prepared for.
         stored: Metric,
     },
 }
 
-/// The metric of both scans, which must be that which is asked for, if any is.
+/// The metric of both scans. Fails if they differ from each other or from `asked`.
 fn common_metric(asked: Option<Metric>, a: &PointHierarchy, b: &PointHierarchy) -> Result<Metric, PlanError> {
     let stored = [a.metric(), b.metric()];
     match asked {
@@ -313,7 +323,7 @@ fn common_metric(asked: Option<Metric>, a: &PointHierarchy, b: &PointHierarchy) 
     }
 }
 
-/// Whether the numbers of the method are in range, and it answers such questions.
+/// Checks that the numbers of the method are in range, and that the method supports the question.
 fn check_method(options: &CollideOptions) -> Result<(), PlanError> {
     match options.method {
         Method::Traversal => return Ok(()),
@@ -354,8 +364,8 @@ fn check_method(options: &CollideOptions) -> Result<(), PlanError> {
 
 /// A validated question about two scans.
 ///
-/// A plan serves every pair of scans of the same [metric](PointHierarchy::metric), in any poses. Make one for
-/// a whole [`World`](crate::World).
+/// A plan serves every pair of scans of the same [metric](PointHierarchy::metric), in any poses.
+/// Make one for a whole [`World`](crate::World).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CollidePlan {
     options: CollideOptions,
@@ -365,8 +375,8 @@ impl CollidePlan {
     /// Validates `options` for two scans in any poses.
     ///
     /// # Errors
-    /// Names the option that is out of range, or the [metric](PointHierarchy::metric) that does not fit.
-    /// Balls about points, which know no kernel, fit any.
+    /// Names the option that is out of range, or the [metric](PointHierarchy::metric) that does not
+    /// match. Balls about points are independent of the metric and match any.
     pub fn new(options: &CollideOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         let is_length = |l: f64| l >= 0.0 && l.is_finite();
         match options.semantics {
@@ -398,8 +408,8 @@ impl CollidePlan {
         semantics.is_of_surfaces() && (method != Method::Traversal || closer)
     }
 
-    /// The distance, in world units, up to which points or surfaces count as meeting: the reach of a
-    /// [broad phase](crate::World::near_pairs) for this question.
+    /// Returns the distance, in world units, up to which points or surfaces count as meeting. This
+    /// is the reach of a [broad phase](crate::World::near_pairs) for this question.
     #[must_use]
     pub fn reach(&self) -> f64 {
         match self.options.semantics {
@@ -408,7 +418,7 @@ impl CollidePlan {
         }
     }
 
-    /// The same question with other test points, which are in range.
+    /// The same plan with other test points, which must be in range.
     pub(crate) fn with_sampling(self, sampling: Sampling) -> Self {
         Self { options: self.options.with_method(Method::Sampling(sampling)) }
     }

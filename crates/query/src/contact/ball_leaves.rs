@@ -1,5 +1,6 @@
-//! Leaves of which one or both hold balls: the lane tests of [`leaf::ball_pair`](crate::leaf::ball_pair) find
-//! who meets, and a witness is looked for on the sheet that a ball meets.
+//! Comparison of leaves of which at least one contains balls. The lane tests of
+//! [`leaf::ball_pair`](crate::leaf::ball_pair) find the pairs that meet; where a ball meets a
+//! sheet, a witness is searched for on the sheet.
 
 use std::ops::ControlFlow;
 
@@ -15,13 +16,13 @@ use crate::leaf::ball_pair::Targets;
 const WIDTH: usize = LeafBlock::WIDTH;
 
 impl Surfaces<'_> {
-    /// The points of two leaves, of which one or both hold balls, against each other.
+    /// Compares the points of two leaves, at least one of which contains balls.
     #[cold]
     pub(crate) fn compare_balls(&mut self, [leaf_a, leaf_b]: [usize; 2]) -> ControlFlow<()> {
         let (a, b) = (self.pair.a, self.pair.b);
         let (of_a, of_b) = (a.leaves, b.leaves);
         let relative = self.pair.relative;
-        // Two places as near as this in the world may come out so much further apart.
+        // Rounding may increase the distance of two points by this much.
         let reach = self.reach + 2.0 * relative.slack();
         let level = self.pair.level;
         if of_a.has_balls(leaf_a) {
@@ -53,7 +54,7 @@ impl Surfaces<'_> {
                     let j = block * WIDTH + lane;
                     let x = relative.point(b.position(j));
                     let radius = b.obstacle_ball(j) * relative.scale() + reach;
-                    // Balls of a have been held against those of b.
+                    // Balls of a were already compared with those of b.
                     let discs = targets.get_or_insert_with(|| Targets::new(a, target).discs());
                     let met = discs.within(level, x, radius);
                     self.balls_meet(met, |lane| [target.1 + lane, j])?;
@@ -63,7 +64,7 @@ impl Surfaces<'_> {
         ControlFlow::Continue(())
     }
 
-    /// Takes down the contacts among the pairs of points that have a bit in `near`.
+    /// Records the contacts among the point pairs that have a bit in `near`.
     fn balls_meet(&mut self, near: u32, points: impl Fn(usize) -> [usize; 2]) -> ControlFlow<()> {
         for lane in Bits(near) {
             let pair = points(lane);
@@ -85,7 +86,8 @@ impl Surfaces<'_> {
         ControlFlow::Continue(())
     }
 
-    /// A verified place of the one scan's sheet in the other's ball, or within the margin of it.
+    /// Returns a verified point on one scan's sheet inside the other's ball, or within the margin
+    /// of it.
     fn ball_on_sheet(&mut self, contact: &Contact, [i, j]: [usize; 2]) -> Option<Contact> {
         if !self.verifies() {
             return None;

@@ -9,18 +9,18 @@ use crate::ask::answer::Contact;
 use crate::leaf::nearest_points::{PointPair, nearest};
 use crate::pair::scan_pair::ScanPair;
 
-/// The search for two points within twice the radius of each other.
+/// The search for two points within `reach` of each other.
 #[derive(Debug)]
 pub(crate) struct Balls<'a> {
     pub(crate) pair: ScanPair<'a>,
-    /// 2R + margin in the world, and a little more in a's stored frame.
+    /// 2R + margin in the world, and the same in a's stored frame, rounded up.
     reach: f64,
     pub(crate) reach_stored: f32,
-    /// The nearest such pair of every pair of leaves, if all are wanted.
+    /// The nearest such point pair of each leaf pair, if all contacts are requested.
     pub(crate) all: Option<&'a mut Vec<Contact>>,
-    /// The first such pair, and its points.
+    /// The first such contact and its points.
     pub(crate) found: Option<(Contact, [usize; 2])>,
-    /// A lower bound of the distance of all points looked at or excluded, in the world.
+    /// A lower bound of the distance of all points compared or pruned, in the world.
     pub(crate) apart: f64,
 }
 
@@ -30,7 +30,7 @@ impl<'a> Balls<'a> {
         Self { pair, reach, reach_stored, all, found: None, apart: f64::INFINITY }
     }
 
-    /// The nearest points of two leaves, which may be near enough.
+    /// Finds the nearest points of two leaves and records them if they are within reach.
     pub(crate) fn compare(&mut self, leaves: NodePair) -> ControlFlow<()> {
         let best = PointPair { distance: self.apart, points: [0; 2] };
         let PointPair { distance, points } = nearest(self.pair.level, &self.pair, leaves, best);
@@ -70,7 +70,7 @@ impl BoxVisitor for Balls<'_> {
     }
 }
 
-/// Between two points.
+/// The contact of two points.
 fn contact(pair: &ScanPair<'_>, [i, j]: [usize; 2]) -> Contact {
     let [p, q] = [pair.views[0].point(i), pair.views[1].point(j)].map(Vector3::from);
     Contact {
@@ -81,7 +81,7 @@ fn contact(pair: &ScanPair<'_>, [i, j]: [usize; 2]) -> Contact {
     }
 }
 
-/// Where two points are, if they are within `reach` of each other in the world.
+/// Returns the contact of two points if they are within `reach` of each other in the world.
 pub(crate) fn balls_meet(pair: &ScanPair<'_>, reach: f64, points: [usize; 2]) -> Option<Contact> {
     (PointPair::new(pair, points).distance <= reach).then(|| contact(pair, points))
 }

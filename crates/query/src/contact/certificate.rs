@@ -1,12 +1,13 @@
-//! Certificates of separation: a set of node pairs that covers all pairs of points, the enclosures of each
-//! pair apart. Enclosures provably contain the surface, or the obstacle, of their nodes.
+//! Certificates of separation: a set of node pairs with disjoint enclosures that covers all pairs
+//! of points. An enclosure provably contains its node's part of the surface, or of the obstacle.
 //!
-//! The proof begins with the roots. A pair whose enclosures are apart is proven; one whose enclosures overlap
-//! is replaced by its children, sixteen pairs at a time. The certificate is whole when no pair is left, and
-//! given up at the first two leaves that nothing parts.
+//! The proof starts with the pair of the roots. A pair with disjoint enclosures is proven; a pair
+//! with overlapping enclosures is replaced by its children, sixteen pairs at a time. The
+//! certificate is complete when no pair is left. The proof fails at the first two leaves that
+//! cannot be separated.
 //!
-//! A certificate that stops at the first volumes that are disjoint proves little distance. So the pair with
-//! the least bound is split further, for about an eighth as long as all took before.
+//! A certificate that stops at the first disjoint volumes proves only a small distance. So the pair
+//! with the smallest gap is split further, for about an eighth of the work done so far.
 
 use std::ops::ControlFlow;
 
@@ -17,34 +18,34 @@ use crate::pair::bounds::{BoundVisitor, Pairs};
 use crate::pair::motion::{Gaps, LANES, Limits, Motion};
 use crate::pair::scan_pair::{ScanPair, balls_apart};
 
-/// A proof that two scans are apart: pairs of nodes with disjoint enclosures, which together cover the pair
-/// of the roots.
+/// A proof that two scans are separated: node pairs with disjoint enclosures that together cover
+/// the pair of the roots.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Proof {
-    /// The pairs, with a lower bound of the distance of their enclosures in world units.
+    /// The node pairs, each with a lower bound of the distance of their enclosures in world units.
     pub pairs: Vec<(NodePair, f64)>,
 }
 
-/// A pair of nodes that are proven to be this far apart, in a's stored frame.
+/// A node pair with a proven gap, in a's stored frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bound {
     pub(crate) gap: f32,
     pub(crate) pair: NodePair,
 }
 
-/// A gap this many times the least one of a proof is good enough.
+/// Pairs whose gap is at least this many times the smallest gap of the proof are not split further.
 const KEPT: f32 = 4.0;
 
-/// The pairs of nodes of a proof. Reused.
+/// Reusable memory for the node pairs of a proof.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ProofScratch {
-    /// Those that are not yet proven apart.
+    /// The pairs that are not yet proven disjoint.
     open: Stack,
-    /// Those that are apart with the least gaps, which are their keys.
+    /// The disjoint pairs with the smallest gaps, which are their keys.
     near: Vec<Open>,
-    /// The same, the least gap first, while these are split further.
+    /// The same pairs, smallest gap first, while they are split further.
     nearest: Heap,
-    /// The others that are apart, if all are wanted.
+    /// The other disjoint pairs, if all are requested.
     rest: Vec<Open>,
 }
 
@@ -56,14 +57,14 @@ impl ProofScratch {
         self.rest.clear();
     }
 
-    /// All pairs that are apart.
+    /// All disjoint pairs.
     fn apart(&self) -> impl Iterator<Item = &Open> {
         self.near.iter().chain(&self.rest)
     }
 }
 
-/// Returns `true` if a proof would fail at two leaves: neither their enclosures nor their points are further
-/// apart than `reach`.
+/// Returns `true` if a proof would fail at these leaves: neither their enclosures nor their points
+/// are further apart than `reach`.
 pub(crate) fn are_doubtful(pair: &ScanPair<'_>, motion: &Motion, leaves: NodePair, reach: f32) -> bool {
     if pair.better_gap(leaves, f32::NEG_INFINITY) > reach || pair.gap_of_enclosures(leaves) > reach {
         return false;
@@ -77,14 +78,14 @@ fn gap_of_nodes(pair: &ScanPair<'_>, motion: &Motion, nodes: NodePair) -> f32 {
     motion.gap(pair.bounds(motion).of(pair.level, nodes).enclosures[0], pair.relative.slack())
 }
 
-/// The search for a pair of leaves whose enclosures are not apart.
+/// The search for a proof, or for two leaves at which it fails.
 pub(crate) struct Certifier<'c, 'a> {
     pub(crate) pair: &'c mut ScanPair<'a>,
     /// Enclosures must be further apart than this, in a's stored frame.
     pub(crate) reach: f32,
-    /// What was proven.
+    /// The proven pairs.
     pub(crate) proven: &'c mut Vec<Bound>,
-    /// Leaves whose enclosures are not apart.
+    /// The leaves at which the proof failed.
     pub(crate) doubtful: Option<NodePair>,
 }
 
@@ -94,10 +95,11 @@ impl<'c, 'a> Certifier<'c, 'a> {
         Self { pair, reach, proven, doubtful: None }
     }
 
-    /// Proves the two scans, b's stored frame at `pose` in a's, to be apart. Returns the least gap, in the
-    /// world, and the band there; `None` where the proof fails. It is likeliest to fail at leaves that were
-    /// `compared` because their boxes overlap, so these come first. The pairs are handed out with their gaps
-    /// in the world if a `proof` is wanted, and left in `proven` if a hint wants them.
+    /// Proves that the two scans are separated, with b's stored frame at `pose` in a's. Returns the
+    /// smallest gap, in the world, and the band there; `None` if the proof fails. The leaves in
+    /// `compared` are tried first: their boxes overlap, so the proof is likeliest to fail there.
+    /// Writes the pairs to `proof` if one is requested, with gaps in the world, and to
+    /// `self.proven` for a hint if `is_hinted`.
     pub(crate) fn prove(
         &mut self,
         pose: &Pose,
@@ -132,7 +134,7 @@ impl<'c, 'a> Certifier<'c, 'a> {
         let least = proving.tighten((compared / 8).max(32), nearest)?;
         let gap = if proving.is_cut { least.key.min(proving.enough) } else { least.key };
         let proven = self.in_world(gap);
-        // Far away balls tell more than boxes.
+        // For distant scans the bounding balls prove more than boxes.
         let balls = balls_apart(self.pair.views, self.pair.part) / self.pair.views[0].placed().scale();
         #[expect(clippy::cast_possible_truncation, reason = "lessened by more than the rounding")]
         let key = (balls * (1.0 - 1e-6)) as f32;
@@ -151,8 +153,8 @@ impl<'c, 'a> Certifier<'c, 'a> {
         Some((distance, self.pair.band_of(least.pair)))
     }
 
-    /// Splits `open` pairs of a proof, b's stored frame at `pose` in a's, until all are apart; `None` where
-    /// that fails. The pairs that are apart are left in `proven`.
+    /// Splits the `open` pairs of a proof, with b's stored frame at `pose` in a's, until all are
+    /// disjoint. Returns `None` if that fails. Leaves the disjoint pairs in `self.proven`.
     pub(crate) fn prove_on(
         &mut self,
         pose: &Pose,
@@ -173,34 +175,34 @@ impl<'c, 'a> Certifier<'c, 'a> {
         is_whole.then_some(())
     }
 
-    /// What a gap in a's stored frame proves in the world.
+    /// The distance in the world that a gap in a's stored frame proves.
     fn in_world(&self, gap: f32) -> f64 {
         let slack = self.pair.relative.slack();
-        // Less the rounding of the scale and of the product.
+        // Minus the rounding errors of the scale and the product.
         f64::from(gap - slack) * self.pair.views[0].placed().scale() * (1.0 - 1e-9)
     }
 }
 
-/// A proof under way. Pairs that are not apart are split, the nearest child first: if the proof fails at all,
-/// it is likeliest to fail there.
+/// A proof in progress. Pairs that are not disjoint are split, the nearest child first, as the
+/// proof is likeliest to fail there.
 struct Proving<'p, 'a> {
     pair: &'p mut ScanPair<'a>,
     motion: &'p Motion,
     /// Enclosures must be further apart than this, in a's stored frame.
     reach: f32,
-    /// Whether all pairs are wanted that are apart.
+    /// `true` if all disjoint pairs are requested.
     lists: bool,
-    /// [`KEPT`] times the least gap so far. A pair with at least this gap is not split for a better bound.
+    /// [`KEPT`] times the smallest gap so far. A pair with at least this gap is not split further.
     enough: f32,
-    /// The same as [`Motion::gaps`] tells gaps: less the distance of the scans' centres.
+    /// The same limit in the unit of [`Motion::gaps`]: minus the distance of the scans' centres.
     beyond: f32,
-    /// Whether the gap of some pair is known to be at least `enough`, and not kept.
+    /// `true` if a pair with a gap of at least `enough` was dropped.
     is_cut: bool,
-    /// Pairs that are apart with the least gaps.
+    /// The disjoint pairs with the smallest gaps.
     near: &'p mut Vec<Open>,
-    /// The others, if all are wanted.
+    /// The other disjoint pairs, if all are requested.
     rest: &'p mut Vec<Open>,
-    /// Leaves that nothing parts.
+    /// The leaves at which the proof failed.
     doubtful: Option<NodePair>,
 }
 
@@ -217,16 +219,16 @@ impl<'p, 'a> Proving<'p, 'a> {
         Self { pair, motion, reach, lists, enough, beyond, is_cut: false, near, rest, doubtful: None }
     }
 
-    /// Splits the open pairs until all are apart. Returns `false` where two leaves are not, or the budget
-    /// ends.
+    /// Splits the open pairs until all are disjoint. Returns `false` if that fails at two leaves,
+    /// or if the budget ends.
     fn run(&mut self, open: &mut Stack) -> bool {
         let (bounds, level) = (self.pair.bounds(self.motion), self.pair.level);
         self.doubtful.is_none() && resume(&bounds, level, open, self).is_continue()
     }
 
-    /// Splits the pair with the least gap again and again, until that is two leaves or `most` node pairs more
-    /// were compared, but once at least. Returns the pair with the least gap then, or the last that was split
-    /// if only pairs with good gaps are left.
+    /// Splits the pair with the smallest gap again and again, at least once, until that pair
+    /// consists of leaves or `most` more node pairs were compared. Returns the pair with the
+    /// smallest gap, or the last pair that was split if only pairs with sufficient gaps remain.
     fn tighten(&mut self, most: u64, nearest: &mut Heap) -> Option<Open> {
         let (bounds, level) = (self.pair.bounds(self.motion), self.pair.level);
         nearest.extend(self.near.drain(..));
@@ -239,11 +241,11 @@ impl<'p, 'a> Proving<'p, 'a> {
         least
     }
 
-    /// Puts a pair that is apart aside, and returns `None`, or the key of one that is not. Leaves that are
-    /// not make the proof fail.
+    /// Stores a disjoint pair and returns `None`, or returns the key of a pair that must be split.
+    /// Leaves that are not disjoint make the proof fail.
     #[inline(always)]
     fn file(&mut self, pair: NodePair, boxes: f32, mut gap: f32) -> Option<f32> {
-        // What is no number is not apart.
+        // This is `false` for NaN.
         let mut is_apart = gap > self.reach;
         if !is_apart {
             let [a, b] = self.pair.which_are_leaves(pair);
@@ -270,7 +272,8 @@ impl<'p, 'a> Proving<'p, 'a> {
         None
     }
 
-    /// Returns `true` if the gap of a pair that is apart is one of the least; otherwise it is put aside.
+    /// Returns `true` if the gap of a disjoint pair is one of the smallest. Otherwise stores the
+    /// pair with the rest.
     #[inline(always)]
     fn is_near(&mut self, own: &Open) -> bool {
         if own.key < self.enough {
@@ -292,7 +295,7 @@ impl<'p, 'a> Proving<'p, 'a> {
         if self.doubtful.is_some() { ControlFlow::Break(()) } else { self.pair.meter.go_on() }
     }
 
-    /// Pairs with good gaps need not be looked at, unless all are wanted.
+    /// Pairs with sufficient gaps can be skipped unless all are requested.
     fn limits(&self) -> Limits {
         let enclosures = if self.lists { f32::INFINITY } else { self.beyond };
         Limits { boxes: f32::NEG_INFINITY, enclosures }
@@ -305,7 +308,7 @@ impl PairVisitor for Proving<'_, '_> {
         Proving::compared(self, pairs)
     }
 
-    /// Leaves of a proof that goes on from a former one.
+    /// Leaves reached when a proof is continued from an earlier one.
     fn leaf_pair(&mut self, _: [usize; 2], open: &Open) -> ControlFlow<()> {
         let gap = gap_of_nodes(self.pair, self.motion, open.pair);
         self.file(open.pair, open.key, gap);
@@ -332,11 +335,11 @@ impl BoundVisitor<f32> for Proving<'_, '_> {
     }
 }
 
-/// A proof whose pairs with the least gaps are split, for greater ones. All pairs are apart, and their gaps
-/// are their keys.
+/// The improvement of a complete proof: the pairs with the smallest gaps are split to increase the
+/// gap. All pairs are disjoint, with their gaps as keys.
 struct Tightening<'t, 'p, 'a> {
     proving: &'t mut Proving<'p, 'a>,
-    /// So many node pairs may be compared in all.
+    /// The total count of compared node pairs at which to stop.
     most: u64,
     /// The pair that was split last.
     last: Option<Open>,
@@ -351,7 +354,7 @@ impl PairVisitor for Tightening<'_, '_, '_> {
         if is_over { ControlFlow::Break(()) } else { flow }
     }
 
-    /// No bound of these leaves is better.
+    /// Leaves cannot be split for a better bound, so the smallest gap is final.
     fn leaf_pair(&mut self, _: [usize; 2], _: &Open) -> ControlFlow<()> {
         ControlFlow::Break(())
     }
@@ -363,7 +366,7 @@ impl BoundVisitor<f32> for Tightening<'_, '_, '_> {
         self.proving.limits()
     }
 
-    /// A pair stays if some of its children show less than it does itself.
+    /// A pair stays unsplit if some of its children have no greater gap than the pair itself.
     #[inline]
     fn may_split(&mut self, above: &Open, pairs: &Pairs, gaps: &Gaps) -> bool {
         let Proving { motion, pair, .. } = &*self.proving;

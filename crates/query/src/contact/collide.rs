@@ -1,8 +1,10 @@
-//! Do two scans meet?
+//! The collision query.
 //!
-//! next node pair → boxes apart? drop → two leaves? compare their points: a crossing is a hit → otherwise the
-//! children of both, or of the much larger one; the deepest overlap first, after nothing that of all that is
-//! left. Where nothing meets, and a certificate is wanted, pairs of enclosures are compared likewise.
+//! The search pops a node pair from the frontier. Pairs with disjoint boxes are pruned, and the
+//! points of two leaves are compared. Any other pair is replaced by the children of both nodes, or
+//! of the larger node if it is much larger. The pair that overlaps most comes first; after a
+//! comparison without contact, that is the best of the whole frontier. If nothing meets and a
+//! certificate is requested, pairs of enclosures are compared in the same way.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -24,7 +26,7 @@ use crate::pair::meter::Meter;
 use crate::pair::placed::{Placed, ViewScratch};
 use crate::pair::scan_pair::{ScanPair, relative};
 
-/// What is asked about two scans.
+/// A collision question about two scans.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Asked<'q> {
     pub(crate) scans: [&'q Placed<'q>; 2],
@@ -32,7 +34,7 @@ pub(crate) struct Asked<'q> {
     pub(crate) budget: &'q Budget,
 }
 
-/// What is written beside an answer.
+/// The outputs beside the answer.
 #[derive(Debug, Default)]
 pub(crate) struct Outputs<'q> {
     pub(crate) hint: Option<&'q mut PairHint>,
@@ -41,10 +43,10 @@ pub(crate) struct Outputs<'q> {
     pub(crate) proof: Option<&'q mut Proof>,
 }
 
-/// Reused between queries.
+/// Memory that is reused between queries.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactScratch {
-    /// The instructions by which lanes are worked on.
+    /// The SIMD instructions to use.
     pub(crate) level: Level,
     pub(crate) longest_stretch: Duration,
     pub(crate) gathers: [ViewScratch; 2],
@@ -72,12 +74,12 @@ impl ContactScratch {
     }
 }
 
-/// The pairs of nodes still to be looked at, by how a search goes on.
+/// The open node pairs, in the container of the search order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Frontiers {
-    /// Depth first.
+    /// For depth-first order.
     pub(crate) stack: Stack,
-    /// The most urgent first.
+    /// For order by priority.
     pub(crate) heap: Heap,
 }
 
@@ -87,19 +89,20 @@ impl Frontiers {
         self.heap.clear();
     }
 
-    /// What is still there. A search goes on from a front depth first, whatever its order.
+    /// The open pairs. A search that continues from a frontier is depth first, whatever its order.
     fn open(&self) -> impl Iterator<Item = NodePair> {
         self.stack.iter().chain(self.heap.iter())
     }
 }
 
-/// The answer to a question, with the outputs that are wanted beside it.
+/// Answers a question and writes the requested outputs.
 pub(crate) fn collide(asked: Asked<'_>, scratch: &mut ContactScratch, outputs: Outputs<'_>) -> Answer {
     let by_overlap = asked.plan.options().order.map_or(asked.budget.may_end(), |by| by != Order::DepthFirst);
     collide_by(asked, 0, scratch, outputs, |search, frontiers| from_the_roots(search, by_overlap, frontiers))
 }
 
-/// The same where `look` compares the surfaces, from the roots on, and leaf pairs cost so many evaluations.
+/// The same as [`collide`], with `look` as the search for contacts of surfaces from the roots on. A
+/// leaf pair costs `evaluations` evaluations.
 pub(crate) fn collide_by<'q>(
     asked: Asked<'q>,
     evaluations: u64,
@@ -140,7 +143,7 @@ pub(crate) fn collide_by<'q>(
     }
 }
 
-/// The answer for balls about the scans that are `distance` apart, or for poses that are none.
+/// The answer if the bounding balls of the scans are `distance` apart, or if a pose is invalid.
 fn without_a_search(
     asked: Asked<'_>,
     distance: Option<f64>,
@@ -164,7 +167,7 @@ fn without_a_search(
     Answer { verdict, band, distance_estimate: None, statistics }
 }
 
-/// What is known from before, and then what there is to see.
+/// Decides a question from the hint if possible, and otherwise by a search.
 fn decide(
     pair: ScanPair<'_>,
     pose: &Pose,
@@ -184,7 +187,7 @@ fn decide(
             return Some((Verdict::Intersecting { contact, evidence }, pair.band(met)));
         }
         known.come_to(*pose, &pair);
-        // What was proven on the way has no list of pairs.
+        // A distance known from earlier poses has no list of node pairs to prove it.
         let distance = known.distance(&pair, plan.reach()).filter(|_| outputs.proof.is_none())?;
         Some((apart(options, distance, true), pair.band_of(NodePair::ROOTS)))
     });
@@ -203,20 +206,21 @@ fn decide(
     }
 }
 
-/// What is seen of a contact at the points of another.
+/// Tests whether the points of the last contact still show a contact.
 fn still_meet(pair: &ScanPair<'_>, plan: &CollidePlan, [i, j]: [usize; 2]) -> Option<(Contact, Evidence)> {
     match plan.options().semantics {
         Semantics::Thickened(_) => {
             balls_meet(pair, plan.reach(), [i, j]).map(|contact| (contact, Evidence::Certified))
         }
         Semantics::Obstacle if !pair.are_sheets([i, j]) => pair.ball_contact([i, j], plan.reach()),
-        // A witness takes a search of its own.
+        // A witness needs its own search.
         _ if plan.options().detail == Detail::Witness => None,
         _ => pair.crosses([i, j]).then(|| (pair.shared_chord(i, j), Evidence::Estimated)),
     }
 }
 
-/// Pairs of tangent discs, then, if they are apart and a certificate is wanted, pairs of enclosures.
+/// Compares pairs of tangent discs, and then pairs of enclosures if the discs show no contact and a
+/// certificate is requested.
 fn surfaces(
     (mut pair, pose): (ScanPair<'_>, &Pose),
     options: &CollideOptions,
@@ -226,7 +230,7 @@ fn surfaces(
 ) -> Answer {
     let ContactScratch { frontiers, gathers, excluded, compared, proven, proof: open, .. } = scratch;
     let reach = pair.stored(options.margin);
-    // Enclosures hold the boxes: what they part has no contact.
+    // Enclosures contain the boxes of discs, so a pair that they separate has no contact.
     if let Some(known) = known.as_mut().filter(|_| proof.is_none())
         && let Some(distance) =
             known.prove_again(pose, &mut Certifier::new(&mut pair, reach, proven), (compared, open))
@@ -288,7 +292,8 @@ fn surfaces(
     Answer { verdict, band, distance_estimate: None, statistics: pair.meter.spent }
 }
 
-/// Looks for a contact: where there was one, then from what kept the scans apart, or else `look`s.
+/// Searches for a contact: at the last contact first, then from the frontier of the last query if
+/// there is one, otherwise with `look`.
 fn from_before(
     search: &mut Surfaces<'_>,
     options: &CollideOptions,
@@ -297,7 +302,7 @@ fn from_before(
     look: impl FnOnce(&mut Surfaces<'_>, &mut Frontiers) -> ControlFlow<()>,
 ) -> ControlFlow<()> {
     let Some(known) = known else { return look(search, frontiers) };
-    // All contacts are those of a search from the roots, in its order.
+    // The list of all contacts comes from a search from the roots, in its order.
     if search.all.is_none() {
         if let Some(points) = known.met() {
             let leaves = search.pair.numbers(search.pair.leaves_of(points));
@@ -312,7 +317,7 @@ fn from_before(
     look(search, frontiers)
 }
 
-/// Looks for a contact from the pair of the roots on.
+/// Searches for a contact from the pair of the roots on.
 fn from_the_roots(
     search: &mut Surfaces<'_>,
     by_overlap: bool,
@@ -331,7 +336,7 @@ fn from_the_roots(
     }
 }
 
-/// Pairs of points.
+/// Compares balls about points.
 fn balls(
     pair: ScanPair<'_>,
     plan: &CollidePlan,
@@ -379,7 +384,8 @@ fn balls(
     Answer { verdict, band, distance_estimate: None, statistics: search.pair.meter.spent }
 }
 
-/// Apart, by at least `distance` between surfaces or points if that is `proven`.
+/// The verdict for a separation by `distance` between surfaces or points, which is certified if
+/// `proven`.
 fn apart(options: &CollideOptions, distance: f64, proven: bool) -> Verdict {
     match options.semantics {
         Semantics::Thickened(radius) => {

@@ -1,4 +1,4 @@
-//! The points of two leaves against each other: sixteen at a time, and what crosses is looked at one by one.
+//! Comparison of the points of two leaves: sixteen at a time, then the crossing pairs one by one.
 
 use std::ops::ControlFlow;
 
@@ -9,7 +9,7 @@ use crate::contact::search::Surfaces;
 use crate::leaf::surfel_pair::{Discs, LeafPair, Near};
 
 impl Surfaces<'_> {
-    /// The points of two leaves, by their numbers, against each other.
+    /// Compares the points of two leaves, given by their leaf numbers.
     pub(crate) fn compare_leaves(&mut self, [leaf_a, leaf_b]: [usize; 2], by_discs: bool) -> ControlFlow<()> {
         let (a, b) = (self.pair.a, self.pair.b);
         let (of_a, of_b) = (a.leaves, b.leaves);
@@ -38,7 +38,7 @@ impl Surfaces<'_> {
                 let tries = self.tries;
                 self.compare_blocks(&test, [first_a, first_b], sparse, by_discs)?;
                 if self.tries > tries {
-                    // Other crossings of the same leaves would fail likewise.
+                    // Other crossings of the same leaves would fail to verify, too.
                     return ControlFlow::Continue(());
                 }
             }
@@ -46,7 +46,7 @@ impl Surfaces<'_> {
         ControlFlow::Continue(())
     }
 
-    /// The radii of the balls about some points of a.
+    /// The radii of the balls about `count` points of a.
     fn balls(&self, first: usize, count: usize) -> [f32; LeafBlock::WIDTH] {
         let mut balls = [0.0; LeafBlock::WIDTH];
         for (i, ball) in (first..first + count).zip(&mut balls) {
@@ -55,7 +55,7 @@ impl Surfaces<'_> {
         balls
     }
 
-    /// The points of a block of a leaf of a against those of b.
+    /// Compares the points of one block of a's leaf with those of one block of b's.
     #[inline]
     fn compare_blocks(
         &mut self,
@@ -65,7 +65,7 @@ impl Surfaces<'_> {
         by_discs: bool,
     ) -> ControlFlow<()> {
         let of_b = first_b..first_b + test.b.count;
-        // Where nothing but crossings counts, only points with some are looked at.
+        // If only crossings count, points without any are skipped.
         let each = sparse_a || sparse_b || self.margin > 0.0;
         let mut lanes = u32::MAX;
         while let Some(Near { lane, crossings }) = test.next(self.pair.level, lanes, each) {
@@ -96,7 +96,8 @@ impl Surfaces<'_> {
         ControlFlow::Continue(())
     }
 
-    /// The disc of point `i` crosses those of b from point `first` on that have a bit in `crossings`.
+    /// Handles crossings of the disc of point `i` with the discs of b that have a bit in
+    /// `crossings`, where bit 0 stands for point `first`.
     #[inline]
     fn discs_cross(&mut self, i: usize, mut crossings: u32, first: usize) -> ControlFlow<()> {
         while crossings != 0 {

@@ -1,10 +1,12 @@
-//! Temporal coherence: what the last query about two scans found helps the next one, a small motion later.
+//! Temporal coherence: the result of a query about two scans speeds up the next query after a small
+//! motion.
 //!
-//! Where they met they probably still meet, so the two points whose discs crossed are tried alone, then their
-//! leaves. Where they were apart and move slowly, the pairs of nodes that parted them are a front across the
-//! tree of pairs; a pair whose gap was g stays apart until b has travelled so far. So only pairs whose time
-//! has come are compared again, and split where they do not part the scans any more; and as long as none has
-//! come, nothing at all. Travel is the length of b's way in a's frame, at the point that moves most.
+//! Scans that met probably still meet, so the two points whose discs crossed are tested first, then
+//! their leaves. Scans that were separated and move slowly keep the pruned node pairs of the last
+//! query as a frontier. A pair with gap g stays disjoint until b has travelled the distance g. So
+//! only pairs whose gap has been used up are compared again, and split if they are no longer
+//! disjoint; while there are none, nothing is compared. Travel is the length of b's path in a's
+//! frame, at the point that moves most.
 
 use std::ops::ControlFlow;
 
@@ -18,76 +20,80 @@ use crate::contact::search::{Closer, Surfaces};
 use crate::pair::motion::Motion;
 use crate::pair::scan_pair::ScanPair;
 
-/// A front that has grown so many times as long as a fresh one is given up: its nodes are smaller than they
-/// need be.
+/// A frontier that has grown to this many times its fresh length is dropped: its nodes are smaller
+/// than necessary.
 const GROWN: usize = 3;
 
-/// Where more than one in so many pairs of the front has expired, a search from the roots is cheaper.
+/// If more than one in this many pairs of the frontier has expired, a search from the roots is
+/// cheaper.
 const MOST_EXPIRED: usize = 4;
 
-/// Steps of up to so many sampling radii find enough of a front as it was: after longer ones a search from
-/// the roots, sixteen pairs at a time, is faster (benches/record).
+/// The longest step, in sampling radii, after which enough of a frontier is still valid. After
+/// longer steps a search from the roots, sixteen pairs at a time, is faster (benches/record).
 const SLOW: f64 = 0.2;
 
-/// A travel of more slacks than this is begun anew: gaps beside it would lose their digits.
+/// The travel, in slacks, at which counting starts anew: beyond it gaps would lose their digits.
 const LONGEST: f64 = (1_u64 << 40) as f64;
 
-/// What a query about two scans passes on to the next one; see [`Question::hinted`](crate::Question::hinted).
-/// Keep one for each pair of scans.
+/// The state that a query about two scans passes on to the next one; see
+/// [`Question::hinted`](crate::Question::hinted). Keep one for each pair of scans.
 ///
-/// Hints cannot be deserialised: a forged hint could forge a certificate.
+/// Hints cannot be deserialised, as a forged hint could forge a certificate.
 ///
-/// A continued proof rests on smaller nodes than a fresh one, and on their earlier positions. So about one
-/// separation in a thousand is certified with a hint and estimated without, or the reverse.
+/// A continued proof relies on smaller nodes than a fresh one, and on their earlier positions. So
+/// about one separation in a thousand is certified with a hint and estimated without, or the
+/// reverse.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PairHint {
     known: Option<Known>,
 }
 
-/// What was asked: a hint for anything else is none.
+/// The identity of a question. A hint is ignored for any other question.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Question {
     options: CollideOptions,
-    /// Their [identities](nearmiss_hierarchy::Outline), and which nodes they have.
+    /// The [identities](nearmiss_hierarchy::Outline) of the scans, and their topologies.
     scans: [(u64, Topology); 2],
-    /// Of a's stored frame in the world.
+    /// The scale from a's stored frame to the world.
     scale: f64,
 }
 
-/// A pair of nodes that are no nearer each other than b has still to travel until then.
+/// A node pair that is disjoint until b's travel reaches `until`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Standing {
     pair: NodePair,
     until: f64,
 }
 
-/// What is known of a question. Lengths are in a's stored frame.
+/// The knowledge about a question. Lengths are in a's stored frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Known {
     question: Question,
-    /// Of b's stored frame in a's, when last asked.
+    /// The pose of b's stored frame in a's at the last query.
     pose: Option<Pose>,
-    /// How far b has come since the first question.
+    /// The travel of b since the first query.
     travel: f64,
-    /// And since the last one.
+    /// The step of b since the last query.
     step: f64,
     /// The points that met.
     met: Option<[u32; 2]>,
-    /// The scans are no nearer each other than b has still to travel until then.
+    /// The scans are separated until b's travel reaches this value.
     clear: f64,
-    /// Pairs that cover all pairs of points, if whole.
+    /// The frontier: if `is_whole`, pairs that cover all pairs of points.
     front: Vec<Standing>,
     is_whole: bool,
-    /// Whether it is enclosures that are apart, not boxes.
+    /// `true` if the enclosures of the frontier's pairs are disjoint, `false` if only their boxes
+    /// are.
     is_proof: bool,
-    /// How long the front was when it was fresh.
+    /// The length of the frontier when it was fresh.
     fresh: usize,
-    /// Leaves at which a proof failed.
+    /// The leaves at which a proof failed.
     doubtful: Option<NodePair>,
 }
 
 impl PairHint {
-    /// What is known of this question, not yet about this pose: that is for [`Known::come_to`].
+    /// Returns the knowledge about this question, not yet updated to its pose; see
+    /// [`Known::come_to`].
     pub(crate) fn recall(&mut self, pair: &ScanPair<'_>, options: &CollideOptions) -> &mut Known {
         let question = Question {
             options: *options,
@@ -102,7 +108,7 @@ impl PairHint {
     }
 }
 
-/// How far the motion from one pose to another takes any point of b at most.
+/// An upper bound on how far the motion between two poses moves any point of b.
 fn motion(pair: &ScanPair<'_>, from: &Pose, to: &Pose) -> f64 {
     let Ball { centre, radius } = pair.b.outline.surface;
     let shift = (Vector3::from(to.apply(centre)) - Vector3::from(from.apply(centre))).norm();
@@ -127,11 +133,12 @@ impl Known {
         }
     }
 
-    /// b is at `pose` now. After too long a way, or one that is no number, all but the question is forgotten.
+    /// Records that b is at `pose`. If the travel is too long or NaN, everything but the question
+    /// is forgotten.
     pub(crate) fn come_to(&mut self, pose: Pose, pair: &ScanPair<'_>) {
         self.step = self.pose.map_or(f64::MAX, |from| motion(pair, &from, &pose));
         self.pose = Some(pose);
-        // Rounded so that no step is lost.
+        // Rounded up so that no step is lost.
         let travel = if self.step > 0.0 { (self.travel + self.step).next_up() } else { self.travel };
         if self.step >= 0.0 && travel <= LONGEST * f64::from(pair.relative.slack()) {
             self.travel = travel;
@@ -141,43 +148,46 @@ impl Known {
         }
     }
 
-    /// The points that met last time.
+    /// The points that met in the last query.
     pub(crate) fn met(&self) -> Option<[usize; 2]> {
         self.met.map(|met| met.map(|i| i as usize))
     }
 
-    /// b has come to `pose`, and the same points meet there: nothing else rests on the way.
+    /// Records that the same points still meet with b at `pose`. Nothing else depends on the travel
+    /// then.
     pub(crate) fn still_met(&mut self, pose: Pose) {
         self.pose = Some(pose);
     }
 
-    /// Whether a front is worth its keep: nothing met last time, and b moves slowly.
+    /// Returns `true` if a frontier is worth keeping: the last query found no contact and b moves
+    /// slowly.
     pub(crate) fn keeps_front(&self, pair: &ScanPair<'_>) -> bool {
         self.met.is_none() && self.is_slow(pair, SLOW)
     }
 
-    /// Returns `true` if a proof is likely to be continued by the next query, so that its pairs are worth
-    /// their keep.
+    /// Returns `true` if the next query is likely to continue a proof, so that its pairs are worth
+    /// keeping.
     pub(crate) fn keeps_proof(&self, pair: &ScanPair<'_>) -> bool {
         self.is_slow(pair, SLOW)
     }
 
-    /// Whether b moves no more than so many sampling radii.
+    /// Returns `true` if the last step of b is at most this many sampling radii.
     fn is_slow(&self, pair: &ScanPair<'_>, radii: f64) -> bool {
         let scale = f64::from(pair.relative.scale());
         let [a, b] = [pair.a, pair.b].map(|scan| f64::from(scan.sampling_radius));
         self.step <= radii * a.min(b * scale)
     }
 
-    /// A lower bound of the distance of the scans in the world, without any search, if it is beyond `reach`.
+    /// A lower bound of the distance of the scans in the world, known without a search, if it
+    /// exceeds `reach`.
     pub(crate) fn distance(&self, pair: &ScanPair<'_>, reach: f64) -> Option<f64> {
-        // The pose is rounded now as it was then.
+        // Now as then, the pose has a rounding error.
         let left = self.clear - self.travel - f64::from(pair.relative.slack());
         (left > f64::from(pair.stored(reach))).then(|| left * pair.views[0].placed().scale() * (1.0 - 1e-9))
     }
 
-    /// Whether [`Known::look_again`] can replace a search, and a proof if one `certifies`: that would fail
-    /// again.
+    /// Returns `true` if [`Known::look_again`] can replace a search. If the question `certifies`,
+    /// this also requires that the proof would fail again.
     pub(crate) fn has_front(&self, pair: &ScanPair<'_>, reach: f32, certifies: bool) -> bool {
         let fails = |&leaves: &NodePair| {
             let motion = self.pose.map(|pose| Motion::new(pair.views, &pose));
@@ -189,12 +199,12 @@ impl Known {
             && (!certifies || self.doubtful.as_ref().is_some_and(fails))
     }
 
-    /// Whether a proof is known to fail, at leaves that [`Known::has_front`] has looked at.
+    /// Returns `true` if a proof is known to fail, at leaves that [`Known::has_front`] has tested.
     pub(crate) fn is_doubtful(&self) -> bool {
         self.doubtful.is_some()
     }
 
-    /// Goes on from the front instead of the roots.
+    /// Searches from the frontier instead of the roots.
     pub(crate) fn look_again(&mut self, search: &mut Surfaces<'_>, stack: &mut Stack) -> ControlFlow<()> {
         stack.clear();
         let (reach, slack, relative) = (search.reach, search.pair.relative.slack(), search.pair.relative);
@@ -205,15 +215,15 @@ impl Known {
         let is_front = self.advance(reach, slack, gap, |pair, key| stack.push(Open { pair, key }));
         let (trees, level) = (search.pair.trees(&relative, reach), search.pair.level);
         if !is_front {
-            // After a long way the roots are nearer than what was the front.
+            // After long travel, starting from the roots is cheaper than from the old frontier.
             self.forget(None);
             return descend(trees, level, stack, &mut Closer(search));
         }
         resume(&trees, level, stack, &mut Closer(search))
     }
 
-    /// Goes on from the front of a proof, if there is one: how far the scans are apart at least, if it can be
-    /// made whole again.
+    /// Continues the proof of the last query, if there is one. Returns a lower bound of the scans'
+    /// distance if the proof can be completed again.
     pub(crate) fn prove_again(
         &mut self,
         pose: &Pose,
@@ -240,8 +250,9 @@ impl Known {
         self.distance(certifier.pair, 0.0)
     }
 
-    /// Looks at the pairs of the front whose time has come: those that are still apart wait again, the others
-    /// leave it and are handed out with their gaps. Returns `false` if they are too many.
+    /// Compares the expired pairs of the frontier again. Pairs that are still disjoint stay; the
+    /// others are removed and passed to `open` with their gaps. Returns `false` if too many have
+    /// expired.
     fn advance(
         &mut self,
         reach: f32,
@@ -272,12 +283,12 @@ impl Known {
         true
     }
 
-    /// Until when a pair with this gap is some way apart.
+    /// The travel until which a pair with this gap stays disjoint.
     fn until(&self, gap: f32, slack: f32) -> f64 {
         (self.travel + (f64::from(gap) - f64::from(slack))).next_down()
     }
 
-    /// The points `met`, or nothing is known.
+    /// Forgets everything except that these points met, if any.
     pub(crate) fn forget(&mut self, met: Option<[usize; 2]>) {
         #[expect(clippy::cast_possible_truncation, reason = "points are counted in 32 bits")]
         let met = met.map(|met| met.map(|i| i as u32));
@@ -289,8 +300,9 @@ impl Known {
         self.doubtful = None;
     }
 
-    /// Nothing meets: adds what a search has excluded and compared to the front, or begins a new one. A proof
-    /// that is wanted has failed, at the leaves `doubtful` if that is known.
+    /// Records that nothing meets: adds the pairs that a search pruned and compared to the
+    /// frontier, or starts a new one. If `proof_failed`, a requested proof failed, at the leaves
+    /// `doubtful` if known.
     pub(crate) fn parted(
         &mut self,
         (excluded, compared): (&[Bound], &[NodePair]),
@@ -299,17 +311,17 @@ impl Known {
         doubtful: Option<NodePair>,
     ) {
         let apart = excluded.iter().map(|bound| (bound.gap, bound.pair));
-        // Leaves that were compared have to be compared again.
+        // Leaves that were compared must be compared again next time.
         let compared = compared.iter().map(|&pair| (f32::NEG_INFINITY, pair));
         self.add(apart.chain(compared), slack);
         self.doubtful = doubtful.or(self.doubtful);
         if proof_failed {
-            // Boxes of discs prove nothing.
+            // Disjoint boxes of discs prove nothing.
             self.clear = f64::MIN;
         }
     }
 
-    /// The scans are proven to be so far apart, in the world, by these pairs.
+    /// Records a proof by these pairs that the scans are `distance` apart in the world.
     pub(crate) fn proven(&mut self, distance: f64, bounds: &[Bound], pair: &ScanPair<'_>) {
         self.forget(None);
         self.add(bounds.iter().map(|bound| (bound.gap, bound.pair)), pair.relative.slack());
@@ -317,13 +329,14 @@ impl Known {
         self.clear_to(distance, pair);
     }
 
-    /// The scans are proven to be so far apart, in the world, by pairs that were not kept.
+    /// Records a proof, by pairs that were not kept, that the scans are `distance` apart in the
+    /// world.
     pub(crate) fn proven_alone(&mut self, distance: f64, pair: &ScanPair<'_>) {
         self.forget(None);
         self.clear_to(distance, pair);
     }
 
-    /// Adds pairs with their gaps to the front, or begins a new one.
+    /// Adds pairs with their gaps to the frontier, or starts a new one.
     fn add(&mut self, pairs: impl Iterator<Item = (f32, NodePair)>, slack: f32) {
         if !self.is_whole {
             self.front.clear();
@@ -339,7 +352,7 @@ impl Known {
         self.met = None;
     }
 
-    /// The scans are so far apart, in the world; nothing else is known.
+    /// Records only that the scans are `distance` apart in the world.
     pub(crate) fn clear_to(&mut self, distance: f64, pair: &ScanPair<'_>) {
         let distance = distance / pair.views[0].placed().scale() * (1.0 - 1e-9);
         self.clear = (self.travel + (distance - f64::from(pair.relative.slack()))).next_down();

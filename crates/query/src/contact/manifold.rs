@@ -1,9 +1,11 @@
-//! A contact for a solver: a few places, well spread, each with the way out and how far that is.
+//! A contact manifold for a physics solver: a few well spread points, each with a normal and a
+//! signed gap.
 //!
-//! The points of either scan that are near the other know how deep they are in: their height over the tangent
-//! plane of the nearest point there. Of these the deepest is taken, then ever again the one furthest from all
-//! that are taken, as Gonzalez ("Clustering to minimize the maximum intercluster distance", Theoretical
-//! Computer Science 38, 1985) spreads centres: whoever stops early has the most of the support.
+//! For points of either scan that are near the other, the penetration depth is the height over the
+//! tangent plane of the nearest point there. The deepest point is selected first, then always the
+//! one furthest from all selected points, as in Gonzalez ("Clustering to minimize the maximum
+//! intercluster distance", Theoretical Computer Science 38, 1985). Every prefix of the selection is
+//! well spread.
 
 use std::cmp::Ordering;
 use std::ops::ControlFlow;
@@ -21,14 +23,14 @@ use crate::pair::scan_pair::ScanPair;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// The lanes of a block.
+/// The lane numbers of a block.
 const NUMBERS: [f32; WIDTH] =
     [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 
-/// Places at most.
+/// The greatest number of points of a manifold.
 const MOST: usize = 8;
 
-/// Memory for manifolds, used again by the next.
+/// Reusable memory for manifolds.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ManifoldScratch {
     stack: Stack,
@@ -36,10 +38,10 @@ pub(crate) struct ManifoldScratch {
     candidates: Vec<(ManifoldPoint, f64)>,
 }
 
-/// A point and the nearest of the other scan.
+/// A point and the nearest point of the other scan.
 #[derive(Debug, Clone, Copy)]
 struct Neighbour {
-    /// Whether the point is b's.
+    /// `true` if `point` is of b.
     of_b: bool,
     point: u32,
     nearest: u32,
@@ -61,7 +63,7 @@ impl Neighbour {
     }
 }
 
-/// Leaves in `points` the manifold of two scans that meet at `contact`. As far as the budget lasts.
+/// Writes the manifold of two scans that meet at `contact` to `points`, as far as the budget lasts.
 pub(crate) fn gather(
     pair: &mut ScanPair<'_>,
     options: &CollideOptions,
@@ -79,7 +81,7 @@ pub(crate) fn gather(
     let back = reach * relative.scale_back();
     let level = pair.level;
     let mut near = Near { pair: &mut *pair, level, reach_sq: back * back, neighbours };
-    // What was found is worth as much where the budget ends it.
+    // A partial result is valid if the budget ends the search.
     let _ended = descend(trees, level, stack, &mut near);
     neighbours.sort_unstable_by(Neighbour::order);
     neighbours.dedup_by_key(|it| (it.of_b, it.point));
@@ -92,12 +94,12 @@ pub(crate) fn gather(
     }
 }
 
-/// Takes the deepest of `candidates`, then ever again the one furthest from all that were taken, while that
-/// is at least `spacing` away.
+/// Selects the deepest of `candidates`, then always the one furthest from all selected ones, as
+/// long as it is at least `spacing` away from them.
 fn spread(candidates: &mut [(ManifoldPoint, f64)], spacing: f64, taken: &mut Vec<ManifoldPoint>) {
     let deepest = |a: &ManifoldPoint, b: &ManifoldPoint| a.gap.total_cmp(&b.gap);
     while taken.len() < MOST {
-        // The furthest, of equals the deepest, of these the first.
+        // The furthest; among equals the deepest, then the first.
         let next = candidates
             .iter()
             .min_by(|(p, far), (q, farther)| farther.total_cmp(far).then_with(|| deepest(p, q)));
@@ -113,17 +115,17 @@ fn spread(candidates: &mut [(ManifoldPoint, f64)], spacing: f64, taken: &mut Vec
     }
 }
 
-/// What counts as a place of the contact, in the world.
+/// The geometry that defines manifold points, in the world.
 struct Solid {
     semantics: Semantics,
     margin: f64,
     /// The greater sampling radius.
     spacing: f64,
-    /// The middles of both scans.
+    /// The centres of both scans.
     centres: [Vector3<f64>; 2],
-    /// Which is the lesser one.
+    /// The index of the smaller scan.
     lesser: usize,
-    /// Whether their normals lead out.
+    /// For each scan, `true` if its normals are oriented outwards.
     oriented: [bool; 2],
 }
 
@@ -141,7 +143,7 @@ impl Solid {
         }
     }
 
-    /// How far from each other points may be that tell of the contact.
+    /// The greatest distance of two points that may contribute to the manifold.
     fn reach(&self) -> f64 {
         match self.semantics {
             Semantics::Obstacle | Semantics::Surface => self.margin.max(self.spacing),
@@ -173,7 +175,7 @@ impl Solid {
                 let side = usize::from(!neighbour.of_b);
                 let disc = [pair.a.discs.get(i), pair.b.discs.get(j)][side];
                 let disc = f64::from(disc) * pair.views[side].placed().scale();
-                // Beside the disc its plane says nothing.
+                // Beside the disc its plane is meaningless.
                 if between.norm_squared() - gap * gap > disc * disc || gap < -self.spacing {
                     return None;
                 }
@@ -195,14 +197,15 @@ impl Solid {
         })
     }
 
-    /// The direction from the middle of b to that of a.
+    /// The direction from the centre of b to that of a.
     fn apart(&self) -> Vector3<f64> {
         (self.centres[0] - self.centres[1]).try_normalize(0.0).unwrap_or_else(Vector3::z)
     }
 
-    /// The normal of a point of one scan, that of a if `of_b` is the other's, in the direction in which a
-    /// leaves b: out of that scan if its normals tell, else into the other if that one's do. Else the lesser
-    /// scan is on the side of its middle, as a cup is on the table and the table in the room.
+    /// The normal at a point of one scan (of a if `of_b`), in the direction in which a moves out of
+    /// b. Oriented normals of that scan decide its sign, otherwise those of the other scan. Without
+    /// any, the smaller scan is assumed to be on the side of its own centre, like a cup on a table
+    /// and a table in a room.
     fn way_out(&self, pair: &ScanPair<'_>, of_b: bool, points: [usize; 2]) -> Vector3<f64> {
         let normal = |side: usize| {
             let stored = pair.views[side].scan().normals()[points[side]].map(f64::from);
@@ -219,12 +222,12 @@ impl Solid {
             let towards = plane.dot(&(self.centres[self.lesser] - foot));
             if self.lesser == own { -towards } else { towards }
         };
-        // Out of b is the way of a; out of a that of b.
+        // The normal points from b to a; flip it if it was taken from a.
         let sign = if of_b { -1.0 } else { 1.0 };
         plane * (sign * 1.0_f64.copysign(out))
     }
 
-    /// The contact itself, where no point tells more.
+    /// The manifold point for the contact itself, used if no point pair contributes one.
     fn alone(&self, contact: &Contact) -> ManifoldPoint {
         let towards = Vector3::from(contact.normals.map_or_else(|| self.apart().into(), |[_, of_b]| of_b));
         let middle = (self.centres[self.lesser] - Vector3::from(contact.point)) * [1.0, -1.0][self.lesser];
@@ -244,7 +247,7 @@ impl Solid {
     }
 }
 
-/// Finds the nearest points of all pairs of leaves that are near.
+/// The search for the nearest points of all leaf pairs within reach.
 struct Near<'a, 'p> {
     pair: &'a mut ScanPair<'p>,
     level: Level,
@@ -278,7 +281,7 @@ impl PairVisitor for Near<'_, '_> {
 impl BoxVisitor for Near<'_, '_> {}
 
 impl Near<'_, '_> {
-    /// The nearest of one block for each point of the other that has one within reach.
+    /// For each point of either block, finds the nearest point of the other block within reach.
     #[inline(always)]
     fn blocks<S: Simd>(&mut self, simd: S, blocks: [usize; 2], [lanes_a, lanes_b]: [u32; 2]) {
         let own = load(simd, &self.pair.a.blocks[blocks[0]].position);

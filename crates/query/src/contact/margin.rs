@@ -1,9 +1,9 @@
-//! Surfaces nearer than a margin count as meeting.
+//! Contact within a margin.
 //!
-//! Two points nearer than it always do: that is a fact, whatever their discs say. Otherwise their tangent
-//! discs decide, whose distance alternating projection finds (both are convex: Cheney & Goldstein, "Proximity
-//! maps for convex sets", Proc. AMS 10, 1959). For a witness a point of either implicit surface walks towards
-//! the other.
+//! Two points nearer than the margin always meet, whatever their discs. Otherwise the distance of
+//! their tangent discs decides. It is found by alternating projection, as both discs are convex
+//! (Cheney & Goldstein, "Proximity maps for convex sets", Proc. AMS 10, 1959). For a witness,
+//! points on both implicit surfaces move towards each other.
 
 use std::ops::{ControlFlow, Range};
 
@@ -14,17 +14,18 @@ use crate::ask::answer::Contact;
 use crate::contact::search::Surfaces;
 use crate::leaf::crossing::Disc;
 
-/// Projections from one disc to the other and back: the distance falls at least as fast as the square of the
-/// cosine between the planes, and what remains after so many is a fraction of the least margin of use.
+/// Projections from one disc to the other and back. The error shrinks at least by the squared
+/// cosine between the planes per round; after this many it is a fraction of the smallest useful
+/// margin.
 const DISC_ROUNDS: u32 = 16;
 
-/// Steps along the surfaces; each costs some ten evaluations.
+/// Steps along the surfaces; each costs about ten evaluations.
 const SURFACE_ROUNDS: u32 = 4;
 
-/// The distance of two discs costs as much as so many node pairs.
+/// The cost of the distance of two discs, in node pairs.
 const PAIRS_A_DISTANCE: u64 = 4;
 
-/// A point of either disc, not further than `enough` from each other, if alternating projection finds such.
+/// Finds a point on each disc, at most `enough` apart, by alternating projection.
 pub(crate) fn near(a: &Disc, b: &Disc, enough: f32) -> Option<[Vector3<f32>; 2]> {
     let mut x = Vector3::from(a.centre);
     let mut least = f32::INFINITY;
@@ -53,7 +54,7 @@ fn nearest(disc: &Disc, p: Vector3<f32>) -> Vector3<f32> {
 }
 
 impl Surfaces<'_> {
-    /// The disc of point `i` against those of some points of b that come nearer than the margin.
+    /// Compares the disc of point `i` with those points of b that come within the margin.
     pub(crate) fn near_discs(&mut self, i: usize, of_b: Range<usize>) -> ControlFlow<()> {
         let disc = self.pair.disc_a(i);
         for j in of_b {
@@ -84,7 +85,7 @@ impl Surfaces<'_> {
         ControlFlow::Continue(())
     }
 
-    /// Two places, of the discs or points `i` and `j`, are nearer than the margin.
+    /// Records a contact of two points within the margin, on or at the points or discs `i` and `j`.
     fn met(&mut self, places: [Vector3<f64>; 2], i: usize, j: usize) -> ControlFlow<()> {
         let contact = self.between(places, i, j);
         self.tries += 1;
@@ -93,7 +94,7 @@ impl Surfaces<'_> {
         self.record(contact, certified)
     }
 
-    /// The contact between a place of either scan.
+    /// The contact midway between two points.
     fn between(&self, [p, q]: [Vector3<f64>; 2], i: usize, j: usize) -> Contact {
         let [va, vb] = self.pair.views;
         let na = va.placed().rotate(self.pair.a.normals[i].map(f64::from));
@@ -106,8 +107,8 @@ impl Surfaces<'_> {
         }
     }
 
-    /// A verified point of either surface, nearer to each other than the margin: both walk towards each other
-    /// along their surfaces, at most a local radius at a time.
+    /// Finds a verified point on each surface, nearer to each other than the margin. Both points
+    /// move towards each other along their surfaces, at most a local radius per step.
     fn approach(
         &mut self,
         [p, q]: [Vector3<f64>; 2],

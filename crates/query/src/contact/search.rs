@@ -1,11 +1,12 @@
 //! `Semantics::Surface`: the tangent discs of one scan against those of the other.
 //!
-//! Boxes hold the discs of their points, so a pair of disjoint boxes hides no crossing, and the descent finds
-//! a crossing exactly if there is one. Discs of points on lines and of lone ones are not to be trusted: where
-//! only they cross, or the other scan comes within a local radius of such a point, the answer stays open.
-//! Where two discs cross, Newton's method looks for a point on both implicit surfaces; it adds a witness and
-//! certainty, and does not overrule: the weighted fit rounds off tips and ends early at borders, where discs
-//! of points still tell (docs/decisions).
+//! Boxes contain the discs of their points, so pruning never loses a crossing, and the descent
+//! finds a crossing exactly if there is one. Discs of isolated points and of points on lines are
+//! unreliable. If only such discs cross, or if the other scan comes within a local radius of such a
+//! point, the query stays undecided. Where two discs cross, Newton's method searches for a point on
+//! both implicit surfaces. It adds a witness and certainty but never overrules the discs: the
+//! weighted fit rounds off tips and ends early at borders, where discs remain valid
+//! (docs/decisions).
 
 use std::ops::{ControlFlow, Range};
 
@@ -20,11 +21,11 @@ use crate::leaf::crossing::Disc;
 use crate::pair::placed::{Placed, ViewScratch};
 use crate::pair::scan_pair::ScanPair;
 
-/// A witness is tried for in so many pairs of leaves before the first crossing stands as estimated.
+/// Leaf pairs in which a witness is tried before the first crossing is reported as estimated.
 const TRIES: u32 = 5;
 
-/// A verified point further than this from the crossing, in the greater of the two local radii, is some other
-/// place.
+/// A verified point further than this from the crossing belongs to another contact. In units of the
+/// greater local radius.
 const NEARBY: f64 = 4.0;
 
 /// The search for a crossing.
@@ -34,42 +35,42 @@ pub(crate) struct Surfaces<'a> {
     pub(crate) detail: Detail,
     /// Surfaces nearer than this, in the world, meet.
     pub(crate) margin: f64,
-    /// What is further apart than this, in a's stored frame, does not meet.
+    /// The distance beyond which pairs are pruned, in a's stored frame.
     pub(crate) reach: f32,
-    /// Whether pairs of nodes that are apart are noted.
+    /// `true` if pruned pairs are recorded.
     pub(crate) notes: bool,
-    /// Whether compared pairs are noted.
+    /// `true` if compared leaf pairs are recorded.
     pub(crate) notes_leaves: bool,
-    /// The least gap of any pair excluded.
+    /// The smallest gap of any pruned pair.
     nearest: f32,
-    /// The pairs that were excluded.
+    /// The pruned pairs.
     pub(crate) excluded: &'a mut Vec<Bound>,
-    /// The pairs whose points were compared, without a hit.
+    /// The leaf pairs whose points were compared without a contact.
     pub(crate) compared: &'a mut Vec<NodePair>,
     pub(crate) gathers: &'a mut [ViewScratch; 2],
     pub(crate) tries: u32,
     /// The best contact so far.
     pub(crate) found: Option<(Contact, Evidence)>,
-    /// The points of the first.
+    /// The points of the first contact.
     pub(crate) met: Option<[usize; 2]>,
-    /// Every contact, one of each pair of leaves that meets, if all are wanted.
+    /// All contacts, one per leaf pair that meets, if requested.
     pub(crate) all: Option<&'a mut Vec<Contact>>,
-    /// A crossing of discs that are not to be trusted, and why.
+    /// Why a crossing of unreliable discs leaves the query undecided, if there was one.
     pub(crate) doubt: Option<Reason>,
 }
 
-/// What a search writes into.
+/// The buffers that a search writes to.
 #[derive(Debug)]
 pub(crate) struct Workspace<'a> {
     pub(crate) gathers: &'a mut [ViewScratch; 2],
     pub(crate) excluded: &'a mut Vec<Bound>,
     pub(crate) compared: &'a mut Vec<NodePair>,
-    /// Contacts, if all are wanted.
+    /// All contacts, if requested.
     pub(crate) all: Option<&'a mut Vec<Contact>>,
 }
 
 impl<'a> Surfaces<'a> {
-    /// `notes`: whether the pairs that were excluded or compared are wanted.
+    /// `notes`: whether pruned and compared pairs are recorded.
     pub(crate) fn new(
         pair: ScanPair<'a>,
         options: &CollideOptions,
@@ -98,12 +99,13 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Whether a disc of some points of b comes into the `ball` about the centre of `disc` of a, or that disc
-    /// into one of their balls. A point with a ball has no disc here.
+    /// Returns `true` if the disc of one of these points of b comes into the `ball` about the
+    /// centre of `disc` of a, or `disc` into one of their balls. The disc of a point with a ball
+    /// counts as a point here.
     pub(crate) fn comes_near_sparse(&self, disc: &Disc, ball: f32, mut points: Range<usize>) -> bool {
         let point =
             |disc: &Disc, ball: f32| Disc { radius: if ball > 0.0 { 0.0 } else { disc.radius }, ..*disc };
-        // Within a margin of a ball is as good as within it.
+        // The margin enlarges each ball.
         let reach = |ball: f32| if ball > 0.0 { ball + self.reach } else { 0.0 };
         points.any(|j| {
             let other = self.pair.disc_b(j);
@@ -113,13 +115,13 @@ impl<'a> Surfaces<'a> {
         })
     }
 
-    /// Discs of two leaves cross, those of points `i` and `j` first.
+    /// Handles crossing discs of two leaves, those of points `i` and `j` first.
     pub(crate) fn crossed(&mut self, i: usize, j: usize) -> ControlFlow<()> {
         let contact = self.pair.shared_chord(i, j);
         self.hit(contact, i, j)
     }
 
-    /// The surfaces meet at `contact`, to first order, near points `i` and `j`.
+    /// Handles surfaces that meet at `contact`, to first order, near points `i` and `j`.
     pub(crate) fn hit(&mut self, contact: Contact, i: usize, j: usize) -> ControlFlow<()> {
         self.tries += 1;
         self.met.get_or_insert([i, j]);
@@ -129,7 +131,8 @@ impl<'a> Surfaces<'a> {
         if enough { flow } else { ControlFlow::Continue(()) }
     }
 
-    /// Takes `contact` down, and what `certified` makes of it. Goes on where all are wanted.
+    /// Records `contact`, and `certified` if it was verified. Continues if all contacts are
+    /// requested.
     pub(crate) fn record(&mut self, contact: Contact, certified: Option<Contact>) -> ControlFlow<()> {
         if let Some(contact) = certified {
             self.found = Some((contact, Evidence::Certified));
@@ -144,19 +147,19 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Whether no witness is looked for, or no more.
+    /// Returns `true` if no witness is needed, or none is searched for any more.
     pub(crate) fn is_settled(&self) -> bool {
         self.detail == Detail::Verdict
             || self.tries > TRIES
             || self.found.is_some_and(|(_, evidence)| evidence == Evidence::Certified)
     }
 
-    /// Whether a place where both functions vanish would verify a crossing of discs.
+    /// Returns `true` if a common zero of both functions would verify a crossing of discs.
     pub(crate) fn verifies(&self) -> bool {
         self.pair.views.into_iter().all(Placed::verifies)
     }
 
-    /// A verified point on both surfaces near `contact`.
+    /// Searches for a verified point on both surfaces near `contact`.
     fn refine(&mut self, contact: &Contact, i: usize, j: usize) -> Option<Contact> {
         let [va, vb] = self.pair.views;
         if !self.verifies() {
@@ -187,7 +190,7 @@ impl<'a> Surfaces<'a> {
     }
 }
 
-/// Whether some place of `disc` is within `radius` of `p`, which is more than zero.
+/// Returns `true` if some point of `disc` is within `radius` of `p` and `radius` is positive.
 fn comes_within(radius: f32, p: [f32; 3], disc: &Disc) -> bool {
     let d = Vector3::from(p) - Vector3::from(disc.centre);
     let height = d.dot(&Vector3::from(disc.normal));
@@ -195,7 +198,7 @@ fn comes_within(radius: f32, p: [f32; 3], disc: &Disc) -> bool {
     radius > 0.0 && height * height + beside.max(0.0).powi(2) <= radius * radius
 }
 
-/// A search that goes by boxes alone.
+/// A search that compares boxes only and records nothing.
 pub(crate) struct Plain<'s, 'a>(pub(crate) &'s mut Surfaces<'a>);
 
 impl PairVisitor for Plain<'_, '_> {
@@ -216,7 +219,7 @@ impl PairVisitor for Plain<'_, '_> {
 
 impl BoxVisitor for Plain<'_, '_> {}
 
-/// A search that notes what it excludes.
+/// A search that records the pairs it prunes.
 pub(crate) struct Closer<'s, 'a>(pub(crate) &'s mut Surfaces<'a>);
 
 impl PairVisitor for Closer<'_, '_> {
@@ -248,10 +251,10 @@ impl BoxVisitor for Closer<'_, '_> {
 }
 
 impl Surfaces<'_> {
-    /// Whether any pair of leaves that meets is as good as another: then the likeliest come first.
+    /// Returns `true` if any leaf pair with a contact will do. Then the likeliest pairs come first.
     pub(crate) fn wants_any(&self) -> bool {
-        // Within a margin boxes that overlap most are beside each other rather than near, and fewer witnesses
-        // verify there.
+        // With a margin, the boxes that overlap most are rather beside than near each other, and
+        // fewer witnesses verify there.
         self.all.is_none() && self.margin == 0.0
     }
 
@@ -261,7 +264,7 @@ impl Surfaces<'_> {
         self.pair.meter.go_on()
     }
 
-    /// Notes a pair whose boxes are apart, if that is wanted. The nearest comes last.
+    /// Records a pruned pair if requested. The pair with the smallest gap stays last.
     fn exclude(&mut self, pair: NodePair, gap: f32) {
         if !self.notes {
             return;
@@ -275,7 +278,7 @@ impl Surfaces<'_> {
         }
     }
 
-    /// Counts two leaves, by their numbers, whose points are compared now.
+    /// Counts two leaves, given by leaf numbers, whose points are compared next.
     #[inline]
     pub(crate) fn begin_leaves(&mut self, leaves: [usize; 2]) {
         let (a, b) = (self.pair.a.leaves, self.pair.b.leaves);
@@ -285,7 +288,7 @@ impl Surfaces<'_> {
         }
     }
 
-    /// The points of two leaves, by their numbers.
+    /// Compares the points of two leaves, given by leaf numbers.
     pub(crate) fn leaf_pair(&mut self, leaves: [usize; 2]) -> ControlFlow<()> {
         self.begin_leaves(leaves);
         self.compare_leaves(leaves, true)

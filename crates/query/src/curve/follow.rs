@@ -1,4 +1,4 @@
-//! Along a curve, step by step.
+//! Following of a curve, step by step.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Evaluation, Status, step_onto_both};
@@ -8,93 +8,97 @@ use super::trail::{PARALLEL, Place, Trail};
 use crate::pair::meter::Meter;
 use crate::pair::placed::{Placed, ViewScratch};
 
-/// The longest step in sampling radii: no further than the points about a place know of.
+/// The longest step, in sampling radii. The points near a place do not describe the surface further
+/// away.
 pub(super) const LONGEST: f64 = 2.0;
 
-/// The shortest, in the same radii: so exactly is it known where a curve ends.
+/// The shortest step, in the same radii, which is the precision of the ends of curves.
 const SHORTEST: f64 = 1.0 / 64.0;
 
-/// So often a chord that turns too far is halved: to a quarter, which may turn sixteen times as much a
-/// length.
+/// The number of times that a chord which turns too far may be halved. Twice gives a quarter, which
+/// may turn sixteen times as much per length.
 const BRIDGES: u32 = 2;
 
-/// Rounds of Newton's method from a crossing of discs: most that reach the tolerance at all do so in half as
+/// Rounds of Newton's method from a crossing of discs. Most that converge at all do so in half as
 /// many.
 const ROUNDS_TO_BEGIN: u32 = 8;
 
-/// Where the square of the sine is less, a beginning is looked for between the surfaces, as
-/// [`meet`](nearmiss_surface::meet) does.
+/// The squared sine below which the start is searched for midway between the surfaces, as in
+/// [`meet`](nearmiss_surface::meet).
 const FLAT: f64 = 1e-3;
 
-/// Corrections may make a step a little longer than it aimed for.
+/// Share of the longest step to aim for, as corrections may lengthen a step a little.
 const STRIDE: f64 = 0.98;
 
-/// A curve that cannot be followed where the sine is below this ends because its surfaces touch.
+/// The sine below which a curve that cannot be followed counts as ending in a tangency.
 const GRAZING: f64 = 0.1;
 
-/// The most a curve turns in the longest step; in a shorter one by as much more. An arc leaves its chord by
-/// an eighth of the turn times its length, so by a fortieth of the longest step.
+/// The greatest turn of a curve in the longest step, in radians; proportionally more in a shorter
+/// one. An arc deviates from its chord by 1/8 of the turn times its length, so by 1/40 of the
+/// longest step.
 const TURN: f64 = 0.2;
 
-/// No step turns further: 34°.
+/// The greatest turn in any step, in radians: 34°.
 const MOST_TURN: f64 = 0.6;
 
-/// The cosine of the most a surface turns in a step, 30°: more is another sheet.
+/// The cosine of the greatest turn of a surface in a step, 30°. A greater turn means another sheet.
 const TILT_COSINE: f64 = 0.866;
 
-/// Where the mean of the points is this many bandwidths aside, the surface ends near: at a border it is 0.56,
-/// elsewhere seldom 0.2.
+/// Distance of the centroid from the point, in bandwidths, from which the surface counts as ending
+/// nearby. At a border it is 0.56, elsewhere seldom 0.2.
 const BESIDE: f64 = 0.4;
 
-/// Rounds of Newton's method a step; a good start needs two.
+/// Rounds of Newton's method per step; a good start needs two.
 const ROUNDS: u32 = 4;
 
-/// These may lead away from where the step aimed by this share of its length: no nearer is another sheet.
+/// The greatest distance, as a share of the step, between the aim and the corrected point. Other
+/// sheets are further away.
 const MOST_CORRECTION: f64 = 0.25;
 
-/// However short the step, so much in sampling radii: f is no smoother than that where points come into its
-/// horizon.
+/// A lower limit for that distance, in sampling radii, for short steps. f is not smoother than this
+/// where points enter its support radius.
 const LEAST_CORRECTION: f64 = 1.0 / 32.0;
 
-/// What a chord passes within this share of its length it joins: four times as far as an arc leaves it.
+/// A chord ends at an earlier place that it passes within this share of its length: four times the
+/// deviation of an arc.
 pub(super) const SAME_TURN: f64 = 0.1;
 
-/// Follows curves, and leaves its trail.
+/// Follows curves and records their trail.
 #[derive(Debug)]
 pub(super) struct Follower<'a> {
     pub(super) views: [&'a Placed<'a>; 2],
     pub(super) gathers: &'a mut [ViewScratch; 2],
-    /// Points near which either function was evaluated last.
+    /// The points near which each function was evaluated last.
     pub(super) nearest: [usize; 2],
     pub(super) meter: Meter,
     /// The longest step.
     pub(super) longest: f64,
     /// The lesser sampling radius.
     pub(super) radius: f64,
-    /// The greatest |f|.
+    /// The greatest |f| allowed.
     pub(super) tolerance: f64,
     pub(super) trail: &'a mut Trail,
 }
 
 impl Place {
-    /// Why a curve cannot be followed from here, although both surfaces go on.
+    /// The reason why a curve cannot be followed from here although both surfaces continue.
     fn lost(&self) -> CurveEnd {
         if self.sine < GRAZING { CurveEnd::Tangent } else { CurveEnd::Lost }
     }
 
-    /// No step was found to where it was looked for.
+    /// The refusal of a step that did not converge near its aim.
     fn astray(&self) -> Refusal {
         Refusal { end: self.lost(), is_wall: false }
     }
 
-    /// How the curve turns here for each unit of length, by the chord from `before`.
+    /// The curvature vector of the curve here, estimated from the chord from `before`.
     fn bend_since(&self, before: &Self, way: f64) -> Vector3<f64> {
         let turned = (self.tangent - before.tangent) * (way / (self.point - before.point).norm());
         turned - self.tangent * self.tangent.dot(&turned)
     }
 
-    /// Where the curve passes halfway to `next`: the middle of the cubic with these ends and their tangents,
-    /// as long as an arc that turns so far.
+    /// The point of the curve halfway to `next`: the middle of the cubic with these ends and
+    /// tangents that is as long as an arc with this turn.
     fn halfway(&self, next: &Self, way: f64) -> Vector3<f64> {
         let turned = next.tangent - self.tangent;
         let length = way * (next.point - self.point).norm() * (1.0 + turned.norm_squared() / 16.0);
@@ -103,7 +107,7 @@ impl Place {
 }
 
 impl Follower<'_> {
-    /// Both functions at `x`; none once the budget is spent.
+    /// Evaluates both functions at `x`. `None` once the budget is spent.
     pub(super) fn evaluate(&mut self, x: [f64; 3]) -> Option<[Evaluation; 2]> {
         if self.meter.go_on().is_break() {
             return None;
@@ -115,8 +119,8 @@ impl Follower<'_> {
         Some([side(0), side(1)])
     }
 
-    /// The curve through `place`, whose points are added to `points`, not further than `spacing` from each
-    /// other.
+    /// Traces the curve through `place` and appends its points to `points`, at most `spacing`
+    /// apart.
     pub(super) fn trace(&mut self, place: Place, spacing: f64, points: &mut Vec<[f64; 3]>) -> Curve {
         let start = self.trail.places.len();
         self.trail.push(place);
@@ -136,8 +140,8 @@ impl Follower<'_> {
         Curve { first, count: points.len() - first, ends }
     }
 
-    /// The place on both surfaces that Newton's method leads to from a crossing of discs, if it does; in
-    /// `Err` that the budget is spent.
+    /// Finds the place on both surfaces to which Newton's method leads from a crossing of discs, if
+    /// it converges. `Err` if the budget is spent.
     pub(super) fn begin(&mut self, crossing: [f64; 3]) -> Result<Option<Place>, CurveEnd> {
         let mut point = Vector3::from(crossing);
         for _ in 0..ROUNDS_TO_BEGIN {
@@ -154,19 +158,19 @@ impl Follower<'_> {
         Ok(None)
     }
 
-    /// From a place of the trail onward, or back (`way` −1), until the curve ends; none when it is there
-    /// again.
+    /// Follows the curve from a place of the trail, forward or backward (`way` −1), to its end.
+    /// Returns `None` if it comes back to the start.
     fn follow(&mut self, start: usize, way: f64) -> Option<CurveEnd> {
         let shortest = SHORTEST * self.longest.min(self.radius);
         let most = STRIDE * self.longest;
         let mut here = self.trail.places[start];
         let mut bend = Vector3::zeros();
         let mut length = most;
-        // How far ahead a surface was seen not to go on.
+        // Distance ahead at which a surface was found to end.
         let mut wall = f64::INFINITY;
         let mut grows = true;
         loop {
-            // A step that would turn too far need not be tried.
+            // Skip the steps that would turn too far.
             let bent: f64 = bend.norm();
             let straight = (0.8 * TURN * self.longest / bent).sqrt().min(0.8 * MOST_TURN / bent);
             let ahead = length.min(straight).max(shortest);
@@ -200,9 +204,9 @@ impl Follower<'_> {
         }
     }
 
-    /// Leaves on the trail `next`, on the same curve as `here`, and before it as many places between as it
-    /// takes for no chord to turn further than it may. Tells which place one of these chords passes, where
-    /// they stop.
+    /// Appends `next`, which is on the same curve as `here`, to the trail. Inserts as many places
+    /// before it as are needed for no chord to turn too far. Returns the earlier place that one of
+    /// these chords passes, and stops there.
     fn join(&mut self, here: &Place, next: &Place, way: f64, bridges: u32) -> Result<Option<usize>, Refusal> {
         let chord = (next.point - here.point).norm();
         if !turns(here, next, chord, self.longest) {
@@ -222,8 +226,8 @@ impl Follower<'_> {
         }
     }
 
-    /// Returns `true` if `passed` lies beyond `next` and a chord from `here` would be too long or turn too
-    /// far to leave `next` out.
+    /// Returns `true` if `passed` is beyond `next` and a chord to it from `here` would be too long
+    /// or turn too far, so that `next` cannot be left out.
     fn needs_between(&self, here: &Place, next: &Place, passed: &Place) -> bool {
         let direct = passed.point - here.point;
         let is_beyond = (passed.point - next.point).dot(&(next.point - here.point)) > 0.0;
@@ -231,7 +235,7 @@ impl Follower<'_> {
         is_beyond && (chord > self.longest || turns(here, &passed.turned_like(here), chord, self.longest))
     }
 
-    /// The place on the curve near `aim`, which is about `length` from `here`, or why there is none.
+    /// Finds the place on the curve near `aim`, which is about `length` from `here`.
     fn land(&mut self, here: &Place, aim: Vector3<f64>, length: f64) -> Result<Place, Refusal> {
         let most = (MOST_CORRECTION * length).max(LEAST_CORRECTION * self.radius);
         let mut point = aim;
@@ -261,17 +265,17 @@ impl Follower<'_> {
     }
 }
 
-/// Why a step is not taken.
+/// The reason why a step is not taken.
 #[derive(Debug, Clone, Copy)]
 struct Refusal {
-    /// Why the curve ends if it can come no nearer.
+    /// The reason for the end of the curve if no shorter step succeeds.
     end: CurveEnd,
-    /// Whether a surface was seen from so near not to go on that another step that far will not be taken
-    /// either.
+    /// `true` if a surface was found to end from so near that no other step of this length will
+    /// succeed.
     is_wall: bool,
 }
 
-/// What is in the way at `x`, where one of the functions that are `at` says that its surface is not.
+/// The reason why the curve ends at `x`, where one of the evaluations `at` is not on its surface.
 fn obstacle(x: Vector3<f64>, at: &[Evaluation; 2]) -> CurveEnd {
     let ends = at.each_ref().map(|at| {
         let aside = (Vector3::from(at.centroid) - x).norm() / at.bandwidth;
@@ -284,15 +288,15 @@ fn obstacle(x: Vector3<f64>, at: &[Evaluation; 2]) -> CurveEnd {
     }
 }
 
-/// Whether the curve turns too far between two places for a chord of that length, where `longest` is the
-/// longest.
+/// Returns `true` if the curve turns too far between two places for a chord of length `chord`,
+/// where `longest` is the longest step.
 fn turns(here: &Place, next: &Place, chord: f64, longest: f64) -> bool {
     let turn = (next.tangent - here.tangent).norm();
     turn > MOST_TURN || turn * chord > TURN * longest
 }
 
-/// Adds to `points` the first and the last of `places`, and of those between so many that none is further
-/// than `spacing` from the one before, nor turned by more than a step may.
+/// Appends the first and the last of `places` to `points`, and as many in between that no point is
+/// further than `spacing` from the one before and no chord turns too far.
 fn thin_out<'a>(
     places: impl Iterator<Item = &'a Place>,
     [spacing, longest]: [f64; 2],

@@ -1,41 +1,42 @@
-//! One curve: a stretch of points, and how it ends.
+//! A single curve: a range of points and the reasons for its ends.
 
-/// Why a curve ends.
+/// The reason why a curve ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CurveEnd {
-    /// The surface of a ends there.
+    /// The surface of a ends.
     BorderOfA,
-    /// The surface of b ends there.
+    /// The surface of b ends.
     BorderOfB,
-    /// The surfaces touch: their normals are parallel to within half a degree, or come to be so faster than
-    /// the curve can be followed. Other curves may end there too.
+    /// The surfaces are tangent: their normals are parallel to within half a degree, or become
+    /// parallel faster than the curve can be followed. Other curves may end there too.
     Tangent,
-    /// A surface does not look like one sheet there, or turns too sharply.
+    /// A surface does not look like a single sheet, or turns too sharply.
     Lost,
     /// The budget was spent.
     Budget,
 }
 
-/// One of [`crate::Curves`].
+/// A curve of [`crate::Curves`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Curve {
-    /// Its first point.
+    /// The index of the first point.
     pub first: usize,
-    /// How many points it has: one alone where the surfaces touch and no curve leads away.
+    /// The number of points. It is 1 if the surfaces are tangent and no curve leads away.
     pub count: usize,
-    /// Why it ends where it begins and where it ends; none if the last point is joined to the first.
+    /// The reasons for the ends at the first and the last point; `None` if the last point is joined
+    /// to the first.
     pub ends: Option<[CurveEnd; 2]>,
 }
 
 impl Curve {
-    /// Whether it is a loop.
+    /// Returns `true` if the curve is closed.
     #[must_use]
     pub const fn is_closed(&self) -> bool {
         self.ends.is_none()
     }
 
-    /// The pairs of points that are joined.
+    /// Returns the pairs of points that are joined.
     pub fn edges(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         let Self { first, count, .. } = *self;
         let joined = if self.is_closed() { count } else { count.saturating_sub(1) };

@@ -1,22 +1,22 @@
-//! The places that curves have passed, and which of them are near.
+//! The places that curves have passed, in a grid for fast look-up.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::Evaluation;
 
-/// Surfaces at angles with a sine below this touch: normals are as exact as a bend of this share within a
-/// bandwidth.
+/// Surfaces at angles with a sine below this count as tangent. Normals are about as exact as the
+/// turn of a surface that bends by this share within a bandwidth.
 pub(super) const PARALLEL: f64 = 0.01;
 
-/// A place on two surfaces, or nearly so.
+/// A place on two surfaces, or nearly on them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     pub(super) point: Vector3<f64>,
     pub(super) normals: [Vector3<f64>; 2],
-    /// `n_A × n_B`, of length one.
+    /// The unit vector along `n_A × n_B`.
     pub(super) tangent: Vector3<f64>,
     /// The sine of the angle between the surfaces.
     pub(super) sine: f64,
-    /// The greater |f|.
+    /// The greater |f| of the two surfaces.
     pub(super) residual: f64,
 }
 
@@ -33,19 +33,21 @@ impl Place {
         Self { point, normals, tangent, sine, residual }
     }
 
-    /// The same with normals on the sides of those at `other`: n and −n are the same to a surface.
+    /// The same place with the normals turned to the sides of those of `other`, as the sign of a
+    /// surface normal is arbitrary.
     pub(super) fn turned_like(self, other: &Self) -> Self {
         let signs = [0, 1].map(|side| 1.0_f64.copysign(self.normals[side].dot(&other.normals[side])));
         let normals = [0, 1].map(|side| self.normals[side] * signs[side]);
         Self { normals, tangent: self.tangent * (signs[0] * signs[1]), ..self }
     }
 
-    /// Whether there is no direction to follow.
+    /// Returns `true` if the surfaces are tangent, so that there is no direction to follow.
     pub(super) fn is_tangent(&self) -> bool {
         self.sine < PARALLEL
     }
 
-    /// Whether surfaces that pass here as they do at `other` are likely the same sheets, cut the same way.
+    /// Returns `true` if the surfaces here and at `other` are likely the same sheets, intersecting
+    /// in the same direction.
     fn agrees(&self, other: &Self) -> bool {
         /// The cosine of 45°.
         const HALFWAY: f64 = 0.7;
@@ -55,35 +57,35 @@ impl Place {
     }
 }
 
-/// Ends a list of places.
+/// The end of a list of places.
 const NONE: u32 = u32::MAX;
 
-/// Crossings at angles with a sine below this tell no direction.
+/// Crossings at angles with a sine below this have no reliable direction.
 const FLAT: f64 = 0.1;
 
-/// Places in a grid of cubes, the lists of which are found by their hash.
+/// Places in a grid of cubes, with a hash table of lists.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Trail {
     pub(super) places: Vec<Place>,
-    /// The place before it in its list.
+    /// The previous place in the same list, for each place.
     next: Vec<u32>,
-    /// The last place of each list; their number is a power of two.
+    /// The last place of each list. The number of lists is a power of two.
     heads: Vec<u32>,
-    /// Coordinates count from here, in edges of cubes.
+    /// The origin of the grid.
     origin: Vector3<f64>,
     /// The longest step.
     longest: f64,
 }
 
 impl Trail {
-    /// Edges of cubes, in longest steps: what is looked for is within half an edge.
+    /// Edge of a cube, in longest steps. Searches reach half an edge.
     const EDGE: f64 = 2.5;
 
     const FEWEST: usize = 256;
 
-    /// Share of its length by which a chord is extended to look for places: `SAME_TURN` times the tangent of
-    /// `MOST_TURN`. Within `SAME_TURN` of its length aside, no place then lies between two chords that turn
-    /// by `MOST_TURN`.
+    /// Share of its length by which a chord is extended to search for places: `SAME_TURN` times the
+    /// tangent of `MOST_TURN`. Then no place within `SAME_TURN` of the chord's length is missed
+    /// between two chords that turn by `MOST_TURN`.
     const BEYOND: f64 = 0.07;
 
     pub(super) fn clear(&mut self, origin: Vector3<f64>, longest: f64) {
@@ -94,7 +96,8 @@ impl Trail {
         (self.origin, self.longest) = (origin, longest);
     }
 
-    /// The cube that has `x` in its upper half, in each direction, or its neighbour's lower one.
+    /// The cube that contains `x` in a grid shifted by `shift` edges. With a shift of one half, the
+    /// eight cubes from there contain everything within half an edge of `x`.
     fn cube(&self, x: Vector3<f64>, shift: f64) -> [i64; 3] {
         #[expect(clippy::cast_possible_truncation, reason = "beyond all cubes is one more")]
         let at = |c: f64| (c / (Self::EDGE * self.longest) - shift).floor() as i64;
@@ -130,11 +133,11 @@ impl Trail {
         self.heads[list] = u32::try_from(i).unwrap_or(NONE);
     }
 
-    /// The places within half an edge of `x`, and others.
+    /// The places within half an edge of `x`, and possibly others.
     fn near(&self, x: Vector3<f64>) -> impl Iterator<Item = usize> {
         let [x, y, z] = self.cube(x, 0.5);
         (0..8).flat_map(move |corner| {
-            // Coordinates saturate far from the origin, as they do in damaged files.
+            // Coordinates saturate far from the origin, as happens with damaged files.
             let next = |c: i64, axis: i64| c.saturating_add(corner >> axis & 1);
             let cube = [next(x, 0), next(y, 1), next(z, 2)];
             let existing = |i: u32| Some(i as usize).filter(|_| i != NONE);
@@ -143,8 +146,8 @@ impl Trail {
         })
     }
 
-    /// Whether a curve has passed `place` within `aside`, or at a place where it tells no direction, within
-    /// the longest step.
+    /// Returns `true` if a curve has passed `place` within `aside`. Where either place has no
+    /// reliable direction, within the longest step.
     pub(super) fn has_passed(&self, place: &Place, aside: f64) -> bool {
         self.near(place.point).any(|i| {
             let other = &self.places[i];
@@ -158,11 +161,12 @@ impl Trail {
         })
     }
 
-    /// The nearest place that the chord from `here` to `next` passes within `aside`, in the same direction.
+    /// The nearest place that the chord from `here` to `next` passes within `aside`, in the same
+    /// direction.
     ///
-    /// The chord is extended by [`Self::BEYOND`] of its length. Otherwise a place just beyond `next` would be
-    /// missed where the next chord turns away from it: that place is then neither before the end of this
-    /// chord nor ahead of the next one.
+    /// The chord is extended by [`Self::BEYOND`] of its length. Otherwise a place just beyond
+    /// `next` would be missed where the next chord turns away from it: that place is then neither
+    /// before the end of this chord nor ahead of the next one.
     pub(super) fn passed(&self, here: &Place, next: &Place, aside: f64) -> Option<usize> {
         let chord = next.point - here.point;
         let length = chord.norm();
@@ -171,7 +175,7 @@ impl Trail {
         for i in self.near(here.point) {
             let offset = self.places[i].point - here.point;
             let along = offset.dot(&direction);
-            // `here` itself, exactly 0 along, was not passed.
+            // `here` itself, exactly 0 along the chord, was not passed.
             let ahead = along > 0.0 && along <= nearest.0;
             if ahead && (offset - direction * along).norm() <= aside && self.places[i].agrees(here) {
                 nearest = (along, Some(i));
@@ -188,7 +192,7 @@ mod tests {
 
     use super::*;
 
-    /// Without a grid.
+    /// The same without a grid.
     fn linear(trail: &Trail, place: &Place, aside: f64) -> bool {
         trail.places.iter().any(|other| {
             let offset = place.point - other.point;
@@ -232,7 +236,8 @@ mod tests {
         assert!(seen.iter().all(|&n| n > 500), "both answers: {seen:?}");
     }
 
-    /// Damaged files hold any numbers. Looking far from the origin of the grid must not overflow.
+    /// Damaged files contain arbitrary numbers. Searching far from the origin of the grid must not
+    /// overflow.
     #[test]
     fn places_without_a_cube_are_looked_for_without_overflow() {
         let normals = [Vector3::y(), Vector3::z()];
@@ -245,14 +250,14 @@ mod tests {
                     let at = |k: u32| far[i / far.len().pow(k) % far.len()];
                     let place = Place::between(Vector3::new(at(0), at(1), at(2)), normals, 0.0);
                     assert_eq!(trail.passed(&place, &place, 0.1), None, "a chord without length");
-                    // Any answer will do, as long as there is one.
+                    // Any result is acceptable.
                     let _ = trail.has_passed(&place, 0.1);
                     trail.push(place);
                 }
                 assert_eq!(trail.places.len(), far.len().pow(3));
             }
         }
-        // Places are found where the coordinates of cubes saturate, too.
+        // Places are also found where the coordinates of cubes saturate.
         trail.clear(Vector3::zeros(), 1.0);
         let place = Place::between(Vector3::repeat(f64::MAX), normals, 0.0);
         assert!(!trail.has_passed(&place, 0.1));
@@ -272,13 +277,14 @@ mod tests {
             trail.push(place(x, y, 1.0));
             assert_eq!(trail.passed(&here, &next, 0.1), None, "({x}, {y})");
         }
-        // Just short of a place counts as there; from `next` on it would be aside or behind.
+        // A chord that ends just before a place counts as passing it: from `next` on, the place
+        // would be aside or behind.
         let mut short = trail.clone();
         short.push(place(1.0 + 1e-9, 0.0, 1.0));
         assert_eq!(short.passed(&here, &next, 0.1), Some(4));
         trail.push(place(0.9, 0.05, 1.0));
         assert_eq!(trail.passed(&here, &next, 0.1), Some(4));
-        // Unoriented normals say nothing of a way.
+        // The signs of unoriented normals do not determine a direction.
         trail.push(place(0.7, -0.05, -1.0));
         assert_eq!(trail.passed(&here, &next, 0.1), Some(5), "the nearest");
         let across = Place::between(Vector3::new(0.4, 0.0, 0.0), [Vector3::x(), Vector3::z()], 0.0);

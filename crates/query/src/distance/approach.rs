@@ -1,8 +1,8 @@
-//! Points of two surfaces near two samples, as near to each other as steps along the surfaces lead.
+//! Points on two surfaces near two samples, moved towards each other along the surfaces.
 //!
-//! Projected gradients of the distance with steps that are halved where they lead too far: along flat or
-//! bent-away surfaces the first step is right, over tips it is too long by as much as the other surface is
-//! further away than they are round.
+//! Projected gradient descent on the distance, with steps that are halved if they go too far. The
+//! first step is right along flat surfaces and surfaces that bend away from each other. Over tips
+//! it is too long by the ratio of the other surface's distance to the tip's radius.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::{Projection, Status, project};
@@ -13,20 +13,20 @@ use crate::pair::placed::{Placed, ViewScratch};
 /// Steps of either point; each costs two or three evaluations.
 const ROUNDS: u32 = 8;
 
-/// A step from which less is to be gained than this share of the sampling radius is not made.
+/// A step is skipped if it would gain less than this share of the sampling radius.
 const ENOUGH: f64 = 1e-3;
 
-/// Steps are shortened to this share before they are given up.
+/// Steps are shortened down to this share before the point stays.
 const SHORTEST: f64 = 1.0 / 16.0;
 
-/// A point of either surface.
+/// A point on each surface.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Feet {
     pub(crate) points: [[f64; 3]; 2],
     pub(crate) distance: f64,
 }
 
-/// Two surfaces about two of their samples.
+/// Two surfaces near one sample of each.
 #[derive(Debug)]
 pub(crate) struct Approach<'a, 's> {
     pub(crate) views: [&'a Placed<'a>; 2],
@@ -36,9 +36,10 @@ pub(crate) struct Approach<'a, 's> {
 }
 
 impl Approach<'_, '_> {
-    /// Verified points of both surfaces, the nearest that were found: from the samples' feet on, either in
-    /// turn steps along its surface towards the other, at most a local radius, half as far where that led
-    /// away. None where no such points are found, or the budget ends the search for the first.
+    /// Returns the nearest verified points of both surfaces that were found. Starting at the
+    /// samples' feet, the points take turns stepping along their surface towards each other. A step
+    /// is at most a local radius long, and half as long after a step that went away. Returns `None`
+    /// if the first such points are not found or the budget ends before.
     pub(crate) fn run(&mut self) -> Option<Feet> {
         let starts = [0, 1].map(|side| self.views[side].point(self.samples[side]));
         let mut feet = [self.land(0, starts[0])?, self.land(1, starts[1])?];
@@ -53,8 +54,8 @@ impl Approach<'_, '_> {
         Some(Feet { points: feet.map(|foot| foot.point), distance })
     }
 
-    /// Moves one foot towards the other along its surface, if that brings it nearer. `share` of the way is
-    /// gone; half as much from then on if it does not. Whether that was worth trying.
+    /// Moves one foot towards the other along its surface by `share` of the way, if that reduces
+    /// the distance; otherwise halves `share`. Returns `false` if no step is worth trying.
     fn step(&mut self, side: usize, feet: &mut [Projection; 2], share: &mut f64) -> bool {
         let view = self.views[side];
         let radius = f64::from(view.scan().radii()[self.samples[side]]) * view.placed().scale();
@@ -79,8 +80,8 @@ impl Approach<'_, '_> {
         true
     }
 
-    /// The verified surface point below `x`; where the surface ends before that, below the mean of the points
-    /// that reach there.
+    /// The verified surface point below `x`. If the surface ends before, the one below the centroid
+    /// of the last evaluation.
     fn land(&mut self, side: usize, x: [f64; 3]) -> Option<Projection> {
         let foot = self.project(side, x)?;
         if foot.at.status != Status::Border || foot.converged {
@@ -89,7 +90,7 @@ impl Approach<'_, '_> {
         self.project(side, foot.at.centroid).filter(|foot| foot.converged)
     }
 
-    /// None once the budget is spent.
+    /// Projects `x` onto the surface. `None` once the budget is spent.
     fn project(&mut self, side: usize, x: [f64; 3]) -> Option<Projection> {
         if self.meter.go_on().is_break() {
             return None;

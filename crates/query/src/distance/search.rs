@@ -1,5 +1,5 @@
-//! The nearest points of two scans, by branch and bound, nearest pair of nodes first: for the nearest points
-//! by boxes, for a bound from below by enclosures, both in one descent.
+//! The search for the nearest points of two scans: branch and bound, nearest pair of nodes first.
+//! One descent finds both the nearest points, by boxes, and a lower bound, by enclosures.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -15,11 +15,12 @@ use crate::pair::scan_pair::ScanPair;
 
 type Open = hierarchy::Open<Nearness>;
 
-/// The lower bounds of the distance of two nodes, less the distance of the scans' centres: by enclosures
-/// first, then by boxes.
+/// The lower bounds on the distance of two nodes, minus the distance of the scans' centres. Ordered
+/// by the enclosures first, then by the boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Nearness(
-    /// The enclosures, and in the lower half the boxes, as numbers in the same order: a heap compares often.
+    /// The bound of the enclosures in the upper half and of the boxes in the lower half, as
+    /// integers in the same order, which a heap compares quickly.
     u64,
 );
 
@@ -42,19 +43,20 @@ impl Nearness {
     }
 }
 
-/// So many steps look at the nearest pair of all, which a heap finds. Then limits are near what they will be,
-/// and what was put off last comes next: some pairs more, but a heap takes longer than to look at those.
+/// Steps that visit the nearest pair of all, which a heap finds. By then the limits are near their
+/// final values, and the last pair postponed is visited next: that visits some more pairs, but a
+/// heap takes longer than those.
 const NEAREST_FIRST: u32 = 128;
 
-/// The pairs of nodes still to be looked at. Reused.
+/// Reusable memory for the open node pairs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Frontier {
     heap: BinaryHeap<Reverse<(Nearness, NodePair)>>,
-    /// Before any in the heap.
+    /// Pairs that are visited before any in the heap.
     stack: Vec<Open>,
-    /// So many pairs were looked at.
+    /// The number of pairs visited.
     steps: u32,
-    /// Whether the nearest child of the pair that is looked at comes next.
+    /// `true` if the nearest child of the current pair comes next.
     dives: bool,
 }
 
@@ -85,7 +87,7 @@ impl hierarchy::Frontier<Nearness> for Frontier {
         let next = |Reverse((key, pair))| Open { pair, key };
         self.steps = self.steps.saturating_add(1);
         if self.stack.is_empty() && self.steps > NEAREST_FIRST {
-            // A heap's array has its nearest first, more or less.
+            // The array of a heap is roughly in order, nearest first.
             self.stack.extend(self.heap.drain().map(next));
             self.stack.reverse();
         }
@@ -111,24 +113,25 @@ pub(crate) struct Search<'a> {
     motion: &'a Motion,
     /// The nearest points so far.
     pub(crate) best: PointPair,
-    /// Whether enclosures are asked about too.
+    /// `true` if the enclosures are compared, too.
     pub(crate) of_enclosures: bool,
-    /// Nothing that is so much further away than the centres of the scans is looked at for the nearest
-    /// points.
+    /// Pairs whose boxes exceed the distance of the scans' centres by this much cannot improve the
+    /// nearest points.
     points: f32,
-    /// Nor for the bound from below: some pair of leaves whose enclosures are so near was looked at.
+    /// The same limit for enclosures and the lower bound: the smallest bound of any leaf pair so
+    /// far.
     enclosures: f32,
-    /// A bound from below that is this share of the bound from above is good enough.
+    /// A lower bound of this share of the upper bound is sufficient.
     pub(crate) share: Option<f64>,
-    /// Points so near each other are near enough.
+    /// The search stops at points within this distance.
     pub(crate) near_enough: f64,
-    /// Whether the search stops as soon as the bound from below will be zero.
+    /// `true` if the search stops as soon as the lower bound must become zero.
     pub(crate) stops_at_zero: bool,
 }
 
 impl<'a> Search<'a> {
-    /// From the points of `best` on; for the nearest points alone, or for the nearest enclosures of leaves as
-    /// well.
+    /// A search that starts from an arbitrary point pair, for the nearest points and, if
+    /// `of_enclosures`, the nearest enclosures of leaves.
     pub(crate) fn new(pair: ScanPair<'a>, motion: &'a Motion, of_enclosures: bool) -> Self {
         let enclosures = if of_enclosures { f32::INFINITY } else { f32::NEG_INFINITY };
         let best = PointPair::new(&pair, [0, 0]);
@@ -137,7 +140,7 @@ impl<'a> Search<'a> {
         Self { pair, motion, best, of_enclosures, points, enclosures, share, near_enough, stops_at_zero }
     }
 
-    /// Looks at pairs from the roots down. Returns whether it came to its end.
+    /// Searches from the roots down. Breaks if the search was ended early.
     pub(crate) fn run(&mut self, open: &mut Frontier) -> ControlFlow<()> {
         open.clear();
         let key = Nearness::new(self.motion.least(), self.motion.least());
@@ -146,20 +149,20 @@ impl<'a> Search<'a> {
         self.go_on(open)
     }
 
-    /// Looks at the pairs that are open.
+    /// Searches the open pairs.
     pub(crate) fn go_on(&mut self, open: &mut Frontier) -> ControlFlow<()> {
         let (bounds, level) = (self.pair.bounds(self.motion), self.pair.level);
         resume(&bounds, level, open, self)
     }
 
-    /// How far surfaces are apart at least, or points where these alone are looked for, in the world. O(open
-    /// pairs).
+    /// A lower bound of the distance of the surfaces in the world, or of the points if only those
+    /// are compared. O(open pairs).
     pub(crate) fn lower(&self, open: &Frontier) -> f64 {
         let known = if self.of_enclosures { self.enclosures } else { self.points };
         self.proven(open.iter().fold(known, |least, key| least.min(key.enclosures())))
     }
 
-    /// Whether [`Self::lower`] will be zero.
+    /// Returns `true` if [`Self::lower`] will be zero.
     pub(crate) fn may_touch(&self) -> bool {
         !self.of_enclosures || self.proven(self.enclosures) <= 0.0
     }
@@ -168,7 +171,7 @@ impl<'a> Search<'a> {
         self.motion.proven(self.motion.bound(beyond))
     }
 
-    /// The points of two leaves.
+    /// Compares the points of two leaves and updates the limits.
     fn compare(&mut self, leaves: NodePair, [a, b]: [usize; 2]) {
         self.pair.meter.leaf_pair(self.pair.a.leaves.points(a).len(), self.pair.b.leaves.points(b).len());
         self.best = nearest(self.pair.level, &self.pair, leaves, self.best);
@@ -182,13 +185,14 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The greater of a bound of two leaves by enclosures and that by points, if they have one, both relative
-    /// to the centres of the scans. A lesser bound will do that is no less than needed.
+    /// The greater bound of two leaves, by enclosures or by points, relative to the distance of the
+    /// scans' centres. Returns a smaller bound early if that suffices.
     fn bound_of_leaves(&self, leaves: NodePair, by_enclosures: f32) -> f32 {
         if self.pair.part == Part::Surface {
             return by_enclosures;
         }
-        // The points of either and a box about the other are far quicker compared than all points of both.
+        // Comparing the points of each leaf with the box of the other is much faster than comparing
+        // all points.
         let by_boxes = self.motion.no_nearer(f64::from(self.pair.gap_of_leaf_boxes(leaves)));
         if by_boxes >= self.enclosures {
             return by_boxes;
@@ -233,12 +237,13 @@ impl BoundVisitor<Nearness> for Search<'_> {
     #[inline(always)]
     fn key(&mut self, above: &Open, pair: NodePair, boxes: f32, enclosures: f32) -> Option<Nearness> {
         let enclosures = if self.of_enclosures { enclosures } else { boxes };
-        // What is in its parents is no nearer than they are.
+        // A pair is no nearer than its parents.
         let (mut enclosures, mut boxes) =
             (enclosures.max(above.key.enclosures()), boxes.max(above.key.boxes()));
         let [is_leaf_a, is_leaf_b] = self.pair.which_are_leaves(pair);
         if is_leaf_a != is_leaf_b {
-            // The points of a loose leaf say more than its box, also of points.
+            // The points of a loose leaf give a better bound than its box, for the nearest points
+            // as well.
             if self.pair.part == Part::Obstacle
                 && let Some(gap) = self.pair.gap_by_points(pair)
             {

@@ -1,8 +1,10 @@
-//! The balls that stand in an obstacle for points that sample no sheet, against balls and against discs.
+//! The balls that represent points of an obstacle which sample no sheet, compared with balls and
+//! with discs.
 //!
-//! Where a leaf of balls is near another leaf, each of its points that reaches the other's box is held
-//! against sixteen points there at a time. Whether a ball meets a ball is a matter of arithmetic; whether it
-//! meets a sheet is one too where it holds a point of that sheet, and to first order where it meets a disc.
+//! If a leaf with balls is near another leaf, each of its points that reaches the other's box is
+//! compared with sixteen points there at a time. Whether two balls meet is decided exactly. Whether
+//! a ball meets a sheet is exact if it contains a point of the sheet, and accurate to first order
+//! if it meets a disc.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
@@ -16,16 +18,16 @@ use crate::pair::scan_pair::ScanPair;
 
 const WIDTH: usize = LeafBlock::WIDTH;
 
-/// What of a place may meet it: up to sixteen points of a leaf, in their scan's stored frame.
+/// Up to sixteen points of a leaf that a ball is compared with, in their scan's stored frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Targets<'a> {
     block: &'a LeafBlock,
     positions: [[f32; WIDTH]; 3],
     /// The radii of balls; zero for discs.
     balls: [f32; WIDTH],
-    /// The lanes of discs, as bits.
+    /// The lanes of discs, as a bit mask.
     discs: u32,
-    /// All lanes that count.
+    /// All lanes that count, as a bit mask.
     lanes: u32,
 }
 
@@ -48,7 +50,8 @@ impl<'a> Targets<'a> {
         Self { lanes: self.discs, ..self }
     }
 
-    /// The lanes of points no further from `x` than `radius`, beside their own discs and balls, as bits.
+    /// The lanes of targets within `radius` of `x`, as a bit mask. Distances are measured to the
+    /// target's disc or ball.
     pub(crate) fn within(&self, level: Level, x: [f32; 3], radius: f32) -> u32 {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -83,7 +86,7 @@ impl<'a> Targets<'a> {
     }
 }
 
-/// The points of a block, and the radii of their balls: 0 of those on sheets.
+/// The points of a block and the radii of their balls, 0 for points on sheets.
 #[inline(always)]
 fn balls<S: Simd>(simd: S, scan: &Slices<'_>, block: usize) -> ([f32x16<S>; 3], f32x16<S>) {
     let balls = f32x16::load_array_ref(simd, &scan.obstacle_balls(block));
@@ -91,26 +94,26 @@ fn balls<S: Simd>(simd: S, scan: &Slices<'_>, block: usize) -> ([f32x16<S>; 3], 
 }
 
 impl ScanPair<'_> {
-    /// Returns `true` if both points stand in their obstacles by sheets.
+    /// Returns `true` if both points are part of a sheet in their obstacles.
     #[inline]
     pub(crate) fn are_sheets(&self, [i, j]: [usize; 2]) -> bool {
         self.a.is_on_sheet(i) && self.b.is_on_sheet(j)
     }
 
-    /// Returns `true` if it is asked about obstacles, and either point stands there as a ball.
+    /// Returns `true` if obstacles are compared and at least one of the points is a ball there.
     #[inline]
     pub(crate) fn is_of_balls(&self, points: [usize; 2]) -> bool {
         self.part == Part::Obstacle && !self.are_sheets(points)
     }
 
-    /// The radii, in the world, of the balls of points `i` and `j`; zero where they are on sheets.
+    /// The radii, in the world, of the balls of points `i` and `j`; zero for points on sheets.
     pub(crate) fn balls(&self, [i, j]: [usize; 2]) -> [f64; 2] {
         let [sa, sb] = self.views.map(|view| view.placed().scale());
         [f64::from(self.a.obstacle_ball(i)) * sa, f64::from(self.b.obstacle_ball(j)) * sb]
     }
 
-    /// The lanes of a block of a whose balls come within `reach`, in a's frame, of the box of a leaf of b, as
-    /// bits.
+    /// The lanes of a block of a whose balls come within `reach`, in a's frame, of the box of a
+    /// leaf of b, as a bit mask.
     #[inline]
     pub(crate) fn balls_of_a(&self, level: Level, block: usize, leaf: &LeafBlock, reach: f32) -> u32 {
         dispatch!(level, simd => simd.vectorize(
@@ -125,7 +128,7 @@ impl ScanPair<'_> {
         ))
     }
 
-    /// The same of a block of b and a leaf of a; `reach` in a's frame.
+    /// The same for a block of b and a leaf of a; `reach` in a's frame.
     #[inline]
     pub(crate) fn balls_of_b(&self, level: Level, block: usize, leaf: &LeafBlock, reach: f32) -> u32 {
         dispatch!(level, simd => simd.vectorize(
@@ -140,11 +143,11 @@ impl ScanPair<'_> {
         ))
     }
 
-    /// The contact of a ball, of point `i` or `j` or both, with what the other stands for, if these are no
-    /// further apart than `margin` in the world.
+    /// The contact of two points, at least one of which is a ball, if they are at most `margin`
+    /// apart in the world.
     ///
-    /// Certified where a ball meets a ball or holds a measured point, estimated where it meets a tangent
-    /// disc.
+    /// Certified if a ball meets a ball or contains a measured point, estimated if it meets a
+    /// tangent disc.
     pub(crate) fn ball_contact(&self, [i, j]: [usize; 2], margin: f64) -> Option<(Contact, Evidence)> {
         let [p, q] = [self.views[0].point(i), self.views[1].point(j)].map(Vector3::from);
         let [ra, rb] = self.balls([i, j]);
@@ -175,7 +178,7 @@ impl ScanPair<'_> {
         })
     }
 
-    /// The place of the tangent disc of point `k` of a scan that is the nearest to `x`, in the world.
+    /// The world point of the tangent disc of point `k` that is nearest to `x`.
     fn nearest_of_disc(&self, side: usize, k: usize, x: Vector3<f64>) -> Vector3<f64> {
         let (view, scan) = (self.views[side], [self.a, self.b][side]);
         let centre = Vector3::from(view.point(k));

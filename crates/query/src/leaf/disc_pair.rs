@@ -1,4 +1,5 @@
-//! A point of either scan: their tangent discs, whether these cross so that it says something, and where.
+//! The tangent discs of one point of each scan: whether their crossing is reliable, and the contact
+//! there.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Part, PointKind};
@@ -8,13 +9,14 @@ use crate::leaf::crossing::Disc;
 use crate::leaf::surfel_pair::{Discs, LeafPair};
 use crate::pair::scan_pair::ScanPair;
 
-/// As near each other as discs are wide, in the lesser local radius, points say enough by themselves, however
-/// their discs lie.
+/// Points nearer than this, in the lesser local radius, show a contact by themselves, whatever the
+/// orientation of their discs: discs are as wide as this.
 const NEAR: f32 = 0.65;
 
-/// Where surfaces cross, samples of either are within some 0.6 local radii of the place, and nearer than this
-/// to each other, in the greater radius. Discs reach up to 1.3; those that stand upright, as noise on thin
-/// plates makes them, would bridge a gap of that width.
+/// The greatest distance, in the greater local radius, at which a crossing of discs counts. Where
+/// surfaces cross, samples of both are within about 0.6 local radii of the crossing and nearer to
+/// each other than this. Discs reach up to 1.3; discs that stand upright, as noise on thin plates
+/// produces, would bridge a gap of that width.
 pub(crate) const FAR: f32 = 0.9;
 
 impl ScanPair<'_> {
@@ -30,8 +32,8 @@ impl ScanPair<'_> {
         }
     }
 
-    /// Why a crossing of the discs of points `i` and `j` says little, if it does.
-    /// Discs of sheets, of which alone an obstacle has some, are beyond doubt.
+    /// Returns why a crossing of the discs of points `i` and `j` is unreliable, or `None` if it is
+    /// reliable. In obstacles, only points on sheets have discs, which are always reliable.
     pub(crate) fn doubt_about(&self, i: usize, j: usize) -> Option<Reason> {
         if self.part == Part::Obstacle {
             return None;
@@ -53,14 +55,15 @@ impl ScanPair<'_> {
         (distance, [self.a.radii[i], self.b.radii[j] * self.relative.scale()])
     }
 
-    /// Returns `true` if two points are so near each other that a crossing of their discs says something.
+    /// Returns `true` if two points are near enough for a crossing of their discs to count.
     #[inline]
     pub(crate) fn are_near(&self, i: usize, j: usize) -> bool {
         let (distance, [ra, rb]) = self.points(i, j);
         distance <= FAR * ra.max(rb)
     }
 
-    /// The middle of what the chords of two crossing discs share, in the world.
+    /// The contact at the middle of the common part of the chords of two crossing discs, in the
+    /// world.
     pub(crate) fn shared_chord(&self, i: usize, j: usize) -> Contact {
         let [va, vb] = self.views;
         let (pa, pb) = (Vector3::from(va.point(i)), Vector3::from(vb.point(j)));
@@ -81,7 +84,7 @@ impl ScanPair<'_> {
             f64::from(self.b.discs.get(j)) * vb.placed().scale(),
         ];
         let place = middle + step;
-        // Along the common line each chord is an interval; for parallel planes the place is as good as any.
+        // Along the common line each chord is an interval. For parallel planes any point will do.
         let along = na.cross(&nb).try_normalize(0.03).map_or_else(Vector3::zeros, |line| {
             let chord = |p: Vector3<f64>, radius: f64| {
                 let t = line.dot(&(p - place));
@@ -99,8 +102,8 @@ impl ScanPair<'_> {
         }
     }
 
-    /// Whether the discs of points `i` and `j` cross, as when leaves are compared, so that it says something.
-    /// Of a sparse leaf it takes more to say.
+    /// Returns `true` if the discs of points `i` and `j` cross reliably, by the same test as in the
+    /// comparison of leaves. Always `false` for sparse leaves of surfaces, which need more tests.
     pub(crate) fn crosses(&self, [i, j]: [usize; 2]) -> bool {
         let (a, b) = (&self.a.leaves, &self.b.leaves);
         let is_sparse = || a.is_sparse(a.leaf_of(i)) || b.is_sparse(b.leaf_of(j));

@@ -1,6 +1,6 @@
-//! The two nearest points of two leaves: sixteen of b side by side, in single precision, for each of a that
-//! may be near; those that come out nearest are measured in double precision, in the world, as brute force
-//! would.
+//! The two nearest points of two leaves. For each point of a that may be near, sixteen points of b
+//! are compared in single precision. The nearest candidates are measured in double precision, in
+//! the world, with the same result as brute force.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
@@ -13,7 +13,7 @@ use crate::pair::scan_pair::ScanPair;
 
 const WIDTH: usize = PointBlock::WIDTH;
 
-/// Two points, and how far apart they are in the world: of obstacles less the balls that stand for them.
+/// Two points and their distance in the world, for obstacles minus the radii of their balls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PointPair {
     pub(crate) distance: f64,
@@ -29,14 +29,13 @@ impl PointPair {
     }
 }
 
-/// Returns `true` if balls stand for some points of either leaf.
+/// Returns `true` if either leaf contains points represented by balls.
 #[inline(always)]
 fn has_balls(pair: &ScanPair<'_>, [a, b]: [usize; 2]) -> bool {
     pair.part == Part::Obstacle && (pair.a.leaves.has_balls(a) || pair.b.leaves.has_balls(b))
 }
 
-/// The nearest of `best` and all pairs of points of two leaves; of pairs that are equally near the first that
-/// is found.
+/// The nearest of `best` and all point pairs of two leaves; among equals the first found.
 pub(crate) fn nearest(level: Level, pair: &ScanPair<'_>, leaves: NodePair, best: PointPair) -> PointPair {
     dispatch!(level, simd => simd.vectorize(
         #[inline(always)]
@@ -56,7 +55,7 @@ fn nearest_by<S: Simd>(simd: S, pair: &ScanPair<'_>, leaves: NodePair, mut best:
         let own = load(simd, &pair.a.blocks[block_a].position);
         let centres = pair.relative.points_back(&own);
         let places = [centres[0].to_array(), centres[1].to_array(), centres[2].to_array()];
-        // How far each is from the box of b.
+        // The distance of each point from the box of b.
         let d = [centres[0] - bounds.centre[0], centres[1] - bounds.centre[1], centres[2] - bounds.centre[2]];
         let off = in_terms_of(&bounds.axes, &d);
         let beyond = [
@@ -119,15 +118,15 @@ fn in_terms_of<S: Simd>([u, v, w]: &[[f32; 3]; 3], [x, y, z]: &[f32x16<S>; 3]) -
     [x * u[0] + y * u[1] + z * u[2], x * v[0] + y * v[1] + z * v[2], x * w[0] + y * w[1] + z * w[2]]
 }
 
-/// How far apart, in b's stored frame, points may come out that are no further apart than `distance`, beside
-/// their balls.
+/// The distance limit in b's stored frame for points within `distance` of each other, excluding
+/// their balls, enlarged by the rounding error.
 #[inline(always)]
 fn reach_of(pair: &ScanPair<'_>, distance: f64) -> f32 {
     let stored = pair.stored(distance.max(0.0)) + 3.0 * pair.relative.slack();
     stored * pair.relative.scale_back() * (1.0 + 2e-6)
 }
 
-/// The lane of the least of those in `lanes`, of which there are some; the first of equals.
+/// The lane with the least value among `lanes`, which must not be empty; the first among equals.
 #[inline(always)]
 fn least(values: &[f32; WIDTH], lanes: u32) -> usize {
     let mut least = lanes.trailing_zeros() as usize;

@@ -1,9 +1,9 @@
-//! Lower bounds of the distance of obstacles from the points of a leaf.
+//! Lower bounds on the distance of obstacles, from the points of a leaf.
 //!
-//! No place of the obstacle is further from its nearest point than that point's reach
-//! ([`Slices::obstacle_reach`]). So the balls of these radii about the points of a leaf contain its part of
-//! the obstacle. Where a leaf straddles a gap, as one of a depth frame does at a silhouette, or holds strays,
-//! its box is mostly empty, and these balls tell far more.
+//! No part of the obstacle is further from its nearest point than that point's reach
+//! ([`Slices::obstacle_reach`]). So balls of these radii about the points of a leaf contain its
+//! part of the obstacle. If a leaf spans a gap, such as a silhouette in a depth frame, or contains
+//! strays, its box is mostly empty and these balls give a much better bound.
 
 use std::ops::Range;
 
@@ -15,12 +15,13 @@ use nearmiss_lanes::wide::{blocks_of, lanes_of, load};
 
 use crate::pair::scan_pair::ScanPair;
 
-/// Points of a leaf in lanes, in one of the two stored frames, with how far the obstacle reaches from each.
+/// Points of a leaf in lanes, in one of the two stored frames, with the reach of the obstacle about
+/// each.
 #[derive(Clone, Copy)]
 struct Balls<S: Simd> {
     centres: [f32x16<S>; 3],
     reaches: f32x16<S>,
-    /// The lanes that are the leaf's, as bits.
+    /// The lanes that belong to the leaf, as a bit mask.
     lanes: u32,
 }
 
@@ -89,13 +90,14 @@ impl<S: Simd> Balls<S> {
 }
 
 impl ScanPair<'_> {
-    /// The gap between the parts of two nodes: that of their enclosures or, of obstacles, that of their
-    /// points if it is more.
+    /// The gap of the parts of two nodes: the gap of their enclosures or, for obstacles, the gap of
+    /// their points if that is greater.
     pub(crate) fn gap_of_parts(&self, pair: NodePair) -> f32 {
         self.better_gap(pair, self.gap_of_enclosures(pair))
     }
 
-    /// `gap`, that of the enclosures of two nodes, or the gap that their points show if it is more.
+    /// The greater of `gap`, the gap of the enclosures of two nodes, and the gap that their points
+    /// show.
     #[inline]
     pub(crate) fn better_gap(&self, pair: NodePair, gap: f32) -> f32 {
         match self.part {
@@ -104,8 +106,8 @@ impl ScanPair<'_> {
         }
     }
 
-    /// A lower bound of the distance of the obstacles of two nodes by the points of a loose leaf, or of two
-    /// leaves; `None` where boxes tell as much.
+    /// A lower bound on the distance of the obstacles of two nodes, from the points of a loose leaf
+    /// or of two leaves. `None` if boxes give the same.
     #[inline]
     pub(crate) fn gap_by_points(&self, pair: NodePair) -> Option<f32> {
         let [a, b] = self.which_are_leaves(pair);
@@ -121,7 +123,7 @@ impl ScanPair<'_> {
         Some(self.gap_of_loose_leaf(pair, loose_a))
     }
 
-    /// Apart, so that asking whether a leaf is loose takes no call.
+    /// A separate function, so that the test for loose leaves takes no call.
     #[inline(never)]
     fn gap_of_loose_leaf(&self, pair: NodePair, of_a: bool) -> f32 {
         let level = self.level;
@@ -131,14 +133,14 @@ impl ScanPair<'_> {
         ))
     }
 
-    /// The same of a leaf and an inner node of obstacles; `None` for others.
+    /// The same for a leaf and an inner node of obstacles; `None` for other pairs.
     #[inline]
     pub(crate) fn gap_by_leaf(&self, pair: NodePair) -> Option<f32> {
         let [a, b] = self.which_are_leaves(pair);
         if a == b || self.part == Part::Surface { None } else { self.gap_by_points(pair) }
     }
 
-    /// The same of two leaves, by the points of either and the enclosure of the other.
+    /// The same for two leaves, from the points of each and the enclosure of the other.
     pub(crate) fn gap_of_leaf_boxes(&self, pair: NodePair) -> f32 {
         let level = self.level;
         dispatch!(level, simd => simd.vectorize(
@@ -147,7 +149,8 @@ impl ScanPair<'_> {
         ))
     }
 
-    /// By the points of a leaf, which is that of a or else that of b, and the enclosure of the other node.
+    /// The same from the points of a leaf, of a if `of_a` and of b otherwise, and the enclosure of
+    /// the other node.
     #[inline(always)]
     fn gap_of_points<S: Simd>(&self, simd: S, pair: NodePair, of_a: bool) -> f32 {
         let mut least = f32::INFINITY;
@@ -169,7 +172,7 @@ impl ScanPair<'_> {
         least
     }
 
-    /// The same of two leaves, by the points of both.
+    /// The same for two leaves, from the points of both.
     pub(crate) fn gap_of_leaves(&self, pair: NodePair) -> f32 {
         let level = self.level;
         dispatch!(level, simd => simd.vectorize(

@@ -1,10 +1,10 @@
-//! Which tangent discs of two leaves cross: sixteen of one against sixteen of the other, in the frame of the
-//! other.
+//! Crossings of the tangent discs of two leaves: sixteen discs of a against sixteen of b, in b's
+//! frame.
 //!
-//! Most discs of a leaf are out of reach of the other's box, and most of the others of all but a few there.
-//! So the points of a are moved into b's frame, all at once, and held against the box; each that is left is
-//! held against all of b's, whose positions stand side by side already; and normals are looked at where
-//! points are near.
+//! Most discs of a leaf are too far from the other's box, and most of the rest are near only a few
+//! discs there. So all points of a are moved into b's frame at once and compared with the box. Each
+//! remaining point is compared with all points of b, whose positions are already in lanes. Normals
+//! are compared only for near points.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x16, mask32x16};
@@ -19,53 +19,53 @@ const WIDTH: usize = LeafBlock::WIDTH;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Discs<'a> {
     pub(crate) block: &'a LeafBlock,
-    /// How many of the lanes, from the first, have a point.
+    /// The number of lanes in use, from the first.
     pub(crate) count: usize,
 }
 
 impl<'a> Discs<'a> {
-    /// Those of the block with point `i`, and its lane.
+    /// The block that contains point `i`, and the point's lane.
     pub(crate) fn about(leaves: &Leaves<'a>, i: usize) -> (Self, usize) {
         let (block, first, count) = leaves.block_with(i);
         (Self { block, count }, i - first)
     }
 
-    /// That in a lane.
+    /// The disc in a lane.
     pub(crate) fn disc(&self, lane: usize) -> Disc {
         let block = self.block;
         Disc { centre: block.position(lane), normal: block.normal(lane), radius: block.disc(lane) }
     }
 
-    /// The lanes that have one, as bits.
+    /// The lanes in use, as a bit mask.
     #[inline]
     fn lanes(&self) -> u32 {
         (1 << self.count) - 1
     }
 }
 
-/// Discs of a and b, and what is between them.
+/// Discs of a and b, and their relative pose.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LeafPair<'a> {
     pub(crate) a: Discs<'a>,
     pub(crate) b: Discs<'a>,
-    /// The radii of balls about the points of a, beside their discs.
+    /// The radii of balls about the points of a, in addition to their discs.
     pub(crate) balls: Option<[f32; WIDTH]>,
-    /// How much further what is at the points of a reaches, in a's frame.
+    /// The amount by which the discs and balls of a are enlarged, in a's frame.
     pub(crate) reach: f32,
     pub(crate) relative: &'a Relative,
 }
 
-/// A point of a that reaches b's box, and which discs of b cross its own.
+/// A point of a that reaches b's box, and the discs of b that cross its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Near {
     pub(crate) lane: usize,
-    /// Lanes of b, as bits.
+    /// Lanes of b, as a bit mask.
     pub(crate) crossings: u32,
 }
 
 impl LeafPair<'_> {
-    /// The first of some `lanes`, as bits, that crosses something, or, if `each`, that reaches the box at
-    /// all; the same by any instructions.
+    /// Returns the first point among `lanes`, a bit mask, that crosses a disc or, if `each`, that
+    /// reaches the box at all. The result does not depend on `level`.
     #[inline]
     pub(crate) fn next(&self, level: Level, lanes: u32, each: bool) -> Option<Near> {
         dispatch!(level, simd => simd.vectorize(
@@ -74,7 +74,7 @@ impl LeafPair<'_> {
         ))
     }
 
-    /// Whether the discs in two lanes cross: the same as [`Self::next`] says of them.
+    /// Returns `true` if the discs in two lanes cross, with the same result as [`Self::next`].
     pub(crate) fn cross_alone(&self, lane_a: usize, lane_b: usize) -> bool {
         let disc = self.a.disc(lane_a);
         let moved = Disc {
@@ -96,7 +96,7 @@ impl LeafPair<'_> {
         let per_scale = self.relative.scale_back();
         let [px, py, pz] = self.b.block.positions(simd);
         let radii = self.b.block.discs(simd);
-        // Who is near anyone is seldom foreseen, so nothing branches on it until all are known.
+        // Branches on nearness are hard to predict, so all lanes are tested before any branch.
         let mut nears = [0_u32; WIDTH];
         let mut left = candidates;
         while left != 0 {
@@ -127,7 +127,7 @@ impl LeafPair<'_> {
         None
     }
 
-    /// The points of a, which are `centres` in b's frame, that reach b's box.
+    /// The points of a, at `centres` in b's frame, that reach b's box.
     #[inline(always)]
     fn near_box<S: Simd>(&self, simd: S, centres: &[f32x16<S>; 3]) -> u32 {
         let mut own = self.a.block.discs(simd);
@@ -138,7 +138,7 @@ impl LeafPair<'_> {
     }
 }
 
-/// The lanes of balls, in a leaf's frame, that come to its box, as bits.
+/// The lanes of balls, given in a leaf's frame, that reach its box, as a bit mask.
 #[inline(always)]
 pub(crate) fn near_box<S: Simd>(
     simd: S,
@@ -158,8 +158,8 @@ pub(crate) fn near_box<S: Simd>(
     bits(beyond_sq.simd_le(radii * radii))
 }
 
-/// The test of [`crossing`](crate::crossing()) in lanes: a disc of a against those of b, whose centres are
-/// `d` away.
+/// The test of [`crossing`](crate::crossing()) in lanes: a disc of a against discs of b whose
+/// centres are `d` away.
 #[inline(always)]
 fn cross<S: Simd>(
     simd: S,
@@ -227,7 +227,7 @@ mod tests {
         }
     }
 
-    /// Who reaches the box and what it crosses there, one by one.
+    /// The points that reach the box and their crossings, computed one by one.
     fn one_by_one(test: &LeafPair<'_>, a: &Leaf, b: &Leaf) -> Vec<Near> {
         let back = test.relative.scale_back();
         let lanes = |leaf: &Leaf| 0..leaf.count;

@@ -1,8 +1,8 @@
 //! Many questions at once, on the threads of the current rayon pool.
 //!
-//! Workers take the questions in order, some at a time, so that the first ones are answered first. What a
-//! question is answered depends on nothing but the question: a batch says what single queries say, bit for
-//! bit, on any number of threads. Only a deadline, which no clock repeats, can change that.
+//! Workers take the questions in order, a few at a time, so that the first ones are answered first.
+//! Each answer depends only on its question: a batch gives the same answers as single queries, bit
+//! for bit, on any number of threads. Only a deadline, which depends on the clock, can change that.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,11 +13,11 @@ use crate::ask::answer::Answer;
 use crate::ask::budget::Deadline;
 use crate::question::Scratch;
 
-/// Questions that a worker takes at once: few enough that those cut short by a deadline, a look at the clock
-/// each, take some microseconds together, and enough to hide the lock.
+/// Questions that a worker takes at once. Few enough that those cut short by a deadline, one clock
+/// read each, take a few microseconds together, and enough to hide the cost of the lock.
 const MOST_AT_ONCE: usize = 16;
 
-/// Of a small batch each worker has so many turns, so that a hard question holds up few others.
+/// Turns per worker in a small batch, so that a hard question delays few others.
 const TURNS: usize = 4;
 
 /// When a batch of collision queries ends.
@@ -31,7 +31,8 @@ pub enum Until {
 }
 
 impl Until {
-    /// The control flow of [`each`] after `answer`: breaks at a contact if only the first one is wanted.
+    /// Returns the control flow of [`each`] after `answer`: a break at a contact if only the first
+    /// one is requested.
     pub fn after(self, answer: Answer) -> ControlFlow<Answer, Answer> {
         if self == Self::First && answer.verdict.is_intersecting() {
             ControlFlow::Break(answer)
@@ -47,17 +48,16 @@ pub struct BatchScratch {
     workers: Vec<Scratch>,
 }
 
-/// Answers many questions on all threads: calls `ask(i, scratch)` for each i and writes the answer to
-/// `answers[i]`.
+/// Answers many questions on all threads: calls `ask(i, scratch)` for each i and writes the answer
+/// to `answers[i]`.
 ///
-/// `ask` breaks with an answer to end the batch there. Returns the number of answers up to and including the
-/// first break, in the order of the questions; the entries after it are unspecified. A question that was not
-/// begun by `deadline` keeps its entry, for example [`Answer::UNASKED`]. Answers do not depend on the number
-/// of threads.
+/// `ask` breaks with an answer to end the batch there. Returns the number of answers up to and
+/// including the first break, in the order of the questions; the entries after it are unspecified.
+/// A question that was not begun by `deadline` keeps its entry, for example [`Answer::UNASKED`].
+/// Answers do not depend on the number of threads.
 ///
-/// Runs on the current rayon pool (choose one with `pool.install(|| …)`), or on the calling thread without
-/// the feature `rayon`. Does not allocate once `scratch` is warm.
-///
+/// Runs on the current rayon pool (choose one with `pool.install(|| …)`), or on the calling thread
+/// without the feature `rayon`. Does not allocate once `scratch` is warm.
 /// ```
 /// use nearmiss_geometry::{PointCloud, Pose};
 /// use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
@@ -70,7 +70,7 @@ pub struct BatchScratch {
 /// let square = PointHierarchy::build(&PointCloud::from_positions(&points)?, &BuildOptions::default())?;
 /// let plan = CollidePlan::new(&CollideOptions::default(), &square, &square)?;
 ///
-/// // An upright square is lowered onto a lying one in steps of 0.1: when does it touch?
+/// // An upright square is lowered onto a horizontal one in steps of 0.1: when does it touch?
 /// let upright = Pose::from_axis_angle([1.0, 0.0, 0.0], 1.5);
 /// let lowered = |step: u32| upright.with_translation([0.3, 0.5, 0.55 - 0.1 * f64::from(step)]);
 /// let path: Vec<Pose> = (0..20).map(lowered).collect();
@@ -104,7 +104,8 @@ pub fn each<T: Send>(
             let next = queue.lock().unwrap_or_else(PoisonError::into_inner).next();
             let Some((turn, slots)) = next else { return };
             for (i, slot) in (turn * at_once..).zip(slots) {
-                // Whatever is told lies before all ends that others find later.
+                // Answers before `told` are needed, as another worker can only lower it to a later
+                // index.
                 if i >= told.load(Ordering::Relaxed) {
                     return;
                 }
@@ -136,7 +137,7 @@ const fn threads() -> usize {
     1
 }
 
-/// Runs `work` for each worker: a single one on this thread.
+/// Runs `work` for each worker; a single one runs on this thread.
 fn run(workers: &mut [Scratch], work: impl Fn(&mut Scratch) + Send + Sync) {
     #[cfg(feature = "rayon")]
     if workers.len() > 1 {

@@ -1,8 +1,8 @@
-//! Many scans in one world, and which of them may meet.
+//! Many scans in one world, and the broad phase that finds the pairs that may meet.
 //!
-//! An R*-tree (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree: an efficient and robust access method for
-//! points and rectangles", SIGMOD 1990; the crate `rstar`) over boxes of the world leaves out the pairs that
-//! are further apart than a question reaches.
+//! An R*-tree over world-space boxes prunes the pairs that are further apart than the reach of a
+//! question. It is that of the crate `rstar` (Beckmann, Kriegel, Schneider & Seeger, "The R*-tree:
+//! an efficient and robust access method for points and rectangles", SIGMOD 1990).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,23 +17,24 @@ use crate::pair::prepared::Prepared;
 use crate::question::Pair;
 use crate::shape::Shape;
 
-/// A placed scan of a [`World`]. Never used again, whatever is removed; later ones are greater.
+/// The id of a placed scan in a [`World`]. Ids increase and are never reused, even after removals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct BodyId(pub u64);
 
-/// Which bodies to ask about.
+/// The bodies whose pairs are requested.
 #[derive(Debug, Clone, Copy)]
 pub enum Bodies<'a> {
-    /// All: every pair.
+    /// All bodies: every pair.
     All,
-    /// These, which may have moved since the last time: pairs with one of them, each once.
+    /// These bodies, such as those that have moved since the last call: each pair with at least one
+    /// of them, once.
     These(&'a [BodyId]),
 }
 
 /// Placed scans, each a *body* with an id.
 ///
-/// `S` is what holds a prepared scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its graph and kernel
-/// come along. One scan may be placed many times.
+/// `S` is what holds a preprocessed scan: `nearmiss::Scan`, an `Arc` of one, or a reference. Its
+/// graph and kernel are included. One scan may be placed many times.
 ///
 /// ```
 /// use nearmiss_geometry::{PointCloud, Pose};
@@ -51,7 +52,7 @@ pub enum Bodies<'a> {
 /// let door = world.insert(&square, &upright.with_translation([0.3, 0.5, -0.4]));
 /// let hinge = world.insert(&square, &upright.with_translation([0.4, 0.4, -0.4]));
 ///
-/// // The door and its hinge belong together.
+/// // The door and its hinge belong together, so their pair is ignored.
 /// let mut pairs = Vec::new();
 /// world.near_pairs(Bodies::All, plan.reach(), &mut pairs);
 /// pairs.retain(|&pair| pair != [door, hinge]);
@@ -63,7 +64,7 @@ pub enum Bodies<'a> {
 /// let touching: Vec<_> = pairs.iter().copied().filter(|&pair| touches(&world, pair)).collect();
 /// assert_eq!(touching, [[floor, door], [floor, hinge]]);
 ///
-/// // Of a body that moved, only its own pairs are asked for.
+/// // After a body has moved, only its own pairs are requested.
 /// world.move_to(door, &upright.with_translation([0.3, 0.5, 0.1]));
 /// world.near_pairs(Bodies::These(&[door]), plan.reach(), &mut pairs);
 /// assert!(pairs.iter().all(|&pair| pair[0] != floor || !touches(&world, pair)));
@@ -72,9 +73,9 @@ pub enum Bodies<'a> {
 #[derive(Debug, Clone)]
 pub struct World<S> {
     bodies: BTreeMap<BodyId, Body<S>>,
-    /// The boxes of the bodies that have one.
+    /// The bounding boxes of the bodies that have one.
     tree: RTree<Leaf>,
-    /// The others, which are near everything.
+    /// The other bodies, which count as near everything.
     unbounded: BTreeSet<BodyId>,
     next: u64,
 }
@@ -97,14 +98,14 @@ impl<S: Prepared> Body<S> {
     }
 }
 
-/// What the tree holds of a body.
+/// A body's entry in the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Leaf {
     id: BodyId,
     bounds: Envelope,
 }
 
-/// A box as the tree wants it.
+/// A bounding box in the type of `rstar`.
 type Envelope = AABB<[f64; 3]>;
 
 impl Leaf {
@@ -129,13 +130,13 @@ impl<S> Default for World<S> {
 }
 
 impl<S: Prepared> World<S> {
-    /// A world without bodies.
+    /// Creates a world without bodies.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Places `scan` in `pose`, which leads from the frame of its input to the world. O(log n).
+    /// Places `scan` at `pose`, which maps the frame of its input to the world. O(log n).
     pub fn insert(&mut self, scan: S, pose: &Pose) -> BodyId {
         let id = BodyId(self.next);
         self.next += 1;
@@ -143,7 +144,7 @@ impl<S: Prepared> World<S> {
         id
     }
 
-    /// Takes a body out; `None` where there is none of this id. O(log n).
+    /// Removes a body and returns its scan; `None` if no body has this id. O(log n).
     pub fn remove(&mut self, id: BodyId) -> Option<S> {
         let body = self.bodies.remove(&id)?;
         match body.bounds {
@@ -153,7 +154,7 @@ impl<S: Prepared> World<S> {
         Some(body.scan)
     }
 
-    /// Moves a body; returns whether there is one of this id. O(log n).
+    /// Moves a body. Returns `false` if no body has this id. O(log n).
     pub fn move_to(&mut self, id: BodyId, pose: &Pose) -> bool {
         let scan = self.remove(id);
         scan.map(|scan| self.place(id, Body::new(scan, pose))).is_some()
@@ -167,53 +168,53 @@ impl<S: Prepared> World<S> {
         self.bodies.insert(id, body);
     }
 
-    /// Number of bodies.
+    /// Returns the number of bodies.
     #[must_use]
     pub fn len(&self) -> usize {
         self.bodies.len()
     }
 
-    /// Whether there are none.
+    /// Returns `true` if there are no bodies.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.bodies.is_empty()
     }
 
-    /// The bodies, in the order in which they were inserted.
+    /// Returns the bodies in the order of insertion.
     #[must_use]
     pub fn ids(&self) -> impl ExactSizeIterator<Item = BodyId> {
         self.bodies.keys().copied()
     }
 
-    /// A body as a placed scan, or `None` if there is no body of this id.
+    /// Returns a body as a placed scan, or `None` if no body has this id.
     #[must_use]
     pub fn placed(&self, id: BodyId) -> Option<Placed<'_>> {
         self.bodies.get(&id).map(Body::placed)
     }
 
-    /// A pair of bodies, or `None` if one of them does not exist.
+    /// Returns a pair of bodies, or `None` if one of them does not exist.
     #[must_use]
     pub fn pair(&self, [a, b]: [BodyId; 2]) -> Option<Pair<'_>> {
         Some(Pair::new(self.placed(a)?, self.placed(b)?))
     }
 
-    /// The box of the world about a body that the broad phase goes by; none of one that it takes for
-    /// boundless.
+    /// Returns the world-space bounding box of a body in the broad phase; `None` if the body counts
+    /// as unbounded or no body has this id.
     #[must_use]
     pub fn bounds(&self, id: BodyId) -> Option<Aabb> {
         self.bodies.get(&id).and_then(|body| body.bounds)
     }
 
-    /// The broad phase: writes the pairs whose bounding boxes come within `reach` of each other to `pairs`,
-    /// lesser id first, in ascending order.
+    /// The broad phase: writes the pairs whose bounding boxes come within `reach` of each other to
+    /// `pairs`, smaller id first, in ascending order.
     ///
     /// All other pairs are separated by more than `reach`; pass
-    /// [`CollidePlan::reach`](crate::CollidePlan::reach) for a collision query. A body with an invalid pose
-    /// ([`Reason::Pose`](crate::Reason::Pose)), or at the limits of double precision, is near every other
-    /// body.
+    /// [`CollidePlan::reach`](crate::CollidePlan::reach) for a collision query. A body with an
+    /// invalid pose ([`Reason::Pose`](crate::Reason::Pose)), or at the limits of double precision,
+    /// counts as near every other body.
     ///
-    /// Takes about 0.5 µs per body where each is near twelve others, on one thread. Does not allocate once
-    /// `pairs` is warm.
+    /// Takes about 0.5 µs per body on one thread if each is near twelve others. Does not allocate
+    /// once `pairs` is warm.
     pub fn near_pairs(&self, bodies: Bodies<'_>, reach: f64, pairs: &mut Vec<[BodyId; 2]>) {
         pairs.clear();
         match bodies {
@@ -239,14 +240,14 @@ impl<S: Prepared> World<S> {
         pairs.dedup();
     }
 
-    /// Writes the bodies whose bounding boxes come within `reach` of `scan` to `ids`, in ascending order.
-    /// `scan` need not be a body of this world.
+    /// Writes the bodies whose bounding boxes come within `reach` of `scan` to `ids`, in ascending
+    /// order. `scan` need not be a body of this world.
     pub fn near(&self, scan: &Placed<'_>, reach: f64, ids: &mut Vec<BodyId>) {
         self.near_bounds(bounds(scan), reach, ids);
     }
 
-    /// Writes the bodies whose bounding boxes come within `reach` of `shape` to `ids`, in ascending order. No
-    /// other body [touches](Placed::touches) the shape.
+    /// Writes the bodies whose bounding boxes come within `reach` of `shape` to `ids`, in ascending
+    /// order. No other body [touches](Placed::touches) the shape.
     pub fn near_shape(&self, shape: &Shape, reach: f64, ids: &mut Vec<BodyId>) {
         let bounds = shape.bounds().filter(|b| b.min.iter().chain(&b.max).all(|x| x.abs() <= FARTHEST));
         self.near_bounds(bounds, reach, ids);
@@ -268,7 +269,7 @@ impl<S: Prepared> World<S> {
     }
 }
 
-/// How near boxes must come: single queries take a little more than their reach for near.
+/// Widens the reach, as single queries count slightly more than their reach as near.
 fn widened(reach: f64) -> f64 {
     reach * (1.0 + 1e-4)
 }
@@ -295,7 +296,7 @@ fn visit_across(
     }
     match (a, b) {
         (RTreeNode::Leaf(a), RTreeNode::Leaf(b)) => visit(a.id, b.id),
-        // In turn, for what is split comes second next time.
+        // Swapping the arguments splits both nodes in turn.
         (RTreeNode::Parent(a), _) => a.children().iter().for_each(|a| visit_across(b, a, reach, visit)),
         (_, RTreeNode::Parent(b)) => b.children().iter().for_each(|b| visit_across(a, b, reach, visit)),
     }
@@ -307,18 +308,19 @@ fn are_near(a: &Envelope, b: &Envelope, reach: f64) -> bool {
     (0..3).all(|k| low_a[k] <= high_b[k] + reach && low_b[k] <= high_a[k] + reach)
 }
 
-/// What double precision loses of a place far from the origin of the world: twice what a query allows for.
+/// Rounding error of a point far from the world's origin in double precision: twice the allowance
+/// of a query.
 const DOUBLE_ROUNDING: f64 = 4e-15;
 
-/// Further out, volumes of boxes leave the range of double precision.
+/// Beyond this, the volumes of boxes leave the range of double precision.
 const FARTHEST: f64 = 1e100;
 
-/// Scans whose stored frames are larger or smaller by more than this are bounded by nothing: then the others
-/// differ by no more than single queries allow, 2⁶⁰.
+/// Scans whose stored frames are scaled up or down by more than this count as unbounded. The others
+/// then differ by at most the 2⁶⁰ that single queries allow.
 const GREATEST_SCALE: f64 = (1_u64 << 30) as f64;
 
-/// A box of the world about all that a query looks at of a scan; half of the rounding that it allows for
-/// included. None of a scan in a pose that is none, or that is extreme.
+/// The world-space bounding box of all parts of a scan that a query compares, enlarged by half of
+/// the rounding error that the query allows for. `None` if the pose is invalid or out of range.
 fn bounds(view: &Placed<'_>) -> Option<Aabb> {
     let root = view.scan().tree().enclosure(Part::Surface, NodeId::ROOT);
     let placed = view.placed();
@@ -328,9 +330,9 @@ fn bounds(view: &Placed<'_>) -> Option<Aabb> {
         let half = f64::from(root.half[j]) * scale;
         placed.rotate(root.axes[j].map(f64::from)).map(|x| (x * half).abs())
     });
-    // A query in single precision allows for SLACK times the coordinates of either scan about the other's
-    // origin: for two whose boxes touch, at most twice the distances of both centres from their origins, and
-    // four radii of each.
+    // A query in single precision allows for SLACK times the coordinates of either scan about the
+    // other's origin. For two scans whose boxes touch, these are at most twice the distances of
+    // both centres from their origins plus four radii of each.
     let own = Vector3::from(root.centre.map(f64::from)).norm();
     let single = f64::from(SLACK) * (2.0 * own + 4.0 * f64::from(root.radius())) * scale;
     let far = Vector3::from(placed.translation()).norm() + Vector3::from(centre).norm();

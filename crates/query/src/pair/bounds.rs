@@ -1,4 +1,4 @@
-//! The comparison of nodes by how far they are apart, for proofs and distances.
+//! Node pairs compared by their distance, for proofs and distance queries.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x4, f32x16};
@@ -9,16 +9,16 @@ use nearmiss_lanes::wide::{repeated, spread};
 
 use crate::pair::motion::{Gaps, LANES, Limits, Motion};
 
-/// So many children of either node make these pairs.
+/// The number of children of each node in a comparison of children with children.
 const FAN: usize = 4;
 
-/// The pairs of nodes that take the place of a pair, up to sixteen, each in a lane of its own: four children
-/// of either node, or one node and the grandchildren of the other.
+/// The up to sixteen pairs that replace a node pair, one per lane: four children of each node, or
+/// one node and the grandchildren of the other.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pairs {
     of_a: LaneNodes,
     of_b: LaneNodes,
-    /// The lanes that hold a pair, as bits.
+    /// The lanes that hold a pair, as a bit mask.
     pub(crate) lanes: u32,
 }
 
@@ -30,8 +30,8 @@ impl Pairs {
     }
 }
 
-/// The lanes of [`Pairs`] that the first `i + 1` children of a and the first `j + 1` of b take, as bits, at
-/// `[i][j]`.
+/// The lanes of [`Pairs`] in use, as a bit mask, at `[i][j]` for i + 1 children of a and j + 1 of
+/// b.
 const FAN_LANES: [[u32; FAN]; FAN] = {
     let mut lanes = [[0; FAN]; FAN];
     let mut i = 0;
@@ -47,33 +47,34 @@ const FAN_LANES: [[u32; FAN]; FAN] = {
     lanes
 };
 
-/// The callbacks of a descent that compares how far nodes are apart ([`Bounds`]).
+/// The callbacks of a descent by distance ([`Bounds`]).
 pub(crate) trait BoundVisitor<K>: PairVisitor<K> {
-    /// Returns the limits: pairs beyond both are left out.
+    /// Returns the limits. Pairs beyond both are pruned.
     fn limits(&self) -> Limits;
 
-    /// Returns `true` if these pairs below `above` may take its place; otherwise it stays.
+    /// Returns `true` if `pairs` may replace their parent pair `above`; otherwise `above` stays
+    /// open.
     fn may_split(&mut self, above: &Open<K>, pairs: &Pairs, gaps: &Gaps) -> bool {
         let _ = (above, pairs, gaps);
         true
     }
 
-    /// The key of a pair below `above`, whose boxes and whose enclosures are apart by so much; `None` leaves
-    /// it out.
+    /// Returns the key of a child pair of `above` with these gaps of its boxes and enclosures.
+    /// `None` prunes the pair.
     fn key(&mut self, above: &Open<K>, pair: NodePair, boxes: f32, enclosures: f32) -> Option<K>;
 }
 
-/// Two trees in relative motion, compared by how far boxes and enclosures are apart.
+/// Two trees under a relative pose, compared by the distances of boxes and enclosures.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bounds<'a> {
     pub(crate) trees: [&'a Tree<'a>; 2],
     pub(crate) motion: &'a Motion,
-    /// The part of the scans that enclosures contain.
+    /// The part of each scan that the enclosures contain.
     pub(crate) part: Part,
 }
 
 impl Bounds<'_> {
-    /// The gaps of two nodes by themselves.
+    /// The gaps of a single node pair.
     pub(crate) fn of(&self, level: Level, pair: NodePair) -> Gaps {
         dispatch!(level, simd => simd.vectorize(
             #[inline(always)]
@@ -81,7 +82,8 @@ impl Bounds<'_> {
         ))
     }
 
-    /// The pairs that take the place of a pair whose `whole` nodes are not split, and their gaps.
+    /// Splits a node pair and computes the gaps of the resulting pairs. Nodes marked in `whole` are
+    /// kept.
     #[inline(always)]
     fn split<S: Simd>(
         &self,
@@ -172,7 +174,7 @@ impl<K: PartialOrd + Copy, V: BoundVisitor<K>> Comparison<V, K> for Bounds<'_> {
     }
 }
 
-/// The first of four in four lanes, then the second, and so on.
+/// Repeats each of four values four times: 0000 1111 2222 3333.
 #[inline(always)]
 fn each_spread<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
     four.map(
@@ -181,7 +183,7 @@ fn each_spread<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
     )
 }
 
-/// The four one after the other, four times.
+/// Repeats the sequence of four values four times: 0123 0123 0123 0123.
 #[inline(always)]
 fn all_repeated<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
     four.map(
@@ -190,7 +192,7 @@ fn all_repeated<S: Simd>(four: &NodeBounds<f32x4<S>>) -> NodeBounds<f32x16<S>> {
     )
 }
 
-/// The one in all lanes.
+/// Copies one value to all lanes.
 #[inline(always)]
 fn alone<S: Simd>(simd: S, one: &NodeBounds<f32>) -> NodeBounds<f32x16<S>> {
     one.map(
@@ -209,7 +211,7 @@ mod tests {
 
     use super::*;
 
-    /// A scan of so many points in a slab of this size.
+    /// A scan of `count` points in a slab of this size.
     fn scan(rng: &mut impl rand::Rng, count: usize, size: f64) -> PointHierarchy {
         let points: Vec<_> =
             (0..count).map(|_| point_in(rng, size)).map(|[x, y, z]| [x, y, 0.1 * z]).collect();

@@ -1,43 +1,44 @@
-//! The likelihood of a contact where a budget ends the search.
+//! The likelihood of a contact when a budget ends the search.
 //!
-//! Three things about the pairs of nodes that are still open tell whether they hide a contact:
+//! It is estimated from three properties of the node pairs that are still open:
 //!
-//! - how much two boxes overlap, as a share s: 1 where they share a centre, 0 where they just touch;
-//! - how much surface the greater box holds. A thing of width w anywhere in a volume with the surface density
-//!   ρ meets ρ w sheets on average, so m = Σ s ρ w is about how many sheets are met. Boxes of a room are
-//!   mostly empty, those of an object are not;
-//! - how many times as long one box is as the other. Where their sizes differ much, s says little.
+//! - the overlap of the two boxes, as a share s: 1 for a common centre, 0 where they just touch;
+//! - the amount of surface in the larger box. An object of width w at a random position in a volume
+//!   with surface density ρ meets ρ w sheets on average, so about m = Σ s ρ w sheets are met. Boxes
+//!   of a room are mostly empty, those of an object are not;
+//! - the ratio of the sizes of the two boxes. If the sizes differ much, s says little.
 //!
-//! The likelihood is a logistic function of s, ln m and the logarithm of that ratio. Its coefficients were
-//! fitted to seven scans with an object in them and to four objects against themselves, all of equal weight,
-//! near contact and in sweeps, with budgets of 1 to 256 node pairs (docs/results; `calibration` of the
-//! benches repeats that). Of each scan in turn the fit to the others beats any constant.
+//! The likelihood is a logistic function of s, ln m and the logarithm of that ratio. Its
+//! coefficients were fitted to seven scans with an object in them and to four objects against
+//! themselves, all with equal weight. The poses were near contact and in sweeps, the budgets 1 to
+//! 256 node pairs (docs/results; `calibration` of the benches repeats the fit). In leave-one-out
+//! validation over the scans, the fit beats every constant.
 
 use nearmiss_geometry::NodeId;
 use nearmiss_hierarchy::{NodePair, OrientedBox, Slices};
 
 use crate::pair::scan_pair::ScanPair;
 
-/// Open pairs that are looked at, those next to be split first.
+/// The number of open pairs that are examined, those that would be split next.
 const LOOKED_AT: usize = 16;
 
-/// Area of a sheet for each of its points, in squares of their local radius: seven of them lie within it.
+/// Area of a sheet per point, in squares of the local radius: seven points lie within that radius.
 const AREA_A_POINT: f64 = 0.5;
 
-/// The range of m, beyond which more of it says nothing.
+/// The range of m; values beyond it carry no further information.
 const SHEETS: [f64; 2] = [1e-6, 1e3];
 
-/// The evidence of a contact that one pair of nodes gives.
+/// The evidence for a contact that one node pair gives.
 struct Hint {
-    /// How much the boxes overlap.
+    /// The overlap s of the boxes.
     share: f64,
-    /// How many sheets are met.
+    /// The expected number of sheets met.
     sheets: f64,
-    /// How many times as long one box is as the other, as a logarithm.
+    /// The absolute logarithm of the ratio of the boxes' sizes.
     ratio: f64,
 }
 
-/// The size of a node's box, and the area of the surface in it.
+/// The size of a node's box and the area of the surface in it.
 struct Content {
     /// The sum of the half edge lengths.
     size: f64,
@@ -46,7 +47,7 @@ struct Content {
 }
 
 impl Content {
-    /// Of a node, in a frame of which the lengths are `scale` times as long.
+    /// The content of a node, with lengths multiplied by `scale`.
     fn of(scan: &Slices<'_>, id: NodeId, scale: f64) -> Self {
         let OrientedBox { half, reach, .. } = scan.tree.bounds(id);
         let half = half.map(|edge| f64::from(edge) * scale);
@@ -69,7 +70,7 @@ impl Hint {
         let b = Content::of(pair.b, nodes.b, f64::from(pair.relative.scale()));
         let ratio = (a.size / b.size).ln().abs();
         let (small, large) = if a.volume < b.volume { (a, b) } else { (b, a) };
-        // Boxes that overflow, or have no extent, say nothing.
+        // Boxes that overflow or have no extent carry no information.
         let number = |x: f64| if x.is_finite() { x } else { 0.0 };
         let share = number(f64::from(share)).clamp(0.0, 1.0);
         let sheets = number(share * large.area / large.volume * small.area.sqrt());
@@ -77,8 +78,8 @@ impl Hint {
     }
 }
 
-/// The chance that the pairs still open, or all if none was looked at, hide a contact or what is within
-/// `reach`.
+/// Estimates the probability that the open pairs contain a contact, or points within `reach`. If no
+/// pair is open, estimates it for the pair of the roots.
 pub(crate) fn likelihood(pair: &ScanPair<'_>, reach: f32, open: impl Iterator<Item = NodePair>) -> f64 {
     let mut open = open.take(LOOKED_AT).peekable();
     let roots = open.peek().is_none().then_some(NodePair::ROOTS);

@@ -1,4 +1,4 @@
-//! A budget being spent.
+//! The spending of a budget.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -7,48 +7,49 @@ use crate::ask::answer::Statistics;
 use crate::ask::budget::{Budget, Deadline, now};
 use crate::pair::placed::Placed;
 
-/// Between two looks at the clock, which cost some 22 ns each, lies work of about this many node pairs, which
-/// cost about 15 ns each.
+/// Work between two reads of the clock, in node pairs. A read costs about 22 ns, a node pair about
+/// 15 ns.
 const PAIRS_A_LOOK: u64 = 64;
 
-/// An evaluation costs as much as so many node pairs.
+/// The cost of an evaluation, in node pairs.
 const PAIRS_AN_EVALUATION: u64 = 64;
 
-/// So many pairs of points cost as much as a node pair.
+/// The number of point pairs that cost as much as one node pair.
 pub(crate) const POINTS_A_PAIR: u64 = 4;
 
-/// A query without a budget of work is ended after so many leaf pairs for each leaf of either scan. Boxes
-/// that lie could otherwise make it compare each leaf with each. Solid noise of 400,000 points in the middle
-/// of other such noise takes 19, surfaces on each other 5; 100,000 points are ended within a second or so
-/// (docs/decisions).
+/// The limit of leaf pairs per leaf of both scans for a query without a work budget. A damaged file
+/// whose boxes all overlap could otherwise make it compare every leaf with every other. Solid noise
+/// of 400,000 points inside other such noise takes 19, coincident surfaces 5; for 100,000 points
+/// the limit is reached within about a second (docs/decisions).
 const LEAF_PAIRS_A_LEAF: u64 = 128;
 
-/// Node pairs that lead to a leaf pair: two to eight where boxes overlap much.
+/// Node pairs per leaf pair: two to eight where boxes overlap much.
 pub(crate) const NODE_PAIRS_A_LEAF_PAIR: u64 = 4;
 
-/// A budget being spent.
+/// A budget and what was spent of it.
 #[derive(Debug)]
 pub(crate) struct Meter {
-    /// Work units that may be spent.
+    /// The limit of work units.
     most_units: u64,
-    /// All work, leaf work included, that may be done, in node pairs.
+    /// The limit of all work, leaf work included, in node pairs.
     most_work: u64,
     deadline: Option<Deadline>,
     /// Leaf work so far, in node pairs.
     leaf_work: u64,
-    /// At this much work something has to be looked at.
+    /// The total work at which the clock or the work limit is checked next.
     next_look: u64,
-    /// Below so many node pairs nothing has, if nothing else was done since this was set.
+    /// No limit can be reached below this count of node pairs, unless other work is counted;
+    /// counting other work resets it to 0.
     free_until: u64,
-    /// When the clock was looked at last, and the longest time that it was not.
+    /// The time of the last clock read.
     looked: Option<Instant>,
     pub(crate) longest_stretch: Duration,
-    /// What was spent.
+    /// The cost so far.
     pub(crate) spent: Statistics,
 }
 
 impl Meter {
-    /// For two scans and so many evaluations for two leaves.
+    /// A meter for two scans whose leaf pairs cost `evaluations` evaluations each.
     pub(crate) fn new(budget: &Budget, views: [&Placed<'_>; 2], evaluations: u64) -> Self {
         let leaves = views.map(|view| view.scan().topology().leaves() as u64);
         let points = views.map(|view| u64::from(view.scan().leaf_size()));
@@ -70,12 +71,12 @@ impl Meter {
         }
     }
 
-    /// The same after this was spent.
+    /// The same meter with `spent` as its count so far.
     pub(crate) fn after(self, spent: Statistics) -> Self {
         Self { spent, ..self }
     }
 
-    /// Counts what another search has spent.
+    /// Adds what another search has spent.
     pub(crate) fn spend(&mut self, spent: &Statistics) {
         self.spent.evaluations += spent.evaluations;
         self.spent.node_pairs += spent.node_pairs;
@@ -83,7 +84,7 @@ impl Meter {
         self.free_until = 0;
     }
 
-    /// Counts two leaves of so many points each.
+    /// Counts a pair of leaves with `a` and `b` points.
     #[inline]
     pub(crate) fn leaf_pair(&mut self, a: usize, b: usize) {
         self.spent.leaf_pairs += 1;
@@ -97,20 +98,20 @@ impl Meter {
         self.free_until = 0;
     }
 
-    /// Counts leaf work that costs as much as so many node pairs.
+    /// Counts leaf work that costs as much as `pairs` node pairs.
     #[inline]
     pub(crate) fn leaf_work(&mut self, pairs: u64) {
         self.leaf_work += pairs;
         self.free_until = 0;
     }
 
-    /// Whether anything is left. Once nothing is, nothing ever will be.
+    /// Breaks once the budget is spent, and always from then on.
     #[inline]
     pub(crate) fn go_on(&mut self) -> ControlFlow<()> {
         if self.spent.node_pairs < self.free_until { ControlFlow::Continue(()) } else { self.count() }
     }
 
-    /// Counts everything together.
+    /// Adds up all work and checks the limits.
     fn count(&mut self) -> ControlFlow<()> {
         let Statistics { evaluations, node_pairs, .. } = self.spent;
         let units = evaluations + node_pairs;
@@ -137,7 +138,7 @@ impl Meter {
             self.looked = Some(now);
         }
         if is_past || work >= self.most_work {
-            // Whoever asks again looks again.
+            // The next call checks again.
             self.next_look = 0;
             return ControlFlow::Break(());
         }

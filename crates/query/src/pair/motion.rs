@@ -1,16 +1,17 @@
-//! How far oriented boxes in relative motion are apart at least, sixteen pairs at a time.
+//! Lower bounds on the distance of oriented boxes under a relative pose, sixteen pairs at a time.
 //!
-//! Along the face normals alone boxes may come out two thirds nearer than they are: enough to tell whether
-//! they touch, too little to tell how far off they are. So a box's centre is projected onto the other box and
-//! back (Cheney & Goldstein, "Proximity maps for convex sets", Proc. AMS 10, 1959), and both are measured
-//! along the line between the two feet. Any line gives a lower bound; that between the nearest places gives
-//! the distance.
+//! The face normals alone underestimate the distance by up to two thirds. That suffices to decide
+//! whether boxes touch, but not to measure their distance. So the centre of one box is projected
+//! onto the other box and back (Cheney & Goldstein, "Proximity maps for convex sets", Proc. AMS 10,
+//! 1959), and both boxes are measured along the line between the two feet. Every line gives a lower
+//! bound; the line between the nearest points gives the distance.
 //!
-//! Single precision cannot tell the near parts of scans from their far ones where these are a million times
-//! as far from each other as they are large. So the vector o between the centres of the two scans stays in
-//! double precision, and what is computed here is by how much a pair of boxes is nearer or further than |o|:
-//! along a unit vector u, u·o = |o| (1 − |u − o/|o||² / 2), of which the second part is small where |o| is
-//! great. Rounding is then a share of the scans' sizes, not of their distance.
+//! Single precision cannot distinguish the near parts of scans from their far parts if the distance
+//! of the scans is a million times their size. So the vector o between the centres of the two scans
+//! stays in double precision, and this module computes the excess of a pair's distance over |o|.
+//! Along a unit vector u, u·o = |o| (1 − |u − o/|o||² / 2), where the second term is small if |o|
+//! is large. The rounding error is then proportional to the sizes of the scans, not to their
+//! distance.
 
 use std::ops::{Add, Mul};
 
@@ -23,24 +24,24 @@ use nearmiss_lanes::wide::{bits, product};
 
 use crate::pair::placed::Placed;
 
-/// Projections back and forth: after one of them the descent visits 0.5 % more pairs than with exact
+/// Projections back and forth. With one, the descent visits 0.5 % more pairs than with exact
 /// distances.
 const ROUNDS: u32 = 1;
 
-/// So many pairs of nodes are compared at once.
+/// The number of node pairs compared at once.
 pub(crate) const LANES: usize = 16;
 
-/// How far sixteen pairs of nodes are apart: by how much further, at least, than the centres of the scans, in
-/// a's stored frame; [`Motion::least`] where they may overlap, or are no numbers.
+/// Lower bounds on the distances of sixteen node pairs, minus |o|, in a's stored frame. Equal to
+/// [`Motion::least`] for volumes that may overlap and for NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gaps {
     pub(crate) boxes: [f32; LANES],
     pub(crate) enclosures: [f32; LANES],
-    /// The lanes of pairs that are nearer than either limit, as bits.
+    /// The lanes of pairs that are below one of the limits, as a bit mask.
     pub(crate) near: u32,
 }
 
-/// How near nodes are to be.
+/// The limits below which a pair is near.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     pub(crate) boxes: f32,
@@ -48,27 +49,27 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    /// All are near enough.
+    /// Every pair is near.
     pub(crate) const NONE: Self = Self { boxes: f32::INFINITY, enclosures: f32::INFINITY };
 }
 
-/// Some ten roundings of double precision.
+/// About ten rounding errors in double precision.
 const DOUBLE_ROUNDING: f64 = 2e-15;
 
-/// The motion of b's stored frame into a's.
+/// b's pose in a's stored frame, prepared for [`Self::gaps`].
 #[derive(Debug, Clone)]
 pub(crate) struct Motion {
     rotation: [[f32; 3]; 3],
     pub(crate) scale: f32,
-    /// Where a place of b lies, less o.
+    /// The translation of b's points, minus o.
     shift: [f32; 3],
-    /// From the centre of a to that of b.
+    /// The vector o from the centre of a to that of b.
     offset: [f32; 3],
     direction: [f32; 3],
     distance: f64,
-    /// What rounding may add to a bound, in a's stored frame.
+    /// The rounding error of a bound, in a's stored frame.
     slack: f64,
-    /// Length in the world of a unit of that.
+    /// The length in the world of one unit of a's stored frame.
     to_world: f64,
 }
 
@@ -78,7 +79,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 }
 
 impl Motion {
-    /// That of two views, whose relative pose is `pose`.
+    /// Prepares the relative pose `pose` of two placed scans.
     #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
     pub(crate) fn new([a, b]: [&Placed<'_>; 2], pose: &Pose) -> Self {
         let [root_a, root_b] = [a, b].map(|view| view.scan().root_box());
@@ -89,8 +90,8 @@ impl Motion {
         let extent =
             ca.norm() + f64::from(root_a.radius()) + pose.scale() * (cb.norm() + f64::from(root_b.radius()));
         let to_world = a.placed().scale();
-        // Places are told in the world, where both scans may be far from the origin, and rotations are such
-        // to rounding only.
+        // Distances are claimed in the world, where both scans may be far from the origin and
+        // rotation matrices are orthogonal only up to rounding.
         let far: f64 = [a, b].map(|view| Vector3::from(view.placed().translation()).norm()).iter().sum();
         let skew = [a, b].map(|view| {
             let rotation = view.placed().rotation();
@@ -111,57 +112,56 @@ impl Motion {
         }
     }
 
-    /// What a bound in a's stored frame proves of a distance in the world.
+    /// Returns the world distance that `bound`, in a's stored frame, proves.
     pub(crate) fn proven(&self, bound: f64) -> f64 {
         ((bound - self.slack) * self.to_world * (1.0 - 4.0 * DOUBLE_ROUNDING)).max(0.0)
     }
 
-    /// A bound in a's stored frame such that nothing is nearer than `distance` in the world to which a
-    /// greater one belongs.
+    /// The inverse of [`Self::proven`]: pairs with a greater bound are at least `distance` apart in
+    /// the world.
     pub(crate) fn bound_of(&self, distance: f64) -> f64 {
         distance / self.to_world * (1.0 + 4.0 * DOUBLE_ROUNDING) + self.slack
     }
 
-    /// The bound, in a's stored frame, of what is so much further away than the centres of the scans are. Not
+    /// The bound on the distance, in a's stored frame, for the excess `beyond` over |o|. Never
     /// negative.
     pub(crate) fn bound(&self, beyond: f32) -> f64 {
         let own = self.distance + f64::from(beyond);
         if own > 0.0 { own } else { 0.0 }
     }
 
-    /// So much further away than the centres of the scans is what has this [`Self::bound`], or a little more.
+    /// The excess over |o| with this [`Self::bound`], rounded up.
     #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
     pub(crate) fn beyond(&self, bound: f64) -> f32 {
         ((bound - self.distance) as f32).next_up().next_up()
     }
 
-    /// The gap, in a's stored frame, of what is so much further away than the centres of the scans are: what
-    /// the world sees of it is at least this less `slack`.
+    /// The gap, in a's stored frame, for the excess `beyond` over |o|. The distance in the world is
+    /// at least this gap minus `slack`.
     #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
     pub(crate) fn gap(&self, beyond: f32, slack: f32) -> f32 {
         ((self.distance + f64::from(beyond) - self.slack + f64::from(slack)) as f32).next_down()
     }
 
-    /// So much further away than the centres of the scans is what has this [`Self::gap`], or a little more.
+    /// The excess over |o| with this [`Self::gap`], rounded up.
     #[expect(clippy::cast_possible_truncation, reason = "rounded up")]
     pub(crate) fn beyond_gap(&self, gap: f32, slack: f32) -> f32 {
         ((f64::from(gap) + self.slack - f64::from(slack) - self.distance) as f32).next_up().next_up()
     }
 
-    /// So much further away than the centres of the scans, or a little less, is what is no nearer than this
-    /// `bound`.
+    /// The excess over |o| of a distance of at least `bound`, rounded down.
     #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
     pub(crate) fn no_nearer(&self, bound: f64) -> f32 {
         ((bound - self.distance) as f32).next_down().next_down().max(self.least())
     }
 
-    /// The least that nodes are [apart](Self::gaps): its bound is 0.
+    /// The smallest value of [`Self::gaps`], whose bound is 0.
     #[expect(clippy::cast_possible_truncation, reason = "rounded down")]
     pub(crate) fn least(&self) -> f32 {
         (-self.distance as f32).next_down().next_down()
     }
 
-    /// Bounds of b in a's stored frame, their centres less o.
+    /// The bounds of b in a's stored frame, with centres relative to o.
     #[inline(always)]
     pub(crate) fn moved<V: Copy + Add<Output = V> + Mul<f32, Output = V> + Add<f32, Output = V>>(
         &self,
@@ -192,7 +192,7 @@ impl Motion {
         ]
     }
 
-    /// The gaps of nodes of a and of [moved](Self::moved) nodes of b, lane by lane.
+    /// Computes the gaps of nodes of a and [moved](Self::moved) nodes of b, lane by lane.
     #[inline(always)]
     pub(crate) fn gaps<S: Simd>(
         &self,
@@ -201,19 +201,19 @@ impl Motion {
         b: &NodeBounds<f32x16<S>>,
         limits: Limits,
     ) -> Gaps {
-        // Unrolled by hand: loops would keep all of it in memory.
+        // Unrolled by hand: loops would keep all values in memory.
         let [x, y, z] = self.offset;
         let between = [b.centre[0] - a.centre[0], b.centre[1] - a.centre[1], b.centre[2] - a.centre[2]];
         let off = [between[0] + x, between[1] + y, between[2] + z];
-        // All that feet need in terms of the axes: their cosines, and how far apart the centres are along
-        // them.
+        // The projections need only the offset of the centres along the axes and the cosines
+        // between the axes.
         let (along_a, along_b) = (in_terms_of(&a.axes, off), in_terms_of(&b.axes, off));
         let cosines = [
             in_terms_of(&b.axes, a.axes[0]),
             in_terms_of(&b.axes, a.axes[1]),
             in_terms_of(&b.axes, a.axes[2]),
         ];
-        // From the centre of b on.
+        // Start from the centre of b.
         let mut seen = along_a;
         let mut foot_a = within(&seen, &a.half);
         for _ in 0..ROUNDS {
@@ -231,7 +231,8 @@ impl Motion {
         let turn = [line[0] - x, line[1] - y, line[2] - z];
         #[expect(clippy::cast_possible_truncation, reason = "slack covers the rounding")]
         let boxes = product(line, between) - product(turn, turn) * (0.5 * self.distance) as f32;
-        // Any line bounds: that of the boxes is nearly that of the enclosures.
+        // Every direction gives a bound. The boxes' direction is nearly the best for the
+        // enclosures.
         let (along_a, along_b) = (in_terms_of(&a.axes, line), in_terms_of(&b.axes, line));
         let mut reach = Reach { boxes, growth: f32x16::splat(simd, 0.0) };
         reach.add(
@@ -261,15 +262,16 @@ impl Motion {
     }
 }
 
-/// What is left between two boxes, and what their enclosures take of it.
+/// The gap of two boxes along a direction, and the amount by which their enclosures reduce it.
 struct Reach<S: Simd> {
     boxes: f32x16<S>,
     growth: f32x16<S>,
 }
 
 impl<S: Simd> Reach<S> {
-    /// Along the axes of either box with the same number: how far each goes `along` the line, with its half
-    /// edge lengths, and by how much the enclosures reach further at the lower and the upper end of each.
+    /// Subtracts the extents along one axis of each box. `along`: cosines of the axes with the
+    /// direction. `half`: half edge lengths. The rest: growth of the enclosures at the lower and
+    /// upper end of each axis.
     #[inline(always)]
     fn add(
         &mut self,
@@ -281,7 +283,7 @@ impl<S: Simd> Reach<S> {
         let shares = [along[0].abs(), along[1].abs()];
         self.boxes -= half[0] * shares[0];
         self.boxes -= half[1] * shares[1];
-        // Towards each other: along the line for a, against it for b.
+        // Towards each other: along the direction for a, against it for b.
         let towards_b = simd.select_f32x16(along[0].simd_gt(0.0), high_a, low_a);
         let towards_a = simd.select_f32x16(along[1].simd_gt(0.0), low_b, high_b);
         self.growth += towards_b * shares[0] + towards_a * shares[1];
@@ -302,7 +304,7 @@ fn combined<S: Simd>(axes: &[[f32x16<S>; 3]; 3], along: &[f32x16<S>; 3]) -> [f32
     [u[0] * x + v[0] * y + w[0] * z, u[1] * x + v[1] * y + w[1] * z, u[2] * x + v[2] * y + w[2] * z]
 }
 
-/// The place of a box nearest to `place`, both along its axes.
+/// The point of a box nearest to `place`; both in coordinates along the box's axes.
 #[inline(always)]
 fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>; 3] {
     [
@@ -314,7 +316,8 @@ fn within<S: Simd>(place: &[f32x16<S>; 3], half: &[f32x16<S>; 3]) -> [f32x16<S>;
 
 #[cfg(test)]
 impl Motion {
-    /// The motion by `pose` between scans about their origins that reach as far as 4.
+    /// The relative pose `pose` of two scans centred at their origins, with all points within 4 of
+    /// them.
     pub(crate) fn of_centred(pose: &Pose) -> Self {
         let offset = Vector3::from(pose.translation());
         let row = |i: usize| single(pose.rotation().row(i).transpose());
@@ -344,7 +347,7 @@ mod tests {
 
     const FAN: usize = 4;
 
-    /// The distance of two boxes: projections to and fro, ten thousand at most.
+    /// The distance of two boxes by alternating projection, at most ten thousand rounds.
     fn distance(a: &OrientedBox, b: &OrientedBox, pose: &Pose) -> f64 {
         let onto = |of: &OrientedBox, p: [f64; 3]| {
             let centre = Vector3::from(of.centre.map(f64::from));
@@ -369,12 +372,12 @@ mod tests {
         last
     }
 
-    /// Growth by these lengths, rounded down: the upper halves of single-precision numbers.
+    /// Growth by these lengths, rounded down to the upper halves of single-precision numbers.
     fn growth(lengths: [f32; 6]) -> Growth {
         bytemuck::cast(lengths.map(|length| u16::try_from(length.to_bits() >> 16).unwrap()))
     }
 
-    /// Four boxes and what they grow by, a lane each.
+    /// Four boxes and their growth, one per lane.
     fn four<S: Simd>(simd: S, boxes: &[OrientedBox; FAN], growths: &[Growth; FAN]) -> NodeBounds<f32x4<S>> {
         let lanes = |of: &dyn Fn(usize) -> f32| f32x4::load_array(simd, [of(0), of(1), of(2), of(3)]);
         let length = |lane: usize, k: usize| {

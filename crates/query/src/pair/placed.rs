@@ -1,4 +1,4 @@
-//! A prepared scan somewhere in the world.
+//! A preprocessed scan at a pose in the world.
 
 use nearmiss_geometry::Pose;
 use nearmiss_graph::{GeodesicKernel, KernelScratch, Samples, SurfaceGraph};
@@ -8,34 +8,34 @@ use nearmiss_surface::{Evaluation, Metric};
 
 use crate::pair::shape_index::ShapeIndex;
 
-/// Memory for evaluations of f, used again by the next; never influences a result.
+/// Reusable memory for evaluations of f; never influences a result.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ViewScratch {
     pub(crate) gather: GatherScratch,
     kernel: KernelScratch,
 }
 
-/// A prepared scan in a pose. Takes some nanoseconds to make or copy.
+/// A preprocessed scan at a pose. Takes a few nanoseconds to make or copy.
 #[derive(Debug, Clone, Copy)]
 pub struct Placed<'a> {
     scan: &'a PointHierarchy,
     graph: Option<&'a SurfaceGraph>,
     shapes: Option<&'a ShapeIndex>,
-    /// Stored frame → world.
+    /// Maps the stored frame to the world.
     placed: Pose,
 }
 
 impl<'a> Placed<'a> {
-    /// Places `scan` at `pose`, which maps the frame of the scan's input to the world. The scale of the pose
-    /// applies to every length of the scan, such as radii and bandwidths.
+    /// Places `scan` at `pose`, which maps the frame of the scan's input to the world. The scale of
+    /// the pose applies to every length of the scan, such as radii and bandwidths.
     ///
-    /// A scan of the [geodesic metric](PointHierarchy::metric) needs [its graph](Self::with_graph) as well;
-    /// without it, no contact is verified.
+    /// A scan of the [geodesic metric](PointHierarchy::metric) needs [its graph](Self::with_graph)
+    /// as well; without it, no contact is verified.
     #[inline]
     #[must_use]
     pub fn new(scan: &'a PointHierarchy, pose: &Pose) -> Self {
         let frame = scan.frame();
-        // As `after` the pose of the frame, which has no rotation.
+        // Equals `pose.after(frame)`, as the pose of the frame has no rotation.
         let placed = pose.with_scale(pose.scale() * frame.scale).with_translation(pose.apply(frame.origin));
         Self { scan, graph: None, shapes: None, placed }
     }
@@ -66,8 +66,8 @@ impl<'a> Placed<'a> {
         self.shapes
     }
 
-    /// f with distances along the graph (Klein & Zachmann 2005, eq. 5) in the frame of the stored positions;
-    /// `None` without a graph that has a map of close pairs.
+    /// Returns f with distances along the graph (Klein & Zachmann 2005, eq. 5) in the frame of the
+    /// stored positions. `None` without a graph that has a map of close pairs.
     #[must_use]
     pub fn geodesic_kernel(&self) -> Option<GeodesicKernel<'a>> {
         let scan = self.scan;
@@ -75,7 +75,7 @@ impl<'a> Placed<'a> {
         self.graph?.kernel(samples)
     }
 
-    /// The kernel of the scan's metric, where that is no sum over straight distances.
+    /// The geodesic kernel if the scan's metric needs it; `None` for the Euclidean metric.
     fn kernel(&self) -> Option<GeodesicKernel<'a>> {
         match self.scan.metric() {
             Metric::Euclidean => None,
@@ -101,23 +101,23 @@ impl<'a> Placed<'a> {
         &self.placed
     }
 
-    /// Returns `true` if the pose is finite, its linear part a rotation with a positive scale: products of
-    /// many poses may not be.
+    /// Returns `true` if the pose is finite and its linear part is a rotation with a positive
+    /// scale. Products of many poses may drift away from that.
     pub(crate) fn is_proper(&self) -> bool {
         let (pose, rotation) = (&self.placed, self.placed.rotation());
         let [u, v, w] = [rotation.column(0), rotation.column(1), rotation.column(2)];
         // Two unit vectors at right angles, and their cross product.
         let (third, across) = (u.cross(&v) - w, u.dot(&v));
         let off = (u.norm_squared() - 1.0).abs() + (v.norm_squared() - 1.0).abs() + across.abs();
-        // Nothing branches on one of them; a sum with NaN is NaN.
+        // Sum up without branches; a sum with NaN is NaN and fails the comparison.
         let off = off + third.x.abs() + third.y.abs() + third.z.abs();
         let far: f64 = pose.translation().iter().map(|x| x.abs()).sum();
         off <= MOST_OFF && far < f64::INFINITY && pose.scale() > 0.0
     }
 
-    /// Returns `true` if `x`, a place of the implicit surface in the world near the stored point `i`, belongs
-    /// to the obstacle: it lies in the cell of its nearest stored point, which samples a sheet
-    /// (`docs/theory/obstacle.md`).
+    /// Returns `true` if `x` belongs to the obstacle. `x` is a world point of the implicit surface
+    /// near the stored point `i`. It belongs to the obstacle if it is in the cell of its nearest
+    /// stored point and that point samples a sheet (`docs/theory/obstacle.md`).
     pub(crate) fn is_obstacle(&self, i: usize, x: [f64; 3]) -> bool {
         let x = self.placed.apply_inverse(x);
         let nearest = self.scan.nearest_point_near(i, x) as usize;
@@ -132,18 +132,18 @@ impl<'a> Placed<'a> {
             && distance_sq <= most * most
     }
 
-    /// The `i`-th stored point in the world.
+    /// Returns the world position of the `i`-th stored point.
     ///
     /// # Panics
-    /// When there is no such point.
+    /// If `i` is out of range.
     #[must_use]
     pub fn point(&self, i: usize) -> [f64; 3] {
         let [x, y, z] = PointBlock::position_in(self.scan.blocks(), i);
         self.placed.apply([f64::from(x), f64::from(y), f64::from(z)])
     }
 
-    /// Returns `true` if f can be evaluated by the metric of the scan: only then its zeros verify what discs
-    /// say.
+    /// Returns `true` if f can be evaluated with the scan's metric. Only then can its zeros verify
+    /// crossings of discs.
     pub(crate) fn verifies(&self) -> bool {
         self.scan.metric() == Metric::Euclidean || self.kernel().is_some()
     }
@@ -158,9 +158,9 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// f at `x` with distances along the graph of this scan, that of `kernel`, whatever the metric of the
-    /// scan; outside further than the greatest horizon from all points. The sign is that of the nearest
-    /// point's normal (Klein & Zachmann 2005, §3.2).
+    /// Evaluates f at `x` with distances along the scan's graph by `kernel`, whatever the metric of
+    /// the scan. The status is `Outside` if `x` is outside all support radii. The sign is that of
+    /// the nearest point's normal (Klein & Zachmann 2005, §3.2).
     pub fn evaluate_by(
         &self,
         kernel: &GeodesicKernel<'_>,
@@ -188,8 +188,8 @@ impl<'a> Placed<'a> {
         self.in_world(at)
     }
 
-    /// As [`Self::evaluate_with`], faster where `x` is near the stored point `i`, on the side of whose normal
-    /// n is.
+    /// The same as [`Self::evaluate_with`], but faster if `x` is near the stored point `i`, and
+    /// with the normal turned to the side of that point's normal.
     pub(crate) fn evaluate_near(&self, i: usize, x: [f64; 3], scratch: &mut ViewScratch) -> Evaluation {
         match self.kernel() {
             None => {
@@ -200,9 +200,9 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// f at `x` but for its sign, as [`Self::evaluate_with`]; faster where the last place that was asked
-    /// about with this scratch is near. `nearest` is the point nearest to that, or any, and then that nearest
-    /// to `x` if the kernel needs it.
+    /// Evaluates |f| at `x`; faster if `x` is near the last point evaluated with this scratch. The
+    /// sign is arbitrary. `nearest` is the stored point nearest to the last `x`, or any; it is
+    /// updated if the kernel needs the nearest point.
     pub(crate) fn evaluate_onward(
         &self,
         x: [f64; 3],
@@ -220,7 +220,7 @@ impl<'a> Placed<'a> {
         })
     }
 
-    /// What holds in the stored frame, in the world.
+    /// Converts an evaluation from the stored frame to the world.
     pub(crate) fn in_world(&self, at: Evaluation) -> Evaluation {
         let scale = self.placed.scale();
         Evaluation {
@@ -234,5 +234,6 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// The sum of what the lengths, the angle and the cross product of the columns of a rotation may be off.
+/// Tolerance of [`Placed::is_proper`]: the summed errors of the lengths, the angle and the cross
+/// product of the rotation's columns.
 const MOST_OFF: f64 = 6e-9;

@@ -1,4 +1,4 @@
-//! The trait of prepared scans.
+//! The trait of preprocessed scans.
 
 use std::rc::Rc;
 use std::sync::Arc;
@@ -8,11 +8,11 @@ use nearmiss_hierarchy::PointHierarchy;
 
 use crate::pair::placed::Placed;
 
-/// A prepared scan, however it is held: `nearmiss::Scan`, [`PointHierarchy`], or a reference, `Arc`, `Rc` or
-/// `Box` of one.
+/// A preprocessed scan, however it is owned: `nearmiss::Scan`, [`PointHierarchy`], or a reference,
+/// `Arc`, `Rc` or `Box` of one.
 pub trait Prepared {
-    /// Places the scan at `pose`, which maps the frame of its input to the world, with its graph and its
-    /// shape index if it has them.
+    /// Places the scan at `pose`, which maps the frame of its input to the world. Includes the
+    /// graph and the shape index of the scan, if there are any.
     fn at(&self, pose: &Pose) -> Placed<'_>;
 }
 

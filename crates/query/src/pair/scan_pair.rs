@@ -1,4 +1,4 @@
-//! Two scans in relative motion, and what every search through them does with a pair of nodes.
+//! Two scans under a relative pose, and the operations on node pairs that all searches share.
 
 use fearless_simd::Level;
 use nearmiss_geometry::nalgebra::Vector3;
@@ -11,7 +11,7 @@ use crate::pair::meter::Meter;
 use crate::pair::motion::Motion;
 use crate::pair::placed::Placed;
 
-/// Two views, their arrays, the motion between them, and what the search has cost.
+/// Two placed scans, their arrays, the relative pose, and the cost of the search.
 #[derive(Debug)]
 pub(crate) struct ScanPair<'a> {
     pub(crate) views: [&'a Placed<'a>; 2],
@@ -19,9 +19,9 @@ pub(crate) struct ScanPair<'a> {
     pub(crate) b: &'a Slices<'a>,
     pub(crate) relative: Relative,
     pub(crate) meter: Meter,
-    /// What enclosures hold.
+    /// The part of each scan that the enclosures contain.
     pub(crate) part: Part,
-    /// The instructions that it is looked at by: no result depends on them.
+    /// The SIMD instructions to use. Results do not depend on them.
     pub(crate) level: Level,
 }
 
@@ -37,7 +37,7 @@ impl<'a> ScanPair<'a> {
         Self { views, a, b, relative, meter, part, level }
     }
 
-    /// Returns `true` if these are leaves, and not other nodes or none at all.
+    /// Returns `true` if both nodes exist and are leaves.
     pub(crate) fn are_leaves(&self, pair: NodePair) -> bool {
         let is_leaf = |scan: &Slices<'_>, id: NodeId| {
             let topology = scan.tree.topology();
@@ -46,29 +46,30 @@ impl<'a> ScanPair<'a> {
         is_leaf(self.a, pair.a) && is_leaf(self.b, pair.b)
     }
 
-    /// Which of two nodes are leaves.
+    /// Returns which of the two nodes are leaves.
     #[inline]
     pub(crate) fn which_are_leaves(&self, pair: NodePair) -> [bool; 2] {
         [self.a.tree.topology().is_leaf(pair.a), self.b.tree.topology().is_leaf(pair.b)]
     }
 
-    /// The leaves with a point of either scan.
+    /// The leaves that contain point `i` of a and point `j` of b.
     pub(crate) fn leaves_of(&self, [i, j]: [usize; 2]) -> NodePair {
         NodePair { a: self.a.tree.topology().leaf_of(i), b: self.b.tree.topology().leaf_of(j) }
     }
 
-    /// The numbers of two leaves.
+    /// The leaf numbers of two leaves.
     #[inline]
     pub(crate) fn numbers(&self, leaves: NodePair) -> [usize; 2] {
         [self.a.tree.topology().leaf_number(leaves.a), self.b.tree.topology().leaf_number(leaves.b)]
     }
 
-    /// The leaves with these numbers.
+    /// The leaves with these leaf numbers.
     pub(crate) fn leaves(&self, [a, b]: [usize; 2]) -> NodePair {
         NodePair { a: self.a.tree.topology().leaf(a), b: self.b.tree.topology().leaf(b) }
     }
 
-    /// The trees of both scans, whose boxes are near within `reach`, in a's stored frame.
+    /// The trees of both scans, for a descent that prunes pairs whose boxes are further apart than
+    /// `reach`, in a's stored frame.
     pub(crate) fn trees<'t>(&self, relative: &'t Relative, reach: f32) -> TreePair<'t>
     where
         'a: 't,
@@ -76,7 +77,7 @@ impl<'a> ScanPair<'a> {
         TreePair { a: &self.a.tree, b: &self.b.tree, relative, reach }
     }
 
-    /// The trees of both scans, compared by how far they are apart.
+    /// The trees of both scans, for a descent by distance.
     pub(crate) fn bounds<'t>(&self, motion: &'t Motion) -> Bounds<'t>
     where
         'a: 't,
@@ -89,46 +90,50 @@ impl<'a> ScanPair<'a> {
         self.in_world([self.a.radii[i], self.b.radii[j]])
     }
 
-    /// The band where the nearest places are of two nodes, in the world: the greatest local radius of any
-    /// point of theirs.
+    /// The band at the nearest points of two nodes, in the world: the greatest local radius of any
+    /// of their points.
     pub(crate) fn band_of(&self, nodes: NodePair) -> f64 {
         self.in_world([self.a.tree.reach(nodes.a), self.b.tree.reach(nodes.b)])
     }
 
-    /// The greater of two lengths in the frames of the scans.
+    /// The greater of two lengths given in the frames of the scans, in the world.
     fn in_world(&self, [of_a, of_b]: [f32; 2]) -> f64 {
         let [a, b] = self.views.map(|view| view.placed().scale());
         (f64::from(of_a) * a).max(f64::from(of_b) * b)
     }
 
-    /// A length of the world in a's stored frame, and a little more: what rounding may take from a gap there.
+    /// Converts a length from the world to a's stored frame, enlarged by the rounding error of a
+    /// gap there.
     pub(crate) fn stored(&self, length: f64) -> f32 {
         #[expect(clippy::cast_possible_truncation, reason = "grown by more than the rounding")]
         let length = (length / self.views[0].placed().scale()) as f32 * (1.0 + 1e-6);
         length + self.relative.slack()
     }
 
-    /// The gap between the boxes of two nodes.
+    /// The gap of the boxes of two nodes.
     pub(crate) fn gap(&mut self, pair: NodePair) -> f32 {
         self.meter.spent.node_pairs += 1;
         self.relative.gap(&self.a.tree.bounds(pair.a), &self.b.tree.bounds(pair.b))
     }
 
-    /// The gap between the enclosures of two nodes.
+    /// The gap of the enclosures of two nodes.
     pub(crate) fn gap_of_enclosures(&self, pair: NodePair) -> f32 {
         let (a, b) = (self.a.tree.enclosure(self.part, pair.a), self.b.tree.enclosure(self.part, pair.b));
         self.relative.gap(&a, &b)
     }
 }
 
-/// From so many radii on the distance of balls is a good bound, and single precision less and less use.
+/// From this many radii on, the distance of the bounding balls is a good bound, and single
+/// precision loses accuracy.
 const FAR_APART: f64 = 100.0;
 
-/// Scans whose stored frames differ in scale by more than this are not compared in single precision.
+/// Scans whose stored frames differ in scale by more than this are not compared in single
+/// precision.
 const GREATEST_RATIO: f64 = (1_u64 << 60) as f64;
 
-/// The motion of b's stored frame into a's, in double and in single precision. An error is the distance of
-/// balls about the two scans if that is more than any contact reaches, or `None` for poses that are none.
+/// Returns b's pose in a's stored frame, in double and in single precision. Fails with the distance
+/// of the scans' bounding balls if that exceeds the reach of the plan, or with `None` for invalid
+/// poses.
 pub(crate) fn relative(
     a: &Placed<'_>,
     b: &Placed<'_>,
@@ -148,38 +153,40 @@ pub(crate) fn relative(
     if gap.is_nan() || gap == f64::INFINITY {
         return Err(None);
     }
-    // A certificate has more to say, unless they are so far apart that balls say nearly all.
+    // A certificate proves more than the balls, unless the scans are so far apart that balls give
+    // nearly the whole distance.
     if gap > plan.reach() && (!plan.options().certifies() || gap > FAR_APART * (ra + rb)) {
         return Err(Some(gap));
     }
     let pose = a.placed().inverse().after(b.placed());
-    // Coordinates in a's stored frame: of its own points, and of b's.
+    // Coordinates in a's stored frame, of a's own points and of b's.
     let extent = size(own.centre.into()) + (distance + ra + 2.0 * rb) / a.placed().scale();
     let shift = size(pose.translation().into());
-    // The slack of the motion is a share of its reach.
+    // The slack of `Relative` is proportional to the extent passed to it.
     let lost = lost / a.placed().scale() / f64::from(SLACK);
     let relative = Relative::new(&pose, extent + shift + lost);
     Ok((pose, relative))
 }
 
-/// No less than the length, and sooner had.
+/// An upper bound of the norm of `v` that takes no square root.
 fn size(v: Vector3<f64>) -> f64 {
     v.x.abs() + v.y.abs() + v.z.abs()
 }
 
-/// Balls about two scans in the world.
+/// The bounding balls of two scans in the world.
 struct Balls {
-    /// Of their middles.
+    /// The distance of the centres.
     distance: f64,
     radii: [f64; 2],
-    /// A lower bound of what is between them.
+    /// A lower bound of the distance of the balls.
     gap: f64,
-    /// What double precision loses of places far from the origin of the world.
+    /// The rounding error in double precision, which grows with the distance from the world's
+    /// origin.
     lost: f64,
 }
 
 impl Balls {
-    /// `stored` in the frames of the scans.
+    /// Places the `stored` balls, given in the frames of the scans, in the world.
     fn of([a, b]: [&Placed<'_>; 2], stored: [Ball; 2]) -> Self {
         let placed = |view: &Placed<'_>, ball: &Ball| {
             (Vector3::from(view.placed().apply(ball.centre)), ball.radius * view.placed().scale())
@@ -193,8 +200,8 @@ impl Balls {
     }
 }
 
-/// A lower bound of the distance of this part of two scans in the world: that of balls about them, which is
-/// less than 0 where these overlap.
+/// A lower bound of the distance of this part of two scans in the world: the gap of their bounding
+/// balls, negative if these overlap.
 pub(crate) fn balls_apart([a, b]: [&Placed<'_>; 2], part: Part) -> f64 {
     let about = |view: &Placed<'_>| match part {
         Part::Obstacle => view.scan().outline().obstacle,
@@ -203,5 +210,5 @@ pub(crate) fn balls_apart([a, b]: [&Placed<'_>; 2], part: Part) -> f64 {
     Balls::of([a, b], [about(a), about(b)]).gap
 }
 
-/// Of 2⁻⁵³ each: some ten roundings where poses are composed and applied.
+/// About ten roundings of 2⁻⁵³ each, from composing and applying poses.
 const DOUBLE_ROUNDING: f64 = 2e-15;

@@ -6,11 +6,11 @@ use fearless_simd::Level;
 use nearmiss_hierarchy::PointHierarchy;
 use nearmiss_index::{BlockBoxes, BlockTree, Cells};
 
-/// An index of the points of a scan, for thousands of shapes. Give it to a placed scan with
+/// An index of the points of a scan, for testing thousands of shapes. Pass it to
 /// [`Placed::with_shapes`](crate::Placed::with_shapes).
 ///
-/// The index borrows nothing, so it can be stored beside its scan. Building it is O(n): some milliseconds and
-/// 2 MB for 100,000 points.
+/// The index borrows nothing, so it can be stored beside its scan. Building it is O(n): a few
+/// milliseconds and 2 MB for 100,000 points.
 #[derive(Debug, Clone)]
 pub struct ShapeIndex {
     /// The [identity](nearmiss_hierarchy::Outline) of the scan.
@@ -21,7 +21,7 @@ pub struct ShapeIndex {
 }
 
 impl ShapeIndex {
-    /// The index of `scan`.
+    /// Builds the index of `scan`.
     #[must_use]
     pub fn new(scan: &PointHierarchy) -> Self {
         let boxes = Arc::new(BlockBoxes::new(scan.blocks(), scan.len()));
@@ -30,14 +30,14 @@ impl ShapeIndex {
         Self { scan: scan.outline().identity, boxes, cells, level }
     }
 
-    /// Returns `true` if the index is of `scan`.
+    /// Returns `true` if this is the index of `scan`.
     #[inline]
     #[must_use]
     pub fn is_of(&self, scan: &PointHierarchy) -> bool {
         self.scan == scan.outline().identity && self.boxes.len() == scan.len()
     }
 
-    /// The tree over the points of `scan`, whose index this is.
+    /// The tree over the points of `scan`, which must be the scan of this index.
     #[inline]
     pub(crate) fn tree<'a>(&'a self, scan: &'a PointHierarchy) -> BlockTree<'a> {
         self.boxes.over(scan.blocks())

@@ -1,4 +1,4 @@
-//! Interpolation search: S1 §4.
+//! Interpolation search (Klein & Zachmann 2005, §4).
 
 mod flat;
 mod leaves;

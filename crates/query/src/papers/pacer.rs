@@ -1,8 +1,8 @@
-//! The same time for every query: S0 §5.4.
+//! Constant time per query (Klein & Zachmann 2004, §5.4).
 //!
-//! A query that takes longer than it may has fewer test points and a greater tolerance next time; one that
-//! has time left has more and a lesser one, if it came to test any. A time budget cuts off what is too long
-//! all the same.
+//! After a query that exceeds its time, the next one has fewer test points and a greater tolerance.
+//! After a query with time to spare that tested any leaves, the next one has more test points and a
+//! smaller tolerance. A deadline limits each query in any case.
 
 use std::time::Duration;
 
@@ -12,20 +12,22 @@ use crate::ask::answer::Answer;
 use crate::ask::budget::{Budget, Deadline, now};
 use crate::ask::options::{CollidePlan, MOST_TEST_POINTS, Method, Sampling};
 
-/// Test points grow and shrink by this share, the tolerance by a quarter of it.
+/// The share by which the number of test points grows or shrinks. The tolerance changes by a
+/// quarter of it.
 const STEP: f64 = 0.125;
 
-/// Fewer test points say nothing.
+/// Fewer test points are meaningless.
 const LEAST_TEST_POINTS: u32 = 8;
 
-/// Tolerances, in sampling radii, below which nothing would be found and above which everything would.
+/// Tolerances in sampling radii. Below this range nothing would be found, above it everything.
 const TOLERANCES: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 
-/// A query that took more than this share of its time had enough to do.
+/// A query that took more than this share of its time does not get more test points.
 const ENOUGH: f64 = 0.9;
 
-/// How many test points leaves get, so that successive queries take the same time. Owned by the caller,
-/// stepped in the order of the queries: one for each pair of scans, or one for all.
+/// The number of test points per leaf, adapted so that successive queries take the same time. Owned
+/// by the caller and updated in the order of the queries: one for each pair of scans, or one for
+/// all.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pacer {
     target: Duration,
@@ -33,37 +35,38 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// Queries of `target` each (S0's `t_max`), the first of them with the default test.
+    /// Creates a pacer for queries of duration `target` (`t_max` in Klein & Zachmann 2004),
+    /// starting with the default test.
     #[must_use]
     pub fn new(target: Duration) -> Self {
         Self { target, sampling: Sampling::default() }
     }
 
-    /// The same pace, next with this test.
+    /// The same pacer with this test for the next query.
     #[must_use]
     pub const fn with_sampling(self, sampling: Sampling) -> Self {
         Self { sampling, ..self }
     }
 
-    /// What the next query tests leaves with: 8 to 65,536 test points, a tolerance of 0.1 to 1, whatever was
-    /// wanted.
+    /// Returns the test of the next query. The test points are limited to 8 to 65,536 and the
+    /// tolerance to 0.1 to 1.
     #[must_use]
     pub fn sampling(&self) -> Sampling {
-        // `clamp` would let through what is no number.
+        // `clamp` would let NaN through.
         let tolerance = self.sampling.tolerance.max(*TOLERANCES.start()).min(*TOLERANCES.end());
         let test_points = self.sampling.test_points.clamp(LEAST_TEST_POINTS, MOST_TEST_POINTS);
         self.sampling.with_tolerance(tolerance).with_test_points(test_points)
     }
 
-    /// How long a query is to take.
+    /// Returns the target duration of a query.
     #[must_use]
     pub const fn target(&self) -> Duration {
         self.target
     }
 
-    /// Calls `ask` with the pacer's budget and with `plan`, whose test points are replaced by the pacer's if
-    /// its method is [`Method::Sampling`]; then adapts the test points to the time that `ask` took. Other
-    /// methods have nothing to adapt.
+    /// Calls `ask` with the pacer's budget and with `plan`. If the method is [`Method::Sampling`],
+    /// the plan's test points are replaced by the pacer's, which are then adapted to the time that
+    /// `ask` took. Other methods have nothing to adapt.
     ///
     /// ```
     /// # use std::time::Duration;
@@ -84,7 +87,7 @@ impl Pacer {
         answer
     }
 
-    /// Learns from a query that took so long.
+    /// Adapts the test points to a query that took the time `spent`.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count within bounds")]
     pub fn adapt(&mut self, spent: Duration, answer: &Answer) {
         let Sampling { test_points, tolerance, .. } = self.sampling();
@@ -99,7 +102,7 @@ impl Pacer {
             return;
         };
         let wanted = (f64::from(test_points) * step).round() as u32;
-        // One test more or less is the least step of small numbers.
+        // Small numbers change by at least one test point.
         let wanted = if step > 1.0 { wanted.max(test_points + 1) } else { wanted.min(test_points - 1) };
         let wider = 1.0 + 0.25 * (1.0 - step);
         self.sampling = self.sampling.with_test_points(wanted).with_tolerance(tolerance * wider);

@@ -1,9 +1,9 @@
-//! What a pair of nodes whose boxes overlap says on a closer look: S0 §5.1 and §5.2.
+//! A closer test of node pairs whose boxes overlap (Klein & Zachmann 2004, §5.1 and §5.2).
 //!
-//! Their sphere coverings may part them. Otherwise the sample points of a's node that lie on either side of
-//! f′_B, the function that the sample points of b's node define, tell how likely the surfaces cross; only
-//! those count that are further from it than the covering radius of b's node, for nearer ones say little of
-//! f_B.
+//! Their sphere coverings may be disjoint. Otherwise the sample points of a's node on either side
+//! of f′_B, the function defined by the sample points of b's node, estimate how likely the surfaces
+//! cross. Only points further from f′_B than the covering radius of b's node count, as nearer ones
+//! say little about f_B.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_hierarchy::{Extent, NodePair, apart as coverings_apart};
@@ -13,8 +13,9 @@ use crate::ask::options::Order;
 use crate::papers::Papers;
 
 impl Papers<'_, '_> {
-    /// `None` where coverings part the pair; otherwise `share`, the less the more urgent, less what the
-    /// sample points say. At most about one itself, a share decides between pairs of as many sample points.
+    /// Returns the priority of a pair, lowest first: `share` minus the count of sample points on
+    /// the sides. As `share` is about one at most, it decides between pairs with equal counts.
+    /// `None` if the coverings are disjoint.
     pub(crate) fn look_closer(&mut self, pair: NodePair, share: f32) -> Option<f32> {
         let (slices_a, slices_b) = (self.search.pair.a, self.search.pair.b);
         if self.coverings
@@ -37,11 +38,11 @@ impl Papers<'_, '_> {
         Some(share - sides)
     }
 
-    /// The lesser number, weighted, of a's sample points on one of the sides of f′_B.
+    /// The number, weighted, of a's sample points on the side of f′_B that has fewer.
     fn sides(&mut self, pair: NodePair, weight: impl Fn([f64; 3]) -> f64) -> f32 {
         let [va, vb] = self.search.pair.views;
         let near = f64::from(self.search.pair.b.covering_radius(pair.b.index()));
-        // f′_B's normals are turned to one side: that of the least extent of b's node.
+        // The normals of f′_B are turned to one side: that of the shortest axis of b's node.
         let up = Vector3::from(self.search.pair.b.tree.bounds(pair.b).axes[2].map(f64::from));
         let mut sides = [0.0_f64; 2];
         for i in self.search.pair.a.samples(pair.a.index()).iter() {
@@ -63,7 +64,7 @@ impl Papers<'_, '_> {
     }
 }
 
-/// (λ2 − λ1)/(λ1 + λ2 + λ3): how sure a normal is.
+/// (λ2 − λ1)/(λ1 + λ2 + λ3): the confidence of a normal.
 fn eigenvalue_gap([l1, l2, l3]: [f64; 3]) -> f64 {
     let sum = l1 + l2 + l3;
     if sum > 0.0 { (l2 - l1) / sum } else { 0.0 }

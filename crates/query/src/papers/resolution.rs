@@ -1,8 +1,9 @@
-//! A resolution of the search: nodes that are fine enough answer by their samples (S0 §1).
+//! A resolution of the search: nodes that are fine enough are compared by their samples (Klein &
+//! Zachmann 2004, §1).
 //!
-//! A node's sample points stand for all below it: the balls about them that cover its tangent discs (S0
-//! Definition 4). Where no two balls overlap no discs cross; where two do, the surfaces come within the sum
-//! of four radii of each other.
+//! A node's sample points represent its points: balls about them cover their tangent discs (Klein &
+//! Zachmann 2004, Definition 4). If no two balls overlap, no discs cross. If two overlap, the
+//! surfaces come within the sum of four radii of each other.
 
 use std::ops::ControlFlow;
 
@@ -13,14 +14,14 @@ use crate::ask::answer::Contact;
 use crate::papers::Papers;
 
 impl Papers<'_, '_> {
-    /// Which nodes of a pair are not to be looked at more finely.
+    /// Returns which nodes of a pair are fine enough not to be split.
     pub(crate) fn nodes_are_fine(&self, pair: NodePair) -> [bool; 2] {
         let a = self.search.pair.a.sampling_radius_of(pair.a.index());
         let b = self.search.pair.b.sampling_radius_of(pair.b.index()) * self.search.pair.relative.scale();
         [a <= self.resolution, b <= self.resolution]
     }
 
-    /// The samples of two nodes, of which not both are leaves.
+    /// Compares the samples of two nodes that are not both leaves.
     pub(crate) fn samples_meet(&mut self, pair: NodePair) -> ControlFlow<()> {
         let (a, b) = (self.search.pair.a, self.search.pair.b);
         let relative = self.search.pair.relative;
@@ -33,7 +34,7 @@ impl Papers<'_, '_> {
             let q = Vector3::from(relative.point(b.position(j)));
             for i in samples_a.iter() {
                 let p = Vector3::from(a.position(i));
-                // What is no number is near.
+                // NaN counts as near.
                 if (p - q).norm() > reach {
                     continue;
                 }

@@ -1,9 +1,10 @@
-//! The random test of two surfaces: S0 §5.3.
+//! The random test of two surfaces (Klein & Zachmann 2004, §5.3).
 //!
-//! Test points are drawn in the sphere covering of a's leaf; the least |f_A| + |f_B| of those on which both
-//! functions mean something estimates the distance of the surfaces (eq. 8). Unlike S0 we draw again what
-//! falls outside the volume of b's leaf, where nothing can be found, and a witness is looked for from the
-//! test point that saw the intersection.
+//! Test points are drawn in the sphere covering of a's leaf. The least |f_A| + |f_B| of those at
+//! which both functions are defined estimates the distance of the surfaces (eq. 8). There are two
+//! differences from the paper. A test point outside the volume of b's leaf is drawn again, as
+//! nothing can be found there. A witness is searched for from the test point that detected the
+//! intersection.
 
 use std::ops::{ControlFlow, Range};
 
@@ -20,13 +21,13 @@ use crate::pair::placed::Placed;
 use crate::papers::Papers;
 use crate::papers::random::{FLAT, below, place_in, stream};
 
-/// So many test points are drawn for one that both volumes hold, before that is given up.
+/// Draws per test point inside both volumes before the test gives up.
 const DRAWS: u32 = 8;
 
-/// A draw costs as much as so many node pairs.
+/// The cost of a draw, in node pairs.
 const PAIRS_A_DRAW: u64 = 2;
 
-/// Points that are looked through between two looks at the clock.
+/// Points visited between two clock reads.
 const A_STRETCH: u32 = 256;
 
 impl Papers<'_, '_> {
@@ -37,7 +38,7 @@ impl Papers<'_, '_> {
             * radius(0, self.search.pair.a.sampling_radius).max(radius(1, self.search.pair.b.sampling_radius))
     }
 
-    /// Random test points about the points of one leaf, in the volume of the other.
+    /// Tests random points about the points of one leaf, in the volume of the other.
     pub(crate) fn test_leaves(&mut self, pair: NodePair, sampling: &Sampling) -> ControlFlow<()> {
         let volume =
             self.search.pair.relative.moved(&self.search.pair.b.tree.enclosure(Part::Surface, pair.b));
@@ -67,9 +68,9 @@ impl Papers<'_, '_> {
         ControlFlow::Continue(())
     }
 
-    /// Random test points about all points of a that lie in the box of b.
+    /// Tests random points about all points of a that are in the box of b.
     pub(crate) fn test_all(&mut self, sampling: &Sampling) -> ControlFlow<()> {
-        // No volumes part anything here: nothing is proven.
+        // No volumes are compared here, so nothing is proven.
         self.search.compared.push(NodePair::ROOTS);
         let volume = self.search.pair.relative.moved(&self.search.pair.b.enclosure(0));
         let own = self.search.pair.a.tree.reach(NodeId::ROOT);
@@ -111,8 +112,8 @@ impl Papers<'_, '_> {
         self.search.pair.meter.go_on()
     }
 
-    /// One test point, in a's stored frame, probably not far from the points `about` of either scan; `points`
-    /// of either are those near which a contact may be.
+    /// Tests one point in a's stored frame, probably near the points `about` of each scan. A
+    /// contact must be near some of `points`.
     fn test(
         &mut self,
         x: [f32; 3],
@@ -134,7 +135,7 @@ impl Papers<'_, '_> {
             return ControlFlow::Continue(());
         }
         let distance = at_a.f.abs() + at_b.f.abs();
-        // Where all contacts are wanted, a further one is as good.
+        // If all contacts are requested, a further one is as good as a nearer one.
         let nearest = if self.search.all.is_some() { f64::INFINITY } else { self.estimate };
         if distance >= nearest.min(self.tolerance(sampling)) {
             self.estimate = self.estimate.min(distance);
@@ -156,8 +157,8 @@ impl Papers<'_, '_> {
     }
 }
 
-/// The point nearest to `x`, if it is so near that there is a surface: between two sheets f vanishes too
-/// (docs/theory). None as well when time is up.
+/// The point nearest to `x`, if it is near enough for a surface to be there: f also vanishes
+/// between two sheets (docs/theory). `None`, too, once the budget is spent.
 fn near(view: &Placed<'_>, x: [f64; 3], points: Range<usize>, meter: &mut Meter) -> Option<usize> {
     let placed = view.placed();
     let local = placed.apply_inverse(x);

@@ -1,4 +1,4 @@
-//! All contacts against brute force: of every pair of leaves, every pair of discs or points.
+//! All contacts against brute force: every pair of discs or points of every pair of leaves.
 use std::collections::BTreeSet;
 
 use nearmiss_geometry::{PointCloud, Pose};
@@ -25,7 +25,7 @@ fn leaves(scan: &PointHierarchy) -> Vec<usize> {
     of
 }
 
-/// The pairs of leaves that contacts are of.
+/// The leaf pairs of the contacts.
 fn found(contacts: &Contacts, scans: [&PointHierarchy; 2]) -> Vec<[usize; 2]> {
     let [leaves_a, leaves_b] = scans.map(leaves);
     let stored = |side: usize, contact: &nearmiss_query::Contact| {
@@ -34,7 +34,8 @@ fn found(contacts: &Contacts, scans: [&PointHierarchy; 2]) -> Vec<[usize; 2]> {
     contacts.contacts.iter().map(|c| [leaves_a[stored(0, c)], leaves_b[stored(1, c)]]).collect()
 }
 
-/// The pairs of leaves of which trusted discs surely cross, and those of which some may.
+/// The leaf pairs with reliable discs that certainly cross, and those with discs that possibly
+/// cross.
 fn crossing(a: &Placed<'_>, b: &Placed<'_>) -> [BTreeSet<[usize; 2]>; 2] {
     let disc = |view: &Placed<'_>, i: usize| oracle::Disc {
         centre: view.point(i),
@@ -183,7 +184,7 @@ fn test_points_and_margins_find_all_along_a_circle() {
         assert!(matches!(answer.verdict, Verdict::Intersecting { .. }), "{answer:?}");
         let set: BTreeSet<_> = found(&contacts, [&sphere; 2]).into_iter().collect();
         assert_eq!(set.len(), contacts.contacts.len(), "one of each pair");
-        // All twelve hours of the circle.
+        // There are contacts in all twelve sectors of the circle.
         let hour = |c: &nearmiss_query::Contact| {
             let angle = c.point[1].atan2(c.point[2]).rem_euclid(std::f64::consts::TAU);
             (0..12).rfind(|&hour| f64::from(hour) * std::f64::consts::TAU / 12.0 <= angle)

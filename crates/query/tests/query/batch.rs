@@ -29,7 +29,7 @@ fn poses(count: usize, spread: f64, seed: u64) -> Vec<[Pose; 2]> {
     (0..count).map(|i| [0.2, spread].map(|s| arbitrary::pose(rng, s).with_scale(scale(i)))).collect()
 }
 
-/// A scan and itself in pairs of poses.
+/// Pairs of a scan with itself at pairs of poses.
 fn pairs<'a>(scan: &'a PointHierarchy, poses: &[[Pose; 2]]) -> Vec<Pair<'a>> {
     poses.iter().map(|[p, q]| Pair::new(Placed::new(scan, p), Placed::new(scan, q))).collect()
 }
@@ -38,12 +38,12 @@ fn plan(options: CollideOptions, scan: &PointHierarchy) -> CollidePlan {
     CollidePlan::new(&options, scan, scan).unwrap()
 }
 
-/// One after the other, a scratch each.
+/// Answers one by one, each with a fresh scratch.
 fn singly(pairs: &[Pair<'_>], plan: &CollidePlan) -> Vec<Answer> {
     pairs.iter().map(|pair| pair.collide(plan, &mut Scratch::default())).collect()
 }
 
-/// All at once.
+/// Answers all in a batch.
 fn batch(
     pairs: &[Pair<'_>],
     plan: &CollidePlan,
@@ -216,7 +216,7 @@ fn a_deadline_spans_the_batch() {
                 told[asked..].iter().all(|answer| answer.verdict == nothing),
                 "no verdict without a look"
             );
-            // What was answered in time is what it always is; the others were under way.
+            // Questions answered in time have their usual answer; the others were in progress.
             let whole = told[..asked].iter().zip(&pairs);
             let whole =
                 whole.filter(|(answer, pair)| **answer == pair.collide(&plan, &mut Scratch::default()));

@@ -1,4 +1,4 @@
-//! Hints: the same verdicts as without, for less.
+//! Hints: the same verdicts as without, at lower cost.
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
@@ -12,7 +12,8 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &leaf).unwrap()
 }
 
-/// A walk of b past and through a: shifts and turns of about `step`, drawn back when it gets far.
+/// A random walk of b past and through a, in shifts and turns of about `step`, drawn back if it
+/// gets far away.
 fn walk(rng: &mut impl rand::Rng, size: f64, step: f64, count: usize) -> Vec<Pose> {
     let mut at = arbitrary::unit_vector(rng).map(|x| x * size);
     let axis = arbitrary::unit_vector(rng);
@@ -79,7 +80,7 @@ fn hints_change_no_verdict() {
                     if let Verdict::Separated { gap, evidence: Evidence::Certified } = warm.verdict
                         && !of_points
                     {
-                        // Enclosures hold the points.
+                        // Enclosures contain the points.
                         let least = least_distance(&views);
                         assert!(
                             gap <= least && options.evidence == Evidence::Certified,
@@ -97,7 +98,7 @@ fn hints_change_no_verdict() {
                         (cold.verdict, options.semantics)
                         && let Verdict::Separated { gap, .. } = warm.verdict
                     {
-                        // Both are lower bounds of the distance of balls.
+                        // Both are lower bounds of the distance of the balls.
                         let least = least_distance(&views) - 0.6 * r;
                         assert!(gap.max(exact) <= least.max(0.0) + 1e-9 * size, "{gap} {exact} {least}");
                     }
@@ -108,7 +109,8 @@ fn hints_change_no_verdict() {
     assert!(seen[0] > 1000 && seen[1] > 3000, "{seen:?}");
     assert!(skipped > 1000, "{skipped} answers came without any search");
     assert!(proven > 1000, "{proven} separations were certified");
-    // The enclosures of two nodes may be apart although those of two of their children are not shown to be.
+    // The enclosures of two nodes may be disjoint even if those of two of their children are not
+    // proven to be.
     assert!(evident.iter().sum::<usize>() * 500 < proven, "the evidence of {evident:?} of {proven} differs");
 }
 
@@ -193,7 +195,7 @@ fn a_copy_of_a_hint_knows_the_same() {
     }
 }
 
-/// A flat square of uneven points, some 1 apart.
+/// A flat square of irregular points, about 1 apart.
 fn plate(side: u32) -> Vec<[f64; 3]> {
     let mut rng = arbitrary::rng(4);
     let mut point = |i: u32| {
@@ -203,7 +205,7 @@ fn plate(side: u32) -> Vec<[f64; 3]> {
     (0..side * side).map(&mut point).collect()
 }
 
-/// Asked without a hint and with one.
+/// Answers without a hint and with one.
 fn both(
     scans: [&PointHierarchy; 2],
     poses: [Pose; 2],
@@ -228,7 +230,7 @@ fn a_hint_certifies_nothing_that_was_not_proven() {
     let options = CollideOptions::default().with_evidence(Evidence::Certified);
     let mut seen = [0; 2];
     for step in 1..20 {
-        // Boxes of discs part the plates long before enclosures do.
+        // The boxes of discs become disjoint long before the enclosures do.
         let poses = lifted(0.1 * f64::from(step) * r);
         let mut hint = PairHint::default();
         for _ in 0..3 {
@@ -273,7 +275,7 @@ fn far_from_the_origin_a_hint_knows_no_better() {
             let poses = [[0.0; 3], [0.0, 0.0, gap]].map(Pose::from_translation);
             let mut hint = PairHint::default();
             let [near, _] = both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
-            // The same motion, but poses so far out are rounded.
+            // The same motion, but poses this far out are rounded.
             let poses = [[away, 0.0, 0.0], [away, 0.0, gap]].map(Pose::from_translation);
             let [cold, warm] = both([&scan; 2], poses, &options, &Budget::UNLIMITED, &mut hint);
             assert_eq!(kind(&cold.verdict), kind(&warm.verdict), "gap {gap} {away} away");
@@ -354,7 +356,7 @@ fn far_from_the_origin_a_hint_proves_no_greater_distance() {
                 let near = [[0.0; 3], lift].map(Pose::from_translation);
                 let mut hint = PairHint::default();
                 both([&scan; 2], near, &options, &Budget::UNLIMITED, &mut hint);
-                // The same motion, exactly; but poses so far out may have been rounded.
+                // The same motion, exactly, except that poses this far out may have been rounded.
                 let far = [[away, 0.0, 0.0], [away, 0.0, lift[2]]].map(Pose::from_translation);
                 let [cold, warm] = both([&scan; 2], far, &options, &Budget::UNLIMITED, &mut hint);
                 let gap = |answer: &Answer| match answer.verdict {

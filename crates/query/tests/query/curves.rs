@@ -1,4 +1,4 @@
-//! Curves against those known exactly: nothing missing, nothing made up, loops closed, ends at borders.
+//! Curves against exactly known ones: none missing, none invented, loops closed, ends at borders.
 use crate::cut::{assert_whole, curves, draw, fine, hausdorff, nearest_true, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
@@ -13,8 +13,8 @@ use nearmiss_testdata::dragon::{Dragon, dragon_mesh};
 use nearmiss_testdata::shapes::{Form, Order, Sampling, patch, sphere};
 use rand::RngExt;
 
-/// How far beyond a border, or before it, a curve may end, in sampling radii: f's domain ends where the mean
-/// of the points is 0.56 h away, and how they lie moves that.
+/// The greatest distance of a curve's end from the border, in sampling radii. f is defined until
+/// the centroid is 0.56 h away, which depends on the positions of the points.
 const AT_BORDERS: f64 = 0.75;
 
 #[test]
@@ -22,7 +22,7 @@ fn clean_cuts_are_found_whole() {
     let mut cases = 0;
     for cut in cuts::clean() {
         for order in [Order::Regular, Order::Random] {
-            // Random darts take long on large forms.
+            // Random dart throwing is slow on large forms.
             if order == Order::Random && !cut.name.contains("sphere") {
                 continue;
             }
@@ -52,7 +52,7 @@ fn clean_cuts_are_found_whole() {
                 }
             }
             if border.is_some() {
-                // Away from the ends as exact as elsewhere.
+                // Away from the ends, the curve is as exact as elsewhere.
                 let mut inner = cut.clone();
                 let ends = cut.curves.iter().flat_map(|c| [c.points[0], c.points[c.points.len() - 1]]);
                 let ends: Vec<_> = ends.collect();
@@ -85,12 +85,12 @@ fn poses_swaps_and_densities_change_little() {
             .with_scale(scale);
         let views = [Placed::new(a, &world), Placed::new(b, &world.after(&cut.pose_b))];
         let found = draw(&views[0], &views[1], CurveOptions::default());
-        // In the frame of a: the same shape.
+        // The same shape in the frame of a.
         let mut home = found.clone();
         home.points.iter_mut().for_each(|p| *p = world.apply_inverse(*p));
         let radii = [a.sampling_radius(), b.sampling_radius()];
         let coarse = radii[0].max(radii[1]) / radii[0].min(radii[1]);
-        // The bias is of the coarser surface, the yardstick the finer radius.
+        // The bias comes from the coarser surface; errors are measured in the finer radius.
         assert_whole(&home, &cut, &Pose::IDENTITY, radii, 0.05 * coarse);
         let swapped = draw(&views[1], &views[0], CurveOptions::default());
         assert_eq!((swapped.curves.len(), swapped.closed()), (found.curves.len(), found.closed()));
@@ -101,7 +101,7 @@ fn poses_swaps_and_densities_change_little() {
     }
 }
 
-/// A step that ends just short of the start must close the loop, wherever the steps happen to fall.
+/// A step that ends just short of the start must close the loop, wherever the steps happen to end.
 #[test]
 fn circles_are_closed_in_every_pose_and_no_chord_is_walked_twice() {
     let mut rng = arbitrary::rng(12);
@@ -132,7 +132,8 @@ fn circles_are_closed_in_every_pose_and_no_chord_is_walked_twice() {
 
         let radius = (1.0 - d * d).sqrt();
         let share = found.length() / (std::f64::consts::TAU * radius);
-        // The bias of the sphere's radius, r²H/2 or so, is that of the circle's over the sine of the angle.
+        // The bias of the circle's radius is that of the sphere's, about r²H/2, divided by the sine
+        // of the angle.
         assert!((share - 1.0).abs() < 0.01 / (radius * radius), "round {round}: {share} of the circle");
         let angle = |i: usize| {
             let [x, y, _] = pose.apply_inverse(found.points[i]);
@@ -195,7 +196,8 @@ fn a_figure_of_eight_is_followed_to_where_it_crosses_itself() {
         let found =
             draw(&Placed::new(&a, &Pose::IDENTITY), &Placed::new(&b, &cut.pose_b), CurveOptions::default());
         let r = a.sampling_radius();
-        // Within some radii of the crossing a shift of h²H/2 makes other curves of it; beyond they are these.
+        // Within a few radii of the crossing, a shift of h²H/2 changes the curves. Further away
+        // they must agree.
         let crossing = [0.0, 0.5, 0.0];
         let near = |x: &[f64; 3]| to_segment(*x, crossing, crossing) < 6.0 * r;
         let mut away = cut.clone();
@@ -260,7 +262,7 @@ fn a_budget_leaves_what_was_found() {
     let (mut found, mut scratch) = (Curves::default(), Scratch::default());
     let mut partial = 0;
     for share in 0..=20 {
-        // Finding contacts takes most of it.
+        // Finding the contacts takes most of the work.
         let work = units(&whole) - whole.statistics.evaluations * (20 - share) / 20 + share / 20;
         let budget = Budget::default().with_work(work);
         Pair::new(views[0], views[1]).within(&budget).curves(&plan, &mut found, &mut scratch);
@@ -291,7 +293,7 @@ fn a_budget_leaves_what_was_found() {
     assert!(none.complete && none.curves.is_empty());
 }
 
-/// Every crossing of discs by itself: Newton's method from each, without a trail.
+/// Newton's method from every crossing of discs by itself, without a trail.
 #[test]
 fn nothing_that_newton_finds_from_any_crossing_is_missing() {
     let points = dragon_mesh(Dragon::Points5k).unwrap().vertices().to_vec();

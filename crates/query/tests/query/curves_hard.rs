@@ -1,5 +1,6 @@
-//! Curves of tori through each other, whole; and of surfaces that graze or nearly coincide, where what is
-//! asserted is that the search ends, makes nothing up and says where it could not go on.
+//! Curves of intersecting tori, complete; and of surfaces that graze or nearly coincide. For the
+//! latter the tests assert that the search ends, invents nothing and reports where it could not
+//! continue.
 use crate::cut::{assert_whole, draw, fine, scans, to_found, to_segment};
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
@@ -31,7 +32,7 @@ fn prepared(form: &Form, spacing: f64, keep: impl Fn(&[f64; 3]) -> bool) -> Poin
     PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
-/// Whether every end is told to be where the surfaces touch.
+/// Returns `true` if every end is reported as a tangency.
 fn ends_touch(found: &Curves) -> bool {
     found.curves.iter().all(|curve| curve.ends.is_none_or(|ends| ends == [CurveEnd::Tangent; 2]))
 }
@@ -43,12 +44,12 @@ fn a_ball_that_grazes_leaves_a_loop_or_a_point_or_nothing() {
     let above = prepared(&sphere(1.0), SPACING, |x| x[2] < -0.7);
     let plane = prepared(&patch(1.4, 1.4), SPACING, |_| true);
     let r = ball.sampling_radius();
-    // Zero sets of balls are h²H/2 within.
+    // The zero sets of balls are h²H/2 inside.
     let radius = 1.0 - 0.5 * (0.99 * r).powi(2);
     let view = Placed::new(&ball, &Pose::IDENTITY);
     for other in [&plane, &above] {
         let is_plane = std::ptr::eq(other, &raw const plane);
-        // Where both surfaces meet on the axis and how far from it, one being so deep in the other.
+        // The curves at this penetration depth, with the centre and the radius of the true circle.
         let drawn = |depth: f64| {
             let (pose, height) = if is_plane {
                 (radius - depth, radius - depth)
@@ -66,8 +67,8 @@ fn a_ball_that_grazes_leaves_a_loop_or_a_point_or_nothing() {
             let off = (to_segment(x, centre, centre) - rho).abs() / r;
             assert!(off < 0.2, "{off} r from the circle");
         }
-        // Smaller than a step, or less than the tolerance deep: a loop or points, none far from where the
-        // surfaces touch.
+        // Smaller than a step, or shallower than the tolerance: a loop or points, none far from the
+        // tangency.
         for depth in [0.2, 0.1, 0.05, 0.02, 0.01, 2e-3, 0.0, -2e-3] {
             let (found, centre, rho) = drawn(depth * r);
             assert!(ends_touch(&found), "{depth} r deep: {:?}", found.curves);
@@ -104,7 +105,7 @@ fn sheets_that_are_nearly_parallel_cross_in_a_line_or_touch_in_points() {
         let aside = found.points.iter().map(|x| x[1].abs()).fold(0.0, f64::max) / r;
         assert!(aside < 0.15, "{angle}: {aside} r aside");
     }
-    // At less than half a degree they touch: in points a step from each other, along the line.
+    // Below half a degree the surfaces count as tangent: points a step apart along the line.
     for angle in [5e-3, 1e-3] {
         let found = drawn(angle, 0.0);
         assert!(!found.curves.is_empty(), "{angle}");
@@ -138,8 +139,8 @@ fn chords_keep_to_what_shorter_ones_show() {
         }
     }
     off.sort_by(f64::total_cmp);
-    // A fortieth of two sampling radii, and what a surface that is rougher than an arc adds: most where it
-    // turns within a step.
+    // 1/40 of two sampling radii, plus the excess of a surface that is rougher than an arc, which
+    // is greatest where the surface turns within a step.
     let [most, nearly_all] = [off[off.len() - 1], off[off.len() * 99 / 100]];
     assert!(off.len() > 500, "{} chords", off.len());
     assert!(nearly_all < 0.065 && most < 0.2, "{nearly_all} r off, {most} at most");

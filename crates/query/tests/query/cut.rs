@@ -1,4 +1,4 @@
-//! Curves that were found, held against true ones.
+//! Comparison of computed curves with the true ones.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
@@ -14,7 +14,7 @@ pub(crate) fn curves(pair: Pair<'_>, plan: &CurvePlan) -> Curves {
     found
 }
 
-/// Samples of `form` near enough to the other surface to matter to the curve.
+/// Samples of `form` near enough to the other surface to affect the curve.
 pub(crate) fn prepared(form: &Form, sampling: Sampling, other: impl Fn([f64; 3]) -> f64) -> PointHierarchy {
     let shape = form.clone().sample(sampling);
     let near: Vec<_> = shape.points.into_iter().filter(|&p| other(p) < 14.0 * sampling.spacing).collect();
@@ -35,7 +35,7 @@ pub(crate) fn draw(a: &Placed<'_>, b: &Placed<'_>, options: CurveOptions) -> Cur
     found
 }
 
-/// Distance from `x` to the segment from `p` to `q`.
+/// The distance from `x` to the segment from `p` to `q`.
 pub(crate) fn to_segment(x: [f64; 3], p: [f64; 3], q: [f64; 3]) -> f64 {
     let [x, p, q] = [x, p, q].map(Vector3::from);
     let d = q - p;
@@ -43,14 +43,14 @@ pub(crate) fn to_segment(x: [f64; 3], p: [f64; 3], q: [f64; 3]) -> f64 {
     (x - p - d * share).norm()
 }
 
-/// Distance from `x` to what was found.
+/// The distance from `x` to the computed curves.
 pub(crate) fn to_found(x: [f64; 3], found: &Curves) -> f64 {
     let at = |i: usize| found.points[i];
     let edges = found.curves.iter().flat_map(|c| c.edges().chain([[c.first; 2]]));
     edges.map(|[i, j]| to_segment(x, at(i), at(j))).fold(f64::INFINITY, f64::min)
 }
 
-/// The place of the true curves that is nearest to `x`, and how far it is.
+/// The point of the true curves nearest to `x`, and its distance.
 pub(crate) fn nearest_true(x: [f64; 3], cut: &Cut) -> ([f64; 3], f64) {
     let all = cut.curves.iter().flat_map(|curve| {
         let n = curve.points.len();
@@ -61,9 +61,9 @@ pub(crate) fn nearest_true(x: [f64; 3], cut: &Cut) -> ([f64; 3], f64) {
     all.map(off).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
 }
 
-/// The greatest of how far found places are from true ones and the other way round, in the lesser sampling
-/// radius, after the bias of the surfaces there is taken off; h is no more than the sampling radius. `world`
-/// is the pose of a.
+/// The greatest distances of computed points from true curves and of true points from computed
+/// curves, in the lesser sampling radius, minus the bias of the surfaces there; h is at most the
+/// sampling radius. `world` is the pose of a.
 pub(crate) fn hausdorff(found: &Curves, cut: &Cut, world: &Pose, radii: [f64; 2]) -> [f64; 2] {
     let r = radii[0].min(radii[1]);
     let h = radii[0].max(radii[1]);
@@ -81,12 +81,12 @@ pub(crate) fn hausdorff(found: &Curves, cut: &Cut, world: &Pose, radii: [f64; 2]
     [made_up, missing.fold(f64::NEG_INFINITY, f64::max)]
 }
 
-/// A spacing at which H·r ≤ 0.02: a sampling radius is at most some 1.6 spacings.
+/// A spacing with H·r ≤ 0.02, as a sampling radius is at most about 1.6 spacings.
 pub(crate) fn fine(cut: &Cut) -> f64 {
     0.02 / 1.6 / cut.curvature()
 }
 
-/// Asserts that what was found of `cut` is all of it and no more, but for `allowed` sampling radii.
+/// Asserts that the computed curves are those of `cut`, within `allowed` sampling radii.
 pub(crate) fn assert_whole(found: &Curves, cut: &Cut, world: &Pose, radii: [f64; 2], allowed: f64) {
     let [made_up, missing] = hausdorff(found, cut, world, radii);
     let name = cut.name;

@@ -1,4 +1,4 @@
-//! Distances against brute force and against what is known of spheres and planes.
+//! Distances against brute force and against known values for spheres and planes.
 use std::time::Duration;
 
 use nearmiss_geometry::{PointCloud, Pose};
@@ -39,7 +39,7 @@ fn points_are_as_far_apart_as_brute_force_says() {
     for (n, kind) in (0_u64..).zip(CloudKind::ALL.iter().cycle().take(42)) {
         let leaf_size = [16, 4, 64][(n % 3) as usize];
         let a = prepared(&arbitrary::cloud(*kind, 250, n), leaf_size);
-        // Other densities, other depths.
+        // Other densities and tree depths.
         let b = prepared(&arbitrary::cloud(*kind, [200, 40, 700][(n / 3 % 3) as usize], n + 100), 16);
         let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
         let plan = plan(Semantics::Thickened(0.0), &a, &b);
@@ -74,7 +74,7 @@ fn coincident_and_single_points_have_distances() {
     assert_eq!(found.upper.to_bits(), 0.0_f64.to_bits(), "the very same points: {found:?}");
     assert_eq!(found.sources[0], found.sources[1]);
 
-    // The corners of a cube so small that it is as good as one point.
+    // The corners of a cube so small that it acts as a single point.
     let corner = |i: u32| [0, 1, 2].map(|k| f64::from(i >> k & 1) * 1e-6);
     let dot = prepared(&(0..8).map(corner).collect::<Vec<_>>(), 16);
     let exact = plan(Semantics::Thickened(0.25), &scan, &dot);
@@ -88,7 +88,7 @@ fn coincident_and_single_points_have_distances() {
     assert_eq!((found.lower.to_bits(), found.upper.to_bits()), (0, 0), "balls that overlap: {found:?}");
 }
 
-/// A sphere of radius 1 along a spiral.
+/// A sphere of radius 1, sampled along a spiral.
 fn sphere(count: u32) -> Vec<[f64; 3]> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let place = |i: u32| {
@@ -99,7 +99,7 @@ fn sphere(count: u32) -> Vec<[f64; 3]> {
     (0..count).map(place).collect()
 }
 
-/// How far the surface of such a sphere lies inside it: h²H/2, as f itself shows.
+/// The depth of the implicit surface below such a sphere, h²H/2, measured with f.
 fn bias(scan: &PointHierarchy) -> f64 {
     let at = scan.evaluate([0.6, 0.0, 0.8]);
     let radius = at.centroid.iter().zip(at.normal).map(|(a, n)| a * n).sum::<f64>().abs();
@@ -125,7 +125,7 @@ fn spheres_are_as_far_apart_as_they_are() {
             let found = Pair::new(va, vb).distance(&plan, &mut scratch);
             assert!(found.complete && found.evidence == Evidence::Certified, "{gap}: {found:?}");
             assert!(found.lower <= truth + 1e-6 * gap, "{gap}: {found:?}");
-            // Both feet approach each other to a thousandth of r or so; the surface is round to a hundredth.
+            // The feet approach each other to about r/1000; the surface is round to r/100.
             assert!((found.upper - truth).abs() < 0.03 * r + 1e-6 * gap, "{gap}: {found:?} for {truth}");
             assert!((apart(found.points) - found.upper).abs() <= 1e-9 * gap.max(1.0), "{found:?}");
             widest = widest.max(found.upper - found.lower);
@@ -163,7 +163,7 @@ fn whenever_a_budget_ends_it_the_distance_is_between_the_bounds() {
                 assert!(found.lower <= truth * (1.0 + 1e-12), "{what} for {truth}");
                 let off = if semantics == Semantics::Surface { 0.01 * a.sampling_radius() } else { 0.0 };
                 assert!(found.upper >= truth * (1.0 - 1e-12) - off, "{what} for {truth}");
-                // A step costs sixteen at most, a projection twelve evaluations.
+                // A step costs at most sixteen units, a projection twelve evaluations.
                 let spent = found.statistics.node_pairs + found.statistics.evaluations;
                 assert!(spent <= work + 16 + 24, "{what}");
                 if let Some(last) = last {
@@ -199,7 +199,7 @@ fn what_touches_is_at_distance_zero() {
             assert!(off.abs() < 0.01, "a place on both: {found:?}");
         }
     }
-    // One within the other does not touch it.
+    // A sphere inside another one does not touch it.
     let within = Pose::IDENTITY.with_scale(0.2);
     let (va, vb) = (Placed::new(&scan, &Pose::IDENTITY), Placed::new(&scan, &within));
     let found = Pair::new(va, vb).distance(&plan, &mut Scratch::default());

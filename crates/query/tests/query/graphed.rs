@@ -5,14 +5,14 @@ use nearmiss_graph::{GraphOptions, Samples, Sides, SurfaceGraph};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::Placed;
 
-/// A tree over points, its normals turned to one side, and their graph.
+/// A hierarchy over points with normals turned to one side, and the graph of the points.
 pub(crate) struct Scan {
     pub(crate) tree: PointHierarchy,
     pub(crate) graph: SurfaceGraph,
 }
 
 impl Scan {
-    /// Perhaps with normals of its own.
+    /// Builds a scan, with its `own` normals if given.
     pub(crate) fn build(points: &[[f64; 3]], own: Option<&[[f32; 3]]>, options: &BuildOptions) -> Self {
         let cloud = PointCloud::from_positions(points).unwrap();
         let mut tree = PointHierarchy::build(&cloud, options).unwrap();

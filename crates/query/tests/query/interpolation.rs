@@ -1,4 +1,4 @@
-//! Interpolation search: its verdicts, against the truth and the traversal's.
+//! Interpolation search: its verdicts against the truth and against the traversal's.
 use crate::graphed::Scan;
 use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::BuildOptions;
@@ -18,7 +18,7 @@ fn with_normals(points: &[[f64; 3]], own: &[[f32; 3]]) -> Scan {
     Scan::build(points, Some(own), &BuildOptions::default())
 }
 
-/// Random samples of a form with noise of this share of their spacing.
+/// Random samples of a form, with noise of this share of their spacing.
 fn scan_of(form: Form, spacing: f64, noise: f64) -> Scan {
     scan(&form.sample(Sampling { spacing, noise, order: Order::Random, seed: 3 }).points)
 }
@@ -60,7 +60,7 @@ fn no_verdict_is_wrong_outside_the_band() {
                     assert!(is_open || verdict.is_separated() != pair.truth, "{}: {verdict:?}", case());
                     assert_eq!(verdict.is_separated(), expected.is_separated(), "{}", case());
                 }
-                // Without hierarchy small contacts may be missed, but none is made up.
+                // Without hierarchy small contacts may be missed, but none may be invented.
                 for (missed, brackets) in missed.iter_mut().zip([Brackets::Drawn, Brackets::Annulus]) {
                     let drawn = options(flat().with_brackets(brackets)).with_detail(Detail::Verdict);
                     let verdict = ask(&a, &b, &drawn, &mut scratch).verdict;
@@ -71,11 +71,11 @@ fn no_verdict_is_wrong_outside_the_band() {
         }
     }
     assert!(judged > 6000 && meeting > 2500, "{judged} questions, {meeting} of what meets");
-    // Of 2,562 none.
+    // Measured: 0 missed of 2,562.
     assert!(missed.iter().all(|&missed| missed <= meeting / 1000), "{missed:?} of {meeting} missed");
 }
 
-/// No edge of a has ends on different sides of what passes between its points.
+/// No edge of a has ends on different sides of an object that passes between its points.
 #[test]
 fn parts_thinner_than_the_edges_of_a_are_found() {
     let coarse = scan_of(patch(4.0, 4.0), 0.2, 0.0);
@@ -113,7 +113,7 @@ fn all_contacts_lie_on_both_spheres_however_they_are_refined() {
         (Refinement::Newton, 0.5),
         (Refinement::Sphere(0.1), 0.2),
         (Refinement::Grid(0.1), 0.2),
-        // Finer than the number of places allows: the whole sphere is looked through all the same.
+        // Finer than the limit of points allows; the whole sphere is still covered.
         (Refinement::Grid(0.02), 0.2),
     ];
     for (refinement, within) in refinements {
@@ -132,7 +132,7 @@ fn all_contacts_lie_on_both_spheres_however_they_are_refined() {
             let worst = found.iter().map(|contact| off(contact.point)).fold(0.0, f64::max);
             assert!(worst <= within * r, "{} r off, {search:?}", worst / r);
             if refinement == Refinement::Newton {
-                // The answer's own is refined.
+                // The contact of the answer is refined.
                 let Verdict::Intersecting { contact, evidence } = answer.verdict else {
                     panic!("{answer:?}")
                 };
@@ -149,7 +149,8 @@ fn all_contacts_lie_on_both_spheres_however_they_are_refined() {
     }
 }
 
-/// S1 Fig. 5: nearly all points on one side of b are beyond a slit, which virtual edges alone bridge.
+/// As in Klein & Zachmann 2005, Fig. 5, nearly all points on one side of b are beyond a slit that
+/// only virtual edges bridge.
 #[test]
 fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
     let sampling = Sampling { spacing: 1.0, noise: 0.1, order: Order::Random, seed: 5 };
@@ -157,8 +158,9 @@ fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
     points.retain(|p| p[0].abs() > 1.5);
     let slit = scan(&points);
     assert_eq!(slit.graph.counts().components, 2, "no edge leads across");
-    // Where a point stands out, a blade upright along the slit cuts it off: no other of this half is beyond,
-    // and it is seldom drawn. Roofs above and below, which meet nothing, have the other half searched too.
+    // An upright blade along the slit cuts off a point that protrudes: no other point of this half
+    // is beyond the blade, and that one is seldom drawn. Roofs above and below, which meet nothing,
+    // extend the search to the other half.
     let outermost = |p: &&[f64; 3]| {
         let is_beyond = |q: &[f64; 3]| q[0] < 0.0 && q[0] > p[0] && (q[1] - p[1]).abs() < 4.5;
         p[0] < 0.0 && p[1].abs() < 25.0 && !points.iter().any(is_beyond)
@@ -184,11 +186,11 @@ fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
             }
         }
     }
-    // 114 of 200; without virtual edges 56.
+    // Measured: 114 of 200; without virtual edges 56.
     assert!(asked >= 200 && found * 5 > asked * 2, "{found} of {asked}");
 }
 
-/// Normals turned at random, none that is sure, and graphs of one scan or none.
+/// Normals turned at random without confidence, and graphs of one scan or none.
 #[test]
 fn where_sides_are_unknown_discs_tell() {
     let form = || sphere(1.0).sample(Sampling::clean(0.06)).points;
@@ -247,7 +249,7 @@ fn what_cannot_be_searched_is_refused() {
     assert_eq!(refused(plain, 0.1), PlanError::SamplingAlone);
     let thick = options(plain).with_semantics(Semantics::Thickened(0.1));
     assert_eq!(CollidePlan::new(&thick, &scan.tree, &scan.tree).unwrap_err(), PlanError::SamplingAlone);
-    // The ends of the ranges are in them, and find what meets.
+    // The ends of the ranges are valid and find contacts.
     let pose = Pose::from_translation([1.0, 0.0, 0.0]);
     let ends = [
         plain.with_surfels(Surfels::Count(1)).with_probability(1e-300),
@@ -352,7 +354,7 @@ fn budgets_end_searches() {
     assert!(ended > 30 && found > 8, "{ended} ended, {found} found");
 }
 
-/// Nothing is proven without volumes, and with them as much as ever.
+/// Nothing is proven without volumes; with them certificates are as usual.
 #[test]
 fn certificates_are_those_of_volumes() {
     let ball = scan_of(sphere(1.0), 0.05, 0.0);

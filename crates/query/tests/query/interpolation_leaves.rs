@@ -1,4 +1,4 @@
-//! Interpolation search as leaf test, against all edges of a and f of b by its sums.
+//! Interpolation search as a leaf test, against all edges of a and f of b by direct sums.
 use std::collections::BTreeSet;
 
 use crate::graphed::Scan;
@@ -12,7 +12,7 @@ use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::oracle::{self, SurfaceTwin};
 use nearmiss_testdata::shapes::{Form, Order, Sampling, cuboid, sphere, torus};
 
-/// Random samples in small leaves, of which few edges cross.
+/// Random samples in small leaves, so that few edges cross.
 fn scan(form: Form, spacing: f64, noise: f64) -> Scan {
     let sampling = Sampling { spacing, noise, order: Order::Random, seed: 3 };
     Scan::build(&form.sample(sampling).points, None, &BuildOptions::default().with_leaf_size(4))
@@ -44,8 +44,8 @@ impl<'a> Twin<'a> {
         (0..self.view.scan().len()).min_by(|i, j| away(i).total_cmp(&away(j))).unwrap()
     }
 
-    /// The distance of `x` from the surface, positive on the side that the normal of the nearest point is on
-    /// (S1 §3.2), if f means something.
+    /// The distance of `x` from the surface, positive on the side to which the normal of the
+    /// nearest point points (Klein & Zachmann 2005, §3.2). `None` where f is undefined.
     fn side(&self, x: Vector3<f64>) -> Option<f64> {
         let placed = self.view.placed();
         let at = self.surface.evaluate(placed.apply_inverse(x.into()))?;
@@ -65,7 +65,7 @@ fn leaves(view: &Placed<'_>) -> Vec<usize> {
     of
 }
 
-/// Checks one pair: how many edges cross, and how many contacts were on edges.
+/// Checks one pair. Returns the number of edges that cross and of contacts on edges.
 fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
     let (a, b) = (scans[0].at(&Pose::IDENTITY), scans[1].at(pose));
     let twin = Twin::new(b);
@@ -82,7 +82,8 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
     let (mut all, mut scratch) = (Contacts::default(), Scratch::default());
     let answer = Pair::new(a, b).contacts(&mut all).collide(&plan, &mut scratch);
 
-    // Contacts on an edge, which discs do not give, lie where f of b vanishes, near points of both.
+    // Contacts on an edge, which do not come from discs, are at zeros of b's f, near points of both
+    // scans.
     let leaf = leaves(&a);
     let mut tested = BTreeSet::new();
     let mut on_edges = 0;
@@ -97,13 +98,13 @@ fn check(scans: [&Scan; 2], pose: &Pose) -> [usize; 2] {
         on_edges += 1;
         tested.extend(edge.map(|i| leaf[i]));
         let j = twin.nearest(x);
-        // Where f means nothing, the nearest point is as near.
+        // Where f is undefined, the nearest point must be as near.
         let f = twin.side(x).unwrap_or_else(|| (Vector3::from(b.point(j)) - x).norm());
         assert!(f.abs() <= 0.25 * radius(j) * (1.0 + 1e-3), "f is {f} at {contact:?}, r {}", radius(j));
         let away = points.iter().map(|p| (p - x).norm()).fold(f64::INFINITY, f64::min);
         assert!(away <= 0.9 * a.scan().sampling_radius().max(radius(j)) * 1.3, "{away} from a: {contact:?}");
     }
-    // Where an edge surely crosses, the leaf of either of its ends has one that was found.
+    // Where an edge certainly crosses, a crossing was found in the leaf of one of its ends.
     let mut crossing = 0;
     for [i, j] in edges {
         let (Some(p), Some(q)) = (sides[i], sides[j]) else { continue };
@@ -142,7 +143,7 @@ fn edges_that_cross_are_those_of_brute_force() {
             }
         }
     }
-    // Where they graze each other, single edges cross.
+    // Where the surfaces graze each other, single edges cross.
     for round in 0..60 {
         let away = 1.8 + 0.003 * f64::from(round);
         let axis = arbitrary::unit_vector(&mut rng).map(|x| away * x);

@@ -1,4 +1,4 @@
-//! Queries: everything is one program, which links once.
+//! Tests of queries. All of them are one program, which is linked once.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 mod all;

@@ -1,4 +1,4 @@
-//! Contacts for a solver: where they are, how deep, which way out, and that nothing deeper was left out.
+//! Contact manifolds: positions, depths, normals, and that no deeper point was missed.
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, PointId, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy, PointKind};
@@ -45,7 +45,7 @@ fn a_ball_in_a_floor_is_as_deep_as_it_is() {
         let (verdict, places) = asked([&ball, &floor], poses, &CollideOptions::default());
         assert!(verdict.is_intersecting(), "{depth}");
         let first = places[0];
-        // A point of the ball is within half a spacing's sagitta of its pole.
+        // A point of the ball is within the sagitta of half a spacing from its pole.
         assert!((first.gap + depth).abs() < 1e-3, "{depth}: {first:?}");
         for place in &places {
             let [x, y, z] = place.point;
@@ -53,7 +53,7 @@ fn a_ball_in_a_floor_is_as_deep_as_it_is() {
             assert!(z.abs() <= depth && x.hypot(y) < (2.0 * depth).sqrt() + 0.05, "{place:?}");
             assert!(place.gap <= 0.0 && place.gap >= first.gap);
         }
-        // The other way round the way out is the other way.
+        // With the scans swapped, the normal is reversed.
         let (_, turned) = asked([&floor, &ball], [poses[1], poses[0]], &CollideOptions::default());
         assert!((turned[0].gap - first.gap).abs() < 1e-6 && turned[0].normal[2] < -0.92, "{turned:?}");
     }
@@ -64,13 +64,13 @@ fn the_places_under_a_box_are_spread() {
     let (brick, floor) = (sampled(cuboid([1.0, 0.6, 0.4]), 0.03), sampled(patch(4.0, 4.0), 0.03));
     let (_, places) = asked([&brick, &floor], [lifted(0.19), Pose::IDENTITY], &CollideOptions::default());
     assert_eq!(places.len(), 8);
-    // Of each corner of the face one is near.
+    // There is a manifold point near each corner of the face.
     for (x, y) in [(0.5, 0.3), (-0.5, 0.3), (0.5, -0.3), (-0.5, -0.3)] {
         let corner = |place: &&ManifoldPoint| (place.point[0] - x).hypot(place.point[1] - y) < 0.25;
         let near = places.iter().find(corner).unwrap_or_else(|| panic!("none at {x} {y}: {places:?}"));
         assert!((-0.0101..0.0).contains(&near.gap), "{near:?}");
     }
-    // By normals next to the edges, which are rounded, a little more.
+    // Slightly more because of the normals next to the edges, which are rounded.
     assert!((places[0].gap + 0.01).abs() < 2e-4, "{places:?}");
     for (i, p) in places.iter().enumerate() {
         for q in &places[..i] {
@@ -82,7 +82,7 @@ fn the_places_under_a_box_are_spread() {
 #[test]
 fn a_solver_that_goes_the_way_out_gets_out() {
     let (ball, room) = (sampled(sphere(0.3), 0.03), sampled(shells(0.9, 1.0), 0.03));
-    // A ball with both sides of a wall of a hollow ball near, from inside.
+    // A ball inside a hollow ball, near both sides of its wall.
     let mut at = Vector3::new(0.35, 0.45, 0.23).normalize() * 0.63;
     let start = at.norm();
     let mut steps = 0;
@@ -109,12 +109,13 @@ fn normals_that_lead_out_tell_the_way() {
     solid.turn_normals(&outwards);
     let ball = sampled(sphere(0.2), 0.02);
     let inside = [Pose::from_translation([0.0, 0.0, 0.82]), Pose::IDENTITY];
-    // Of a shell the middle of the ball tells: it is inside. Of what is solid it is to be driven out.
+    // For a shell, the centre of the ball decides: the ball is inside. From a solid, the ball is
+    // pushed out.
     let (_, places) = asked([&ball, &shell], inside, &CollideOptions::default());
     assert!(places[0].normal[2] < -0.95 && (places[0].gap + 0.02).abs() < 5e-3, "{places:?}");
     let (_, places) = asked([&ball, &solid], inside, &CollideOptions::default());
     assert!(places[0].normal[2] > 0.5 && places[0].gap < -0.02, "{places:?}");
-    // From the ball's side, whose own normals nobody knows.
+    // The same from the side of the ball, which has no oriented normals.
     let (_, places) = asked([&solid, &ball], [inside[1], inside[0]], &CollideOptions::default());
     assert!(places[0].normal[2] < -0.5 && places[0].gap < -0.02, "{places:?}");
 }
@@ -129,7 +130,7 @@ fn within_a_margin_gaps_are_positive() {
     assert!(places.iter().all(|place| place.gap <= 0.1 && place.normal[2] > 0.9), "{places:?}");
 }
 
-/// Every point of either scan with the nearest of the other, from the definition, as (of b, i, j).
+/// For every point of either scan the nearest point of the other by brute force, as (of b, i, j).
 fn neighbours(views: &[Placed<'_>; 2]) -> Vec<(bool, usize, usize)> {
     let points = [0, 1].map(|k: usize| -> Vec<Vector3<f64>> {
         (0..views[k].scan().len()).map(|i| views[k].point(i).into()).collect()

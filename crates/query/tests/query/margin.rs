@@ -1,4 +1,4 @@
-//! Margins: one-sided against brute force on points, right on shapes with known distances.
+//! Margins: one-sided against brute force on points, exact on shapes with known distances.
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{

@@ -1,4 +1,4 @@
-//! Orders, coverings, resolutions and test points: the same verdicts in other ways.
+//! Orders, coverings, resolutions and test points: the same verdicts with other methods.
 use std::time::Duration;
 
 use nearmiss_geometry::{PointCloud, Pose};
@@ -73,7 +73,8 @@ fn orders_and_coverings_change_no_verdict() {
                     let is_proven = |verdict: &Verdict| {
                         matches!(verdict, Verdict::Separated { evidence: Evidence::Certified, .. })
                     };
-                    // Coverings may part leaves whose boxes overlap, which then need not be compared.
+                    // Coverings may separate leaves whose boxes overlap, which then need not be
+                    // compared.
                     assert!(is_proven(&verdict) || !is_proven(&proven), "{cloud:?} {round} {options:?}");
                 }
             }
@@ -131,7 +132,7 @@ fn a_resolution_saves_work_and_errs_towards_contact() {
         before = pairs;
     }
     assert!(before < 60, "{before} at the coarsest");
-    // Nothing is finer than nothing, and all is finer than the whole.
+    // No node is finer than resolution 0; every node is finer than 1e3.
     let pose = Pose::from_translation([0.0, 2.3, 0.0]);
     let fine = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED.with_resolution(0.0));
     let whole = ask(&scan, &scan, &pose, &options, &Budget::UNLIMITED);
@@ -164,7 +165,7 @@ fn test_points_see_what_surfaces_do() {
             }
         }
     }
-    // Without volumes nothing is proven, not even of what is far apart; with them it is.
+    // Without volumes nothing is proven, not even at a large distance; with volumes it is.
     for (flat, away, proven) in [(true, 3.0, false), (false, 3.0, true), (true, 2.1, false)] {
         let sampling = Sampling::default().with_flat(flat);
         let options = base.with_method(Method::Sampling(sampling)).with_evidence(Evidence::Certified);
@@ -189,7 +190,7 @@ fn test_points_see_what_surfaces_do() {
 fn test_points_depend_on_seed_and_leaves_alone() {
     let scan = sphere(2000);
     let r = scan.sampling_radius();
-    // Nothing is found, so every order tests every pair of leaves.
+    // Nothing is found, so every order tests every leaf pair.
     let pose = Pose::from_translation([2.0 + 0.3 * r, 0.0, 0.0]);
     let estimate = |order, seed| {
         let sampling = Sampling::default().with_seed(seed).with_tolerance(0.1);
@@ -221,7 +222,7 @@ fn what_cannot_be_sampled_is_refused() {
 #[test]
 fn ended_searches_by_test_points_are_as_likely_to_hit_as_what_they_leave_open() {
     let scan = sphere(3000);
-    // Deep in each other, but no test point is near enough to both.
+    // The scans overlap deeply, but no test point is near enough to both.
     let pose = Pose::from_translation([1.0, 0.1, 0.0]);
     for flat in [false, true] {
         let sampling = Sampling::default().with_flat(flat).with_tolerance(1e-9);
@@ -273,7 +274,7 @@ fn closer_looks_do_not_use_up_what_damaged_files_are_allowed() {
     let build = BuildOptions::default().with_leaf_size(4).with_samples(32);
     let scan = PointHierarchy::build(&cloud, &build).unwrap();
     let margin = scan.sampling_radius();
-    // Parallel to itself, just out of reach: thousands of pairs of nodes, and not one that meets.
+    // Parallel to itself, just out of reach: thousands of node pairs and no contact.
     let height = 1.02 * margin / f64::sqrt(0.09 + 0.49 + 1.0);
     let pose = Pose::from_translation([0.3, -0.7, -1.0].map(|x| x * height));
     let options = CollideOptions::default().with_margin(margin);
@@ -314,7 +315,7 @@ fn no_resolution_misses_what_meets() {
     assert!(met > 300 && erred > 20, "{met} meet, {erred} seem to");
 }
 
-/// The likelihood after one unit of work: of two boxes alone.
+/// The likelihood after one unit of work, from the two root boxes alone.
 fn first_guess(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose) -> f64 {
     let budget = Budget::UNLIMITED.with_work(1);
     let answer = ask(a, b, pose, &CollideOptions::default().with_detail(Detail::Verdict), &budget);
@@ -322,7 +323,7 @@ fn first_guess(a: &PointHierarchy, b: &PointHierarchy, pose: &Pose) -> f64 {
     likelihood
 }
 
-/// Squares of 2 × 2 at these heights, in points a tenth apart.
+/// Squares of 2 × 2 at these heights, with points 0.1 apart.
 fn shelves(heights: &[f64]) -> Vec<[f64; 3]> {
     let along = |i: i32| 0.1 * f64::from(i);
     let square = |z: f64| {

@@ -23,7 +23,7 @@ struct Told {
     proof: Proof,
 }
 
-/// Asks with the outputs that have a bit in `which`, in dirty memory: manifold, contacts, proof.
+/// Asks for the outputs that have a bit in `which`, in reused memory: manifold, contacts, proof.
 fn ask(
     pair: &Pair<'_>,
     plan: &CollidePlan,
@@ -47,7 +47,8 @@ fn ask(
     question.collide(plan, scratch)
 }
 
-/// Whether the pairs of a proof cover each pair of points once, by the counts of points alone.
+/// Returns `true` if the pairs of a proof cover each pair of points once, by the counts of points
+/// alone.
 fn covers(proof: &Proof, [a, b]: [&PointHierarchy; 2]) -> bool {
     let points = |pair: &NodePair| a.topology().points(pair.a).len() * b.topology().points(pair.b).len();
     let distinct: BTreeSet<_> = proof.pairs.iter().map(|(pair, _)| (pair.a, pair.b)).collect();
@@ -76,7 +77,7 @@ fn outputs_are_the_same_in_every_combination() {
             let start = Vector3::from(arbitrary::unit_vector(rng)) * (2.2 * size);
             let way = Vector3::from(arbitrary::unit_vector(rng)) * (0.3 * size) - start;
             for step in 0..60 {
-                // In, and for the last steps still.
+                // Move in, then stay for the last steps.
                 let share = f64::from(step).min(50.0) / 50.0;
                 let pose = Pose::from_axis_angle([1.0, 2.0, 3.0], 0.2 * share)
                     .with_translation((start + way * share).into());
@@ -103,7 +104,7 @@ fn outputs_are_the_same_in_every_combination() {
                     if which & 4 != 0 {
                         assert_eq!(dirty.proof, proof.proof, "{what}");
                     }
-                    // With a hint of its own.
+                    // Each combination has its own hint.
                     let hint = &mut hints[which as usize];
                     let hinted = ask(&pair, &plan, which, Some(hint), (&mut dirty, &mut scratch));
                     let what = format!("{what}, hinted");

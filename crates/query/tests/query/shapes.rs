@@ -1,4 +1,4 @@
-//! Shapes against brute force: every point, by formulas of its own.
+//! Shapes against brute force over all points, with independent formulas.
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{Placed, Shape, ShapeIndex};
@@ -14,7 +14,7 @@ fn between(p: [f64; 3], q: [f64; 3]) -> f64 {
     (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// How far a place of the world is from a shape.
+/// The distance of a world point from a shape.
 fn gap(shape: &Shape, p: [f64; 3]) -> f64 {
     match *shape {
         Shape::Sphere { centre, radius } => between(p, centre) - radius,
@@ -55,7 +55,7 @@ fn shapes_touch_what_brute_force_says_and_the_nearest_point_is_nearest() {
         let (index, view) = (ShapeIndex::new(&scan), Placed::new(&scan, &pose));
         let placed = view.with_shapes(&index);
         for round in 0..60_usize {
-            // About a point, or anywhere near.
+            // Near a point, or anywhere near the scan.
             let about = view.point(rng.random_range(0..scan.len()));
             let reach = size * scale * [1.2, 0.02, 1e-4][round % 3];
             let d = point_in(&mut rng, reach);
@@ -77,7 +77,8 @@ fn shapes_touch_what_brute_force_says_and_the_nearest_point_is_nearest() {
             };
             let gaps: Vec<f64> = (0..scan.len()).map(|i| gap(&shape, view.point(i))).collect();
             let least = gaps.iter().copied().fold(f64::INFINITY, f64::min);
-            // What the world's double precision, and the search for the foot on a segment, can tell.
+            // The rounding error of world coordinates in double precision, and of the search for
+            // the foot on a segment.
             let lost = 1e-7 * radius + 1e-13 * (size * scale + between(centre, [0.0; 3]));
             let what = format!("{kind:?} {n}, {shape:?}: {least}");
             let touches = placed.touches(&shape);

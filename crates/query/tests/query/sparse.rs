@@ -1,4 +1,5 @@
-//! Points on lines and lone ones: a near miss of them is open, and no more than that.
+//! Isolated points and points on lines: a near miss of them leaves the query undecided, and nothing
+//! else does.
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
@@ -15,7 +16,7 @@ fn ask(a: &Placed<'_>, b: &Placed<'_>) -> Verdict {
     Pair::new(*a, *b).collide(&plan, &mut Scratch::default()).verdict
 }
 
-/// A patch with a wire over it and a lone point above that.
+/// A patch with a wire above it and an isolated point above that.
 fn scene(seed: u64) -> Vec<[f64; 3]> {
     let mut rng = arbitrary::rng(seed);
     let patch = (0..900).map(|_| arbitrary::point_in(&mut rng, 1.0)).map(|[x, y, _]| [x, y, 0.0]);
@@ -25,8 +26,8 @@ fn scene(seed: u64) -> Vec<[f64; 3]> {
     points
 }
 
-/// Places where a point with a ball comes near: the least of distance over reach, of balls and of the points'
-/// discs.
+/// The least ratio of distance to reach between points with balls and the discs or points of the
+/// other scan.
 fn nearest_ball(a: &Placed<'_>, b: &Placed<'_>) -> f64 {
     let all = |view: &Placed<'_>| -> Vec<(oracle::Disc, f64)> {
         let (scan, scale) = (view.scan(), view.placed().scale());

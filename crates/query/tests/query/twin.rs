@@ -30,8 +30,8 @@ const SHAPES: [CloudKind; 8] = [
     CloudKind::Huge,
 ];
 
-/// The greatest slack of any two trusted discs in the world, in shares of their radii, and whether any
-/// doubtful ones cross.
+/// The greatest overlap of any two reliable discs in the world, as a share of their radii, and
+/// whether any unreliable ones cross.
 fn best_crossing(a: &Placed<'_>, b: &Placed<'_>) -> (f64, bool) {
     let discs = |view: &Placed<'_>| -> Vec<(oracle::Disc, bool, f64)> {
         let scan = view.scan();
@@ -124,7 +124,7 @@ fn surfaces_meet_where_some_discs_cross() {
             let surfaces = CollideOptions::default().with_semantics(Semantics::Surface);
             let options = surfaces.with_detail(Detail::Verdict);
             let verdict = ask(&va, &vb, options, &Budget::UNLIMITED).verdict;
-            // Rounding, and the thickness of nearly parallel discs, decide in between.
+            // In between, rounding and the thickness of nearly parallel discs decide.
             if slack > 1e-3 {
                 assert!(verdict.is_intersecting(), "{kind:?} {n}: slack {slack}, but {verdict:?}");
                 hits += 1;
@@ -217,7 +217,7 @@ fn a_work_budget_is_kept_and_reproducible() {
     let size = sphere.bounds().half_extents()[0];
     let pose = Pose::from_translation([1.9 * size, 0.2 * size, 0.1 * size]);
     let (a, b) = (Placed::new(&sphere, &Pose::IDENTITY), Placed::new(&sphere, &pose));
-    // In one order, for another may meet another contact first.
+    // A fixed order, as another one may find another contact first.
     let options = CollideOptions::default().with_order(Order::DepthFirst);
     let unlimited = ask(&a, &b, options, &Budget::UNLIMITED);
     for work in [0, 1, 10, 50, 1_000_000] {
@@ -252,7 +252,7 @@ fn lattice(half: i32, spacing: f64) -> Vec<[f64; 3]> {
 fn grazing_sheets_touch_flat_or_not() {
     let flat = prepared(&lattice(25, 1.0));
     let verdict = CollideOptions::default().with_detail(Detail::Verdict);
-    // Discs have a radius of some 0.65 · 1.41, and a twentieth of that is how near sheets touch.
+    // Discs have a radius of about 0.65 · 1.41. Sheets touch within a twentieth of that.
     for (lift, touches) in [(0.0, true), (0.02, true), (0.04, true), (0.06, false), (0.5, false)] {
         let pose = Pose::from_translation([0.3, 0.2, lift]);
         let (a, b) = (Placed::new(&flat, &Pose::IDENTITY), Placed::new(&flat, &pose));
@@ -309,7 +309,7 @@ fn a_pose_that_is_none_is_undecided() {
     }
 }
 
-/// A mirror, as only a file can hold it.
+/// A mirror, which only deserialising can produce.
 fn mirrored() -> Pose {
     let mut pose = serde_json::to_value(Pose::IDENTITY).unwrap();
     pose["rotation"][0] = (-1.0).into();
@@ -337,7 +337,7 @@ fn signs_of_normals_change_no_answer() {
     for (n, kind) in (0_u64..).zip(SHAPES.iter().cycle().take(16)) {
         let points = arbitrary::cloud(*kind, 600, n);
         let plain = prepared(&points);
-        // Some of all to either side, as where nothing tells inside from outside.
+        // Some normals are turned to either side, as when nothing tells inside from outside.
         let mut turned = prepared(&points);
         let either: Vec<[f32; 3]> = turned
             .normals()

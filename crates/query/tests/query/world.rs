@@ -17,7 +17,8 @@ fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
     PointHierarchy::build(&cloud, &BuildOptions::default().with_leaf_size(8)).unwrap()
 }
 
-/// A sphere, noise, rings and a plate about the origin, and a sphere a million of its radii away from it.
+/// A sphere, noise, rings and a plate about the origin, and a sphere a million of its radii away
+/// from it.
 static SCANS: LazyLock<[PointHierarchy; 5]> = LazyLock::new(|| {
     let cloud = |kind| arbitrary::cloud(kind, 200, 1);
     let far: Vec<_> = cloud(CloudKind::Sphere).iter().map(|[x, y, z]| [x + 1e6, y - 2e6, z + 3e6]).collect();
@@ -40,11 +41,11 @@ fn options() -> [CollideOptions; 4] {
     ]
 }
 
-/// The bodies that a world ought to hold, in the order of their ids.
+/// The bodies that a world should hold, in the order of their ids.
 type Bodied = Vec<(BodyId, usize, Pose)>;
 
-/// A proper pose: b about a place in a cube, whatever the scan's own origin, a third of them far from the
-/// world's.
+/// A valid pose that places the scan in a cube, whatever the scan's own origin; one in three is far
+/// from the world's origin.
 fn proper_pose(scan: usize, seed: u64) -> Pose {
     let rng = &mut arbitrary::rng(seed);
     let scale = [1.0, 0.3, 4.0, 1e3][usize::try_from(seed % 4).unwrap()];
@@ -56,7 +57,7 @@ fn proper_pose(scan: usize, seed: u64) -> Pose {
     turn.with_translation((place - centre).into())
 }
 
-/// Poses that are none, and such as lead to the ends of the world.
+/// Invalid poses, and poses at the limits of the number range.
 fn hostile_pose(seed: u64) -> Pose {
     let nan = f64::NAN;
     let poses = [
@@ -104,7 +105,8 @@ fn asked(
     near(world, bodies, plan).into_iter().map(answer).collect()
 }
 
-/// Holds what a world tells against the loop over all pairs. Returns how many pairs there are, and are near.
+/// Compares the results of a world with the loop over all pairs. Returns the numbers of pairs and
+/// of near pairs.
 fn check(world: &World<&'static PointHierarchy>, placed: &Bodied, plan: &CollidePlan) -> [usize; 2] {
     let told = asked(world, Bodies::All, plan);
     assert!(told.is_sorted_by_key(|(pair, _)| *pair), "by ids");
@@ -128,7 +130,7 @@ fn check(world: &World<&'static PointHierarchy>, placed: &Bodied, plan: &Collide
     }
     assert!(remaining.next().is_none(), "each pair once, of bodies that are there");
 
-    // What is asked of some is what all say of them.
+    // The pairs of some bodies are those of all pairs that contain one of them.
     let some: Vec<BodyId> = placed.iter().step_by(3).map(|(id, ..)| *id).collect();
     let of_some = near(world, Bodies::These(&some), plan);
     let all = near(world, Bodies::All, plan);
@@ -162,7 +164,7 @@ fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
-/// A pose of this scan: one in eight is hostile.
+/// A pose of this scan; one in eight is hostile.
 fn pose(scan: usize, seed: u64) -> Pose {
     if seed.is_multiple_of(8) { hostile_pose(seed / 8) } else { proper_pose(scan, seed) }
 }
@@ -207,7 +209,7 @@ proptest! {
     }
 }
 
-/// A world of so many bodies in proper poses.
+/// A world of `count` bodies at valid poses.
 fn crowd(count: u64) -> (World<&'static PointHierarchy>, Bodied) {
     let mut world = World::new();
     let mut placed = Vec::new();
@@ -230,7 +232,7 @@ fn a_crowd_equals_the_loop_and_much_is_left_out() {
     }
 }
 
-/// The box of the world about the corners of a scan's enclosure, from the formulas alone.
+/// The world-space box of the corners of a scan's enclosure, by the formulas alone.
 fn naive_bounds((_, scan, pose): &(BodyId, usize, Pose)) -> [[f64; 3]; 2] {
     let scan = &SCANS[*scan];
     let root = scan.enclosures().next().unwrap();

@@ -1,4 +1,5 @@
-//! Numbers that no scan has: every function ends, and calls nothing a surface that is not a number.
+//! Values that no scan contains, such as NaN, infinities and extremes. Every function must
+//! terminate, and must not accept a NaN as a surface point.
 
 use nearmiss_surface::{
     Bandwidth, Evaluation, Kernel, Level, Moments, Status, SurfaceOptions, SurfacePlan, meet, project,
@@ -20,7 +21,7 @@ const ABSURD: [f32; 12] = [
     -1.0,
 ];
 
-/// A sheet of points, of which some coordinates and radii are absurd, and f about it.
+/// A sheet of points, some with absurd coordinates or radii, and its implicit function.
 struct Sheet {
     points: Vec<([f32; 3], f32)>,
     plan: SurfacePlan,

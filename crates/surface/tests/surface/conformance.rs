@@ -1,10 +1,10 @@
-//! What every kernel must do: one suite, run for each.
+//! Conformance tests, run for each kernel.
 use nearmiss_surface::{
     Evaluation, Kernel, Level, Moments, Status, SurfaceOptions, SurfacePlan, meet, project,
 };
 use nearmiss_testdata::arbitrary;
 
-/// Points with one radius for all: a brute-force gather is enough here.
+/// Points with one radius for all; a brute-force search is fast enough here.
 struct Sheet {
     points: Vec<[f32; 3]>,
     radius: f32,
@@ -17,14 +17,15 @@ impl Sheet {
         Self { points, radius, plan: SurfacePlan::new(&options, f64::from(radius), 1.0).unwrap() }
     }
 
-    /// z = height over a square lattice of unit spacing from −15 to 15, left of x = `end`.
+    /// The plane z = `height` over a square lattice of unit spacing from −15 to 15, for x ≤ `end`.
     fn plane(height: f32, end: f32, kernel: Kernel) -> Self {
         let side = |i: u8| f32::from(i) - 15.0;
         let lattice = (0..31).flat_map(|i| (0..31).map(move |j| [side(i), side(j), height]));
         Self::new(lattice.filter(|p| p[0] <= end).collect(), 2.0_f32.sqrt(), kernel)
     }
 
-    /// Evenly spread points on a sphere about the origin, some 1 apart for 4000 of them at a radius of 18.
+    /// Evenly spread points on a sphere about the origin; 4000 of them at a radius of 18 are about
+    /// 1 apart.
     fn sphere(count: u16, radius: f64, kernel: Kernel) -> Self {
         let points = (0..count).map(|i| {
             let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
@@ -98,7 +99,7 @@ fn between_two_sheets_there_is_no_surface() {
         let middle = plates.at([0.2, 0.3, h]);
         assert!(middle.f.abs() < 1e-3 * h, "{kernel:?}: f vanishes there: {}", middle.f);
         assert_eq!(middle.status, Status::Ambiguous, "{kernel:?}: but the points are no one sheet");
-        // Closer, the normal stands upright again, but two sheets are still no one sheet.
+        // On closer sheets the normal is upright again, but there is still more than one sheet.
         #[expect(clippy::cast_possible_truncation, reason = "positions are single precision")]
         let close = Sheet::plane(0.0, 99.0, kernel).with(Sheet::plane((1.1 * h) as f32, 99.0, kernel));
         let between = close.at([0.2, 0.3, 0.55 * h]);
@@ -127,7 +128,8 @@ fn a_sphere_shrinks_by_its_curvature() {
     });
 }
 
-/// A sheet turned about the y axis by `angle` and lifted by `lift`, evaluated in the common frame.
+/// Evaluates a sheet that is rotated by `angle` about the y axis and lifted by `lift`, in the
+/// common frame.
 fn turned(sheet: &Sheet, angle: f64, lift: f64, x: [f64; 3]) -> Evaluation {
     use nearmiss_geometry::Pose;
     let pose = Pose::from_axis_angle([0.0, 1.0, 0.0], angle).with_translation([0.0, 0.0, lift]);
@@ -167,13 +169,15 @@ fn parallel_planes_meet_only_if_they_coincide() {
 #[test]
 fn newton_takes_few_rounds_on_curved_sheets() {
     each_kernel(|kernel| {
-        // Radius 4 at a spacing of 1: the points about a place spread by a seventh of h across the surface.
+        // Radius 4 at a spacing of 1: the points near a surface point deviate from a plane by a
+        // seventh of h.
         let sphere = Sheet::sphere(200, 4.0, kernel);
         let mut rng = arbitrary::rng(9);
         let (mut rounds, mut verified) = (0, 0);
         for _ in 0..100 {
             let [x, y, z] = arbitrary::unit_vector(&mut rng);
-            // A second sphere, 4 to the side: they meet in a circle in the plane half way.
+            // A second sphere, 4 to the side. The spheres meet in a circle in the plane halfway
+            // between them.
             let length = (y * y + z * z).sqrt().max(0.1);
             let start = [2.0 + 0.1 * x, 3.3 * y / length, 3.3 * z / length];
             let meeting = meet(start, |p| Some([sphere.at(p), sphere.at([p[0] - 4.0, p[1], p[2]])])).unwrap();

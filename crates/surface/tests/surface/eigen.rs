@@ -1,4 +1,4 @@
-//! What every eigen solver must do: one suite of matrices, run for each.
+//! Conformance tests on families of matrices, run for each eigen solver.
 use nearmiss_geometry::nalgebra::Matrix3;
 use nearmiss_surface::{
     Eigen3, EigenBlock, Level, MatrixBlock, cubic_cholesky_eigen, symmetric_eigen, symmetric_eigen_batch,
@@ -18,7 +18,7 @@ fn handedness([x, y, z]: [[f64; 3]; 3]) -> f64 {
     Matrix3::from_columns(&[x.into(), y.into(), z.into()]).determinant()
 }
 
-/// Whether these are eigenpairs of the matrix as [`symmetric_eigen`] promises them.
+/// Checks that `eigen` holds the eigenpairs of `matrix` with the guarantees of [`symmetric_eigen`].
 fn check(matrix: [f64; 6], eigen: &Eigen3) {
     let finite = eigen.values.iter().chain(eigen.vectors.iter().flatten()).all(|x| x.is_finite());
     assert!(finite, "{matrix:?}: {eigen:?}");
@@ -54,7 +54,7 @@ fn closed_form_agrees_with_rotations() {
             for i in 0..3 {
                 let difference = (eigen.values[i] / largest - twin.values[i]).abs();
                 assert!(difference < 4e-15, "{family:?} {matrix:?}: {eigen:?} for {twin:?}");
-                // A vector turns by the error over the gap to the next eigenvalue.
+                // A vector rotates by the error over the distance to the nearest other eigenvalue.
                 let gap = (0..3).filter(|&j| j != i).map(|j| (twin.values[i] - twin.values[j]).abs());
                 let gap = gap.fold(f64::MAX, f64::min);
                 let along: f64 = (0..3).map(|k| eigen.vectors[i][k] * twin.vectors[i][k]).sum();
@@ -159,7 +159,7 @@ proptest! {
     }
 }
 
-/// The worst residual of the least eigenpair by the cubic and Cholesky.
+/// Returns the greatest residual of the least eigenpair by the cubic and Cholesky.
 fn worst_of_cubic(family: Family) -> f64 {
     let mut worst = 0.0_f64;
     for matrix in family.matrices(COUNT, 4) {

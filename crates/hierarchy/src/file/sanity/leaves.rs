@@ -1,4 +1,4 @@
-//! What leaves are compared by: one that is not made of its points sees contacts where there are none.
+//! Validation of the leaf blocks: one that does not match its points gives false contacts.
 
 use bytemuck::bytes_of;
 use nearmiss_lanes::parallel::ranges;
@@ -6,7 +6,7 @@ use nearmiss_lanes::parallel::ranges;
 use crate::scan::build::PointHierarchy;
 use nearmiss_store::Flaw;
 
-/// Checks that the blocks and marks of all leaves are those of their points.
+/// Checks that the blocks and marks of all leaves match their points.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let (topology, parts) = (scan.topology(), scan.leaf_parts());
     let blocks_a_leaf = scan.arrays.leaf_blocks.len() / topology.leaves();

@@ -1,4 +1,4 @@
-//! Hierarchies in which one number lies: each is refused, and by its name.
+//! Hierarchies with one corrupt number: each is rejected, and the error names the number.
 
 use std::sync::OnceLock;
 
@@ -18,8 +18,8 @@ fn honest() -> PointHierarchy {
     PointHierarchy::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap()
 }
 
-/// The flaw that is found after `lie`, by the checks of the structure alone and by those of the contents as
-/// well.
+/// Returns the flaws found after `lie` has corrupted a scan: by the structural checks alone, and by
+/// those of the contents as well.
 fn found(lie: impl FnOnce(&mut PointHierarchy)) -> [Option<String>; 2] {
     let mut scan = honest();
     lie(&mut scan);
@@ -29,13 +29,13 @@ fn found(lie: impl FnOnce(&mut PointHierarchy)) -> [Option<String>; 2] {
     [structure, full].map(|outcome| outcome.err().map(|flaw| flaw.to_string()))
 }
 
-/// A lie that only the contents show.
+/// Expects that only the checks of the contents find the corruption.
 fn deep(words: &str, lie: impl FnOnce(&mut PointHierarchy)) {
-    let message = format!("{words} is wrong; prepare the scan again");
+    let message = format!("{words} is invalid; prepare the scan again");
     assert_eq!(found(lie), [None, Some(message)]);
 }
 
-/// A lie that the structure shows.
+/// Expects that the structural checks find the corruption.
 fn plain(words: &str, lie: impl FnOnce(&mut PointHierarchy)) {
     let message = Some(format!("{words}; prepare the scan again"));
     assert_eq!(found(lie), [message.clone(), message]);
@@ -48,13 +48,13 @@ fn nothing_is_wrong_with_an_honest_one() {
     assert_eq!(found(|_| ()), [None, None]);
 }
 
-/// The siblings that hold the box of node 7, and its lane there.
+/// Returns the siblings that hold the box of node `id`, and its lane there.
 fn place(scan: &PointHierarchy, id: usize) -> (usize, usize) {
     let (parent, lane) = scan.topology().parent(NodeId(id32(id))).unwrap();
     (parent.index(), lane)
 }
 
-/// A box lies.
+/// Corrupts the box of node `id`.
 fn lying(scan: &mut PointHierarchy, id: usize, lie: impl FnOnce(&mut OrientedBox)) {
     let (parent, lane) = place(scan, id);
     let siblings = &mut scan.arrays.siblings.to_mut()[parent];
@@ -73,7 +73,7 @@ fn boxes_that_are_none() {
             wrong(&|bounds| bounds.axes[k][1] = value);
         }
         wrong(&|bounds| bounds.reach = value);
-        plain("the box of the root is wrong", |scan| scan.meta.root.bounds.half[0] = value);
+        plain("the box of the root is invalid", |scan| scan.meta.root.bounds.half[0] = value);
     }
     wrong(&|bounds| bounds.half[2] = -1e-3);
     wrong(&|bounds| bounds.axes[2][0] = 1.01);
@@ -97,13 +97,13 @@ fn boxes_that_leave_their_parents_or_their_points() {
     let topology = *honest().topology();
     for id in 1..topology.len() {
         for k in 0..3 {
-            // Some boxes have room in their parent's: grow until there can be none.
+            // Some boxes have room in their parent's: large enough that none is left.
             deep(&format!("the box of node {id}"), |scan| lying(scan, id, |bounds| bounds.half[k] = 2.0));
             deep(&format!("the box of node {id}"), |scan| lying(scan, id, |bounds| bounds.centre[k] += 4.0));
         }
         deep(&format!("the box of node {id}"), |scan| lying(scan, id, |bounds| bounds.reach *= 2.0));
         if id >= topology.inner() {
-            // Smaller than the discs it is about: one of its points, or more, stick out.
+            // Smaller than the discs in it: one or more of its points extend beyond it.
             let [_, flaw] = found(|scan| lying(scan, id, |bounds| bounds.half[0] *= 0.9));
             assert!(flaw.is_some_and(|words| words.starts_with("the box about point ")), "leaf {id}");
             let [_, flaw] = found(|scan| lying(scan, id, |bounds| bounds.reach *= 0.5));
@@ -135,7 +135,7 @@ fn leaves_that_are_not_their_points() {
     }
 }
 
-/// A position lies.
+/// Corrupts a coordinate of point `i`.
 fn lie_of_position(scan: &mut PointHierarchy, i: usize, k: usize, value: f32) {
     scan.arrays.blocks.to_mut()[i / 16].position[k][i % 16] = value;
     scan.positions = OnceLock::new();
@@ -143,7 +143,7 @@ fn lie_of_position(scan: &mut PointHierarchy, i: usize, k: usize, value: f32) {
 
 #[test]
 fn points_that_no_build_writes() {
-    // The last point of all shares its block with lanes that are filled up.
+    // The last point of all shares its block with padding.
     for i in [0, 7, 8, 150, 300] {
         let named = |words: &str| format!("{words} of point {i}");
         for value in NONE {
@@ -167,7 +167,7 @@ fn points_that_no_build_writes() {
 
 #[test]
 fn blocks_that_are_not_the_points() {
-    // The last block is not full: what stands in its empty lanes counts too.
+    // The last block is not full: the contents of its unused lanes count too.
     for (block, lane) in [(0, 3), (7, 15), (18, 12), (18, 13)] {
         let copy = format!("the copy of the points of block {block}");
         deep(&copy, |scan| scan.arrays.blocks.to_mut()[block].position[1][lane] = 7.0);
@@ -199,7 +199,7 @@ fn lists_that_are_none() {
         let last = at + scan.arrays.lists[4].count as usize - 1;
         scan.arrays.listed.to_mut()[last] = 19;
     });
-    plain("lists has 18 entries where 19 belong", |scan| {
+    plain("expected 19 entries in lists, got 18", |scan| {
         scan.arrays.lists = scan.arrays.lists[1..].to_vec().into();
     });
 }
@@ -248,25 +248,25 @@ fn samples_and_coverings_that_are_none() {
 #[test]
 fn metadata_that_no_build_writes() {
     for value in [f64::NAN, f64::INFINITY, 0.0, -1.0, 1e-320, f64::MAX] {
-        plain("the frame of the stored positions is wrong", |scan| scan.meta.frame.scale = value);
+        plain("the frame of the stored positions is invalid", |scan| scan.meta.frame.scale = value);
     }
     for value in [f64::NAN, f64::INFINITY] {
-        plain("the frame of the stored positions is wrong", |scan| scan.meta.frame.origin[2] = value);
-        plain("the box of bounds is wrong", |scan| scan.meta.bounds.max[0] = value);
-        plain("what rounding cost is wrong", |scan| scan.meta.step = value);
+        plain("the frame of the stored positions is invalid", |scan| scan.meta.frame.origin[2] = value);
+        plain("the box of bounds is invalid", |scan| scan.meta.bounds.max[0] = value);
+        plain("what rounding cost is invalid", |scan| scan.meta.step = value);
     }
-    plain("the box of bounds is wrong", |scan| scan.meta.bounds.min[0] = 7.0);
+    plain("the box of bounds is invalid", |scan| scan.meta.bounds.min[0] = 7.0);
     deep("the box of bounds", |scan| scan.meta.bounds.min[0] -= 1e-9);
     deep("the box of bounds", |scan| scan.meta.frame.origin[1] = 0.5);
     for value in [f32::NAN, f32::INFINITY, 0.0, -1.0, 2e12] {
-        plain("the sampling radius is wrong", |scan| scan.meta.sampling_radius = value);
+        plain("the sampling radius is invalid", |scan| scan.meta.sampling_radius = value);
     }
     deep("the sampling radius", |scan| scan.meta.sampling_radius *= 1.01);
     deep("the sampling radius", |scan| scan.meta.sampling_radius *= 0.99);
     for value in [0, 2, 33, u32::MAX] {
-        plain("the number of neighbours for a radius is wrong", |scan| scan.meta.radius_neighbours = value);
+        plain("the number of neighbours for a radius is invalid", |scan| scan.meta.radius_neighbours = value);
     }
-    plain("the number of dropped points is wrong", |scan| scan.meta.dropped.duplicate = usize::MAX);
+    plain("the number of dropped points is invalid", |scan| scan.meta.dropped.duplicate = usize::MAX);
 }
 
 #[test]

@@ -1,4 +1,5 @@
 //! Limits of stored numbers.
 
-/// No stored length exceeds this, so that no square of one overflows. Frames keep coordinates below 2³⁴.
+/// The upper limit of stored lengths, so that their squares do not overflow. Frames keep
+/// coordinates below 2³⁴.
 pub(super) const FARTHEST: f32 = (1_u64 << 40) as f32;

@@ -1,4 +1,5 @@
-//! Blocks, the balls about them, and neighbour lists: one that lies makes f what it is not.
+//! Validation of blocks, the balls around them, and neighbour lists: a corrupt list silently
+//! changes f.
 
 use nearmiss_index::{Level, PointBlock};
 
@@ -7,7 +8,8 @@ use crate::point::neighbours::MOST_LISTED;
 use crate::scan::build::PointHierarchy;
 use nearmiss_store::Flaw;
 
-/// Checks that every list is there, and none so long that an evaluation would take its time.
+/// Checks that every list is within the entries, and not so long that an evaluation would take too
+/// much time.
 fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
     let is_there = |list: &NeighbourList| {
         let (first, count) = (list.first as usize, list.count as usize);
@@ -16,8 +18,8 @@ fn check_ranges(lists: &[NeighbourList], listed: usize) -> Result<(), Flaw> {
     Flaw::first("the neighbour list of block", lists.iter().position(|list| !is_there(list)))
 }
 
-/// Checks that blocks repeat the points, which are sound, that balls hold what is heard of them, and that
-/// lists ascend and name groups.
+/// Checks that blocks repeat the points, which are already validated, that balls contain the
+/// support of their blocks, and that lists ascend and contain valid groups.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     check_ranges(&scan.arrays.lists, scan.arrays.listed.len())?;
     let blocks = scan.plan.blocks(scan.positions(), &scan.arrays.radii);
@@ -32,7 +34,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
         for i in 0..PointBlock::WIDTH {
             let (dx, dy, dz) = (x[i] - cx, y[i] - cy, z[i] - cz);
             let room = radius - horizon[i];
-            // Where there is no point, nothing is heard.
+            // Unused lanes have no support.
             let empty = horizon[i] <= 0.0;
             let within = (room >= 0.0) & (dx * dx + dy * dy + dz * dz <= room * room);
             held[i] = u32::from(empty | within);
@@ -53,7 +55,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     Flaw::first("the neighbour list of block", wrong)
 }
 
-/// Checks that no list leaves out a group of which a point is heard where the list is said to be complete.
+/// Checks that no list misses a group with support where the list claims to be complete.
 pub(super) fn check_complete(scan: &PointHierarchy) -> Result<(), Flaw> {
     let mut found = Vec::new();
     let incomplete = (0..scan.arrays.blocks.len()).position(|block| {

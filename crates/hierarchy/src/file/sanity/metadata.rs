@@ -1,4 +1,4 @@
-//! The numbers about a whole scan: how many entries its arrays have, and what the metadata say.
+//! Validation of the numbers of a whole scan: the lengths of its arrays, and the metadata.
 
 use nearmiss_geometry::{Aabb, Dropped, Frame};
 use nearmiss_index::PointBlock;
@@ -14,10 +14,10 @@ use crate::scan::options::RADIUS_NEIGHBOURS;
 use crate::scan::sampling::sampling_rank;
 use crate::tree::topology::Topology;
 
-/// The nodes over so many points.
+/// Returns the tree over `points` points.
 ///
 /// # Errors
-/// Names the number that no build writes.
+/// Names the number that a build never writes.
 pub(crate) fn checked_topology(points: usize, leaf_size: u32, dense: u32) -> Result<Topology, Flaw> {
     let wrong = |what| Err(Flaw::Metadata { what });
     let Some(count) = u32::try_from(points).ok().filter(|&count| count > 0) else {
@@ -59,11 +59,11 @@ impl PointHierarchy {
         }
     }
 
-    /// What the metadata say, as far as it shows without the points.
+    /// Checks the metadata, as far as possible without the points.
     pub(super) fn check_metadata(&self) -> Result<(), Flaw> {
         let wrong = |what| Err(Flaw::Metadata { what });
         let Frame { origin, scale } = self.meta.frame;
-        // Then nothing overflows on its way to the caller's frame and back.
+        // With such a scale nothing overflows on the way to the caller's frame and back.
         let turns_back = scale > 0.0 && scale.is_normal() && scale.recip().is_normal();
         if !(turns_back && origin.iter().all(|x| x.is_finite())) {
             return wrong("the frame of the stored positions");
@@ -96,14 +96,14 @@ impl PointHierarchy {
         Ok(())
     }
 
-    /// How many points the input had: sources lie below it.
+    /// Returns the number of points in the input; sources are below it.
     pub(super) fn given(&self) -> usize {
         let Dropped { not_finite, duplicate, filtered } = self.meta.dropped;
         let dropped = not_finite.saturating_add(duplicate).saturating_add(filtered);
         dropped.saturating_add(self.len())
     }
 
-    /// What the metadata say, against the points, which are sound.
+    /// Checks the metadata against the points, which are already validated.
     pub(super) fn check_summary(&self) -> Result<(), Flaw> {
         let [mut low, mut high] = [self.positions()[0]; 2];
         for p in self.positions() {
@@ -112,7 +112,7 @@ impl PointHierarchy {
                 high[k] = if p[k] > high[k] { p[k] } else { high[k] };
             }
         }
-        // The way to the caller's frame keeps the order, rounding included.
+        // The transform to the caller's frame is monotonic, rounding included.
         if (self.meta.frame.to_world(low), self.meta.frame.to_world(high))
             != (self.meta.bounds.min, self.meta.bounds.max)
         {
@@ -128,7 +128,7 @@ impl PointHierarchy {
         if less > rank || more > self.len() - 1 - rank {
             return Err(Flaw::Metadata { what: "the sampling radius" });
         }
-        // As text, so that what is no number equals itself.
+        // Compared as text, so that NaN equals itself.
         if format!("{:?}", self.outlined()) != format!("{:?}", self.meta.outline) {
             return Err(Flaw::Metadata { what: "the outline of the scan" });
         }

@@ -1,4 +1,5 @@
-//! The boxes: one that is none, or that leaves its parent's, makes a query look everywhere or miss a contact.
+//! Validation of the boxes: an invalid box, or one outside its parent's, makes a query visit
+//! everything or miss a contact.
 
 use bytemuck::{bytes_of, cast_ref};
 use nearmiss_geometry::NodeId;
@@ -14,19 +15,20 @@ use crate::bounds::growth::Growth;
 use crate::scan::build::PointHierarchy;
 use crate::tree::wide::Siblings;
 
-/// Axes are unit and at right angles to rounding; this is far from rounding and far from a box that lies.
+/// Tolerance for unit and orthogonal axes: far above rounding errors, far below those of a corrupt
+/// box.
 const ASKEW: f32 = 1e-3;
 
-/// What rounding may make a child stick out of its parent, relative to their coordinates: both boxes were
-/// grown by 2e-6 of their own, and the comparison rounds as much again.
+/// How far rounding may make a child extend beyond its parent, relative to their coordinates: both
+/// boxes were grown by 2e-6 of their own, and the comparison rounds as much again.
 const STICKS_OUT: f32 = 8e-6;
 
-/// Numbers of a box.
+/// The count of numbers in a box.
 const NUMBERS: usize = size_of::<OrientedBox>() / size_of::<f32>();
 
-/// For each number of a box the bits that count, all or all but the sign, and the greatest value they may
-/// have. Finite numbers without their sign are ordered like their bits, and what is not finite is above them
-/// all.
+/// For each number of a box, a mask of the bits that are compared (all, or all but the sign) and
+/// the greatest valid value. Finite numbers without their sign are ordered like their bits;
+/// infinity and NaN are above them all.
 const RANGES: [(u32, u32); NUMBERS] = {
     let mut ranges = [(u32::MAX, FARTHEST.to_bits()); NUMBERS];
     let mut i = 0;
@@ -41,7 +43,7 @@ const RANGES: [(u32, u32); NUMBERS] = {
     ranges
 };
 
-/// Returns `true` if the numbers of a box lie in their ranges: the middle, half edges, axes, reach.
+/// Returns `true` if the numbers of a box are in their ranges: centre, half edges, axes, reach.
 pub(super) fn is_in_range(bounds: &OrientedBox) -> bool {
     let bits: &[u32; NUMBERS] = cast_ref(bounds);
     let mut beyond = 0;
@@ -51,8 +53,8 @@ pub(super) fn is_in_range(bounds: &OrientedBox) -> bool {
     beyond == 0
 }
 
-/// Checks the boxes and enclosures of all nodes: their numbers lie in their ranges, axes form a frame, each
-/// box lies within its parent's, and where there is no child nothing is said.
+/// Checks the boxes and enclosures of all nodes: the numbers are in their ranges, axes form a
+/// frame, each box is within its parent's, and unused lanes are zero.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let (topology, tree) = (scan.topology(), scan.tree());
     let wrong = |what, id: NodeId| Err(Flaw::Value { what, index: id.index() });
@@ -86,7 +88,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     found.into_iter().collect()
 }
 
-/// Whether three vectors are unit and at right angles. Written so that what is no number fails.
+/// Returns `true` if three vectors are unit and orthogonal. Written so that NaN fails.
 #[inline]
 fn is_frame(&[x, y, z]: &[[f32; 3]; 3]) -> bool {
     let is_unit = |axis: [f32; 3]| (dot(axis, axis) - 1.0).abs() <= ASKEW;
@@ -94,8 +96,9 @@ fn is_frame(&[x, y, z]: &[[f32; 3]; 3]) -> bool {
     is_unit(x) & is_unit(y) & is_unit(z) & is_right(x, y) & is_right(x, z) & is_right(y, z)
 }
 
-/// Whether `child` may be the box of a node under that of `parent`: along each of its own axes it is no
-/// longer than the discs it is about, which the parent's box holds, and no point below it reaches further.
+/// Returns `true` if `child` may be the box of a node under that of `parent`. Its interval along
+/// each of its own axes must be within the parent's, because it is tight around discs that the
+/// parent's box contains too. Its greatest local radius must not exceed the parent's.
 #[inline]
 fn lies_within(child: &OrientedBox, parent: &OrientedBox) -> bool {
     let d = sub(child.centre, parent.centre);

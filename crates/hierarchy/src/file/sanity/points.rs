@@ -1,4 +1,4 @@
-//! The numbers of every point, each against its range and against its leaf.
+//! Validation of the numbers of every point, against their ranges and against the leaf.
 
 use std::array::from_fn;
 
@@ -10,25 +10,25 @@ use crate::point::disc::{DiscRadii, PointCode};
 use crate::point::kind::THICKNESS;
 use crate::scan::build::PointHierarchy;
 
-/// Normals are unit to rounding.
+/// Tolerance for the squared length of normals, which are unit up to rounding.
 const NORMAL: f32 = 1e-5;
 
-/// What rounding may make of a coordinate in a box that was grown by 1e-6 of its coordinates.
+/// Bound on the rounding error of a coordinate in a box that was grown by 2e-6 of its coordinates.
 const SLACK: f32 = 1e-6;
 
-/// 1 − (n·axis)², about 1e-7 off, stands for the square of a sine, which is then less than this off.
+/// Tolerance for a sine computed as √(1 − (n·axis)²), whose square is about 1e-7 off.
 const SINE: f32 = 2e-3;
 
-/// Points that are worked on together.
+/// The number of points processed together.
 const LANES: usize = 8;
 
-/// A number of each of them.
+/// One number for each lane.
 type Lanes = [f32; LANES];
 
-/// One for each lane in which something is as it should be, else zero.
+/// One for each lane that passes a check, otherwise zero.
 type Sound = [u32; LANES];
 
-/// Checks all points of a hierarchy whose structure is sound.
+/// Checks all points of a hierarchy whose structure is valid.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let arrays = Arrays {
         positions: scan.positions(),
@@ -51,7 +51,7 @@ pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     Ok(())
 }
 
-/// The arrays that have an entry a point.
+/// The arrays with one entry for each point.
 struct Arrays<'a> {
     positions: &'a [[f32; 3]],
     normals: &'a [[f32; 3]],
@@ -60,7 +60,7 @@ struct Arrays<'a> {
     source: &'a [u32],
 }
 
-/// Some points of a leaf side by side; where there are fewer than lanes, the first of them again.
+/// Some points of a leaf side by side, padded with the first of them.
 struct Block {
     position: [Lanes; 3],
     normal: [Lanes; 3],
@@ -107,16 +107,16 @@ fn transposed(vectors: &[[f32; 3]; LANES]) -> [Lanes; 3] {
     rows
 }
 
-/// What the points of a leaf are held against.
+/// The limits for the points of a leaf.
 struct Leaf<'a> {
     bounds: &'a OrientedBox,
-    /// The last place in the caller's input.
+    /// The last index of the caller's input.
     last: u32,
-    /// What rounding may cost in this leaf.
+    /// The rounding error in this leaf.
     slack: f32,
 }
 
-/// What is compared, in the order of [`Leaf::sound`].
+/// The names of the checks, in the order of [`Leaf::sound`].
 const COMPARED: [&str; 6] = [
     "the position of point",
     "the normal of point",
@@ -127,7 +127,7 @@ const COMPARED: [&str; 6] = [
 ];
 
 impl Leaf<'_> {
-    /// Names the first of the points from `start` with which something is wrong.
+    /// Checks the points from `start`; the error names the first that fails.
     #[inline]
     fn check(&self, p: &Block, start: usize) -> Result<(), Flaw> {
         let found = self.sound(p);
@@ -143,7 +143,7 @@ impl Leaf<'_> {
         Err(Flaw::Value { what, index: start + lane })
     }
 
-    /// Every comparison, in all lanes. Written so that what is no number fails, and with plain loops over
+    /// Performs every check, in all lanes. Written so that NaN fails, and with plain loops over
     /// lanes, so that it compiles to vector code.
     #[inline]
     fn sound(&self, p: &Block) -> [Sound; COMPARED.len()] {
@@ -168,7 +168,7 @@ impl Leaf<'_> {
         sound
     }
 
-    /// Whether the box holds each disc with its thickness.
+    /// Returns the lanes of points whose disc, with its thickness, is inside the box.
     #[inline]
     fn in_box(&self, p: &Block) -> Sound {
         let b = self.bounds;

@@ -1,5 +1,5 @@
-//! Samples and coverings: a sample that is not there makes a query leave its arrays, a radius that is too
-//! short one miss a contact.
+//! Validation of samples and coverings: an invalid sample makes a query leave its arrays, a radius
+//! that is too short makes it miss a contact.
 
 use nearmiss_geometry::NodeId;
 use nearmiss_lanes::id32;
@@ -11,16 +11,16 @@ use super::limits::FARTHEST;
 use crate::patch::covering::{Covering, centres_of};
 use crate::scan::build::PointHierarchy;
 
-/// What rounding may make of a mean of radii.
+/// Allowance for the rounding of a mean of radii.
 const MEAN: f32 = 1.0 + 1e-5;
 
-/// Of the samples of a node's children every so many-th is looked for in its covering: all would take as long
-/// as the rest of the checks.
+/// Of the samples of a node's children, every fourth is tested against its covering; testing all
+/// would take as long as the rest of the checks.
 const STEP: usize = 4;
 
-/// Checks that the samples of each node are points of its own, and differ, that its covering has lengths, if
-/// infinite ones, and contains some of the samples of its children, and that its spacing is one of its
-/// points'.
+/// Checks that the samples of each node are distinct points of its own, that the lengths of its
+/// covering are valid (possibly infinite), that the covering contains some of the samples of its
+/// children, and that its spacing is at most the greatest local radius under it.
 pub(super) fn check(scan: &PointHierarchy) -> Result<(), Flaw> {
     let topology = scan.topology();
     let found =

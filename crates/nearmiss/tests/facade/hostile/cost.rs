@@ -1,4 +1,4 @@
-//! Boxes that lie do not make a query compare every leaf with every leaf.
+//! Forged boxes must not make a query compare all pairs of leaves.
 
 use nearmiss::store::File;
 use nearmiss::{
@@ -7,7 +7,8 @@ use nearmiss::{
 };
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
-/// The scan with each box replaced by one that holds everything, and fitting checksums.
+/// Returns the scan with every box replaced by one that contains everything, and with valid
+/// checksums.
 fn with_boundless_boxes(scan: &Scan, half: f32) -> Scan {
     let mut bytes = Vec::new();
     scan.write_to(&mut bytes).unwrap();
@@ -32,7 +33,7 @@ fn boundless_boxes_end_a_query_undecided_unless_told_otherwise() {
     let cloud = PointCloud::from_positions(&points).unwrap();
     let scan = Scan::build(&cloud, &BuildOptions::default()).unwrap();
     let leaves = scan.topology().leaves() as u64;
-    // A sphere within a sphere: balls about the two say nothing.
+    // A sphere within a sphere, which bounding balls cannot separate.
     let away = Pose::IDENTITY.with_scale(0.5);
     for half in [10.0, 1e12] {
         let lying = with_boundless_boxes(&scan, half);
@@ -63,8 +64,8 @@ fn boundless_boxes_end_a_query_undecided_unless_told_otherwise() {
     }
 }
 
-/// Solid noise in the midst of other such noise, apart by a hair: the most that sound scans were found to
-/// need.
+/// Two clouds of solid noise in each other's midst, separated by a small gap: the most expensive
+/// query known for valid scans.
 #[test]
 fn sound_scans_stay_far_below_the_limit() {
     let noise = |seed| {

@@ -1,4 +1,4 @@
-//! Random damage, the same for the same seed.
+//! Random damage, which is the same for the same seed.
 
 use crate::hostile::repair::{HEADER, ROW};
 
@@ -43,7 +43,7 @@ const FLOATS: [f32; 14] = [
 const COUNTS: [u64; 12] =
     [0, 1, 2, 63, 64, 128, 1 << 31, u32::MAX as u64, 1 << 32, u64::MAX - 63, 1 << 63, u64::MAX];
 
-/// Damages `bytes`, a container, in one to three ways.
+/// Damages `bytes`, a container, in one to three places.
 pub(crate) fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
     for _ in 0..=random.below(3) {
         if bytes.len() > HEADER {
@@ -66,10 +66,10 @@ fn once(bytes: &mut Vec<u8>, random: &mut Random) {
         4 => bytes[at..at + some].fill(0),
         5 => drop(bytes.splice(at..at, vec![random.next().to_le_bytes()[0]; random.below(130)])),
         6 => drop(bytes.drain(at..at + some)),
-        // A field of the header, or of the table.
+        // A field of the header or the table.
         7 => put(bytes, 8 + 4 * random.below(14), &random.one(&COUNTS).to_le_bytes()[..random.one(&[4, 8])]),
         8 => put(bytes, HEADER + 4 * random.below(10 * ROW / 4), &random.one(&COUNTS).to_le_bytes()),
-        // A number of an array.
+        // A number in an array.
         9 => put(bytes, at / 4 * 4, &random.one(&FLOATS).to_le_bytes()),
         10 => {
             let word = bytes.get(at / 4 * 4..).and_then(<[u8]>::first_chunk).copied().unwrap_or_default();
@@ -92,7 +92,8 @@ fn put(bytes: &mut [u8], at: usize, value: &[u8]) {
     }
 }
 
-/// Makes the header state the length that the file has, so that a file cut or grown gets past it.
+/// Makes the header state the actual length of the file, so that a truncated or extended file
+/// passes that check.
 pub(crate) fn restate_length(bytes: &mut Vec<u8>) {
     bytes.resize(bytes.len().next_multiple_of(64), 0);
     let length = bytes.len() as u64;

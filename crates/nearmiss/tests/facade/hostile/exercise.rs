@@ -1,5 +1,5 @@
-//! Everything that a program does with a scan, in small: questions in a few poses, evaluations, checks,
-//! saving again.
+//! Small versions of everything that a program does with a scan: queries in a few poses,
+//! evaluations, checks, and saving.
 
 use nearmiss::{
     Answer, CollideOptions, CollidePlan, Detail, Evaluation, Evidence, Pair, Pose, Reason, Scan, Scratch,
@@ -8,18 +8,18 @@ use nearmiss::{
 
 use crate::hostile::graph::{GraphAnswers, exercise_graph};
 
-/// What a scan answered.
+/// The answers of a scan.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Answers {
-    /// To questions about it and another scan, and itself.
+    /// Answers to queries about the scan and another one, and itself.
     pub(crate) collide: Vec<Answer>,
-    /// At places near some of its points.
+    /// Evaluations near some of its points.
     pub(crate) at: Vec<Evaluation>,
-    /// To questions about its graph.
+    /// Answers of its graph.
     pub(crate) graph: Option<GraphAnswers>,
 }
 
-/// Poses of the other scan: on the first, a little off, across its rim, far away.
+/// Poses of the other scan: coincident, slightly off, across the rim, far away.
 fn poses(size: f64) -> [Pose; 4] {
     let turn = Pose::from_axis_angle([1.0, 2.0, 3.0], 0.7);
     [
@@ -30,11 +30,11 @@ fn poses(size: f64) -> [Pose; 4] {
     ]
 }
 
-/// Asks `scan` everything, beside `other`.
+/// Runs all queries on `scan`, with `other` as the second scan.
 ///
 /// # Panics
-/// When a question costs more than to compare every node with every node, an evaluation is no number, or the
-/// scan cannot be written.
+/// Panics if a query costs more than comparing all pairs of nodes, if an evaluation is NaN, or if
+/// the scan cannot be written.
 #[must_use]
 pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
     let size = other.bounds().half_extents().into_iter().fold(0.0, f64::max);
@@ -57,7 +57,7 @@ pub(crate) fn exercise(scan: &Scan, other: &Scan) -> Answers {
                 let Ok(plan) = CollidePlan::new(&options, a, b) else { continue };
                 let (a, b) = (a.at(&Pose::IDENTITY), b.at(&pose));
                 let answer = Pair::new(a, b).collide(&plan, &mut scratch);
-                // A pair of nodes is compared once by boxes, once by enclosures.
+                // A node pair is compared once by boxes and once by enclosures.
                 assert!(answer.statistics.node_pairs <= 2 * everything + 4, "{:?}", answer.statistics);
                 if let Verdict::Undecided(Reason::Budget { likelihood }) = answer.verdict {
                     assert!((0.0..=1.0).contains(&likelihood), "a likelihood of {likelihood}");

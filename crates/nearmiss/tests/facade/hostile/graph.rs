@@ -1,9 +1,9 @@
-//! Everything that a program does with the graph of a scan, in small.
+//! Small versions of everything that a program does with the graph of a scan.
 
 use nearmiss::graph::{GeodesicScratch, KernelScratch, LevelScratch};
 use nearmiss::{Pose, Scan};
 
-/// What a graph answered, as bits where it is of lengths.
+/// The answers of a graph; lengths are stored as bits.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct GraphAnswers {
     counts: Vec<usize>,
@@ -12,10 +12,10 @@ pub(crate) struct GraphAnswers {
     values: Vec<u64>,
 }
 
-/// Asks the graph of `scan`, if it has one.
+/// Runs all queries on the graph of `scan`, if it has one.
 ///
 /// # Panics
-/// When an evaluation is no number, or a path does not lead where it should.
+/// Panics if an evaluation is NaN, or if a path does not lead to its end.
 pub(crate) fn exercise_graph(scan: &Scan) -> Option<GraphAnswers> {
     let graph = scan.graph()?;
     let mut answers = GraphAnswers::default();

@@ -1,5 +1,5 @@
-//! Thousands of damaged files. `NEARMISS_MUTATIONS` says how many of each sort, `NEARMISS_SEED` where to
-//! begin.
+//! Thousands of damaged files. `NEARMISS_MUTATIONS` sets the number of each kind, `NEARMISS_SEED`
+//! the first seed.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
@@ -13,14 +13,14 @@ use crate::hostile::damage::{Random, damage, restate_length};
 use crate::hostile::exercise::{Answers, exercise};
 use crate::hostile::repair::repair;
 
-/// No single file may cost more, on any machine that runs tests.
+/// Time limit for a single file, on any machine that runs the tests.
 const LONGEST: Duration = Duration::from_secs(20);
 
-/// Every message holds one of these.
+/// Every error message contains one of these.
 const REMEDIES: [&str; 5] =
     ["prepare", "copy it again", "update the program", "name another file", "unpack it"];
 
-/// A sound scan, its file, and what it answers.
+/// A valid scan, its file, and its answers.
 struct Sample {
     scan: Scan,
     bytes: Vec<u8>,
@@ -68,20 +68,20 @@ fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(default)
 }
 
-/// What became of the damaged files.
+/// Outcomes of the damaged files.
 #[derive(Debug, Default)]
 struct Tally {
     refused: u32,
-    /// Opened, and answered as before.
+    /// Opened, with unchanged answers.
     same: u32,
-    /// Opened, and answered otherwise.
+    /// Opened, with changed answers.
     other: u32,
-    /// Of those answers: undecided.
+    /// Changed answers that are undecided.
     undecided: u32,
     longest: Duration,
 }
 
-/// Opens files that `spoil` has damaged and asks what opens everything.
+/// Opens files damaged by `spoil`, and runs all queries on those that open.
 fn run(seed: u64, check: Check, spoil: impl Fn(&mut Vec<u8>, &mut Random)) -> Tally {
     let samples = samples();
     let mut tally = Tally::default();

@@ -1,11 +1,11 @@
-//! Makes all checksums of a container fit again, as someone who knows the format would.
+//! Recomputes all checksums of a container, as an attacker who knows the format could.
 
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Bytes of the header.
+/// Length of the header in bytes.
 pub(crate) const HEADER: usize = 64;
 
-/// Bytes of a row of the table.
+/// Length of a table row in bytes.
 pub(crate) const ROW: usize = 40;
 
 fn number(bytes: &[u8], at: usize) -> Option<u64> {
@@ -16,7 +16,7 @@ fn put(bytes: &mut [u8], at: usize, value: u64) {
     bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
 }
 
-/// Recomputes the checksum of each section that lies in the file, of the table, and of the header.
+/// Recomputes the checksums of each section in the file, of the table, and of the header.
 pub(crate) fn repair(bytes: &mut [u8]) {
     let Some(count) = bytes.get(20..24).and_then(<[u8]>::first_chunk) else { return };
     let rows = u32::from_le_bytes(*count) as usize;

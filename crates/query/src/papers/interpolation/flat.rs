@@ -1,4 +1,5 @@
-//! Without hierarchy: brackets among drawn points of a, and a search along the path of each.
+//! Interpolation search without hierarchy: brackets among drawn points of a, and a search along the
+//! path of each.
 
 use std::ops::ControlFlow;
 
@@ -19,36 +20,37 @@ use crate::leaf::disc_pair::FAR;
 use crate::papers::Papers;
 use crate::papers::random::{FLAT, below, stream};
 
-/// So many points are drawn for one that lies in the box of b, before that is given up.
+/// Draws per point inside the box of b before drawing stops.
 const DRAWS: u32 = 8;
 
-/// So many steps at most, from nearest point to nearest point.
+/// The limit of steps from nearest point to nearest point.
 const STEPS: u32 = 32;
 
-/// So many looks at most along an edge.
+/// The limit of evaluations along an edge.
 const LOOKS: u32 = 8;
 
-/// Drawn points and partners in a list of the close-pairs map: some 30 points are within the kernel's reach.
+/// Partners tried per drawn point in a list of the close-pairs map. About 30 points are within the
+/// support radius.
 const OF_THE_ANNULUS: u32 = 4;
 
-/// A way so many times as long as its ends are apart leads round something.
+/// A path this many times as long as the distance of its ends is a detour.
 const DETOUR: f64 = 4.0;
 
-/// Over virtual edges only points are joined that are no more than so many sampling radii apart: holes that
-/// these bridge are small.
+/// Virtual edges join only points at most this many sampling radii apart, so the holes that they
+/// bridge are small.
 const NARROW: f32 = 32.0;
 
-/// As near b, in its local sampling radii, a path has arrived.
+/// A path has arrived when it is this near b, in b's local sampling radii.
 const ARRIVED: f64 = 0.1;
 
-/// A place is on b if |f| is at most so many of its local sampling radii there,
+/// A point counts as on b if |f| is at most this many of b's local sampling radii.
 const ZERO: f64 = 0.25;
 
-/// and no further from the tangent planes of the nearest points of both than so many of theirs: edges cut
-/// bends short, and points are noisy.
+/// The greatest distance of a contact from the tangent planes of both nearest points, in their
+/// local sampling radii. Edges cut bends short, and points are noisy.
 const OFF: f64 = 0.5;
 
-/// What a search goes by.
+/// The state of a search.
 struct Ways<'a> {
     search: &'a Interpolation,
     graph: &'a SurfaceGraph,
@@ -56,7 +58,7 @@ struct Ways<'a> {
     rng: Xoshiro256PlusPlus,
 }
 
-/// Two points of a, and on which sides they are.
+/// Two points of a and their sides of b.
 #[derive(Debug, Clone, Copy)]
 struct Bracket {
     points: [u32; 2],
@@ -68,10 +70,10 @@ fn id(i: usize) -> u32 {
 }
 
 impl Papers<'_, '_> {
-    /// Draws points of a that lie in the box of b, and looks for intersections between those on either side
-    /// of b.
+    /// Draws points of a in the box of b and searches for intersections between points on different
+    /// sides of b.
     pub(crate) fn interpolate_all(&mut self, search: &Interpolation) -> ControlFlow<()> {
-        // No volumes part anything here: nothing is proven.
+        // No volumes are compared here, so nothing is proven.
         self.search.compared.push(NodePair { a: NodeId::ROOT, b: NodeId::ROOT });
         let [va, _] = self.search.pair.views;
         let Some(graph) = va.graph() else {
@@ -101,7 +103,8 @@ impl Papers<'_, '_> {
                 (volume.area / (radius * radius)).max(1.0)
             }
         };
-        // None has less than a point: nothing is nearer to each other than these.
+        // More surfels than points are meaningless: no two points are nearer to each other than
+        // neighbours.
         let surfels = surfels.min(f64::from(volume.count));
         let wanted = search.draws(surfels);
         #[expect(clippy::cast_possible_truncation, reason = "a length in single precision")]
@@ -128,7 +131,7 @@ impl Papers<'_, '_> {
         }
     }
 
-    /// One drawn point, which may be outside of the box of b; whether it was in there.
+    /// Processes a drawn point. Returns `false` if it is outside the box of b.
     fn try_drawn(&mut self, i: u32, bounds: &Bounds, ways: &mut Ways<'_>) -> ControlFlow<(), bool> {
         self.search.pair.meter.leaf_work(1);
         self.search.pair.meter.go_on()?;
@@ -136,7 +139,7 @@ impl Papers<'_, '_> {
         if !bounds.holds(place) {
             return ControlFlow::Continue(false);
         }
-        // Drawn points are anywhere: none tells where to look for the next.
+        // Drawn points are anywhere, so none is a hint for the next.
         let side = self.side_again(i, 0);
         self.estimate = self.estimate.min(side.distance.abs());
         let partner = match ways.search.brackets {
@@ -153,8 +156,9 @@ impl Papers<'_, '_> {
         ControlFlow::Continue(true)
     }
 
-    /// One of some points about two surfel radii from `i` along the surface that is on the other side, if the
-    /// map of close pairs reaches there: the annulus of S1 §4.3, at most.
+    /// Tries a few points about two surfel radii from `i` along the surface, as far as the map of
+    /// close pairs reaches. Returns the first on the other side of b. These points are a part of
+    /// the annulus of Klein & Zachmann 2005, §4.3.
     fn partner_around(
         &mut self,
         i: u32,
@@ -163,7 +167,7 @@ impl Papers<'_, '_> {
     ) -> ControlFlow<(), Option<(u32, Side)>> {
         let Some(pairs) = ways.graph.close_pairs() else { return ControlFlow::Continue(None) };
         let reach = self.scratch.interpolation.drawn.reach();
-        // Sorted by distance; the outer half has most of the points.
+        // The list is sorted by distance; the outer half has most of the points.
         let list = pairs.of(i as usize).take_while(|close| close.distance <= reach);
         let outer = list.filter(|close| close.distance >= 0.5 * reach).map(|close| close.point);
         let annulus = &mut self.scratch.interpolation.annulus;
@@ -181,7 +185,7 @@ impl Papers<'_, '_> {
         ControlFlow::Continue(None)
     }
 
-    /// Looks for an intersection on the path between two points on either side.
+    /// Searches for an intersection on the path between two points on different sides.
     fn search_between(&mut self, bracket: &Bracket, ways: &mut Ways<'_>) -> ControlFlow<()> {
         let (positions, radii) = (self.search.pair.views[0].scan().positions(), self.search.pair.a.radii);
         let Ways { search, graph, path, .. } = ways;
@@ -240,7 +244,7 @@ impl Papers<'_, '_> {
             Some(Root::Edge { first, values }) => {
                 let ends = [point(first).min(point(first + 1)), point(first).max(point(first + 1))];
                 let Err(place) = self.scratch.interpolation.crossed.binary_search(&ends) else {
-                    // Another bracket led here.
+                    // Another bracket led to the same edge.
                     self.search.tries += 1;
                     return ControlFlow::Continue(());
                 };
@@ -250,11 +254,11 @@ impl Papers<'_, '_> {
         }
     }
 
-    /// The distance from b to first order about a point of a, in a's stored frame.
+    /// The distance from b, to first order about a point of a, in a's stored frame.
     fn slope(&self, i: u32, side: &Side) -> Slope {
         let (place, j) = (self.search.pair.a.position(i as usize), side.near as usize);
         let normal = self.search.pair.relative.direction(self.search.pair.b.normals[j]);
-        // Far from b its nearest point is the centre of all that is as far away.
+        // Far from b, the distance is that from b's nearest point.
         let is_far = side.distance.abs() >= side.away && side.away > 0.0;
         let from = Vector3::from(place)
             - Vector3::from(self.search.pair.relative.point(self.search.pair.b.position(j)));
@@ -268,7 +272,8 @@ impl Papers<'_, '_> {
         self.search.pair.views[1].placed().scale()
     }
 
-    /// Looks for an intersection between two points of a at these signed distances of b, which an edge joins.
+    /// Searches for an intersection on the edge between two points of a with these signed distances
+    /// from b.
     pub(super) fn search_edge(
         &mut self,
         ends: [u32; 2],
@@ -280,7 +285,8 @@ impl Papers<'_, '_> {
         let [p, q] = ends.map(|i| Vector3::from(va.point(i as usize)));
         let ([mut from, mut to], [mut at_from, mut at_to]) = ([0.0, 1.0], values);
         let mut looks = 0;
-        // S1 §4.6 has signed distances here, of which the sum of a good bracket is none.
+        // Klein & Zachmann 2005, §4.6 adds the signed distances here, but their sum vanishes for a
+        // good bracket.
         let (share, x, side) = loop {
             self.search.pair.meter.go_on()?;
             let share = if looks % 3 == 2 { 0.5 } else { at_from.abs() / (at_from.abs() + at_to.abs()) };
@@ -303,7 +309,8 @@ impl Papers<'_, '_> {
         self.meets_at(i, x.into(), &side, search)
     }
 
-    /// A place on the surface of a near its point `i` that should be on that of b too: a hit, if it is.
+    /// Handles a point on the surface of a, near its point `i`, that should be on b as well: a
+    /// contact if it is.
     fn meets_at(&mut self, i: u32, x: [f64; 3], side: &Side, search: &Interpolation) -> ControlFlow<()> {
         let [va, vb] = self.search.pair.views;
         let nearest = va.scan().nearest_point_within(i as usize, va.placed().apply_inverse(x), f64::INFINITY);
@@ -318,8 +325,8 @@ impl Papers<'_, '_> {
             vb.placed().rotate(self.search.pair.b.normals[j].map(f64::from)),
         ];
         let from = [va.point(i), vb.point(j)].map(|p| Vector3::from(x) - Vector3::from(p));
-        // Edges lead over gaps of a, and from sheet to sheet; where b ends, its side changes too, but there
-        // are no samples, and between two sheets of it f vanishes.
+        // Edges of a cross gaps and lead from sheet to sheet. The side also changes where b ends,
+        // but there are no samples there, and f vanishes between two sheets of b.
         let far = f64::from(FAR) * radii[0].max(radii[1]);
         let off = [0, 1].map(|k: usize| Vector3::from(normals[k]).dot(&from[k]).abs());
         let is_off = [0, 1].into_iter().any(|k: usize| from[k].norm() > far || off[k] > OFF * radii[k]);
@@ -339,8 +346,8 @@ impl Papers<'_, '_> {
         self.hit_by(search, contact, i, j)
     }
 
-    /// Draws the drawn points that are near b towards it: from nearest point to nearest point, until the
-    /// discs there cross, or it goes no nearer.
+    /// Moves the drawn points that are near b towards it, from nearest point to nearest point,
+    /// until the discs there cross or the distance stops shrinking.
     fn draw_all_near(&mut self, most: usize, reach: f32, graph: &SurfaceGraph) -> ControlFlow<()> {
         let reach = f64::from(reach) * self.search.pair.views[0].placed().scale();
         let mut near = std::mem::take(&mut self.scratch.interpolation.near);
@@ -391,7 +398,7 @@ impl Papers<'_, '_> {
         self.scratch.interpolation.seen.push([i, j]);
         let away = (Vector3::from(va.point(i as usize)) - Vector3::from(vb.point(j as usize))).norm();
         self.estimate = self.estimate.min(away);
-        // The discs of these points, and of those about them.
+        // Compare the discs of these points and of their neighbours.
         let about_a = std::iter::once(i).chain(graph.points().edges().of(i as usize).iter().copied());
         for i in about_a {
             let disc = self.search.pair.disc_a(i as usize);

@@ -1,4 +1,5 @@
-//! As leaf test of the hierarchical search: edges of a's graph whose ends are on different sides of b.
+//! The leaf test of the hierarchical search: edges of a's graph whose ends are on different sides
+//! of b.
 
 use std::ops::ControlFlow;
 
@@ -8,12 +9,13 @@ use nearmiss_lanes::id32;
 use crate::ask::interpolation::Interpolation;
 use crate::papers::Papers;
 
-/// Distances from b at the ends of an edge that crosses it add up to no more than its length; noise and
-/// curvature add to them.
+/// An edge crosses b only if the distances of its ends from b add up to at most its length. This
+/// factor allows for noise and curvature.
 const CROSSES: f64 = 1.5;
 
 impl Papers<'_, '_> {
-    /// Whether the leaf of b says which side of it a place is on: its normals are oriented, and sure of it.
+    /// Returns `true` if the leaf of b determines sides: its normals are oriented with sufficient
+    /// confidence.
     fn tells_sides(&self, pair: NodePair) -> bool {
         let [_, vb] = self.search.pair.views;
         let points = self.search.pair.b.tree.topology().points(pair.b);
@@ -23,8 +25,9 @@ impl Papers<'_, '_> {
             })
     }
 
-    /// Each edge of a's graph from a point of its leaf near the leaf of b: whether it crosses b. No edge does
-    /// where sides are not known, nor need one where b is thinner than edges are long: there the discs tell.
+    /// Tests each edge of a's graph from a point of a's leaf near b's leaf for a crossing with b.
+    /// No edge crosses if sides are unknown, and none need cross where b is thinner than the edges
+    /// are long; there the discs decide.
     pub(crate) fn test_edges(&mut self, pair: NodePair, search: &Interpolation) -> ControlFlow<()> {
         let [va, _] = self.search.pair.views;
         let Some(graph) = va.graph().filter(|_| self.tells_sides(pair)) else {
@@ -48,7 +51,7 @@ impl Papers<'_, '_> {
                 continue;
             }
             for &to in edges.of(i) {
-                // Edges within the leaf are looked at once.
+                // Test each edge within the leaf once.
                 if leaf.contains(&(to as usize)) && to < from {
                     continue;
                 }

@@ -1,4 +1,4 @@
-//! Drawn points in a grid: for each the nearest of those before it on the other side.
+//! Drawn points in a grid, which finds the nearest earlier point on the other side.
 
 use super::sides::Side;
 
@@ -8,25 +8,25 @@ pub(crate) struct DrawnPoint {
     pub(crate) point: u32,
     pub(crate) place: [f32; 3],
     pub(crate) side: Side,
-    /// The one before it in its list.
+    /// The previous point in the same list.
     next: u32,
 }
 
 const NONE: u32 = u32::MAX;
 
-/// Drawn points, in lists by the cells of a grid, which share lists where hashes of cells agree.
+/// Drawn points in lists by the cells of a grid. Cells whose hashes agree share a list.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Drawn {
     points: Vec<DrawnPoint>,
     heads: Vec<u32>,
     per_cell: f32,
     reach_sq: f32,
-    /// How many are outside, and how many inside.
+    /// The numbers of points outside and inside.
     sides: [u32; 2],
 }
 
 impl Drawn {
-    /// Makes ready for `count` points, partners within `reach` of each other.
+    /// Prepares for `count` points and partners within `reach` of each other.
     pub(crate) fn begin(&mut self, count: u32, reach: f32) {
         self.points.clear();
         self.heads.clear();
@@ -36,7 +36,7 @@ impl Drawn {
         self.sides = [0; 2];
     }
 
-    /// How far partners may be from each other.
+    /// The greatest distance of partners.
     pub(crate) fn reach(&self) -> f32 {
         self.reach_sq.sqrt()
     }
@@ -60,7 +60,7 @@ impl Drawn {
         (mixed >> 20) as usize & (self.heads.len() - 1)
     }
 
-    /// The nearest drawn point on the other side within reach; of equally near ones the first.
+    /// The nearest drawn point on the other side within reach; among equals the first.
     pub(crate) fn partner(&self, place: [f32; 3], side: &Side) -> Option<&DrawnPoint> {
         if !side.is_known || self.sides[usize::from(side.distance >= 0.0)] == 0 {
             return None;
@@ -99,7 +99,8 @@ mod tests {
     use super::Drawn;
     use crate::papers::interpolation::sides::Side;
 
-    /// Against all pairs, with points far outside of the grid's numbers among them.
+    /// Compared with a search over all pairs, including points outside the range of the grid's
+    /// integers.
     #[test]
     fn partners_are_the_nearest_of_all() {
         let mut state = 1_u32;

@@ -1,4 +1,5 @@
-//! From an approximate place to one on both surfaces: the ways of the papers, beside Newton's method.
+//! Refinement of an approximate point to one on both surfaces by the papers' methods, as
+//! alternatives to Newton's method.
 
 use std::ops::ControlFlow;
 
@@ -13,17 +14,18 @@ use crate::ask::options::Detail;
 use crate::papers::Papers;
 use crate::papers::random::place_in;
 
-/// No sphere is looked through with more places than this.
+/// The limit of test points in a sphere.
 const MOST_PLACES: u32 = 65_536;
 
-/// Its cube root.
+/// The cube root of this limit.
 const MOST_ACROSS: f64 = 40.0;
 
-/// The probability that each small sphere that makes up the large one gets a point (S1, Lemma 1).
+/// The probability that each of the small spheres that make up the large one contains a point
+/// (Klein & Zachmann 2005, Lemma 1).
 const PROBABILITY: f64 = 0.97;
 
 impl Papers<'_, '_> {
-    /// A hit near points `i` and `j`, refined as is wanted.
+    /// Handles a contact near points `i` and `j`, with the requested refinement.
     pub(super) fn hit_by(
         &mut self,
         search: &Interpolation,
@@ -43,15 +45,16 @@ impl Papers<'_, '_> {
             f64::from(self.search.pair.a.radii[i]) * va.placed().scale(),
             f64::from(self.search.pair.b.radii[j]) * self.scale_of_b(),
         ];
-        // The sphere about the place between two neighbouring points holds a common point, unless the surface
-        // is bent (S1 §4.6).
+        // The sphere about the point between two neighbours contains a common point unless the
+        // surface is bent (Klein & Zachmann 2005, §4.6).
         let (radius, wanted) = (radii[0].max(radii[1]), tolerance * radii[0].max(radii[1]));
         let found = self.look_through(contact, [i, j], (radius, wanted), (by_grid, seed))?;
         self.search.tries += 1;
         self.search.record(found.unwrap_or(contact), None)
     }
 
-    /// The first place in the sphere that is as near to both surfaces as is wanted, or the nearest to both.
+    /// Returns the first point in the sphere within the wanted distance of both surfaces, or else
+    /// the nearest one.
     fn look_through(
         &mut self,
         contact: Contact,
@@ -60,9 +63,10 @@ impl Papers<'_, '_> {
         (by_grid, seed): (bool, u64),
     ) -> ControlFlow<(), Option<Contact>> {
         let [va, vb] = self.search.pair.views;
-        // Spheres of this diameter, as many as cover the large one (Rogers 1963), get a point each.
+        // The large sphere is covered by this number of small ones of that diameter (Rogers 1963),
+        // which get one point each.
         let across = (3.0_f64.sqrt() * 2.0 * radius / wanted).ceil();
-        // A finer grid would end before it is through the sphere.
+        // A finer grid would reach the limit before it covers the sphere.
         let across = if by_grid { across.min(MOST_ACROSS) } else { across };
         let places =
             if by_grid { across.powi(3) } else { f64::from(points_to_draw(across.powi(3), PROBABILITY)) };

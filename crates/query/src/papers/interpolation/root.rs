@@ -1,33 +1,35 @@
-//! A zero of a function along a path, by an interpolation search that ends.
+//! A zero of a function along a path, by an interpolation search that terminates.
 //!
-//! S1's Algorithm 1 goes where a straight line between the two values at the ends of the bracket is zero. As
-//! printed it need not end, and where the function bends it may come nearer by a point at a time
-//! (docs/theory). Ours looks strictly between the ends, halves the value at an end that stays (the Illinois
-//! rule), and bisects where two looks have not halved the stretch: at most three times as many looks as a
-//! bisection by length, and a few in all where the function is nearly linear.
+//! Algorithm 1 of Klein & Zachmann 2005 evaluates where the straight line through the values at the
+//! ends of the bracket is zero. As printed it need not terminate, and for curved functions it may
+//! advance one point at a time (docs/theory). This version evaluates strictly between the ends,
+//! halves the value at an end that stays (the Illinois rule), and bisects if two evaluations have
+//! not halved the interval. It takes at most three times as many evaluations as a bisection by
+//! length, and a few in total if the function is nearly linear.
 
 use nearmiss_graph::{LazyPath, Levels};
 
-/// Points in a row, of which some are known.
+/// A sequence of points, only some of which are known.
 pub(crate) trait Path {
-    /// Number of points that are known.
+    /// The number of known points.
     fn len(&self) -> usize;
-    /// How far the `k`-th of them is from the beginning.
+    /// The distance of the `k`-th known point from the start.
     fn along(&self, k: usize) -> f64;
-    /// See [`LazyPath::look`]. The path may know of a better place than that, unless it must be there.
+    /// See [`LazyPath::look`]. The path may choose a better point than the one at `along`, unless
+    /// `exactly` is set.
     fn look(&mut self, left: usize, right: usize, along: f64, exactly: bool) -> Option<usize>;
 }
 
-/// A path of a graph that has levels, over points in space.
+/// A path of a graph with levels, over points in space.
 pub(crate) struct GraphPath<'a> {
     pub(crate) path: &'a mut LazyPath,
     pub(crate) levels: &'a Levels,
     pub(crate) positions: &'a [[f32; 3]],
-    /// What the function is about the last point that was looked at.
+    /// The function to first order about the last evaluated point.
     pub(crate) slope: Slope,
 }
 
-/// A function to first order: its value at a place, and how fast it grows.
+/// A function to first order: its value at a place and its gradient.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Slope {
     pub(crate) place: [f32; 3],
@@ -55,32 +57,33 @@ impl Path for GraphPath<'_> {
         let (slope, positions) = (self.slope, self.positions);
         let guess = |point: u32| slope.at(positions[point as usize]);
         let guessed = if exactly { None } else { self.path.look_where(self.levels, left, right, guess) };
-        // What is taken apart stays so.
+        // Expanded parts of the path stay expanded.
         guessed.or_else(|| self.path.look(self.levels, left, right, along))
     }
 }
 
-/// Where a search ended.
+/// The result of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Root {
-    /// At a known point where the function is as small as was wanted.
+    /// A known point at which the function is within the tolerance.
     Point(usize),
-    /// Between a known point and the next, which an edge joins and the function has different signs at.
+    /// An edge between a known point and the next, at which the function has different signs.
     Edge {
-        /// The number of the first.
+        /// The index of the first point.
         first: usize,
-        /// Its values at both.
+        /// The values at both points.
         values: [f64; 2],
     },
-    /// At a known point where the function is not defined.
+    /// A known point at which the function is undefined.
     Undefined(usize),
 }
 
-/// So many looks in a row may leave more than half of the stretch.
+/// Evaluations in a row that may leave more than half of the interval.
 const PATIENCE: u32 = 2;
 
-/// Looks for a zero between the ends of `path`, which has two at least, where the function has the `values`,
-/// of different signs; `value` is asked for it at known points by number. None as soon as that gives up.
+/// Searches for a zero between the ends of `path`, which has at least two points. `values` are the
+/// function's values at the ends, with different signs; `value` returns the value at a known point.
+/// Returns `None` as soon as `value` does.
 pub(crate) fn find_root<P: Path>(
     path: &mut P,
     values: [f64; 2],
@@ -95,7 +98,7 @@ pub(crate) fn find_root<P: Path>(
     if at_right.abs() <= tolerance {
         return Some(Root::Point(right));
     }
-    // Of the values at either end, what interpolation believes: half for an end that stayed twice.
+    // Weights of the end values in the interpolation, halved for an end that stayed twice.
     let (mut weight_left, mut weight_right) = (1.0, 1.0);
     let mut left_moved = None;
     let (mut goal, mut idle) = (0.5 * (path.along(right) - path.along(left)), 0);
@@ -108,7 +111,7 @@ pub(crate) fn find_root<P: Path>(
             0.5
         };
         let before = path.len();
-        // Values may be so great that their sum is none.
+        // The values may be so large that their sum overflows.
         let share = if share.is_finite() { share } else { 0.5 };
         let found = path.look(left, right, from + share * (to - from), idle == PATIENCE);
         right += path.len() - before;
@@ -141,7 +144,7 @@ pub(crate) fn find_root<P: Path>(
 mod tests {
     use super::{Path, Root, find_root};
 
-    /// Points at these places, all known.
+    /// Points at these positions, all known.
     struct Places(Vec<f64>);
 
     impl Path for Places {
@@ -162,7 +165,7 @@ mod tests {
         }
     }
 
-    /// Where it ended, and after how many looks.
+    /// Returns the result and the number of evaluations.
     fn search(places: Vec<f64>, f: impl Fn(usize, f64) -> f64) -> (Root, usize) {
         let last = places.len() - 1;
         let values = [f(0, places[0]), f(last, places[last])];
@@ -178,7 +181,7 @@ mod tests {
         (0..m).map(|k| f64::from(u32::try_from(k).unwrap_or(0))).collect()
     }
 
-    /// Looks for every place of the root in a path of `m` points: most, and in the mean.
+    /// Evaluations for every position of the root in a path of `m` points: maximum and mean.
     fn looks(m: usize, f: impl Fn(f64, f64) -> f64) -> (usize, f64) {
         let (mut most, mut all, mut count) = (0, 0, 0.0);
         for k in (0..m - 1).step_by((m / 256).max(1)) {
@@ -192,7 +195,8 @@ mod tests {
         (most, mean)
     }
 
-    /// S1, Algorithm 1, never ends on a line of 50 points; ours takes two looks, whatever the length.
+    /// Algorithm 1 of Klein & Zachmann 2005 never terminates on a line of 50 points. This version
+    /// takes two evaluations, whatever the length.
     #[test]
     fn a_line_takes_two_looks() {
         for m in [2, 3, 50, 4000, 100_000] {
@@ -201,7 +205,7 @@ mod tests {
         }
     }
 
-    /// Functions on which pure interpolation goes point by point.
+    /// Functions on which pure interpolation advances point by point.
     #[test]
     fn bent_functions_take_logarithmically_many_looks() {
         type Function = fn(f64, f64) -> f64;
@@ -220,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Distances along a path over a bent and noisy surface.
+    /// Distances along a path over a curved and noisy surface.
     #[test]
     fn a_distance_takes_a_few_looks_however_many_points_there_are() {
         let mut means = Vec::new();
@@ -235,8 +239,8 @@ mod tests {
         assert!(means[3] <= 6.0 && means[3] <= 2.0 * means[0], "{means:?} looks");
     }
 
-    /// Some change of signs is found however many there are, also where points are unevenly spaced; NaN ends
-    /// the search.
+    /// A change of sign is found however many there are, also if points are unevenly spaced. NaN
+    /// ends the search.
     #[test]
     fn searches_end_on_any_path() {
         let (found, looks) = search(even(4096), |k, _| if k == 0 || k % 2 == 0 { -1.0 } else { 1.0 });

@@ -1,7 +1,8 @@
-//! On which side of b a place is, and how far from it.
+//! The side of b on which a point is, and its distance.
 //!
-//! S1 lets f_B say that everywhere, its sign turned to the normal of the nearest point. Ours ends at the
-//! horizon; beyond, the nearest point says both, as in Hoppe et al. 1992.
+//! Klein & Zachmann 2005 uses f_B for this everywhere, with its sign turned to the normal of the
+//! nearest point. Here f_B is used only within the support radius; beyond, the nearest point gives
+//! both, as in Hoppe et al. 1992.
 
 use nearmiss_geometry::nalgebra::Vector3;
 use nearmiss_surface::Status;
@@ -10,11 +11,11 @@ use super::sides::{CERTAIN, Side};
 use crate::papers::Papers;
 
 impl Papers<'_, '_> {
-    /// The side of a place in the world; fast if b has the point `hint` near there.
+    /// The side of a world point; fast if `hint` is a point of b near it.
     pub(crate) fn side_at(&mut self, x: [f64; 3], hint: u32) -> Side {
         let [_, vb] = self.search.pair.views;
         let local = vb.placed().apply_inverse(x);
-        // Beyond all horizons the side is all that counts.
+        // Beyond all support radii only the side matters.
         let reach = f64::from(vb.scan().plan().horizon(self.search.pair.b.sampling_radius));
         let (near, steps) = vb.scan().nearest_point_within(hint as usize, local, reach);
         let meter = &mut self.search.pair.meter;
@@ -45,7 +46,7 @@ impl Papers<'_, '_> {
         self.side_at(va.point(i as usize), hint)
     }
 
-    /// The same, remembered for a while.
+    /// The same, cached.
     pub(crate) fn side_again(&mut self, i: u32, hint: u32) -> Side {
         match *self.scratch.interpolation.sides.slot(i) {
             Some((point, side)) if point == i => side,

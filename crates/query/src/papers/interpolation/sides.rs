@@ -1,23 +1,23 @@
-//! Sides of places, and what is remembered of them.
+//! Sides of b, and a cache of them.
 
-/// Orientation less certain than this, of 255, says nothing about sides.
+/// The least confidence of an orientation, of 255, that determines sides.
 pub(super) const CERTAIN: u8 = 64;
 
-/// On which side of b a place is.
+/// The side of b on which a point is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Side {
-    /// How far from the surface, in the world: positive outside, negative inside.
+    /// The signed distance from the surface, in the world: positive outside, negative inside.
     pub(crate) distance: f64,
     /// The nearest point of b.
     pub(crate) near: u32,
-    /// How far away that is.
+    /// The distance from that point.
     pub(crate) away: f64,
-    /// Whether the sign means something: normals are oriented there, and sure of it.
+    /// `true` if the sign is meaningful: the normals there are oriented with sufficient confidence.
     pub(crate) is_known: bool,
 }
 
 impl Side {
-    /// The signed distance, if the sign means something.
+    /// The signed distance, if the sign is meaningful.
     pub(crate) fn known(&self) -> Option<f64> {
         self.is_known.then_some(self.distance)
     }
@@ -27,10 +27,10 @@ impl Side {
     }
 }
 
-/// So many sides of points are remembered.
+/// The number of cached sides.
 const REMEMBERED: usize = 1024;
 
-/// Sides of points of a that were looked up last.
+/// A cache of the sides of points of a.
 #[derive(Debug, Clone)]
 pub(crate) struct Cache(Vec<Option<(u32, Side)>>);
 
@@ -41,7 +41,7 @@ impl Default for Cache {
 }
 
 impl Cache {
-    /// Where the side of a point is remembered, with the point that it is of.
+    /// The cache slot for point `i`, with the point whose side it holds.
     pub(crate) fn slot(&mut self, i: u32) -> &mut Option<(u32, Side)> {
         &mut self.0[i as usize % REMEMBERED]
     }

@@ -1,4 +1,4 @@
-//! Which points of a lie in the box of b.
+//! The part of a that is in the box of b.
 
 use std::ops::{ControlFlow, Range};
 
@@ -9,10 +9,11 @@ use nearmiss_lanes::id32;
 use super::volume::{Row, Volume};
 use crate::papers::Papers;
 
-/// The part of a that lies in the box of b is told by no fewer nodes than these, if it has so many.
+/// The least number of nodes that describe the part of a in the box of b, if a has that many.
 const NODES: usize = 128;
 
-/// Where b is, in a's stored frame, and how far outside of it a point of a may reach in.
+/// The box of b in a's stored frame, and the distance outside of it up to which a point of a may
+/// reach into it.
 #[derive(Debug, Clone)]
 pub(crate) struct Bounds {
     volume: OrientedBox,
@@ -32,8 +33,8 @@ impl Papers<'_, '_> {
         Bounds { volume, reach_sq: own * own }
     }
 
-    /// Looks for the part of a in the box of b, as coarsely as will do. `areas` has the areas of all points
-    /// before each.
+    /// Finds the part of a in the box of b, as coarsely as suffices. `areas` holds the prefix sums
+    /// of the areas of all points.
     pub(crate) fn survey(&mut self, areas: &[f64], volume: &mut Volume) -> ControlFlow<()> {
         volume.nodes.clear();
         volume.nodes.push(NodeId::ROOT);

@@ -1,4 +1,4 @@
-//! Points of a in the box of b, drawn by area.
+//! Points of a in the box of b, drawn with probabilities proportional to their areas.
 
 use std::ops::Range;
 
@@ -7,32 +7,33 @@ use rand_xoshiro::rand_core::Rng;
 
 use crate::papers::random::uniform_f64;
 
-/// Points of a in a row, with the area of all rows before them.
+/// A range of points of a, with the area of all ranges before it.
 #[derive(Debug, Clone)]
 pub(crate) struct Row {
     pub(crate) points: Range<u32>,
     pub(crate) before: f64,
 }
 
-/// Points of a in the box of b, and some around.
+/// Ranges that contain the points of a in the box of b, and some near it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Volume {
     pub(crate) nodes: Vec<NodeId>,
     pub(crate) finer: Vec<NodeId>,
     pub(crate) rows: Vec<Row>,
-    /// Of all rows, over π, in a's stored frame.
+    /// The total area divided by π, in a's stored frame.
     pub(crate) area: f64,
-    /// Of all rows.
+    /// The total number of points.
     pub(crate) count: u32,
 }
 
 impl Volume {
-    /// All points of all rows, in order.
+    /// All points of all ranges, in order.
     pub(crate) fn points(&self) -> impl Iterator<Item = u32> {
         self.rows.iter().flat_map(|row| row.points.clone())
     }
 
-    /// A point with a probability by its area, of which `areas` has the sums.
+    /// Draws a point with a probability proportional to its area. `areas` holds the prefix sums of
+    /// the areas.
     pub(crate) fn draw(&self, areas: &[f64], rng: &mut impl Rng) -> Option<u32> {
         let at = uniform_f64(rng) * self.area;
         let row = self.rows.partition_point(|row| row.before <= at).checked_sub(1)?;
@@ -43,8 +44,8 @@ impl Volume {
     }
 }
 
-/// The last of some ascending sums that is not above `wanted`, as the first is: looked for about where it
-/// would be if they rose evenly, in steps that double.
+/// The last of these ascending sums that is at most `wanted`; the first must be. Searches with
+/// doubling steps from where the sum would be if they rose evenly.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -74,7 +75,7 @@ fn last_below(sums: &[f64], range: Range<usize>, wanted: f64) -> usize {
 mod tests {
     use super::last_below;
 
-    /// Even and uneven sums, with equal ones among them, against looking at all.
+    /// Even and uneven sums, with equal ones among them, compared with a linear search.
     #[test]
     fn a_place_is_found_as_by_looking_at_all() {
         let uneven: [fn(f64) -> f64; 4] = [|_| 1.0, |x| x * x, |x| (-x).exp(), |x| (x.sin() > 0.0).into()];
