@@ -6,7 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use nearmiss::{
     Budget, CollideOptions, Contact, Deadline, Detail, Evidence, Interpolation, Method, Metric, Order,
-    PointId, Reason, Sampling, Surfels, Verdict,
+    PointId, Reason, Sampling, SurfelSize, Verdict,
 };
 
 /// Orders by name.
@@ -72,8 +72,8 @@ impl Asking {
             .with_tolerance(self.tolerance)
             .with_flat(self.flat);
         let mut interpolation = Interpolation::default().with_flat(self.flat);
-        let by_radius = self.surfel_radius.map(Surfels::Radius);
-        if let Some(surfels) = by_radius.or(self.surfels.map(Surfels::Count)) {
+        let by_radius = self.surfel_radius.map(SurfelSize::Radius);
+        if let Some(surfels) = by_radius.or(self.surfels.map(SurfelSize::Count)) {
             interpolation = interpolation.with_surfels(surfels);
         }
         let options = CollideOptions::default()

@@ -28,6 +28,7 @@ mod readers;
 mod repository;
 mod tables;
 mod tidy;
+mod words;
 
 use std::process::ExitCode;
 

@@ -6,6 +6,7 @@ use std::process::Command;
 
 use crate::circles::circles;
 use crate::repository::{Outcome, ask_cargo, members, root};
+use crate::words::{PublicTypes, banned_openings};
 
 /// The maximum number of lines of a file: a longer one holds more than one noun or one step.
 const MOST_LINES: usize = 500;
@@ -85,10 +86,16 @@ fn find_faults() -> Outcome<Vec<String>> {
     let references = fs::read_to_string(root().join("docs/theory/references.md"))?;
     let references: Vec<&str> = references.split_whitespace().collect();
     let references = references.join(" ");
+    let mut types = PublicTypes::default();
     for path in &sources {
         let Ok(text) = fs::read_to_string(path) else { continue };
         faults.extend(source_faults(path, &text, &references));
+        let shown = path.strip_prefix(root()).unwrap_or(path);
+        if shown.starts_with("crates") && shown.components().any(|part| part.as_os_str() == "src") {
+            types.add(&shown.display().to_string(), &text);
+        }
     }
+    faults.extend(types.doubled());
     for member in members()? {
         let Some((_, allowed)) = LAYERS.iter().find(|(name, _)| *name == member.name) else {
             faults.push(format!("{}: add it to the table of layers", member.name));
@@ -133,6 +140,11 @@ fn source_faults(path: &Path, text: &str, references: &str) -> Vec<String> {
         if line.trim_start().starts_with("//") && line.chars().count() > COMMENT_WIDTH {
             faults.push(format!("{shown}:{}: a comment reaches beyond column {COMMENT_WIDTH}", number + 1));
         }
+    }
+    for (line, word) in banned_openings(text) {
+        faults.push(format!(
+            "{shown}:{line}: documentation starts with `{word}`; start with a noun phrase or a verb"
+        ));
     }
     // Written in two parts, so that this line is not a fault itself.
     if code.contains(concat!(".partial", "_cmp(")) {

@@ -9,7 +9,8 @@ use std::path::PathBuf;
 use clap::Args;
 use nearmiss::query::points_for;
 use nearmiss::{
-    CollideOptions, CollidePlan, Density, Detail, Interpolation, Method, Pair, Pose, Scan, Scratch, Surfels,
+    CollideOptions, CollidePlan, Density, Detail, Interpolation, Method, Pair, Pose, Scan, Scratch,
+    SurfelSize,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -152,7 +153,7 @@ fn points(surfels: u32) -> u32 {
 }
 
 fn search(surfels: u32) -> Interpolation {
-    Interpolation::default().with_flat(true).with_surfels(Surfels::Count(surfels))
+    Interpolation::default().with_flat(true).with_surfels(SurfelSize::Count(surfels))
 }
 
 /// Questions whose answers the traversal knows.

@@ -288,7 +288,7 @@ fn duration(seconds: f64) -> String {
 mod tests {
     use std::path::PathBuf;
 
-    use nearmiss::mesh::{SampleOptions, Samples, sample};
+    use nearmiss::mesh::{SampleOptions, SampleSize, sample};
 
     use super::*;
 
@@ -341,7 +341,7 @@ mod tests {
             [(&solid, 0.01, 0.05), (&solid, 0.1, 0.2), (&fan, 0.01, 0.2), (&fan, 0.3, 0.5)]
         {
             for is_jittered in [false, true] {
-                let mut options = SampleOptions::new(Samples::Spacing(spacing));
+                let mut options = SampleOptions::new(SampleSize::Spacing(spacing));
                 options.seed = is_jittered.then_some(1);
                 let count = to_float(sample(mesh, &options).unwrap().len() as u64);
                 let share = samples(mesh, spacing, is_jittered) / count;

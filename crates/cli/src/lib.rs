@@ -83,7 +83,7 @@ pub use path::PathArgs;
 pub use picture::contact_picture;
 pub use poses::PosesArgs;
 pub use posing::PairArgs;
-pub use preprocess::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
+pub use preprocess::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, WeightName};
 pub use sample::SampleArgs;
 pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
 pub use slices::{

@@ -16,7 +16,7 @@ use crate::report::ScanReport;
 use args::{graph_options, options};
 use outcome::{Seconds, save, tell};
 
-pub use args::{FormatChoice, PathsName, Place, PreprocessArgs, WeightName};
+pub use args::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, WeightName};
 pub(crate) use args::{parse_format, parse_threads};
 
 pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {

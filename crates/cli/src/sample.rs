@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use nearmiss::io::PlyPoints;
-use nearmiss::mesh::{SampleOptions, Samples, sample};
+use nearmiss::mesh::{SampleOptions, SampleSize, sample};
 use serde::Serialize;
 
 use crate::console::{Console, Results, now};
@@ -65,8 +65,8 @@ pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
         check_sampling(&args.input, args.memory.limit(), console, &mesh, (spacing, args.seed.is_some()))?;
     }
     let samples = match (args.spacing, args.points) {
-        (Some(spacing), _) => Samples::Spacing(spacing),
-        (None, points) => Samples::Count(points.unwrap_or(0)),
+        (Some(spacing), _) => SampleSize::Spacing(spacing),
+        (None, points) => SampleSize::Count(points.unwrap_or(0)),
     };
     let mut options = SampleOptions::new(samples);
     options.seed = args.seed;

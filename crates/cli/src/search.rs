@@ -1,7 +1,9 @@
 //! The search options of `collide`: methods, orders, resolution.
 
 use clap::{Args, ValueEnum};
-use nearmiss::{Brackets, CollideOptions, Interpolation, Method, Order, Refinement, Sampling, Scan, Surfels};
+use nearmiss::{
+    Brackets, CollideOptions, Interpolation, Method, Order, Refinement, Sampling, Scan, SurfelSize,
+};
 
 use crate::error::CliError;
 use crate::parse::parse_radius;
@@ -30,7 +32,7 @@ pub struct SearchArgs {
     /// A number, or `adapted` for surfels that are 8 sampling radii wide. By default the number
     /// that `density --store` kept with a, or 30.
     #[arg(long, value_name = "A", value_parser = parse_surfels, help_heading = "Research", hide_short_help = true)]
-    pub surfels: Option<Surfels>,
+    pub surfels: Option<SurfelSize>,
     /// Probability that a surfel gets a point, with `--method interpolation --flat`
     #[arg(long, value_name = "P", default_value_t = Interpolation::default().probability, help_heading = "Research", hide_short_help = true)]
     pub probability: f64,
@@ -93,11 +95,11 @@ const IN_A_SPHERE: f64 = 0.1;
 /// Surfels adapted to the sampling density are so many sampling radii wide.
 const ADAPTED: f64 = 8.0;
 
-fn parse_surfels(text: &str) -> Result<Surfels, String> {
+fn parse_surfels(text: &str) -> Result<SurfelSize, String> {
     if text == "adapted" {
-        return Ok(Surfels::Radius(ADAPTED));
+        return Ok(SurfelSize::Radius(ADAPTED));
     }
-    let count = text.parse().ok().filter(|count| (1..=65_536).contains(count)).map(Surfels::Count);
+    let count = text.parse().ok().filter(|count| (1..=65_536).contains(count)).map(SurfelSize::Count);
     count.ok_or_else(|| "expected a number from 1 to 65536, or `adapted`".into())
 }
 
@@ -144,7 +146,7 @@ impl SearchArgs {
             .with_tolerance(self.tolerance)
             .with_seed(self.seed)
             .with_flat(self.flat);
-        let stored = a.density().map(|density| Surfels::Count(density.surfels.clamp(1, 65_536)));
+        let stored = a.density().map(|density| SurfelSize::Count(density.surfels.clamp(1, 65_536)));
         let interpolation = Interpolation::default()
             .with_surfels(self.surfels.or(stored).unwrap_or(Interpolation::default().surfels))
             .with_probability(self.probability)

@@ -41,7 +41,7 @@ const RINGS: usize = 1;
 
 /// The cells of a level. Their centres are points of the finer level.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cells {
+pub struct LevelCells {
     /// Cell of each point of the finer level.
     pub(crate) owner: Array<u32>,
     /// Distance of each point of the finer level from the centre of its cell.
@@ -66,7 +66,7 @@ pub struct Cells {
 /// Increasingly coarse levels over a graph.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Levels {
-    pub(crate) cells: Vec<Cells>,
+    pub(crate) cells: Vec<LevelCells>,
 }
 
 /// Scratch memory for searches. Reuse it for later searches.
@@ -145,7 +145,7 @@ impl LevelScratch {
     }
 }
 
-impl Cells {
+impl LevelCells {
     /// Builds the next level over a graph whose points have these local sampling radii. Takes
     /// O(n log n) time on one core.
     fn over(network: Network<'_>, radii: &[f32], scratch: &mut GeodesicScratch) -> Self {
@@ -371,14 +371,14 @@ impl Levels {
     pub fn build(network: Network<'_>, radii: &[f32]) -> Self {
         assert_eq!(network.len(), radii.len(), "a radius a point");
         let mut scratch = GeodesicScratch::default();
-        let mut cells: Vec<Cells> = Vec::new();
+        let mut cells: Vec<LevelCells> = Vec::new();
         loop {
             let (finer, radii) =
                 cells.last().map_or((network, radii), |cells| (cells.network(), &cells.radii));
             if finer.len() <= FEW {
                 break;
             }
-            let mut next = Cells::over(finer, radii, &mut scratch);
+            let mut next = LevelCells::over(finer, radii, &mut scratch);
             #[expect(clippy::cast_precision_loss, reason = "a share")]
             if next.len() as f64 > MOST_KEPT * finer.len() as f64 {
                 break;
@@ -391,14 +391,14 @@ impl Levels {
 
     /// Returns the levels, finest first.
     #[must_use]
-    pub fn cells(&self) -> &[Cells] {
+    pub fn cells(&self) -> &[LevelCells] {
         &self.cells
     }
 
     /// Returns the size of all arrays in bytes.
     #[must_use]
     pub fn byte_len(&self) -> usize {
-        self.cells.iter().map(Cells::byte_len).sum()
+        self.cells.iter().map(LevelCells::byte_len).sum()
     }
 
     /// Returns the length of a path from `a` to `b` in the graph that the levels are over; `None`

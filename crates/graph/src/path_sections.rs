@@ -6,7 +6,7 @@ use nearmiss_store::{Array, Check, File, Flaw, LoadError, OpenError, WriteError,
 use crate::Adjacency;
 use crate::close_list::{BESIDE, is_floor, pack, rounded};
 use crate::close_pairs::ClosePairs;
-use crate::levels::{Cells, Levels};
+use crate::levels::{LevelCells, Levels};
 
 /// Part 0 belongs to the points, part k to the cells of level k.
 const LIST_STARTS: [u8; 4] = *b"CPST";
@@ -159,7 +159,7 @@ impl Levels {
     /// Fails if a section is missing, holds values that no build writes, or contradicts another
     /// section.
     pub fn load(file: &File, points: usize, check: Check) -> Result<Self, LoadError> {
-        let mut cells: Vec<Cells> = Vec::new();
+        let mut cells: Vec<LevelCells> = Vec::new();
         let mut finer = points;
         for part in (1..).take_while(|&part| file.has(OWNERS, part)) {
             let mut next = load_cells(file, part)?;
@@ -180,8 +180,8 @@ impl Levels {
     }
 }
 
-fn load_cells(file: &File, part: u32) -> Result<Cells, OpenError> {
-    Ok(Cells {
+fn load_cells(file: &File, part: u32) -> Result<LevelCells, OpenError> {
+    Ok(LevelCells {
         owner: file.array(OWNERS, part)?,
         to_centre: file.array(TO_CENTRE, part)?,
         inwards: file.array(INWARDS, part)?,
@@ -194,7 +194,7 @@ fn load_cells(file: &File, part: u32) -> Result<Cells, OpenError> {
     })
 }
 
-impl Cells {
+impl LevelCells {
     fn check_structure(&self, finer: usize) -> Result<(), Flaw> {
         Flaw::length("cells", self.owner.len(), finer)?;
         Flaw::length("distances within cells", self.to_centre.len(), finer)?;

@@ -24,7 +24,7 @@ const PARTS: [u8; 4] = *b"PART";
 
 /// The samples of a surface that a graph is built over, in the order of the hierarchy's leaves.
 #[derive(Debug, Clone, Copy)]
-pub struct Samples<'a> {
+pub struct SurfaceSamples<'a> {
     /// Options that define the surface.
     pub plan: &'a SurfacePlan,
     /// Positions of the samples.
@@ -102,7 +102,7 @@ impl SurfaceGraph {
     /// Panics if the numbers of positions, radii and normals, including those of `sides` if any,
     /// differ.
     pub fn build(
-        samples: Samples<'_>,
+        samples: SurfaceSamples<'_>,
         sides: Sides<'_>,
         normals: &mut [[f32; 3]],
         options: &GraphOptions,
@@ -126,7 +126,7 @@ impl SurfaceGraph {
         })
     }
 
-    fn with_close_pairs(self, samples: Samples<'_>, paths: Paths) -> Self {
+    fn with_close_pairs(self, samples: SurfaceSamples<'_>, paths: Paths) -> Self {
         let network = self.network(samples.positions);
         let map = |network, radii: &[f32]| ClosePairs::build(network, &horizons(samples.plan, radii), paths);
         // Building levels uses one core only.
@@ -219,7 +219,7 @@ impl SurfaceGraph {
     /// Computes everything that searches along the graph otherwise compute at first use: lengths,
     /// [areas](Self::areas), [bridges](Self::bridged_network) and [levels](Self::levels). Takes
     /// O(e log e) time for e edges. The first search is then as fast as later ones.
-    pub fn make_ready(&self, samples: Samples<'_>) {
+    pub fn make_ready(&self, samples: SurfaceSamples<'_>) {
         let _ = self.levels(samples.positions, samples.radii);
         let _ = self.bridged_network(samples.positions);
         let _ = self.areas(samples.radii);
@@ -257,8 +257,8 @@ impl SurfaceGraph {
     /// # Panics
     /// Panics if `samples` are not the samples that the graph was built over.
     #[must_use]
-    pub fn kernel<'a>(&'a self, samples: Samples<'a>) -> Option<GeodesicKernel<'a>> {
-        let Samples { plan, positions, radii } = samples;
+    pub fn kernel<'a>(&'a self, samples: SurfaceSamples<'a>) -> Option<GeodesicKernel<'a>> {
+        let SurfaceSamples { plan, positions, radii } = samples;
         let pairs = self.close_pairs()?;
         Some(GeodesicKernel::new(plan, positions, radii, self.points.edges(), pairs))
     }

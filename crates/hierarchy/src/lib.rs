@@ -17,7 +17,7 @@ pub use descent::{
     TreePair, descend, resume,
 };
 pub use patch::covering::Covering;
-pub use patch::samples::Samples;
+pub use patch::samples::NodeSamples;
 pub use point::disc::DiscRadii;
 pub use point::gather::{GatherScratch, NeighbourList};
 pub use point::kind::{PointKind, SLAB, THICKNESS};
@@ -30,6 +30,6 @@ pub use scan::options::{BuildError, BuildOptions};
 pub use scan::outline::{Ball, Outline};
 pub use scan::points::ScanPoints;
 pub use scan::slices::Slices;
-pub use scan::survey::Survey;
+pub use scan::survey::SamplingSurvey;
 pub use tree::topology::{Children, Grandchildren, LaneNodes, MOST_LEAF_POINTS, NodePair, Topology};
 pub use tree::wide::{Growths, NodeBounds, Siblings, Tree, whole};

@@ -19,7 +19,7 @@ mod nearest;
 mod skeleton;
 mod walk;
 
-pub use cells::Cells;
+pub use cells::BlockGrid;
 pub use cones::Cones;
 pub use heard::Heard;
 pub use nearest::{Nearest, Neighbour};

@@ -6,4 +6,4 @@ mod sample;
 mod triangle;
 
 pub use lattice::{Lattice, lattice_samples};
-pub use sample::{SampleError, SampleOptions, Samples, sample};
+pub use sample::{SampleError, SampleOptions, SampleSize, sample};

@@ -20,7 +20,7 @@ const JITTER: f64 = 0.2;
 
 /// Density or number of samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Samples {
+pub enum SampleSize {
     /// Greatest distance from any point of the surface to its nearest sample, in the units of the
     /// mesh.
     Spacing(f64),
@@ -33,7 +33,7 @@ pub enum Samples {
 #[non_exhaustive]
 pub struct SampleOptions {
     /// Density or number of samples.
-    pub samples: Samples,
+    pub samples: SampleSize,
     /// Seed of the random numbers.
     ///
     /// Without a seed, samples at a spacing form regular rows. With a seed, each sample is
@@ -45,7 +45,7 @@ pub struct SampleOptions {
 impl SampleOptions {
     /// Creates options without a seed.
     #[must_use]
-    pub const fn new(samples: Samples) -> Self {
+    pub const fn new(samples: SampleSize) -> Self {
         Self { samples, seed: None }
     }
 
@@ -101,11 +101,11 @@ pub fn sample(mesh: &TriangleMesh, options: &SampleOptions) -> Result<Vec<[f64; 
     let triangles = mesh.triangles().iter().map(|t| Triangle::new(t.map(|v| vertices[v as usize])));
     let triangles: Vec<Triangle> = triangles.collect();
     match options.samples {
-        Samples::Spacing(spacing) if spacing > 0.0 && spacing.is_finite() => {
+        SampleSize::Spacing(spacing) if spacing > 0.0 && spacing.is_finite() => {
             spaced(&triangles, spacing, options.seed)
         }
-        Samples::Spacing(spacing) => Err(SampleError::Spacing { spacing }),
-        Samples::Count(count) => counted(&triangles, count, options.seed.unwrap_or(0)),
+        SampleSize::Spacing(spacing) => Err(SampleError::Spacing { spacing }),
+        SampleSize::Count(count) => counted(&triangles, count, options.seed.unwrap_or(0)),
     }
 }
 

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use nearmiss_geometry::TriangleMesh;
-use nearmiss_mesh::{Lattice, SampleError, SampleOptions, Samples, lattice_samples, sample};
+use nearmiss_mesh::{Lattice, SampleError, SampleOptions, SampleSize, lattice_samples, sample};
 
 /// Triangles of many shapes: right, flat, needle-thin, obtuse, tiny, huge, without area, a point.
 const CORNERS: [[[f64; 3]; 3]; 9] = [
@@ -51,7 +51,7 @@ fn off_the_mesh(p: [f64; 3]) -> f64 {
 fn no_place_is_further_from_a_sample_than_asked() {
     for seed in [None, Some(3)] {
         for spacing in [0.5, 0.13] {
-            let mut options = SampleOptions::new(Samples::Spacing(spacing));
+            let mut options = SampleOptions::new(SampleSize::Spacing(spacing));
             options.seed = seed;
             let points = sample(&mesh(), &options).unwrap();
             let mut farthest = 0.0_f64;
@@ -72,8 +72,8 @@ fn no_place_is_further_from_a_sample_than_asked() {
             assert_eq!(sample(&mesh(), &options).unwrap(), points, "the same again");
         }
     }
-    let rows = sample(&mesh(), &SampleOptions::new(Samples::Spacing(0.13))).unwrap();
-    let moved = sample(&mesh(), &SampleOptions::new(Samples::Spacing(0.13)).with_seed(1)).unwrap();
+    let rows = sample(&mesh(), &SampleOptions::new(SampleSize::Spacing(0.13))).unwrap();
+    let moved = sample(&mesh(), &SampleOptions::new(SampleSize::Spacing(0.13)).with_seed(1)).unwrap();
     assert!(moved.len() < 2 * rows.len(), "{} in rows, {} moved", rows.len(), moved.len());
 }
 
@@ -85,7 +85,7 @@ fn a_number_of_samples_is_spread_by_area() {
     let vertices = [square(0.0, 1.0), square(5.0, 3.0)].concat();
     let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]).unwrap();
     for seed in 0..5 {
-        let points = sample(&mesh, &SampleOptions::new(Samples::Count(10_000)).with_seed(seed)).unwrap();
+        let points = sample(&mesh, &SampleOptions::new(SampleSize::Count(10_000)).with_seed(seed)).unwrap();
         assert_eq!(points.len(), 10_000);
         let small = points.iter().filter(|p| p[0] <= 1.0).count();
         assert!(small.abs_diff(1000) <= 2, "{small} of 10000 on a tenth of the area");
@@ -100,7 +100,7 @@ fn a_number_of_samples_is_spread_by_area() {
             assert!(count.abs_diff(1000) < 160, "{count} in cell {cell}");
         }
     }
-    let drawn = |seed| sample(&mesh, &SampleOptions::new(Samples::Count(100)).with_seed(seed)).unwrap();
+    let drawn = |seed| sample(&mesh, &SampleOptions::new(SampleSize::Count(100)).with_seed(seed)).unwrap();
     assert_ne!(drawn(1), drawn(2));
 }
 
@@ -185,14 +185,16 @@ fn of_what_reaches_beyond_the_lattice_the_part_inside_is_sampled_in_bounded_time
 #[test]
 fn what_cannot_be_sampled_is_refused() {
     let refused = |mesh: &TriangleMesh, samples| sample(mesh, &SampleOptions::new(samples)).unwrap_err();
-    assert_eq!(refused(&mesh(), Samples::Spacing(0.0)), SampleError::Spacing { spacing: 0.0 });
-    assert!(matches!(refused(&mesh(), Samples::Spacing(f64::NAN)), SampleError::Spacing { .. }));
-    assert!(matches!(refused(&mesh(), Samples::Spacing(1e-9)), SampleError::TooMany { .. }));
+    assert_eq!(refused(&mesh(), SampleSize::Spacing(0.0)), SampleError::Spacing { spacing: 0.0 });
+    assert!(matches!(refused(&mesh(), SampleSize::Spacing(f64::NAN)), SampleError::Spacing { .. }));
+    assert!(matches!(refused(&mesh(), SampleSize::Spacing(1e-9)), SampleError::TooMany { .. }));
     let flat = TriangleMesh::new(vec![[0.0; 3], [1.0; 3]], vec![[0, 1, 1]]).unwrap();
-    assert_eq!(refused(&flat, Samples::Count(10)), SampleError::NoArea);
-    assert!(!sample(&flat, &SampleOptions::new(Samples::Spacing(0.1))).unwrap().is_empty(), "a line");
+    assert_eq!(refused(&flat, SampleSize::Count(10)), SampleError::NoArea);
+    assert!(!sample(&flat, &SampleOptions::new(SampleSize::Spacing(0.1))).unwrap().is_empty(), "a line");
     let broken = TriangleMesh::new(vec![[0.0; 3], [1.0, f64::NAN, 0.0]], vec![[0, 1, 1]]).unwrap();
-    assert_eq!(refused(&broken, Samples::Spacing(0.1)), SampleError::NotFinite { vertex: 1 });
-    assert_eq!(refused(&TriangleMesh::default(), Samples::Count(1)), SampleError::NoArea);
-    assert!(sample(&TriangleMesh::default(), &SampleOptions::new(Samples::Spacing(1.0))).unwrap().is_empty());
+    assert_eq!(refused(&broken, SampleSize::Spacing(0.1)), SampleError::NotFinite { vertex: 1 });
+    assert_eq!(refused(&TriangleMesh::default(), SampleSize::Count(1)), SampleError::NoArea);
+    assert!(
+        sample(&TriangleMesh::default(), &SampleOptions::new(SampleSize::Spacing(1.0))).unwrap().is_empty()
+    );
 }

@@ -35,7 +35,7 @@ pub use nearmiss_query::{
     Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions,
     DistancePlan, Evidence, Interpolation, ManifoldPoint, Method, NearestPoint, Order, Pacer, Pair, PairHint,
     Placed, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
-    ShapeIndex, Statistics, Surfels, Until, Verdict, World, each,
+    ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

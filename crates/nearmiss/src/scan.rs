@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use nearmiss_geometry::{PointCloud, Pose, Scanner};
 use nearmiss_graph::{
-    GeodesicKernel, GraphError, GraphOptions, KernelScratch, Samples, Sides, SurfaceGraph, SurfaceGraphMeta,
-    Viewpoint,
+    GeodesicKernel, GraphError, GraphOptions, KernelScratch, Sides, SurfaceGraph, SurfaceGraphMeta,
+    SurfaceSamples, Viewpoint,
 };
 use nearmiss_hierarchy::{BuildError, BuildOptions, HierarchyMeta, PointHierarchy, ScanPoints};
 use nearmiss_query::{Placed, Prepared, ShapeIndex};
@@ -193,7 +193,7 @@ impl Scan {
         let mut hierarchy = Arc::unwrap_or_clone(hierarchy);
         let (positions, radii) = (hierarchy.positions().to_vec(), hierarchy.radii().to_vec());
         let plan = *hierarchy.plan();
-        let samples = Samples { plan: &plan, positions: &positions, radii: &radii };
+        let samples = SurfaceSamples { plan: &plan, positions: &positions, radii: &radii };
         let kernel = graph.kernel(samples).ok_or(GraphError::NoClosePairs)?;
         hierarchy.use_metric(Metric::Geodesic, |i, scratch: &mut KernelScratch, heard| {
             let (at, near) = kernel.evaluate_at(i, scratch);
@@ -364,8 +364,8 @@ impl Prepared for Scan {
 }
 
 /// Returns the points as the graph needs them.
-fn samples(hierarchy: &PointHierarchy) -> Samples<'_> {
-    Samples { plan: hierarchy.plan(), positions: hierarchy.positions(), radii: hierarchy.radii() }
+fn samples(hierarchy: &PointHierarchy) -> SurfaceSamples<'_> {
+    SurfaceSamples { plan: hierarchy.plan(), positions: hierarchy.positions(), radii: hierarchy.radii() }
 }
 
 /// Returns for each point, in the order of the hierarchy, the position of its scanner in the local

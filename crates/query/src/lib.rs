@@ -14,7 +14,7 @@ mod shape;
 
 pub use ask::answer::{Answer, Contact, Contacts, Evidence, ManifoldPoint, Reason, Statistics, Verdict};
 pub use ask::budget::{Budget, Deadline};
-pub use ask::interpolation::{Brackets, Interpolation, Refinement, Surfels};
+pub use ask::interpolation::{Brackets, Interpolation, Refinement, SurfelSize};
 pub use ask::occupancy::{occupancy, points_for};
 pub use ask::options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};
 pub use contact::certificate::Proof;

@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use nearmiss::{
     Answer, BuildOptions, CollideOptions, CollidePlan, Contacts, Detail, GraphOptions, Interpolation, Method,
-    Pair, Pose, Sampling, Scan, Scratch, Surfels,
+    Pair, Pose, Sampling, Scan, Scratch, SurfelSize,
 };
 use nearmiss_benches::clock::{nanoseconds, timed};
 use nearmiss_benches::figures::FigureOptions;
@@ -87,7 +87,7 @@ fn verdict(method: Method) -> CollideOptions {
 
 /// Without hierarchy, by brackets alone as in the paper, or with approaches too.
 fn interpolation(surfels: u32, approaches: bool) -> Interpolation {
-    let search = Interpolation::default().with_flat(true).with_surfels(Surfels::Count(surfels));
+    let search = Interpolation::default().with_flat(true).with_surfels(SurfelSize::Count(surfels));
     if approaches { search } else { search.with_approaches(0) }
 }
 

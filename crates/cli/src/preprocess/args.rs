@@ -77,7 +77,7 @@ pub struct PreprocessArgs {
     /// Position of the scanner, in the frame of the input: normals are turned towards it;
     /// implies --graph
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = parse_place, help_heading = "Graph")]
-    pub scanner: Option<Place>,
+    pub scanner: Option<ScannerPosition>,
     /// Threads; 0 for all cores; the result does not depend on it
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads, help_heading = "Output")]
     pub threads: usize,
@@ -119,15 +119,17 @@ pub enum PathsName {
 
 /// A place in the frame of the input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place(
+pub struct ScannerPosition(
     /// Its coordinates.
     pub [f64; 3],
 );
 
-fn parse_place(text: &str) -> Result<Place, String> {
+fn parse_place(text: &str) -> Result<ScannerPosition, String> {
     let numbers: Vec<f64> = pieces(text).map_while(|piece| piece.parse().ok()).collect();
     match <[f64; 3]>::try_from(numbers) {
-        Ok(place) if pieces(text).count() == 3 && place.iter().all(|c| c.is_finite()) => Ok(Place(place)),
+        Ok(place) if pieces(text).count() == 3 && place.iter().all(|c| c.is_finite()) => {
+            Ok(ScannerPosition(place))
+        }
         _ => Err("expected three numbers, x,y,z".into()),
     }
 }

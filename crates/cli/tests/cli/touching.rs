@@ -60,7 +60,11 @@ fn what_is_no_shape_is_refused_with_its_line() {
         place.refused(1, &["touch", "ball.xyz", "--shapes", "shapes.jsonl"], words);
     }
     place.write("shapes.jsonl", "\n\n");
-    place.refused(1, &["touch", "ball.xyz", "--shapes", "shapes.jsonl"], &["expected shapes, got none", "sphere"]);
+    place.refused(
+        1,
+        &["touch", "ball.xyz", "--shapes", "shapes.jsonl"],
+        &["expected shapes, got none", "sphere"],
+    );
     place.refused(2, &["touch", "ball.xyz"], &["--shapes"]);
     place.refused(1, &["touch", "ball.xyz", "--shapes", "none.jsonl"], &["none.jsonl", "no such file"]);
 }

@@ -1,7 +1,7 @@
 //! Coarser levels: guarantees about centres and cells, and paths compared with searches of the
 //! whole graph.
 use crate::clouds::{Cloud, single};
-use nearmiss_graph::{Adjacency, Cells, GeodesicScratch, LevelScratch, Levels, Network};
+use nearmiss_graph::{Adjacency, GeodesicScratch, LevelCells, LevelScratch, Levels, Network};
 use nearmiss_testdata::arbitrary::{CloudKind, cloud};
 use nearmiss_testdata::shapes::{Form, bowl, plates, torus};
 
@@ -10,7 +10,7 @@ fn torus_cloud() -> Cloud {
 }
 
 /// Checks the guarantees of one level.
-fn check(network: Network<'_>, radii: &[f32], cells: &Cells) {
+fn check(network: Network<'_>, radii: &[f32], cells: &LevelCells) {
     let mut scratch = GeodesicScratch::default();
     let n = u32::try_from(network.len()).unwrap();
     assert!(cells.centres().windows(2).all(|two| two[0] < two[1]), "centres ascend");

@@ -20,7 +20,7 @@ use crate::bounds::boxes::OrientedBox;
 use crate::bounds::growth::Growth;
 use crate::patch::centres::{Centres, WIDTH, fold_min};
 use crate::patch::enclosure::Cell;
-use crate::patch::samples::Samples;
+use crate::patch::samples::NodeSamples;
 use crate::point::kind::THICKNESS;
 use crate::point::spacing::fold_nodes;
 use crate::tree::topology::{TREE_STACK, Topology};
@@ -51,7 +51,7 @@ const CANCELLED: f32 = 1.0 + 2e-6;
 const LOST: f32 = 1e-20;
 
 /// Returns the positions of the samples of a node.
-pub(crate) fn centres_of(samples: Samples<'_>, positions: &[[f32; 3]]) -> Centres {
+pub(crate) fn centres_of(samples: NodeSamples<'_>, positions: &[[f32; 3]]) -> Centres {
     let mut centres = Centres::default();
     for i in samples.iter() {
         centres.push(positions[i]);
@@ -161,7 +161,7 @@ pub(crate) struct Ground<'a> {
 /// Sets `out` to the coverings of all nodes with these samples.
 pub(crate) fn coverings<'a>(
     ground: &Ground<'_>,
-    samples: impl Fn(NodeId) -> Samples<'a> + Sync + Send,
+    samples: impl Fn(NodeId) -> NodeSamples<'a> + Sync + Send,
     out: &mut [Covering],
 ) {
     let Ground { topology, positions, radii, .. } = *ground;

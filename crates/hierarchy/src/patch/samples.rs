@@ -36,7 +36,7 @@ const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The sample of a node, as indices of points in leaf order, ascending.
 #[derive(Debug, Clone, Copy)]
-pub struct Samples<'a> {
+pub struct NodeSamples<'a> {
     /// The first of the points, all of which are samples if there is no list.
     first: usize,
     len: usize,
@@ -45,7 +45,7 @@ pub struct Samples<'a> {
     last: usize,
 }
 
-impl<'a> Samples<'a> {
+impl<'a> NodeSamples<'a> {
     /// Returns all points of a node as its sample.
     #[inline]
     pub(crate) fn all(points: &Range<usize>) -> Self {
@@ -77,13 +77,13 @@ impl<'a> Samples<'a> {
 
 /// Returns the sample of a node.
 #[inline]
-pub(crate) fn samples<'a>(lists: &'a [u32], topology: &Topology, id: NodeId, count: u32) -> Samples<'a> {
+pub(crate) fn samples<'a>(lists: &'a [u32], topology: &Topology, id: NodeId, count: u32) -> NodeSamples<'a> {
     let points = topology.points(id);
     let count = count as usize;
     if topology.is_leaf(id) || points.len() <= count {
-        return Samples::all(&points);
+        return NodeSamples::all(&points);
     }
-    Samples::listed(&lists[id.index() * count..][..count], &points)
+    NodeSamples::listed(&lists[id.index() * count..][..count], &points)
 }
 
 /// Draws `count` distinct points of the inner node `id`, ascending. If the node has no more,

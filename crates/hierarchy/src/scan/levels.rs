@@ -6,7 +6,7 @@ use nearmiss_index::PointBlock;
 use nearmiss_lanes::id32;
 use nearmiss_surface::{Evaluation, Moments};
 
-use crate::patch::samples::{Samples, samples};
+use crate::patch::samples::{NodeSamples, samples};
 use crate::point::gather::GatherScratch;
 use crate::scan::build::PointHierarchy;
 use crate::scan::slices::Slices;
@@ -19,7 +19,7 @@ impl<'a> Slices<'a> {
     /// If there is no such node.
     #[inline]
     #[must_use]
-    pub fn samples(&self, node: usize) -> Samples<'a> {
+    pub fn samples(&self, node: usize) -> NodeSamples<'a> {
         samples(self.sample_lists, self.tree.topology, NodeId(id32(node)), self.samples_a_node)
     }
 

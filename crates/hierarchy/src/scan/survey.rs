@@ -49,7 +49,7 @@ const LEVEL: f64 = 0.15;
 
 /// Estimates from a sample of a scan's points. Lengths are in the caller's units.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Survey {
+pub struct SamplingSurvey {
     /// The distance of each sampled point except outliers to its sixth neighbour, ascending, and
     /// the share of all points that it represents.
     pub spacings: Vec<(f64, f64)>,
@@ -80,9 +80,9 @@ impl PointHierarchy {
     /// threads.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "counts")]
-    pub fn survey(&self, seed: u64) -> Survey {
+    pub fn survey(&self, seed: u64) -> SamplingSurvey {
         let slices = self.slices();
-        let mut survey = Survey::default();
+        let mut survey = SamplingSurvey::default();
         let parts = [(0..slices.dense, BLOCKS), (slices.dense..self.len(), BLOCKS / 2)];
         for (points, most) in parts {
             if points.is_empty() {

@@ -29,7 +29,7 @@ const CROWDED: u32 = u32::MAX;
 /// A grid that lists the nearby blocks of a [`BlockTree`] for each cell. Takes about 20 bytes for
 /// each point.
 #[derive(Debug, Clone)]
-pub struct Cells {
+pub struct BlockGrid {
     min: [f64; 3],
     per_cell: f64,
     size: [usize; 3],
@@ -52,7 +52,7 @@ struct Named {
 impl BlockTree<'_> {
     /// Builds a grid of cubes over all points, with at most one cell for each point. O(n).
     #[must_use]
-    pub fn cells(&self, level: Level) -> Cells {
+    pub fn cells(&self, level: Level) -> BlockGrid {
         let mut cells = self.grid();
         let mut all = Vec::new();
         for block in 0..self.blocks.len() {
@@ -94,7 +94,7 @@ impl BlockTree<'_> {
 
     /// Appends an entry to `all` for each cell that lists a block.
     #[inline(always)]
-    fn name<S: Simd>(&self, simd: S, block: usize, cells: &Cells, all: &mut Vec<Named>) {
+    fn name<S: Simd>(&self, simd: S, block: usize, cells: &BlockGrid, all: &mut Vec<Named>) {
         let points = load(simd, &self.blocks[block].position);
         let present = (1_u32 << self.count(block)) - 1;
         let [xs, ys, zs] = cells.reached(&self.bounds(0, block));
@@ -127,7 +127,7 @@ impl BlockTree<'_> {
         clippy::cast_sign_loss,
         reason = "cells are counted in small numbers"
     )]
-    fn grid(&self) -> Cells {
+    fn grid(&self) -> BlockGrid {
         let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for block in 0..self.blocks.len() {
             let bounds = self.bounds(0, block);
@@ -149,7 +149,7 @@ impl BlockTree<'_> {
         let margin = MARGIN * edge;
         let far = (0..3).fold(edge, |far, k| far.max(min[k].abs()).max(max[k].abs()));
         let size = [0, 1, 2].map(|k| ((max[k] - min[k]) / edge + 2.0 * MARGIN) as usize + 1);
-        Cells {
+        BlockGrid {
             min: min.map(|c| c - margin),
             per_cell: 1.0 / edge,
             size,
@@ -161,7 +161,7 @@ impl BlockTree<'_> {
     }
 }
 
-impl Cells {
+impl BlockGrid {
     /// Returns the blocks that may have points within `radius` of `place`, roughly nearest first.
     /// Returns `None` if the grid cannot tell: `radius` exceeds about half a cell, or more than 24
     /// blocks are near the cell. O(1).

@@ -47,7 +47,7 @@ impl BlockTree<'_> {
     }
 
     /// Like [`Self::any_within`], for a ball around `centre` and the blocks `near` it from
-    /// [`Cells::near`](crate::Cells::near). Tests these few blocks instead of descending from the
+    /// [`BlockGrid::near`](crate::BlockGrid::near). Tests these few blocks instead of descending from the
     /// root; with `None` it descends.
     ///
     /// # Panics

@@ -18,7 +18,7 @@ use crate::ask::occupancy::points_to_draw;
 #[non_exhaustive]
 pub struct Interpolation {
     /// The notional partition into surfels of the part of a's surface that is near b.
-    pub surfels: Surfels,
+    pub surfels: SurfelSize,
     /// The probability that every surfel contains a drawn point (Klein & Zachmann 2005, Lemma 1):
     /// above 0 and below 1; default 0.97.
     pub probability: f64,
@@ -42,7 +42,7 @@ pub struct Interpolation {
 
 /// The size of surfels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Surfels {
+pub enum SurfelSize {
     /// This many surfels, whatever the number of points: 1 to 65,536. Default: 30, for about 200
     /// points (Klein & Zachmann 2005, §4.1).
     Count(u32),
@@ -79,7 +79,7 @@ pub enum Refinement {
 impl Default for Interpolation {
     fn default() -> Self {
         Self {
-            surfels: Surfels::Count(30),
+            surfels: SurfelSize::Count(30),
             probability: 0.97,
             brackets: Brackets::Drawn,
             refinement: Refinement::Newton,
@@ -93,7 +93,7 @@ impl Default for Interpolation {
 impl Interpolation {
     /// The same search with these surfels.
     #[must_use]
-    pub const fn with_surfels(self, surfels: Surfels) -> Self {
+    pub const fn with_surfels(self, surfels: SurfelSize) -> Self {
         Self { surfels, ..self }
     }
 
@@ -138,13 +138,13 @@ impl Interpolation {
         points_to_draw(surfels, self.probability)
     }
 
-    /// Returns the number of points drawn if surfels are [counted](Surfels::Count); `None` if their
+    /// Returns the number of points drawn if surfels are [counted](SurfelSize::Count); `None` if their
     /// size is given.
     #[must_use]
     pub fn points(&self) -> Option<u32> {
         match self.surfels {
-            Surfels::Count(surfels) => Some(self.draws(f64::from(surfels))),
-            Surfels::Radius(_) => None,
+            SurfelSize::Count(surfels) => Some(self.draws(f64::from(surfels))),
+            SurfelSize::Radius(_) => None,
         }
     }
 }

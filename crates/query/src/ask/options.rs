@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::ask::answer::Evidence;
 use crate::ask::budget::Budget;
-use crate::ask::interpolation::{Interpolation, Refinement, Surfels};
+use crate::ask::interpolation::{Interpolation, Refinement, SurfelSize};
 
 /// The meaning of "two scans meet".
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -276,7 +276,7 @@ pub enum PlanError {
     Tolerance(f64),
     /// Too few or too many surfels.
     #[error("{0} surfels; 1 to 65536 are possible, or 1 to 1024 sampling radii for each")]
-    Surfels(f64),
+    SurfelSize(f64),
     /// The probability is not between 0 and 1.
     #[error("a probability of {0} that each surfel has a point; it must be more than 0 and less than 1")]
     Probability(f64),
@@ -337,11 +337,11 @@ fn check_method(options: &CollideOptions) -> Result<(), PlanError> {
         }
         Method::Interpolation(Interpolation { surfels, probability, refinement, .. }) => {
             match surfels {
-                Surfels::Count(count) if !(1..=MOST_TEST_POINTS).contains(&count) => {
-                    return Err(PlanError::Surfels(f64::from(count)));
+                SurfelSize::Count(count) if !(1..=MOST_TEST_POINTS).contains(&count) => {
+                    return Err(PlanError::SurfelSize(f64::from(count)));
                 }
-                Surfels::Radius(radii) if !(1.0..=1024.0).contains(&radii) => {
-                    return Err(PlanError::Surfels(radii));
+                SurfelSize::Radius(radii) if !(1.0..=1024.0).contains(&radii) => {
+                    return Err(PlanError::SurfelSize(radii));
                 }
                 _ => {}
             }

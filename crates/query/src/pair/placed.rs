@@ -1,7 +1,7 @@
 //! A preprocessed scan at a pose in the world.
 
 use nearmiss_geometry::Pose;
-use nearmiss_graph::{GeodesicKernel, KernelScratch, Samples, SurfaceGraph};
+use nearmiss_graph::{GeodesicKernel, KernelScratch, SurfaceGraph, SurfaceSamples};
 use nearmiss_hierarchy::{GatherScratch, PointHierarchy, SLAB, Slices};
 use nearmiss_index::PointBlock;
 use nearmiss_surface::{Evaluation, Metric};
@@ -71,7 +71,7 @@ impl<'a> Placed<'a> {
     #[must_use]
     pub fn geodesic_kernel(&self) -> Option<GeodesicKernel<'a>> {
         let scan = self.scan;
-        let samples = Samples { plan: scan.plan(), positions: scan.positions(), radii: scan.radii() };
+        let samples = SurfaceSamples { plan: scan.plan(), positions: scan.positions(), radii: scan.radii() };
         self.graph?.kernel(samples)
     }
 

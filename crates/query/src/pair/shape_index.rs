@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use fearless_simd::Level;
 use nearmiss_hierarchy::PointHierarchy;
-use nearmiss_index::{BlockBoxes, BlockTree, Cells};
+use nearmiss_index::{BlockBoxes, BlockGrid, BlockTree};
 
 /// An index of the points of a scan, for testing thousands of shapes. Pass it to
 /// [`Placed::with_shapes`](crate::Placed::with_shapes).
@@ -16,7 +16,7 @@ pub struct ShapeIndex {
     /// The [identity](nearmiss_hierarchy::Outline) of the scan.
     scan: u64,
     boxes: Arc<BlockBoxes>,
-    pub(crate) cells: Cells,
+    pub(crate) cells: BlockGrid,
     pub(crate) level: Level,
 }
 

@@ -1,7 +1,7 @@
 //! Scans with their graphs.
 
 use nearmiss_geometry::{PointCloud, Pose};
-use nearmiss_graph::{GraphOptions, Samples, Sides, SurfaceGraph};
+use nearmiss_graph::{GraphOptions, Sides, SurfaceGraph, SurfaceSamples};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::Placed;
 
@@ -19,7 +19,7 @@ impl Scan {
         let own: Option<Vec<[f32; 3]>> =
             own.map(|own| tree.source().iter().map(|&i| own[i as usize]).collect());
         let mut normals = tree.normals().to_vec();
-        let samples = Samples { plan: tree.plan(), positions: tree.positions(), radii: tree.radii() };
+        let samples = SurfaceSamples { plan: tree.plan(), positions: tree.positions(), radii: tree.radii() };
         let sides = Sides { normals: own.as_deref(), scanner: None };
         let graph = SurfaceGraph::build(samples, sides, &mut normals, &GraphOptions::default()).unwrap();
         tree.turn_normals(&normals);

@@ -4,7 +4,7 @@ use nearmiss_geometry::Pose;
 use nearmiss_hierarchy::BuildOptions;
 use nearmiss_query::{
     Answer, Brackets, Budget, CollideOptions, CollidePlan, Contacts, Detail, Evidence, Interpolation, Method,
-    Pair, Placed, PlanError, Reason, Refinement, Scratch, Semantics, Surfels, Verdict,
+    Pair, Placed, PlanError, Reason, Refinement, Scratch, Semantics, SurfelSize, Verdict,
 };
 use nearmiss_testdata::arbitrary;
 use nearmiss_testdata::pairs::{SetOptions, analytic_set};
@@ -177,7 +177,7 @@ fn a_bracket_across_a_slit_is_searched_over_virtual_edges() {
         let pose = Pose::from_translation([tip[0] - 0.3, tip[1], 0.0]);
         let (a, b) = (slit.at(&Pose::IDENTITY), blade.at(&pose));
         for seed in 0..40 {
-            let few = flat().with_approaches(0).with_surfels(Surfels::Count(2)).with_seed(seed);
+            let few = flat().with_approaches(0).with_surfels(SurfelSize::Count(2)).with_seed(seed);
             let answer = ask(&a, &b, &options(few), &mut Scratch::default());
             asked += 1;
             if let Verdict::Intersecting { contact, .. } = answer.verdict {
@@ -229,14 +229,14 @@ fn what_cannot_be_searched_is_refused() {
     };
     let plain = Interpolation::default();
     for count in [0, 65_537, u32::MAX] {
-        let expected = PlanError::Surfels(f64::from(count));
-        assert_eq!(refused(plain.with_surfels(Surfels::Count(count)), 0.0), expected);
+        let expected = PlanError::SurfelSize(f64::from(count));
+        assert_eq!(refused(plain.with_surfels(SurfelSize::Count(count)), 0.0), expected);
     }
     for radii in [0.0, 0.99, 1024.5, -1.0, f64::INFINITY] {
-        assert_eq!(refused(plain.with_surfels(Surfels::Radius(radii)), 0.0), PlanError::Surfels(radii));
+        assert_eq!(refused(plain.with_surfels(SurfelSize::Radius(radii)), 0.0), PlanError::SurfelSize(radii));
     }
-    let none = refused(plain.with_surfels(Surfels::Radius(f64::NAN)), 0.0);
-    assert!(matches!(none, PlanError::Surfels(radii) if radii.is_nan()));
+    let none = refused(plain.with_surfels(SurfelSize::Radius(f64::NAN)), 0.0);
+    assert!(matches!(none, PlanError::SurfelSize(radii) if radii.is_nan()));
     for probability in [0.0, 1.0, -0.5, 2.0] {
         assert_eq!(refused(plain.with_probability(probability), 0.0), PlanError::Probability(probability));
     }
@@ -252,10 +252,10 @@ fn what_cannot_be_searched_is_refused() {
     // The ends of the ranges are valid and find contacts.
     let pose = Pose::from_translation([1.0, 0.0, 0.0]);
     let ends = [
-        plain.with_surfels(Surfels::Count(1)).with_probability(1e-300),
-        plain.with_surfels(Surfels::Count(65_536)).with_probability(1.0 - f64::EPSILON),
-        plain.with_surfels(Surfels::Radius(1.0)),
-        plain.with_surfels(Surfels::Radius(1024.0)),
+        plain.with_surfels(SurfelSize::Count(1)).with_probability(1e-300),
+        plain.with_surfels(SurfelSize::Count(65_536)).with_probability(1.0 - f64::EPSILON),
+        plain.with_surfels(SurfelSize::Radius(1.0)),
+        plain.with_surfels(SurfelSize::Radius(1024.0)),
     ];
     for search in ends {
         let options = options(search.with_flat(true));

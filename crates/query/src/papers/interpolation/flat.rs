@@ -14,7 +14,7 @@ use super::sides::Side;
 use super::survey::Bounds;
 use super::volume::Volume;
 use crate::ask::answer::{Contact, Reason};
-use crate::ask::interpolation::{Brackets, Interpolation, Surfels};
+use crate::ask::interpolation::{Brackets, Interpolation, SurfelSize};
 use crate::leaf::crossing::crossing;
 use crate::leaf::disc_pair::FAR;
 use crate::papers::Papers;
@@ -97,8 +97,8 @@ impl Papers<'_, '_> {
             return ControlFlow::Continue(());
         }
         let surfels = match search.surfels {
-            Surfels::Count(count) => f64::from(count),
-            Surfels::Radius(radii) => {
+            SurfelSize::Count(count) => f64::from(count),
+            SurfelSize::Radius(radii) => {
                 let radius = radii * f64::from(self.search.pair.a.sampling_radius);
                 (volume.area / (radius * radius)).max(1.0)
             }
