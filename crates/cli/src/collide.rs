@@ -9,11 +9,12 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use nearmiss::{
     Answer, BatchScratch, Budget, CollideOptions, CollidePlan, Contacts, Deadline, Detail, Evidence,
-    ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch, each,
+    ManifoldPoint, Metric, Pair, Placed, Pose, Proof, Scan, Scratch, Verdict, each,
 };
 
 use crate::console::{self, Console, Results, now};
 use crate::distance::beside;
+use crate::distance_picture::paint_apart;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
@@ -24,6 +25,7 @@ use crate::report::AnswerReport;
 use crate::search::SearchArgs;
 use crate::sentence::{hint, sentence};
 use crate::units::SizeCheck;
+use crate::viewpoint::ViewArgs;
 use crate::{output, picture, proof};
 
 /// Options of `collide`.
@@ -82,6 +84,9 @@ pub struct CollideArgs {
     /// Picture, as PNG, of both scans and of the place where they meet
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// One object of JSON a query instead of sentences
     #[arg(long)]
     pub json: bool,
@@ -322,8 +327,21 @@ fn answer_one(
         let style = picture::Style {
             names: picture::names(args.pair.inputs()),
             points: args.meaning.thickened.is_some(),
+            view: args.view,
+            unit: args.pair.world_unit(),
         };
-        picture::paint([&a, &b], &asked.answer, &style).save(path)?;
+        let apart = match asked.answer.verdict {
+            Verdict::Separated { evidence, .. } => {
+                let semantics = question.plan.options().semantics;
+                beside([&a, &b], semantics, &question.budget_from(now())).map(|found| (found, evidence))
+            }
+            _ => None,
+        };
+        let picture = match apart.filter(|(found, _)| found.upper > 0.0 && found.upper.is_finite()) {
+            Some((found, evidence)) => paint_apart([&a, &b], &found, evidence, &style),
+            None => picture::paint([&a, &b], &asked.answer, &style),
+        };
+        picture.save(path)?;
         drop(bar);
     }
     question.tell(out, &asked, args)

@@ -22,6 +22,7 @@ use crate::preprocess::parse_threads;
 use crate::report::word;
 use crate::sentence::{bracket, unit, untold};
 use crate::units::SizeCheck;
+use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
 
 /// Options of `distance`.
@@ -58,6 +59,9 @@ pub struct DistanceArgs {
     /// Picture, as PNG, of both scans, the two nearest places, and the lengths between
     #[arg(long, value_name = "OUT.png", conflicts_with = "poses")]
     pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// One object of JSON a query instead of sentences
     #[arg(long)]
     pub json: bool,
@@ -154,6 +158,8 @@ impl Question<'_> {
             let style = picture::Style {
                 names: names(self.args.pair.inputs()),
                 points: self.args.meaning.thickened.is_some(),
+                view: self.args.view,
+                unit: self.args.pair.world_unit(),
             };
             paint_distance([&a, &b], &found, &style).save(path)?;
         }

@@ -13,7 +13,8 @@ use nearmiss::{Scan, SurfaceGraph};
 use crate::console::Console;
 use crate::error::CliError;
 use crate::input::Opening;
-use crate::kinds_picture::{colour, kinds_picture};
+use crate::kinds_picture::{self, colour};
+use crate::viewpoint::ViewArgs;
 use crate::{output, picture, report};
 
 /// Options of `export`. At least one output is asked for.
@@ -49,6 +50,9 @@ pub struct ExportArgs {
     /// Picture, as PNG, of the points in the colours of their kinds, with their shares
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Only nodes at this depth, the root's being 0, and leaves above it
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
@@ -102,7 +106,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
         output::replace_plain(path, |out| radii(&scan, out))?;
     }
     if let Some(path) = &args.image {
-        kinds_picture(&scan).save(path)?;
+        kinds_picture::paint(&scan, &args.view).save(path)?;
     }
     Ok(())
 }

@@ -44,9 +44,12 @@ mod font;
 mod geodesic;
 mod image;
 mod kinds_picture;
+mod legend;
 mod level;
+mod marks;
 mod no_curve;
 mod picture;
+mod viewpoint;
 
 use std::ffi::OsString;
 use std::iter;
@@ -88,6 +91,7 @@ pub use slices::{
 };
 pub use touch::TouchArgs;
 pub use units::UnitName;
+pub use viewpoint::{Angles, ViewArgs};
 
 /// Whether, where and how near scanned things meet, straight from their points.
 ///
