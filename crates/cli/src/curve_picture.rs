@@ -215,3 +215,48 @@ fn write_legend(canvas: &mut Canvas, found: &Curves, style: &Style) {
     };
     legend::sentence(canvas, [left, top + legend::LINE], width, &told);
 }
+
+#[cfg(test)]
+mod tests {
+    use nearmiss::{BuildOptions, CurveOptions, CurvePlan, Pair, PointCloud, Pose, Scan, Scratch};
+
+    use super::*;
+
+    /// The picture of a plate of 20 by 20 and the same plate on edge, which reaches `depth` into it.
+    fn cut(depth: f64) -> (Curves, Picture) {
+        let points: Vec<[f64; 3]> =
+            (0..3600_u32).map(|i| [f64::from(i % 60), f64::from(i / 60), 0.0].map(|c| c / 3.0)).collect();
+        let scan =
+            Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap();
+        let along = 59.0 / 3.0 - depth;
+        let edge = [1.0, 0.0, 0.0, along, 0.0, 0.0, -1.0, 10.0, 0.0, 1.0, 0.0, -10.0, 0.0, 0.0, 0.0, 1.0];
+        let poses = [Pose::IDENTITY, Pose::from_row_major(&edge, scan.bounds(), 0.1).unwrap()];
+        let [a, b] = poses.each_ref().map(|pose| scan.at(pose));
+        let plan = CurvePlan::new(&CurveOptions::default(), &scan, &scan).unwrap();
+        let mut found = Curves::default();
+        Pair::new(a, b).curves(&plan, &mut found, &mut Scratch::default());
+        let picture = curve_picture(&a, &b, &found);
+        (found, picture)
+    }
+
+    #[test]
+    fn small_curves_have_a_close_view_and_others_do_not() {
+        for (depth, is_close) in [(3.0, true), (18.0, false)] {
+            let (found, picture) = cut(depth);
+            assert!((found.length() - depth).abs() < 0.7, "{} for {depth}", found.length());
+            let (width, _) = picture.size();
+            let middle = (GAP + PANEL + GAP / 2) / FINE;
+            let pixel = &picture.pixels()[3 * (2 * GAP / FINE * width + middle)..][..3];
+            assert_eq!(pixel == GROUND, is_close, "{depth}: {pixel:?} between the views");
+            let is_curve = |p: &&[u8]| p.iter().zip(CURVE).all(|(&x, y)| x.abs_diff(y) < 30);
+            let count = |columns: std::ops::Range<usize>| {
+                let rows = picture.pixels().chunks(3 * width).take((GAP + HEIGHT) / FINE);
+                rows.flat_map(|row| row[3 * columns.start..3 * columns.end].chunks(3))
+                    .filter(is_curve)
+                    .count()
+            };
+            let (left, right) = (count(0..middle), count(middle..width));
+            assert!(!is_close || right > 2 * left && left > 30, "{left} and {right} pixels of curve");
+        }
+    }
+}

