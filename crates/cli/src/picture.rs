@@ -30,6 +30,9 @@ const CLOSE: f64 = 12.0;
 /// Half the width of that view at most, in half diagonals of the smaller scan.
 const AROUND: f64 = 1.5;
 
+/// Where points are shown, the two that count are seen from this much nearer.
+const NEARER: f64 = 0.4;
+
 /// What lies this near the cutting plane is painted darker, as a share of that half width.
 const CUT: f64 = 0.045;
 
@@ -226,6 +229,7 @@ impl Close {
         let small = half_diagonal(views[0]).min(half_diagonal(views[1]));
         let least = (CLOSE * radius(0).min(radius(1))).max(AROUND * small);
         let reach = (CLOSE * radius(0).max(radius(1))).min(least);
+        let reach = if style.points { NEARER * reach } else { reach };
         Self { point: contact.point.into(), normals, reach, pair, upright: style.view.upright(views) }
     }
 

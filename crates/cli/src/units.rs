@@ -75,7 +75,10 @@ impl WorldUnit {
     /// Returns what stands at a scale bar.
     pub(crate) fn scale(self, length: f64) -> String {
         match self {
-            Self::OfFile => format!("{} units of the file", short(length)),
+            Self::OfFile => {
+                let length = short(length);
+                format!("{length} unit{} of the file", if length == "1" { "" } else { "s" })
+            }
             Self::Metres => self.length(length),
         }
     }
@@ -176,6 +179,7 @@ mod tests {
         );
         assert_eq!(all(WorldUnit::Metres), ["0 m", "20 m", "1 m", "5 cm", "2 mm", "5 µm", "-50 cm"]);
         assert_eq!(WorldUnit::OfFile.scale(0.05), "0.05 units of the file");
+        assert_eq!(WorldUnit::OfFile.scale(1.0), "1 unit of the file");
         assert_eq!(WorldUnit::Metres.scale(0.05), "5 cm");
     }
 

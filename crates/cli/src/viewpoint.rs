@@ -101,9 +101,10 @@ impl ViewArgs {
         hides: impl Fn(&[Vector3<f64>], &Vector3<f64>) -> f64,
     ) -> Camera {
         let points = sample(views);
-        let (long, apart) = extent(&points, views);
+        let ([long, wide], apart) = extent(&points, views);
         let cost = |toward: &Vector3<f64>| {
-            hides(&points, toward) + toward.dot(&apart).abs() + 0.5 * toward.dot(&long).abs()
+            let [long, wide, apart] = [long, wide, apart].map(|axis| toward.dot(&axis).abs());
+            hides(&points, toward) + apart + 0.5 * long + 0.25 * wide
         };
         let axes = self.axes(views, cost).unwrap_or_else(|| {
             let cost = |toward: &Vector3<f64>| cost(toward) + below(toward);
@@ -265,8 +266,8 @@ pub(crate) fn scan_camera(view: &Placed<'_>, area: Area) -> Camera {
     whole_camera([view, view], area, |_, _| 0.0)
 }
 
-/// The direction of greatest extent, and the unit direction from one scan's middle to the other's, or zero.
-fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> (Vector3<f64>, Vector3<f64>) {
+/// The directions of greatest and of second extent, and the unit direction from one scan's middle to the other's, or zero.
+fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> ([Vector3<f64>; 2], Vector3<f64>) {
     #[expect(clippy::cast_precision_loss, reason = "a count")]
     let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
     let mut s = [0.0; 6];
@@ -278,7 +279,8 @@ fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> (Vector3<f64>, Ve
     }
     let [ca, cb] = views.map(|v| Vector3::from(v.placed().apply(v.scan().outline().discs.centre)));
     let apart = (cb - ca).try_normalize(0.0).unwrap_or_default();
-    (Vector3::from(symmetric_eigen(s).vectors[2]), apart)
+    let [_, wide, long] = symmetric_eigen(s).vectors;
+    ([long, wide].map(Vector3::from), apart)
 }
 
 /// Returns some unit direction at right angles to `v`.
