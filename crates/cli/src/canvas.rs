@@ -238,8 +238,8 @@ impl Canvas {
         });
     }
 
-    /// Writes a line of letters. Capitals are 7 `size` high, their upper left corner is at `[x, y]`, and letters reach
-    /// at most 2 `size` below them. All lengths are in fine pixels.
+    /// Writes a line of letters. Capitals are 7 `size` high, their upper left corner is at `[x,
+    /// y]`, and letters reach at most 2 `size` below them. All lengths are in fine pixels.
     pub fn text(&mut self, [x, y]: [usize; 2], size: usize, colour: Colour, text: &str) {
         font::cover(size, text, |column, row, share| {
             let at = |start: usize, offset: i32| start.checked_add_signed(isize::try_from(offset).ok()?);

@@ -33,12 +33,13 @@ const POINT_SAMPLE: usize = 3000;
 /// Curves that reach further than this share of what both scans do need no close view.
 const SMALL: f64 = 0.35;
 
-/// Half the width of a close view: so many times what the curves in it reach, and this many sampling radii at least.
+/// Half the width of a close view: so many times what the curves in it reach, and this many
+/// sampling radii at least.
 const AROUND: f64 = 1.3;
 const LEAST: f64 = 8.0;
 
-/// Both scans, softly, and their curves, from where most of these are seen; thin where they are hidden. Where the curves
-/// are small, a close view of them or of the longest lies beside that.
+/// Both scans, softly, and their curves, from where most of these are seen; thin where they are
+/// hidden. Where the curves are small, a close view of them or of the longest lies beside that.
 #[must_use]
 pub fn curve_picture(a: &Placed<'_>, b: &Placed<'_>, found: &Curves) -> Picture {
     paint([a, b], found, &Style { names: ["A", "B"].map(Into::into), ..Style::default() })

@@ -142,9 +142,9 @@ impl Segment {
         count / (count + 4.0)
     }
 
-    /// Obliquely across the segment with as little before it as may be; and the direction at right angles to it from
-    /// which what is before it is cut away. A surface at right angles to the segment is seen as one. The segment lies
-    /// level, unless the picture stands upright.
+    /// Obliquely across the segment with as little before it as may be; and the direction at right
+    /// angles to it from which what is before it is cut away. A surface at right angles to the
+    /// segment is seen as one. The segment lies level, unless the picture stands upright.
     fn camera(
         &self,
         points: &[Vector3<f64>],

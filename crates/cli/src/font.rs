@@ -10,8 +10,8 @@ pub(crate) const CAPITAL: usize = 7;
 /// A line of letters is this many sizes high, from the top of capitals to the lowest descender.
 pub(crate) const LINE: usize = 9;
 
-/// The strokes of this light face are widened by this share of the size: it is read in pictures that are often shown
-/// smaller than they are.
+/// The strokes of this light face are widened by this share of the size: it is read in pictures
+/// that are often shown smaller than they are.
 const WIDENED: f32 = 0.2;
 
 /// Stands where letters were left out.
@@ -52,10 +52,9 @@ impl Face {
     }
 }
 
-/// Calls `paint` with the column, the row and the coverage, 0 to 1, of every pixel that a line of letters covers, of
-/// some pixels more than once.
-/// Columns count from the left end of the first letter, rows from the top of capital letters; accents and overhangs
-/// have negative ones.
+/// Calls `paint` with the column, the row and the coverage, 0 to 1, of every pixel that a line of
+/// letters covers, of some pixels more than once. Columns count from the left end of the first
+/// letter, rows from the top of capital letters; accents and overhangs have negative ones.
 pub(crate) fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32)) {
     let Some(face) = &*FACE else { return };
     let scale = face.scale(size);
@@ -86,7 +85,8 @@ pub(crate) fn width(size: usize, text: &str) -> usize {
     width
 }
 
-/// Returns `text`, or as much of its start and its end as fits into `most` pixels, with an ellipsis in between.
+/// Returns `text`, or as much of its start and its end as fits into `most` pixels, with an ellipsis
+/// in between.
 pub(crate) fn elided(size: usize, text: &str, most: usize) -> String {
     if width(size, text) <= most {
         return text.to_owned();

@@ -16,8 +16,8 @@ const GAP: usize = 8 * FINE;
 /// Between entries.
 const SPACE: usize = 26 * FINE;
 
-/// Writes entries beside each other, a patch of colour before each that has one, from `[left, top]` and at most `width`
-/// wide. The longest are shortened until all fit.
+/// Writes entries beside each other, a patch of colour before each that has one, from `[left, top]`
+/// and at most `width` wide. The longest are shortened until all fit.
 pub(crate) fn entries(
     canvas: &mut Canvas,
     [mut left, top]: [usize; 2],

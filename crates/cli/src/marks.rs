@@ -22,8 +22,8 @@ const PAD: usize = 6 * FINE;
 /// From the border of a panel.
 const MARGIN: usize = 8 * FINE;
 
-/// Writes `text` on a ground of its own with its upper left corner at `[left, top]`, moved into `area` where it would
-/// leave it, and returns that ground.
+/// Writes `text` on a ground of its own with its upper left corner at `[left, top]`, moved into
+/// `area` where it would leave it, and returns that ground.
 pub(crate) fn label(canvas: &mut Canvas, area: Area, [left, top]: [f64; 2], text: &str) -> Area {
     let text = font::elided(LETTERS, text, area.width.saturating_sub(2 * PAD));
     let (width, height) = label_size(&text);
@@ -89,8 +89,8 @@ pub(crate) fn arrow(
     }
 }
 
-/// Draws a square about what a close view shows, `reach` to every side of `point`. Returns `false`, and draws none, where
-/// it would be too small to be seen.
+/// Draws a square about what a close view shows, `reach` to every side of `point`. Returns `false`,
+/// and draws none, where it would be too small to be seen.
 pub(crate) fn frame(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, reach: f64) -> bool {
     let [x, y, _] = camera.project(point);
     let half = camera.scale * reach;
@@ -112,8 +112,8 @@ pub(crate) fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
     scale_bar_in(canvas, camera, WorldUnit::OfFile);
 }
 
-/// Draws a scale bar into the lower left corner: a length of 1, 2 or 5 times a power of ten, a sixth to a third of the
-/// panel's height.
+/// Draws a scale bar into the lower left corner: a length of 1, 2 or 5 times a power of ten, a
+/// sixth to a third of the panel's height.
 pub(crate) fn scale_bar_in(canvas: &mut Canvas, camera: &Camera, unit: WorldUnit) {
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let longest = camera.area.height as f64 / 3.0 / camera.scale;

@@ -36,7 +36,8 @@ const NEARER: f64 = 0.4;
 /// What lies this near the cutting plane is painted darker, as a share of that half width.
 const CUT: f64 = 0.045;
 
-/// In the whole view no disc is larger than this, in fine pixels: far returns of a LiDAR would hide the rest.
+/// In the whole view no disc is larger than this, in fine pixels: far returns of a LiDAR would hide
+/// the rest.
 pub(crate) const LARGEST: f64 = 14.0;
 
 /// A scan whose extent is less than this share of the other's is seen through it, with this opacity.
@@ -137,8 +138,8 @@ fn close_told(points: bool) -> &'static str {
     }
 }
 
-/// Paints both scans by `paint`, which is given 0 for a and 1 for b. Of a scan that is much smaller than the other, the
-/// hidden parts are seen faintly.
+/// Paints both scans by `paint`, which is given 0 for a and 1 for b. Of a scan that is much smaller
+/// than the other, the hidden parts are seen faintly.
 pub(crate) fn paint_both(
     canvas: &mut Canvas,
     area: Area,
@@ -242,8 +243,8 @@ impl Close {
         if is_from_below { -chord } else { chord }
     }
 
-    /// Obliquely along the chord, so that the cut is seen as a line and the surfaces behind it as surfaces. The normals
-    /// point up, unless the picture stands upright.
+    /// Obliquely along the chord, so that the cut is seen as a line and the surfaces behind it as
+    /// surfaces. The normals point up, unless the picture stands upright.
     fn camera(&self, area: Area) -> Camera {
         let chord = self.chord();
         let scale = scale_of(area, self.reach);

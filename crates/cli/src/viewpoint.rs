@@ -13,12 +13,14 @@ use crate::canvas::{Area, Camera};
 /// Options of pictures of scans: which way is up, and from where they are seen.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct ViewArgs {
-    /// The axis that points up in the picture: x, y, z, -x, -y or -z. By default z where the larger scan has level
-    /// floors and is not highest along z, as rooms and buildings are; otherwise the longest extent lies level
+    /// The axis that points up in the picture: x, y, z, -x, -y or -z. By default z where the larger
+    /// scan has level floors and is not highest along z, as rooms and buildings are; otherwise the
+    /// longest extent lies level
     #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "image")]
     pub up: Option<Up>,
-    /// The direction from which the picture is taken, in degrees. Azimuth 0, 90 looks from +x, +y with --up z,
-    /// from +z, +x with --up y, from +y, +z with --up x; elevation 90 looks from above. --up defaults to z with it
+    /// The direction from which the picture is taken, in degrees. Azimuth 0, 90 looks from +x, +y
+    /// with --up z, from +z, +x with --up y, from +y, +z with --up x; elevation 90 looks from
+    /// above. --up defaults to z with it
     #[arg(long, value_name = "AZIMUTH,ELEVATION", allow_hyphen_values = true, requires = "image")]
     pub view: Option<Angles>,
 }
@@ -91,8 +93,9 @@ impl ViewArgs {
         self.up.or_else(by_default).map(Upright::new)
     }
 
-    /// Returns a camera that sees both scans whole, but for outliers, and the places `shown`. A direction that is not given is chosen: what matters is hidden
-    /// least, as `hides` says of points and a direction towards the viewer, and the scans lie beside each other.
+    /// Returns a camera that sees both scans whole, but for outliers, and the places `shown`. A
+    /// direction that is not given is chosen: what matters is hidden least, as `hides` says of
+    /// points and a direction towards the viewer, and the scans lie beside each other.
     pub(crate) fn camera(
         &self,
         views: [&Placed<'_>; 2],
@@ -117,8 +120,8 @@ impl ViewArgs {
         fitted(axes, views, shown, area)
     }
 
-    /// Returns a camera that sees `reach` to every side of `centre`, from where `cost` is least unless a direction is
-    /// given.
+    /// Returns a camera that sees `reach` to every side of `centre`, from where `cost` is least
+    /// unless a direction is given.
     pub(crate) fn close_camera(
         &self,
         views: [&Placed<'_>; 2],
@@ -165,8 +168,8 @@ fn below(toward: &Vector3<f64>) -> f64 {
     (-toward.dot(&Vector3::from(ABOUT_UP))).max(0.0)
 }
 
-/// This share of a scan's points at either end of an axis may lie outside the picture, if more than this share of the
-/// picture would be spent on them.
+/// This share of a scan's points at either end of an axis may lie outside the picture, if more than
+/// this share of the picture would be spent on them.
 const OUTLYING: f64 = 0.003;
 const SPENT: f64 = 0.25;
 
@@ -207,8 +210,8 @@ fn usual(mut values: Vec<f64>) -> [f64; 2] {
     if inner[1] - inner[0] < (1.0 - SPENT) * (high - low) { inner } else { [low, high] }
 }
 
-/// Normals with at least this component along z are those of floors and ceilings. Of evenly spread normals 3 % are;
-/// of rooms, buildings and streets 12 to 50 %, of single objects 2 to 8 %.
+/// Normals with at least this component along z are those of floors and ceilings. Of evenly spread
+/// normals 3 % are; of rooms, buildings and streets 12 to 50 %, of single objects 2 to 8 %.
 const LEVEL: f64 = 0.97;
 const LEVEL_SHARE: f64 = 0.1;
 
@@ -266,7 +269,8 @@ pub(crate) fn scan_camera(view: &Placed<'_>, area: Area) -> Camera {
     whole_camera([view, view], area, |_, _| 0.0)
 }
 
-/// The directions of greatest and of second extent, and the unit direction from one scan's middle to the other's, or zero.
+/// The directions of greatest and of second extent, and the unit direction from one scan's middle
+/// to the other's, or zero.
 fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> ([Vector3<f64>; 2], Vector3<f64>) {
     #[expect(clippy::cast_precision_loss, reason = "a count")]
     let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
