@@ -238,22 +238,23 @@ impl Canvas {
         });
     }
 
-    /// Letters with their upper left corner at `[x, y]`, each pixel of theirs `size` wide.
+    /// Writes a line of letters. Capitals are 7 `size` high, their upper left corner is at `[x,
+    /// y]`, and letters reach at most 2 `size` below them. All lengths are in fine pixels.
     pub fn text(&mut self, [x, y]: [usize; 2], size: usize, colour: Colour, text: &str) {
-        for (i, letter) in text.chars().enumerate() {
-            for row in 0..font::HEIGHT {
-                for column in (0..font::ADVANCE).filter(|&c| font::is_set(letter, c, row)) {
-                    let left = x + (i * font::ADVANCE + column) * size;
-                    self.fill(Area { left, top: y + row * size, width: size, height: size }, colour);
-                }
+        font::cover(size, text, |column, row, share| {
+            let at = |start: usize, offset: i32| start.checked_add_signed(isize::try_from(offset).ok()?);
+            let (Some(column), Some(row)) = (at(x, column), at(y, row)) else { return };
+            if column < self.width && row < self.height {
+                let pixel = &mut self.pixels[row * self.width + column];
+                *pixel = blend(*pixel, colour, f64::from(share).clamp(0.0, 1.0));
             }
-        }
+        });
     }
 
-    /// How wide such letters are.
+    /// Returns how wide such letters are, in fine pixels.
     #[must_use]
     pub fn text_width(size: usize, text: &str) -> usize {
-        text.chars().count() * font::ADVANCE * size
+        font::width(size, text)
     }
 
     /// What was painted, [`FINE`]² pixels joined to one.

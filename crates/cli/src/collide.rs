@@ -14,6 +14,7 @@ use nearmiss::{
 
 use crate::console::{self, Console, Results, now};
 use crate::distance::beside;
+use crate::distance_picture::paint_apart;
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::meaning::MeaningArgs;
@@ -25,6 +26,7 @@ use crate::report::AnswerReport;
 use crate::search::SearchArgs;
 use crate::sentence::{hint, sentence};
 use crate::units::SizeCheck;
+use crate::viewpoint::ViewArgs;
 use crate::{output, picture, proof};
 
 /// Options of `collide`.
@@ -93,6 +95,9 @@ pub struct CollideArgs {
     /// Draw both scans and the place where they touch, as PNG
     #[arg(long, value_name = "OUT.png", conflicts_with = "poses", help_heading = "Output")]
     pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Print one JSON object a query
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -388,8 +393,21 @@ fn answer_one(
         let style = picture::Style {
             names: picture::names(args.pair.inputs()),
             points: args.meaning.thickened.is_some(),
+            view: args.view,
+            unit: args.pair.world_unit(),
         };
-        picture::paint([&a, &b], &asked.answer, &style).save(path)?;
+        let apart = match asked.answer.verdict {
+            Verdict::Separated { evidence, .. } => {
+                let semantics = question.plan.options().semantics;
+                beside([&a, &b], semantics, &question.budget_from(now())).map(|found| (found, evidence))
+            }
+            _ => None,
+        };
+        let picture = match apart.filter(|(found, _)| found.upper > 0.0 && found.upper.is_finite()) {
+            Some((found, evidence)) => paint_apart([&a, &b], &found, evidence, &style),
+            None => picture::paint([&a, &b], &asked.answer, &style),
+        };
+        picture.save(path)?;
         drop(bar);
     }
     question.tell(out, &asked, args)

@@ -20,6 +20,7 @@ use crate::picture::names;
 use crate::posing::PairArgs;
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
+use crate::viewpoint::ViewArgs;
 use crate::{output, picture, posing};
 
 /// Options of `curve`.
@@ -56,6 +57,9 @@ pub struct CurveArgs {
     /// Draw both scans and their curves, as PNG
     #[arg(long, value_name = "OUT.png", help_heading = "Output")]
     pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Print one JSON object
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -131,7 +135,13 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     write(&args.output, &found)?;
     if let Some(path) = &args.image {
         let bar = console.spinner(format_args!("painting {}", path.display()));
-        curve_picture::paint([&a, &b], &found, &names(inputs)).save(path)?;
+        let style = picture::Style {
+            names: names(inputs),
+            points: false,
+            view: args.view,
+            unit: args.pair.world_unit(),
+        };
+        curve_picture::paint([&a, &b], &found, &style).save(path)?;
         drop(bar);
     }
     tell(&found, missed.as_ref(), [&a, &b], micros, args.json)

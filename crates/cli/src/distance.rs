@@ -23,6 +23,7 @@ use crate::preprocess::parse_threads;
 use crate::report::word;
 use crate::sentence::{bracket, unit, untold};
 use crate::units::SizeCheck;
+use crate::viewpoint::ViewArgs;
 use crate::{output, picture};
 
 /// Options of `distance`.
@@ -66,6 +67,9 @@ pub struct DistanceArgs {
     /// Draw both scans, the nearest places and the distance between them, as PNG
     #[arg(long, value_name = "OUT.png", conflicts_with = "poses", help_heading = "Output")]
     pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Print one JSON object a query
     #[arg(long, help_heading = "Output")]
     pub json: bool,
@@ -182,6 +186,8 @@ impl Question<'_> {
             let style = picture::Style {
                 names: names(self.args.pair.inputs()),
                 points: self.args.meaning.thickened.is_some(),
+                view: self.args.view,
+                unit: self.args.pair.world_unit(),
             };
             paint_distance([&a, &b], &found, &style).save(path)?;
         }

@@ -13,7 +13,8 @@ use nearmiss::{Scan, SurfaceGraph};
 use crate::console::Console;
 use crate::error::CliError;
 use crate::input::Opening;
-use crate::kinds_picture::{colour, kinds_picture};
+use crate::kinds_picture::{self, colour};
+use crate::viewpoint::ViewArgs;
 use crate::{digits, output, picture, report};
 
 /// Options of `export`. At least one output is asked for.
@@ -53,6 +54,9 @@ pub struct ExportArgs {
     /// Draw the points in the colours of their kinds, with their shares, as PNG
     #[arg(long, value_name = "OUT.png")]
     pub image: Option<PathBuf>,
+    /// From where the picture is taken
+    #[command(flatten)]
+    pub view: ViewArgs,
     /// Depth of the nodes to export; the root has depth 0; leaves above it are included
     #[arg(long, value_name = "L", requires = "levelled")]
     pub level: Option<u32>,
@@ -128,7 +132,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
         wrote(scan.len(), "point", path);
     }
     if let Some(path) = &args.image {
-        kinds_picture(&scan).save(path)?;
+        kinds_picture::paint(&scan, &args.view).save(path)?;
     }
     Ok(())
 }

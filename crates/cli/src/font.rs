@@ -1,70 +1,154 @@
-//! Letters for legends: five pixels wide, seven high.
+//! The typeface of pictures: Ubuntu Light, proportional and anti-aliased.
 
-/// Width of a letter with the gap after it.
-pub(crate) const ADVANCE: usize = 6;
+use std::sync::LazyLock;
 
-/// Height of a letter.
-pub(crate) const HEIGHT: usize = 7;
+use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont, point};
 
-/// Rows of a glyph from the top, the leftmost pixel in the highest of five bits.
-type Glyph = [u8; HEIGHT];
+/// A capital letter is this many sizes high.
+pub(crate) const CAPITAL: usize = 7;
 
-/// Whether the pixel in column `x` and row `y` of a letter is set. Small letters look like capitals; what has
-/// no glyph is blank.
-pub(crate) fn is_set(letter: char, x: usize, y: usize) -> bool {
-    x < 5 && y < HEIGHT && glyph(letter.to_ascii_uppercase())[y] >> (4 - x) & 1 == 1
+/// A line of letters is this many sizes high, from the top of capitals to the lowest descender.
+pub(crate) const LINE: usize = 9;
+
+/// The strokes of this light face are widened by this share of the size: it is read in pictures
+/// that are often shown smaller than they are.
+const WIDENED: f32 = 0.2;
+
+/// Stands where letters were left out.
+const ELLIPSIS: char = '…';
+
+struct Face {
+    font: FontRef<'static>,
+    /// Height of a capital letter as a share of the height that a scale stands for.
+    capital: f32,
 }
 
-#[rustfmt::skip]
-const fn glyph(letter: char) -> Glyph {
-    match letter {
-        'A' => [0b01110, 0b10001, 0b10001, 0b11111, 0b10001, 0b10001, 0b10001],
-        'B' => [0b11110, 0b10001, 0b10001, 0b11110, 0b10001, 0b10001, 0b11110],
-        'C' => [0b01110, 0b10001, 0b10000, 0b10000, 0b10000, 0b10001, 0b01110],
-        'D' => [0b11110, 0b10001, 0b10001, 0b10001, 0b10001, 0b10001, 0b11110],
-        'E' => [0b11111, 0b10000, 0b10000, 0b11110, 0b10000, 0b10000, 0b11111],
-        'F' => [0b11111, 0b10000, 0b10000, 0b11110, 0b10000, 0b10000, 0b10000],
-        'G' => [0b01110, 0b10001, 0b10000, 0b10111, 0b10001, 0b10001, 0b01111],
-        'H' => [0b10001, 0b10001, 0b10001, 0b11111, 0b10001, 0b10001, 0b10001],
-        'I' => [0b01110, 0b00100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110],
-        'J' => [0b00111, 0b00010, 0b00010, 0b00010, 0b00010, 0b10010, 0b01100],
-        'K' => [0b10001, 0b10010, 0b10100, 0b11000, 0b10100, 0b10010, 0b10001],
-        'L' => [0b10000, 0b10000, 0b10000, 0b10000, 0b10000, 0b10000, 0b11111],
-        'M' => [0b10001, 0b11011, 0b10101, 0b10101, 0b10001, 0b10001, 0b10001],
-        'N' => [0b10001, 0b11001, 0b11001, 0b10101, 0b10011, 0b10011, 0b10001],
-        'O' => [0b01110, 0b10001, 0b10001, 0b10001, 0b10001, 0b10001, 0b01110],
-        'P' => [0b11110, 0b10001, 0b10001, 0b11110, 0b10000, 0b10000, 0b10000],
-        'Q' => [0b01110, 0b10001, 0b10001, 0b10001, 0b10101, 0b10010, 0b01101],
-        'R' => [0b11110, 0b10001, 0b10001, 0b11110, 0b10100, 0b10010, 0b10001],
-        'S' => [0b01111, 0b10000, 0b10000, 0b01110, 0b00001, 0b00001, 0b11110],
-        'T' => [0b11111, 0b00100, 0b00100, 0b00100, 0b00100, 0b00100, 0b00100],
-        'U' => [0b10001, 0b10001, 0b10001, 0b10001, 0b10001, 0b10001, 0b01110],
-        'V' => [0b10001, 0b10001, 0b10001, 0b01010, 0b01010, 0b01010, 0b00100],
-        'W' => [0b10001, 0b10001, 0b10001, 0b10101, 0b10101, 0b10101, 0b01010],
-        'X' => [0b10001, 0b10001, 0b01010, 0b00100, 0b01010, 0b10001, 0b10001],
-        'Y' => [0b10001, 0b10001, 0b01010, 0b00100, 0b00100, 0b00100, 0b00100],
-        'Z' => [0b11111, 0b00001, 0b00010, 0b00100, 0b01000, 0b10000, 0b11111],
-        '0' => [0b01110, 0b10001, 0b10011, 0b10101, 0b11001, 0b10001, 0b01110],
-        '1' => [0b00100, 0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110],
-        '2' => [0b01110, 0b10001, 0b00001, 0b00110, 0b01000, 0b10000, 0b11111],
-        '3' => [0b11110, 0b00001, 0b00001, 0b01110, 0b00001, 0b00001, 0b11110],
-        '4' => [0b00010, 0b00110, 0b01010, 0b10010, 0b11111, 0b00010, 0b00010],
-        '5' => [0b11111, 0b10000, 0b11110, 0b00001, 0b00001, 0b10001, 0b01110],
-        '6' => [0b00110, 0b01000, 0b10000, 0b11110, 0b10001, 0b10001, 0b01110],
-        '7' => [0b11111, 0b00001, 0b00010, 0b00010, 0b00100, 0b00100, 0b00100],
-        '8' => [0b01110, 0b10001, 0b10001, 0b01110, 0b10001, 0b10001, 0b01110],
-        '9' => [0b01110, 0b10001, 0b10001, 0b01111, 0b00001, 0b00010, 0b01100],
-        '.' => [0, 0, 0, 0, 0, 0b01100, 0b01100],
-        ',' => [0, 0, 0, 0, 0b01100, 0b00100, 0b01000],
-        ':' => [0, 0b01100, 0b01100, 0, 0b01100, 0b01100, 0],
-        '_' => [0, 0, 0, 0, 0, 0, 0b11111],
-        '-' => [0, 0, 0, 0b01110, 0, 0, 0],
-        '(' => [0b00010, 0b00100, 0b01000, 0b01000, 0b01000, 0b00100, 0b00010],
-        ')' => [0b01000, 0b00100, 0b00010, 0b00010, 0b00010, 0b00100, 0b01000],
-        '/' => [0b00001, 0b00010, 0b00010, 0b00100, 0b01000, 0b01000, 0b10000],
-        '%' => [0b11000, 0b11001, 0b00010, 0b00100, 0b01000, 0b10011, 0b00011],
-        '=' => [0, 0, 0b11111, 0, 0b11111, 0, 0],
-        '+' => [0, 0b00100, 0b00100, 0b11111, 0b00100, 0b00100, 0],
-        _ => [0; HEIGHT],
+static FACE: LazyLock<Option<Face>> = LazyLock::new(|| {
+    let font = FontRef::try_from_slice(epaint_default_fonts::UBUNTU_LIGHT).ok()?;
+    let capital = font.outline(font.glyph_id('H'))?.bounds.height().abs() / font.height_unscaled();
+    Some(Face { font, capital })
+});
+
+impl Face {
+    /// The scale at which capital letters are [`CAPITAL`] times `size` high.
+    #[expect(clippy::cast_precision_loss, reason = "pixels")]
+    fn scale(&self, size: usize) -> PxScale {
+        PxScale::from((CAPITAL * size) as f32 / self.capital)
+    }
+
+    /// Calls `visit` with each glyph of `text` and its left end, and returns the right end of the last.
+    fn lay_out(&self, size: usize, text: &str, mut visit: impl FnMut(GlyphId, f32)) -> f32 {
+        let scaled = self.font.as_scaled(self.scale(size));
+        let mut x = 0.0;
+        let mut last = None;
+        for letter in text.chars() {
+            let glyph = scaled.glyph_id(if letter.is_control() { '?' } else { letter });
+            x += last.map_or(0.0, |last| scaled.kern(last, glyph));
+            visit(glyph, x);
+            x += scaled.h_advance(glyph);
+            last = Some(glyph);
+        }
+        x
+    }
+}
+
+/// Calls `paint` with the column, the row and the coverage, 0 to 1, of every pixel that a line of
+/// letters covers, of some pixels more than once. Columns count from the left end of the first
+/// letter, rows from the top of capital letters; accents and overhangs have negative ones.
+pub(crate) fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32)) {
+    let Some(face) = &*FACE else { return };
+    let scale = face.scale(size);
+    #[expect(clippy::cast_precision_loss, reason = "pixels")]
+    let baseline = (CAPITAL * size) as f32;
+    #[expect(clippy::cast_precision_loss, reason = "pixels")]
+    let widened = WIDENED * size as f32;
+    face.lay_out(size, text, |glyph, x| {
+        for x in [x - 0.5 * widened, x + 0.5 * widened] {
+            let placed = glyph.with_scale_and_position(scale, point(x, baseline));
+            let Some(outline) = face.font.outline_glyph(placed) else { return };
+            let corner = outline.px_bounds().min;
+            #[expect(clippy::cast_possible_truncation, reason = "whole pixels; the cast saturates")]
+            let [left, top] = [corner.x, corner.y].map(|c| c.floor() as i32);
+            outline.draw(|column, row, share| {
+                let at = |start: i32, offset: u32| start.saturating_add_unsigned(offset);
+                paint(at(left, column), at(top, row), share);
+            });
+        }
+    });
+}
+
+/// Returns how wide a line of letters is, in whole pixels.
+pub(crate) fn width(size: usize, text: &str) -> usize {
+    let width = FACE.as_ref().map_or(0.0, |face| face.lay_out(size, text, |_, _| ()));
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+    let width = width.ceil() as usize;
+    width
+}
+
+/// Returns `text`, or as much of its start and its end as fits into `most` pixels, with an ellipsis
+/// in between.
+pub(crate) fn elided(size: usize, text: &str, most: usize) -> String {
+    if width(size, text) <= most {
+        return text.to_owned();
+    }
+    let letters: Vec<char> = text.chars().collect();
+    let shortened = |kept: usize| {
+        let (head, tail) = (&letters[..kept.div_ceil(2)], &letters[letters.len() - kept / 2..]);
+        head.iter().chain([&ELLIPSIS]).chain(tail).collect::<String>()
+    };
+    let fits = |kept: &usize| width(size, &shortened(*kept)) <= most;
+    (0..letters.len()).rev().find(fits).map(shortened).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The covered pixels of a line of letters, rounded.
+    fn covered(text: &str) -> Vec<[i32; 2]> {
+        let mut all = Vec::new();
+        cover(4, text, |x, y, share| all.extend((share > 0.5).then_some([x, y])));
+        all
+    }
+
+    #[test]
+    fn letters_are_as_wide_as_they_are() {
+        let [i, w, both] = ["i", "W", "iW"].map(|text| width(4, text));
+        assert!(3 * i < w, "i is {i} wide, W {w}");
+        assert!(both.abs_diff(i + w) <= 2, "{both}");
+        assert_eq!(width(4, ""), 0);
+        assert!(width(8, "spacing").abs_diff(2 * width(4, "spacing")) <= 2);
+    }
+
+    #[test]
+    fn small_letters_differ_from_capitals_and_every_sign_in_use_has_a_shape() {
+        assert_ne!(covered("r"), covered("R"));
+        let missing = covered("\u{fffe}");
+        for letter in "éüµ°×–…²³π0123456789%/()=+-_:;,.~±".chars() {
+            let shape = covered(&letter.to_string());
+            assert!(!shape.is_empty() && shape != missing, "{letter}");
+        }
+    }
+
+    #[test]
+    fn capitals_fill_their_height_and_descenders_stay_in_the_line() {
+        let rows = |text: &str| {
+            let rows: Vec<i32> = covered(text).into_iter().map(|[_, y]| y).collect();
+            [rows.iter().copied().min().unwrap(), rows.iter().copied().max().unwrap()]
+        };
+        assert_eq!(rows("H"), [0, 4 * 7 - 1]);
+        assert!(rows("gpq_").iter().all(|&y| (0..4 * 9).contains(&y)), "{:?}", rows("gpq_"));
+    }
+
+    #[test]
+    fn long_names_keep_their_start_and_their_end() {
+        let name = "A: a-very-long-name-of-a-scan-2026-11-24.laz";
+        let most = width(4, name) / 2;
+        let short = elided(4, name, most);
+        assert!(short.starts_with("A: a-") && short.ends_with(".laz") && short.contains('…'), "{short}");
+        let used = width(4, &short);
+        assert!(used <= most && used + width(4, "WW") > most, "{used} of {most}");
+        assert_eq!(elided(4, name, 2 * most + 2), name);
+        assert_eq!(elided(4, name, 0), "");
     }
 }

@@ -5,14 +5,15 @@ use nearmiss::graph::{GeodesicScratch, SurfaceGraph};
 use nearmiss::{Pose, Scan};
 
 use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
-use crate::digits::short;
+use crate::digits::{count, short};
 use crate::image::Picture;
+use crate::legend;
 use crate::picture::{scale_bar, scan_camera, splat};
 
 /// In fine pixels.
 const PANEL: usize = 800 * FINE;
 const GAP: usize = 12 * FINE;
-const LINE: usize = 22 * FINE;
+const LINE: usize = legend::LINE;
 
 const GROUND: Colour = [255, 255, 255];
 const PANEL_GROUND: Colour = [238, 240, 243];
@@ -93,23 +94,28 @@ pub fn geodesic_picture(scan: &Scan, from: usize) -> Option<Picture> {
     let said = [
         [
             format!(
-                "DISTANCE FROM A POINT ALONG THE GRAPH: A RING EACH {}",
+                "Distance from the dot along the surface; a ring each {}.",
                 short(ways.furthest / RINGS * ways.unit)
             ),
-            format!("WHITE: THE WAY TO THE FURTHEST, {}, GREY: NO WAY", short(ways.furthest * ways.unit)),
+            format!(
+                "White: the shortest path to the furthest point, {} long. Grey: not connected.",
+                short(ways.furthest * ways.unit)
+            ),
         ],
         [
-            "THE GRAPH ABOUT THE POINT, VIRTUAL EDGES RED".to_owned(),
+            "The graph about the dot; red: virtual edges.".to_owned(),
             format!(
-                "{} EDGES, {} VIRTUAL, {} COMPONENTS",
-                counts.edges, counts.virtual_edges, counts.components
+                "{}, {} of them virtual; {}.",
+                count(counts.edges as u64, "edge"),
+                counts.virtual_edges,
+                count(counts.components as u64, "component")
             ),
         ],
     ];
     for (k, lines) in said.iter().enumerate() {
         for (row, line) in lines.iter().enumerate() {
             let top = area(k).top + PANEL + GAP / 2 + row * LINE;
-            canvas.text([area(k).left, top], 3 * FINE / 2, INK, line);
+            legend::sentence(&mut canvas, [area(k).left, top], PANEL, line);
         }
     }
     Some(canvas.picture())

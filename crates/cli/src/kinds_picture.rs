@@ -4,20 +4,19 @@ use nearmiss::{PointKind, Pose, Scan};
 
 use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::digits::short;
-use crate::font;
 use crate::health::kind_name;
 use crate::image::Picture;
-use crate::picture;
+use crate::viewpoint::ViewArgs;
+use crate::{legend, picture};
 
 /// In fine pixels.
 const WIDTH: usize = 1572 * FINE;
 const HEIGHT: usize = 900 * FINE;
 const GAP: usize = 12 * FINE;
-const LEGEND: usize = 44 * FINE;
+const LEGEND: usize = 2 * legend::LINE + 2 * FINE;
 
 const GROUND: Colour = [255, 255, 255];
 const PANEL_GROUND: Colour = [238, 240, 243];
-const INK: Colour = [30, 34, 40];
 
 /// The colour of a kind in pictures and exported points. All are told apart by eyes that do not see
 /// all colours.
@@ -36,25 +35,33 @@ pub(crate) const fn colour(kind: PointKind) -> Colour {
 /// in the colours of their kinds.
 #[must_use]
 pub fn kinds_picture(scan: &Scan) -> Picture {
+    paint(scan, &ViewArgs::default())
+}
+
+/// [`kinds_picture`] from where `from` says.
+pub(crate) fn paint(scan: &Scan, from: &ViewArgs) -> Picture {
     let mut canvas = Canvas::new(WIDTH + 2 * GAP, HEIGHT + 2 * GAP + LEGEND, GROUND);
     let area = Area { left: GAP, top: GAP, width: WIDTH, height: HEIGHT };
     canvas.fill(area, PANEL_GROUND);
     let view = scan.at(&Pose::IDENTITY);
-    let camera = picture::scan_camera(&view, area);
+    let camera = from.camera([&view, &view], area, &[], |_, _| 0.0);
     for i in 0..scan.len() {
         picture::obstacle(&mut canvas, &camera, &view, i, colour(scan.kind(i)), picture::LARGEST);
     }
     picture::scale_bar(&mut canvas, &camera);
-    let top = HEIGHT + 2 * GAP + 8 * FINE;
-    let mut left = GAP + 4 * FINE;
-    for kind in PointKind::ALL {
+    let entries = PointKind::ALL.map(|kind| {
         let share = short(100.0 * scan.share(kind));
-        let name = format!("{} {share} %", kind_name(kind));
-        canvas.fill(Area { left, top, width: 14 * FINE, height: 14 * FINE }, colour(kind));
-        canvas.text([left + 20 * FINE, top], 2 * FINE, INK, &name);
-        left += (40 + 2 * font::ADVANCE * name.chars().count()) * FINE;
-    }
-    let reach = format!("reach {}", short(scan.reach()));
-    canvas.text([left + 10 * FINE, top], 2 * FINE, INK, &reach);
+        (Some(colour(kind)), format!("{} {share} %", kind_name(kind)))
+    });
+    let entries: Vec<(Option<Colour>, &str)> =
+        entries.iter().map(|(colour, text)| (*colour, text.as_str())).collect();
+    let [left, top] = [GAP + 4 * FINE, HEIGHT + 2 * GAP + 4 * FINE];
+    let width = WIDTH - 4 * FINE;
+    legend::entries(&mut canvas, [left, top], width, &entries);
+    let told = format!(
+        "The kinds of the points and their shares. Gaps of up to {} count as surface.",
+        short(scan.reach())
+    );
+    legend::sentence(&mut canvas, [left, top + legend::LINE], width, &told);
     canvas.picture()
 }

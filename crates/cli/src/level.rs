@@ -4,16 +4,17 @@ use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Pose, Scan};
 
 use crate::canvas::{Area, Canvas, Colour, FINE};
-use crate::digits::short;
+use crate::digits::{count, short};
 use crate::export::at_depth;
 use crate::image::Picture;
+use crate::legend;
 use crate::picture::{scale_bar, scan_camera, splat};
 use crate::report;
 
 /// In fine pixels.
 const PANEL: usize = 620 * FINE;
 const GAP: usize = 12 * FINE;
-const LINE: usize = 22 * FINE;
+const LINE: usize = legend::LINE;
 
 const GROUND: Colour = [255, 255, 255];
 const PANEL_GROUND: Colour = [238, 240, 243];
@@ -91,13 +92,13 @@ fn caption(canvas: &mut Canvas, scan: &Scan, depth: u32, nodes: &[usize], area: 
     let median = radii.get(radii.len() / 2).map_or_else(String::new, |&r| short(r));
     let samples: usize = nodes.iter().map(|&node| scan.slices().samples(node).len()).sum();
     let lines = [
-        format!("DEPTH {depth}: {} NODES, A COLOUR EACH", nodes.len()),
-        format!("DOTS: THEIR {samples} SAMPLES"),
-        format!("BALLS ABOUT SAMPLES: RADIUS {median} R, MEDIAN"),
+        format!("{} at depth {depth}, each in a colour", count(nodes.len() as u64, "node")),
+        format!("dots: their {}", count(samples as u64, "sample")),
+        format!("balls: covering radii, median {median} sampling radii"),
     ];
     for (k, line) in lines.iter().enumerate() {
         let top = area.top + area.height + GAP / 2 + k * LINE;
-        canvas.text([area.left, top], 3 * FINE / 2, INK, line);
+        legend::sentence(canvas, [area.left, top], area.width, line);
     }
 }
 

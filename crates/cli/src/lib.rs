@@ -47,9 +47,12 @@ mod font;
 mod geodesic;
 mod image;
 mod kinds_picture;
+mod legend;
 mod level;
+mod marks;
 mod no_curve;
 mod picture;
+mod viewpoint;
 
 use std::ffi::OsString;
 use std::iter;
@@ -92,6 +95,7 @@ pub use slices::{
 };
 pub use touch::TouchArgs;
 pub use units::UnitName;
+pub use viewpoint::{Angles, ViewArgs};
 
 /// Tells whether, where and how near scanned things meet, straight from their points.
 ///

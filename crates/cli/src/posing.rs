@@ -10,7 +10,7 @@ use crate::error::CliError;
 use crate::input::{Opening, TextLines, pieces};
 use crate::matrix::{Matrix, PoseRefused};
 use crate::pose_text::{self, FILE_FORMS, FORMS, PoseFormat};
-use crate::units::{SizeCheck, UnitName, scaled};
+use crate::units::{SizeCheck, UnitName, WorldUnit, scaled};
 
 /// Two scans, and where they are.
 #[derive(Debug, Clone, Args)]
@@ -75,6 +75,11 @@ impl PairArgs {
     /// A check that asks about units once if the scans differ too much in size.
     pub(crate) fn size_check(&self, console: Console) -> SizeCheck {
         SizeCheck::new(console, self.factors())
+    }
+
+    /// The unit of lengths in the world.
+    pub(crate) fn world_unit(&self) -> WorldUnit {
+        if self.factors().is_some() { WorldUnit::Metres } else { WorldUnit::OfFile }
     }
 
     /// The units in metres, if any is given.

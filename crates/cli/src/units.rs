@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use nearmiss::{Aabb, Placed};
 
 use crate::console::Console;
-use crate::digits::rough;
+use crate::digits::{rough, short};
 use crate::matrix::Matrix;
 
 /// Scans whose bounds differ more than this in their diagonals may be in different units. An object in a room
@@ -38,6 +38,48 @@ impl UnitName {
             Self::M => 1.0,
             Self::In => 0.0254,
             Self::Ft => 0.3048,
+        }
+    }
+}
+
+/// The unit of lengths in the world, as far as it is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum WorldUnit {
+    /// The unit of the input, whatever that is.
+    #[default]
+    OfFile,
+    /// Metres: a unit was named for a scan.
+    Metres,
+}
+
+impl WorldUnit {
+    /// Returns a length with three significant digits, and its unit if that is known.
+    pub(crate) fn length(self, length: f64) -> String {
+        match self {
+            Self::OfFile => short(length),
+            Self::Metres => {
+                // A length of 0 is so many metres.
+                let scales = [(1.0, "m"), (0.01, "cm"), (0.001, "mm"), (1e-6, "µm")];
+                let fits = |(metres, _): &&(f64, &str)| length.abs() >= 0.9995 * metres;
+                let (metres, name) = scales.iter().find(fits).unwrap_or(&scales[0]);
+                format!("{} {name}", short(length / metres))
+            }
+        }
+    }
+
+    /// Returns what follows lengths without a unit, if theirs is known.
+    pub(crate) fn aside(self) -> &'static str {
+        if self == Self::Metres { " (in metres)" } else { "" }
+    }
+
+    /// Returns what stands at a scale bar.
+    pub(crate) fn scale(self, length: f64) -> String {
+        match self {
+            Self::OfFile => {
+                let length = short(length);
+                format!("{length} unit{} of the file", if length == "1" { "" } else { "s" })
+            }
+            Self::Metres => self.length(length),
         }
     }
 }
@@ -126,6 +168,19 @@ mod tests {
         assert_eq!(question([0.04, 41.0], Some([0.001, 0.001])), None, "both in millimetres");
         let said = question([0.04, 41.0], Some([0.001, 1.0])).unwrap();
         assert_eq!(said, "b is 1025 times larger than a in the units given; check --units-a and --units-b");
+    }
+
+    #[test]
+    fn lengths_carry_their_unit_if_it_is_known() {
+        let all = |unit: WorldUnit| [0.0, 20.0, 1.0, 0.05, 0.002, 5e-6, -0.5].map(|x| unit.length(x));
+        assert_eq!(
+            all(WorldUnit::OfFile),
+            ["0", "20", "1", "0.05", "0.002", "0.000005", "-0.5"].map(String::from)
+        );
+        assert_eq!(all(WorldUnit::Metres), ["0 m", "20 m", "1 m", "5 cm", "2 mm", "5 µm", "-50 cm"]);
+        assert_eq!(WorldUnit::OfFile.scale(0.05), "0.05 units of the file");
+        assert_eq!(WorldUnit::OfFile.scale(1.0), "1 unit of the file");
+        assert_eq!(WorldUnit::Metres.scale(0.05), "5 cm");
     }
 
     #[test]

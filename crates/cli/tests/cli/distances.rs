@@ -97,6 +97,49 @@ fn a_picture_shows_the_segment() {
 }
 
 #[test]
+fn pictures_are_taken_from_where_it_is_said() {
+    let place = Place::new();
+    place.cloud("one.xyz", sphere(1.0), 0.1);
+    let pose = shift(0.0, 0.0, 3.0);
+    let ask = |options: &[&str]| {
+        let asked = ["distance", "one.xyz", "one.xyz", "--pose-b", &pose, "--image", "d.png"];
+        place.ok(&[&asked[..], options].concat());
+        let (width, pixels) = place.picture("d.png");
+        // The mean column and row of what is blue, and of what is orange, in the whole view.
+        let middle = |is: fn(&[u8]) -> bool| {
+            let inside = |&i: &usize| i % width < width / 2 && i / width < 790;
+            let all: Vec<usize> =
+                (0..pixels.len() / 3).filter(inside).filter(|i| is(&pixels[3 * i..3 * i + 3])).collect();
+            [0, 1].map(|k| {
+                let sum: usize = all.iter().map(|i| if k == 0 { i % width } else { i / width }).sum();
+                sum / all.len().max(1)
+            })
+        };
+        [middle(|p| p[2] > p[0].saturating_add(60)), middle(|p| p[0] > p[2].saturating_add(60))]
+    };
+    let [[ax, ay], [bx, by]] = ask(&["--up", "z"]);
+    assert!(ay > by + 200 && ax.abs_diff(bx) < 20, "b is above a: {ax}, {ay}, {bx}, {by}");
+    let [[ax, ay], [bx, by]] = ask(&["--up", "-z", "--view", "30,10"]);
+    assert!(by > ay + 200 && ax.abs_diff(bx) < 20, "below: {ax}, {ay}, {bx}, {by}");
+    // Seen from +x with y up, +z is to the left.
+    let [[ax, ay], [bx, by]] = ask(&["--up", "y", "--view", "90,0"]);
+    assert!(ax > bx + 200 && ay.abs_diff(by) < 20, "to the left: {ax}, {ay}, {bx}, {by}");
+
+    let refused = |options: &[&str], told: &str| {
+        for command in [&["distance", "one.xyz", "one.xyz"][..], &["collide", "one.xyz", "one.xyz"]] {
+            place.refused(2, &[command, options].concat(), &[told]);
+        }
+    };
+    refused(&["--image", "d.png", "--up", "w"], "known are x, y, z, -x, -y and -z");
+    refused(&["--image", "d.png", "--view", "30"], "such as 30,20");
+    refused(&["--image", "d.png", "--view", "30,95"], "the elevation from -90 to 90");
+    refused(&["--up", "z"], "--image");
+    place.refused(2, &["export", "one.xyz", "--points", "p.ply", "--up", "z"], &["--image"]);
+    let curve = ["curve", "one.xyz", "one.xyz", "-o", "c.ply", "--view", "0,0"];
+    place.refused(2, &curve, &["--image"]);
+}
+
+#[test]
 fn distances_are_refused_with_a_reason() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.2);
