@@ -46,6 +46,11 @@ impl Scratch {
         }
     }
 
+    /// The SIMD instructions that queries run with.
+    pub(crate) fn level(&self) -> Level {
+        self.contact.level
+    }
+
     /// The longest interval between two looks at the clock in the last collision query with a deadline; zero
     /// without a deadline. A query overruns its deadline by about this much at most.
     #[must_use]

@@ -255,6 +255,9 @@ pub enum PlanError {
     /// A margin that is no length.
     #[error("a margin of {0}; it must be finite and not negative")]
     Margin(f64),
+    /// A link length that is no length.
+    #[error("link must be a finite length, zero or more, got {0}")]
+    Link(f64),
     /// A relative precision out of range.
     #[error("relative must be at least 0 and less than 1, got {0}")]
     Relative(f64),
