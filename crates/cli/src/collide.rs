@@ -13,6 +13,7 @@ use nearmiss::{
 };
 
 use crate::console::{self, Console, Results, now};
+use crate::contacts::ContactArgs;
 use crate::distance::beside;
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -22,7 +23,7 @@ use crate::posing::{self, PairArgs, PoseFile};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::search::SearchArgs;
-use crate::sentence::{hint, sentence};
+use crate::sentence::{hint, sentence, unit};
 use crate::units::SizeCheck;
 use crate::{output, picture, proof};
 
@@ -73,6 +74,9 @@ pub struct CollideArgs {
     /// order, beside the answer
     #[arg(long)]
     pub all: bool,
+    /// What is done with all contacts
+    #[command(flatten)]
+    pub contacts: ContactArgs,
     /// How to search
     #[command(flatten)]
     pub search: SearchArgs,
@@ -181,6 +185,12 @@ impl Question {
         let results = &mut *out.results;
         let report = AnswerReport::new(&asked.answer, asked.contacts.as_ref(), asked.micros);
         let report = report.with_manifold(asked.manifold.as_deref());
+        let all = asked.contacts.as_ref().map(|all| all.contacts.as_slice());
+        let grouped = all.map(|all| (all, args.contacts.group(all, [&a, &b])));
+        if let Some((all, grouped)) = &grouped {
+            args.contacts.write(all, grouped)?;
+        }
+        let report = report.with_clashes(grouped.as_ref());
         if args.json {
             return results.json(&report);
         }
@@ -197,6 +207,9 @@ impl Question {
             results.line(hint)?;
         }
         results.line(report.details())?;
+        if let Some((all, grouped)) = &grouped {
+            grouped.lines(all, unit([&a, &b])).iter().try_for_each(|line| results.line(line))?;
+        }
         report.contacts().chain(report.manifold()).try_for_each(|contact| results.line(contact))
     }
 }
@@ -237,6 +250,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     if let Some(path) = &args.prove {
         output::check_apart(path, &args.pair.inputs())?;
     }
+    args.contacts.check(&args.pair.inputs())?;
     let matrices = args.pair.matrices()?;
     let mut poses = args.pair.pose_file(args.poses.as_ref())?;
 

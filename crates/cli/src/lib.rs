@@ -30,6 +30,7 @@ mod posing;
 mod units;
 
 mod advice;
+mod contacts;
 mod digits;
 mod health;
 mod meaning;
@@ -59,6 +60,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
 pub use collide::{CollideArgs, DetailName, EvidenceName};
+pub use contacts::ContactArgs;
 pub use convert::ConvertArgs;
 pub use curve::CurveArgs;
 pub use curve_picture::curve_picture;

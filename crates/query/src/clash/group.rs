@@ -1,5 +1,7 @@
 //! Contacts that belong together.
 
+use std::cmp::Ordering;
+
 use nearmiss_geometry::Aabb;
 
 use crate::ask::answer::Contact;
@@ -55,5 +57,14 @@ impl ContactGroup {
     #[must_use]
     pub fn diagonal(&self) -> f64 {
         self.size().into_iter().fold(0.0, f64::hypot)
+    }
+
+    /// The order of clash lists: the greater box diagonal first, then more contacts, then the group that was
+    /// found first.
+    #[must_use]
+    pub fn by_size(&self, other: &Self) -> Ordering {
+        (other.diagonal().total_cmp(&self.diagonal()))
+            .then(other.contacts.len().cmp(&self.contacts.len()))
+            .then(self.contacts.cmp(&other.contacts))
     }
 }
