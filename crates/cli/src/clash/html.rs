@@ -52,6 +52,10 @@ pub(crate) fn write(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) 
     writeln!(out, "<h2>Overview</h2>")?;
     let told = if list.found.clashes.is_empty() { "" } else { ", with the numbers of the clashes" };
     image(&pictures.overview, &format!("{a} and {b}{told}"), out)?;
+    if let Some(picture) = &pictures.surroundings {
+        writeln!(out, "<h2>About the smaller scan</h2>")?;
+        image(picture, &format!("the surroundings of the smaller scan{told}"), out)?;
+    }
     if !list.found.clashes.is_empty() {
         table(list, pictures.close.len(), out)?;
         figures(list, pictures, out)?;

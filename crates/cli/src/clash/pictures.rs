@@ -31,23 +31,33 @@ const OF_SMALLER: f64 = 0.12;
 /// A scan is cut open in the overview if its box is so many times larger than the other's.
 const LARGER: f64 = 3.0;
 
+/// The surroundings of the smaller scan are so many times as high as its diagonal is long, and are shown if
+/// that makes it so many times larger.
+const AROUND: f64 = 1.6;
+const LOST: f64 = 3.0;
+
 /// Points of a chunk lie together, for the order of the points is that of the tree.
 const CHUNK: usize = 512;
 
-/// Points and contacts that are looked at to choose a direction.
-const LOOKED_AT: usize = 1500;
+/// Points of a scan, and contacts, that are looked at to choose a direction.
+const LOOKED_AT: usize = 1200;
 const TARGETS: usize = 24;
 
 /// The pictures of a list.
 pub(crate) struct Pictures {
+    /// Both scans.
     pub(crate) overview: Picture,
+    /// The surroundings of the smaller scan, if it is lost in the overview.
+    pub(crate) surroundings: Option<Picture>,
     /// Of the first clashes.
     pub(crate) close: Vec<Picture>,
 }
 
 /// Paints the overview and the first `count` clashes; the bar advances with each.
 pub(crate) fn paint(list: &List<'_>, count: usize, bar: &Bar) -> Pictures {
-    let overview = overview(list, count);
+    let whole = Overview::new(list);
+    let overview = whole.paint(list, count, &whole.camera);
+    let surroundings = whole.nearer.as_ref().map(|camera| whole.paint(list, count, camera));
     bar.advance(1);
     let chunks = list.views.map(Chunks::new);
     let close = list.found.clashes.iter().take(count).map(|clash| {
@@ -55,51 +65,72 @@ pub(crate) fn paint(list: &List<'_>, count: usize, bar: &Bar) -> Pictures {
         bar.advance(1);
         picture
     });
-    Pictures { overview, close: close.collect() }
+    Pictures { overview, surroundings, close: close.collect() }
 }
 
-/// Both scans with the numbers of the first clashes, and dots at the others. Of a scan that is much larger
-/// than the other, what lies before the clashes is left out, as the roof of a doll's house.
-fn overview(list: &List<'_>, numbered: usize) -> Picture {
-    let [width, height] = OVERVIEW;
-    let mut canvas = Canvas::new(width, height, GROUND);
-    let area = Area { left: 0, top: 0, width, height };
-    canvas.fill(area, PANEL_GROUND);
-    let clashes = &list.found.clashes;
-    let centres: Vec<Vector3<f64>> = clashes.iter().map(|clash| clash.group.centre().into()).collect();
-    let sizes = list.views.map(|view| diagonal(&bounds(view)));
-    let apart = sizes[0].min(sizes[1]);
-    let is_larger = [sizes[0] > LARGER * sizes[1], sizes[1] > LARGER * sizes[0]];
-    let targets = thinned(&centres, TARGETS);
-    let is_open = is_larger != [false; 2] && !centres.is_empty();
-    let camera = whole_camera(list.views, area, |points, toward| {
-        if is_open {
-            // From above, as buildings are looked into.
-            return 3.0 * (1.0 - toward.dot(&Vector3::new(0.0, -0.35, 0.94)));
+/// How both scans are shown. Of a scan that is much larger than the other, what lies before that one is left
+/// out, as the roof of a doll's house.
+struct Overview {
+    camera: Camera,
+    /// What is about the scan that is much smaller.
+    nearer: Option<Camera>,
+    /// What of either scan lies nearer to the viewer than this, along the view, is left out.
+    cuts: [f64; 2],
+}
+
+impl Overview {
+    fn new(list: &List<'_>) -> Self {
+        let [width, height] = OVERVIEW;
+        let area = Area { left: 0, top: 0, width, height };
+        let clashes = &list.found.clashes;
+        let centres: Vec<Vector3<f64>> = clashes.iter().map(|clash| clash.group.centre().into()).collect();
+        let boxes = list.views.map(bounds);
+        let sizes = boxes.map(|bounds| diagonal(&bounds));
+        let smaller = usize::from(sizes[1] < sizes[0]);
+        let size = sizes[smaller];
+        let is_open = sizes[1 - smaller] > LARGER * size && !centres.is_empty();
+        let targets = thinned(&centres, TARGETS);
+        let camera = whole_camera(list.views, area, |points, toward| {
+            if is_open {
+                // From above, as buildings are looked into.
+                return 3.0 * (1.0 - toward.dot(&Vector3::new(0.0, -0.35, 0.94)));
+            }
+            4.0 * hidden(&targets, points, *toward, [0.1 * size, 0.05 * size])
+        });
+        let mut cuts = [f64::INFINITY; 2];
+        if !is_open {
+            return Self { camera, nearer: None, cuts };
         }
-        4.0 * hidden(&targets, points, *toward, [0.1 * apart, 0.05 * apart])
-    });
-    let toward = camera.axes[2];
-    let front = |p: Vector3<f64>| toward.dot(&p);
-    let of_smaller = |larger: usize| {
-        let corners = bounds(list.views[1 - larger]).corners();
-        corners.into_iter().map(|p| front(p.into())).fold(f64::NEG_INFINITY, f64::max)
-    };
-    for (k, (view, colour)) in list.views.into_iter().zip([OF_A, OF_B]).enumerate() {
-        let cut = if is_open && is_larger[k] { of_smaller(k) } else { f64::INFINITY };
-        for i in (0..view.scan().len()).filter(|&i| front(view.point(i).into()) <= cut) {
-            point(list, &mut canvas, &camera, view, i, colour, LARGEST);
+        let front = |corner: [f64; 3]| camera.axes[2].dot(&Vector3::from(corner));
+        cuts[1 - smaller] = boxes[smaller].corners().into_iter().map(front).fold(f64::NEG_INFINITY, f64::max);
+        #[expect(clippy::cast_precision_loss, reason = "pixels")]
+        let scale = height as f64 / (AROUND * size.max(f64::MIN_POSITIVE));
+        let nearer = Camera { centre: boxes[smaller].centre().into(), scale, ..camera };
+        Self { camera, nearer: Some(nearer).filter(|nearer| nearer.scale > LOST * camera.scale), cuts }
+    }
+
+    /// Both scans with the numbers of the first clashes, and dots at the others.
+    fn paint(&self, list: &List<'_>, numbered: usize, camera: &Camera) -> Picture {
+        let Area { width, height, .. } = camera.area;
+        let mut canvas = Canvas::new(width, height, GROUND);
+        canvas.fill(camera.area, PANEL_GROUND);
+        for ((view, colour), cut) in list.views.into_iter().zip([OF_A, OF_B]).zip(self.cuts) {
+            let front = |i: usize| camera.axes[2].dot(&Vector3::from(view.point(i)));
+            for i in (0..view.scan().len()).filter(|&i| front(i) <= cut) {
+                point(list, &mut canvas, camera, view, i, colour, LARGEST);
+            }
         }
+        scale_bar(&mut canvas, camera);
+        let clashes = &list.found.clashes;
+        for clash in clashes.iter().skip(numbered) {
+            contact_dot(&mut canvas, camera, clash.group.centre().into(), colour_of(clash));
+        }
+        // The first clash comes last, on top.
+        for (i, clash) in clashes.iter().enumerate().take(numbered).rev() {
+            label(&mut canvas, camera, clash.group.centre().into(), i + 1, colour_of(clash));
+        }
+        canvas.picture()
     }
-    scale_bar(&mut canvas, &camera);
-    for clash in clashes.iter().skip(numbered) {
-        contact_dot(&mut canvas, &camera, clash.group.centre().into(), colour_of(clash));
-    }
-    // The first clash comes last, on top.
-    for (number, clash) in (1..).zip(clashes.iter().take(numbered)).collect::<Vec<_>>().into_iter().rev() {
-        label(&mut canvas, &camera, clash.group.centre().into(), number, colour_of(clash));
-    }
-    canvas.picture()
 }
 
 /// One stored point as it is compared.
@@ -229,26 +260,34 @@ impl Close {
             let local = view.scan().radii()[stored_index(view, nearest.sources[k])];
             f64::from(local) * view.placed().scale()
         };
-        let smaller =
-            list.views.map(|view| diagonal(&bounds(view))).into_iter().fold(f64::INFINITY, f64::min);
+        let sizes = list.views.map(|view| diagonal(&bounds(view)));
+        let smaller = usize::from(sizes[1] < sizes[0]);
         let reach: f64 = (0.7_f64 * clash.group.diagonal())
             .max(RADII * radius(0).max(radius(1)))
-            .max(OF_SMALLER * smaller)
+            .max(OF_SMALLER * sizes[smaller])
             .max(1.5 * clash.upper)
             .max(f64::MIN_POSITIVE);
         let centre = Vector3::from(clash.group.centre());
         let shown = [0, 1].map(|k| chunks[k].within(list.views[k], centre, 1.7 * reach));
-        let looked_at: Vec<Vector3<f64>> = (0..2)
-            .flat_map(|k| {
-                let stride = shown[k].len().div_ceil(LOOKED_AT).max(1);
-                shown[k].iter().step_by(stride).map(move |&i| list.views[k].point(i).into())
-            })
-            .collect();
-        let targets = thinned(&contacts, TARGETS);
+        let looked_at = [0, 1].map(|k: usize| {
+            let stride = shown[k].len().div_ceil(LOOKED_AT).max(1);
+            let some = shown[k].iter().step_by(stride).map(|&i| Vector3::from(list.views[k].point(i)));
+            some.collect::<Vec<_>>()
+        });
+        // Neither the contacts should be hidden, nor the smaller scan by the larger one.
+        let (targets, body) = (thinned(&contacts, TARGETS), thinned(&looked_at[smaller], TARGETS));
+        let normal = nearest.normals.map_or_else(Vector3::zeros, |normals| normals[1 - smaller].into());
+        // A gap is seen along the surfaces, a cut obliquely.
+        let oblique = if clash.kind == ClashKind::Hard { 0.4 } else { 0.1 };
         let cost = |toward: &Vector3<f64>| {
             let below = (-toward.dot(&Vector3::new(0.0, 0.5, 0.8))).max(0.0);
             let steep = toward.z.abs().powi(4);
-            hidden(&targets, &looked_at, *toward, [0.08 * reach, 0.1 * reach]) + 0.25 * below + 0.1 * steep
+            let turned = (toward.dot(&normal).abs() - oblique).abs();
+            let before = [0.08 * reach, 0.1 * reach];
+            let of_contacts: f64 =
+                looked_at.iter().map(|points| hidden(&targets, points, *toward, before)).sum();
+            let of_body = hidden(&body, &looked_at[1 - smaller], *toward, before);
+            of_contacts + of_body + 0.4 * turned + 0.25 * below + 0.1 * steep
         };
         let toward = directions().min_by(|p, q| cost(p).total_cmp(&cost(q))).unwrap_or_else(Vector3::z);
         // Upright, as far as that can be told: z is up, unless it is looked along.
