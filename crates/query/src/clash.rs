@@ -1,14 +1,22 @@
 //! Clash lists: all places where two scans meet, or come nearer to each other than a clearance, each once.
 //!
 //! One search finds a contact of every pair of leaves that meets. A second one, with the clearance as its
-//! margin, finds one of every pair of leaves that comes nearer. Contacts of the first are *hard*, all others
-//! *near*. Hard contacts are grouped into hard clashes. Near contacts that are linked to hard ones surround
-//! these; the rest is grouped into clearance clashes. So hard clashes do not depend on the clearance.
+//! margin, finds one of every pair of leaves that comes nearer. Contacts of the first are *hard*; those of the
+//! second, but for leaves that meet, are *near*. Hard contacts are grouped into hard clashes. Near contacts
+//! that are linked to hard ones, directly or by others, surround these; the rest is grouped into clearance
+//! clashes. So hard clashes do not depend on the clearance.
+//!
+//! A near contact is the first one found of two leaves, not the nearest. So the nearest points of the same
+//! leaves bound the distance of a clearance clash from above, and their enclosures or the balls about their
+//! points from below.
 
 mod components;
 mod group;
 mod least;
 mod measure;
+mod stored;
+
+use std::collections::BTreeSet;
 
 use nearmiss_hierarchy::PointHierarchy;
 use nearmiss_surface::Metric;
@@ -21,6 +29,7 @@ use crate::ask::options::{CollideOptions, CollidePlan, Detail, PlanError, Semant
 use crate::pair::placed::Placed;
 use crate::question::{Pair, Scratch};
 use measure::{NearContacts, Nearness, nearness};
+use stored::{leaves, stored};
 
 /// What is asked. Plain values; [`ClashPlan::new`] validates them. Lengths are in the world.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -191,11 +200,18 @@ impl Pair<'_> {
         let count = hard.contacts.len();
         let groups = ContactGroup::all(&hard.contacts, link);
         let mut contacts = hard.contacts;
-        contacts.append(&mut near.contacts);
         let mut clashes = Vec::new();
         if let Some(plan) = &plan.near {
+            let mut points = stored(views, &contacts);
+            let touching: BTreeSet<[usize; 2]> = points.iter().map(|&points| leaves(views, points)).collect();
+            for (contact, near) in near.contacts.iter().zip(stored(views, &near.contacts)) {
+                if !touching.contains(&leaves(views, near)) {
+                    contacts.push(*contact);
+                    points.push(near);
+                }
+            }
             let NearContacts { surroundings, misses } = NearContacts::new(&contacts, count, &groups, link);
-            let nearness = nearness(views, plan, scratch.level(), &contacts, &misses);
+            let nearness = nearness(views, plan, scratch.level(), (&contacts, &points), &misses);
             clashes
                 .extend(groups.into_iter().zip(surroundings).map(|(group, near)| Clash::hard(group, near)));
             clashes.extend(misses.into_iter().zip(nearness).map(|(group, near)| Clash::miss(group, near)));

@@ -287,7 +287,7 @@ impl Close {
             let of_contacts: f64 =
                 looked_at.iter().map(|points| hidden(&targets, points, *toward, before)).sum();
             let of_body = hidden(&body, &looked_at[1 - smaller], *toward, before);
-            of_contacts + of_body + 0.4 * turned + 0.25 * below + 0.1 * steep
+            of_contacts + 2.0 * of_body + 0.4 * turned + 0.25 * below + 0.1 * steep
         };
         let toward = directions().min_by(|p, q| cost(p).total_cmp(&cost(q))).unwrap_or_else(Vector3::z);
         // Upright, as far as that can be told: z is up, unless it is looked along.

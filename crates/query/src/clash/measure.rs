@@ -56,67 +56,45 @@ pub(crate) struct Nearness {
     pub(crate) evidence: Evidence,
 }
 
-/// The nearness of each group of `contacts`, over the pairs of leaves that these are of.
+/// The nearness of each group of `contacts`, which are of stored `points`, over the pairs of leaves with these.
 pub(crate) fn nearness(
     views: [&Placed<'_>; 2],
     plan: &CollidePlan,
     level: Level,
-    contacts: &[Contact],
+    (contacts, points): (&[Contact], &[[usize; 2]]),
     groups: &[ContactGroup],
 ) -> Vec<Nearness> {
-    let by_discs = |group: &ContactGroup| Nearness {
-        lower: 0.0,
-        upper: 2.0 * contacts[group.nearest].residual,
-        evidence: Evidence::Estimated,
-    };
     let Ok((_, relative)) = relative(views[0], views[1], plan) else {
-        return groups.iter().map(by_discs).collect();
+        let unknown = Nearness { lower: 0.0, upper: f64::INFINITY, evidence: Evidence::Estimated };
+        return vec![unknown; groups.len()];
     };
     let slices = views.map(|view| view.scan().slices());
     let meter = Meter::new(&Budget::UNLIMITED, views, 0);
     let semantics = plan.options().semantics;
     let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, semantics.part()));
-    let sources = |side: usize| {
-        let of_groups = groups.iter().flat_map(|group| &group.contacts);
-        Sources::new(views[side], of_groups.map(|&i| contacts[i].sources[side].0).collect())
-    };
-    let stored = [sources(0), sources(1)];
     let proves_upper = !matches!(semantics, Semantics::Surface);
+    // The distance of the places that a contact lies between; residuals are halves of it, balls included.
+    let between = |i: usize| {
+        let balls = match semantics {
+            Semantics::Thickened(radius) => 2.0 * radius,
+            _ if pair.is_of_balls(points[i]) => pair.balls(points[i]).iter().sum(),
+            _ => 0.0,
+        };
+        (2.0 * contacts[i].residual - balls).max(0.0)
+    };
     let of_group = |group: &ContactGroup| {
-        let mut all = Nearness { lower: f64::INFINITY, ..by_discs(group) };
+        let mut all = Nearness { lower: f64::INFINITY, upper: f64::INFINITY, evidence: Evidence::Estimated };
         for &i in &group.contacts {
-            let [a, b] = [0, 1].map(|side| stored[side].stored(contacts[i].sources[side].0));
-            let least = Least::of(&pair, plan, pair.leaves_of([a, b]));
+            let least = Least::of(&pair, plan, pair.leaves_of(points[i]));
             all.lower = all.lower.min(least.lower);
-            if least.upper <= all.upper {
-                all.upper = least.upper.max(0.0);
-                all.evidence = if proves_upper { Evidence::Certified } else { Evidence::Estimated };
+            let of_points = if proves_upper { Evidence::Certified } else { Evidence::Estimated };
+            for (upper, evidence) in [(least.upper.max(0.0), of_points), (between(i), Evidence::Estimated)] {
+                if upper < all.upper {
+                    (all.upper, all.evidence) = (upper, evidence);
+                }
             }
         }
         Nearness { lower: all.lower.min(all.upper), ..all }
     };
     groups.iter().map(of_group).collect()
-}
-
-/// Where some of the caller's points are stored.
-struct Sources {
-    /// Pairs of the caller's number and the index of the stored point, by number.
-    known: Vec<(u32, usize)>,
-}
-
-impl Sources {
-    fn new(view: &Placed<'_>, mut wanted: Vec<u32>) -> Self {
-        wanted.sort_unstable();
-        wanted.dedup();
-        let of_scan = view.scan().source().iter().enumerate();
-        let known = of_scan.filter(|(_, id)| wanted.binary_search(id).is_ok()).map(|(i, &id)| (id, i));
-        let mut known: Vec<(u32, usize)> = known.collect();
-        known.sort_unstable();
-        Self { known }
-    }
-
-    /// The stored point with a number that was wanted.
-    fn stored(&self, id: u32) -> usize {
-        self.known.binary_search_by_key(&id, |&(id, _)| id).map_or(0, |at| self.known[at].1)
-    }
 }
