@@ -13,6 +13,7 @@ use nearmiss::{
 };
 
 use crate::console::{self, Console, Results, now};
+use crate::contacts::ContactArgs;
 use crate::distance::beside;
 use crate::distance_picture::paint_apart;
 use crate::error::CliError;
@@ -24,7 +25,7 @@ use crate::posing::{self, PairArgs, PoseFile, Posed};
 use crate::preprocess::parse_threads;
 use crate::report::AnswerReport;
 use crate::search::SearchArgs;
-use crate::sentence::{hint, sentence};
+use crate::sentence::{hint, sentence, unit};
 use crate::units::SizeCheck;
 use crate::viewpoint::ViewArgs;
 use crate::{output, picture, proof};
@@ -83,6 +84,9 @@ pub struct CollideArgs {
     /// first order.
     #[arg(long)]
     pub all: bool,
+    /// What is done with all contacts
+    #[command(flatten)]
+    pub contacts: ContactArgs,
     /// How to search
     #[command(flatten)]
     pub search: SearchArgs,
@@ -204,6 +208,13 @@ impl Question {
         let results = &mut *out.results;
         let report = AnswerReport::new(&asked.answer, asked.contacts.as_ref(), asked.micros);
         let report = report.with_manifold(asked.manifold.as_deref());
+        let all = asked.contacts.as_ref().map(|all| all.contacts.as_slice());
+        let grouped = all.map(|all| (all, args.contacts.group(all, [&a, &b])));
+        if let Some((all, grouped)) = &grouped {
+            let csv = args.path.csv.as_deref().filter(|_| asked.line.is_none());
+            args.contacts.write(csv, all, grouped)?;
+        }
+        let report = report.with_clashes(grouped.as_ref());
         if args.json {
             return results.json(&report);
         }
@@ -221,6 +232,9 @@ impl Question {
             results.line(hint)?;
         }
         results.line(report.details())?;
+        if let Some((all, grouped)) = &grouped {
+            grouped.lines(all, unit([&a, &b])).iter().try_for_each(|line| results.line(line))?;
+        }
         report.contacts().chain(report.manifold()).try_for_each(|contact| results.line(contact))
     }
 }
@@ -288,7 +302,8 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     if let Some(path) = &args.prove {
         output::check_apart(path, &args.pair.inputs())?;
     }
-    args.path.check(&args.pair.inputs())?;
+    args.path.check(&args.pair.inputs(), args.all)?;
+    args.contacts.check(args.path.csv.as_deref(), &args.pair.inputs())?;
     let matrices = args.pair.matrices()?;
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
 
@@ -327,7 +342,8 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     let mut results = Results::new();
     output::replace_if_any(args.prove.as_deref(), |proof| {
         let proof = args.prove.as_deref().zip(proof);
-        output::replace_if_any(args.path.csv.as_deref(), |csv| match &mut poses {
+        let table = args.path.csv.as_deref().filter(|_| poses.is_some());
+        output::replace_if_any(table, |csv| match &mut poses {
             Some(poses) => {
                 let log = Some(PathLog::new(&args.path, csv)?);
                 let mut out = Outputs { results: &mut results, proof, log };

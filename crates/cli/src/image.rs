@@ -35,7 +35,8 @@ impl Picture {
         output::replace_plain(path, |out| self.encode(out))
     }
 
-    fn encode(&self, out: impl Write) -> std::io::Result<()> {
+    /// Encodes the picture as PNG.
+    pub(crate) fn encode(&self, out: impl Write) -> std::io::Result<()> {
         let side = |length: usize| u32::try_from(length).unwrap_or(u32::MAX);
         let mut encoder = png::Encoder::new(out, side(self.width), side(self.height));
         encoder.set_color(png::ColorType::Rgb);

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod bus;
+mod clash;
 mod collide;
 mod console;
 mod convert;
@@ -33,6 +34,7 @@ mod posing;
 mod units;
 
 mod advice;
+mod contacts;
 mod digits;
 mod health;
 mod meaning;
@@ -64,7 +66,9 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub use canvas::{Area, Canvas, Colour, FINE};
 pub use clap;
+pub use clash::ClashArgs;
 pub use collide::{CollideArgs, DetailName, EvidenceName};
+pub use contacts::ContactArgs;
 pub use convert::ConvertArgs;
 pub use curve::CurveArgs;
 pub use curve_picture::curve_picture;
@@ -113,6 +117,12 @@ Examples:
   nearmiss collide a.nm b.nm --poses near.jsonl --work 2000 --json
   nearmiss collide ring-1.nm ring-2.nm --thickened 0.15 --image contact.png";
 
+const CLASH_EXAMPLES: &str = "\
+Examples:
+  nearmiss clash pump.nm hall.nm --pose-a \"1 0 0 2.5  0 1 0 0.8  0 0 1 0  0 0 0 1\" --clearance 0.05
+  nearmiss clash pump.nm hall.nm --csv clashes.csv --html clashes.html
+  nearmiss clash pump.nm hall.nm --json";
+
 const CONVERT_EXAMPLES: &str = "\
 Examples:
   nearmiss convert survey.laz survey.ply --class 2,6
@@ -154,6 +164,9 @@ pub enum Command {
     /// Test whether two scans touch, where, and how near they come
     #[command(after_long_help = COLLIDE_EXAMPLES)]
     Collide(CollideArgs),
+    /// List all places where two scans touch or come too close: table, CSV, HTML page
+    #[command(after_long_help = CLASH_EXAMPLES)]
+    Clash(ClashArgs),
     /// Find all curves in which two surfaces intersect
     #[command(after_long_help = "Example:\n  nearmiss curve a.nm b.nm --image curves.png -o curves.ply")]
     Curve(CurveArgs),
@@ -193,6 +206,7 @@ impl Command {
             Self::Inspect(args) => vec![&args.file],
             Self::Eval(args) => vec![&args.file],
             Self::Collide(args) => vec![&args.pair.a, &args.pair.b],
+            Self::Clash(args) => vec![&args.pair.a, &args.pair.b],
             Self::Curve(args) => vec![&args.pair.a, &args.pair.b],
             Self::Distance(args) => vec![&args.pair.a, &args.pair.b],
             Self::Touch(args) => vec![&args.scan],
@@ -214,6 +228,7 @@ impl Command {
             Self::Inspect(args) => inspect::run(args),
             Self::Eval(args) => eval::run(args),
             Self::Collide(args) => collide::run(args),
+            Self::Clash(args) => clash::run(args),
             Self::Curve(args) => curve::run(args),
             Self::Density(args) => density::run(args),
             Self::Distance(args) => distance::run(args),

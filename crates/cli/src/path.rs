@@ -21,8 +21,8 @@ pub struct PathArgs {
     /// line of output, in order; a summary follows.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Write a table of --poses: line, time, verdict, clearance, place
-    #[arg(long, value_name = "OUT.csv", requires = "poses", help_heading = "Output")]
+    /// Write a table: of --poses line, time, verdict, clearance, place; of --all its contacts
+    #[arg(long, value_name = "OUT.csv", help_heading = "Output")]
     pub csv: Option<PathBuf>,
     /// Plot clearance and verdict over --poses, as SVG
     #[arg(long, value_name = "OUT.svg", requires = "poses", help_heading = "Output")]
@@ -30,8 +30,12 @@ pub struct PathArgs {
 }
 
 impl PathArgs {
-    /// Checks the names of the outputs before any work is done.
-    pub(crate) fn check(&self, inputs: &[&Path]) -> Result<(), CliError> {
+    /// Checks the names of the outputs before any work is done. `has_table` tells that there is something to
+    /// write to a table without --poses too.
+    pub(crate) fn check(&self, inputs: &[&Path], has_table: bool) -> Result<(), CliError> {
+        if self.csv.is_some() && self.poses.is_none() && !has_table {
+            return Err(CliError::Usage("--csv needs many answers: give --poses".into()));
+        }
         let mut inputs = inputs.to_vec();
         inputs.extend(self.poses.as_deref());
         for path in self.csv.iter().chain(&self.plot) {

@@ -7,6 +7,7 @@ use nearmiss::{
 };
 use serde::Serialize;
 
+use crate::contacts::{GroupReport, Grouped};
 use crate::digits::{bytes, count, percent, place, short};
 use crate::filters::Filtered;
 use crate::health::Health;
@@ -276,7 +277,15 @@ pub(crate) struct AnswerReport {
     #[serde(skip_serializing_if = "Option::is_none")]
     complete: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    contact_count: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     contacts: Option<Vec<ContactReport>>,
+    /// Contacts up to this far apart are in one clash.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    link: Option<f64>,
+    /// The groups of contacts, the greatest first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    clashes: Option<Vec<GroupReport>>,
     /// The deepest place first.
     #[serde(skip_serializing_if = "Option::is_none")]
     manifold: Option<Vec<PlaceReport>>,
@@ -308,6 +317,8 @@ struct ContactReport {
     residual: f64,
     source_a: u32,
     source_b: u32,
+    /// The number of its clash, counted from 1.
+    clash: u32,
 }
 
 impl ContactReport {
@@ -319,6 +330,7 @@ impl ContactReport {
             residual: contact.residual,
             source_a: contact.sources[0].0,
             source_b: contact.sources[1].0,
+            clash: 0,
         }
     }
 }
@@ -345,7 +357,10 @@ impl AnswerReport {
             neighbour_steps: Some(answer.statistics.neighbour_steps).filter(|&steps| steps > 0),
             micros,
             complete: all.map(|all| all.complete),
+            contact_count: all.map(|all| all.contacts.len()),
             contacts: all.map(|all| all.contacts.iter().map(ContactReport::new).collect()),
+            link: None,
+            clashes: None,
             manifold: None,
         };
         match answer.verdict {
@@ -390,6 +405,18 @@ impl AnswerReport {
     pub(crate) fn with_manifold(self, places: Option<&[ManifoldPoint]>) -> Self {
         let manifold = places.map(|places| places.iter().map(PlaceReport::new).collect());
         Self { manifold, ..self }
+    }
+
+    /// The same with the clashes that all contacts are grouped into.
+    pub(crate) fn with_clashes(mut self, grouped: Option<&(&[Contact], Grouped)>) -> Self {
+        if let Some((contacts, grouped)) = grouped {
+            self.link = Some(grouped.link);
+            self.clashes = Some(grouped.reports(contacts));
+            for (contact, &clash) in self.contacts.iter_mut().flatten().zip(&grouped.numbers) {
+                contact.clash = clash;
+            }
+        }
+        self
     }
 
     /// The places of a manifold, if it was asked for, for people.

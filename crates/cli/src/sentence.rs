@@ -66,7 +66,7 @@ pub(crate) fn sentence(
             });
             format!("No contact{found}{within}{} ({}).", apart.unwrap_or_default(), word(evidence))
         }
-        Verdict::Undecided(reason) => format!("Cannot tell: {}.", doubt(reason, views, options)),
+        Verdict::Undecided(reason) => format!("Cannot tell: {}.", why(reason, views, options)),
     }
 }
 
@@ -122,7 +122,7 @@ fn world_bounds(view: &Placed<'_>) -> Aabb {
 }
 
 /// Returns why there is no verdict, and what would help.
-fn doubt(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> String {
+pub(crate) fn why(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> String {
     // Only surfaces leave doubts: in obstacles, all other points are balls.
     let first = match (options.method, options.metric) {
         (_, Some(Metric::Geodesic)) => None,

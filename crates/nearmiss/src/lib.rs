@@ -31,11 +31,12 @@ pub use nearmiss_hierarchy::{
     ScanPoints,
 };
 pub use nearmiss_query::{
-    Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, CollideOptions, CollidePlan, Contact, Contacts,
-    Curve, CurveEnd, CurveOptions, CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions,
-    DistancePlan, Evidence, Interpolation, ManifoldPoint, Method, NearestPoint, Order, Pacer, Pair, PairHint,
-    Placed, PlanError, Prepared, Proof, Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape,
-    ShapeIndex, Statistics, SurfelSize, Until, Verdict, World, each,
+    Answer, BatchScratch, Bodies, BodyId, Brackets, Budget, Clash, ClashKind, ClashOptions, ClashPlan,
+    Clashes, CollideOptions, CollidePlan, Contact, ContactGroup, Contacts, Curve, CurveEnd, CurveOptions,
+    CurvePlan, Curves, Deadline, Detail, Distance, DistanceOptions, DistancePlan, Evidence, Interpolation,
+    ManifoldPoint, Method, NearestPoint, Order, Pacer, Pair, PairHint, Placed, PlanError, Prepared, Proof,
+    Question, Reason, Refinement, Sampling, Scratch, Semantics, Shape, ShapeIndex, Statistics, SurfelSize,
+    Until, Verdict, World, each,
 };
 pub use nearmiss_store::{Check, WorkError, Workspace};
 pub use nearmiss_surface::{Bandwidth, Evaluation, Kernel, Metric, Status, SurfaceOptions};

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod ask;
+mod clash;
 mod contact;
 mod curve;
 mod distance;
@@ -17,6 +18,7 @@ pub use ask::budget::{Budget, Deadline};
 pub use ask::interpolation::{Brackets, Interpolation, Refinement, SurfelSize};
 pub use ask::occupancy::{occupancy, points_for};
 pub use ask::options::{CollideOptions, CollidePlan, Detail, Method, Order, PlanError, Sampling, Semantics};
+pub use clash::{Clash, ClashKind, ClashOptions, ClashPlan, Clashes, ContactGroup, components, default_link};
 pub use contact::certificate::Proof;
 pub use contact::hint::PairHint;
 pub use curve::{Curve, CurveEnd, CurveOptions, CurvePlan, Curves};

@@ -48,6 +48,11 @@ impl Scratch {
         }
     }
 
+    /// Returns the SIMD instruction set that queries use.
+    pub(crate) fn level(&self) -> Level {
+        self.contact.level
+    }
+
     /// Returns the longest interval between two clock reads in the last collision query with a
     /// deadline; zero without a deadline. A query overruns its deadline by about this much at most.
     #[must_use]

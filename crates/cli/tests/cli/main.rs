@@ -3,6 +3,7 @@
 
 mod bad_input;
 mod building_maps;
+mod clashes;
 mod collide;
 mod converting;
 mod curves;

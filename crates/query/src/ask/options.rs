@@ -265,6 +265,9 @@ pub enum PlanError {
     /// The margin is negative, infinite or NaN.
     #[error("a margin of {0}; it must be finite and not negative")]
     Margin(f64),
+    /// The link length is negative, infinite or NaN.
+    #[error("link must be a finite length, zero or more, got {0}")]
+    Link(f64),
     /// The relative precision is out of range.
     #[error("relative must be at least 0 and less than 1, got {0}")]
     Relative(f64),

@@ -3,6 +3,7 @@
 
 mod all;
 mod batch;
+mod clashes;
 mod coherence;
 mod curves;
 mod curves_hard;

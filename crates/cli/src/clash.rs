@@ -1,0 +1,132 @@
+//! `clash`: the list of all places where two scans meet or come nearer than a clearance.
+
+mod html;
+mod list;
+mod pictures;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nearmiss::{Budget, ClashOptions, ClashPlan, Pair, Scan, Scratch};
+
+use crate::console::{Console, Results, now};
+use crate::contacts::check_outputs;
+use crate::distance::beside;
+use crate::error::CliError;
+use crate::eval::KernelName;
+use crate::meaning::MeaningArgs;
+use crate::output;
+use crate::parse::parse_radius;
+use crate::posing::{self, PairArgs};
+use crate::preprocess::parse_threads;
+use list::List;
+use table::Summary;
+
+/// Options of `clash`.
+#[derive(Debug, Clone, Args)]
+pub struct ClashArgs {
+    /// What is asked about
+    #[command(flatten)]
+    pub pair: PairArgs,
+    /// Which distances define the surfaces; by default as prepared, else straight ones
+    #[arg(long, value_enum, conflicts_with = "thickened")]
+    pub kernel: Option<KernelName>,
+    /// The meaning of the scans
+    #[command(flatten)]
+    pub meaning: MeaningArgs,
+    /// List places that come nearer than this as well, in world units: clearance clashes
+    #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
+    pub clearance: f64,
+    /// Contacts that are at most this far from each other, in world units, belong to one clash. By default
+    /// four times the greater sampling radius
+    #[arg(long, value_name = "LEN", allow_hyphen_values = true, value_parser = parse_radius)]
+    pub link: Option<f64>,
+    /// Write the list as a table for spreadsheets, a line a clash
+    #[arg(long, value_name = "OUT.csv")]
+    pub csv: Option<PathBuf>,
+    /// Write a page with pictures, all in one file
+    #[arg(long, value_name = "OUT.html")]
+    pub html: Option<PathBuf>,
+    /// The page has a close picture of so many clashes at most, the first of the list
+    #[arg(long, value_name = "N", requires = "html", default_value_t = 50)]
+    pub pictures: usize,
+    /// Threads to prepare raw inputs, 0 for all cores
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    pub threads: Option<usize>,
+    /// Lines of JSON instead of a table: one of the whole list, then one of each clash
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// No more clashes are listed for people than this; files and JSON hold all.
+const SHOWN: usize = 40;
+
+pub(crate) fn run(args: &ClashArgs) -> Result<(), CliError> {
+    let console = Console::new(args.quiet);
+    let inputs = args.pair.inputs();
+    let outputs: Vec<&Path> = args.csv.iter().chain(&args.html).map(PathBuf::as_path).collect();
+    check_outputs(&outputs, &inputs)?;
+    let matrices = args.pair.matrices()?;
+    let [a, b] = open(args, console)?;
+    let mut options =
+        ClashOptions::default().with_semantics(args.meaning.semantics(&a)).with_clearance(args.clearance);
+    options.link = args.link;
+    let plan = ClashPlan::new(&options, &a, &b)?;
+    let [pose_a, pose_b] = posing::of_options(&matrices, [&a, &b])?;
+    let [a, b] = [a.at(&pose_a), b.at(&pose_b)];
+    args.pair.size_check(console).compare([&a, &b]);
+
+    let start = now();
+    let bar = console.spinner("looking for clashes");
+    let found = Pair::new(a, b).clashes(&plan, &mut Scratch::default());
+    drop(bar);
+    #[expect(clippy::cast_precision_loss, reason = "nanoseconds of less than a month are exact")]
+    let micros = start.elapsed().as_nanos() as f64 / 1e3;
+
+    let of_points = args.meaning.thickened.is_some();
+    let list = List { inputs, views: [&a, &b], of_points, plan: &plan, found: &found };
+    if let Some(path) = &args.csv {
+        output::replace_plain(path, |out| table::write_csv(&list, out))?;
+    }
+    if let Some(path) = &args.html {
+        let pictured = found.clashes.len().min(args.pictures);
+        let bar = console.steps(format_args!("painting {}", path.display()), pictured as u64 + 1);
+        let pictures = pictures::paint(&list, pictured, &bar);
+        output::replace_plain(path, |out| html::write(&list, &pictures, out))?;
+        drop(bar);
+    }
+    tell(&list, args.json, micros)
+}
+
+/// The scans: balls about points know no kernel, so any do for these.
+fn open(args: &ClashArgs, console: Console) -> Result<[Scan; 2], CliError> {
+    let opening = args.pair.opening(args.threads, console);
+    if args.meaning.thickened.is_some() {
+        return opening.open_points(args.pair.inputs());
+    }
+    opening.open_both(args.kernel.map(KernelName::metric), args.pair.inputs())
+}
+
+/// The list on standard output.
+fn tell(list: &List<'_>, json: bool, micros: f64) -> Result<(), CliError> {
+    let mut results = Results::new();
+    if json {
+        results.json(&Summary::new(list, micros))?;
+        list.reports().try_for_each(|clash| results.json(&clash))?;
+        return results.flush();
+    }
+    for line in table::lines(list, SHOWN) {
+        results.line(line)?;
+    }
+    let distance = if list.found.clashes.is_empty() {
+        beside(list.views, list.plan.options().semantics, &Budget::UNLIMITED)
+    } else {
+        None
+    };
+    results.line(table::sentence(list, distance.as_ref()))?;
+    results.flush()
+}

@@ -1,0 +1,189 @@
+//! All contacts of two scans, as a table and as points, and the clashes that they are grouped into.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nearmiss::io::{Column, PlyPoints};
+use nearmiss::query::default_link;
+use nearmiss::{Contact, ContactGroup, Placed};
+use serde::Serialize;
+
+use crate::digits::{count, place, rough, short};
+use crate::error::CliError;
+use crate::export::refused;
+use crate::output;
+use crate::parse::parse_radius;
+
+/// What is done with all contacts.
+#[derive(Debug, Clone, Args)]
+pub struct ContactArgs {
+    /// Put contacts into one clash if they are at most this far apart, in world units
+    ///
+    /// The default is four times the larger sampling radius.
+    #[arg(long, value_name = "LEN", requires = "all", allow_hyphen_values = true, value_parser = parse_radius)]
+    pub link: Option<f64>,
+    /// Write the contacts of --all as points, with normals of a and the number of their clash
+    #[arg(long, value_name = "OUT.ply", requires = "all", conflicts_with = "poses", help_heading = "Output")]
+    pub ply: Option<PathBuf>,
+}
+
+impl ContactArgs {
+    /// Refuses outputs that cannot be written, or would replace an input or each other.
+    pub(crate) fn check(&self, csv: Option<&Path>, inputs: &[&Path]) -> Result<(), CliError> {
+        let outputs: Vec<&Path> = csv.into_iter().chain(self.ply.as_deref()).collect();
+        check_outputs(&outputs, inputs)
+    }
+
+    /// Groups `contacts` by the link length, by default one that suits the scans.
+    pub(crate) fn group(&self, contacts: &[Contact], views: [&Placed<'_>; 2]) -> Grouped {
+        Grouped::new(contacts, self.link.unwrap_or_else(|| default_link(views)))
+    }
+
+    /// Writes the files that were asked for.
+    pub(crate) fn write(
+        &self,
+        csv: Option<&Path>,
+        contacts: &[Contact],
+        grouped: &Grouped,
+    ) -> Result<(), CliError> {
+        if let Some(path) = csv {
+            output::replace_plain(path, |out| write_csv(contacts, &grouped.numbers, out))?;
+        }
+        if let Some(path) = &self.ply {
+            write_ply(path, contacts, &grouped.numbers)?;
+        }
+        Ok(())
+    }
+}
+
+/// Refuses outputs that cannot be written, or would replace an input or each other.
+pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
+    for (i, path) in outputs.iter().enumerate() {
+        output::check_apart(path, inputs)?;
+        if outputs[..i].iter().any(|earlier| output::is_same(earlier, path)) {
+            return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
+        }
+    }
+    Ok(())
+}
+
+/// Contacts in clashes.
+#[derive(Debug)]
+pub(crate) struct Grouped {
+    pub(crate) link: f64,
+    /// The greatest clash first.
+    pub(crate) groups: Vec<ContactGroup>,
+    /// The number of the clash of each contact, counted from 1.
+    pub(crate) numbers: Vec<u32>,
+}
+
+impl Grouped {
+    fn new(contacts: &[Contact], link: f64) -> Self {
+        let mut groups = ContactGroup::all(contacts, link);
+        groups.sort_by(ContactGroup::by_size);
+        let numbers = numbers(contacts.len(), groups.iter().map(|group| &group.contacts));
+        Self { link, groups, numbers }
+    }
+
+    /// The clashes, for scripts.
+    pub(crate) fn reports(&self, contacts: &[Contact]) -> Vec<GroupReport> {
+        self.groups.iter().map(|group| GroupReport::new(contacts, group)).collect()
+    }
+
+    /// How many contacts there are, and the clashes, for people.
+    pub(crate) fn lines(&self, contacts: &[Contact], unit: f64) -> Vec<String> {
+        let head = format!(
+            "{} in {} (contacts up to {} apart are in one)",
+            count(contacts.len() as u64, "contact"),
+            clash_count(self.groups.len()),
+            rough(self.link)
+        );
+        let line = |(number, group): (usize, &ContactGroup)| {
+            let [x, y, z] = group.size().map(short);
+            let contacts = count(group.contacts.len() as u64, "contact");
+            format!("  clash {number}: {contacts} about {}, {x} × {y} × {z}", place(group.centre(), unit))
+        };
+        std::iter::once(head).chain((1..).zip(&self.groups).map(line)).collect()
+    }
+}
+
+/// A number of clashes in words.
+pub(crate) fn clash_count(n: usize) -> String {
+    format!("{n} clash{}", if n == 1 { "" } else { "es" })
+}
+
+/// The number of the list, counted from 1, that each of `n` contacts is in; 0 for those in none.
+pub(crate) fn numbers<'a>(n: usize, lists: impl Iterator<Item = &'a Vec<usize>>) -> Vec<u32> {
+    let mut numbers = vec![0; n];
+    for (number, list) in (1..).zip(lists) {
+        for &i in list {
+            numbers[i] = number;
+        }
+    }
+    numbers
+}
+
+/// A group of contacts, for scripts.
+#[derive(Debug, Serialize)]
+pub(crate) struct GroupReport {
+    contacts: usize,
+    centre: [f64; 3],
+    size: [f64; 3],
+    bounds: [[f64; 3]; 2],
+    /// Null: no search tells yet how deep one scan is in the other.
+    depth: Option<f64>,
+    /// The contact with the least residual.
+    point: [f64; 3],
+    residual: f64,
+    source_a: u32,
+    source_b: u32,
+}
+
+impl GroupReport {
+    fn new(contacts: &[Contact], group: &ContactGroup) -> Self {
+        let nearest = &contacts[group.nearest];
+        Self {
+            contacts: group.contacts.len(),
+            centre: group.centre(),
+            size: group.size(),
+            bounds: [group.bounds.min, group.bounds.max],
+            depth: None,
+            point: nearest.point,
+            residual: nearest.residual,
+            source_a: nearest.sources[0].0,
+            source_b: nearest.sources[1].0,
+        }
+    }
+}
+
+/// A header line and a line for each contact. Normals are empty where points are compared.
+fn write_csv(contacts: &[Contact], numbers: &[u32], out: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "clash,x,y,z,normal_a_x,normal_a_y,normal_a_z,normal_b_x,normal_b_y,normal_b_z,residual,source_a,source_b"
+    )?;
+    for (contact, clash) in contacts.iter().zip(numbers) {
+        let Contact { point: [x, y, z], residual, sources: [a, b], .. } = contact;
+        write!(out, "{clash},{x},{y},{z}")?;
+        match contact.normals {
+            Some(normals) => normals.as_flattened().iter().try_for_each(|n| write!(out, ",{n}"))?,
+            None => write!(out, ",,,,,,")?,
+        }
+        writeln!(out, ",{residual},{},{}", a.0, b.0)?;
+    }
+    Ok(())
+}
+
+/// Points in double precision with the normal of a, zero where points are compared, and `uint clash`.
+fn write_ply(path: &Path, contacts: &[Contact], numbers: &[u32]) -> Result<(), CliError> {
+    let points: Vec<[f64; 3]> = contacts.iter().map(|contact| contact.point).collect();
+    #[expect(clippy::cast_possible_truncation, reason = "unit vectors")]
+    let normal = |contact: &Contact| contact.normals.map_or([0.0; 3], |[of_a, _]| of_a.map(|c| c as f32));
+    let normals: Vec<[f32; 3]> = contacts.iter().map(normal).collect();
+    let columns = [Column::Uint("clash", numbers)];
+    output::replace(path, |out| {
+        let ply = PlyPoints::double(&points).with_normals(&normals).with_columns(&columns);
+        ply.write(out).map_err(|error| refused(path, error))
+    })
+}

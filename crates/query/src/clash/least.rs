@@ -1,0 +1,33 @@
+//! How near the points of two leaves come to each other, and how near what they stand for can come.
+
+use nearmiss_hierarchy::NodePair;
+use nearmiss_surface::Metric;
+
+use crate::ask::options::{CollidePlan, Semantics};
+use crate::leaf::nearest_points::{PointPair, nearest};
+use crate::pair::scan_pair::ScanPair;
+
+/// Bounds of the distance of two leaves, in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Least {
+    /// Proven, zero or more.
+    pub(crate) lower: f64,
+    /// That of the two nearest points, less their balls; less than zero where these overlap.
+    pub(crate) upper: f64,
+}
+
+impl Least {
+    pub(crate) fn of(pair: &ScanPair<'_>, plan: &CollidePlan, leaves: NodePair) -> Self {
+        let none = PointPair { distance: f64::INFINITY, points: [0; 2] };
+        let points = nearest(pair.level, pair, leaves, none).distance;
+        if let Semantics::Thickened(radius) = plan.options().semantics {
+            let beyond = points - 2.0 * radius;
+            return Self { lower: beyond.max(0.0), upper: beyond };
+        }
+        if plan.options().metric == Some(Metric::Geodesic) {
+            return Self { lower: 0.0, upper: points };
+        }
+        let gap = f64::from(pair.gap_of_parts(leaves) - pair.relative.slack());
+        Self { lower: (gap * pair.views[0].placed().scale()).max(0.0), upper: points }
+    }
+}

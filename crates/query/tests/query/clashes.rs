@@ -1,0 +1,204 @@
+//! Clash lists: components of all contacts against brute force, clearances on shapes with known distances.
+use nearmiss_geometry::{PointCloud, Pose};
+use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
+use nearmiss_query::{
+    Clash, ClashKind, ClashOptions, ClashPlan, Clashes, CollideOptions, CollidePlan, Contact, ContactGroup,
+    Contacts, Detail, Pair, Placed, PlanError, Scratch, Semantics,
+};
+use nearmiss_testdata::arbitrary::{self, CloudKind};
+use nearmiss_testdata::oracle;
+
+fn prepared(points: &[[f64; 3]]) -> PointHierarchy {
+    let leaf = BuildOptions::default().with_leaf_size(8);
+    PointHierarchy::build(&PointCloud::from_positions(points).unwrap(), &leaf).unwrap()
+}
+
+fn list(a: &Placed<'_>, b: &Placed<'_>, options: &ClashOptions) -> Clashes {
+    let plan = ClashPlan::new(options, a.scan(), b.scan()).unwrap();
+    Pair::new(*a, *b).clashes(&plan, &mut Scratch::default())
+}
+
+/// The components of contacts, by comparing each with each, in the order of their first contacts.
+fn components(contacts: &[Contact], link: f64) -> Vec<Vec<usize>> {
+    let distance = |i: usize, j: usize| {
+        let (p, q): ([f64; 3], [f64; 3]) = (contacts[i].point, contacts[j].point);
+        (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt()
+    };
+    let mut seen = vec![false; contacts.len()];
+    let mut all = Vec::new();
+    for first in 0..contacts.len() {
+        if seen[first] {
+            continue;
+        }
+        seen[first] = true;
+        let (mut own, mut next) = (vec![first], 0);
+        while next < own.len() {
+            for j in 0..contacts.len() {
+                if !seen[j] && distance(own[next], j) <= link {
+                    seen[j] = true;
+                    own.push(j);
+                }
+            }
+            next += 1;
+        }
+        own.sort_unstable();
+        all.push(own);
+    }
+    all
+}
+
+fn of_kind(found: &Clashes, kind: ClashKind) -> Vec<&Clash> {
+    found.clashes.iter().filter(|clash| clash.kind == kind).collect()
+}
+
+fn sorted(mut lists: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
+    lists.sort();
+    lists
+}
+
+/// A square of `n` × `n` points, 0.1 apart, at height `z`.
+fn square(n: u32, z: f64) -> Vec<[f64; 3]> {
+    (0..n * n).map(|i| [f64::from(i % n) * 0.1, f64::from(i / n) * 0.1, z]).collect()
+}
+
+#[test]
+fn clashes_are_components_of_all_contacts() {
+    let mut rng = arbitrary::rng(71);
+    let (mut several, mut surrounded, mut misses) = (0, 0, 0);
+    let kinds = [CloudKind::Sphere, CloudKind::Random, CloudKind::Lattice, CloudKind::Coplanar];
+    for (n, kind) in (0_u64..).zip(kinds.iter().cycle().take(12)) {
+        let a = prepared(&arbitrary::cloud(*kind, 250, n));
+        let b = prepared(&arbitrary::cloud(*kind, 200, n + 100));
+        let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        for round in 0..6 {
+            let pose =
+                arbitrary::rotation(&mut rng).with_translation(arbitrary::point_in(&mut rng, 1.5 * size));
+            let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose));
+            let semantics = [Semantics::Obstacle, Semantics::Thickened(0.05 * size)][round % 2];
+            let link = [0.0, 0.05, 0.2, 1.0][round % 4] * size;
+            let options = ClashOptions::default().with_semantics(semantics).with_link(link);
+
+            let touching = CollideOptions::default().with_semantics(semantics).with_detail(Detail::Verdict);
+            let plan = CollidePlan::new(&touching, &a, &b).unwrap();
+            let mut contacts = Contacts::default();
+            Pair::new(va, vb).contacts(&mut contacts).collide(&plan, &mut Scratch::default());
+
+            let hard = list(&va, &vb, &options);
+            assert_eq!(hard.contacts, contacts.contacts, "{kind:?} {n}: all contacts, and no others");
+            let groups = |found: &Clashes, kind| {
+                let of_kind = of_kind(found, kind).into_iter();
+                sorted(of_kind.map(|clash| clash.group.contacts.clone()).collect())
+            };
+            assert_eq!(groups(&hard, ClashKind::Hard), components(&hard.contacts, link), "{kind:?} {n}");
+            several += u32::from(hard.clashes.len() > 1);
+
+            // A clearance changes no hard clash, and each near contact is somewhere.
+            let near = list(&va, &vb, &options.with_clearance(0.2 * size));
+            assert_eq!(groups(&near, ClashKind::Hard), groups(&hard, ClashKind::Hard), "{kind:?} {n}");
+            let all = components(&near.contacts, link);
+            let without: Vec<Vec<usize>> = all.into_iter().filter(|own| own[0] >= near.hard).collect();
+            assert_eq!(groups(&near, ClashKind::Clearance), without, "{kind:?} {n}");
+            let lists =
+                near.clashes.iter().flat_map(|clash| clash.group.contacts.iter().chain(&clash.surroundings));
+            let mut told: Vec<usize> = lists.copied().collect();
+            told.sort_unstable();
+            assert!(told.into_iter().eq(0..near.contacts.len()), "{kind:?} {n}: each contact once");
+            surrounded += near.clashes.iter().filter(|clash| !clash.surroundings.is_empty()).count();
+            misses += without.len();
+            for clash in &near.clashes {
+                let contained = |&i: &usize| clash.group.bounds.contains(near.contacts[i].point);
+                assert!(clash.group.contacts.iter().all(contained), "{kind:?} {n}: boxes contain contacts");
+                assert!(0.0 <= clash.lower && clash.lower <= clash.upper, "{kind:?} {n}: {clash:?}");
+                assert!(clash.upper <= 0.2 * size * (1.0 + 1e-6), "nearer than the clearance: {clash:?}");
+            }
+            let order = near
+                .clashes
+                .is_sorted_by(|p, q| (p.kind, -p.group.diagonal()) <= (q.kind, -q.group.diagonal()));
+            assert!(order, "{kind:?} {n}: by kind, then by size");
+        }
+    }
+    assert!(several > 10 && surrounded > 10 && misses > 10, "{several} {surrounded} {misses}");
+}
+
+#[test]
+fn two_feet_on_a_floor_are_two_clashes_and_one_above_it_is_a_clearance_clash() {
+    let floor = prepared(&square(60, 0.0));
+    // Upright sheets: two cut the floor, a third ends 0.45 above it.
+    let sheet = |x: f64, low: f64| {
+        (0..100_u32).map(move |i| [x + 0.01, 1.03 + f64::from(i % 10) * 0.1, low + f64::from(i / 10) * 0.1])
+    };
+    let feet: Vec<[f64; 3]> = sheet(1.0, -0.25).chain(sheet(3.0, -0.25)).chain(sheet(5.0, 0.45)).collect();
+    let feet = prepared(&feet);
+    let (a, b) = (Placed::new(&feet, &Pose::IDENTITY), Placed::new(&floor, &Pose::IDENTITY));
+    let found = list(&a, &b, &ClashOptions::default());
+    assert!(found.complete && found.clashes.len() == 2, "{:?}", found.clashes);
+    let mut at: Vec<f64> = found.clashes.iter().map(|clash| clash.group.centre()[0]).collect();
+    at.sort_by(f64::total_cmp);
+    assert!((at[0] - 1.0).abs() < 0.1 && (at[1] - 3.0).abs() < 0.1, "{at:?}");
+    for clash in &found.clashes {
+        assert_eq!((clash.kind, clash.lower, clash.upper, clash.depth), (ClashKind::Hard, 0.0, 0.0, None));
+        let size = clash.group.size();
+        assert!(size[1] > 0.5 && size[1] < 1.1 && size[0] < 0.15 && size[2] < 0.15, "{size:?}");
+    }
+
+    let near = list(&a, &b, &ClashOptions::default().with_clearance(0.5));
+    let misses = of_kind(&near, ClashKind::Clearance);
+    assert_eq!((near.clashes.len(), misses.len()), (3, 1), "{:?}", near.clashes);
+    assert!((misses[0].group.centre()[0] - 5.0).abs() < 0.1, "{:?}", misses[0]);
+    // The lowest row of the sheet is 0.45 above the floor; its discs may reach a local radius lower.
+    assert!(misses[0].lower < 0.45 && misses[0].upper > 0.25, "{:?}", misses[0]);
+    assert!(misses[0].upper < 0.46 && misses[0].lower > 0.1, "{:?}", misses[0]);
+    assert_eq!(list(&a, &b, &ClashOptions::default().with_clearance(0.2)).clashes.len(), 2, "too far off");
+}
+
+#[test]
+fn the_distance_of_a_clearance_clash_is_that_of_the_nearest_points() {
+    let mut rng = arbitrary::rng(72);
+    let mut proven = 0;
+    for n in 0..8 {
+        let points_a = arbitrary::cloud(CloudKind::Sphere, 400, n);
+        let points_b = arbitrary::cloud(CloudKind::Sphere, 300, n + 50);
+        let (a, b) = (prepared(&points_a), prepared(&points_b));
+        let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max);
+        let pose = arbitrary::rotation(&mut rng).with_translation([4.0 * size, 0.3 * size, 0.0]);
+        let (va, vb) = (Placed::new(&a, &Pose::IDENTITY), Placed::new(&b, &pose));
+        let in_world =
+            |view: &Placed<'_>| -> Vec<[f64; 3]> { (0..view.scan().len()).map(|i| view.point(i)).collect() };
+        let same = Pose::IDENTITY;
+        let nearest = oracle::least_distance(&in_world(&va), &same, &in_world(&vb), &same).unwrap();
+        for radius in [None, Some(0.1 * nearest.distance)] {
+            let semantics = radius.map_or(Semantics::Obstacle, Semantics::Thickened);
+            let options = ClashOptions::default()
+                .with_semantics(semantics)
+                .with_link(10.0 * size)
+                .with_clearance(1.05 * nearest.distance);
+            let found = list(&va, &vb, &options);
+            let [clash] = found.clashes.as_slice() else { panic!("{n}: {:?}", found.clashes) };
+            let expected = nearest.distance - 2.0 * radius.unwrap_or(0.0);
+            assert_eq!(clash.kind, ClashKind::Clearance, "{n}: {clash:?}");
+            assert!(clash.upper <= expected * (1.0 + 1e-9), "{n}: {clash:?} for {expected}");
+            if radius.is_some() {
+                assert!((clash.upper - expected).abs() < 1e-9 * expected, "{n}: {clash:?} for {expected}");
+                assert_eq!(clash.lower.to_bits(), clash.upper.to_bits(), "balls are exact");
+            }
+            proven += u32::from(clash.lower > 0.5 * expected);
+        }
+    }
+    assert!(proven > 8, "lower bounds say something: {proven} of 16");
+}
+
+#[test]
+fn scans_that_are_apart_have_no_clash_and_bad_lengths_are_refused() {
+    let floor = prepared(&square(20, 0.0));
+    let above = Pose::IDENTITY.with_translation([0.0, 0.0, 1.0]);
+    let (a, b) = (Placed::new(&floor, &Pose::IDENTITY), Placed::new(&floor, &above));
+    let found = list(&a, &b, &ClashOptions::default().with_clearance(0.5));
+    assert!(found.complete && found.clashes.is_empty() && found.contacts.is_empty());
+    assert!(ContactGroup::all(&[], 1.0).is_empty());
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        let of_link = ClashPlan::new(&ClashOptions::default().with_link(bad), &floor, &floor);
+        assert!(matches!(of_link, Err(PlanError::Link(_))), "{bad}");
+        let of_clearance = ClashPlan::new(&ClashOptions::default().with_clearance(bad), &floor, &floor);
+        assert!(matches!(of_clearance, Err(PlanError::Margin(_))), "{bad}");
+    }
+}
