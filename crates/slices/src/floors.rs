@@ -1,7 +1,12 @@
 //! The storeys of a building: heights at which much floor lies with room to stand above it.
 
+use std::ops::Range;
+
 use crate::avatar::Avatar;
+use crate::grid::Grid;
 use crate::map::{SliceMap, Unloaded};
+use crate::slice::Slice;
+use crate::store::{SliceFolder, StoreError};
 
 /// A storey.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,89 +45,126 @@ impl SliceMap {
     /// # Errors
     /// When a slice is not loaded.
     pub fn storeys(&self, avatar: &Avatar) -> Result<Vec<Storey>, Unloaded> {
-        let grid = self.grid();
+        let mut floor = FloorCount::new(self.grid(), avatar);
+        for s in (0..self.grid().counts[2]).rev() {
+            floor.add(s, self.slice(s)?);
+        }
+        Ok(floor.storeys())
+    }
+}
+
+impl SliceFolder {
+    /// Finds the storeys as [`SliceMap::storeys`] does, with one slice in memory at a time, and 8 bytes a
+    /// pixel.
+    ///
+    /// # Errors
+    /// Names the file of a slice that cannot be loaded.
+    pub fn storeys(&self, avatar: &Avatar) -> Result<Vec<Storey>, StoreError> {
+        let mut floor = FloorCount::new(self.grid(), avatar);
+        for s in (0..self.grid().counts[2]).rev() {
+            floor.add(s, &self.load(s)?);
+        }
+        Ok(floor.storeys())
+    }
+}
+
+/// Pixels of floor by their height.
+struct FloorCount {
+    grid: Grid,
+    headroom: f64,
+    climb: f64,
+    /// Height of a bin.
+    fine: f64,
+    /// Pixels of floor with headroom.
+    bins: Vec<u64>,
+    /// Height of the lowest thing above, for each pixel.
+    ceilings: Vec<f64>,
+    /// Pixels that hold something, for each slice.
+    filled: Vec<u64>,
+}
+
+impl FloorCount {
+    fn new(grid: &Grid, avatar: &Avatar) -> Self {
         let rise = f64::from(grid.counts[2]) * grid.slice_height;
         let (headroom, climb) = (avatar.options().height, avatar.options().climb);
         let fine = (climb / FINE).max(rise / MOST_BINS);
-        let mut bins = self.floor_by_height(headroom, fine)?;
-        let height = |bin: usize| grid.origin[2] + (to_f64(bin) + 0.5) * fine;
-        let half = whole(0.5 * climb / fine);
+        Self {
+            grid: *grid,
+            headroom,
+            climb,
+            fine,
+            bins: vec![0; whole(rise / fine) + 1],
+            ceilings: vec![f64::INFINITY; grid.area()],
+            filled: vec![0; grid.counts[2] as usize],
+        }
+    }
+
+    /// Takes in a slice; the highest first.
+    fn add(&mut self, s: u32, slice: &Slice) {
+        let [columns, rows, _] = self.grid.counts;
+        self.filled[s as usize] = slice.counts()[0];
+        for row in 0..rows {
+            if !slice.any(&(0..=columns - 1), &(row..=row)) {
+                continue;
+            }
+            let first = row as usize * columns as usize;
+            for (column, ceiling) in (0..columns).zip(&mut self.ceilings[first..]) {
+                let Some(content) = slice.pixel(column, row) else { continue };
+                let top = self.grid.height(s, content.top);
+                if !content.is_obstacle && *ceiling - top >= self.headroom {
+                    let bin = whole((top - self.grid.origin[2]) / self.fine).min(self.bins.len() - 1);
+                    self.bins[bin] += 1;
+                }
+                *ceiling = self.grid.height(s, content.bottom);
+            }
+        }
+    }
+
+    /// The storeys, when all slices are taken in.
+    fn storeys(mut self) -> Vec<Storey> {
+        let half = whole(0.5 * self.climb / self.fine);
+        let apart = whole(self.headroom / self.fine).max(2 * half);
         let mut found: Vec<Storey> = Vec::new();
-        let mut largest = 0;
-        while let Some((middle, _)) = fullest(&bins, half) {
-            let window = middle.saturating_sub(half)..(middle + half + 1).min(bins.len());
-            let median = median(&bins[window.clone()]) + window.start;
-            let near = median.saturating_sub(2 * half)..(median + 2 * half + 1).min(bins.len());
-            let area: u64 = bins[near].iter().sum();
-            largest = largest.max(area);
+        let mut largest = 0.0_f64;
+        while let Some(middle) = fullest(&self.bins, half) {
+            let window = self.about(middle, half);
+            let median = median(&self.bins[window.clone()]) + window.start;
+            let pixels: u64 = self.bins[self.about(median, 2 * half)].iter().sum();
             #[expect(clippy::cast_precision_loss, reason = "pixels, below 2^53")]
-            let (area, most) = (area as f64, largest as f64);
-            if area < LEAST_SHARE * most {
+            let area = pixels as f64 * self.grid.pixel * self.grid.pixel;
+            largest = largest.max(area);
+            if area < LEAST_SHARE * largest {
                 break;
             }
-            let level = height(median);
-            found.push(Storey { height: level, area: area * grid.pixel * grid.pixel, heights: [0.0; 2] });
-            let apart = whole(headroom / fine).max(2 * half);
-            let end = (median + apart + 1).min(bins.len());
-            bins[median.saturating_sub(apart)..end].fill(0);
+            let height = self.grid.origin[2] + (to_f64(median) + 0.5) * self.fine;
+            found.push(Storey { height, area, heights: [0.0; 2] });
+            let around = self.about(median, apart);
+            self.bins[around].fill(0);
         }
         found.sort_by(|a, b| a.height.total_cmp(&b.height));
-        let mut storeys: Vec<Storey> = Vec::new();
-        for storey in found {
-            if storeys.is_empty() || self.rises_from(&storey, [climb, headroom])? {
-                storeys.push(storey);
-            }
-        }
+        let kept = found.iter().enumerate().filter(|(i, storey)| *i == 0 || self.rises_from(storey));
+        let mut storeys: Vec<Storey> = kept.map(|(_, storey)| *storey).collect();
         let floors: Vec<f64> = storeys.iter().map(|storey| storey.height).collect();
         for (i, storey) in storeys.iter_mut().enumerate() {
-            let low = if i == 0 { f64::NEG_INFINITY } else { floors[i] - climb };
-            storey.heights = [low, floors.get(i + 1).map_or(f64::INFINITY, |next| next - climb)];
+            let low = if i == 0 { f64::NEG_INFINITY } else { floors[i] - self.climb };
+            storey.heights = [low, floors.get(i + 1).map_or(f64::INFINITY, |next| next - self.climb)];
         }
-        Ok(storeys)
+        storeys
     }
 
-    /// Counts the pixels of floor with headroom by their height, in bins of `fine`.
-    fn floor_by_height(&self, headroom: f64, fine: f64) -> Result<Vec<u64>, Unloaded> {
-        let grid = self.grid();
-        let [columns, rows, slices] = grid.counts;
-        let count = whole(f64::from(slices) * grid.slice_height / fine) + 1;
-        let mut bins = vec![0_u64; count];
-        let mut ceilings = vec![f64::INFINITY; columns as usize];
-        for row in 0..rows {
-            ceilings.fill(f64::INFINITY);
-            for s in (0..slices).rev() {
-                let slice = self.slice(s)?;
-                if !slice.any(&(0..=columns - 1), &(row..=row)) {
-                    continue;
-                }
-                for (column, ceiling) in (0..columns).zip(&mut ceilings) {
-                    let Some(content) = slice.pixel(column, row) else { continue };
-                    let top = grid.height(s, content.top);
-                    if !content.is_obstacle && *ceiling - top >= headroom {
-                        let bin = whole((top - grid.origin[2]) / fine).min(count - 1);
-                        bins[bin] += 1;
-                    }
-                    *ceiling = grid.height(s, content.bottom);
-                }
-            }
-        }
-        Ok(bins)
+    /// The bins around one, as far as they are there.
+    fn about(&self, middle: usize, half: usize) -> Range<usize> {
+        middle.saturating_sub(half)..(middle + half + 1).min(self.bins.len())
     }
 
-    /// Returns `true` if something rises from a storey, between these heights above it.
-    fn rises_from(&self, storey: &Storey, [low, high]: [f64; 2]) -> Result<bool, Unloaded> {
-        let grid = self.grid();
-        let Some(slices) = grid.range(2, [storey.height + low, storey.height + high]) else {
-            return Ok(false);
-        };
-        let (mut pixels, mut count) = (0_u64, 0_u64);
-        for s in slices {
-            pixels += self.slice(s)?.counts()[0];
-            count += 1;
-        }
-        #[expect(clippy::cast_precision_loss, reason = "pixels, below 2^53")]
-        let mean = pixels as f64 / count.max(1) as f64;
-        Ok(mean * grid.pixel * grid.pixel >= LEAST_ABOVE * storey.area)
+    /// Returns `true` if something rises from a storey, from a climb to the headroom above it.
+    fn rises_from(&self, storey: &Storey) -> bool {
+        let heights = [storey.height + self.climb, storey.height + self.headroom];
+        let Some(slices) = self.grid.range(2, heights) else { return false };
+        let filled = &self.filled[*slices.start() as usize..=*slices.end() as usize];
+        #[expect(clippy::cast_precision_loss, reason = "pixels and slices, below 2^53")]
+        let mean = filled.iter().sum::<u64>() as f64 / filled.len() as f64;
+        mean * self.grid.pixel * self.grid.pixel >= LEAST_ABOVE * storey.area
     }
 }
 
@@ -132,15 +174,15 @@ pub fn storey_of(storeys: &[Storey], feet: f64) -> Option<usize> {
     storeys.iter().position(|storey| storey.heights[0] <= feet && feet < storey.heights[1])
 }
 
-/// Returns the middle of the window of `2·half + 1` bins that holds most, and what it holds; `None` if all
-/// bins are empty. Of several the lowest.
-fn fullest(bins: &[u64], half: usize) -> Option<(usize, u64)> {
+/// Returns the middle of the window of `2·half + 1` bins that holds most; `None` if all bins are empty. Of
+/// several the lowest.
+fn fullest(bins: &[u64], half: usize) -> Option<usize> {
     let mut sum: u64 = bins.iter().take(half).sum();
-    let mut best = None;
+    let (mut best, mut most) = (None, 0);
     for middle in 0..bins.len() {
         sum += bins.get(middle + half).copied().unwrap_or(0);
-        if sum > best.map_or(0, |(_, most)| most) {
-            best = Some((middle, sum));
+        if sum > most {
+            (best, most) = (Some(middle), sum);
         }
         if let Some(first) = middle.checked_sub(half) {
             sum -= bins[first];
