@@ -66,7 +66,7 @@ pub(super) fn paint(
         (STEP, "steep, but low enough to climb"),
         (IN_THE_WAY, "in the way"),
         (EMPTY, "nothing at this height"),
-        (AIM, "start"),
+        (AIM, if others.is_empty() { "start" } else { "start, goal, and the place nearest to it" }),
     ];
     let mut sheet = Sheet::new((map, avatar), window, (&told, &titles), &entries, 0);
     for (i, &storey_shown) in shown.iter().enumerate() {

@@ -7,9 +7,14 @@ use nearmiss::slices::{Grid, RouteError, Standing, StartError, WalkError};
 use crate::digits::{rounded, short};
 use crate::error::CliError;
 
-/// A place as the options take it, to a thousandth of a pixel.
+/// A place as the options take it, to a hundredth of a pixel.
 pub(super) fn told_place(place: [f64; 3], grid: &Grid) -> String {
-    format!("[{}]", place.map(|x| rounded(x, 1e-3 * grid.pixel)).join(", "))
+    let told = place.map(|x| {
+        let digits = rounded(x, 1e-2 * grid.pixel);
+        let is_decimal = digits.contains('.') && !digits.contains('e');
+        if is_decimal { digits.trim_end_matches('0').trim_end_matches('.').to_owned() } else { digits }
+    });
+    format!("[{}]", told.join(", "))
 }
 
 /// The refusal of a place, which `what` names, for a map or a route in `path`.

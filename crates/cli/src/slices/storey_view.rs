@@ -54,8 +54,8 @@ pub(super) fn window(
     let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let margin = AROUND * avatar.options().height + MORE * extent;
     let end = |k: usize| grid.origin[k] + f64::from(grid.counts[k]) * grid.pixel;
-    // What is off the map is shown with a little around it.
-    let off = MORE * margin;
+    // What is off the map is shown with enough around it for names and the scale.
+    let off = 0.5 * margin;
     [
         [0, 1].map(|k| (low[k] - margin).max(grid.origin[k].min(low[k] - off))),
         [0, 1].map(|k| (high[k] + margin).min(end(k).max(high[k] + off))),
@@ -86,7 +86,9 @@ impl<'a> Sheet<'a> {
         let scale = side / size[0].max(size[1]);
         let [width, height] = size.map(|length| whole(length * scale).max(FINE));
         let columns = columns(titles.len(), [width, height + LINE]);
-        let full = (columns * (width + GAP) + GAP).max(LEAST_WIDTH);
+        let widest = titles.iter().map(|title| Canvas::text_width(LETTER, title)).max().unwrap_or(0);
+        let text = Canvas::text_width(SMALL, told).max(widest) + 2 * GAP;
+        let full = (columns * (width + GAP) + GAP).max(LEAST_WIDTH).max(text);
         let top = |row: usize| GAP + LINE + row * (LINE + height + GAP);
         let below = top(titles.len().div_ceil(columns));
         let legend = below + space;

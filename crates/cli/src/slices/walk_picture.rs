@@ -171,9 +171,10 @@ fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track, avatar: &Av
             canvas.text([left, top], SMALL, AIM, &name);
         }
     }
-    for i in 1..track.places.len() {
+    for i in 0..track.places.len() {
         let at = |i: usize| [across(track.distances[i]), up(track.places[i][2])];
-        canvas.line(area, [at(i - 1), at(i)], 4.0, WAY);
+        // A walk without steps is a dot.
+        canvas.line(area, [at(i.saturating_sub(1)), at(i)], 4.0, WAY);
     }
     for &(place, way) in &track.stops {
         cross(canvas, area, [across(way), up(place[2])]);
@@ -229,6 +230,20 @@ mod tests {
         track
     }
 
+    /// A floor with a wall at the end, and a step of 0.2 across the middle.
+    fn room() -> SliceMap {
+        let row = |x: f64| (0..80_u8).map(move |i| [x, 0.05 * f64::from(i)]);
+        let ground = (0..80_u8).flat_map(|i| row(0.05 * f64::from(i))).map(|[x, y]| [x, y, 0.0]);
+        let wall = row(3.9).flat_map(|[x, y]| (0..50_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
+        let step = row(2.0).flat_map(|[x, y]| (0..5_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
+        let points: Vec<[f64; 3]> = ground.chain(wall).chain(step).collect();
+        let options = SliceOptions::default().with_pixel(Pixel::Side(0.05));
+        let plan = SlicePlan::new(&options, &Aabb::of(points.iter().copied())).unwrap();
+        let mut builder = SliceBuilder::new(&plan).unwrap();
+        builder.add(&points);
+        builder.finish()
+    }
+
     #[test]
     fn ticks_are_round_and_within() {
         let of = |low, high| ticks([low, high], 5.0).map(short).collect::<Vec<_>>();
@@ -248,19 +263,68 @@ mod tests {
     }
 
     #[test]
+    fn storeys_of_the_map_divide_a_walk_that_was_on_them() {
+        let over = track(&[[0.0, 0.0, 0.0], [5.0, 0.0, 3.0], [0.1, 0.0, 6.0]], &[], &GRID);
+        let floor = |height: f64, heights: [f64; 2]| {
+            let mut storeys = room().storeys(&Avatar::new(&AvatarOptions::default()).unwrap()).unwrap();
+            let mut storey = storeys.remove(0);
+            (storey.height, storey.heights) = (height, heights);
+            storey
+        };
+        let floors = [floor(0.0, [f64::NEG_INFINITY, 5.0]), floor(5.4, [5.0, f64::INFINITY])];
+        let of = |floors: &[Storey]| storeys(&over, &AvatarOptions::default(), floors);
+        assert_eq!(of(&floors), [[0.0, 5.0], [5.0, 6.0]]);
+        assert_eq!(of(&floors[..1]), [[0.0, 3.0], [3.0, 6.0]], "on one floor alone");
+    }
+
+    #[test]
+    fn stops_and_points_out_of_the_way_are_in_the_picture() {
+        let map = room();
+        let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
+        let shown = |places: &[[f64; 3]], points: &[[f64; 2]], stops: bool| {
+            let mut track = track(places, points, map.grid());
+            if stops {
+                track.stop(places[places.len() - 1], 1.0);
+            }
+            paint(&map, &track, &avatar, &[])
+        };
+        let count = |picture: &Picture, colour: Colour| {
+            picture.pixels().chunks(3).filter(|pixel| *pixel == colour).count()
+        };
+        let way: Vec<[f64; 3]> = (0..20_u8).map(|i| [0.5 + 0.05 * f64::from(i), 2.0, 0.0]).collect();
+        // Legends hold a patch of either colour.
+        let plain = shown(&way, &[], false);
+        let stopped = shown(&way, &[], true);
+        assert_eq!(count(&plain, STOP), 0);
+        assert!(count(&stopped, STOP) > 14 * 12 + 20, "{} pixels of crosses", count(&stopped, STOP));
+        // Of the view of a far point to the right or left, that half of the picture, without the legend, holds
+        // the ring alone: the way is a few pixels at the other end.
+        for (far, is_right) in [([30.0, 2.0], true), ([-30.0, 2.0], false)] {
+            let picture = shown(&way, &[far], false);
+            let (width, height) = picture.size();
+            let rows = picture.pixels().chunks(3 * width).take(height / 3);
+            let half = |row: &[u8]| {
+                let row =
+                    if is_right { row[3 * (width / 2)..].to_vec() } else { row[..3 * (width / 2)].to_vec() };
+                row.chunks(3).filter(|pixel| *pixel == AIM).count()
+            };
+            let ring: usize = rows.map(half).sum();
+            assert!(ring > 10, "{far:?}: {ring} pixels of its ring");
+        }
+        // An empty walk, and a level one whose unevenness stays small.
+        let empty = shown(&way[..1], &[], false);
+        let legend = 14 * 12;
+        assert!((legend + 2..legend + 40).contains(&count(&empty, WAY)), "{}", count(&empty, WAY));
+        let uneven: Vec<[f64; 3]> =
+            way.iter().zip(0_u8..).map(|(p, i)| [p[0], p[1], 0.01 * f64::from(i % 2)]).collect();
+        let [flat, uneven] = [&way, &uneven].map(|way| count(&shown(way, &[], false), WAY));
+        assert!(uneven < flat + flat / 2, "{uneven} pixels of an uneven way, {flat} of a level one");
+    }
+
+    #[test]
     fn a_picture_shows_floor_walls_and_the_way() {
-        let row = |x: f64| (0..80_u8).map(move |i| [x, 0.05 * f64::from(i)]);
-        let ground = (0..80_u8).flat_map(|i| row(0.05 * f64::from(i))).map(|[x, y]| [x, y, 0.0]);
-        // A wall at the end, and a step of 0.2 across the middle.
-        let wall = row(3.9).flat_map(|[x, y]| (0..50_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
-        let step = row(2.0).flat_map(|[x, y]| (0..5_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
-        let points: Vec<[f64; 3]> = ground.chain(wall).chain(step).collect();
-        let options = SliceOptions::default().with_pixel(Pixel::Side(0.05));
-        let plan = SlicePlan::new(&options, &Aabb::of(points.iter().copied())).unwrap();
-        let mut builder = SliceBuilder::new(&plan).unwrap();
-        builder.add(&points);
+        let map = room();
         let places: Vec<[f64; 3]> = (0..20_u8).map(|i| [0.5 + 0.05 * f64::from(i), 2.0, 0.0]).collect();
-        let map = builder.finish();
         let track = track(&places, &[[1.45, 2.0]], map.grid());
         let picture = paint(&map, &track, &Avatar::new(&AvatarOptions::default()).unwrap(), &[]);
         let share = |colour: Colour| {

@@ -16,6 +16,7 @@ mod looking_inside;
 mod making_poses;
 mod on_disk;
 mod prepare;
+mod routing;
 mod running;
 mod slicing;
 mod touching;
