@@ -85,6 +85,17 @@ impl Avatar {
         &self.options
     }
 
+    /// The greatest number of pixels of a map that lie under its base.
+    pub(crate) fn most_pixels(&self, grid: &Grid) -> u64 {
+        let base = grid.up.across(self.options.base);
+        let along = |k: usize| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
+            let pixels = (base[k] / grid.pixel) as u64;
+            pixels.saturating_add(2).min(u64::from(grid.counts[k]))
+        };
+        along(0) * along(1)
+    }
+
     /// How far it moves in a step, and what makes it so.
     pub(crate) fn stride(&self) -> (&'static str, f64) {
         let AvatarOptions { base: [width, depth], step, .. } = self.options;

@@ -14,6 +14,9 @@ use crate::query::Floor;
 use crate::walk::Walker;
 use crate::walk_error::WalkError;
 
+/// Places that are looked at lie no farther apart than a pixel, or than this part of the base.
+const COARSE: f64 = 32.0;
+
 /// A place where an avatar can stand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standing {
@@ -113,7 +116,8 @@ impl Avatar {
     /// there is none.
     ///
     /// Looked at are all heights of `near` itself and of the places of the [`Lattice`] with the spacing of a
-    /// pixel, ring by ring, until no further ring can be nearer. A place of them is one if a walker that is
+    /// pixel, for bases beyond 64 pixels of a 32nd of their lesser side in whole pixels, ring by ring, until no
+    /// further ring can be nearer. A place of them is one if a walker that is
     /// put there stays there ([`Walker::new`]). Takes microseconds for each place that is nearer than the one
     /// found; seconds for a large map with none.
     ///
@@ -125,7 +129,9 @@ impl Avatar {
         }
         let grid = map.grid();
         let [x, y, z] = grid.up.to_map(near);
-        let lattice = Lattice::new(grid, self, grid.pixel);
+        let spacing = grid.pixel
+            * (self.options().base[0].min(self.options().base[1]) / COARSE / grid.pixel).floor().max(1.0);
+        let lattice = Lattice::new(grid, self, spacing);
         let mut best: Option<([f64; 3], f64)> = None;
         let mut heights = Vec::new();
         let mut look = |place: [f64; 2], best: &mut Option<([f64; 3], f64)>| {
@@ -151,8 +157,8 @@ impl Avatar {
         for ring in 0..=rings {
             // A place of the ring is so far from the centre, which rounds `near`, or what of it is on the map.
             // The way from there to `near` outside leads away from all places, so squares add up.
-            let inner = (f64::from(ring) - 1.0).max(0.0) * grid.pixel;
-            let least = if off > grid.pixel { inner.hypot(off - grid.pixel) } else { inner };
+            let inner = (f64::from(ring) - 1.0).max(0.0) * spacing;
+            let least = if off > spacing { inner.hypot(off - spacing) } else { inner };
             if best.is_some_and(|(_, found)| least >= found) {
                 break;
             }

@@ -12,6 +12,9 @@ use crate::{Avatar, Back};
 /// The greatest number of states that a search holds: some 4 GB.
 const MOST_NODES: usize = 1 << 26;
 
+/// The greatest number of pixels under bases at all places of a lattice: minutes.
+const MOST_WORK: u64 = 1 << 36;
+
 /// Cells along a side of a tile, and the greatest number of tiles.
 const TILE: u32 = 64;
 const MOST_TILES: u64 = 1 << 24;
@@ -71,6 +74,11 @@ impl<'a> Steps<'a> {
         let Some(tiles) = most else {
             return Err(WalkError::TooManyPlaces { limit: MOST_NODES, step });
         };
+        let pixels = avatar.most_pixels(map.grid());
+        let places = lattice.counts[0].saturating_mul(lattice.counts[1]);
+        if places.saturating_mul(pixels) > MOST_WORK {
+            return Err(WalkError::TooMuchWork { places, pixels });
+        }
         let tile_columns = usize::try_from(columns).unwrap_or(usize::MAX);
         Ok(Self { map, avatar, lattice, falls, nodes: Vec::new(), tiles: vec![None; tiles], tile_columns })
     }

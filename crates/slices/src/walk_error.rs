@@ -66,6 +66,17 @@ pub enum WalkError {
         /// The length of a step.
         step: f64,
     },
+    /// A search that would not end while anybody waits.
+    #[error(
+        "expected a search of at most 2^36 pixels, got {places} places with {pixels} pixels under the base; give a \
+         longer step or a smaller avatar"
+    )]
+    TooMuchWork {
+        /// Places of the lattice.
+        places: u64,
+        /// Pixels of the map under a base.
+        pixels: u64,
+    },
     /// A slice that is needed is not loaded.
     #[error(transparent)]
     Unloaded(#[from] Unloaded),

@@ -42,7 +42,7 @@ pub(super) fn misplaced(path: &Path, what: &str, grid: &Grid, cause: &StartError
 /// The refusal of a search.
 pub(super) fn refused(path: &Path, cause: &WalkError) -> CliError {
     match cause {
-        WalkError::TooManyPlaces { .. } => CliError::Usage(cause.to_string()),
+        WalkError::TooManyPlaces { .. } | WalkError::TooMuchWork { .. } => CliError::Usage(cause.to_string()),
         _ => CliError::Unfit { path: path.to_owned(), what: cause.to_string() },
     }
 }

@@ -171,10 +171,12 @@ fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track, avatar: &Av
             canvas.text([left, top], SMALL, AIM, &name);
         }
     }
-    for i in 0..track.places.len() {
-        let at = |i: usize| [across(track.distances[i]), up(track.places[i][2])];
-        // A walk without steps is a dot.
-        canvas.line(area, [at(i.saturating_sub(1)), at(i)], 4.0, WAY);
+    let at = |i: usize| [across(track.distances[i]), up(track.places[i][2])];
+    for i in 1..track.places.len() {
+        canvas.line(area, [at(i - 1), at(i)], 4.0, WAY);
+    }
+    if track.places.len() == 1 {
+        canvas.line(area, [at(0), at(0)], 10.0, WAY);
     }
     for &(place, way) in &track.stops {
         cross(canvas, area, [across(way), up(place[2])]);

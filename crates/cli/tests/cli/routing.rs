@@ -73,7 +73,7 @@ fn reach_is_told_painted_and_listed() {
     assert!(number(&falls["floors"][0]["places"]) > 1000.0, "{falls}");
     let people = place.ok(&["slices", "reach", "house", "--start", "3,6,0.1"]).results;
     assert!(
-        people.starts_with("Within reach of (3, 6, 0.0") && people.contains("floor      at z = "),
+        people.starts_with("Within reach of (3.00, 6.00, 0.0") && people.contains("floor      at z = "),
         "{people}"
     );
 }
@@ -158,7 +158,7 @@ fn where_there_is_no_route_that_is_told() {
             &["--image and --csv", "same file"],
         ),
         (2, reach(&["--start", "3,6,0.1", "--csv", "house/index.nms"]), &["replace the input"]),
-        (1, vec!["slices", "start", "house", "--avatar", "90,90,90"], &["stand nowhere"]),
+        (2, vec!["slices", "start", "house", "--avatar", "90,90,90"], &["smaller avatar"]),
     ] {
         place.refused(status, &args, words);
     }
