@@ -94,8 +94,8 @@ pub use preprocess::{FormatChoice, PathsName, PreprocessArgs, ScannerPosition, W
 pub use sample::SampleArgs;
 pub use search::{BracketsName, MethodName, OrderName, RefinementName, SearchArgs};
 pub use slices::{
-    AvatarBox, BuildArgs, FloorName, PixelArgs, QueryArgs, ResponseName, SlicesCommand, SlicesExportArgs,
-    SlicesInspectArgs, WalkArgs,
+    AvatarArgs, AvatarBox, BuildArgs, FloorName, PixelArgs, QueryArgs, ReachArgs, ResponseName, RouteArgs,
+    SlicesCommand, SlicesExportArgs, SlicesInspectArgs, Spot, StartArgs, WalkArgs,
 };
 pub use touch::TouchArgs;
 pub use units::UnitName;

@@ -1,22 +1,33 @@
 //! `slices`: a building as a stack of images, and what is asked of it.
 
+mod avatar_args;
 mod build;
 mod export;
 mod inspect;
 mod labels;
 mod query;
+mod reach;
+mod reach_picture;
+mod refusal;
 mod report;
+mod route;
+mod start;
+mod storey_view;
 mod track;
 mod walk;
 mod walk_picture;
 
 use clap::Subcommand;
 
+pub use avatar_args::{AvatarArgs, AvatarBox, Spot};
 pub use build::{BuildArgs, PixelArgs};
 pub use export::SlicesExportArgs;
 pub use inspect::SlicesInspectArgs;
 pub use query::{FloorName, QueryArgs};
-pub use walk::{AvatarBox, ResponseName, WalkArgs};
+pub use reach::ReachArgs;
+pub use route::RouteArgs;
+pub use start::StartArgs;
+pub use walk::{ResponseName, WalkArgs};
 
 use crate::error::CliError;
 
@@ -33,17 +44,40 @@ const WALK_EXAMPLES: &str = "\
 Example, with {\"start\":[x,y,z],\"points\":[[x,y],…]} in route.json:
   nearmiss slices walk building.slices --route route.json --image walk.png --trace walk.csv";
 
+const START_EXAMPLES: &str = "\
+Examples:
+  nearmiss slices start building.slices --near 3,4,0
+  nearmiss slices start building.slices --json";
+
+const REACH_EXAMPLES: &str = "\
+Example:
+  nearmiss slices reach building.slices --start 3,4,0 --image reach.png --csv reach.csv";
+
+const ROUTE_EXAMPLES: &str = "\
+Example, a route that is found and then walked:
+  nearmiss slices route building.slices --from 3,4,0 --to 12,7,3.2 -o route.json
+  nearmiss slices walk building.slices --route route.json --image walk.png";
+
 /// What can be done with slice maps.
 #[derive(Debug, Clone, Subcommand)]
 pub enum SlicesCommand {
     /// Make a slice map of a point cloud or mesh
     #[command(after_long_help = BUILD_EXAMPLES)]
     Build(BuildArgs),
-    /// Say what a slice map holds
+    /// Say what a slice map holds, its bounds, and its storeys
     Inspect(SlicesInspectArgs),
     /// Whether boxes, or another map in some poses, meet anything, and how high the floor is
     #[command(after_long_help = QUERY_EXAMPLES)]
     Query(QueryArgs),
+    /// Find a place where an avatar can stand
+    #[command(after_long_help = START_EXAMPLES)]
+    Start(StartArgs),
+    /// Find everywhere that an avatar can walk to
+    #[command(after_long_help = REACH_EXAMPLES)]
+    Reach(ReachArgs),
+    /// Find a short walkable route between two places
+    #[command(after_long_help = ROUTE_EXAMPLES)]
+    Route(RouteArgs),
     /// Walk an avatar along a route
     #[command(after_long_help = WALK_EXAMPLES)]
     Walk(WalkArgs),
@@ -56,6 +90,9 @@ pub(crate) fn run(command: &SlicesCommand) -> Result<(), CliError> {
         SlicesCommand::Build(args) => build::run(args),
         SlicesCommand::Inspect(args) => inspect::run(args),
         SlicesCommand::Query(args) => query::run(args),
+        SlicesCommand::Start(args) => start::run(args),
+        SlicesCommand::Reach(args) => reach::run(args),
+        SlicesCommand::Route(args) => route::run(args),
         SlicesCommand::Walk(args) => walk::run(args),
         SlicesCommand::Export(args) => export::run(args),
     }

@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use nearmiss_geometry::Aabb;
 use serde::{Deserialize, Serialize};
 
 use crate::Up;
@@ -134,6 +135,13 @@ impl Grid {
         #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
         let slice = ((height - self.origin[2]) / self.slice_height).floor() as i64;
         slice
+    }
+
+    /// Bounds of all voxels, in the caller's coordinates.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        let end = [0, 1, 2].map(|k| self.origin[k] + f64::from(self.counts[k]) * self.size(k));
+        Aabb::of([self.origin, end].map(|corner| self.up.from_map(corner)))
     }
 
     /// Middle of a pixel, in the map's coordinates.

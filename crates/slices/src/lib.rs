@@ -19,9 +19,20 @@ mod options;
 mod object;
 mod query;
 
+mod avatar;
 mod response;
 mod route;
 mod walk;
+mod walk_error;
+
+// Where an avatar can be, and how it gets there.
+mod floors;
+mod lattice;
+mod reach;
+mod shortest;
+mod smooth;
+mod standing;
+mod steps;
 
 // On disk, and from there as it is needed.
 mod cache;
@@ -29,18 +40,25 @@ mod encode;
 mod store;
 mod target;
 
+pub use avatar::{Avatar, AvatarOptions};
 pub use build::SliceBuilder;
 pub use cache::{CacheCounts, CacheOptions, SliceCache};
 pub use error::SliceError;
+pub use floors::{Storey, storey_of};
 pub use grid::{Block, Grid, LEVELS};
+pub use lattice::Lattice;
 pub use map::{About, SliceMap, Unloaded};
 pub use object::ObjectError;
 pub use options::{Obstacle, Pixel, SliceOptions, SlicePlan};
 pub use query::{Floor, Occupancy};
+pub use reach::{Covered, Reach};
 pub use response::{Back, Response, Slide};
 pub use route::{Building, Ended, Route};
+pub use shortest::{FoundRoute, RouteError};
 pub use slice::{Content, Slice};
+pub use standing::{Misplaced, Standing, StartError};
 pub use store::{SliceFolder, StoreError};
 pub use target::SliceTarget;
 pub use up::{UnknownAxis, Up};
-pub use walk::{Avatar, AvatarOptions, Step, WalkError, Walker, step_each};
+pub use walk::{Step, Walker, step_each};
+pub use walk_error::WalkError;

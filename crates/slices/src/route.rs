@@ -4,8 +4,10 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
+use crate::avatar::Avatar;
 use crate::map::{SliceMap, Unloaded};
-use crate::walk::{Avatar, Step, WalkError, Walker};
+use crate::walk::{Step, Walker};
+use crate::walk_error::WalkError;
 use crate::{Grid, Response};
 
 /// Where slices come from: a whole map, or a cache over a folder.

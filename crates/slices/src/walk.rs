@@ -7,186 +7,20 @@
 
 use std::ops::RangeInclusive;
 
-use nearmiss_geometry::Aabb;
 use nearmiss_lanes::parallel::change_both;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use crate::grid::LEVELS;
 use crate::map::{SliceMap, Unloaded};
 use crate::slice::Slice;
-use crate::{Grid, Response};
+use crate::walk_error::WalkError;
+use crate::{Avatar, AvatarOptions, Grid, Response};
 
 /// Levels of a slice.
 const SLICE: i64 = LEVELS as i64;
 
 /// Avatars that a thread takes at a time.
 const CHUNK: usize = 64;
-
-/// Who walks: lengths in the caller's units. Plain numbers, checked by [`Avatar::new`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct AvatarOptions {
-    /// Of the box, along the two axes across in the caller's order. Default: 0.4 each.
-    pub base: [f64; 2],
-    /// Of the box. Default: 1.6: on stairs a box stands on the highest step under it, a quarter of a metre
-    /// higher than whoever it stands for.
-    pub height: f64,
-    /// How far it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
-    pub climb: f64,
-    /// How far it moves in a step, at most the lesser side of its base: then bases at both ends meet, and it
-    /// steps over nothing. Default: 0.05.
-    pub step: f64,
-}
-
-impl Default for AvatarOptions {
-    fn default() -> Self {
-        Self { base: [0.4; 2], height: 1.6, climb: 0.35, step: 0.05 }
-    }
-}
-
-impl AvatarOptions {
-    /// The same avatar with a box of this base and height.
-    #[must_use]
-    pub const fn with_box(self, base: [f64; 2], height: f64) -> Self {
-        Self { base, height, ..self }
-    }
-
-    /// The same avatar that climbs so far.
-    #[must_use]
-    pub const fn with_climb(self, climb: f64) -> Self {
-        Self { climb, ..self }
-    }
-
-    /// The same avatar with steps of this length.
-    #[must_use]
-    pub const fn with_step(self, step: f64) -> Self {
-        Self { step, ..self }
-    }
-}
-
-/// Why nobody walks.
-#[derive(Debug, Clone, PartialEq, Error)]
-#[non_exhaustive]
-pub enum WalkError {
-    /// A length that is none.
-    #[error("{what} of {length} is none; give a length above 0")]
-    Length {
-        /// Which.
-        what: &'static str,
-        /// As given.
-        length: f64,
-    },
-    /// A length so short that a walk would not end while anybody waits.
-    #[error(
-        "with {what} of {length} the route may take {steps:e} steps, more than 2^32; give a greater length"
-    )]
-    TooShort {
-        /// Which.
-        what: &'static str,
-        /// As given.
-        length: f64,
-        /// How many.
-        steps: f64,
-    },
-    /// An avatar that climbs over its own head.
-    #[error("an avatar {height} high cannot climb {climb}; give less than its height")]
-    Climb {
-        /// Of the avatar.
-        height: f64,
-        /// As given.
-        climb: f64,
-    },
-    /// A place that is not finite.
-    #[error("point {index} of the route has a coordinate that is not finite")]
-    NotFinite {
-        /// Which, the start being 0.
-        index: usize,
-    },
-    /// A place so far off the map that a walk would not end while anybody waits.
-    #[error("point {index} of the route is {away:.2e} off the map; give one on it")]
-    FarOff {
-        /// Which, the start being 0.
-        index: usize,
-        /// How far, along an axis.
-        away: f64,
-    },
-    /// Nobody can stand there.
-    #[error(
-        "the start {place:?} is inside an obstacle or too low under a ceiling; start elsewhere, or with a smaller avatar"
-    )]
-    Blocked {
-        /// As given.
-        place: [f64; 3],
-    },
-    /// A slice that is needed is not loaded.
-    #[error(transparent)]
-    Unloaded(#[from] Unloaded),
-}
-
-/// Somebody with a size that makes sense.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Avatar {
-    options: AvatarOptions,
-}
-
-impl Avatar {
-    /// Checks the lengths.
-    ///
-    /// # Errors
-    /// Names the one that makes no sense.
-    pub fn new(options: &AvatarOptions) -> Result<Self, WalkError> {
-        let AvatarOptions { base: [width, depth], height, climb, step } = *options;
-        let all = [
-            ("an avatar's width", width),
-            ("an avatar's depth", depth),
-            ("an avatar's height", height),
-            ("a climb", climb),
-            ("a step", step),
-        ];
-        for (what, length) in all {
-            if !(length > 0.0 && length.is_finite()) {
-                return Err(WalkError::Length { what, length });
-            }
-        }
-        if climb >= height {
-            return Err(WalkError::Climb { height, climb });
-        }
-        Ok(Self { options: *options })
-    }
-
-    /// Its lengths.
-    #[must_use]
-    pub fn options(&self) -> &AvatarOptions {
-        &self.options
-    }
-
-    /// How far it moves in a step, and what makes it so.
-    pub(crate) fn stride(&self) -> (&'static str, f64) {
-        let AvatarOptions { base: [width, depth], step, .. } = self.options;
-        let base = width.min(depth);
-        if step <= base { ("a step", step) } else { ("an avatar's base", base) }
-    }
-
-    /// Its box, in the caller's coordinates, when its feet stand on this place.
-    #[must_use]
-    pub fn bounds(&self, grid: &Grid, feet: [f64; 3]) -> Aabb {
-        let [x, y, z] = grid.up.to_map(feet);
-        let [w, d] = grid.up.across(self.options.base).map(|side| 0.5 * side);
-        let corners = [[x - w, y - d, z], [x + w, y + d, z + self.options.height]];
-        Aabb::of(corners.map(|corner| grid.up.from_map(corner)))
-    }
-
-    /// The greatest number of slices that a step can need.
-    #[must_use]
-    pub fn slices(&self, grid: &Grid) -> u32 {
-        // Down as far as it falls, up from the greatest climb to the head, and both ends.
-        let AvatarOptions { height, climb, .. } = self.options;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-        let slices = ((height + 2.0 * climb) / grid.slice_height).ceil() as u32;
-        slices.saturating_add(1).min(grid.counts[2])
-    }
-}
 
 /// What became of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -257,6 +91,27 @@ impl Walker {
         grid.up.from_map(self.place)
     }
 
+    /// A walker that stands where another of the same avatar stood, on the same footing.
+    pub(crate) fn resumed(avatar: Avatar, place: [f64; 3], footing: f64) -> Self {
+        Self { avatar, place, footing, falling: false }
+    }
+
+    /// The avatar.
+    #[must_use]
+    pub fn avatar(&self) -> &Avatar {
+        &self.avatar
+    }
+
+    /// The place of the feet, in the map's coordinates.
+    pub(crate) fn place(&self) -> [f64; 3] {
+        self.place
+    }
+
+    /// Height of the last floor under the feet, in the map's coordinates.
+    pub(crate) fn footing(&self) -> f64 {
+        self.footing
+    }
+
     /// Height of the feet in the map's coordinates.
     pub(crate) fn feet(&self) -> f64 {
         self.place[2]
@@ -264,7 +119,7 @@ impl Walker {
 
     /// How far it falls in a step.
     pub(crate) fn climb(&self) -> f64 {
-        self.avatar.options.climb
+        self.avatar.options().climb
     }
 
     /// Whether it stands on nothing.
@@ -290,7 +145,7 @@ impl Walker {
     /// The slices that the next step needs, as far as they are on the map.
     #[must_use]
     pub fn needs(&self, grid: &Grid) -> Option<RangeInclusive<u32>> {
-        let AvatarOptions { height, climb, .. } = self.avatar.options;
+        let AvatarOptions { height, climb, .. } = *self.avatar.options();
         grid.range(2, [self.place[2] - climb, self.footing + climb + height])
     }
 
@@ -343,7 +198,7 @@ impl Walker {
 
     /// Goes to a place if there is room.
     fn stand(&mut self, map: &SliceMap, place: [f64; 2]) -> Result<bool, Unloaded> {
-        let climb = self.avatar.options.climb;
+        let climb = self.avatar.options().climb;
         let look = self.look(map, place, [self.place[2] - climb, self.footing + climb])?;
         if look.blocked {
             return Ok(false);
@@ -363,7 +218,7 @@ impl Walker {
     /// Down as far as it climbs, or onto what is there.
     fn fall(&mut self, map: &SliceMap) -> Result<(), Unloaded> {
         let [x, y, z] = self.place;
-        let below = z - self.avatar.options.climb;
+        let below = z - self.avatar.options().climb;
         let look = self.look(map, [x, y], [below, z])?;
         self.place[2] = look.support.unwrap_or(below);
         self.falling = look.support.is_none();
@@ -374,7 +229,7 @@ impl Walker {
     /// What is at a place, where what lies between two heights would carry the avatar.
     fn look(&self, map: &SliceMap, [x, y]: [f64; 2], reach: [f64; 2]) -> Result<Look, Unloaded> {
         let grid = map.grid();
-        let [w, d] = grid.up.across(self.avatar.options.base).map(|side| 0.5 * side);
+        let [w, d] = grid.up.across(self.avatar.options().base).map(|side| 0.5 * side);
         let nothing = Look { blocked: false, support: None, floor: None };
         let ranges = (grid.range(0, [x - w, x + w]), grid.range(1, [y - d, y + d]));
         let (Some(columns), Some(rows)) = ranges else { return Ok(nothing) };
@@ -414,7 +269,7 @@ impl Walker {
                 break;
             }
         }
-        let head = found.support.unwrap_or(self.place[2]) + self.avatar.options.height;
+        let head = found.support.unwrap_or(self.place[2]) + self.avatar.options().height;
         let crown = grid.level_at(head);
         // What is above all that can be climbed, be it in the slice where the climb ends.
         let lowest = most.div_euclid(SLICE) + i64::from(!is_over);
@@ -431,7 +286,7 @@ impl Walker {
     }
 
     fn told(&self, grid: &Grid, blocked: bool, falling: bool) -> Step {
-        let head = self.place[2] + self.avatar.options.height;
+        let head = self.place[2] + self.avatar.options().height;
         let last = i64::from(grid.counts[2]) - 1;
         let slices = [self.place[2], head].map(|height| {
             let slice = grid.slice_at(height).clamp(0, last);

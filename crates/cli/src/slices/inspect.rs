@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use nearmiss::slices::{Avatar, AvatarOptions};
 
-use super::report::{Report, open};
-use crate::console::{self, now};
+use super::report::{Detail, Report, open};
+use crate::console::{self, Console, now};
 use crate::error::CliError;
 
 /// Options of `slices inspect`.
@@ -19,6 +20,9 @@ pub struct SlicesInspectArgs {
     /// One object of JSON instead of sentences
     #[arg(long)]
     pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 pub(super) fn run(args: &SlicesInspectArgs) -> Result<(), CliError> {
@@ -34,5 +38,13 @@ pub(super) fn run(args: &SlicesInspectArgs) -> Result<(), CliError> {
             return Err(fault.into());
         }
     }
-    Report::new(&folder, start.elapsed()).tell(&folder, args.json)
+    // Somebody as large as the default of the other commands.
+    let options = AvatarOptions::default();
+    let avatar = Avatar::new(&options).map_err(|e| CliError::Usage(e.to_string()))?;
+    let bar = Console::new(args.quiet).spinner("looking for floors");
+    let storeys = folder.storeys(&avatar);
+    drop(bar);
+    let storeys = storeys.map_err(|fault| console::warn(format_args!("no floors are told: {fault}"))).ok();
+    let detail = Detail::new(folder.grid(), storeys.as_deref());
+    Report::new(&folder, start.elapsed()).with_detail(detail).tell(&folder, args.json)
 }

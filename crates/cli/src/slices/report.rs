@@ -3,12 +3,41 @@
 use std::path::Path;
 use std::time::Duration;
 
-use nearmiss::slices::{About, Obstacle, SliceFolder};
+use nearmiss::Aabb;
+use nearmiss::slices::{About, Grid, Obstacle, SliceFolder, Storey};
 use serde::Serialize;
 
 use crate::console::Results;
-use crate::digits::{count, short};
+use crate::digits::{count, place, rounded, short};
 use crate::error::CliError;
+
+/// A storey, as it is told.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct FloorReport {
+    /// Along the axis that points up, in the caller's coordinates.
+    height: f64,
+    /// In square units.
+    area: f64,
+}
+
+/// What `inspect` says beyond what `build` does.
+#[derive(Debug, Serialize)]
+pub(super) struct Detail {
+    bounds: [[f64; 3]; 2],
+    up: String,
+    /// Lowest first; none if a slice cannot be loaded.
+    floors: Option<Vec<FloorReport>>,
+}
+
+impl Detail {
+    pub(super) fn new(grid: &Grid, storeys: Option<&[Storey]>) -> Self {
+        let Aabb { min, max } = grid.bounds();
+        let floor =
+            |storey: &Storey| FloorReport { height: grid.up.coordinate(storey.height), area: storey.area };
+        let floors = storeys.map(|storeys| storeys.iter().map(floor).collect());
+        Self { bounds: [min, max], up: grid.up.to_string(), floors }
+    }
+}
 
 /// What `build` and `inspect` say of a map.
 #[derive(Debug, Serialize)]
@@ -25,6 +54,8 @@ pub(super) struct Report {
     noise: f64,
     noise_estimated: bool,
     bytes: u64,
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    detail: Option<Detail>,
     seconds: f64,
 }
 
@@ -45,8 +76,14 @@ impl Report {
             noise: about.noise,
             noise_estimated: about.is_noise_estimated(),
             bytes: folder.bytes(),
+            detail: None,
             seconds: took.as_secs_f64(),
         }
+    }
+
+    /// The same with bounds and storeys.
+    pub(super) fn with_detail(self, detail: Detail) -> Self {
+        Self { detail: Some(detail), ..self }
     }
 
     /// As JSON, or for people.
@@ -72,6 +109,14 @@ impl Report {
             100.0 * about.share,
             of_noise(about)
         ))?;
+        if let Some(Detail { bounds: [min, max], up, floors }) = &self.detail {
+            let [min, max] = [min, max].map(|corner| place(*corner, self.pixel));
+            results.line(format_args!("bounds     from {min} to {max}"))?;
+            for floor in floors.iter().flatten() {
+                let height = rounded(floor.height, 0.1 * self.pixel);
+                results.line(format_args!("floor      at {up} = {height}, area {}", short(floor.area)))?;
+            }
+        }
         #[expect(clippy::cast_precision_loss, reason = "for people")]
         let megabytes = self.bytes as f64 / 1e6;
         let left_out = match self.dropped {

@@ -7,6 +7,9 @@ use nearmiss::slices::{Grid, Route};
 /// Places of a way that are kept at most: far more than a picture shows.
 const MOST: usize = 1 << 20;
 
+/// Stops that are kept at most.
+const MOST_STOPS: usize = 1000;
+
 /// Where it went, in the map's coordinates, and how far that was: of longer ways every second place, every
 /// fourth, and so on.
 pub(super) struct Track {
@@ -20,6 +23,8 @@ pub(super) struct Track {
     pub(super) numbers: Vec<usize>,
     /// Distance and height where the first of them were reached in turn.
     pub(super) reached: Vec<[f64; 2]>,
+    /// Places where it was stopped, with how far that was; each once in a row, the first ones.
+    pub(super) stops: Vec<([f64; 3], f64)>,
     /// Steps from one place to the next.
     every: usize,
     /// Steps so far.
@@ -41,6 +46,7 @@ impl Track {
             targets,
             numbers,
             reached: Vec::new(),
+            stops: Vec::new(),
             every: 1,
             steps: 0,
         };
@@ -56,6 +62,13 @@ impl Track {
             self.put(place, distance);
         }
         self.reach(place, distance);
+    }
+
+    /// Notes that it was stopped at this place, so far along the way.
+    pub(super) fn stop(&mut self, place: [f64; 3], distance: f64) {
+        if self.stops.len() < MOST_STOPS && self.stops.last() != Some(&(place, distance)) {
+            self.stops.push((place, distance));
+        }
     }
 
     /// Ends the way at this place, which is not left out.

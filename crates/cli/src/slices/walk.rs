@@ -10,13 +10,14 @@ use nearmiss::slices::{
 };
 use serde::Serialize;
 
+use super::avatar_args::{AvatarBox, parse_avatar};
+use super::refusal::misplaced;
 use super::report::open;
 use super::track::Track;
 use super::walk_picture;
 use crate::console::{self, Console, Results};
 use crate::digits::{count, short};
 use crate::error::CliError;
-use crate::input::pieces;
 use crate::parse::parse_length;
 use crate::{output, picture};
 
@@ -63,13 +64,6 @@ pub struct WalkArgs {
     pub quiet: bool,
 }
 
-/// Width, depth and height.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AvatarBox(
-    /// The lengths.
-    pub [f64; 3],
-);
-
 /// A response, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ResponseName {
@@ -77,14 +71,6 @@ pub enum ResponseName {
     Back,
     /// Along the wall
     Slide,
-}
-
-fn parse_avatar(text: &str) -> Result<AvatarBox, String> {
-    let lengths: Vec<f64> = pieces(text).map_while(|piece| parse_length(piece).ok()).collect();
-    match <[f64; 3]>::try_from(lengths) {
-        Ok(lengths) if pieces(text).count() == 3 => Ok(AvatarBox(lengths)),
-        _ => Err("expected three lengths, width,depth,height".into()),
-    }
 }
 
 /// A line of the output.
@@ -127,12 +113,24 @@ pub(super) fn run(args: &WalkArgs) -> Result<(), CliError> {
             "--cache {asked} is raised to {capacity}: the avatar needs as many slices at once"
         ));
     }
-    let walker = route.stand(&mut cache, &avatar).map_err(|cause| refused(args, cause))?;
+    let walker = match route.stand(&mut cache, &avatar) {
+        Ok(walker) if !walker.is_falling() => walker,
+        // The nearest place may need any slice.
+        Ok(_) | Err(StoreError::Walk(WalkError::Blocked { .. })) => {
+            let (map, faults) = folder.load_all();
+            faults.iter().for_each(console::warn);
+            avatar
+                .placed(&map, route.start)
+                .map_err(|cause| misplaced(&args.route, "start", folder.grid(), &cause))?
+        }
+        Err(cause) => return Err(refused(args, cause)),
+    };
     let (ended, tally, track) = walk(args, &route, &mut cache, walker)?;
     if let (Some(path), Some(track)) = (&args.image, &track) {
         let (map, faults) = folder.load_all();
         faults.iter().for_each(console::warn);
-        walk_picture::paint(&map, track, &avatar).save(path)?;
+        let floors = map.storeys(&avatar).unwrap_or_default();
+        walk_picture::paint(&map, track, &avatar, &floors).save(path)?;
     }
     if !args.json {
         let mut results = Results::new();
@@ -204,9 +202,14 @@ fn walk(
     let _bar = Console::new(args.quiet).spinner("walking");
     let mut follow = |trace: &mut dyn FnMut(f64, &Step) -> Result<(), CliError>| {
         route.follow(cache, walker, response, |cache: &SliceCache, step| {
+            let before = tally.position;
             tally.add(step);
             if let Some(track) = &mut track {
                 track.add(tally.place(), tally.distance);
+                // Where it slides along something it is not stopped.
+                if step.blocked && tally.position == before {
+                    track.stop(tally.place(), tally.distance);
+                }
             }
             if args.json {
                 results.json(&StepLine::new(step, cache.counts()))?;
@@ -255,9 +258,9 @@ fn check_outputs(args: &WalkArgs) -> Result<(), CliError> {
 /// Why there is no walk: the route, an option, or the map.
 fn refused(args: &WalkArgs, cause: StoreError) -> CliError {
     match cause {
-        StoreError::Walk(
-            cause @ (WalkError::Blocked { .. } | WalkError::NotFinite { .. } | WalkError::FarOff { .. }),
-        ) => CliError::Unfit { path: args.route.clone(), what: cause.to_string() },
+        StoreError::Walk(cause @ (WalkError::NotFinite { .. } | WalkError::FarOff { .. })) => {
+            CliError::Unfit { path: args.route.clone(), what: cause.to_string() }
+        }
         StoreError::Walk(cause @ WalkError::TooShort { .. }) => CliError::Usage(cause.to_string()),
         other => other.into(),
     }

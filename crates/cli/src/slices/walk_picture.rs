@@ -1,69 +1,39 @@
 //! A walk from above, storey by storey where it comes over itself, and its height over its length.
 
-use nearmiss::geometry::nalgebra::Vector3;
-use nearmiss::slices::{Avatar, AvatarOptions, SliceMap};
+use nearmiss::slices::{Avatar, AvatarOptions, SliceMap, Storey};
 
 use super::labels::Labels;
+use super::storey_view::{
+    AIM, EMPTY, FLOOR, GAP, IN_THE_WAY, INK, LETTER, LINE, SMALL, STEP, STOP, Sheet, View, cross, whole,
+    window,
+};
 use super::track::Track;
-use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
+use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::digits::{rounded, short};
 use crate::image::Picture;
-use crate::picture::scale_bar;
 
-/// In fine pixels: the longer side of a view, alone or one of several; the curve, margins, letters.
-const ALONE: f64 = 900.0 * FINE as f64;
-const ONE_OF_MANY: f64 = 560.0 * FINE as f64;
-const LEAST_WIDTH: usize = 560 * FINE;
+/// Height of the curve, in fine pixels.
 const CURVE: usize = 210 * FINE;
-const GAP: usize = 12 * FINE;
-const LETTER: usize = 2 * FINE;
-const SMALL: usize = 3 * FINE / 2;
-const LINE: usize = 22 * FINE;
-
-/// Views are laid out in a shape not far from this, width to height.
-const SHAPE: f64 = 1.3;
 
 const GROUND: Colour = [255, 255, 255];
-const EMPTY: Colour = [238, 240, 243];
-const FLOOR: Colour = [188, 214, 190];
-const STEP: Colour = [214, 180, 120];
-const IN_THE_WAY: Colour = [70, 74, 82];
 const WAY: Colour = [208, 60, 40];
 const ELSEWHERE: Colour = [226, 166, 158];
-const AIM: Colour = [40, 90, 200];
-const INK: Colour = [30, 34, 40];
 
 /// Where there are several, a view holds so many times the avatar's height, unless there would be more than
 /// `MOST_VIEWS`.
 const STOREY: f64 = 2.0;
 const MOST_VIEWS: f64 = 9.0;
 
-/// What is shown around the way: so many times the avatar's height, and this share of the way's extent.
-const AROUND: f64 = 1.5;
-const MORE: f64 = 0.1;
-
-/// Places of the way that pixels, and each other, are held against.
-const SAMPLE: usize = 150;
+/// Places of the way that are held against each other.
 const MOST_PLACES: usize = 1500;
 
 /// A view for each storey that the walk was on, lowest first; below them its height over its length. Pixels
-/// are shown as they are to the avatar where it came nearest to them.
-pub(super) fn paint(map: &SliceMap, track: &Track, avatar: &Avatar) -> Picture {
-    let storeys = storeys(track, avatar.options());
-    let window = window(map, track, avatar);
-    // So far off the map that nothing is around it.
-    let size = [0, 1].map(|k| (window[1][k] - window[0][k]).max(map.grid().pixel));
-    let side = if storeys.len() == 1 { ALONE } else { ONE_OF_MANY };
-    let scale = side / size[0].max(size[1]);
-    let [width, height] = size.map(|length| whole(length * scale));
-    let columns = columns(storeys.len(), [width, height + LINE]);
-    let full = (columns * (width + GAP) + GAP).max(LEAST_WIDTH);
-    let top = |row: usize| GAP + LINE + row * (LINE + height + GAP);
-    let curve = top(storeys.len().div_ceil(columns));
-    let legend = curve + CURVE + LINE;
-    let entries = entries(storeys.len() > 1);
-    let mut canvas = Canvas::new(full, legend + rows(&entries, full) * LINE + GAP, GROUND);
+/// are shown as they are to the avatar where it came nearest to them. `floors` are the storeys of the map, as
+/// far as they are known.
+pub(super) fn paint(map: &SliceMap, track: &Track, avatar: &Avatar, floors: &[Storey]) -> Picture {
     let options = avatar.options();
+    let storeys = storeys(track, options, floors);
+    let places = track.places.iter().map(|p| [p[0], p[1]]).chain(track.targets.iter().copied());
     let told = format!(
         "walk of {}, pixels of {}, avatar of {} x {} x {}",
         short(track.distances.last().copied().unwrap_or(0.0)),
@@ -72,38 +42,70 @@ pub(super) fn paint(map: &SliceMap, track: &Track, avatar: &Avatar) -> Picture {
         options.base[1],
         options.height
     );
-    canvas.text([GAP, GAP], SMALL, INK, &told);
-    for (i, &heights) in storeys.iter().enumerate() {
-        let area =
-            Area { left: GAP + i % columns * (width + GAP), top: top(i / columns) + LINE, width, height };
+    let titles = storeys.iter().map(|heights| {
         let [low, high] = heights.map(|z| rounded(z, map.grid().pixel));
-        let title = format!("heights from {low} to {high}");
-        canvas.text([area.left, area.top - LINE + 4 * FINE], LETTER, INK, &title);
-        let view = View { map, track, avatar, window, scale, area };
-        view.paint(&mut canvas, heights);
-        if i == 0 {
-            scale_bar(&mut canvas, &view.camera());
-        }
+        format!("heights from {low} to {high}")
+    });
+    let titles: Vec<String> = titles.collect();
+    let entries = entries(storeys.len() > 1, !track.stops.is_empty());
+    let mut sheet =
+        Sheet::new((map, avatar), window(map, avatar, places), (&told, &titles), &entries, CURVE + LINE);
+    for (i, &heights) in storeys.iter().enumerate() {
+        let view = sheet.view(i);
+        paint_storey(&mut sheet.canvas, &view, track, heights);
     }
-    heights_over_way(
-        &mut canvas,
-        Area { left: GAP, top: curve, width: full - 2 * GAP, height: CURVE },
-        track,
-    );
-    draw_legend(&mut canvas, &entries, [legend, full]);
-    canvas.picture()
+    let curve = Area { left: GAP, top: sheet.below, width: sheet.full - 2 * GAP, height: CURVE };
+    heights_over_way(&mut sheet.canvas, curve, track, options);
+    sheet.picture()
 }
 
-/// Ranges of height that hold all places, none empty: a single one, unless the walk comes over itself.
-fn storeys(track: &Track, avatar: &AvatarOptions) -> Vec<[f64; 2]> {
+fn paint_storey(canvas: &mut Canvas, view: &View<'_>, track: &Track, heights: [f64; 2]) {
+    let here: Vec<[f64; 3]> = track.places.iter().copied().filter(|p| is_within(p[2], heights)).collect();
+    view.ground(canvas, &here);
+    let is_here = |pair: &[[f64; 3]]| is_within(pair[1][2], heights);
+    for (colour, width, here) in [(ELSEWHERE, 3.0, false), (WAY, 5.0, true)] {
+        for pair in track.places.windows(2).filter(|pair| is_here(pair) == here) {
+            let ends = [pair[0], pair[1]].map(|p| view.at([p[0], p[1]]));
+            canvas.line(view.area, ends, width, colour);
+        }
+    }
+    let start = track.places.first().filter(|p| is_within(p[2], heights)).map(|p| [p[0], p[1]]);
+    let mut labels = Labels::default();
+    if let Some(start) = start {
+        let again = track.targets.iter().position(|target| *target == start);
+        let name = again.map_or_else(|| "start".into(), |i| format!("start, {}", i + 1));
+        view.base(canvas, &mut labels, start, &name);
+    }
+    for ((i, &number), &target) in (1..).zip(&track.numbers).zip(&track.targets) {
+        if number == i && start != Some(target) {
+            view.goal(canvas, &mut labels, target, &number.to_string());
+        }
+    }
+    for (place, _) in track.stops.iter().filter(|(place, _)| is_within(place[2], heights)) {
+        view.cross(canvas, [place[0], place[1]]);
+    }
+}
+
+/// Ranges of height that hold all places, none empty: a single one, unless the walk comes over itself. Then
+/// those of the storeys of the map that it was on, or equal ones if it was on one alone.
+fn storeys(track: &Track, avatar: &AvatarOptions, floors: &[Storey]) -> Vec<[f64; 2]> {
     let heights = || track.places.iter().map(|p| p[2]);
     let low = heights().fold(f64::INFINITY, f64::min);
-    let rise = heights().fold(f64::NEG_INFINITY, f64::max) - low;
-    let count = if is_over_itself(track, avatar) { rise / (STOREY * avatar.height) } else { 1.0 };
-    let count = count.ceil().clamp(1.0, MOST_VIEWS);
+    let high = heights().fold(f64::NEG_INFINITY, f64::max);
+    if !is_over_itself(track, avatar) {
+        return vec![[low, high]];
+    }
+    let is_used = |range: &[f64; 2]| heights().any(|z| is_within(z, *range));
+    let by_floor = floors.iter().map(|floor| [floor.heights[0].max(low), floor.heights[1].min(high)]);
+    let by_floor: Vec<[f64; 2]> = by_floor.filter(|range| range[0] <= range[1]).filter(is_used).collect();
+    if by_floor.len() > 1 {
+        return by_floor;
+    }
+    let rise = high - low;
+    let count = (rise / (STOREY * avatar.height)).ceil().clamp(1.0, MOST_VIEWS);
     let bounds = |i: f64| [low + rise * i / count, low + rise * (i + 1.0) / count];
     let all = std::iter::successors(Some(0.0), |i| Some(i + 1.0)).take_while(|i| *i < count).map(bounds);
-    all.filter(|range| heights().any(|z| is_within(z, *range))).collect()
+    all.filter(is_used).collect()
 }
 
 /// Whether at one place there was an avatar above the head of itself.
@@ -123,181 +125,8 @@ fn is_within(z: f64, [low, high]: [f64; 2]) -> bool {
     low - off <= z && z <= high + off
 }
 
-/// What of the map is shown: its least and its greatest corner.
-fn window(map: &SliceMap, track: &Track, avatar: &Avatar) -> [[f64; 2]; 2] {
-    let grid = map.grid();
-    let all = || track.places.iter().map(|p| [p[0], p[1]]);
-    let [low, high] = [0, 1].map(|end| {
-        [0, 1].map(|k| {
-            let values = all().map(|p| p[k]);
-            if end == 0 {
-                values.fold(f64::INFINITY, f64::min)
-            } else {
-                values.fold(f64::NEG_INFINITY, f64::max)
-            }
-        })
-    });
-    let extent = (high[0] - low[0]).max(high[1] - low[1]);
-    let margin = AROUND * avatar.options().height + MORE * extent;
-    let end = |k: usize| grid.origin[k] + f64::from(grid.counts[k]) * grid.pixel;
-    // A walk that left the map is shown off it.
-    [
-        [0, 1].map(|k| (low[k] - margin).max(grid.origin[k].min(low[k]))),
-        [0, 1].map(|k| (high[k] + margin).min(end(k).max(high[k]))),
-    ]
-}
-
-/// How many views beside each other come nearest to the shape, and leave little of it empty.
-fn columns(views: usize, [width, height]: [usize; 2]) -> usize {
-    #[expect(clippy::cast_precision_loss, reason = "pixels")]
-    let off = |columns: usize| {
-        let rows = views.div_ceil(columns);
-        let shape = (columns * width) as f64 / (rows * height) as f64;
-        (shape / SHAPE).ln().abs() + 1.0 - views as f64 / (columns * rows) as f64
-    };
-    (1..=views).min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(1)
-}
-
-/// One storey.
-struct View<'a> {
-    map: &'a SliceMap,
-    track: &'a Track,
-    avatar: &'a Avatar,
-    window: [[f64; 2]; 2],
-    /// Fine pixels of a unit of length.
-    scale: f64,
-    area: Area,
-}
-
-impl View<'_> {
-    fn camera(&self) -> Camera {
-        let [low, high] = self.window;
-        let centre = Vector3::new(0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0);
-        Camera {
-            axes: [Vector3::x(), Vector3::y(), Vector3::z()],
-            centre,
-            scale: self.scale,
-            area: self.area,
-        }
-    }
-
-    fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [x, y, _] = self.camera().project(Vector3::new(x, y, 0.0));
-        [x, y]
-    }
-
-    fn paint(&self, canvas: &mut Canvas, heights: [f64; 2]) {
-        canvas.fill(self.area, EMPTY);
-        self.ground(canvas, heights);
-        let pairs = || self.track.places.windows(2);
-        let is_here = |pair: &[[f64; 3]]| is_within(pair[1][2], heights);
-        for (colour, width, here) in [(ELSEWHERE, 3.0, false), (WAY, 5.0, true)] {
-            for pair in pairs().filter(|pair| is_here(pair) == here) {
-                let ends = [pair[0], pair[1]].map(|p| self.at([p[0], p[1]]));
-                canvas.line(self.area, ends, width, colour);
-            }
-        }
-        let start = self.track.places.first().filter(|p| is_within(p[2], heights)).map(|p| [p[0], p[1]]);
-        let mut labels = Labels::default();
-        if let Some(start) = start {
-            self.base(canvas, &mut labels, start);
-        }
-        for ((i, &number), &target) in (1..).zip(&self.track.numbers).zip(&self.track.targets) {
-            if number == i && start != Some(target) {
-                let [x, y] = self.at(target);
-                canvas.ring(self.area, [x, y], 9.0, 3.0, AIM);
-                self.label(canvas, &mut labels, [x + 14.0, y - 24.0], &number.to_string());
-            }
-        }
-    }
-
-    /// The avatar's base at a place.
-    fn base(&self, canvas: &mut Canvas, labels: &mut Labels, place: [f64; 2]) {
-        let half = self.map.grid().up.across(self.avatar.options().base).map(|side| 0.5 * side);
-        let corner = |s: f64, t: f64| self.at([place[0] + s * half[0], place[1] + t * half[1]]);
-        let corners = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-        for i in 0..4 {
-            canvas.line(self.area, [corners[i], corners[(i + 1) % 4]], 3.0, AIM);
-        }
-        let [x, y] = corners[2];
-        let again = self.track.targets.iter().position(|target| *target == place);
-        let name = again.map_or_else(|| "start".into(), |i| format!("start, {}", i + 1));
-        self.label(canvas, labels, [x + 4.0, y - 20.0], &name);
-    }
-
-    /// Letters that stay in the view, on a ground of their own, unless others are there.
-    fn label(&self, canvas: &mut Canvas, labels: &mut Labels, [x, y]: [f64; 2], text: &str) {
-        let Area { left, top, width, height } = self.area;
-        let long = Canvas::text_width(SMALL, text);
-        let place = |x: f64, least: usize, most: usize| whole(x.max(0.0)).clamp(least, most.max(least));
-        let x = place(x, left, (left + width).saturating_sub(long + SMALL));
-        let y = place(y, top, (top + height).saturating_sub(9 * SMALL));
-        let ground = Area {
-            left: x.saturating_sub(SMALL),
-            top: y.saturating_sub(SMALL),
-            width: long + SMALL,
-            height: 9 * SMALL,
-        };
-        if labels.has_room(ground) {
-            canvas.fill(ground, GROUND);
-            canvas.text([x, y], SMALL, AIM, text);
-        }
-    }
-
-    /// What pixels are to an avatar that stands where the way on this storey comes nearest to them.
-    fn ground(&self, canvas: &mut Canvas, heights: [f64; 2]) {
-        let here: Vec<[f64; 3]> =
-            self.track.places.iter().copied().filter(|p| is_within(p[2], heights)).collect();
-        let here: Vec<[f64; 3]> = here.iter().copied().step_by(here.len().div_ceil(SAMPLE).max(1)).collect();
-        let grid = self.map.grid();
-        let [low, high] = self.window;
-        let ranges = [0, 1].map(|k| grid.range(k, [low[k], high[k]]));
-        let [Some(columns), Some(rows)] = ranges else { return };
-        // Of pixels finer than can be seen one speaks for its neighbours.
-        let stride = whole((1.0 / (self.scale * grid.pixel)).max(1.0));
-        let reach = u32::try_from(stride).unwrap_or(u32::MAX);
-        for row in rows.step_by(stride) {
-            for column in columns.clone().step_by(stride) {
-                let middle = grid.middle(column, row);
-                let away = |p: &[f64; 3]| (p[0] - middle[0]).powi(2) + (p[1] - middle[1]).powi(2);
-                let nearest = here.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
-                let Some(colour) = nearest.and_then(|p| self.kind([column, row], p[2])) else { continue };
-                // Walls between pixels reckoned alike from both sides, so that no gap is left.
-                let wall = |k: usize, i: u32| grid.origin[k] + f64::from(i) * grid.pixel;
-                let [x0, y0] = self.at([wall(0, column), wall(1, row.saturating_add(reach))]);
-                let [x1, y1] = self.at([wall(0, column.saturating_add(reach)), wall(1, row)]);
-                let inside = |x: f64, from: usize, size: usize| whole(x.max(0.0)).clamp(from, from + size);
-                let [left, right] = [x0, x1].map(|x| inside(x, self.area.left, self.area.width));
-                let [top, bottom] = [y0, y1].map(|y| inside(y, self.area.top, self.area.height));
-                // Where several pixels share a fine one, the last is seen.
-                let (width, height) = ((right - left).max(1), (bottom - top).max(1));
-                canvas.fill(Area { left, top, width, height }, colour);
-            }
-        }
-    }
-
-    /// What a column is to feet at this height.
-    fn kind(&self, [column, row]: [u32; 2], feet: f64) -> Option<Colour> {
-        let grid = self.map.grid();
-        let AvatarOptions { height, climb, .. } = *self.avatar.options();
-        let mut kind = None;
-        for s in grid.range(2, [feet - climb, feet + height])? {
-            let found = self.map.slice(s).ok().and_then(|slice| slice.pixel(column, row));
-            let Some(found) = found else { continue };
-            let [bottom, top] = [found.bottom, found.top].map(|level| grid.height(s, level));
-            if top > feet + climb && bottom < feet + height {
-                return Some(IN_THE_WAY);
-            }
-            if top >= feet - climb && bottom < feet + height {
-                kind = Some(if found.is_obstacle { STEP } else { FLOOR });
-            }
-        }
-        kind
-    }
-}
-
 /// Height over distance.
-fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track) {
+fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track, avatar: &AvatarOptions) {
     let margin = 64 * FINE;
     let area = Area {
         left: outer.left + margin,
@@ -307,11 +136,13 @@ fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track) {
     };
     canvas.text([outer.left, outer.top + 4 * FINE], LETTER, INK, "height over the way");
     canvas.fill(area, EMPTY);
-    let length = track.distances.last().copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
+    // A walk of no length, or of a step, is shown as a short one.
+    let length = track.distances.last().copied().unwrap_or(0.0).max(avatar.base[0].max(avatar.base[1]));
     let ends = track.places.iter().map(|p| p[2]);
-    let [low, high] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], z| [l.min(z), h.max(z)]);
-    // A level way is shown as one.
-    let rise = (high - low).max(0.02 * length);
+    let [least, most] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], z| [l.min(z), h.max(z)]);
+    // The unevenness of a level way is not spread over the whole height.
+    let rise = (most - least).max(0.02 * length).max(avatar.height);
+    let low = least - 0.5 * (rise - (most - least));
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let [left, top, w, h] = [area.left, area.top, area.width, area.height].map(|n| n as f64);
     let across = |way: f64| left + 0.01 * w + 0.98 * w * way / length;
@@ -340,9 +171,15 @@ fn heights_over_way(canvas: &mut Canvas, outer: Area, track: &Track) {
             canvas.text([left, top], SMALL, AIM, &name);
         }
     }
+    let at = |i: usize| [across(track.distances[i]), up(track.places[i][2])];
     for i in 1..track.places.len() {
-        let at = |i: usize| [across(track.distances[i]), up(track.places[i][2])];
         canvas.line(area, [at(i - 1), at(i)], 4.0, WAY);
+    }
+    if track.places.len() == 1 {
+        canvas.line(area, [at(0), at(0)], 10.0, WAY);
+    }
+    for &(place, way) in &track.stops {
+        cross(canvas, area, [across(way), up(place[2])]);
     }
 }
 
@@ -360,7 +197,7 @@ fn ticks([low, high]: [f64; 2], most: f64) -> impl Iterator<Item = f64> {
 }
 
 /// What colours mean.
-fn entries(several: bool) -> Vec<(Colour, &'static str)> {
+fn entries(several: bool, stopped: bool) -> Vec<(Colour, &'static str)> {
     let mut entries = vec![
         (FLOOR, "floor"),
         (STEP, "steep, but low enough to climb"),
@@ -372,42 +209,10 @@ fn entries(several: bool) -> Vec<(Colour, &'static str)> {
     if several {
         entries.insert(5, (ELSEWHERE, "the walk, on another storey"));
     }
+    if stopped {
+        entries.push((STOP, "stopped here"));
+    }
     entries
-}
-
-/// Width of an entry of the legend.
-fn entry_width(text: &str) -> usize {
-    40 * FINE + Canvas::text_width(SMALL, text)
-}
-
-/// How many lines the legend takes.
-fn rows(entries: &[(Colour, &str)], full: usize) -> usize {
-    let mut left = GAP;
-    let mut rows = 1;
-    for (_, text) in entries {
-        if left > GAP && left + entry_width(text) > full {
-            (left, rows) = (GAP, rows + 1);
-        }
-        left += entry_width(text);
-    }
-    rows
-}
-
-fn draw_legend(canvas: &mut Canvas, entries: &[(Colour, &str)], [top, full]: [usize; 2]) {
-    let (mut left, mut top) = (GAP, top);
-    for (colour, text) in entries {
-        if left > GAP && left + entry_width(text) > full {
-            (left, top) = (GAP, top + LINE);
-        }
-        canvas.fill(Area { left, top, width: 14 * FINE, height: 12 * FINE }, *colour);
-        canvas.text([left + 20 * FINE, top + FINE], SMALL, INK, text);
-        left += entry_width(text);
-    }
-}
-
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels, not negative")]
-fn whole(x: f64) -> usize {
-    x.round() as usize
 }
 
 #[cfg(test)]
@@ -427,6 +232,20 @@ mod tests {
         track
     }
 
+    /// A floor with a wall at the end, and a step of 0.2 across the middle.
+    fn room() -> SliceMap {
+        let row = |x: f64| (0..80_u8).map(move |i| [x, 0.05 * f64::from(i)]);
+        let ground = (0..80_u8).flat_map(|i| row(0.05 * f64::from(i))).map(|[x, y]| [x, y, 0.0]);
+        let wall = row(3.9).flat_map(|[x, y]| (0..50_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
+        let step = row(2.0).flat_map(|[x, y]| (0..5_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
+        let points: Vec<[f64; 3]> = ground.chain(wall).chain(step).collect();
+        let options = SliceOptions::default().with_pixel(Pixel::Side(0.05));
+        let plan = SlicePlan::new(&options, &Aabb::of(points.iter().copied())).unwrap();
+        let mut builder = SliceBuilder::new(&plan).unwrap();
+        builder.add(&points);
+        builder.finish()
+    }
+
     #[test]
     fn ticks_are_round_and_within() {
         let of = |low, high| ticks([low, high], 5.0).map(short).collect::<Vec<_>>();
@@ -437,7 +256,7 @@ mod tests {
 
     #[test]
     fn storeys_are_told_apart_where_a_walk_comes_over_itself() {
-        let of = |places: &[[f64; 3]]| storeys(&track(places, &[], &GRID), &AvatarOptions::default());
+        let of = |places: &[[f64; 3]]| storeys(&track(places, &[], &GRID), &AvatarOptions::default(), &[]);
         assert_eq!(of(&[[0.0, 0.0, 1.0], [9.0, 0.0, 7.0]]), [[1.0, 7.0]], "beside each other");
         let over = of(&[[0.0, 0.0, 0.0], [5.0, 0.0, 3.0], [0.1, 0.0, 6.0]]);
         assert_eq!(over, [[0.0, 3.0], [3.0, 6.0]]);
@@ -446,29 +265,70 @@ mod tests {
     }
 
     #[test]
-    fn views_lie_in_a_shape_that_fits_a_page() {
-        assert_eq!(columns(1, [100, 100]), 1);
-        assert_eq!(columns(4, [100, 100]), 2);
-        assert_eq!(columns(3, [100, 300]), 3);
-        assert_eq!(columns(2, [300, 100]), 1);
+    fn storeys_of_the_map_divide_a_walk_that_was_on_them() {
+        let over = track(&[[0.0, 0.0, 0.0], [5.0, 0.0, 3.0], [0.1, 0.0, 6.0]], &[], &GRID);
+        let floor = |height: f64, heights: [f64; 2]| {
+            let mut storeys = room().storeys(&Avatar::new(&AvatarOptions::default()).unwrap()).unwrap();
+            let mut storey = storeys.remove(0);
+            (storey.height, storey.heights) = (height, heights);
+            storey
+        };
+        let floors = [floor(0.0, [f64::NEG_INFINITY, 5.0]), floor(5.4, [5.0, f64::INFINITY])];
+        let of = |floors: &[Storey]| storeys(&over, &AvatarOptions::default(), floors);
+        assert_eq!(of(&floors), [[0.0, 5.0], [5.0, 6.0]]);
+        assert_eq!(of(&floors[..1]), [[0.0, 3.0], [3.0, 6.0]], "on one floor alone");
+    }
+
+    #[test]
+    fn stops_and_points_out_of_the_way_are_in_the_picture() {
+        let map = room();
+        let avatar = Avatar::new(&AvatarOptions::default()).unwrap();
+        let shown = |places: &[[f64; 3]], points: &[[f64; 2]], stops: bool| {
+            let mut track = track(places, points, map.grid());
+            if stops {
+                track.stop(places[places.len() - 1], 1.0);
+            }
+            paint(&map, &track, &avatar, &[])
+        };
+        let count = |picture: &Picture, colour: Colour| {
+            picture.pixels().chunks(3).filter(|pixel| *pixel == colour).count()
+        };
+        let way: Vec<[f64; 3]> = (0..20_u8).map(|i| [0.5 + 0.05 * f64::from(i), 2.0, 0.0]).collect();
+        // Legends hold a patch of either colour.
+        let plain = shown(&way, &[], false);
+        let stopped = shown(&way, &[], true);
+        assert_eq!(count(&plain, STOP), 0);
+        assert!(count(&stopped, STOP) > 14 * 12 + 20, "{} pixels of crosses", count(&stopped, STOP));
+        // Of the view of a far point to the right or left, that half of the picture, without the legend, holds
+        // the ring alone: the way is a few pixels at the other end.
+        for (far, is_right) in [([30.0, 2.0], true), ([-30.0, 2.0], false)] {
+            let picture = shown(&way, &[far], false);
+            let (width, height) = picture.size();
+            let rows = picture.pixels().chunks(3 * width).take(height / 3);
+            let half = |row: &[u8]| {
+                let row =
+                    if is_right { row[3 * (width / 2)..].to_vec() } else { row[..3 * (width / 2)].to_vec() };
+                row.chunks(3).filter(|pixel| *pixel == AIM).count()
+            };
+            let ring: usize = rows.map(half).sum();
+            assert!(ring > 10, "{far:?}: {ring} pixels of its ring");
+        }
+        // An empty walk, and a level one whose unevenness stays small.
+        let empty = shown(&way[..1], &[], false);
+        let legend = 14 * 12;
+        assert!((legend + 2..legend + 40).contains(&count(&empty, WAY)), "{}", count(&empty, WAY));
+        let uneven: Vec<[f64; 3]> =
+            way.iter().zip(0_u8..).map(|(p, i)| [p[0], p[1], 0.01 * f64::from(i % 2)]).collect();
+        let [flat, uneven] = [&way, &uneven].map(|way| count(&shown(way, &[], false), WAY));
+        assert!(uneven < flat + flat / 2, "{uneven} pixels of an uneven way, {flat} of a level one");
     }
 
     #[test]
     fn a_picture_shows_floor_walls_and_the_way() {
-        let row = |x: f64| (0..80_u8).map(move |i| [x, 0.05 * f64::from(i)]);
-        let ground = (0..80_u8).flat_map(|i| row(0.05 * f64::from(i))).map(|[x, y]| [x, y, 0.0]);
-        // A wall at the end, and a step of 0.2 across the middle.
-        let wall = row(3.9).flat_map(|[x, y]| (0..50_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
-        let step = row(2.0).flat_map(|[x, y]| (0..5_u8).map(move |i| [x, y, 0.05 * f64::from(i)]));
-        let points: Vec<[f64; 3]> = ground.chain(wall).chain(step).collect();
-        let options = SliceOptions::default().with_pixel(Pixel::Side(0.05));
-        let plan = SlicePlan::new(&options, &Aabb::of(points.iter().copied())).unwrap();
-        let mut builder = SliceBuilder::new(&plan).unwrap();
-        builder.add(&points);
+        let map = room();
         let places: Vec<[f64; 3]> = (0..20_u8).map(|i| [0.5 + 0.05 * f64::from(i), 2.0, 0.0]).collect();
-        let map = builder.finish();
         let track = track(&places, &[[1.45, 2.0]], map.grid());
-        let picture = paint(&map, &track, &Avatar::new(&AvatarOptions::default()).unwrap());
+        let picture = paint(&map, &track, &Avatar::new(&AvatarOptions::default()).unwrap(), &[]);
         let share = |colour: Colour| {
             let all = picture.pixels().chunks(3);
             #[expect(clippy::cast_precision_loss, reason = "pixels")]

@@ -18,6 +18,7 @@ mod making_poses;
 mod on_disk;
 mod paths;
 mod prepare;
+mod routing;
 mod running;
 mod slicing;
 mod touching;

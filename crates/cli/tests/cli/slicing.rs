@@ -61,9 +61,24 @@ fn a_map_is_built_inspected_and_exported() {
     }
     let mut told = place.ok(&["slices", "inspect", "house", "--verify", "--json"]).json().remove(0);
     told["seconds"] = built["seconds"].clone();
-    assert_eq!(told, built);
+    let detail = ["bounds", "up", "floors"].map(|field| told.as_object_mut().unwrap().remove(field).unwrap());
+    assert_eq!(told, built, "but for what inspect alone tells");
+    let [bounds, up, floors] = detail;
+    let (low, high) = (numbers(&bounds[0]), numbers(&bounds[1]));
+    for (k, end) in [16.0, 12.0].into_iter().enumerate() {
+        assert!(low[k] > -0.15 && low[k] < 0.01 && high[k] > end - 0.01 && high[k] < end + 0.15, "{bounds}");
+    }
+    assert_eq!(up, "z");
+    let heights: Vec<f64> =
+        floors.as_array().unwrap().iter().map(|floor| floor["height"].as_f64().unwrap()).collect();
+    assert!(heights.len() == 2 && heights[0].abs() < 0.03 && (heights[1] - STOREY).abs() < 0.03, "{floors}");
+    assert!(floors.as_array().unwrap().iter().all(|floor| floor["area"].as_f64() > Some(40.0)), "{floors}");
     let people = place.ok(&["slices", "inspect", "house"]).results;
     assert!(people.contains("321 × 241 pixels") && people.contains("up is z"), "{people}");
+    assert!(
+        people.contains("\nbounds     from (-0.0") && people.matches("\nfloor      at z = ").count() == 2,
+        "{people}"
+    );
 
     place.ok(&["slices", "export", "house", "-o", "images", "--quiet"]);
     let slices = usize::try_from(built["slices"].as_u64().unwrap()).unwrap();
@@ -270,16 +285,13 @@ fn an_avatar_walks_up_the_stairs_and_leaves_a_trace() {
 }
 
 #[test]
-fn walks_without_steps_and_off_the_map_are_told_as_they_were() {
+fn walks_without_steps_are_told_as_they_were() {
     let place = with_house();
     for (route, words) in [
         ("[3,6,0.2],\"points\":[]", "Arrived at (3, 6, 0.0"),
         ("[3,6,0.2],\"points\":[[3,6]]", "Arrived at (3, 6, 0.0"),
-        ("[3,6,1.2],\"points\":[]", "Arrived at (3, 6, 0.0"),
-        ("[1e300,1e300,0],\"points\":[]", "Fell below the map at "),
-        ("[90,6,0],\"points\":[]", "Fell below the map at (90, 6, -0"),
-        ("[90,6,0],\"points\":[[3,6]]", "after 0, on the way to point 1."),
-        ("[3,6,-1e300],\"points\":[[3,6]]", "Fell below the map at (3, 6, -1"),
+        ("[3,6,0.2],\"points\":[[3,90]]", "Stopped at (3, "),
+        ("[10,6.5,3.3],\"points\":[[10,4.5]]", "Arrived at (10, 4.5, "),
     ] {
         place.write("route.json", format!("{{\"start\":{route}}}"));
         let told = place.ok(&["slices", "walk", "house", "--route", "route.json", "--image", "w.png"]);
@@ -321,6 +333,9 @@ fn what_does_not_serve_is_refused_by_name() {
     place.write("nan.json", "{\"start\":[1,1,1e999],\"points\":[]}");
     place.write("blocked.json", "{\"start\":[9,6.5,0.1],\"points\":[[1,1]]}");
     place.write("route.json", "{\"start\":[3,6,0.1],\"points\":[[4,6]]}");
+    place.write("air.json", "{\"start\":[3,6,1.2],\"points\":[]}");
+    place.write("off.json", "{\"start\":[90,6,0],\"points\":[[3,6]]}");
+    place.write("deep.json", "{\"start\":[3,6,-1e9],\"points\":[[3,6]]}");
     place.write("far.json", "{\"start\":[3,6,0.1],\"points\":[[4,6],[1e300,6]]}");
     place.write("from-far.json", "{\"start\":[1e300,6,0.1],\"points\":[[4,6]]}");
     let build =
@@ -371,7 +386,11 @@ fn what_does_not_serve_is_refused_by_name() {
             &["line 1", "tilts"],
         ),
         (1, walk(&["nan.json"]), &["nan.json"]),
-        (1, walk(&["blocked.json", "--cache", "40"]), &["blocked.json", "inside an obstacle"]),
+        (
+            1,
+            walk(&["blocked.json", "--cache", "40"]),
+            &["blocked.json", "start [9, 6.5, 0.1] is inside an obstacle; nearest place to stand: ["],
+        ),
         (2, walk(&["route.json", "--avatar", "1,1"]), &["three lengths"]),
         (2, walk(&["route.json", "--climb", "5"]), &["cannot climb"]),
         (2, walk(&["route.json", "--climb", "1e300"]), &["cannot climb"]),
@@ -380,6 +399,17 @@ fn what_does_not_serve_is_refused_by_name() {
         (2, walk(&["route.json", "--image", "w.jpg"]), &["PNG"]),
         (2, walk(&["route.json", "--image", "./w.png", "--trace", "w.png"]), &["same file"]),
         (2, walk(&["route.json", "--image", "w.png", "--trace", "house/../w.png"]), &["same file"]),
+        (
+            1,
+            walk(&["air.json"]),
+            &["air.json", "start [3, 6, 1.2] is in the air; nearest place to stand: [3, 6, 0.0", " away"],
+        ),
+        (
+            1,
+            walk(&["off.json"]),
+            &["off.json", "start [90, 6, 0] is outside the map; nearest place to stand: [16"],
+        ),
+        (1, walk(&["deep.json"]), &["deep.json", "is outside the map; nearest place to stand: ["]),
         (1, walk(&["far.json"]), &["far.json", "point 2", "off the map"]),
         (1, walk(&["from-far.json"]), &["from-far.json", "point 0", "off the map"]),
         (1, vec!["sample", "house.xyz", "-o", "s.ply", "--points", "9"], &["house.xyz", "faces"]),

@@ -1,0 +1,183 @@
+//! `slices route`: a short walkable route between two places.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use nearmiss::slices::{Avatar, Back, FoundRoute, Grid, Reach, Route, RouteError, SliceMap, WalkError};
+use serde::Serialize;
+
+use super::avatar_args::{AvatarArgs, Spot, check_outputs, load, parse_spot};
+use super::reach_picture::{Marks, paint};
+use super::refusal::{no_route, refused};
+use super::track::Track;
+use super::walk_picture;
+use crate::console::{Console, Results, now};
+use crate::digits::{count, place, short};
+use crate::error::CliError;
+use crate::output;
+
+/// Options of `slices route`.
+#[derive(Debug, Clone, Args)]
+pub struct RouteArgs {
+    /// Folder of the map
+    pub folder: PathBuf,
+    /// The feet at the start, within a climb of something that carries the avatar
+    #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
+    pub from: Spot,
+    /// The feet at the goal, alike; the avatar ends within a climb of that height
+    #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
+    pub to: Spot,
+    /// The avatar
+    #[command(flatten)]
+    pub avatar: AvatarArgs,
+    /// Let the avatar fall on the way
+    #[arg(long)]
+    pub falls: bool,
+    /// The route, for `slices walk --route` with the same avatar, climb and step
+    #[arg(short, long, value_name = "ROUTE.json")]
+    pub output: Option<PathBuf>,
+    /// Picture, as PNG: the walk along the route; if there is none, the places within reach
+    #[arg(long, value_name = "OUT.png")]
+    pub image: Option<PathBuf>,
+    /// One object of JSON instead of a sentence
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What is told.
+#[derive(Debug, Default, Serialize)]
+struct RouteReport<'a> {
+    found: bool,
+    route: Option<&'a Route>,
+    /// Along the ground.
+    length: Option<f64>,
+    /// Of the shortest way over the lattice.
+    lattice_length: Option<f64>,
+    /// Where the feet end.
+    end: Option<[f64; 3]>,
+    /// If there is none, the place within reach that is nearest to the goal, and how far it is from it.
+    nearest: Option<[f64; 3]>,
+    away: Option<f64>,
+    seconds: f64,
+}
+
+pub(super) fn run(args: &RouteArgs) -> Result<(), CliError> {
+    let begin = now();
+    let outputs = [("--output", args.output.as_deref()), ("--image", args.image.as_deref())];
+    check_outputs(&args.folder, &outputs, args.image.as_deref())?;
+    let (folder, map) = load(&args.folder, args.quiet)?;
+    let grid = folder.grid();
+    let avatar = args.avatar.avatar(grid)?;
+    let bar = Console::new(args.quiet).spinner("looking for a route");
+    let found = Route::find(&map, &avatar, [args.from.0, args.to.0], args.falls);
+    drop(bar);
+    let seconds = begin.elapsed().as_secs_f64();
+    match found {
+        Ok(found) => {
+            if let Some(path) = &args.output {
+                write(path, &found.route)?;
+            }
+            if let Some(path) = &args.image {
+                paint_walk(args, &map, &avatar, &found.route, path)?;
+            }
+            tell(args, grid, &found, seconds)
+        }
+        Err(cause) => {
+            if let RouteError::NoRoute { nearest, away, .. } = cause {
+                if let Some(path) = &args.image {
+                    paint_reach(args, &map, &avatar, nearest, path)?;
+                }
+                if args.json {
+                    let (nearest, away) = (Some(nearest), Some(away));
+                    let mut results = Results::new();
+                    results.json(&RouteReport { nearest, away, seconds, ..RouteReport::default() })?;
+                    results.flush()?;
+                }
+            }
+            Err(no_route(&args.folder, grid, &cause))
+        }
+    }
+}
+
+fn write(path: &Path, route: &Route) -> Result<(), CliError> {
+    output::replace_plain(path, |out| {
+        serde_json::to_writer(&mut *out, route)?;
+        std::io::Write::write_all(out, b"\n")
+    })
+}
+
+fn tell(args: &RouteArgs, grid: &Grid, found: &FoundRoute, seconds: f64) -> Result<(), CliError> {
+    let mut results = Results::new();
+    if args.json {
+        results.json(&RouteReport {
+            found: true,
+            route: Some(&found.route),
+            length: Some(found.length),
+            lattice_length: Some(found.lattice_length),
+            end: Some(found.end),
+            seconds,
+            ..RouteReport::default()
+        })?;
+    } else {
+        results.line(format_args!(
+            "A route of {} over {} to {}; the shortest way over the lattice is {}. {} were looked at in {seconds:.2} s.",
+            short(found.length),
+            count(found.route.points.len() as u64, "point"),
+            place(found.end, grid.pixel),
+            short(found.lattice_length),
+            count(found.visited as u64, "place"),
+        ))?;
+    }
+    results.flush()
+}
+
+/// The picture of the walk along the route.
+fn paint_walk(
+    args: &RouteArgs,
+    map: &SliceMap,
+    avatar: &Avatar,
+    route: &Route,
+    path: &Path,
+) -> Result<(), CliError> {
+    let failed = |cause: WalkError| refused(&args.folder, &cause);
+    let (grid, mut building) = (map.grid(), map);
+    let walker = route.stand(&mut building, avatar).map_err(failed)?;
+    let mut before = grid.up.to_map(walker.position(grid));
+    let (mut track, mut distance) = (Track::new(route, grid, before), 0.0);
+    let walked = route.follow(&mut building, walker, &Back, |_, step| {
+        let now = grid.up.to_map(step.position);
+        distance += (now[0] - before[0]).hypot(now[1] - before[1]);
+        track.add(now, distance);
+        if step.blocked {
+            track.stop(now, distance);
+        }
+        before = now;
+        Ok::<(), WalkError>(())
+    });
+    walked.map_err(failed)?;
+    track.end(before, distance);
+    let storeys = map.storeys(avatar).map_err(|cause| failed(cause.into()))?;
+    walk_picture::paint(map, &track, avatar, &storeys).save(path)
+}
+
+/// The picture of what is within reach, where there is no route.
+fn paint_reach(
+    args: &RouteArgs,
+    map: &SliceMap,
+    avatar: &Avatar,
+    nearest: [f64; 3],
+    path: &Path,
+) -> Result<(), CliError> {
+    let failed = |cause: WalkError| refused(&args.folder, &cause);
+    let start = avatar
+        .placed(map, args.from.0)
+        .map_err(|cause| super::refusal::misplaced(&args.folder, "start", map.grid(), &cause))?;
+    let reach = Reach::new(map, &start, args.falls).map_err(failed)?;
+    let storeys = map.storeys(avatar).map_err(|cause| failed(cause.into()))?;
+    let others = [(args.to.0, "goal"), (nearest, "nearest")];
+    let marks = Marks { start: start.position(map.grid()), others: &others };
+    paint(map, avatar, &storeys, &reach, &marks).save(path)
+}

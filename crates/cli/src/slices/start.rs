@@ -1,0 +1,74 @@
+//! `slices start`: a place where an avatar can stand.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nearmiss::slices::{Standing, storey_of};
+use serde::Serialize;
+
+use super::avatar_args::{AvatarArgs, Spot, load, parse_spot};
+use super::refusal::{refused, told_place};
+use crate::console::{Console, Results};
+use crate::digits::short;
+use crate::error::CliError;
+
+/// Options of `slices start`.
+#[derive(Debug, Clone, Args)]
+pub struct StartArgs {
+    /// Folder of the map
+    pub folder: PathBuf,
+    /// The nearest place to here is wanted; by default one in the middle of the largest part of the lowest
+    /// floor that hangs together
+    #[arg(long, value_name = "x,y,z", allow_hyphen_values = true, value_parser = parse_spot)]
+    pub near: Option<Spot>,
+    /// The avatar
+    #[command(flatten)]
+    pub avatar: AvatarArgs,
+    /// One object of JSON instead of a sentence
+    #[arg(long)]
+    pub json: bool,
+    /// No progress on the terminal
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What is told.
+#[derive(Debug, Serialize)]
+struct StartReport {
+    position: [f64; 3],
+    /// From the place that was named.
+    distance: Option<f64>,
+    /// The storey, counted from 0, the lowest.
+    floor: Option<usize>,
+}
+
+pub(super) fn run(args: &StartArgs) -> Result<(), CliError> {
+    let (folder, map) = load(&args.folder, args.quiet)?;
+    let grid = folder.grid();
+    let avatar = args.avatar.avatar(grid)?;
+    let failed = |cause| refused(&args.folder, &cause);
+    let bar = Console::new(args.quiet).spinner("looking for a place to stand");
+    let storeys = map.storeys(&avatar).map_err(|cause| failed(cause.into()))?;
+    let found = match args.near {
+        Some(Spot(near)) => avatar.nearest_standing(&map, near),
+        None => avatar.roomy_start(&map, &storeys),
+    };
+    drop(bar);
+    let Some(Standing { position, distance }) = found.map_err(failed)? else {
+        let what = "this avatar can stand nowhere on the map; give a smaller one".to_owned();
+        return Err(CliError::Unfit { path: args.folder.clone(), what });
+    };
+    let floor = storey_of(&storeys, grid.up.to_map(position)[2]);
+    let mut results = Results::new();
+    if args.json {
+        let distance = args.near.map(|_| distance);
+        results.json(&StartReport { position, distance, floor })?;
+    } else {
+        let place = told_place(position, grid);
+        results.line(match args.near {
+            Some(_) => format!("Nearest place to stand: {place}, {} away.", short(distance)),
+            None => format!("A place to start: {place}."),
+        })?;
+    }
+    results.flush()
+}
