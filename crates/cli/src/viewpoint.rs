@@ -13,15 +13,30 @@ use crate::canvas::{Area, Camera};
 /// Options of pictures of scans: which way is up, and from where they are seen.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct ViewArgs {
-    /// The axis that points up in the picture: x, y, z, -x, -y or -z. By default z where the larger
-    /// scan has level floors and is not highest along z, as rooms and buildings are; otherwise the
-    /// longest extent lies level
-    #[arg(long, value_name = "AXIS", allow_hyphen_values = true, requires = "image")]
+    /// Axis that points up in the picture: x, y, z, -x, -y or -z
+    ///
+    /// By default z where the larger scan has level floors and is not highest along z, as rooms,
+    /// buildings and streets are; otherwise the longest extent lies level.
+    #[arg(
+        long,
+        value_name = "AXIS",
+        allow_hyphen_values = true,
+        requires = "image",
+        help_heading = "Output"
+    )]
     pub up: Option<Up>,
-    /// The direction from which the picture is taken, in degrees. Azimuth 0, 90 looks from +x, +y
-    /// with --up z, from +z, +x with --up y, from +y, +z with --up x; elevation 90 looks from
-    /// above. --up defaults to z with it
-    #[arg(long, value_name = "AZIMUTH,ELEVATION", allow_hyphen_values = true, requires = "image")]
+    /// Direction from which the picture is taken, in degrees
+    ///
+    /// The azimuth is counted anticlockwise as seen from above. With --up z, the default here, 0
+    /// looks from +x and 90 from +y; with --up y from +z and +x; with --up x from +y and +z.
+    /// Elevation 0 looks from the side, 90 from above.
+    #[arg(
+        long,
+        value_name = "AZIMUTH,ELEVATION",
+        allow_hyphen_values = true,
+        requires = "image",
+        help_heading = "Output"
+    )]
     pub view: Option<Angles>,
 }
 
