@@ -9,8 +9,9 @@ use crate::console::Bar;
 use crate::image::Picture;
 use crate::picture::{
     GROUND, HALO, LARGEST, OF_A, OF_B, PANEL_GROUND, directions, dot, obstacle, scale_bar, splat,
-    stored_index, whole_camera,
+    stored_index,
 };
+use crate::viewpoint::whole_camera;
 
 /// Sizes in fine pixels.
 const OVERVIEW: [usize; 2] = [1120 * FINE, 700 * FINE];
