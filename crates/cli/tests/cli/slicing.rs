@@ -331,7 +331,6 @@ fn what_does_not_serve_is_refused_by_name() {
     place.write("inside.jsonl", "{\"min\":[0,0,9],\"max\":[1,1,1]}\n");
     place.write("tilted.jsonl", "{\"b\":[1,0,0,0, 0,0,-1,0, 0,1,0,0, 0,0,0,1]}\n");
     place.write("nan.json", "{\"start\":[1,1,1e999],\"points\":[]}");
-    place.write("blocked.json", "{\"start\":[9,6.5,0.1],\"points\":[[1,1]]}");
     place.write("route.json", "{\"start\":[3,6,0.1],\"points\":[[4,6]]}");
     place.write("far.json", "{\"start\":[3,6,0.1],\"points\":[[4,6],[1e300,6]]}");
     place.write("from-far.json", "{\"start\":[1e300,6,0.1],\"points\":[[4,6]]}");
@@ -383,11 +382,6 @@ fn what_does_not_serve_is_refused_by_name() {
             &["line 1", "tilts"],
         ),
         (1, walk(&["nan.json"]), &["nan.json"]),
-        (
-            1,
-            walk(&["blocked.json", "--cache", "40"]),
-            &["blocked.json", "start [9, 6.5, 0.1] is inside an obstacle; nearest place to stand: ["],
-        ),
         (2, walk(&["route.json", "--avatar", "1,1"]), &["three lengths"]),
         (2, walk(&["route.json", "--climb", "5"]), &["cannot climb"]),
         (2, walk(&["route.json", "--climb", "1e300"]), &["cannot climb"]),
