@@ -11,13 +11,13 @@ use crate::store::{SliceFolder, StoreError};
 /// A storey.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Storey {
-    /// Median height of its floor, in the map's coordinates ([`Up::coordinate`](crate::Up::coordinate)
-    /// returns the caller's).
+    /// Median height of its floor, in the map's coordinates
+    /// ([`Up::coordinate`](crate::Up::coordinate) returns the caller's).
     pub height: f64,
     /// Area of its floor that has headroom, in square units of the input.
     pub area: f64,
-    /// Heights of feet that belong to it, in the map's coordinates; half open. Those of all storeys cover
-    /// every height: stairs belong to the storey that they leave upwards.
+    /// Heights of feet that belong to it, in the map's coordinates; half open. Those of all storeys
+    /// cover every height: stairs belong to the storey that they leave upwards.
     pub heights: [f64; 2],
 }
 
@@ -30,17 +30,18 @@ const MOST_BINS: f64 = 4_194_304.0;
 /// A storey has at least this share of the area of the largest one.
 const LEAST_SHARE: f64 = 0.1;
 
-/// A level above the lowest is a storey if what rises from it, per slice, covers at least this share of it: on
-/// a roof, or on a ceiling that was scanned from below, nothing does.
+/// A level above the lowest is a storey if what rises from it, per slice, covers at least this
+/// share of it: on a roof, or on a ceiling that was scanned from below, nothing does.
 const LEAST_ABOVE: f64 = 0.001;
 
 impl SliceMap {
     /// Finds the storeys, lowest first, with the headroom that the avatar's height needs.
     ///
-    /// Floor is what is no obstacle and has nothing above it up to the height of the avatar. The height with
-    /// the most floor within one climb is a storey; so is, in turn, the next one that is at least the
-    /// avatar's height away from all others and has a tenth of the area of the largest or more. Levels from
-    /// which nothing rises are roofs, not storeys. Looks at every pixel of every slice once.
+    /// Floor is what is no obstacle and has nothing above it up to the height of the avatar. The
+    /// height with the most floor within one climb is a storey; so is, in turn, the next one that
+    /// is at least the avatar's height away from all others and has a tenth of the area of the
+    /// largest or more. Levels from which nothing rises are roofs, not storeys. Looks at every
+    /// pixel of every slice once.
     ///
     /// # Errors
     /// When a slice is not loaded.
@@ -54,8 +55,8 @@ impl SliceMap {
 }
 
 impl SliceFolder {
-    /// Finds the storeys as [`SliceMap::storeys`] does, with one slice in memory at a time, and 8 bytes a
-    /// pixel.
+    /// Finds the storeys as [`SliceMap::storeys`] does, with one slice in memory at a time, and 8
+    /// bytes a pixel.
     ///
     /// # Errors
     /// Names the file of a slice that cannot be loaded.
@@ -174,8 +175,8 @@ pub fn storey_of(storeys: &[Storey], feet: f64) -> Option<usize> {
     storeys.iter().position(|storey| storey.heights[0] <= feet && feet < storey.heights[1])
 }
 
-/// Returns the middle of the window of `2·half + 1` bins that holds most; `None` if all bins are empty. Of
-/// several the lowest.
+/// Returns the middle of the window of `2·half + 1` bins that holds most; `None` if all bins are
+/// empty. Of several the lowest.
 fn fullest(bins: &[u64], half: usize) -> Option<usize> {
     let mut sum: u64 = bins.iter().take(half).sum();
     let (mut best, mut most) = (None, 0);

@@ -2,15 +2,16 @@
 
 use crate::{Avatar, Grid};
 
-/// A base that is a whole number of pixels long, up to this share of a pixel, counts as that number.
+/// A base that is a whole number of pixels long, up to this share of a pixel, counts as that
+/// number.
 const TOLERANCE: f64 = 0.01;
 
 /// Places at equal distances along both axes across, as far as a base there meets the map.
 ///
-/// A base of side `b` over pixels of side `t` covers `⌊b/t⌋ + 1` or one more of them along an axis, as it
-/// lies. The places are the middles of blocks of the lesser number, so an avatar passes every gap that it can
-/// pass at all, provided that the spacing is a pixel or a whole part of it. They depend on the map and the
-/// avatar alone.
+/// A base of side `b` over pixels of side `t` covers `⌊b/t⌋ + 1` or one more of them along an axis,
+/// as it lies. The places are the middles of blocks of the lesser number, so an avatar passes every
+/// gap that it can pass at all, provided that the spacing is a pixel or a whole part of it. They
+/// depend on the map and the avatar alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
     /// The place of column 0 and row 0, across in the map's coordinates.
@@ -46,7 +47,8 @@ impl Lattice {
         [0, 1].map(|k| self.origin[k] + f64::from(cell[k]) * self.spacing)
     }
 
-    /// Returns the column and the row of the place nearest to `place`, across in the map's coordinates.
+    /// Returns the column and the row of the place nearest to `place`, across in the map's
+    /// coordinates.
     pub(crate) fn nearest(&self, place: [f64; 2]) -> [u32; 2] {
         [0, 1].map(|k| self.clamped(k, ((place[k] - self.origin[k]) / self.spacing).round()))
     }

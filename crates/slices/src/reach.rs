@@ -1,6 +1,8 @@
-//! The reach of an avatar: all places that it can walk to, found by a flood fill over its own steps.
+//! The reach of an avatar: all places that it can walk to, found by a flood fill over its own
+//! steps.
 //!
-//! R. K. dos Anjos, J. M. Pereira, J. F. Oliveira, WSCG 2012 (S4), gives the steps; the fill is plain.
+//! R. K. dos Anjos, J. M. Pereira, J. F. Oliveira, WSCG 2012 (S4), gives the steps; the fill is
+//! plain.
 
 use std::collections::BTreeSet;
 
@@ -37,10 +39,11 @@ pub struct Covered {
 impl Reach {
     /// Finds the reach of a walker that stands somewhere.
     ///
-    /// The places are those of the [`Lattice`] whose spacing is the avatar's step, at the heights at which the
-    /// avatar comes to them. From the start the avatar walks to the corners of its cell, then from each place
-    /// to its eight neighbours, by [`Walker::step`]. With `falls` it also goes where it falls and lands on
-    /// something; without, only where something carries it at every step.
+    /// The places are those of the [`Lattice`] whose spacing is the avatar's step, at the heights
+    /// at which the avatar comes to them. From the start the avatar walks to the corners of its
+    /// cell, then from each place to its eight neighbours, by [`Walker::step`]. With `falls` it
+    /// also goes where it falls and lands on something; without, only where something carries it at
+    /// every step.
     ///
     /// Takes about ten steps of a walker for each place and each footing of it.
     ///
@@ -80,8 +83,8 @@ impl Reach {
         self.places.is_empty()
     }
 
-    /// The columns and rows of the places with the heights of the feet there, in the map's coordinates; by
-    /// rows, then columns, then heights.
+    /// The columns and rows of the places with the heights of the feet there, in the map's
+    /// coordinates; by rows, then columns, then heights.
     #[must_use]
     pub fn cells(&self) -> impl ExactSizeIterator<Item = ([u32; 2], f64)> + '_ {
         self.places.iter().copied()
@@ -123,8 +126,9 @@ impl Reach {
 }
 
 impl Avatar {
-    /// Finds a good place to start: in the largest part of the lowest storey that hangs together, the place
-    /// nearest to its middle. Returns `None` if the avatar can stand nowhere. The distance is 0.
+    /// Finds a good place to start: in the largest part of the lowest storey that hangs together,
+    /// the place nearest to its middle. Returns `None` if the avatar can stand nowhere. The
+    /// distance is 0.
     ///
     /// Takes as long as [`Reach::new`] for all parts together.
     ///

@@ -1,5 +1,5 @@
-//! Shortest walkable routes: A* over a walker's own steps (P. E. Hart, N. J. Nilsson, B. Raphael, "A Formal
-//! Basis for the Heuristic Determination of Minimum Cost Paths", 1968), then shortcuts.
+//! Shortest walkable routes: A* over a walker's own steps (P. E. Hart, N. J. Nilsson, B. Raphael,
+//! "A Formal Basis for the Heuristic Determination of Minimum Cost Paths", 1968), then shortcuts.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -67,21 +67,21 @@ impl From<Unloaded> for RouteError {
 }
 
 impl Route {
-    /// Finds a short route between two places of the caller's coordinates, both within a climb of a place to
-    /// stand.
+    /// Finds a short route between two places of the caller's coordinates, both within a climb of a
+    /// place to stand.
     ///
-    /// The graph is that of [`Reach`](crate::Reach): the places of the [`Lattice`](crate::Lattice) and their
-    /// eight neighbours, start and goal joined to the corners of their cells, and to each other if they share
-    /// one; every edge is walked by the walker itself. A* finds the shortest path, by its length across. It is
-    /// then smoothed where the walker confirms a shortcut, so `length ≤ lattice_length`. With `falls` the
-    /// avatar may fall on its way.
+    /// The graph is that of [`Reach`](crate::Reach): the places of the [`Lattice`](crate::Lattice)
+    /// and their eight neighbours, start and goal joined to the corners of their cells, and to each
+    /// other if they share one; every edge is walked by the walker itself. A* finds the shortest
+    /// path, by its length across. It is then smoothed where the walker confirms a shortcut, so
+    /// `length ≤ lattice_length`. With `falls` the avatar may fall on its way.
     ///
-    /// Looks at no more places than [`Reach::new`](crate::Reach::new), and at all of them if there is no
-    /// route.
+    /// Looks at no more places than [`Reach::new`](crate::Reach::new), and at all of them if there
+    /// is no route.
     ///
     /// # Errors
-    /// When the avatar cannot stand at the start or at the goal, the goal is out of reach, there are more than
-    /// 2^26 places, or a slice is not loaded.
+    /// When the avatar cannot stand at the start or at the goal, the goal is out of reach, there
+    /// are more than 2^26 places, or a slice is not loaded.
     pub fn find(
         map: &SliceMap,
         avatar: &Avatar,
@@ -258,7 +258,8 @@ impl<'a> Search<'a> {
         path
     }
 
-    /// The place within reach that is nearest to the goal, in the map's coordinates, and its distance.
+    /// The place within reach that is nearest to the goal, in the map's coordinates, and its
+    /// distance.
     fn nearest(&self) -> ([f64; 3], f64) {
         let [x, y, z] = self.goal.place();
         let away = |p: [f64; 3]| (p[0] - x).hypot(p[1] - y).hypot(p[2] - z);

@@ -8,12 +8,12 @@ use crate::walk::Walker;
 const MOST_PASSES: usize = 12;
 const LEAST_GAIN: f64 = 1e-3;
 
-/// Replaces parts of a path by straight lines. `path` has the states of a walker at corners, each of which it
-/// walks to straight from the one before; so does the result.
+/// Replaces parts of a path by straight lines. `path` has the states of a walker at corners, each
+/// of which it walks to straight from the one before; so does the result.
 ///
-/// A shortcut is taken if the walker walks it to the very same state, so all that follows stays walkable. Each
-/// pass tries lines from a corner to every step of the path, twice as far each time, then halves; passes end
-/// when they gain little.
+/// A shortcut is taken if the walker walks it to the very same state, so all that follows stays
+/// walkable. Each pass tries lines from a corner to every step of the path, twice as far each time,
+/// then halves; passes end when they gain little.
 pub(crate) fn smoothed(map: &SliceMap, path: Vec<Walker>, falls: bool) -> Result<Vec<Walker>, Unloaded> {
     let mut path = path;
     for _ in 0..MOST_PASSES {
@@ -68,7 +68,8 @@ fn pulled(map: &SliceMap, path: &[Walker], falls: bool) -> Result<Vec<Walker>, U
     Ok(pulled)
 }
 
-/// The states of a walker after every step of a path at which it stands, and which of them are corners.
+/// The states of a walker after every step of a path at which it stands, and which of them are
+/// corners.
 fn trail(map: &SliceMap, path: &[Walker], falls: bool) -> Result<(Vec<Walker>, Vec<usize>), Unloaded> {
     let mut trail: Vec<Walker> = path.first().copied().into_iter().collect();
     let mut corners = Vec::new();

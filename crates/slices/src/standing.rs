@@ -85,12 +85,13 @@ fn told(nearest: Option<&Standing>) -> String {
 }
 
 impl Avatar {
-    /// Puts the avatar's feet at a place of the caller's coordinates, as [`Walker::new`] does, but only where
-    /// something carries it within a climb of that height.
+    /// Puts the avatar's feet at a place of the caller's coordinates, as [`Walker::new`] does, but
+    /// only where something carries it within a climb of that height.
     ///
     /// # Errors
-    /// Names the nearest place where the avatar can stand ([`Avatar::nearest_standing`]) if there is no room,
-    /// nothing to stand on, or no map. Fails if the place is not finite or a slice is not loaded.
+    /// Names the nearest place where the avatar can stand ([`Avatar::nearest_standing`]) if there
+    /// is no room, nothing to stand on, or no map. Fails if the place is not finite or a slice is
+    /// not loaded.
     pub fn placed(&self, map: &SliceMap, place: [f64; 3]) -> Result<Walker, StartError> {
         let cause = match Walker::new(*self, map, place) {
             Ok(walker) if !walker.is_falling() => return Ok(walker),
@@ -112,14 +113,14 @@ impl Avatar {
         Err(StartError::Misplaced { place, cause, nearest: self.nearest_standing(map, place)? })
     }
 
-    /// Finds the place nearest to `near`, in the caller's coordinates, where the avatar can stand; `None` if
-    /// there is none.
+    /// Finds the place nearest to `near`, in the caller's coordinates, where the avatar can stand;
+    /// `None` if there is none.
     ///
-    /// Looked at are all heights of `near` itself and of the places of the [`Lattice`] with the spacing of a
-    /// pixel, for bases beyond 64 pixels of a 32nd of their lesser side in whole pixels, ring by ring, until no
-    /// further ring can be nearer. A place of them is one if a walker that is
-    /// put there stays there ([`Walker::new`]). Takes microseconds for each place that is nearer than the one
-    /// found; seconds for a large map with none.
+    /// Looked at are all heights of `near` itself and of the places of the [`Lattice`] with the
+    /// spacing of a pixel, for bases beyond 64 pixels of a 32nd of their lesser side in whole
+    /// pixels, ring by ring, until no further ring can be nearer. A place of them is one if a
+    /// walker that is put there stays there ([`Walker::new`]). Takes microseconds for each place
+    /// that is nearer than the one found; seconds for a large map with none.
     ///
     /// # Errors
     /// When `near` is not finite, or a slice is not loaded.
@@ -155,8 +156,9 @@ impl Avatar {
         let last = lattice.counts.map(|count| u32::try_from(count - 1).unwrap_or(u32::MAX));
         let rings = (0..2).map(|k| centre[k].max(last[k] - centre[k])).max().unwrap_or(0);
         for ring in 0..=rings {
-            // A place of the ring is so far from the centre, which rounds `near`, or what of it is on the map.
-            // The way from there to `near` outside leads away from all places, so squares add up.
+            // A place of the ring is so far from the centre, which rounds `near`, or what of it is
+            // on the map. The way from there to `near` outside leads away from all places, so
+            // squares add up.
             let inner = (f64::from(ring) - 1.0).max(0.0) * spacing;
             let least = if off > spacing { inner.hypot(off - spacing) } else { inner };
             if best.is_some_and(|(_, found)| least >= found) {
@@ -169,8 +171,8 @@ impl Avatar {
         Ok(best.map(|(place, distance)| Standing { position: grid.up.from_map(place), distance }))
     }
 
-    /// Collects the heights, in the map's coordinates, at which the avatar can stand at a place across, lowest
-    /// first.
+    /// Collects the heights, in the map's coordinates, at which the avatar can stand at a place
+    /// across, lowest first.
     pub(crate) fn standing_heights(
         &self,
         map: &SliceMap,

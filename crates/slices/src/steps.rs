@@ -1,7 +1,8 @@
-//! The graph of a walker's own steps: places of a lattice, joined where an avatar walks from one to the next.
+//! The graph of a walker's own steps: places of a lattice, joined where an avatar walks from one to
+//! the next.
 //!
-//! A node is a state of a [`Walker`]: its place and its footing, on which the next step depends. An edge is
-//! simulated by the walker itself, so each one can be walked.
+//! A node is a state of a [`Walker`]: its place and its footing, on which the next step depends. An
+//! edge is simulated by the walker itself, so each one can be walked.
 
 use crate::lattice::Lattice;
 use crate::map::{SliceMap, Unloaded};
@@ -63,8 +64,8 @@ pub(crate) struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    /// Returns the graph of an avatar in a map, of which nothing is explored yet. With `falls` an edge may
-    /// lead over a fall.
+    /// Returns the graph of an avatar in a map, of which nothing is explored yet. With `falls` an
+    /// edge may lead over a fall.
     pub(crate) fn new(map: &'a SliceMap, avatar: Avatar, falls: bool) -> Result<Self, WalkError> {
         let step = avatar.stride().1;
         let lattice = Lattice::new(map.grid(), &avatar, step);
@@ -135,7 +136,8 @@ impl<'a> Steps<'a> {
         Ok((index, true))
     }
 
-    /// Returns where a walker comes to that walks straight to a place, across in the map's coordinates.
+    /// Returns where a walker comes to that walks straight to a place, across in the map's
+    /// coordinates.
     pub(crate) fn straight(&self, walker: &Walker, to: [f64; 2]) -> Result<Option<Walker>, Unloaded> {
         straight(self.map, walker, to, self.falls, |_| ())
     }
@@ -182,9 +184,9 @@ impl<'a> Steps<'a> {
     }
 }
 
-/// Walks straight to a place, across in the map's coordinates, as [`Route::follow`](crate::Route::follow)
-/// does, and hands out every state on the way. Returns `None` if anything is in the way, if the walker falls
-/// without `falls`, or if it leaves the map.
+/// Walks straight to a place, across in the map's coordinates, as
+/// [`Route::follow`](crate::Route::follow) does, and hands out every state on the way. Returns
+/// `None` if anything is in the way, if the walker falls without `falls`, or if it leaves the map.
 pub(crate) fn straight(
     map: &SliceMap,
     walker: &Walker,

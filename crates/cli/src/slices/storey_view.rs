@@ -1,5 +1,5 @@
-//! A storey from above: what its pixels are to an avatar, with marks and names; and the sheet that storeys are
-//! laid out on.
+//! A storey from above: what its pixels are to an avatar, with marks and names; and the sheet that
+//! storeys are laid out on.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::slices::{Avatar, AvatarOptions, SliceMap};
@@ -9,7 +9,8 @@ use crate::canvas::{Area, Camera, Canvas, Colour, FINE};
 use crate::image::Picture;
 use crate::picture::scale_bar;
 
-/// In fine pixels: the longer side of a view, alone or one of several; margins, letters, lines of text.
+/// In fine pixels: the longer side of a view, alone or one of several; margins, letters, lines of
+/// text.
 const ALONE: f64 = 900.0 * FINE as f64;
 const ONE_OF_MANY: f64 = 560.0 * FINE as f64;
 const LEAST_WIDTH: usize = 560 * FINE;
@@ -40,8 +41,8 @@ const SAMPLE: usize = 150;
 /// What of a map is shown: its least and its greatest corner.
 pub(super) type Window = [[f64; 2]; 2];
 
-/// The window around places, which must not be none: with a margin as far as there is a map, and as far as
-/// they go off it.
+/// The window around places, which must not be none: with a margin as far as there is a map, and as
+/// far as they go off it.
 pub(super) fn window(
     map: &SliceMap,
     avatar: &Avatar,

@@ -19,17 +19,17 @@ const GROUND: Colour = [255, 255, 255];
 const WAY: Colour = [208, 60, 40];
 const ELSEWHERE: Colour = [226, 166, 158];
 
-/// Where there are several, a view holds so many times the avatar's height, unless there would be more than
-/// `MOST_VIEWS`.
+/// Where there are several, a view holds so many times the avatar's height, unless there would be
+/// more than `MOST_VIEWS`.
 const STOREY: f64 = 2.0;
 const MOST_VIEWS: f64 = 9.0;
 
 /// Places of the way that are held against each other.
 const MOST_PLACES: usize = 1500;
 
-/// A view for each storey that the walk was on, lowest first; below them its height over its length. Pixels
-/// are shown as they are to the avatar where it came nearest to them. `floors` are the storeys of the map, as
-/// far as they are known.
+/// A view for each storey that the walk was on, lowest first; below them its height over its
+/// length. Pixels are shown as they are to the avatar where it came nearest to them. `floors` are
+/// the storeys of the map, as far as they are known.
 pub(super) fn paint(map: &SliceMap, track: &Track, avatar: &Avatar, floors: &[Storey]) -> Picture {
     let options = avatar.options();
     let storeys = storeys(track, options, floors);
@@ -86,8 +86,9 @@ fn paint_storey(canvas: &mut Canvas, view: &View<'_>, track: &Track, heights: [f
     }
 }
 
-/// Ranges of height that hold all places, none empty: a single one, unless the walk comes over itself. Then
-/// those of the storeys of the map that it was on, or equal ones if it was on one alone.
+/// Ranges of height that hold all places, none empty: a single one, unless the walk comes over
+/// itself. Then those of the storeys of the map that it was on, or equal ones if it was on one
+/// alone.
 fn storeys(track: &Track, avatar: &AvatarOptions, floors: &[Storey]) -> Vec<[f64; 2]> {
     let heights = || track.places.iter().map(|p| p[2]);
     let low = heights().fold(f64::INFINITY, f64::min);
@@ -299,8 +300,8 @@ mod tests {
         let stopped = shown(&way, &[], true);
         assert_eq!(count(&plain, STOP), 0);
         assert!(count(&stopped, STOP) > 14 * 12 + 20, "{} pixels of crosses", count(&stopped, STOP));
-        // Of the view of a far point to the right or left, that half of the picture, without the legend, holds
-        // the ring alone: the way is a few pixels at the other end.
+        // Of the view of a far point to the right or left, that half of the picture, without the
+        // legend, holds the ring alone: the way is a few pixels at the other end.
         for (far, is_right) in [([30.0, 2.0], true), ([-30.0, 2.0], false)] {
             let picture = shown(&way, &[far], false);
             let (width, height) = picture.size();

@@ -163,3 +163,21 @@ fn where_there_is_no_route_that_is_told() {
         place.refused(status, &args, words);
     }
 }
+
+#[test]
+fn walks_start_where_somebody_stands() {
+    let place = with_house();
+    for (start, words) in [
+        ("[3,6,1.2]", "w.json: start [3, 6, 1.2] is in the air; nearest place to stand: [3, 6, 0.0"),
+        ("[90,6,0]", "w.json: start [90, 6, 0] is outside the map; nearest place to stand: [16"),
+        ("[3,6,-1e9]", "is outside the map; nearest place to stand: ["),
+        ("[9,6.5,0.1]", "w.json: start [9, 6.5, 0.1] is inside an obstacle; nearest place to stand: ["),
+    ] {
+        place.write("w.json", format!("{{\"start\":{start},\"points\":[[3,6]]}}"));
+        place.refused(
+            1,
+            &["slices", "walk", "house", "--route", "w.json", "--cache", "40"],
+            &[words, " away"],
+        );
+    }
+}
