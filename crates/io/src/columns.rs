@@ -1,11 +1,11 @@
-//! Which columns of a table are coordinates, normals and colours; the same words in every format.
+//! Names of columns, the same in every format: coordinates, normals, colours, intensity and class.
 
 use crate::error::Fault;
 
-/// Values of a row that can mean something to us: x y z, normal x y z, red green blue, intensity, class.
+/// The values of a row: x y z, normal x y z, red green blue, intensity, class.
 pub(crate) type Row = [f64; 11];
 
-/// Which of a row's values a column holds, by its name in any case.
+/// Returns the index in a [`Row`] of a column with this name, in any case.
 pub(crate) fn slot(name: &[u8]) -> Option<usize> {
     const NAMES: [&[&str]; 11] = [
         &["x"],
@@ -23,13 +23,13 @@ pub(crate) fn slot(name: &[u8]) -> Option<usize> {
     NAMES.iter().position(|names| names.iter().any(|known| name.eq_ignore_ascii_case(known.as_bytes())))
 }
 
-/// Whether a second column of the same meaning contradicts the first; of intensities and classes files may
-/// hold several.
+/// Returns `true` if a second column for this slot is an error. Files may have several intensities
+/// and classes.
 pub(crate) const fn is_unique(slot: usize) -> bool {
     slot < 9
 }
 
-/// What the rows of a table hold besides coordinates.
+/// The attributes that the rows of a table have besides coordinates.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Holds {
     pub(crate) normals: bool,
@@ -39,12 +39,12 @@ pub(crate) struct Holds {
 }
 
 impl Holds {
-    /// From the slots that the columns fill; coordinates must be among them, normals and colours count in
-    /// threes.
+    /// Finds the attributes from the slots of the columns. Coordinates are required. Normals and
+    /// colours are only attributes if all three components are present.
     pub(crate) fn among(slots: impl Iterator<Item = usize>) -> Result<Self, Fault> {
         let mut filled = [false; 11];
         slots.for_each(|slot| filled[slot] = true);
-        for (there, what) in filled.iter().zip(["a coordinate x", "a coordinate y", "a coordinate z"]) {
+        for (there, what) in filled.iter().zip(["the coordinate x", "the coordinate y", "the coordinate z"]) {
             if !there {
                 return Err(Fault::Undeclared { what });
             }
@@ -69,6 +69,6 @@ mod tests {
         assert_eq!(of("X Y Z intensity nx ny nz Red Green Blue"), Ok(both));
         assert_eq!(of("x y z nx ny red green"), Ok(Holds::default()));
         assert_eq!(of("x y z Classification"), Ok(Holds { classes: true, ..Holds::default() }));
-        assert_eq!(of("x z nx"), Err(Fault::Undeclared { what: "a coordinate y" }));
+        assert_eq!(of("x z nx"), Err(Fault::Undeclared { what: "the coordinate y" }));
     }
 }

@@ -1,7 +1,7 @@
 //! E57 (ASTM E2807): scans of terrestrial scanners, decoded by the crate `e57`.
 //!
-//! Spherical coordinates are made Cartesian and each scan's pose is applied. Points that the file marks as
-//! invalid become points that are not finite, so that places in the file still count.
+//! Spherical coordinates are converted to Cartesian ones, and the pose of each scan is applied.
+//! Points marked as invalid become NaN, so that indices in the file stay valid.
 
 use std::io::Read;
 use std::ops::ControlFlow;
@@ -15,31 +15,32 @@ use crate::error::{Broken, Fault};
 use crate::guard::guarded;
 use crate::input::{Input, Reader, Stop};
 use crate::points::Points;
+use crate::text::counted;
 
 /// Bytes of the header.
 const HEADER: usize = 48;
 
-/// Where in it the length of the XML stands.
+/// Offset in the header of the length of the XML.
 const XML: usize = 32;
 
-/// Where in it the length of a page stands.
+/// Offset in the header of the length of a page.
 const PAGE: usize = 40;
 
-/// The longest page that is believed; the standard says 1024.
+/// Maximum length of a page in bytes. The standard prescribes 1024.
 const LONGEST_PAGE: u64 = 1 << 20;
 
-/// The longest XML that is believed: it is held in memory several times.
+/// Maximum length of the XML in bytes, as the decoder keeps several copies in memory.
 const LONGEST_XML: u64 = 1 << 26;
 
-/// Points that are handed out together, for so many bytes of a block.
+/// Bytes of a block for each point: a block of `n` bytes is read as `n / 32` points.
 const BYTES_A_POINT: usize = 32;
 
-/// How many points there are, as the file says.
+/// Returns the number of points that the file declares.
 pub(crate) fn count(input: Input<'_>) -> Option<u64> {
     Some(open(input).ok()?.pointclouds().iter().map(|cloud| cloud.records).sum())
 }
 
-/// Where the scanner stood for which points, for the scans that have a pose.
+/// Returns the scanner position and the points of each scan that has a pose.
 pub(crate) fn scanners(input: Input<'_>) -> Result<Vec<Scanner>, Stop> {
     let mut first = 0;
     let mut scanners = Vec::new();
@@ -55,7 +56,7 @@ pub(crate) fn scanners(input: Input<'_>) -> Result<Vec<Scanner>, Stop> {
     Ok(scanners)
 }
 
-/// Goes over all points of all scans.
+/// Passes all points of all scans to `take`, in blocks.
 pub(crate) fn each(
     input: Input<'_>,
     block: usize,
@@ -63,7 +64,7 @@ pub(crate) fn each(
 ) -> Result<(), Stop> {
     let mut reader = open(input)?;
     let clouds = reader.pointclouds();
-    // What only some scans have, none keeps.
+    // Attributes are kept only if all scans have them.
     let all = |has: fn(&PointCloud) -> bool| !clouds.is_empty() && clouds.iter().all(has);
     let holds = Holds {
         colours: all(PointCloud::has_color),
@@ -75,7 +76,8 @@ pub(crate) fn each(
     let mut done = 0;
     for cloud in &clouds {
         if !cloud.has_cartesian() && !cloud.has_spherical() {
-            return Err(Fault::Undeclared { what: "coordinates of a scan" }.at_byte(HEADER).into());
+            let what = "Cartesian or spherical coordinates of each scan";
+            return Err(Fault::Undeclared { what }.at_byte(HEADER).into());
         }
         let wrong = |cause: String| damaged(cause).within("point", done);
         let mut simple = reader.pointcloud_simple(cloud).map_err(|cause| wrong(cause.to_string()))?;
@@ -85,9 +87,9 @@ pub(crate) fn each(
         while left > 0 {
             points.clear();
             let many = usize::try_from(left).unwrap_or(usize::MAX).min(together);
-            // Damaged data may lead the decoder out of its tables.
+            // Damaged data may make the decoder panic.
             guarded(|| fill(&mut simple, many, holds, &mut points))
-                .unwrap_or_else(|| Err("the decoder gave up".into()))
+                .unwrap_or_else(|| Err("the decoder panicked".into()))
                 .map_err(|cause| damaged(cause).within("point", done + points.len() as u64))?;
             if take(&points).is_break() {
                 return Ok(());
@@ -103,7 +105,7 @@ fn damaged(cause: String) -> Broken {
     Fault::Decoder { cause: cause.into() }.at_byte(HEADER)
 }
 
-/// The next so many points of a scan.
+/// Reads the next `many` points of a scan.
 fn fill(
     simple: &mut PointCloudReaderSimple<'_, Reader<'_>>,
     many: usize,
@@ -128,7 +130,7 @@ fn fill(
     Ok(())
 }
 
-/// Opens a file after what its header declares was held against its length.
+/// Opens a file after checking the lengths in its header against the length of the file.
 fn open(input: Input<'_>) -> Result<E57Reader<Reader<'_>>, Stop> {
     let length = input.length()?;
     let mut header = Vec::new();
@@ -139,8 +141,8 @@ fn open(input: Input<'_>) -> Result<E57Reader<Reader<'_>>, Stop> {
         return Err(Fault::PastEnd.at_byte(header.len()).into());
     };
     for (found, most, at, expected) in [
-        (xml, length.min(LONGEST_XML), XML, "XML that fits into the file, of 64 MiB at most"),
-        (page, LONGEST_PAGE, PAGE, "pages of 1 MiB at most"),
+        (xml, length.min(LONGEST_XML), XML, "XML within the file, of at most 64 MiB"),
+        (page, LONGEST_PAGE, PAGE, "pages of at most 1 MiB"),
     ] {
         if found > most {
             return Err(Fault::Expected { expected, found: found.to_string().into() }.at_byte(at).into());
@@ -148,13 +150,14 @@ fn open(input: Input<'_>) -> Result<E57Reader<Reader<'_>>, Stop> {
     }
     let source = input.reader(0)?;
     let reader = guarded(|| E57Reader::new(source))
-        .ok_or_else(|| damaged("the decoder gave up".into()))?
+        .ok_or_else(|| damaged("the decoder panicked".into()))?
         .map_err(|cause| damaged(cause.to_string()))?;
-    // A point takes a bit at least, unless all are the same.
+    // A point takes at least one bit, unless all points are equal.
     let mut left = u128::from(length) * 8;
     for cloud in reader.pointclouds() {
         let Some(rest) = left.checked_sub(cloud.records.into()) else {
-            let cause = format!("a scan of {} points does not fit into {length} bytes", cloud.records);
+            let points = counted(cloud.records, "point", "points");
+            let cause = format!("expected scans that fit into {length} bytes, got {points} in one");
             return Err(damaged(cause).into());
         };
         left = rest;

@@ -1,4 +1,4 @@
-//! What can be wrong with a file, and where.
+//! Errors of reading a file: the fault, its place, and a remedy.
 
 use std::fmt;
 use std::io;
@@ -7,89 +7,100 @@ use std::path::{Path, PathBuf};
 use nearmiss_geometry::CloudError;
 use thiserror::Error;
 
-use crate::text::said;
+use crate::text::{bytes, counted, io_words, said};
 
-/// Why a file could not be read. The message names the file, what is wrong, where, and what would mend it.
+/// Error of reading a file. The message names the file, the fault, its place and a remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReadError {
-    /// The operating system refused.
-    #[error("{}: {cause}", .path.display())]
+    /// The operating system reported an error.
+    #[error("{}: {}", .path.display(), io_words(cause))]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's error.
         cause: io::Error,
     },
-    /// A directory, pipe or device.
-    #[error("{}: not a regular file; name a file that holds points or a mesh", .path.display())]
+    /// A folder, pipe or device.
+    #[error(
+        "{}: expected a regular file, got a folder, pipe or device; name a file with points or a mesh",
+        .path.display()
+    )]
     NotAFile {
-        /// What was named.
+        /// The path.
         path: PathBuf,
     },
-    /// No bytes at all.
-    #[error("{}: the file is empty", .path.display())]
+    /// A file of zero bytes.
+    #[error("{}: expected points or a mesh, got an empty file; export it again", .path.display())]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// Neither content nor name tell the format.
-    #[error("{}: unknown format; known are ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off and gltf; say which with `--format`", .path.display())]
+    /// Neither the content nor the name identifies the format.
+    #[error(
+        "{}: expected ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off or gltf, got an \
+         unknown format; name the format with `--format`",
+        .path.display()
+    )]
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// A format that is known but cannot be read.
-    #[error("{}: this is {format}, which this version cannot read; {}", .path.display(), .format.remedy())]
+    /// A known format that cannot be read.
+    #[error("{}: expected points or a mesh, got {format}; {}", .path.display(), .format.remedy())]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// The format.
         format: Foreign,
     },
-    /// The content breaks the rules of its format.
+    /// The content violates its format.
     #[error("{}: {place}: {fault}", .path.display())]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// Where.
+        /// Place of the fault.
         place: Place,
-        /// What is wrong there.
+        /// The fault.
         fault: Fault,
     },
-    /// A mesh was asked for, but the file has no faces.
-    #[error("{}: the file has points but no faces; a mesh is needed here", .path.display())]
+    /// The caller requires a mesh, but the file has no faces.
+    #[error("{}: expected a mesh, got points without faces; name a file with faces", .path.display())]
     NoFaces {
         /// The file.
         path: PathBuf,
     },
-    /// Faces on vertices one of which has a NaN or infinite coordinate.
-    #[error("{}: vertex {vertex} of a mesh has a coordinate that is not finite; repair it, or remove the faces to use the points alone", .path.display())]
+    /// The file has faces, and a vertex with a NaN or infinite coordinate.
+    #[error(
+        "{}: expected finite coordinates in a mesh, got NaN or infinity (vertex {vertex}); repair it, or remove the \
+         faces to use the points alone",
+        .path.display()
+    )]
     MeshNotFinite {
         /// The file.
         path: PathBuf,
-        /// The first such vertex, counted from 0.
+        /// Index of the first such vertex, counted from 0.
         vertex: usize,
     },
-    /// The file is well-formed, but its points make no cloud.
+    /// The file is well-formed, but its points are not a valid cloud.
     #[error("{}: {cause}", .path.display())]
     Cloud {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The cloud's error.
         cause: CloudError,
     },
 }
 
-/// Formats that are recognised in order to say that they cannot be read.
+/// A format that is recognised, but cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Foreign {
-    /// Compressed by gzip.
+    /// A file compressed by gzip.
     Gzip,
     /// A zip archive.
     Zip,
-    /// Text in 16-bit characters.
+    /// Text in UTF-16.
     Utf16,
 }
 
@@ -112,12 +123,12 @@ impl fmt::Display for Foreign {
     }
 }
 
-/// Where in a file something is wrong.
+/// The place of a fault in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
     /// Position in the file.
     pub at: At,
-    /// The element there, where the fault belongs to one.
+    /// The element at this position, if the fault belongs to one.
     pub item: Option<Item>,
 }
 
@@ -130,12 +141,12 @@ pub enum At {
     Byte(u64),
 }
 
-/// One of the things a file consists of.
+/// An element of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Item {
-    /// What it is: `vertex`, `face`, `point`, or any other element that a PLY header declares.
+    /// Kind of the element: `vertex`, `face`, `point`, or any other element of a PLY header.
     pub element: Box<str>,
-    /// Which one, counted from 0.
+    /// Index of the element, counted from 0.
     pub index: u64,
 }
 
@@ -152,63 +163,67 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong at a place of a file.
+/// A violation of a file format.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Something else stands where the format wants a certain thing.
-    #[error("expected {expected}, found `{found}`")]
+    /// A word or value other than the format requires.
+    #[error("expected {expected}, got `{found}`")]
     Expected {
-        /// What should be there.
+        /// Required content.
         expected: &'static str,
-        /// What is there, shortened.
+        /// Content of the file, shortened.
         found: Box<str>,
     },
-    /// Numbers where the header should be.
-    #[error("numbers instead of a header; if its lines are points, read it with `--format xyz`")]
+    /// Numbers in place of the header.
+    #[error("expected a header, got numbers; if the lines are points, read the file with `--format xyz`")]
     NoHeader,
     /// The file ends within its header.
-    #[error("the header never ends: no line `{keyword}`; the file is cut off or not what its start says")]
+    #[error("expected `{keyword}` at the end of the header, got the end of the file; export the file again")]
     HeaderNeverEnds {
-        /// What would have ended it.
+        /// Keyword of the last line of the header.
         keyword: &'static str,
     },
-    /// The header lacks something that cannot be guessed.
-    #[error("the header does not declare {what}")]
+    /// A required declaration is missing in the header.
+    #[error("expected {what} in the header, got none")]
     Undeclared {
-        /// What is missing.
+        /// The missing declaration.
         what: &'static str,
     },
-    /// The header names the same thing twice.
-    #[error("`{name}` is declared twice")]
+    /// The header declares the same name twice.
+    #[error("expected one `{name}`, got two; remove one of them")]
     Repeated {
-        /// What.
+        /// The name.
         name: Box<str>,
     },
-    /// A header line of a PCD file that must have one entry for each field.
-    #[error("{keyword} has {entries} entries for {fields} fields")]
+    /// A header line of a PCD file whose number of entries differs from the number of fields.
+    #[error(
+        "expected {} in {keyword}, one for each field, got {entries}",
+        counted(fields, "entry", "entries")
+    )]
     FieldEntries {
-        /// The line.
+        /// Keyword of the line.
         keyword: &'static str,
-        /// How many entries it has.
+        /// Number of entries.
         entries: usize,
-        /// How many fields there are.
+        /// Number of fields.
         fields: usize,
     },
-    /// A field of a type that holds no coordinate.
+    /// A PCD field of an unsupported type.
     #[error(
-        "field `{field}` has type {kind} and size {size}; readable are F 4, F 8, and I or U of size 1, 2, 4, 8"
+        "expected type F of 4 or 8 bytes, or I or U of 1, 2, 4 or 8 bytes, for field `{field}`, got {kind} of {}",
+        bytes(size)
     )]
     FieldType {
-        /// The field.
+        /// Name of the field.
         field: Box<str>,
-        /// Its TYPE entry.
+        /// TYPE of the field.
         kind: Box<str>,
-        /// Its SIZE entry, in bytes.
+        /// SIZE of the field, in bytes.
         size: u64,
     },
-    /// Width, height and number of points of a PCD file contradict each other.
-    #[error("{points} points declared, but width {width} times height {height} is another number")]
+    /// WIDTH × HEIGHT of a PCD file differs from POINTS.
+    #[error("expected POINTS to equal WIDTH × HEIGHT, {width} × {height}, got {points}")]
     Grid {
         /// WIDTH.
         width: u64,
@@ -217,112 +232,131 @@ pub enum Fault {
         /// POINTS.
         points: u64,
     },
-    /// A value that must be a number is none.
-    #[error("`{found}` in column `{column}` is not a number")]
+    /// A word that is not a number.
+    #[error("expected a number in column `{column}`, got `{found}`")]
     NotANumber {
         /// Name of the column.
         column: Box<str>,
-        /// What stands there, shortened.
+        /// The word, shortened.
         found: Box<str>,
     },
-    /// A length of a list, or an index, that is no whole number.
-    #[error("`{found}` is not {expected}")]
+    /// A list length or an index that is not a whole number.
+    #[error("expected {expected} (a whole number), got `{found}`")]
     NotWhole {
-        /// What it should be.
+        /// Meaning of the number.
         expected: &'static str,
-        /// What stands there, shortened.
+        /// The word, shortened.
         found: Box<str>,
     },
-    /// A line of text has too few values.
-    #[error("the line ends before column `{column}`")]
+    /// A line of text has fewer values than columns.
+    #[error("expected a value in column `{column}`, got the end of the line")]
     ShortLine {
         /// The first column without a value.
         column: Box<str>,
     },
-    /// A line of text has more values than columns are declared.
-    #[error("the line has more values than the header declares columns")]
+    /// A line of text has more values than columns.
+    #[error("expected one value for each column of the header, got more")]
     LongLine,
-    /// The header promises more elements than the file holds.
+    /// The header declares more elements than the file contains.
     #[error(
-        "{promised} of `{element}` promised, but the file holds {present}; it is cut off, or this count is wrong"
+        "expected {}, got {present}; the file is cut off, or this count is wrong",
+        counted(promised, &format!("`{element}` element"), &format!("`{element}` elements"))
     )]
     Promised {
         /// Name of the element.
         element: Box<str>,
-        /// How many the header promises.
+        /// Number of elements in the header.
         promised: u64,
-        /// How many complete ones there are.
+        /// Number of complete elements in the file.
         present: u64,
     },
-    /// Text goes on after everything that the header promises.
-    #[error("text after the last element; the header promises too few, or the file is damaged")]
+    /// Text continues after the last element of the header.
+    #[error(
+        "expected the end of the file after the last element, got more text; correct the count in the header"
+    )]
     Surplus,
-    /// A list says that it is longer than the rest of the file.
-    #[error("a list of {values} values does not fit into the {left} bytes left")]
+    /// A list is longer than the rest of the file.
+    #[error(
+        "expected a list that fits into the {} left, got {}",
+        bytes(left),
+        counted(values, "value", "values")
+    )]
     ListPastEnd {
-        /// Values in the list.
+        /// Number of values in the list.
         values: u64,
-        /// Bytes from here to the end of the file.
+        /// Bytes up to the end of the file.
         left: u64,
     },
     /// The file ends within an element.
-    #[error("the file ends here, within an element")]
+    #[error("expected the rest of an element, got the end of the file")]
     PastEnd,
-    /// A face names a vertex that is not there.
-    #[error("the face names vertex {vertex}, but there are {vertices}, counted from {first}")]
+    /// A face refers to a missing vertex.
+    #[error("{}, got {vertex}", vertex_range(*vertex, *vertices, *first))]
     NoSuchVertex {
-        /// The vertex it names, as written.
+        /// Index of the vertex, as written.
         vertex: i64,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: u64,
-        /// Number of the first vertex, by the rules of the format: 0 or 1.
+        /// Index of the first vertex in this format: 0 or 1.
         first: u8,
     },
     /// A face with fewer than three corners.
-    #[error("the face has {corners} corners; at least 3 are needed")]
+    #[error("expected at least 3 corners of the face, got {corners}")]
     FewCorners {
-        /// How many it has.
+        /// Number of corners.
         corners: usize,
     },
-    /// The length of compressed data does not fit the points that the header declares.
-    #[error("compressed data declare {declared} bytes unpacked, but the header's points take {needed}")]
+    /// The declared length of compressed data does not match the points of the header.
+    #[error("expected {} of unpacked data for the points of the header, got {declared}", bytes(needed))]
     UnpackedSize {
-        /// Length after decompression, as declared.
+        /// Declared length after decompression, in bytes.
         declared: u64,
-        /// Length that the header's fields and points take.
+        /// Length of the fields and points of the header, in bytes.
         needed: u64,
     },
     /// Compressed data that would take very much memory for their length.
     #[error(
-        "{packed} compressed bytes are to give {points} points, far more than scans give; if that is right, save the \
-         file with `DATA binary`"
+        "expected compressed points of a scan, got {} from {}, far more than a scan gives; if that is right, save \
+         the file with `DATA binary`",
+        counted(points, "point", "points"),
+        bytes(packed)
     )]
     Expansion {
-        /// Points that the header declares.
+        /// Number of points in the header.
         points: u64,
-        /// Bytes of the compressed data.
+        /// Length of the compressed data in bytes.
         packed: u64,
     },
-    /// A foreign decoder refused the data.
-    #[error("the data are damaged: {}", said(cause))]
+    /// A third-party decoder rejected the data.
+    #[error("cannot decode the data: {}", said(cause))]
     Decoder {
-        /// What it said.
+        /// The decoder's message.
         cause: Box<str>,
     },
-    /// A format that this build was made without.
-    #[error("{what} cannot be read by this build; build nearmiss-io with the feature `{feature}`")]
+    /// A format whose feature is disabled in this build.
+    #[error("this build cannot read {what}; enable the feature `{feature}` of nearmiss-io")]
     Feature {
         /// The format.
         what: &'static str,
-        /// What it needs.
+        /// The feature that the format requires.
         feature: &'static str,
     },
     /// Compressed data that do not decompress to their declared length.
-    #[error("the compressed data are corrupt")]
+    #[error("cannot decompress the data; export the file again")]
     Corrupt,
 }
 
-/// A fault and its place; the file's name is added where it is known.
+/// Describes the valid indices of vertices. In OBJ, where the first is 1, negative indices count
+/// from the end.
+fn vertex_range(vertex: i64, vertices: u64, first: u8) -> String {
+    match (vertices, first) {
+        (0, _) => "expected vertices before the face".to_owned(),
+        (_, 1) if vertex < 0 => format!("expected a vertex index from -{vertices} to -1"),
+        _ => format!("expected a vertex index from {first} to {}", vertices - 1 + u64::from(first)),
+    }
+}
+
+/// A fault and its place, without the name of the file.
 #[derive(Debug)]
 pub(crate) struct Broken {
     pub(crate) place: Place,
@@ -330,30 +364,30 @@ pub(crate) struct Broken {
 }
 
 impl Fault {
-    /// The fault, on a line.
+    /// Places the fault on a line.
     pub(crate) fn on_line(self, line: u64) -> Broken {
         self.at(At::Line(line))
     }
 
-    /// The fault, at a byte.
+    /// Places the fault at a byte.
     pub(crate) fn at_byte(self, byte: usize) -> Broken {
         self.at(At::Byte(byte as u64))
     }
 
-    /// The fault, at a position.
+    /// Places the fault at a position.
     pub(crate) fn at(self, at: At) -> Broken {
         Broken { place: Place { at, item: None }, fault: self }
     }
 }
 
 impl Broken {
-    /// The same, saying to which element it belongs.
+    /// Adds the element that the fault belongs to.
     pub(crate) fn within(mut self, element: &str, index: u64) -> Self {
         self.place.item = Some(Item { element: element.into(), index });
         self
     }
 
-    /// As the fault of this file.
+    /// Adds the name of the file.
     pub(crate) fn of(self, path: &Path) -> ReadError {
         let Self { place, fault } = self;
         ReadError::Malformed { path: path.into(), place, fault }

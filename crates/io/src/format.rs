@@ -1,4 +1,4 @@
-//! Which format a file has: by its magic, then by its name, then by the look of its first line.
+//! Recognition of file formats: by the magic number, then by the name, then by the first line.
 
 use std::fmt;
 use std::path::Path;
@@ -14,15 +14,16 @@ use crate::{npy, off, stl};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Format {
-    /// Polygon File Format: ascii or binary, either byte order, with or without faces.
+    /// Polygon File Format: ascii or binary in either byte order, with or without faces.
     Ply,
-    /// Point Cloud Data of the Point Cloud Library: ascii, binary or compressed.
+    /// Point Cloud Data, the format of the Point Cloud Library: ascii, binary or compressed.
     Pcd,
-    /// Points as lines of text, separated by white space, commas or semicolons; CSV among them.
+    /// Text with one point per line and values separated by white space, commas or semicolons;
+    /// includes CSV.
     Xyz,
     /// Wavefront OBJ.
     Obj,
-    /// ASPRS LAS 1.0 to 1.4, also compressed by laszip: LAZ and COPC.
+    /// ASPRS LAS 1.0 to 1.4, including LAZ and COPC, which are compressed by laszip.
     Las,
     /// ASTM E57.
     E57,
@@ -30,7 +31,7 @@ pub enum Format {
     Npy,
     /// Stereolithography, binary or text.
     Stl,
-    /// Object File Format of Geomview, as text.
+    /// Object File Format of Geomview, text only.
     Off,
     /// glTF 2.0, text or binary.
     Gltf,
@@ -51,20 +52,20 @@ impl Format {
         Self::Gltf,
     ];
 
-    /// Returns `true` if all files of this format can be read from disk in pieces, so that no reader for
-    /// bytes in memory is needed.
+    /// Returns `true` if every file of this format can be read from disk in pieces. Such a format
+    /// has no reader for bytes in memory.
     pub(crate) const fn is_streamed(self) -> bool {
         matches!(self, Self::Las | Self::E57)
     }
 }
 
-/// Not the name of a format that can be read.
+/// Error of parsing a [`Format`] from an unknown name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
-    "unknown format `{given}`; known are ply, pcd, las (also laz), e57, xyz (also csv), npy, obj, stl, off and gltf (also glb)"
+    "expected ply, pcd, las (also laz), e57, xyz (also csv), npy, obj, stl, off or gltf (also glb), got `{given}`"
 )]
 pub struct UnknownFormatName {
-    /// What was given.
+    /// The given name.
     pub given: String,
 }
 
@@ -105,11 +106,11 @@ impl fmt::Display for Format {
     }
 }
 
-/// Endings of names of text files that hold points and nothing else.
+/// File extensions of text files that contain only points.
 const TEXT_ENDINGS: [&str; 9] = ["xyz", "csv", "txt", "asc", "pts", "xyzn", "xyzrgb", "3d", "neu"];
 
-/// The format of a file of this length from its start, 64 KiB unless it is shorter; refuses those that are
-/// known but cannot be read.
+/// Recognises the format of a file of this length from its first 64 KiB and its name. Fails for
+/// known formats that cannot be read.
 pub(crate) fn recognise(bytes: &[u8], length: u64, name: &Path) -> Result<Format, ReadError> {
     let unsupported = |format| ReadError::Unsupported { path: name.into(), format };
     let ending = name.extension().and_then(|e| e.to_str()).unwrap_or_default();
@@ -173,9 +174,9 @@ fn look(bytes: &[u8]) -> Option<Format> {
     }
 }
 
-/// The first word that is not in a comment; none if the file starts with very much else.
+/// Returns the first word outside comments, if it is within the first 64 KiB.
 fn first_word(bytes: &[u8]) -> Option<&[u8]> {
-    /// Bytes looked at: more than any licence text at the head of a file.
+    /// Number of bytes searched: more than any licence text at the start of a file.
     const START: usize = 1 << 16;
     let mut lines = Lines::new(&bytes[..bytes.len().min(START)]);
     let line = lines.find(|line| {

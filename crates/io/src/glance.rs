@@ -1,4 +1,4 @@
-//! A first look at a file: about how many points it holds, and where.
+//! A quick estimate of the number of points in a file, and of their bounds.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -13,32 +13,32 @@ use crate::rows::{Encoding, Layout};
 use crate::text::Lines;
 use crate::{las, npy, obj, off, pcd, ply, stl, xyz};
 
-/// Bytes at the start that are looked at.
+/// Number of bytes read at the start of the file.
 const HEAD: u64 = 1 << 16;
 
-/// Pieces of the rest that are looked at.
+/// Number of pieces read from the rest of the file.
 const PIECES: u64 = 64;
 
-/// Bytes of such a piece.
+/// Length of a piece in bytes.
 const PIECE: u64 = 1 << 12;
 
-/// What a first look at a file tells. Nothing of it is checked.
+/// An estimate of the contents of a file. Nothing is checked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Glance {
-    /// About how many points the file holds, broken ones and duplicates included.
+    /// Approximate number of points, including invalid points and duplicates.
     pub points: u64,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Bounds of some thousands of points throughout the file, if it holds nothing but points that are not
-    /// compressed.
+    /// Bounds of a sample of some thousands of points, or the bounds in the header of LAS. Always
+    /// `None` for E57, OBJ, STL, OFF, glTF, compressed PCD, and PLY with faces.
     pub bounds: Option<Aabb>,
 }
 
-/// Looks at the header and at some pieces of a file, a third of a mebibyte in all.
+/// Estimates the contents of a file from its header and some pieces, a third of a mebibyte in all.
 ///
-/// Returns `None` if the file cannot be read or is of an unknown format. A header that promises more points
-/// than the file has space for is not believed.
+/// Returns `None` if the file cannot be read or has an unknown format. A count in the header is
+/// limited to the number of points that fit into the file.
 #[must_use]
 pub fn glance(path: impl AsRef<Path>, format: Option<Format>) -> Option<Glance> {
     let path = path.as_ref();
@@ -78,7 +78,7 @@ pub fn glance(path: impl AsRef<Path>, format: Option<Format>) -> Option<Glance> 
         Format::Stl => stl::count(content, length),
         Format::Off => off::count(content, length)?,
         Format::E57 => count_of_e57(&file)?,
-        // Half of it may be positions in single precision.
+        // Assumes that half of the file is positions in single precision.
         Format::Gltf => length / 24,
         Format::Las => return None,
     };
@@ -100,7 +100,7 @@ fn count_of_e57(_: &File) -> Option<u64> {
     None
 }
 
-/// Rows of a text of this length, by the mean length of those in its head.
+/// Estimates the number of rows of a text of this length from the mean row length of its head.
 fn lines(head: &[u8], length: u64, layout: &Layout) -> Option<u64> {
     if let Some((promised, _)) = layout.promised {
         return Some(promised.min(length / 2));
@@ -108,7 +108,7 @@ fn lines(head: &[u8], length: u64, layout: &Layout) -> Option<u64> {
     let rows = head.get(layout.start..)?;
     let count = Lines::new(rows).count() as u64;
     let (rows_length, all) = (rows.len() as u64, length - layout.start as u64);
-    // Wide enough for files of any length.
+    // 128 bits cannot overflow.
     let points = u128::from(all) * u128::from(count) / u128::from(rows_length.max(1));
     u64::try_from(points).ok()
 }
@@ -129,7 +129,7 @@ fn bounds(layout: &Layout, pieces: &mut Pieces<'_>) -> Option<Aabb> {
         }
         Encoding::Text { end, .. } => {
             let whole = Lines::going_on(piece, 0, end);
-            // The first line may lack its start, and the last one its end.
+            // The first line may lack its start, and the last line its end.
             let mut rows: Vec<_> = whole.skip(1).filter(|line| layout.rows.is_row(line)).collect();
             rows.pop();
             for line in rows {
@@ -143,7 +143,7 @@ fn bounds(layout: &Layout, pieces: &mut Pieces<'_>) -> Option<Aabb> {
     (!finite.is_empty()).then(|| Aabb::of(finite))
 }
 
-/// Pieces that are evenly spread over a part of a file.
+/// Pieces that are spread evenly over a part of a file.
 struct Pieces<'a> {
     file: &'a mut File,
     start: u64,
@@ -155,7 +155,8 @@ impl Pieces<'_> {
         self.each_at(|_, piece| take(piece));
     }
 
-    /// Hands out where each piece starts, and what can be read of it.
+    /// Passes the offset and the bytes of each piece to `take`. Pieces that cannot be read are
+    /// skipped.
     fn each_at(&mut self, mut take: impl FnMut(u64, &[u8])) {
         let room = self.end.saturating_sub(self.start);
         let count = room.div_ceil(PIECE).min(PIECES);

@@ -1,6 +1,8 @@
-//! glTF 2.0 and its binary form GLB: the points and triangles of the default scene, each where its node puts
-//! it. The crate `gltf` parses and checks the document; accessors are read here, for its own readers panic
-//! where one reaches out of its buffer.
+//! glTF 2.0 and its binary form GLB: points and triangles of the default scene, transformed by
+//! their nodes.
+//!
+//! The crate `gltf` parses and checks the document. Accessors are read here, because the readers of
+//! the crate panic if an accessor exceeds its buffer.
 
 use std::fs;
 use std::path::{Component, Path};
@@ -16,26 +18,29 @@ use crate::error::{Broken, Fault};
 use crate::guard::guarded;
 use crate::scalar::{Order, Scalar};
 use crate::sink::Sink;
+use crate::text::{bytes as with_unit, counted};
 
-/// The content of a file; other files that it names are looked for in the folder of `path`.
+/// Parses a file. Buffers in other files are read from the folder of `path`.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Sink, Broken> {
     check_lengths(bytes)?;
     let Gltf { document, blob } = guarded(|| Gltf::from_slice(bytes))
-        .ok_or_else(|| damaged("the decoder gave up"))?
+        .ok_or_else(|| damaged("the decoder panicked"))?
         .map_err(|cause| damaged(&cause.to_string()))?;
     if let Some(extension) = document.extensions_required().find(|name| name.contains("compression")) {
-        return Err(damaged(&format!("{extension} is not supported; save it without compression")));
+        return Err(damaged(&format!("{extension} is not supported; save the file without compression")));
     }
     let mut buffers = Vec::new();
     let mut blob = blob;
     for buffer in document.buffers() {
         let content = match buffer.source() {
-            gltf::buffer::Source::Bin => blob.take().ok_or_else(|| damaged("a buffer is missing"))?,
+            gltf::buffer::Source::Bin => {
+                blob.take().ok_or_else(|| damaged("expected a binary chunk for the buffer, got none"))?
+            }
             gltf::buffer::Source::Uri(uri) => linked(uri, path)?,
         };
         if content.len() < buffer.length() {
             let (declared, found) = (buffer.length(), content.len());
-            return Err(damaged(&format!("a buffer has {found} bytes of {declared}")));
+            return Err(damaged(&format!("expected a buffer of {}, got {found}", with_unit(declared))));
         }
         buffers.push(content);
     }
@@ -45,7 +50,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Sink, Broken> {
         None => document.nodes().collect(),
     };
     let mut placed = Vec::new();
-    // A node has one parent, so that a scene has no more nodes than the document.
+    // Each node has one parent, so a scene has at most as many nodes as the document.
     let mut seen = vec![false; document.nodes().count()];
     let mut open: Vec<(Node<'_>, Matrix)> = roots.into_iter().map(|node| (node, IDENTITY)).collect();
     while let Some((node, outer)) = open.pop() {
@@ -53,7 +58,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Sink, Broken> {
             if scene.is_none() {
                 continue;
             }
-            return Err(damaged(&format!("node {} has two parents", node.index())));
+            return Err(damaged(&format!("expected one parent of node {}, got two", node.index())));
         }
         let matrix = product(&outer, &node.transform().matrix().map(|column| column.map(f64::from)));
         open.extend(node.children().map(|child| (child, matrix)));
@@ -61,7 +66,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Sink, Broken> {
             placed.extend(mesh.primitives().map(|primitive| (primitive, matrix)));
         }
     }
-    // In the order of the scene.
+    // Restores the order of the scene.
     placed.reverse();
     let all = |semantic: Semantic| placed.iter().all(|(primitive, _)| primitive.get(&semantic).is_some());
     let holds =
@@ -74,7 +79,7 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<Sink, Broken> {
     Ok(sink)
 }
 
-/// A matrix in columns, as glTF has it.
+/// A matrix in column-major order, as in glTF.
 type Matrix = [[f64; 4]; 4];
 
 const IDENTITY: Matrix =
@@ -88,7 +93,7 @@ fn damaged(cause: &str) -> Broken {
     Fault::Decoder { cause: cause.into() }.at_byte(0)
 }
 
-/// Checks that the chunks of a binary file lie in it.
+/// Checks that the chunks of a binary file are within the file.
 fn check_lengths(bytes: &[u8]) -> Result<(), Broken> {
     if !bytes.starts_with(b"glTF") {
         return Ok(());
@@ -108,33 +113,33 @@ fn check_lengths(bytes: &[u8]) -> Result<(), Broken> {
     Ok(())
 }
 
-/// What a buffer names: data in the address itself, or a file in the same folder or below.
+/// Reads the buffer of a URI: base64 data in the URI itself, or a file in the same folder or below.
 fn linked(uri: &str, path: &Path) -> Result<Vec<u8>, Broken> {
     if let Some(data) = uri.strip_prefix("data:") {
         let (_, encoded) =
-            data.split_once(";base64,").ok_or_else(|| damaged("a buffer in the document is not base64"))?;
+            data.split_once(";base64,").ok_or_else(|| damaged("expected a buffer in base64"))?;
         return BASE64_STANDARD.decode(encoded).map_err(|cause| damaged(&cause.to_string()));
     }
     let name = uri.replace("%20", " ");
     if !Path::new(&name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)) {
-        return Err(damaged(&format!("the buffer `{uri}` is not a file beside this one")));
+        return Err(damaged(&format!("expected a buffer in the same folder, got `{uri}`")));
     }
     let file = path.parent().unwrap_or(Path::new("")).join(&name);
     let is_file = fs::metadata(&file).is_ok_and(|about| about.is_file());
     let content = if is_file { fs::read(&file).ok() } else { None };
-    content.ok_or_else(|| damaged(&format!("the buffer {} cannot be read", file.display())))
+    content.ok_or_else(|| damaged(&format!("cannot read the buffer {}", file.display())))
 }
 
-/// The numbers of an accessor.
+/// A view of the numbers of an accessor.
 struct Numbers<'a> {
     bytes: &'a [u8],
     scalar: Scalar,
-    /// Numbers of an element.
+    /// Number of components of an element.
     width: usize,
     /// Bytes from one element to the next.
     stride: usize,
     count: usize,
-    /// What integers are divided by.
+    /// Divisor of normalised integers; otherwise 1.
     unit: f64,
 }
 
@@ -144,7 +149,7 @@ impl<'a> Numbers<'a> {
         if accessor.sparse().is_some() {
             return Err(wrong("sparse accessors are not supported"));
         }
-        let view = accessor.view().ok_or_else(|| wrong("it has no data"))?;
+        let view = accessor.view().ok_or_else(|| wrong("expected data, got none"))?;
         let (scalar, unit) = match accessor.data_type() {
             DataType::I8 => (Scalar::I8, 127.0),
             DataType::U8 => (Scalar::U8, 255.0),
@@ -159,7 +164,7 @@ impl<'a> Numbers<'a> {
             Dimensions::Vec3 => 3,
             Dimensions::Vec4 => 4,
             Dimensions::Mat2 | Dimensions::Mat3 | Dimensions::Mat4 => {
-                return Err(wrong("it holds matrices"));
+                return Err(wrong("expected scalars or vectors, got matrices"));
             }
         };
         let size = width * scalar.size();
@@ -180,11 +185,14 @@ impl<'a> Numbers<'a> {
                 count,
                 unit: if accessor.normalized() { unit } else { 1.0 },
             }),
-            _ => Err(wrong(&format!("its {count} elements reach out of the buffer"))),
+            _ => {
+                let elements = counted(count, "element", "elements");
+                Err(wrong(&format!("expected elements within the buffer, got {elements} that exceed it")))
+            }
         }
     }
 
-    /// The numbers of the `i`-th element, at most three of them.
+    /// Returns the first three numbers of the `i`-th element.
     fn get(&self, i: usize) -> [f64; 3] {
         let mut numbers = [0.0; 3];
         for (k, number) in numbers.iter_mut().enumerate().take(self.width) {
@@ -196,7 +204,7 @@ impl<'a> Numbers<'a> {
     }
 }
 
-/// Adds a primitive whose first vertex gets the index `first`. Returns how many vertices it has.
+/// Adds a primitive. Its first vertex has the index `first`. Returns the number of its vertices.
 fn add(
     primitive: &Primitive<'_>,
     matrix: &Matrix,
@@ -212,14 +220,14 @@ fn add(
         let found = if wanted { numbers(semantic).transpose()? } else { None };
         match found {
             Some(found) if found.count != places.count => {
-                Err(damaged("a primitive has arrays of two lengths"))
+                let (expected, found) = (places.count, found.count);
+                Err(damaged(&format!("expected attributes of length {expected}, got {found}")))
             }
             found => Ok(found),
         }
     };
     let normals = of_each(Semantic::Normals, holds.normals)?;
     let colours = of_each(Semantic::Colors(0), holds.colours)?;
-    // Shares of colours are numbers up to 1 in any type.
     let turned = cofactors(matrix);
     for i in 0..places.count {
         let mut row: Row = [0.0; 11];
@@ -234,11 +242,12 @@ fn add(
             row[3..6].copy_from_slice(&normal.map(|c| if length > 0.0 { c / length } else { 0.0 }));
         }
         if let Some(colours) = &colours {
+            // The components of colours are in 0..=1.
             row[6..9].copy_from_slice(&colours.get(i).map(|channel| channel * 255.0));
         }
         sink.row(&row);
     }
-    let too_many = || damaged("more than 2^32 vertices");
+    let too_many = || damaged("expected at most 2^32 - 1 vertices, got more");
     let count = u32::try_from(places.count).ok().ok_or_else(too_many)?;
     let corners = match primitive.indices() {
         None => (0..count).collect(),
@@ -256,7 +265,7 @@ fn add(
     first.checked_add(count).map(|_| count).ok_or_else(too_many)
 }
 
-/// Corners by their index among the `count` vertices of a primitive.
+/// Reads the corners, as indices of the `count` vertices of a primitive.
 fn indices(numbers: &Numbers<'_>, count: u32) -> Result<Vec<u32>, Broken> {
     let corner = |i: usize| {
         #[expect(
@@ -271,7 +280,7 @@ fn indices(numbers: &Numbers<'_>, count: u32) -> Result<Vec<u32>, Broken> {
     (0..numbers.count).map(corner).collect()
 }
 
-/// What turns normals along with points: the cofactors of the linear part, in columns.
+/// Returns the matrix that transforms normals: the cofactors of the linear part, in columns.
 fn cofactors(m: &Matrix) -> [[f64; 3]; 3] {
     let cross = |a: [f64; 4], b: [f64; 4]| {
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

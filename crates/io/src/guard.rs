@@ -1,8 +1,9 @@
-//! Decoders of other people, whose panics must not be ours.
+//! A guard against panics of third-party decoders.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What `decode` returns, or `None` if it panics. Nothing that it has changed may be used then.
+/// Calls `decode` and returns `None` if it panics. Then the data that it has changed must not be
+/// used.
 pub(crate) fn guarded<T>(decode: impl FnOnce() -> T) -> Option<T> {
     catch_unwind(AssertUnwindSafe(decode)).ok()
 }

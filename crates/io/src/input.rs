@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::error::{Broken, ReadError};
 
-/// Where the bytes of a file are.
+/// The bytes of a file, on disk or in memory.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Input<'a> {
     /// On disk.
@@ -15,7 +15,7 @@ pub(crate) enum Input<'a> {
     Memory(&'a [u8]),
 }
 
-/// Reads an [`Input`].
+/// A reader of an [`Input`].
 #[derive(Debug)]
 pub(crate) enum Reader<'a> {
     File(&'a File),
@@ -23,7 +23,7 @@ pub(crate) enum Reader<'a> {
 }
 
 impl<'a> Input<'a> {
-    /// How many bytes there are.
+    /// Returns the number of bytes.
     pub(crate) fn length(self) -> io::Result<u64> {
         match self {
             Self::File(file) => file.metadata().map(|about| about.len()),
@@ -31,7 +31,7 @@ impl<'a> Input<'a> {
         }
     }
 
-    /// A reader from this byte on.
+    /// Returns a reader that starts at this byte.
     pub(crate) fn reader(self, start: u64) -> io::Result<Reader<'a>> {
         let mut reader = match self {
             Self::File(file) => Reader::File(file),
@@ -41,7 +41,7 @@ impl<'a> Input<'a> {
         Ok(reader)
     }
 
-    /// At most so many bytes from the start.
+    /// Reads at most `most` bytes from the start.
     pub(crate) fn head(self, most: usize) -> io::Result<Vec<u8>> {
         let mut head = Vec::new();
         self.reader(0)?.take(most as u64).read_to_end(&mut head)?;
@@ -67,17 +67,17 @@ impl Seek for Reader<'_> {
     }
 }
 
-/// Why reading stopped before the end.
+/// Error of reading an [`Input`].
 #[derive(Debug)]
 pub(crate) enum Stop {
-    /// The content is broken.
+    /// The content violates its format.
     Broken(Broken),
-    /// The operating system refused.
+    /// The operating system reported an error.
     Io(io::Error),
 }
 
 impl Stop {
-    /// As the error of this file.
+    /// Adds the name of the file.
     pub(crate) fn of(self, path: &Path) -> ReadError {
         match self {
             Self::Broken(broken) => broken.of(path),

@@ -1,7 +1,7 @@
 //! LAS 1.0 to 1.4 (ASPRS) with all point formats, and LAZ, its compression by laszip, COPC included.
 //!
-//! Records are fixed in length and need no library; LAZ is decoded by the crate `laz`, chunk by chunk, after
-//! its tables were checked against the length of the file.
+//! Records of LAS have a fixed length and are read here. LAZ is decoded by the crate `laz`, chunk
+//! by chunk, after its tables are checked against the length of the file.
 
 #[cfg(feature = "laz")]
 mod copc;
@@ -25,29 +25,29 @@ use crate::points::Points;
 use crate::selection::Selection;
 use header::Header;
 
-/// Points whose colours are looked at to tell eight bits a channel from sixteen.
+/// Number of points examined to decide whether colour channels have 8 or 16 bits.
 const LOOKED_AT: usize = 1 << 16;
 
-/// What a header says: how many points, and their bounds.
+/// Reads the number of points and their bounds from the header.
 pub(crate) fn glance(head: &[u8]) -> Option<(u64, Option<Aabb>)> {
     let header = Header::parse(head).ok()?;
     Some((header.count, header.bounds))
 }
 
-/// The steps in which coordinates are counted.
+/// Returns the scale and offset of the coordinates.
 pub(crate) fn lattice(input: Input<'_>) -> Option<Lattice> {
     let Header { scale, offset, .. } = Header::parse(&input.head(header::LONGEST).ok()?).ok()?;
     Some(Lattice { scale, offset })
 }
 
-/// Returns `true` if parts of space, and levels, can be read alone.
+/// Returns `true` if the file is COPC, of which a region or a level of detail can be read alone.
 pub(crate) fn has_levels(input: Input<'_>) -> bool {
     octree(input).is_some()
 }
 
 #[cfg(feature = "laz")]
 fn octree(input: Input<'_>) -> Option<copc::Octree> {
-    // Its record is the first one.
+    // The record of COPC is the first one.
     let head = input.head(1 << 12).ok()?;
     copc::Octree::of(&head, &Header::parse(&head).ok()?)
 }
@@ -57,8 +57,8 @@ fn octree(_: Input<'_>) -> Option<()> {
     None
 }
 
-/// Goes over all points, some `block` bytes of records at a time; of COPC over those that are selected, and
-/// some about them.
+/// Passes all points to `take`, in blocks of about `block` bytes of records. For COPC, only nodes
+/// that meet the selection are read, so some points beyond it are passed too.
 pub(crate) fn each(
     input: Input<'_>,
     block: usize,
@@ -103,17 +103,17 @@ pub(crate) fn each(
     Ok(())
 }
 
-/// Makes points of records.
+/// Converts records to points.
 struct Records<'a> {
     header: &'a Header,
     holds: Holds,
-    /// How many bits a colour channel takes: 16 by the standard, and 8 in many files.
+    /// Number of bits of a colour channel: 16 by the standard, but 8 in many files.
     colour_bits: Option<u8>,
     points: Points,
 }
 
 impl Records<'_> {
-    /// Hands out whole records as points.
+    /// Converts whole records to points and passes them to `take`.
     fn hand_out(
         &mut self,
         bytes: &[u8],
@@ -153,12 +153,13 @@ impl Records<'_> {
     }
 }
 
-/// The colour in a record.
+/// Returns the colour of a record.
 fn channels(record: &[u8], at: usize) -> [u16; 3] {
     [0, 2, 4].map(|k| u16::from_le_bytes([record[at + k], record[at + k + 1]]))
 }
 
-/// Eight if no channel needs more: then a program wrote them as they were.
+/// Returns 8 if every channel is below 256, as some programs write 8-bit colours unscaled;
+/// otherwise 16.
 fn colour_bits(mut colours: impl Iterator<Item = [u16; 3]>) -> u8 {
     if colours.any(|colour| colour.iter().any(|channel| *channel > 0xff)) { 16 } else { 8 }
 }

@@ -6,13 +6,13 @@ use crate::rows::{Encoding, Layout, Rows};
 use crate::scalar::{Order, Scalar};
 use crate::text::{Line, shown};
 
-/// What such a file begins with.
+/// The magic number at the start of the file.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Coordinates of a point.
+/// Number of coordinates of a point.
 const COLUMNS: usize = 3;
 
-/// The rows of a file that begins like this.
+/// Parses the header at the start of a file.
 pub(crate) fn layout(head: &[u8]) -> Result<Layout, Broken> {
     let after = MAGIC.len() + 2;
     // The length of the header takes two bytes in version 1, and four later.
@@ -30,17 +30,16 @@ pub(crate) fn layout(head: &[u8]) -> Result<Layout, Broken> {
             Some(found + key.len())
         });
         let value = start.map(|start| header[start..].trim_ascii_start());
-        value.ok_or_else(|| wrong("a dictionary with descr, fortran_order and shape", header))
+        value.ok_or_else(|| wrong("a header with descr, fortran_order and shape", header))
     };
     let is_contiguous = entry("fortran_order")?.starts_with(b"False");
     if !is_contiguous {
-        return Err(wrong(
-            "rows one after the other; save `numpy.ascontiguousarray(points)`",
-            b"fortran_order",
-        ));
+        let expected = "'fortran_order': False, as saved from `numpy.ascontiguousarray(points)`";
+        return Err(wrong(expected, entry("fortran_order").unwrap_or_default()));
     }
-    let (scalar, order) = kind(entry("descr")?)
-        .ok_or_else(|| wrong("numbers, as <f4 or <f8", entry("descr").unwrap_or_default()))?;
+    let (scalar, order) = kind(entry("descr")?).ok_or_else(|| {
+        wrong("floats or integers, such as '<f4' or '<f8'", entry("descr").unwrap_or_default())
+    })?;
     let points = shape(entry("shape")?)
         .ok_or_else(|| wrong("the shape (N, 3)", entry("shape").unwrap_or_default()))?;
     Ok(Layout {
@@ -53,7 +52,7 @@ pub(crate) fn layout(head: &[u8]) -> Result<Layout, Broken> {
     })
 }
 
-/// The type of numbers that a description such as `'<f8'` names.
+/// Parses a type of numbers, such as `'<f8'`.
 fn kind(text: &[u8]) -> Option<(Scalar, Order)> {
     let [quote @ (b'\'' | b'"'), order, kind, size, end, ..] = text else { return None };
     if quote != end {
@@ -79,7 +78,7 @@ fn kind(text: &[u8]) -> Option<(Scalar, Order)> {
     }
 }
 
-/// N of a shape `(N, 3)`.
+/// Parses a shape `(N, 3)` and returns N.
 fn shape(text: &[u8]) -> Option<u64> {
     let inner = text.strip_prefix(b"(")?;
     let inner = &inner[..inner.iter().position(|byte| *byte == b')')?];

@@ -1,15 +1,15 @@
-//! Wavefront OBJ: the lines `v`, with or without colours, and `f`. All others are ignored.
+//! Wavefront OBJ: the lines `v`, with or without colours, and `f`. All other lines are ignored.
 //!
-//! Corners of a face may count back from the last vertex (negative), and may name vertices that come later.
-//! Four values make a vertex with a weight, which is ignored; six make one with red, green and blue in 0..=1.
-//! A line that ends in a backslash goes on in the next one.
+//! Negative indices of a face count back from the last vertex. Faces may refer to later vertices. A
+//! vertex of four values has a weight, which is ignored. A vertex of six values has red, green and
+//! blue in 0..=1. A line that ends in a backslash continues on the next line.
 
 use crate::columns::{Holds, Row};
 use crate::error::{Broken, Fault};
 use crate::sink::{Sink, corner};
 use crate::text::{Line, Lines, number, shown, whole, words};
 
-/// The content of an OBJ file.
+/// Parses an OBJ file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let (mut total, mut coloured) = (0_u64, 0_u64);
     each_line(bytes, |text, _| {
@@ -26,14 +26,14 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
         vertices: 0,
         faces: 0,
         corners: Vec::new(),
-        // Each vertex was a line of its own.
+        // Each vertex is a line, so `total` is bounded by the length of the file.
         sink: Sink::new(holds, usize::try_from(total).unwrap_or(0)),
     };
     each_line(bytes, |text, number| reader.line(text, number))?;
     Ok(reader.sink)
 }
 
-/// The share of vertices among the bytes of a file, from some pieces of it.
+/// An estimate of the number of vertices per byte, from some pieces of a file.
 #[derive(Debug, Default)]
 pub(crate) struct Share {
     bytes: u64,
@@ -41,26 +41,26 @@ pub(crate) struct Share {
 }
 
 impl Share {
-    /// Looks at another piece, which may start and end within a line.
+    /// Adds a piece, which may start and end within a line.
     pub(crate) fn add(&mut self, piece: &[u8]) {
         self.bytes += piece.len() as u64;
         let lines = piece.split(|byte| *byte == b'\n').skip(1);
         self.vertices += lines.filter(|line| words(line).next() == Some(b"v")).count() as u64;
     }
 
-    /// About how many vertices a file of this length has.
+    /// Estimates the number of vertices in a file of this length.
     pub(crate) fn vertices(&self, length: u64) -> u64 {
         let vertices = u128::from(self.vertices) * u128::from(length) / u128::from(self.bytes.max(1));
         u64::try_from(vertices).unwrap_or(u64::MAX)
     }
 }
 
-/// Every line with its number, those that go on in the next ones joined.
+/// Passes every line and its number to `each`, with continued lines joined.
 fn each_line(bytes: &[u8], mut each: impl FnMut(&[u8], u64) -> Result<(), Broken>) -> Result<(), Broken> {
     let mut lines = Lines::new(bytes);
     let mut joined = Vec::new();
     while let Some(Line { number, text }) = lines.next() {
-        // Comments may well end in a backslash, as paths do.
+        // Only vertices and faces: a comment may end in a backslash, for example with a path.
         let goes_on = matches!(text.trim_ascii_start(), [b'v' | b'f', .., b'\\']);
         if goes_on {
             joined.clear();
@@ -78,9 +78,9 @@ fn each_line(bytes: &[u8], mut each: impl FnMut(&[u8], u64) -> Result<(), Broken
 }
 
 struct Reader {
-    /// Vertices in the whole file.
+    /// Number of vertices in the whole file.
     total: u64,
-    /// Vertices so far.
+    /// Number of vertices so far.
     vertices: u64,
     faces: u64,
     corners: Vec<u32>,
@@ -125,7 +125,7 @@ impl Reader {
         for value in values {
             let index = value.split(|&b| b == b'/').next().unwrap_or_default();
             let index: i64 = whole(index)
-                .ok_or_else(|| Fault::NotWhole { expected: "the index of a vertex", found: shown(value) })?;
+                .ok_or_else(|| Fault::NotWhole { expected: "a vertex index", found: shown(value) })?;
             let vertex = if index < 0 {
                 // No file has 2^63 vertices.
                 let from_first = i64::try_from(self.vertices).unwrap_or_default() + index;

@@ -1,41 +1,42 @@
-//! OFF, the Object File Format of Geomview, as text: vertices with normals or colours, and polygons.
+//! OFF, the Object File Format of Geomview, text only: vertices with normals or colours, and
+//! polygons.
 
 use crate::columns::{Holds, Row};
 use crate::error::{Broken, Fault};
 use crate::sink::{Sink, corner};
 use crate::text::{Line, Lines, number, shown, whole};
 
-/// Whether a text whose first word is this is OFF.
+/// Returns `true` if this first word of a file is that of OFF.
 pub(crate) fn is_header(word: &[u8]) -> bool {
     matches!(word, b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF" | b"STCNOFF" | b"STNOFF" | b"STCOFF")
 }
 
-/// How many vertices a file that begins like this has, at most as many as fit.
+/// Returns the number of vertices in the header, limited to those that fit into a file of this
+/// length.
 pub(crate) fn count(head: &[u8], length: u64) -> Option<u64> {
     Some(Header::parse(&mut Lines::new(head)).ok()?.vertices.min(length / 6))
 }
 
 struct Header {
-    /// What stands before the coordinates of a vertex, and what after.
     has_colours: bool,
     has_normals: bool,
     vertices: u64,
     faces: u64,
-    /// Where the counts stand.
+    /// Line of the counts.
     line: u64,
 }
 
 impl Header {
     fn parse(lines: &mut Lines<'_>) -> Result<Self, Broken> {
-        let missing = || Fault::Undeclared { what: "how many vertices and faces there are" };
+        let missing = || Fault::Undeclared { what: "numbers of vertices and faces" };
         let first = filled(lines).ok_or_else(|| missing().on_line(1))?;
         let mut words = first.words();
         let name = words.next().unwrap_or_default();
         if !is_header(name) || first.words().any(|word| word == b"BINARY") {
-            let expected = "OFF as text, of three dimensions";
+            let expected = "three-dimensional OFF as text";
             return Err(Fault::Expected { expected, found: shown(first.text) }.on_line(first.number));
         }
-        // The counts may follow on the same line.
+        // The counts may be on the same line.
         let mut line = first;
         let mut counts: Vec<&[u8]> = words.collect();
         if counts.is_empty() {
@@ -44,7 +45,8 @@ impl Header {
         }
         let count = |i: usize| {
             let word = counts.get(i).copied().unwrap_or_default();
-            let wrong = || Fault::NotWhole { expected: "a number of vertices or faces", found: shown(word) };
+            let expected = ["the number of vertices", "the number of faces"][i];
+            let wrong = || Fault::NotWhole { expected, found: shown(word) };
             whole::<u64>(word).ok_or_else(|| wrong().on_line(line.number))
         };
         Ok(Self {
@@ -57,7 +59,7 @@ impl Header {
     }
 }
 
-/// The next line with values.
+/// Returns the next line with values, without its comment.
 fn filled<'a>(lines: &mut Lines<'a>) -> Option<Line<'a>> {
     let line = lines.find(|line| {
         let text = line.text.trim_ascii_start();
@@ -67,7 +69,7 @@ fn filled<'a>(lines: &mut Lines<'a>) -> Option<Line<'a>> {
     Some(Line { text, ..line })
 }
 
-/// The content of a file.
+/// Parses an OFF file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let mut lines = Lines::new(bytes);
     let header = Header::parse(&mut lines)?;
@@ -76,7 +78,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let promised = |element: &str, promised, present| {
         Fault::Promised { element: element.into(), promised, present }.on_line(declared)
     };
-    // A vertex takes six bytes at least.
+    // A vertex takes at least six bytes.
     let fit = (lines.left() / 6) as u64;
     let mut sink = Sink::new(holds, usize::try_from(vertices.min(fit)).unwrap_or_default());
     for index in 0..vertices {
@@ -94,8 +96,8 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     Ok(sink)
 }
 
-/// Coordinates, then a normal and a colour where the header says so. A colour in whole numbers goes up to
-/// 255, one with decimal points up to 1.
+/// Parses coordinates, then a normal and a colour if the header declares them. Colours of whole
+/// numbers are in 0..=255, those with decimal points in 0..=1.
 fn vertex(line: Line<'_>, holds: Holds) -> Result<Row, Fault> {
     const NAMES: [&str; 9] = ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"];
     let mut row: Row = [0.0; 11];
@@ -114,16 +116,16 @@ fn vertex(line: Line<'_>, holds: Holds) -> Result<Row, Fault> {
     Ok(row)
 }
 
-/// How many corners a face has, then their vertices; a colour after them says nothing to us.
+/// Parses the number of corners of a face, then their vertices. A colour after them is ignored.
 fn face(line: Line<'_>, vertices: u64, corners: &mut Vec<u32>) -> Result<(), Fault> {
     let mut words = line.words();
     let expected = |expected, word: &[u8]| Fault::NotWhole { expected, found: shown(word) };
     let word = words.next().unwrap_or_default();
-    let count: usize = whole(word).ok_or_else(|| expected("how many corners a face has", word))?;
+    let count: usize = whole(word).ok_or_else(|| expected("the number of corners of a face", word))?;
     corners.clear();
     for _ in 0..count {
         let word = words.next().ok_or(Fault::PastEnd)?;
-        let index: i64 = whole(word).ok_or_else(|| expected("the index of a vertex", word))?;
+        let index: i64 = whole(word).ok_or_else(|| expected("a vertex index", word))?;
         corners.push(corner(index, vertices, 0)?);
     }
     Ok(())

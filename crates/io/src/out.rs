@@ -1,7 +1,7 @@
-//! Points out, a block at a time, in any format that holds points alone.
+//! Writing of points in blocks, in all formats for points.
 //!
-//! A header says how many points follow, where they are and how precise they are, so that points are gone
-//! over twice: a [`Survey`] first, then a [`PointWriter`].
+//! The header contains the number, the bounds and the precision of the points. Therefore the points
+//! are processed twice: first by a [`Survey`], then by a [`PointWriter`].
 
 #[cfg(feature = "laz")]
 mod las;
@@ -29,17 +29,17 @@ pub enum OutputFormat {
     Las,
     /// LAS 1.4, compressed by laszip.
     Laz,
-    /// Text: x y z, then what else there is, under a line of names.
+    /// Text: x y z, then further attributes, with a line of column names if there are any.
     Xyz,
     /// A NumPy array of N × 3 numbers.
     Npy,
 }
 
-/// Not the name of a format that can be written.
+/// Error of parsing an [`OutputFormat`] from an unknown name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("expected ply, pcd, las, laz, xyz or npy, got `{given}`")]
 pub struct UnknownOutputFormat {
-    /// What was given.
+    /// The given name.
     pub given: String,
 }
 
@@ -60,15 +60,15 @@ impl FromStr for OutputFormat {
 }
 
 impl OutputFormat {
-    /// The format that the ending of a name stands for.
+    /// Returns the format of the file extension of `path`.
     ///
     /// # Errors
-    /// Names the ending if no format has it.
+    /// Fails if no format has this extension.
     pub fn of(path: &Path) -> Result<Self, UnknownOutputFormat> {
         path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().parse()
     }
 
-    /// Names what points hold and this format does not.
+    /// Returns the names of the attributes that the points have and this format cannot store.
     #[must_use]
     pub fn loses(self, survey: &Survey) -> Vec<&'static str> {
         let Holds { normals, colours, intensities, classes } = survey.holds;
@@ -83,7 +83,7 @@ impl OutputFormat {
     }
 }
 
-/// Writes points that were surveyed before.
+/// A writer of points that a [`Survey`] has processed before.
 pub struct PointWriter<W: Write + Seek + Send + Sync + 'static> {
     survey: Survey,
     out: Out<W>,
@@ -97,10 +97,11 @@ enum Out<W: Write + Seek + Send + Sync + 'static> {
 }
 
 impl<W: Write + Seek + Send + Sync + 'static> PointWriter<W> {
-    /// Writes the header.
+    /// Creates a writer and writes the header.
     ///
     /// # Errors
-    /// When the output fails, and when LAS cannot count such coordinates.
+    /// Fails if the output fails, if the coordinates exceed the range of LAS, or for LAS and LAZ
+    /// without the feature `laz`.
     pub fn new(out: W, format: OutputFormat, survey: &Survey) -> Result<Self, OutError> {
         let out = match format {
             #[cfg(feature = "laz")]
@@ -118,10 +119,10 @@ impl<W: Write + Seek + Send + Sync + 'static> PointWriter<W> {
         Ok(Self { survey: survey.clone(), out, bytes: Vec::new() })
     }
 
-    /// Writes some points.
+    /// Writes a block of points.
     ///
     /// # Errors
-    /// When the output fails.
+    /// Fails if the output fails.
     pub fn write(&mut self, points: &Points) -> Result<(), OutError> {
         self.bytes.clear();
         match &mut self.out {
@@ -143,10 +144,10 @@ impl<W: Write + Seek + Send + Sync + 'static> PointWriter<W> {
         Ok(())
     }
 
-    /// Writes what comes after the last point.
+    /// Finishes the file and returns the output.
     ///
     /// # Errors
-    /// When the output fails.
+    /// Fails if the output fails.
     pub fn finish(self) -> Result<W, OutError> {
         match self.out {
             #[cfg(feature = "laz")]
@@ -162,8 +163,7 @@ impl<W: Write + Seek + Send + Sync + 'static> std::fmt::Debug for PointWriter<W>
     }
 }
 
-/// Names of what points hold besides coordinates, in the order in which it is written, and the type of each
-/// by PLY's name.
+/// Returns the names of the attributes besides coordinates, in file order, each with its PLY type.
 fn columns(holds: Holds) -> Vec<(&'static str, &'static str)> {
     let groups: [(bool, &[(&str, &str)]); 4] = [
         (holds.normals, &[("nx", "float"), ("ny", "float"), ("nz", "float")]),
@@ -186,7 +186,7 @@ fn header(out: &mut impl Write, format: OutputFormat, survey: &Survey) -> io::Re
             writeln!(out, "end_header")
         }
         OutputFormat::Pcd => {
-            // Colours are packed into one field, as readers of PCD expect them.
+            // Colours are packed into one field, as readers of PCD expect.
             let (size, mut fields) = (if is_single { 4 } else { 8 }, vec![]);
             fields.extend(["x", "y", "z"].map(|name| (name, size, 'F')));
             for (name, _) in columns(holds).into_iter().filter(|(name, _)| !matches!(*name, "green" | "blue"))
@@ -216,7 +216,7 @@ fn header(out: &mut impl Write, format: OutputFormat, survey: &Survey) -> io::Re
         OutputFormat::Npy => {
             let kind = if is_single { "<f4" } else { "<f8" };
             let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({count}, 3), }}");
-            // Magic, version and length take ten bytes; all of it a multiple of 64.
+            // Magic, version and length take ten bytes. The whole header is a multiple of 64 bytes.
             while (10 + text.len() + 1) % 64 != 0 {
                 text.push(' ');
             }
@@ -244,7 +244,7 @@ fn coordinates(position: [f64; 3], is_single: bool, bytes: &mut Vec<u8>) {
     }
 }
 
-/// A point in binary.
+/// Writes a point in binary.
 fn record(points: &Points, i: usize, is_single: bool, format: OutputFormat, bytes: &mut Vec<u8>) {
     coordinates(points.positions[i], is_single, bytes);
     if let Some(normal) = points.normals.get(i) {
@@ -263,7 +263,8 @@ fn record(points: &Points, i: usize, is_single: bool, format: OutputFormat, byte
     bytes.extend(points.classes.get(i));
 }
 
-/// A point as text, in as few digits as lead back to the same numbers, or in so many decimals.
+/// Writes a point as text, with this number of decimals, or else the shortest digits that parse to
+/// the same number.
 fn line(points: &Points, i: usize, decimals: Option<usize>, bytes: &mut Vec<u8>) -> io::Result<()> {
     let [x, y, z] = points.positions[i];
     match decimals {

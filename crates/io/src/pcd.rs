@@ -1,7 +1,9 @@
-//! PCD, the Point Cloud Library's own format, versions 0.5 to 0.7: ascii, binary and `binary_compressed`.
+//! PCD, the format of the Point Cloud Library, versions 0.5 to 0.7: ascii, binary and
+//! `binary_compressed`.
 //!
-//! A field of several values a point (COUNT above 1) is stepped over, NaN points are left to the cloud to
-//! drop, and VIEWPOINT is ignored: points stay in the frame of the file. Numbers are little endian.
+//! Fields with several values per point (COUNT above 1) are skipped. NaN points are passed on; the
+//! cloud drops them. VIEWPOINT is ignored: points stay in the frame of the file. Numbers are little
+//! endian.
 
 mod header;
 mod lzf;
@@ -14,18 +16,19 @@ use crate::sink::Sink;
 use crate::text::{Line, Lines, number, shown, whole};
 use header::{Encoding, Field, Header, Part};
 
-/// Memory that reading takes for each point, beside its bytes: in double precision, then rounded and sorted.
+/// Memory for reading a point in bytes, besides its record: double precision, then rounding and
+/// sorting.
 const BYTES_A_POINT: u128 = 64;
 
-/// Compressed data may take this much memory whatever their length: two million points, all of them at one
-/// place.
+/// Memory in bytes that compressed data may always take: enough for two million equal points.
 const FREE: u128 = 128 << 20;
 
-/// Beyond it, so much for each compressed byte. Scans take some 10 bytes of memory a byte; frames most of
-/// whose pixels saw nothing up to 100. Made to harm, a byte gives 2000.
+/// Additional memory in bytes that each compressed byte may take. Scans take some 10 bytes per
+/// compressed byte, and camera frames with few valid pixels up to 100. Malicious data can reach
+/// 2000.
 const BYTES_A_BYTE: u128 = 128;
 
-/// The content of a PCD file.
+/// Parses a PCD file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let (header, lines) = header::parse(bytes)?;
     match header.encoding {
@@ -35,7 +38,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     }
 }
 
-/// How to go over the points of a file that begins like this, unless they are compressed or it is broken.
+/// Returns the layout of the points, unless they are compressed or the header is invalid.
 pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     let (header, lines) = header::parse(head).ok()?;
     let encoding = match header.encoding {
@@ -54,8 +57,8 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     })
 }
 
-/// How many points a file of this length that begins like this has, as its header says, and at most as many
-/// as fit.
+/// Returns the number of points in the header, limited to those that fit into a file of this
+/// length.
 pub(crate) fn count(head: &[u8], length: u64) -> Option<u64> {
     let (header, lines) = header::parse(head).ok()?;
     let room = u128::from(length - lines.offset() as u64);
@@ -151,7 +154,8 @@ fn binary(header: &Header, bytes: &[u8], start: usize) -> Result<Sink, Broken> {
     Ok(sink)
 }
 
-/// Two lengths, packed and unpacked, then the values: all of the first field, all of the second and so on.
+/// Parses compressed data: the compressed and the uncompressed length, then the values, field by
+/// field.
 fn compressed(header: &Header, bytes: &[u8], start: usize) -> Result<Sink, Broken> {
     let length = |at: usize| {
         let length = bytes.get(at..).and_then(<[u8]>::first_chunk);
@@ -160,7 +164,7 @@ fn compressed(header: &Header, bytes: &[u8], start: usize) -> Result<Sink, Broke
     let (Some(packed), Some(declared)) = (length(start), length(start + 4)) else {
         return Err(Fault::PastEnd.at_byte(start));
     };
-    // Wide enough: the stride is below 2^63, so the product of 64-bit numbers cannot overflow 128 bits.
+    // A product of two 64-bit numbers cannot overflow 128 bits.
     let needed = u128::from(header.points) * header.stride as u128;
     if needed != u128::from(declared) {
         let unpacked = Fault::UnpackedSize {
@@ -198,11 +202,12 @@ fn cut(byte: usize, index: usize) -> Broken {
 }
 
 impl Field {
-    /// Puts the field's value at the start of `bytes` where it belongs; none if they are too few.
+    /// Reads the value of the field from the start of `bytes` into `row`. Returns `None` if `bytes`
+    /// is too short.
     fn read(&self, bytes: &[u8], row: &mut Row) -> Option<()> {
         match self.part {
             Part::Slot(slot, scalar) => row[slot] = scalar.read(bytes, Order::Little)?,
-            // As bits, since colours are no valid floats in general.
+            // Read as bits, since packed colours may be signalling NaNs.
             Part::Packed(_) => unpack(u32::from_le_bytes(*bytes.first_chunk()?), row),
             Part::Nothing => {}
         }
@@ -210,7 +215,7 @@ impl Field {
     }
 }
 
-/// The bits of a packed colour written as a number.
+/// Parses a number whose bits are a packed colour.
 fn packed(word: &[u8], scalar: Scalar) -> Option<u32> {
     match scalar {
         Scalar::F32 if number(word)?.is_nan() => Some(0),
@@ -220,7 +225,7 @@ fn packed(word: &[u8], scalar: Scalar) -> Option<u32> {
     }
 }
 
-/// Red, green and blue from the lower three bytes.
+/// Unpacks red, green and blue from the lower three bytes.
 fn unpack(bits: u32, row: &mut Row) {
     let [_, r, g, b] = bits.to_be_bytes();
     row[6..9].copy_from_slice(&[r, g, b].map(f64::from));

@@ -1,7 +1,6 @@
-//! Files of points larger than memory: row by row, a block at a time.
+//! Reading of files larger than the memory, in blocks.
 //!
-//! What the whole-file readers know of a row is used here too; what they say of a broken file is said here in
-//! the same words.
+//! The parsers of rows are those of the whole-file readers, so both report the same errors.
 
 use std::fmt;
 use std::fs::File;
@@ -21,28 +20,28 @@ use crate::rows::{Blocks, Encoding, Layout};
 use crate::selection::Selection;
 use crate::{las, npy, pcd, ply, xyz};
 
-/// A mesh, or points that can be gone over a piece at a time.
+/// A mesh, or points that can be read in pieces.
 #[derive(Debug)]
 pub enum Pieces {
-    /// What has faces, read whole.
+    /// A file with faces, read as a whole.
     Mesh {
-        /// The vertices, with what the file says of each.
+        /// The vertices with their attributes.
         vertices: Points,
         /// The triangles over the same vertices.
         mesh: TriangleMesh,
     },
-    /// What has none.
+    /// A file without faces.
     Points(PointPieces),
 }
 
-/// The points of a file, all vertices in its order, broken ones and duplicates too.
+/// The points of a file in file order, including invalid points and duplicates.
 pub struct PointPieces {
     path: PathBuf,
     source: Source,
 }
 
 enum Source {
-    /// Formats that cannot be read in pieces.
+    /// The points of a format that cannot be read in pieces.
     Whole(Points),
     Stream {
         file: File,
@@ -57,15 +56,15 @@ enum Source {
     },
 }
 
-/// Opens a file for going over its points, of which some `block` bytes are read at a time; meshes are read
-/// whole.
+/// Opens a file whose points are read in blocks of about `block` bytes. Meshes are read as a whole.
 ///
-/// PLY of vertices alone, PCD that is not compressed, LAS, LAZ, E57, NPY and text are never in memory as a
-/// whole, only a block (more if a row is longer) and its points, which take up to eight times as much. Others
-/// are read as by [`read`](crate::read()).
+/// PLY without faces, uncompressed PCD, LAS, LAZ, E57, NPY and text are never in memory as a whole.
+/// The memory holds a block, or one row if that is longer, and its points, which take up to eight
+/// times as much. All other files are read as by [`read`](crate::read()).
 ///
 /// # Errors
-/// As [`read`](crate::read()), as far as the header tells. That there are too few points for a cloud is none.
+/// Fails like [`read`](crate::read()) for errors in the header. A file with too few points for a
+/// cloud is not an error.
 pub fn read_in_pieces(
     path: impl AsRef<Path>,
     format: Option<Format>,
@@ -91,7 +90,7 @@ pub fn read_in_pieces(
         Format::Obj | Format::Las | Format::E57 | Format::Stl | Format::Off | Format::Gltf => None,
     };
     let points = |source| Pieces::Points(PointPieces { path: path.into(), source });
-    // A header that fills all of the head may go on after it.
+    // A header that fills the whole head may continue behind it.
     if let Some(mut layout) = layout.filter(|layout| mark + layout.start < head.len()) {
         layout.start += mark;
         layout.check_length(length).map_err(|broken| broken.of(path))?;
@@ -111,8 +110,8 @@ pub fn read_in_pieces(
 }
 
 impl PointPieces {
-    /// The same points, without most of those outside `bounds` where the file can be read in part, as COPC
-    /// can: only what lies near them is read. Other files are read whole.
+    /// Restricts COPC to the nodes that meet `bounds`, so most points outside `bounds` are left
+    /// out. Has no effect on other formats.
     #[must_use]
     pub fn near(mut self, bounds: Aabb) -> Self {
         if let Source::Stream { selection, .. } = &mut self.source {
@@ -121,15 +120,15 @@ impl PointPieces {
         self
     }
 
-    /// Returns `true` if the file has levels of detail, as COPC has.
+    /// Returns `true` if the file has levels of detail, like COPC.
     #[must_use]
     pub fn has_levels(&self) -> bool {
         matches!(&self.source, Source::Stream { file, format: Format::Las, .. }
             if las::has_levels(Input::File(file)))
     }
 
-    /// The points of the coarser levels of detail, down to the one whose points are about `spacing` apart.
-    /// Files without levels are read whole.
+    /// Restricts the points to the coarser levels of detail, down to the level whose points are
+    /// about `spacing` apart. Has no effect on files without levels.
     #[must_use]
     pub fn at_resolution(mut self, spacing: f64) -> Self {
         if let Source::Stream { selection, .. } = &mut self.source {
@@ -138,7 +137,7 @@ impl PointPieces {
         self
     }
 
-    /// The steps in which coordinates are counted, if this is LAS.
+    /// Returns the scale and offset of the coordinates of a LAS file.
     #[must_use]
     pub fn lattice(&self) -> Option<Lattice> {
         match &self.source {
@@ -147,11 +146,12 @@ impl PointPieces {
         }
     }
 
-    /// Goes over all points from the first on, and hands out some at a time. Can be done again.
+    /// Passes all points to `take`, in blocks, starting at the first point. Can be called
+    /// repeatedly.
     ///
     /// # Errors
-    /// When the file cannot be read, or a row is broken: which, and where. What came before it has been
-    /// handed out.
+    /// Fails if the file cannot be read or a row is invalid; the error names the row. Earlier
+    /// blocks have been passed to `take`.
     pub fn each(&self, mut take: impl FnMut(&Points)) -> Result<(), ReadError> {
         self.each_until(&mut |points| {
             take(points);
@@ -159,10 +159,10 @@ impl PointPieces {
         })
     }
 
-    /// As [`Self::each`], until the first error of `take`.
+    /// Like [`Self::each`], but stops at the first error of `take`.
     ///
     /// # Errors
-    /// As [`Self::each`], and those of `take`.
+    /// Fails like [`Self::each`], or with the error of `take`.
     pub fn try_each<E: From<ReadError>>(
         &self,
         mut take: impl FnMut(&Points) -> Result<(), E>,

@@ -1,10 +1,10 @@
 //! PLY, after Greg Turk, "The PLY Polygon File Format" (Stanford, 1994): ascii and binary in both byte
 //! orders.
 //!
-//! Points come from the element `vertex`, triangles from `face` (polygons, as fans) and `tristrips`; whatever
-//! else the header declares is stepped over. Bytes after the last element of a binary file are ignored as by
-//! other readers; text after the last element of an ascii file is refused, because a count that is too small
-//! would silently cut the cloud.
+//! Points come from the element `vertex`, and triangles from `face` (polygons, cut into fans) and
+//! `tristrips`. Other elements are skipped. Bytes after the last element of a binary file are
+//! ignored, as by other readers. Text after the last element of an ascii file is an error, because
+//! a count that is too small would silently cut the cloud.
 
 mod header;
 mod source;
@@ -18,7 +18,7 @@ use crate::text::Line;
 use header::{Element, Encoding, Header, Part, Role};
 use source::{Ascii, Binary, Source};
 
-/// The content of a PLY file.
+/// Parses a PLY file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let (header, lines) = header::parse(bytes)?;
     match header.encoding {
@@ -32,8 +32,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     }
 }
 
-/// How to go over the vertices of a file that begins like this, if there is nothing else in it and it is not
-/// broken.
+/// Returns the layout of the vertices, if the file has no other elements and its header is valid.
 pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     let (header, lines) = header::parse(head).ok()?;
     let mut elements = header.elements.into_iter().filter(|e| !e.properties.is_empty() && e.count > 0);
@@ -57,10 +56,10 @@ pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     Some(Layout { start: lines.offset(), encoding, element, promised, holds, rows })
 }
 
-/// Rows of nothing but vertices.
+/// The rows of a file with vertices only.
 struct Vertices {
     element: Element,
-    /// Of binary numbers.
+    /// Byte order of binary numbers.
     order: Order,
 }
 
@@ -83,13 +82,13 @@ impl Rows for Vertices {
     }
 
     fn record(&self, bytes: &[u8], row: &mut Row) {
-        // Nothing but numbers, as many as there are bytes for.
+        // Cannot fail: `bytes` holds the numbers of one vertex.
         let _ = self.read(&mut Binary::new(bytes, 0, self.order), row);
     }
 }
 
-/// How many vertices a file of this length that begins like this has, as its header says, and at most as many
-/// as fit.
+/// Returns the number of vertices in the header, limited to those that fit into a file of this
+/// length.
 pub(crate) fn count(head: &[u8], length: u64) -> Option<u64> {
     let (header, lines) = header::parse(head).ok()?;
     let vertex = header.vertices().ok()?;
@@ -105,7 +104,7 @@ fn elements<'a>(header: &Header, source: &mut impl Source<'a>) -> Result<Sink, B
     let vertex = header.vertices()?;
     let holds = Holds::among(vertex.slots()).map_err(|fault| fault.on_line(vertex.line))?;
     let mut reader = Reader::new(vertex.count);
-    // An element without properties takes no space, so its count says nothing.
+    // An element without properties takes no space, so its count cannot be checked.
     for element in header.elements.iter().filter(|e| !e.properties.is_empty()) {
         if element.role == Role::Vertex {
             let fit = source.left() / source.least_size(element);
@@ -130,7 +129,7 @@ fn elements<'a>(header: &Header, source: &mut impl Source<'a>) -> Result<Sink, B
     Ok(sink)
 }
 
-/// What is kept of the element that is being read.
+/// The values of the element that is being read.
 struct Reader {
     vertices: u64,
     row: Row,
@@ -193,10 +192,11 @@ impl Reader {
     }
 }
 
-/// A vertex index from a number of any type; the types of PLY all fit into double precision.
+/// Converts a number of any PLY type to a vertex index. All PLY types are exact in double
+/// precision.
 fn index(value: f64) -> Result<i64, Fault> {
     if value.fract() != 0.0 {
-        return Err(Fault::NotWhole { expected: "the index of a vertex", found: value.to_string().into() });
+        return Err(Fault::NotWhole { expected: "a vertex index", found: value.to_string().into() });
     }
     #[expect(clippy::cast_possible_truncation, reason = "saturates, and no vertex is that far out")]
     let index = value as i64;

@@ -1,44 +1,44 @@
-//! Points with what a file says of each, array by array.
+//! `Points`: points with their attributes, in arrays.
 
 use crate::columns::{Holds, Row};
 
-/// Some points of a file, in its order, with an entry of each array for each point; arrays of what the file
-/// does not hold are empty.
+/// Points in file order, with their attributes. Each array has one entry per point, or is empty if
+/// the file does not have the attribute.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Points {
-    /// Positions in the units of the file; some may be NaN or infinite.
+    /// Positions in the units of the file. Coordinates may be NaN or infinite.
     pub positions: Vec<[f64; 3]>,
-    /// Normals as they stand in the file.
+    /// Normals as stored in the file, of any length.
     pub normals: Vec<[f32; 3]>,
     /// Red, green and blue.
     pub colours: Vec<[u8; 3]>,
-    /// Intensities, in whatever unit the file has.
+    /// Intensities, in the unit of the file.
     pub intensities: Vec<f32>,
-    /// Classes by the codes of LAS: 2 is ground, 6 is buildings.
+    /// LAS class codes, such as 2 for ground and 6 for buildings.
     pub classes: Vec<u8>,
 }
 
 impl Points {
-    /// Points of which nothing else is known.
+    /// Creates points without attributes.
     #[must_use]
     pub fn of_positions(positions: Vec<[f64; 3]>) -> Self {
         Self { positions, ..Self::default() }
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     #[must_use]
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Returns `true` if there are none.
+    /// Returns `true` if there are no points.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// Forgets all points and keeps the memory.
+    /// Removes all points, but keeps the memory.
     pub(crate) fn clear(&mut self) {
         self.positions.clear();
         self.normals.clear();
@@ -47,7 +47,7 @@ impl Points {
         self.classes.clear();
     }
 
-    /// Makes room for so many points that hold this.
+    /// Reserves memory for `more` points with these attributes.
     pub(crate) fn reserve(&mut self, holds: Holds, more: usize) {
         self.positions.reserve(more);
         self.normals.reserve(if holds.normals { more } else { 0 });
@@ -56,7 +56,7 @@ impl Points {
         self.classes.reserve(if holds.classes { more } else { 0 });
     }
 
-    /// Adds a point, of which this is kept.
+    /// Adds a point with these attributes.
     #[inline]
     pub(crate) fn push(&mut self, holds: Holds, row: &Row) {
         let [x, y, z, nx, ny, nz, r, g, b, intensity, class] = *row;
@@ -77,7 +77,7 @@ impl Points {
         }
     }
 
-    /// Adds all of `other`, which holds the same.
+    /// Adds all points of `other`, which must have the same attributes.
     pub fn append(&mut self, other: &Self) {
         self.positions.extend_from_slice(&other.positions);
         self.normals.extend_from_slice(&other.normals);
@@ -102,7 +102,7 @@ fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
     values.retain(|_| kept.next().is_some_and(|kept| *kept));
 }
 
-/// A whole number in 0..=255 from any: a channel of a colour, or a class.
+/// Rounds a number to 0..=255, for a colour channel or a class.
 pub(crate) fn channel(value: f64) -> u8 {
     #[expect(
         clippy::cast_possible_truncation,

@@ -1,4 +1,4 @@
-//! From a file, or bytes in memory, to a model.
+//! Reading of whole files, from disk or memory.
 
 use std::fs::{self, File};
 use std::io::Read;
@@ -21,42 +21,45 @@ use crate::selection::Selection;
 use crate::sink::{Model, Sink};
 use crate::{las, npy, obj, off, pcd, ply, stl, xyz};
 
-/// Reads the points of a file, and its triangles where it has faces.
+/// Reads the points of a file, and its triangles if it has faces.
 ///
-/// Without a `format` the content decides, then the name. The whole file is held in memory while it is read,
-/// and what is allocated besides is bounded by the file's length, never by a count in its header: some tens
-/// of bytes for each of its own, 128 for compressed ones beyond a first 128 MiB.
+/// Without a `format`, the format is recognised by the content, then by the name. LAS, LAZ and E57
+/// are read in blocks; other files are in memory as a whole while they are read. Further
+/// allocations are bounded by the length of the file, not by counts in its header: some tens of
+/// bytes for each byte of the file, and for compressed data 128 bytes each beyond the first 128
+/// MiB.
 ///
 /// # Errors
-/// Says which file, what is wrong and where; never panics, whatever the file holds.
+/// Fails if the file cannot be read or is invalid. The error names the file, the fault and its
+/// place. Never panics, whatever the content.
 pub fn read(path: impl AsRef<Path>, format: Option<Format>) -> Result<Model, ReadError> {
     let path = path.as_ref();
     load(path, format)?.into_model(path)
 }
 
-/// [`read`] for content that is already in memory; `name` is for messages, and its ending for the format.
+/// Like [`read`], for content in memory. `name` is used in messages, and to recognise the format.
 ///
 /// # Errors
-/// As [`read`], input and output apart.
+/// Fails like [`read`], except for I/O errors.
 pub fn read_bytes(bytes: &[u8], format: Option<Format>, name: impl AsRef<Path>) -> Result<Model, ReadError> {
     let name = name.as_ref();
     parse(bytes, format, name)?.into_model(name)
 }
 
-/// Reads only the triangles, which may have fewer than the eight vertices that a cloud needs.
+/// Reads only the triangles of a file. Unlike a cloud, a mesh may have fewer than eight vertices.
 ///
 /// # Errors
-/// As [`read`], and when the file has no faces.
+/// Fails like [`read`], or if the file has no faces.
 pub fn read_mesh(path: impl AsRef<Path>, format: Option<Format>) -> Result<TriangleMesh, ReadError> {
     let path = path.as_ref();
     let no_faces = || ReadError::NoFaces { path: path.into() };
     load(path, format)?.into_mesh(path)?.ok_or_else(no_faces)
 }
 
-/// [`read_mesh`] for content that is already in memory.
+/// Like [`read_mesh`], for content in memory.
 ///
 /// # Errors
-/// As [`read_mesh`], input and output apart.
+/// Fails like [`read_mesh`], except for I/O errors.
 pub fn read_mesh_bytes(
     bytes: &[u8],
     format: Option<Format>,
@@ -67,10 +70,10 @@ pub fn read_mesh_bytes(
     parse(bytes, format, name)?.into_mesh(name)?.ok_or_else(no_faces)
 }
 
-/// The format of a file, by its first 64 KiB, then by its name.
+/// Recognises the format of a file by its first 64 KiB, then by its name.
 ///
 /// # Errors
-/// When the file cannot be read, is empty, or is of no format that can be read.
+/// Fails if the file cannot be read, is empty, or has an unsupported format.
 pub fn format_of(path: impl AsRef<Path>) -> Result<Format, ReadError> {
     let path = path.as_ref();
     check_file(path)?;
@@ -78,10 +81,11 @@ pub fn format_of(path: impl AsRef<Path>) -> Result<Format, ReadError> {
     Start::of(&mut file, None, path).map(|start| start.format)
 }
 
-/// What some programs begin text with.
+/// The byte order mark of UTF-8, which some programs write at the start of text.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Checks that it is a file; asked first, because merely opening a pipe waits for its other end.
+/// Checks that `path` is a regular file. Done before opening, since opening a pipe blocks until its
+/// other end is opened.
 pub(crate) fn check_file(path: &Path) -> Result<(), ReadError> {
     match fs::metadata(path).map_err(|cause| ReadError::Io { path: path.into(), cause })?.is_file() {
         true => Ok(()),
@@ -89,7 +93,7 @@ pub(crate) fn check_file(path: &Path) -> Result<(), ReadError> {
     }
 }
 
-/// The content of a file.
+/// Reads and parses a file.
 fn load(path: &Path, format: Option<Format>) -> Result<Sink, ReadError> {
     check_file(path)?;
     let failed = |cause| ReadError::Io { path: path.into(), cause };
@@ -103,22 +107,22 @@ fn load(path: &Path, format: Option<Format>) -> Result<Sink, ReadError> {
     parse_as(start.format, &bytes[start.mark..], path)
 }
 
-/// The first bytes of a file, and what they say of it.
+/// The start of a file, and its format.
 pub(crate) struct Start {
-    /// 64 KiB, unless the file is shorter.
+    /// The first 64 KiB, or the whole file if it is shorter.
     pub(crate) head: Vec<u8>,
-    /// Length of the byte order mark in it.
+    /// Length of the byte order mark in bytes.
     pub(crate) mark: usize,
-    /// Length of the file.
+    /// Length of the file in bytes.
     pub(crate) length: u64,
     pub(crate) format: Format,
 }
 
-/// Bytes looked at to recognise a format; headers of files that are read in pieces end in them.
+/// Number of bytes read to recognise the format. Files with longer headers are not read in pieces.
 const HEAD: u64 = 1 << 16;
 
 impl Start {
-    /// Reads the start of a file and leaves it there.
+    /// Reads the start of a file, and leaves the file positioned behind it.
     pub(crate) fn of(file: &mut File, format: Option<Format>, path: &Path) -> Result<Self, ReadError> {
         let failed = |cause| ReadError::Io { path: path.into(), cause };
         let length = file.metadata().map_err(failed)?.len();
@@ -136,7 +140,8 @@ impl Start {
     }
 }
 
-/// Goes over the points of a format that is [streamed](Format::is_streamed), some `block` bytes at a time.
+/// Passes the points of a [streamed](Format::is_streamed) format to `take`, about `block` bytes at
+/// a time.
 pub(crate) fn stream(
     format: Format,
     input: Input<'_>,
@@ -155,7 +160,7 @@ pub(crate) fn stream(
     done.map_err(|stop: Stop| stop.of(path))
 }
 
-/// All points of a format that is streamed.
+/// Reads all points of a streamed format.
 fn collect(format: Format, input: Input<'_>, path: &Path) -> Result<Sink, ReadError> {
     const BLOCK: usize = 1 << 20;
     let mut sink = Sink::default();
@@ -183,7 +188,7 @@ fn parse(bytes: &[u8], format: Option<Format>, name: &Path) -> Result<Sink, Read
     parse_as(format, bytes, name)
 }
 
-/// Content of this format, without a byte order mark.
+/// Parses content of this format. The byte order mark must have been removed.
 pub(crate) fn parse_as(format: Format, bytes: &[u8], name: &Path) -> Result<Sink, ReadError> {
     let parsed = match format {
         Format::Las | Format::E57 => return collect(format, Input::Memory(bytes), name),

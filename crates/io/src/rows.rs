@@ -1,4 +1,4 @@
-//! Rows of a file, in binary or as text, read a block at a time.
+//! Reading of rows in blocks, in binary or as text.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
@@ -11,32 +11,34 @@ use crate::points::Points;
 use crate::sink::Sink;
 use crate::text::{Line, Lines};
 
-/// Rows of a file, from its header.
+/// The layout of the rows of a file, from its header.
 pub(crate) struct Layout {
-    /// Where the first row starts, in bytes from the start of the file or what follows its byte order mark.
+    /// Offset of the first row in bytes, from the start of the file or from the end of its byte
+    /// order mark.
     pub(crate) start: usize,
     pub(crate) encoding: Encoding,
-    /// What a row is called.
+    /// Name of a row in messages.
     pub(crate) element: Box<str>,
-    /// How many there are, and the line that says so.
+    /// Number of rows in the header, and the line that declares it.
     pub(crate) promised: Option<(u64, u64)>,
-    /// What of a row is kept.
+    /// The attributes of a row.
     pub(crate) holds: Holds,
     pub(crate) rows: Box<dyn Rows + Send + Sync>,
 }
 
-/// What divides rows.
+/// The encoding of rows.
 #[derive(Clone, Copy)]
 pub(crate) enum Encoding {
-    /// So many bytes each.
+    /// Rows of `stride` bytes.
     Binary { stride: usize },
-    /// A line each. The number of the line before the first row, and the byte that ends lines.
+    /// Rows of one line. `number` is that of the line before the first row, and `end` is the byte
+    /// that ends lines.
     Text { number: u64, end: u8 },
 }
 
-/// Parses rows in either encoding. Slots of a row without a column keep their values.
+/// A parser of rows in either encoding. Slots of a row without a column keep their values.
 pub(crate) trait Rows {
-    /// Returns `false` for blank lines and comments.
+    /// Returns `true` unless the line is blank or a comment.
     fn is_row(&self, line: &Line<'_>) -> bool;
     /// Parses a line.
     fn line(&self, line: Line<'_>, row: &mut Row) -> Result<(), Fault>;
@@ -45,21 +47,21 @@ pub(crate) trait Rows {
 }
 
 impl Encoding {
-    /// For the rest of these lines.
+    /// Returns the encoding of the remaining lines.
     pub(crate) fn of_text(lines: &Lines<'_>) -> Self {
         Self::Text { number: lines.number(), end: lines.end() }
     }
 }
 
 impl Layout {
-    /// Checks that records are as many as promised.
+    /// Checks that a file of this length contains all records of the header.
     pub(crate) fn check_length(&self, length: u64) -> Result<(), Broken> {
         let Encoding::Binary { stride } = self.encoding else { return Ok(()) };
         let present = length.saturating_sub(self.start as u64) / stride as u64;
         self.check_count(present)
     }
 
-    /// All records of a file in memory.
+    /// Reads all records of a file in memory.
     pub(crate) fn whole(&self, bytes: &[u8]) -> Result<Sink, Broken> {
         self.check_length(bytes.len() as u64)?;
         let Encoding::Binary { stride } = self.encoding else { return Ok(Sink::default()) };
@@ -119,7 +121,7 @@ impl Layout {
         let (mut points, mut row, mut index) = (Points::default(), Row::default(), 0);
         let mut is_last = false;
         while !is_last {
-            // What was left over has no end of a line, so that a long one is looked through once.
+            // The rest of the last block has no line end, so only new bytes are searched.
             let left_over = blocks.bytes.len();
             is_last = blocks.fill_more()?;
             let last = blocks.bytes[left_over..].iter().rposition(|byte| *byte == end);
@@ -146,7 +148,7 @@ impl Layout {
     }
 }
 
-/// A file, a block at a time.
+/// A reader of a file in blocks.
 pub(crate) struct Blocks<'a> {
     path: &'a Path,
     file: &'a File,
@@ -168,15 +170,15 @@ impl<'a> Blocks<'a> {
         Ok(())
     }
 
-    /// The next so many bytes, instead of those before.
+    /// Replaces the bytes by the next `length` bytes.
     fn fill(&mut self, length: usize) -> Result<(), ReadError> {
         self.bytes.clear();
         self.append(length)?;
-        // It was long enough when it was opened.
+        // The length was checked when the file was opened, so it has become shorter.
         if self.bytes.len() == length { Ok(()) } else { Err(self.failed(ErrorKind::UnexpectedEof.into())) }
     }
 
-    /// Another block after what is left of those before. Tells whether it is the last.
+    /// Appends a block to the remaining bytes. Returns `true` if the block is the last one.
     fn fill_more(&mut self) -> Result<bool, ReadError> {
         let before = self.bytes.len();
         self.append(self.block)?;

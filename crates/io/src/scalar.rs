@@ -1,6 +1,6 @@
-//! Numbers in binary.
+//! Binary numbers.
 
-/// A type of number that PLY or PCD files hold.
+/// A type of binary number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Scalar {
     I8,
@@ -15,7 +15,7 @@ pub(crate) enum Scalar {
     F64,
 }
 
-/// Order of the bytes of a number.
+/// A byte order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
     Little,
@@ -33,7 +33,8 @@ impl Scalar {
         }
     }
 
-    /// The number at the start of `bytes`, if they are enough. Exact, but for 64-bit integers beyond 2^53.
+    /// Reads the number at the start of `bytes`, if it is long enough. Exact, except for 64-bit
+    /// integers beyond 2^53.
     #[inline]
     pub(crate) fn read(self, bytes: &[u8], order: Order) -> Option<f64> {
         Some(match self {

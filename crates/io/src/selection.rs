@@ -1,12 +1,12 @@
-//! Which points of a file are wanted.
+//! `Selection`: a region and a level of detail.
 
 use nearmiss_geometry::Aabb;
 
-/// Points of a part of space, and no more of them than a distance asks for.
+/// A selection of the nodes of a COPC file, by region and level of detail.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Selection {
-    /// Nodes that lie outside are left out.
+    /// Bounds outside of which nodes are skipped.
     pub(crate) bounds: Option<Aabb>,
-    /// Levels of the tree are left out whose points are nearer to each other than this.
+    /// Distance between points at the finest level. Finer levels are skipped.
     pub(crate) spacing: Option<f64>,
 }

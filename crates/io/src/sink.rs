@@ -1,4 +1,4 @@
-//! The one thing that every reader fills; it ends in a model.
+//! `Sink`: the points and triangles that every reader collects, and that become a `Model`.
 
 use std::path::Path;
 
@@ -8,19 +8,19 @@ use crate::columns::{Holds, Row};
 use crate::error::{Fault, ReadError};
 use crate::points::Points;
 
-/// What a file holds.
+/// The contents of a file: a point cloud, and a mesh if the file has faces.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Model {
-    /// All vertices, broken ones and duplicates dropped and counted; [`PointCloud::source`] leads back to the
-    /// order of the file, and so to the vertices of the mesh. Carries normals, colours, intensities and
-    /// classes if the file does.
+    /// All vertices, except invalid ones and duplicates, which are dropped and counted.
+    /// [`PointCloud::source`] maps its points to indices in the file, which are also those of the
+    /// mesh. It has normals, colours, intensities and classes if the file does.
     pub cloud: PointCloud,
-    /// The faces, cut into triangles, over all vertices in the order of the file; `None` if there are none.
+    /// The faces, cut into triangles, with all vertices in file order; `None` without faces.
     pub mesh: Option<TriangleMesh>,
 }
 
-/// Rows and faces as they come, in the order of the file.
+/// Points and triangles in file order.
 #[derive(Debug, Default)]
 pub(crate) struct Sink {
     points: Points,
@@ -30,36 +30,36 @@ pub(crate) struct Sink {
 }
 
 impl Sink {
-    /// For rows that hold this. `capacity` of them must be sure to fit into memory: no more than the file's
-    /// length has space for.
+    /// Creates a sink for points with these attributes. `capacity` must be bounded by the length of
+    /// the file.
     pub(crate) fn new(holds: Holds, capacity: usize) -> Self {
         Self::default().with_rows(holds, capacity)
     }
 
-    /// The same, now expecting rows; for formats in which faces may come first.
+    /// Sets the attributes of the points that follow. For formats in which faces may come first.
     pub(crate) fn with_rows(mut self, holds: Holds, capacity: usize) -> Self {
         self.holds = holds;
         self.points.reserve(holds, capacity);
         self
     }
 
-    /// A point with what belongs to it.
+    /// Adds a point.
     #[inline]
     pub(crate) fn row(&mut self, row: &Row) {
         self.points.push(self.holds, row);
     }
 
-    /// Where scanners stood.
+    /// Sets the scanner positions.
     pub(crate) fn with_scanners(self, scanners: Vec<Scanner>) -> Self {
         Self { scanners, ..self }
     }
 
-    /// Points that all hold the same.
+    /// Adds points. All must have the same attributes.
     pub(crate) fn append(&mut self, points: &Points) {
         self.points.append(points);
     }
 
-    /// A polygon, cut into the triangles of a fan.
+    /// Adds a polygon, cut into a fan of triangles.
     pub(crate) fn polygon(&mut self, corners: &[u32]) -> Result<(), Fault> {
         let [first, rest @ ..] = corners else {
             return Err(Fault::FewCorners { corners: 0 });
@@ -71,19 +71,19 @@ impl Sink {
         Ok(())
     }
 
-    /// Triangles by their corners.
+    /// Adds triangles, given by the indices of their corners.
     pub(crate) fn triangles(&mut self, triangles: &[[u32; 3]]) {
         self.triangles.extend_from_slice(triangles);
     }
 
-    /// Triangles by the places of their corners, three after three; corners at one place become one vertex. A
-    /// sort, O(n log n).
+    /// Creates a sink of triangles, given by the positions of their corners, three for each. Equal
+    /// corners become one vertex. Takes O(n log n) time, for a sort.
     pub(crate) fn of_corners(corners: &[[f64; 3]]) -> Self {
         let bits = |i: u32| corners[i as usize].map(|x| (x + 0.0).to_bits());
         let count = u32::try_from(corners.len()).unwrap_or(u32::MAX);
         let mut order: Vec<u32> = (0..count).collect();
         order.sort_unstable_by_key(|&i| (bits(i), i));
-        // Of corners at one place the first stands for all.
+        // The first of equal corners becomes the vertex.
         let mut first_of = vec![0; order.len()];
         for run in order.chunk_by(|&i, &j| bits(i) == bits(j)) {
             run.iter().for_each(|&i| first_of[i as usize] = run[0]);
@@ -105,8 +105,8 @@ impl Sink {
         sink
     }
 
-    /// A strip: each corner makes a triangle with the two before it, every other one turned round. Triangles
-    /// with two equal corners only lead the strip on.
+    /// Adds a triangle strip: each corner forms a triangle with the previous two, and the
+    /// orientation alternates. Triangles with two equal corners are left out.
     pub(crate) fn strip(&mut self, corners: &[u32]) {
         for (i, triple) in corners.windows(3).enumerate() {
             let [a, b, c] = [triple[0], triple[1], triple[2]];
@@ -116,7 +116,7 @@ impl Sink {
         }
     }
 
-    /// The file's points as a cloud, and its triangles if there are any.
+    /// Converts the points to a cloud, and the triangles, if any, to a mesh.
     pub(crate) fn into_model(self, path: &Path) -> Result<Model, ReadError> {
         let cloud = self.cloud().map_err(|cause| ReadError::Cloud { path: path.into(), cause })?;
         let mesh = self.into_mesh(path)?;
@@ -141,17 +141,17 @@ impl Sink {
         Ok(cloud)
     }
 
-    /// The file's points, if it has no faces; else what there is.
+    /// Returns the points if there are no faces, otherwise the sink itself as the error.
     pub(crate) fn into_points(self) -> Result<Points, Box<Self>> {
         if self.triangles.is_empty() { Ok(self.points) } else { Err(Box::new(self)) }
     }
 
-    /// The file's points.
+    /// Returns the points.
     pub(crate) fn points(&self) -> &Points {
         &self.points
     }
 
-    /// The file's triangles, if there are any.
+    /// Converts the triangles, if any, to a mesh.
     pub(crate) fn into_mesh(self, path: &Path) -> Result<Option<TriangleMesh>, ReadError> {
         if self.triangles.is_empty() {
             return Ok(None);
@@ -166,7 +166,8 @@ impl Sink {
     }
 }
 
-/// The vertex that a face names by `index`, where the format counts `vertices` of them from `first`.
+/// Converts `index` of a face to the index of a vertex from 0. The format numbers `vertices`
+/// vertices from `first`.
 pub(crate) fn corner(index: i64, vertices: u64, first: u8) -> Result<u32, Fault> {
     let from_zero = index.checked_sub(first.into());
     from_zero

@@ -1,41 +1,42 @@
-//! STL, binary and text: triangles with their corners written out. Corners at one place become one vertex.
+//! STL, binary and text: triangles given by the positions of their corners. Equal corners become
+//! one vertex.
 
 use crate::error::{Broken, Fault};
 use crate::scalar::{Order, Scalar};
 use crate::sink::Sink;
 use crate::text::{Lines, number, shown};
 
-/// Bytes before the first triangle of a binary file: a comment, and how many there are.
+/// Length of the header of a binary file in bytes: a comment, and the number of triangles.
 const HEADER: usize = 84;
 
-/// Bytes of a triangle: a normal, three corners, and two bytes of anything.
+/// Length of a triangle in bytes: a normal, three corners, and two arbitrary bytes.
 const TRIANGLE: usize = 50;
 
-/// Whether these are the first bytes of a binary file of this length. There is no magic, but the length
-/// follows from a count.
+/// Returns `true` if this is the start of a binary file. The format has no magic number, but the
+/// length of the file follows from the number of triangles.
 pub(crate) fn is_binary(head: &[u8], length: u64) -> bool {
     promised(head).is_some_and(|count| HEADER as u64 + TRIANGLE as u64 * count == length)
 }
 
-/// Whether these are the first bytes of a text.
+/// Returns `true` if this is the start of a text file.
 pub(crate) fn is_text(head: &[u8]) -> bool {
     let start = head[..head.len().min(1024)].trim_ascii_start();
     start.starts_with(b"solid") && start.windows(5).any(|word| word == b"facet")
 }
 
-/// Triangles that a binary file declares.
+/// Returns the number of triangles that a binary file declares.
 fn promised(head: &[u8]) -> Option<u64> {
     let count = head.get(HEADER - 4..HEADER).and_then(<[u8]>::first_chunk)?;
     Some(u32::from_le_bytes(*count).into())
 }
 
-/// About how many corners a file of this length has.
+/// Estimates the number of corners in a file of this length.
 pub(crate) fn count(head: &[u8], length: u64) -> u64 {
-    // A triangle of a text takes some 250 bytes.
+    // A triangle takes some 250 bytes of text.
     if is_text(head) { length / 250 * 3 } else { length.saturating_sub(HEADER as u64) / TRIANGLE as u64 * 3 }
 }
 
-/// The content of a file.
+/// Parses an STL file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let corners = if is_text(bytes) { text(bytes)? } else { binary(bytes)? };
     Ok(Sink::of_corners(&corners))
@@ -50,7 +51,7 @@ fn binary(bytes: &[u8]) -> Result<Vec<[f64; 3]>, Broken> {
     let mut corners = Vec::new();
     let triangles = usize::try_from(promised).unwrap_or(usize::MAX);
     for triangle in bytes[HEADER..].chunks_exact(TRIANGLE).take(triangles) {
-        // After the normal.
+        // The corners follow the normal.
         for corner in triangle[12..48].chunks_exact(12) {
             let coordinate = |k: usize| Scalar::F32.read(&corner[4 * k..], Order::Little);
             corners.push([0, 1, 2].map(|k| coordinate(k).unwrap_or(f64::NAN)));
@@ -66,7 +67,7 @@ fn text(bytes: &[u8]) -> Result<Vec<[f64; 3]>, Broken> {
     let complete = |of_face: usize, line: u64, face: u64| match of_face {
         3 => Ok(()),
         found => {
-            let expected = "three lines `vertex` in each facet";
+            let expected = "three `vertex` lines in each facet";
             let fault = Fault::Expected { expected, found: found.to_string().into() };
             Err(fault.on_line(line).within("face", face))
         }
@@ -96,7 +97,7 @@ fn text(bytes: &[u8]) -> Result<Vec<[f64; 3]>, Broken> {
             _ => (),
         }
     }
-    // A file that was cut off.
+    // The file ends within a facet.
     if of_face > 0 {
         complete(of_face, lines.number(), faces)?;
     }

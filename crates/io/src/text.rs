@@ -1,6 +1,10 @@
-//! Lines, words and numbers of a text that may be anything.
+//! Lines, words and numbers of arbitrary text, and words of error messages.
 
-/// Lines of a text with their numbers. They end with LF, CR LF or, where the first one does, CR alone.
+use std::fmt::Display;
+use std::io::{self, ErrorKind};
+
+/// An iterator over the lines of a text, with their numbers. Lines end with LF or CR LF, or with CR
+/// alone if the first line does.
 #[derive(Clone)]
 pub(crate) struct Lines<'a> {
     bytes: &'a [u8],
@@ -9,10 +13,10 @@ pub(crate) struct Lines<'a> {
     end: u8,
 }
 
-/// A line without its end.
+/// A line without its line end.
 #[derive(Clone, Copy)]
 pub(crate) struct Line<'a> {
-    /// Counted from 1.
+    /// Number of the line, counted from 1.
     pub(crate) number: u64,
     pub(crate) text: &'a [u8],
 }
@@ -28,33 +32,33 @@ impl<'a> Lines<'a> {
         Self { bytes, offset: 0, number: 0, end }
     }
 
-    /// The lines of a further piece of a text, of which the last line before has this number, and every line
-    /// ends with this byte.
+    /// Iterates over the next piece of a text. `number` is that of the line before the piece, and
+    /// every line ends with the byte `end`.
     pub(crate) fn going_on(bytes: &'a [u8], number: u64, end: u8) -> Self {
         Self { bytes, offset: 0, number, end }
     }
 
-    /// The byte that lines end with, maybe after another.
+    /// Returns the last byte of line ends.
     pub(crate) fn end(&self) -> u8 {
         self.end
     }
 
-    /// Where the next line starts.
+    /// Returns the offset of the next line.
     pub(crate) fn offset(&self) -> usize {
         self.offset
     }
 
-    /// Bytes from the next line to the end.
+    /// Returns the number of bytes from the next line to the end.
     pub(crate) fn left(&self) -> usize {
         self.bytes.len() - self.offset
     }
 
-    /// Number of the line returned last.
+    /// Returns the number of the last line returned.
     pub(crate) fn number(&self) -> u64 {
         self.number
     }
 
-    /// The next line that is not blank.
+    /// Returns the next line that is not blank.
     pub(crate) fn next_filled(&mut self) -> Option<Line<'a>> {
         self.find(|line| !line.text.trim_ascii().is_empty())
     }
@@ -75,62 +79,98 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 impl<'a> Line<'a> {
-    /// What stands between white space.
+    /// Returns the words of the line, separated by white space.
     pub(crate) fn words(&self) -> impl Iterator<Item = &'a [u8]> + use<'a> {
         words(self.text)
     }
 }
 
-/// What stands between white space.
+/// Returns the words of a text, separated by white space.
 pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// Returns `true` if a line is neither blank nor a comment.
+/// Returns `true` if the line is neither blank nor a comment.
 pub(crate) fn has_values(line: &Line<'_>) -> bool {
     let text = line.text.trim_ascii_start();
     !text.is_empty() && !text.starts_with(b"#") && !text.starts_with(b"//")
 }
 
-/// The number that a word spells, NaN and infinity in all their spellings included.
+/// Parses a number, including NaN and infinity in all common spellings.
 pub(crate) fn number(word: &[u8]) -> Option<f64> {
     let parsed = std::str::from_utf8(word).ok()?.parse().ok();
     parsed.or_else(|| is_not_finite(word).then_some(f64::NAN))
 }
 
-/// What C libraries print for numbers that are not finite, as in `-nan(ind)` and `1.#QNAN`.
+/// Returns `true` for the spellings of C libraries for NaN and infinity, such as `-nan(ind)` and
+/// `1.#QNAN`.
 fn is_not_finite(word: &[u8]) -> bool {
     let word = word.strip_prefix(b"-").unwrap_or(word);
     let starts_with = |start: &[u8]| word.get(..start.len()).is_some_and(|w| w.eq_ignore_ascii_case(start));
     starts_with(b"nan(") || starts_with(b"1.#")
 }
 
-/// The whole number that a word spells.
+/// Parses a whole number.
 pub(crate) fn whole<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// Longer words are cut in messages.
+/// Maximum length of a word in a message, in characters.
 const SHOWN: usize = 40;
 
-/// A piece of the file fit for a message: short, and without control characters.
+/// Formats a piece of a file for a message: shortened, with control characters escaped.
 pub(crate) fn shown(piece: &[u8]) -> Box<str> {
     let start = &piece[..piece.len().min(4 * SHOWN)];
     cut(&String::from_utf8_lossy(start.trim_ascii()), SHOWN).into()
 }
 
-/// The message of a decoder, which may repeat parts of the file: cut to 200 characters, control characters
-/// escaped.
+/// Formats the message of a decoder, which may quote the file: cut to 200 characters, with control
+/// characters escaped.
 pub(crate) fn said(cause: &str) -> String {
     cut(cause, 200)
 }
 
-/// At most `most` characters, as they are shown.
+/// Returns a number with its noun: "1 entry", "2 entries".
+pub(crate) fn counted(count: impl Display, one: &str, many: &str) -> String {
+    let count = count.to_string();
+    let noun = if count == "1" { one } else { many };
+    format!("{count} {noun}")
+}
+
+/// Returns a number of bytes with its unit.
+pub(crate) fn bytes(count: impl Display) -> String {
+    counted(count, "byte", "bytes")
+}
+
+/// Returns the message and the remedy for an error of reading a file.
+pub(crate) fn io_words(cause: &io::Error) -> String {
+    match cause.kind() {
+        ErrorKind::NotFound => "no such file; check the path".to_owned(),
+        ErrorKind::PermissionDenied => "permission denied; make the file readable".to_owned(),
+        ErrorKind::OutOfMemory => {
+            "the file exceeds the available memory; close other programs, or read it in parts".to_owned()
+        }
+        _ => format!("cannot read the file ({}); check the disk and try again", plain(cause)),
+    }
+}
+
+/// Returns the message of an error in lower case, without the operating system's number for it.
+pub(crate) fn plain(cause: &io::Error) -> String {
+    let message = cause.to_string();
+    let message = message.split(" (os error ").next().unwrap_or_default();
+    let mut chars = message.chars();
+    match (chars.next(), chars.clone().next()) {
+        (Some(first), Some(second)) if second.is_lowercase() => first.to_lowercase().chain(chars).collect(),
+        _ => message.to_owned(),
+    }
+}
+
+/// Cuts a text to `most` characters after control characters are escaped.
 fn cut(text: &str, most: usize) -> String {
     let (mut shown, mut length) = (String::new(), 0);
     for c in text.chars() {
         let is_quote = matches!(c, '"' | '\'');
-        // Six characters may stand for one.
+        // An escape may have six characters.
         length += if is_quote { 1 } else { c.escape_debug().count() };
         if length > most {
             shown.push('…');
@@ -169,11 +209,21 @@ mod tests {
     }
 
     #[test]
+    fn messages_use_singular_and_plural_and_no_error_numbers() {
+        assert_eq!([0, 1, 2].map(bytes), ["0 bytes", "1 byte", "2 bytes"]);
+        if cfg!(unix) {
+            assert_eq!(plain(&io::Error::from_raw_os_error(13)), "permission denied");
+        }
+        let denied = io_words(&ErrorKind::PermissionDenied.into());
+        assert_eq!(denied, "permission denied; make the file readable");
+    }
+
+    #[test]
     fn what_is_shown_is_short_and_printable() {
         assert_eq!(&*shown(b" a\x1b[31mb "), "a\\u{1b}[31mb");
         assert_eq!(shown(&[b'x'; 1000]).chars().count(), SHOWN + 1, "cut with an ellipsis");
         assert_eq!(&*shown("Größe".as_bytes()), "Größe");
-        // Found by fuzzing: a message of two words that were escaped was longer than 400 bytes.
+        // Found by fuzzing: two escaped words made a message longer than 400 bytes.
         assert_eq!(shown(&[0x1b; 1000]).chars().count(), 6 * 6 + 1, "cut as it is shown");
     }
 }

@@ -1,40 +1,44 @@
-//! Points out, as binary little endian PLY.
+//! Writing of points as binary little-endian PLY.
 
 use std::io::{self, BufWriter, Write};
 
 use thiserror::Error;
 
-/// Why points could not be written.
+use crate::text::{counted, plain};
+
+/// Error of writing points.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The output failed.
-    #[error("writing PLY: {cause}")]
+    /// The operating system reported an error.
+    #[error("cannot write the PLY file ({}); check the space left on the disk and try again", plain(cause))]
     Io {
-        /// What the operating system said.
+        /// The operating system's error.
         cause: io::Error,
     },
-    /// Values that do not belong to the points.
-    #[error("{given} {what} for {points} points; give one for each")]
+    /// The number of values differs from the number of points.
+    #[error(
+        "expected {what} for each of {}, got {given}; give one for each",
+        counted(points, "point", "points")
+    )]
     Count {
-        /// What the values are.
+        /// Name of the values.
         what: &'static str,
-        /// How many of them there are.
+        /// Number of values.
         given: usize,
-        /// How many points there are.
+        /// Number of points.
         points: usize,
     },
-    /// An edge or a triangle that names a point which is not there, or which PLY's 31-bit indices cannot
-    /// name.
-    #[error("{element} {index} names point {point}, but there are {points} points")]
+    /// An edge or a triangle refers to a missing point, or to one beyond the 31-bit indices of PLY.
+    #[error("expected point indices below {}, got {point} ({element} {index})", (*points).min(1 << 31))]
     NoSuchPoint {
         /// `edge` or `face`.
         element: &'static str,
         /// Index of the edge or face.
         index: usize,
-        /// The point it names.
+        /// Index of the point.
         point: u32,
-        /// How many points there are.
+        /// Number of points.
         points: usize,
     },
 }
@@ -45,12 +49,12 @@ impl From<io::Error> for WriteError {
     }
 }
 
-/// A further number of each point, with its name.
+/// An additional value of each point, with its name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Column<'a> {
-    /// In single precision.
+    /// Single-precision numbers.
     Float(&'a str, &'a [f32]),
-    /// Not negative.
+    /// Unsigned 32-bit integers.
     Uint(&'a str, &'a [u32]),
 }
 
@@ -77,10 +81,11 @@ impl Column<'_> {
     }
 }
 
-/// Points and what belongs to them, to be written as binary little endian PLY.
+/// Points with their attributes, to be written as binary little-endian PLY.
 ///
-/// Positions are `float` or `double` as given, normals `float nx ny nz`, colours `uchar red green blue`, the
-/// source `uint source`; further columns follow. The same content gives the same bytes.
+/// Positions are written as `float` or `double`, as given, normals as `float nx ny nz`, colours as
+/// `uchar red green blue`, and source indices as `uint source`; further columns follow. Equal
+/// content gives equal bytes.
 #[derive(Debug, Clone, Copy)]
 #[must_use = "nothing is written before `write`"]
 pub struct PlyPoints<'a> {
@@ -100,12 +105,12 @@ enum Positions<'a> {
 }
 
 impl<'a> PlyPoints<'a> {
-    /// Points in single precision.
+    /// Creates points in single precision.
     pub const fn single(positions: &'a [[f32; 3]]) -> Self {
         Self::of(Positions::Single(positions))
     }
 
-    /// Points in double precision.
+    /// Creates points in double precision.
     pub const fn double(positions: &'a [[f64; 3]]) -> Self {
         Self::of(Positions::Double(positions))
     }
@@ -122,47 +127,48 @@ impl<'a> PlyPoints<'a> {
         }
     }
 
-    /// With a normal for each point.
+    /// Adds a normal for each point.
     pub const fn with_normals(mut self, normals: &'a [[f32; 3]]) -> Self {
         self.normals = Some(normals);
         self
     }
 
-    /// With a colour for each point: red, green, blue.
+    /// Adds a colour for each point: red, green, blue.
     pub const fn with_colours(mut self, colours: &'a [[u8; 3]]) -> Self {
         self.colours = Some(colours);
         self
     }
 
-    /// With the index that each point had in another file.
+    /// Adds the index of each point in the input.
     pub const fn with_source(mut self, source: &'a [u32]) -> Self {
         self.source = Some(source);
         self
     }
 
-    /// With further numbers of each point.
+    /// Adds further values of each point.
     pub const fn with_columns(mut self, columns: &'a [Column<'a>]) -> Self {
         self.columns = columns;
         self
     }
 
-    /// With lines between points, as the element `edge`.
+    /// Adds edges between points, as the element `edge`.
     pub const fn with_edges(mut self, edges: &'a [[u32; 2]]) -> Self {
         self.edges = edges;
         self
     }
 
-    /// With triangles between points, as the element `face`.
+    /// Adds triangles of points, as the element `face`.
     pub const fn with_triangles(mut self, triangles: &'a [[u32; 3]]) -> Self {
         self.triangles = triangles;
         self
     }
 
-    /// Writes header and content; `out` need not be buffered.
+    /// Writes the file. `out` need not be buffered.
     ///
     /// # Errors
-    /// When the output fails; and, before anything is written, when there is not one normal, colour, source
-    /// or further number for each point, or when an edge or triangle names a point that is not there.
+    /// Fails before anything is written if the number of normals, colours, source indices or values
+    /// of a column differs from the number of points, or if an edge or triangle refers to a missing
+    /// point. Fails if the output fails.
     pub fn write(&self, out: &mut impl Write) -> Result<(), WriteError> {
         self.check()?;
         let mut out = BufWriter::with_capacity(1 << 16, out);
@@ -215,7 +221,7 @@ impl<'a> PlyPoints<'a> {
             }
         }
         if let Some(column) = self.columns.iter().find(|column| column.len() != points) {
-            return Err(WriteError::Count { what: "numbers of a column", given: column.len(), points });
+            return Err(WriteError::Count { what: "values of a column", given: column.len(), points });
         }
         let edges = self.edges.iter().map(<[u32; 2]>::as_slice);
         let faces = self.triangles.iter().map(<[u32; 3]>::as_slice);

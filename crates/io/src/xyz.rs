@@ -1,9 +1,9 @@
-//! Points as lines of text: XYZ, CSV and their kin.
+//! Points as lines of text: XYZ, CSV and similar formats.
 //!
-//! The first line of values decides how all are divided: by semicolons if it has any, else by commas, else by
-//! white space. A line of column names may come before it, and a count of the points before that, as in PTS.
-//! Without names the first three columns are x, y and z, and others are known by what they hold. `#` and `//`
-//! start lines that say nothing.
+//! The first line of values determines the separator: semicolons if it has any, otherwise commas,
+//! otherwise white space. It may be preceded by a line of column names, and before that by the
+//! number of points, as in PTS. Without names the first three columns are x, y and z, and the
+//! meaning of others is guessed from their values. Lines that start with `#` or `//` are comments.
 
 mod unnamed;
 
@@ -13,7 +13,7 @@ use crate::rows::{Encoding, Layout, Rows};
 use crate::sink::Sink;
 use crate::text::{Line, Lines, has_values, number, shown, whole};
 
-/// The content of a text file.
+/// Parses a text file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     let mut lines = Lines::new(bytes);
     let count = count(&mut lines);
@@ -45,7 +45,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Sink, Broken> {
     }
 }
 
-/// The number of points, and the line of it, if the text begins with one.
+/// Reads the number of points and its line, if the text starts with one.
 fn count(lines: &mut Lines<'_>) -> Option<(u64, u64)> {
     let line = lines.clone().find(has_values)?;
     let points: u64 = whole(line.text.trim_ascii())?;
@@ -53,7 +53,7 @@ fn count(lines: &mut Lines<'_>) -> Option<(u64, u64)> {
     Some((points, line.number))
 }
 
-/// How to go over the rows of a text that begins like this; none where too little of it is there.
+/// Returns the layout of the rows. Returns `None` if the head of the file is too short or invalid.
 pub(crate) fn layout(head: &[u8]) -> Option<Layout> {
     let mut lines = Lines::new(head);
     let promised = count(&mut lines);
@@ -93,18 +93,19 @@ fn short(promised: u64, present: u64, line: u64) -> Broken {
     fault.on_line(line)
 }
 
-/// How the lines are divided, and what their columns are.
+/// The separator and the columns of a text file.
 struct Table {
     divider: Option<u8>,
-    /// Up to the last column of use.
+    /// The slot of each column, up to the last column that is read.
     columns: Vec<Option<usize>>,
     holds: Holds,
-    /// Whether the first line holds names, not values.
+    /// `true` if the first line contains names.
     named: bool,
 }
 
 impl Table {
-    /// From the first line with values; `lines` begin at or before it.
+    /// Creates a table from the first line with names or values. `lines` must start at or before
+    /// it.
     fn of(line: Line<'_>, lines: Lines<'_>, is_counted: bool) -> Result<Self, Fault> {
         let divider = [b';', b','].into_iter().find(|d| line.text.contains(d));
         let mut table = Self { divider, columns: vec![], holds: Holds::default(), named: false };
@@ -119,7 +120,7 @@ impl Table {
         table.columns = table.values(line).map(slot).collect();
         table.holds =
             Holds::among(table.columns.iter().copied().flatten()).map_err(|_less_clear| Fault::Expected {
-                expected: "three numbers (with decimal points), or names of columns with x, y and z among them",
+                expected: "three numbers (with decimal points), or column names that include x, y and z",
                 found: shown(line.text),
             })?;
         for slot in (0..Row::default().len()).filter(|slot| is_unique(*slot)) {
@@ -133,7 +134,7 @@ impl Table {
         Ok(table)
     }
 
-    /// The columns of a line, without the white space and quotes around them.
+    /// Returns the columns of a line, without surrounding white space and quotes.
     fn values<'a>(&self, line: Line<'a>) -> impl Iterator<Item = &'a [u8]> + use<'a> {
         let divider = self.divider;
         let is_divider = move |b: &u8| match divider {

@@ -1,4 +1,4 @@
-//! An array that does not care whether it was computed or lies in a file.
+//! `Array`: elements backed by a `Vec` or by the bytes of a file.
 
 use std::fmt;
 use std::ops::{Deref, Range};
@@ -8,20 +8,20 @@ use bytemuck::Pod;
 
 use crate::bytes::Bytes;
 
-/// A read-only run of plain-old-data elements, backed by a `Vec` or by the bytes of a container.
+/// A read-only array of plain-old-data elements, backed by a `Vec` or by the bytes of a container.
 ///
-/// Derefs to `[T]`. A clone costs a reference count, never a copy. To replace values in one clone,
-/// [`Array::to_mut`] copies first where the elements are shared.
+/// Derefs to `[T]`. Cloning increments a reference count and copies nothing. To change the values
+/// of one clone, use [`Array::to_mut`], which copies shared elements first.
 ///
-/// Each deref of an array that lies in a file checks bounds and alignment again, some nanoseconds: take the
-/// slice once, outside the loop.
+/// Each deref of an array in a file checks bounds and alignment again, which takes some
+/// nanoseconds. Take the slice once, outside the loop.
 pub struct Array<T> {
     backing: Backing<T>,
 }
 
 enum Backing<T> {
     Owned(Arc<Vec<T>>),
-    /// A range whose address and length were found to suit `T`.
+    /// A range whose address and length suit `T`.
     InPlace {
         bytes: Bytes,
         range: Range<usize>,
@@ -29,9 +29,11 @@ enum Backing<T> {
 }
 
 impl<T: Pod> Array<T> {
-    /// The elements in `range` of `bytes`: in place where the address is aligned for `T`, otherwise a copy.
+    /// Creates an array of the elements in `range` of `bytes`: in place if the address is aligned
+    /// for `T`, otherwise as a copy.
     ///
-    /// The length of `range` is a multiple of the size of `T`; the caller has compared element sizes.
+    /// The length of `range` must be a multiple of the size of `T`; the caller has compared element
+    /// sizes.
     pub(crate) fn in_place(bytes: Bytes, range: Range<usize>) -> Self {
         let raw = &bytes.as_slice()[range.clone()];
         let backing = match bytemuck::try_cast_slice::<u8, T>(raw) {
@@ -41,13 +43,14 @@ impl<T: Pod> Array<T> {
         Self { backing }
     }
 
-    /// Whether the elements lie in the bytes of a container, so that they cost no memory of their own.
+    /// Returns `true` if the elements are bytes of a container, without memory of their own.
     #[must_use]
     pub fn is_in_place(&self) -> bool {
         matches!(self.backing, Backing::InPlace { .. })
     }
 
-    /// The elements as a `Vec`: without a copy if this is the only clone and it is backed by a `Vec`.
+    /// Converts the array to a `Vec`, without a copy if this is the only clone and is backed by a
+    /// `Vec`.
     #[must_use]
     pub fn into_vec(self) -> Vec<T> {
         match self.backing {
@@ -56,8 +59,8 @@ impl<T: Pod> Array<T> {
         }
     }
 
-    /// The elements for writing. Copied first if they lie in a file or another clone shares them; other
-    /// clones and the file keep their values.
+    /// Returns the elements for writing. They are copied first if they are in a file or shared with
+    /// another clone, so the file and other clones keep their values.
     pub fn to_mut(&mut self) -> &mut [T] {
         if self.is_in_place() {
             self.backing = Backing::Owned(Arc::new(self.to_vec()));
@@ -127,7 +130,7 @@ impl<T: Pod + PartialEq> PartialEq for Array<T> {
 
 impl<T: Pod + Eq> Eq for Array<T> {}
 
-/// Says how many elements there are and where, not which: there may be millions.
+/// Shows the number of elements and their backing, but not the elements: there may be millions.
 impl<T: Pod> fmt::Debug for Array<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Array")
@@ -185,7 +188,8 @@ mod tests {
         let bytes = given(raw.clone());
         let expected: Vec<u32> =
             raw[1..61].chunks(4).map(|c| u32::from_le_bytes(c.try_into().unwrap())).collect();
-        // Of four neighbouring offsets one suits a u32, the others do not; all must give the right values.
+        // One of four neighbouring offsets is aligned for a u32. All four must give the right
+        // values.
         let in_place =
             (0..4).filter(|&shift| Array::<u32>::in_place(bytes.clone(), shift..60 + shift).is_in_place());
         assert_eq!(in_place.count(), 1);

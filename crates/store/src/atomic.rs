@@ -1,10 +1,10 @@
-//! Replacing a file in one step, and clearing away what killed writers left.
+//! Atomic replacement of a file, and removal of temporary files that killed writers left.
 //!
-//! Every writer holds an exclusive lock on its temporary file from just after its creation until it has its
-//! final name; the system lets go of the lock when the process ends, however it ends. So a file with our
-//! pattern that can be locked has no living writer. Between creating and locking lies a moment in which
-//! another process might take a new file for litter: hence a writer, once it has the lock, looks whether the
-//! name is still there, and otherwise begins anew.
+//! Every writer locks its temporary file exclusively, from just after its creation until the final
+//! rename. The system releases the lock when the process ends for any reason, so a temporary file
+//! that can be locked has no running writer. Another process might remove a new file between its
+//! creation and its locking. Therefore a writer that has the lock checks that the name still
+//! exists, and otherwise starts again.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, TryLockError};
@@ -15,16 +15,17 @@ use tempfile::NamedTempFile;
 
 use crate::error::{WriteError, WriteStep};
 
-/// Stands between the target's name and the random part.
+/// The part of a temporary name between the target's name and the random part.
 const INFIX: &str = ".tmp-";
 
-/// Random letters and digits in a temporary name: long enough that nobody else's file looks like it.
+/// Number of random letters and digits in a temporary name: enough that no unrelated file matches.
 const RANDOM: usize = 12;
 
-/// Attempts at a temporary file; each fails only if another process cleared it away within microseconds.
+/// Number of attempts to create a temporary file. One fails only if another process removes the
+/// file within microseconds.
 const ATTEMPTS: usize = 16;
 
-/// As [`replace_file`], for writers that fail with the system's errors alone.
+/// Like [`replace_file`], for writers that return I/O errors.
 pub(crate) fn replace(
     path: &Path,
     write: impl FnOnce(&mut fs::File) -> io::Result<()>,
@@ -33,16 +34,16 @@ pub(crate) fn replace(
     replace_file(path, |file| write(file).map_err(failed))
 }
 
-/// Replaces the file at `path` by what `write` writes, or leaves everything as it was; hands on what `write`
-/// returns.
+/// Replaces the file at `path` by what `write` writes, or leaves the file as it was. Returns the
+/// value that `write` returns.
 ///
-/// The content is written beside the target and put in its place in one step, once it is on the disk. A link
-/// stays a link; permissions of a replaced file are kept. What writers of this target left that were killed
-/// is removed first, where the file system knows locks.
+/// The content is written to a temporary file beside the target, synced to the disk, and renamed to
+/// the target in one step. A link stays a link. A replaced file keeps its permissions. Temporary
+/// files of killed writers of the same target are removed first, if the file system supports locks.
 ///
 /// # Errors
-/// Those of `write`, [`WriteError::NotAFile`] for folders and devices, and [`WriteError::Io`] with the step
-/// that failed.
+/// Returns the error of `write`, [`WriteError::NotAFile`] for folders and devices, or
+/// [`WriteError::Io`] with the step that failed.
 pub fn replace_file<T, E: From<WriteError>>(
     path: impl AsRef<Path>,
     write: impl FnOnce(&mut fs::File) -> Result<T, E>,
@@ -65,11 +66,11 @@ pub fn replace_file<T, E: From<WriteError>>(
     let folder = folder_of(&target);
 
     clear_litter(folder, name);
-    // From here on the temporary file is removed when dropped, also if `write` panics.
+    // The temporary file is removed when dropped, also if `write` panics.
     let mut temporary = create_locked(folder, name).map_err(failed(WriteStep::Create))?;
     let told = write(temporary.as_file_mut())?;
     if let Some(permissions) = previous {
-        // Not every file system has permissions to keep; the bytes matter more.
+        // Ignored: some file systems have no permissions, and the content matters more.
         let _ = temporary.as_file().set_permissions(permissions);
     }
     temporary.as_file().sync_all().map_err(failed(WriteStep::Sync))?;
@@ -78,7 +79,8 @@ pub fn replace_file<T, E: From<WriteError>>(
     Ok(told)
 }
 
-/// The file that a link leads to, so that the link outlives the replacement; anything else as it is.
+/// Returns the target of a link, so that the link survives the replacement, or else the path
+/// itself.
 fn follow(path: &Path) -> io::Result<PathBuf> {
     match fs::symlink_metadata(path) {
         Ok(entry) if entry.is_symlink() => fs::canonicalize(path),
@@ -99,7 +101,7 @@ fn prefix(name: &OsStr) -> OsString {
     prefix
 }
 
-/// A new file beside the target that no other process will take for litter.
+/// Creates and locks a temporary file beside the target, so that no other process removes it.
 fn create_locked(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     let prefix = prefix(name);
     let mut builder = tempfile::Builder::new();
@@ -107,13 +109,13 @@ fn create_locked(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // What any program asks for when it creates a file; the umask takes its share.
+        // The usual mode of new files, before the umask.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     for _ in 0..ATTEMPTS {
         let file = builder.tempfile_in(folder)?;
-        // An error other than "held by someone" means that there are no locks here, and nobody clears litter
-        // then.
+        // Any other error means that the file system has no locks. Then no process removes
+        // temporary files.
         let ours = !matches!(file.as_file().try_lock(), Err(TryLockError::WouldBlock));
         if ours && file.path().try_exists()? {
             return Ok(file);
@@ -122,8 +124,8 @@ fn create_locked(folder: &Path, name: &OsStr) -> io::Result<NamedTempFile> {
     Err(io::ErrorKind::ResourceBusy.into())
 }
 
-/// Removes what killed writers of this very target left. Never fails: litter does no harm but to the eye and
-/// the disk.
+/// Removes temporary files that killed writers of this target left. Errors are ignored, since such
+/// files only waste disk space.
 fn clear_litter(folder: &Path, name: &OsStr) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     let prefix = prefix(name);
@@ -141,18 +143,18 @@ fn is_temporary(candidate: &OsStr, prefix: &OsStr) -> bool {
 }
 
 fn remove_if_abandoned(path: &Path) {
-    // For writing, because network file systems grant an exclusive lock only then.
+    // Opened for writing, as network file systems require for an exclusive lock.
     let Ok(file) = fs::OpenOptions::new().write(true).open(path) else {
         return;
     };
     if file.try_lock().is_ok() {
-        // Removed while the lock is held. Should it fail, the next save tries again.
+        // Removed while the lock is held. If this fails, the next save tries again.
         let _ = fs::remove_file(path);
     }
 }
 
-/// Makes the new name itself survive a loss of power. The replacement has happened, and some file systems
-/// cannot sync a folder, so a failure is not reported.
+/// Syncs the folder, so that the new name survives a power failure. Errors are ignored: the file is
+/// already replaced, and some file systems cannot sync a folder.
 fn sync_folder(folder: &Path) {
     if cfg!(unix)
         && let Ok(folder) = fs::File::open(folder)

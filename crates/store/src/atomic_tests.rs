@@ -1,4 +1,4 @@
-//! What remains on disk when writers fail, overlap or are killed.
+//! Files on disk after writers fail, overlap or are killed.
 
 use std::env;
 use std::io::Write;
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::*;
 
-/// Set for the process that `a_killed_writer…` starts and kills: the file it is to replace.
+/// Environment variable of the child process that `a_killed_writer…` kills: the file to replace.
 const VICTIM: &str = "NEARMISS_STORE_TEST_VICTIM";
 
 fn names(folder: &Path) -> Vec<String> {
@@ -112,13 +112,13 @@ fn many_writers_at_once_all_succeed_and_one_of_them_wins() {
     assert_eq!(names(folder.path()), ["scan.nm"]);
 }
 
-/// Runs itself in a second process, which writes half a file and waits to be killed.
+/// Runs itself in a child process, which writes half a file and waits to be killed.
 #[test]
 fn a_killed_writer_leaves_the_previous_file_and_the_next_clears_up() {
     if let Some(target) = env::var_os(VICTIM) {
         let _ = replace(Path::new(&target), |file| {
             file.write_all(b"half")?;
-            // Not for ever: should the parent die, so does this one.
+            // Bounded, so that the child ends even if the parent dies.
             std::thread::sleep(Duration::from_secs(60));
             Err(io::ErrorKind::TimedOut.into())
         });
@@ -146,7 +146,7 @@ fn a_killed_writer_leaves_the_previous_file_and_the_next_clears_up() {
     });
     assert!(seen, "the second process began to write within half a minute");
 
-    // While it lives, nobody clears its file away.
+    // The file of a running writer is not removed.
     replace(&target, put(b"between")).unwrap();
     assert!(half_written(), "a living writer's file is left alone");
     child.kill().unwrap();

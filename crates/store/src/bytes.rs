@@ -1,4 +1,4 @@
-//! What may stand behind a file in memory: a map, aligned blocks, or bytes that the caller holds.
+//! `Bytes`: the bytes of a container, mapped, read into aligned blocks, or given by the caller.
 
 use std::fmt;
 use std::fs;
@@ -10,11 +10,11 @@ use bytemuck::{Pod, Zeroable};
 #[cfg(feature = "mmap")]
 use crate::own_map::OwnMap;
 
-/// Bytes of a whole container, shared by the [`File`](crate::File) and every [`Array`](crate::Array) made
-/// from it.
+/// The bytes of a whole container, shared by the [`File`](crate::File) and its
+/// [`Array`](crate::Array)s.
 ///
-/// Made from a `Vec<u8>`, an `Arc<[u8]>` or a `&'static [u8]` without copying them. A clone costs a reference
-/// count.
+/// Conversion from a `Vec<u8>`, an `Arc<[u8]>` or a `&'static [u8]` copies nothing. Cloning
+/// increments a reference count.
 #[derive(Clone)]
 pub struct Bytes(Backing);
 
@@ -24,7 +24,7 @@ enum Backing {
     Mapped(Arc<memmap2::Mmap>),
     #[cfg(feature = "mmap")]
     Own(Arc<OwnMap>),
-    /// The last block may be longer than the file: `length` counts.
+    /// Aligned blocks. The last block may extend beyond the file, which has `length` bytes.
     Blocks {
         blocks: Arc<Vec<Block>>,
         length: usize,
@@ -34,13 +34,13 @@ enum Backing {
     Static(&'static [u8]),
 }
 
-/// Storage with the alignment that sections have in the file.
+/// Storage with the alignment of sections in the file.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Block([u8; 64]);
 
 impl Bytes {
-    /// The bytes themselves.
+    /// Returns the bytes as a slice.
     #[must_use]
     pub fn as_slice(&self) -> &[u8] {
         match &self.0 {
@@ -65,7 +65,7 @@ impl Bytes {
         Self(Backing::Own(Arc::new(map)))
     }
 
-    /// Reads at most `length` bytes into aligned memory; fewer where the file became shorter meanwhile.
+    /// Reads `length` bytes into aligned memory, or fewer if the file has become shorter.
     pub(crate) fn read(file: &mut fs::File, length: u64) -> io::Result<Self> {
         let length =
             usize::try_from(length).map_err(|_too_large| io::Error::from(io::ErrorKind::OutOfMemory))?;
@@ -76,7 +76,7 @@ impl Bytes {
     }
 }
 
-/// Fills `buffer` as far as `file` reaches and says how far that was.
+/// Reads from `file` until `buffer` is full or the file ends. Returns the number of bytes read.
 pub(crate) fn fill(file: &mut fs::File, buffer: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
     while filled < buffer.len() {

@@ -1,4 +1,5 @@
-//! What can go wrong, as values: which file, what is wrong, where, and what would mend it.
+//! Errors of opening and writing containers. Each message names the file, the fault, its place and
+//! a remedy.
 
 use std::error::Error;
 use std::fmt;
@@ -8,19 +9,20 @@ use std::path::PathBuf;
 
 use crate::id::SectionId;
 use crate::sniff::Looks;
+use crate::words::{bytes, counted, plain};
 
-/// A container could not be opened, or does not hold what was asked of it.
+/// Error of opening a container or of taking an array out of it.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct OpenError {
-    /// The file, or whatever name [`OpenError::with_path`] gave; `None` for bytes in memory.
+    /// The file, or the name given to [`OpenError::with_path`]; `None` for bytes in memory.
     pub path: Option<PathBuf>,
-    /// What is wrong with it.
+    /// The fault.
     pub fault: Fault,
 }
 
 impl OpenError {
-    /// Names the source of bytes that were in memory, say an entry of an archive.
+    /// Names the source of bytes that were in memory, such as an entry of an archive.
     #[must_use]
     pub fn with_path(mut self, path: impl Into<PathBuf>) -> Self {
         self.path = Some(path.into());
@@ -37,250 +39,276 @@ impl fmt::Display for OpenError {
     }
 }
 
-/// The fault's words are already in the message, so the chain goes on behind it.
+/// The message contains the fault's own message, so the source is the fault's source.
 impl Error for OpenError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         self.fault.source()
     }
 }
 
-/// What is wrong with a container. Offsets are bytes from its start.
+/// A fault of a container. Offsets are in bytes from the start of the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// The operating system refused: no such file, no permission, or a failing disk.
+    /// The operating system reported an error: no such file, permission denied, or a failing disk.
     #[error("{}", io_words(source))]
     Io {
-        /// Its answer.
+        /// The operating system's error.
         source: io::Error,
     },
     /// A folder, a device or a pipe.
-    #[error("is {}, not a file; name a file", if *directory { "a folder" } else { "a device or pipe" })]
+    #[error("expected a file, got {}; name a file", not_a_file(*directory))]
     NotAFile {
-        /// Whether it is a folder.
+        /// `true` for a folder.
         directory: bool,
     },
-    /// No bytes at all.
-    #[error("is empty; copy it again or prepare it with `preprocess`")]
+    /// A file of zero bytes.
+    #[error(
+        "expected a nearmiss container, got an empty file; copy it again or prepare it with `preprocess`"
+    )]
     Empty,
-    /// The first bytes are not those of a container.
-    #[error("is not a prepared container, it {looks}")]
+    /// The magic number differs.
+    #[error("expected a nearmiss container, got {looks}")]
     NotAContainer {
-        /// What they look like instead.
+        /// The likely format of the file.
         looks: Looks,
     },
-    /// Written with the bytes of every number reversed.
-    #[error("was written on a big-endian machine; prepare it again on this one with `preprocess`")]
-    ByteOrder,
-    /// Header and table of another layout.
+    /// The bytes of every number are reversed.
     #[error(
-        "has container layout {found}, this program reads layout {supported}; {}",
+        "expected little-endian numbers, got those of a big-endian machine; prepare it again with `preprocess`"
+    )]
+    ByteOrder,
+    /// Header and table have another layout.
+    #[error(
+        "expected container layout {supported}, got layout {found}; {}",
         if found > supported { "update the program" } else { "prepare it again with `preprocess`" }
     )]
     Layout {
-        /// The file's.
+        /// Layout of the file.
         found: u32,
-        /// This crate's, [`LAYOUT`](crate::LAYOUT).
+        /// Layout of this crate, [`LAYOUT`](crate::LAYOUT).
         supported: u32,
     },
-    /// A container, but not of what was asked for.
-    #[error("holds `{}`, expected `{}`; name another file", found.escape_ascii(), expected.escape_ascii())]
+    /// The container has content of another kind.
+    #[error("expected content `{}`, got `{}`; name another file", expected.escape_ascii(), found.escape_ascii())]
     Kind {
-        /// The file's.
+        /// Kind of the file.
         found: [u8; 4],
-        /// The one asked for.
+        /// Kind required by the caller.
         expected: [u8; 4],
     },
-    /// Content of a version that the caller does not read.
+    /// The caller does not support this version of the content.
     #[error(
-        "has format version {found}, this program reads {}; {}",
+        "expected format {}, got version {found}; {}",
         versions(supported),
         if found > supported.end() { "update the program" } else { "prepare it again with `preprocess`" }
     )]
     Version {
-        /// The file's.
+        /// Version of the file.
         found: u32,
-        /// Those the caller reads.
+        /// Versions that the caller supports.
         supported: RangeInclusive<u32>,
     },
-    /// Shorter than its header says, or than a header.
-    #[error("is cut short: {found} of {expected} bytes are there; copy it again or prepare it again")]
+    /// The file is shorter than its header states, or than a header.
+    #[error("expected {}, got {found} (cut short); copy it again or prepare it again", bytes(expected))]
     Truncated {
-        /// Bytes that ought to be there.
+        /// Expected length in bytes.
         expected: u64,
-        /// Bytes that are.
+        /// Length of the file in bytes.
         found: u64,
     },
-    /// Longer than its header says.
-    #[error("has {found} bytes where its header says {expected}; copy it again or prepare it again")]
+    /// The file is longer than its header states.
+    #[error("expected {} as in the header, got {found}; copy it again or prepare it again", bytes(expected))]
     TrailingBytes {
-        /// Bytes that ought to be there.
+        /// Length in the header, in bytes.
         expected: u64,
-        /// Bytes that are.
+        /// Length of the file in bytes.
         found: u64,
     },
-    /// The header states a length that no writer makes.
-    #[error("is damaged: its header states {length} bytes, not a multiple of 64; prepare it again")]
+    /// The length in the header is not a multiple of 64.
+    #[error(
+        "damaged header: expected a length that is a multiple of 64, got {}; prepare it again",
+        bytes(length)
+    )]
     RaggedLength {
-        /// As stated.
+        /// Length in the header, in bytes.
         length: u64,
     },
-    /// The first 64 bytes do not match their checksum.
+    /// The header does not match its checksum.
     #[error(
-        "is damaged: bytes 0 to 64, the header, do not match their checksum; copy it again or prepare it again"
+        "damaged header: expected checksum {stored:016x}, got {computed:016x} (bytes 0 to 64); copy it again or \
+         prepare it again"
     )]
     HeaderChecksum {
-        /// As stated in the header.
+        /// Checksum in the header.
         stored: u64,
-        /// Of the bytes found.
+        /// Checksum of the bytes read.
         computed: u64,
     },
     /// The section table does not match its checksum.
     #[error(
-        "is damaged: the section table at byte 64 does not match its checksum; copy it again or prepare it again"
-    )]
-    TableChecksum {
-        /// As stated in the header.
-        stored: u64,
-        /// Of the bytes found.
-        computed: u64,
-    },
-    /// More sections than the file has room to list.
-    #[error("is damaged: a table of {count} sections would end at byte {end} of {length}; prepare it again")]
-    TableOutOfBounds {
-        /// Sections as stated in the header.
-        count: u32,
-        /// Where their table would end.
-        end: u64,
-        /// Where the file ends.
-        length: u64,
-    },
-    /// Two sections with one name.
-    #[error("is damaged: section {section} is listed twice; prepare it again")]
-    DuplicateSection {
-        /// Their name.
-        section: SectionId,
-    },
-    /// The table points outside the file.
-    #[error(
-        "is damaged: section {section} of {length} bytes at byte {offset} leaves the file of {limit} bytes; \
+        "damaged section table: expected checksum {stored:016x}, got {computed:016x} (byte 64); copy it again or \
          prepare it again"
     )]
-    OutOfBounds {
-        /// Which.
-        section: SectionId,
-        /// Its first byte.
-        offset: u64,
-        /// Its bytes.
+    TableChecksum {
+        /// Checksum in the header.
+        stored: u64,
+        /// Checksum of the bytes read.
+        computed: u64,
+    },
+    /// The section table ends behind the end of the file.
+    #[error(
+        "damaged header: expected a table within {}, got {} up to byte {end}; prepare it again",
+        bytes(length),
+        counted(count, "section", "sections")
+    )]
+    TableOutOfBounds {
+        /// Number of sections in the header.
+        count: u32,
+        /// End of their table.
+        end: u64,
+        /// Length of the file in bytes.
         length: u64,
-        /// Bytes of the file.
+    },
+    /// Two sections have the same name.
+    #[error("damaged section table: expected distinct sections, got {section} twice; prepare it again")]
+    DuplicateSection {
+        /// Name of both sections.
+        section: SectionId,
+    },
+    /// A section ends behind the end of the file.
+    #[error(
+        "damaged section table: expected section {section} within {}, got {} at byte {offset}; prepare it again",
+        bytes(limit),
+        bytes(length)
+    )]
+    OutOfBounds {
+        /// Name of the section.
+        section: SectionId,
+        /// Offset of its first byte.
+        offset: u64,
+        /// Length in bytes.
+        length: u64,
+        /// Length of the file in bytes.
         limit: u64,
     },
-    /// A section does not begin at a multiple of 64.
-    #[error("is damaged: section {section} at byte {offset} is not aligned to 64 bytes; prepare it again")]
+    /// A section does not start at a multiple of 64.
+    #[error(
+        "damaged section table: expected section {section} at a multiple of 64, got byte {offset}; prepare it again"
+    )]
     Misaligned {
-        /// Which.
+        /// Name of the section.
         section: SectionId,
-        /// Its first byte.
+        /// Offset of its first byte.
         offset: u64,
     },
-    /// A section begins inside another, inside the table, or out of order.
+    /// A section starts inside another section, inside the table, or out of order.
     #[error(
-        "is damaged: section {section} at byte {offset} overlaps what ends at byte {taken}; prepare it again"
+        "damaged section table: expected section {section} at byte {taken} or later, got byte {offset}; prepare it \
+         again"
     )]
     Overlapping {
-        /// Which.
+        /// Name of the section.
         section: SectionId,
-        /// Its first byte.
+        /// Offset of its first byte.
         offset: u64,
-        /// First byte that was free.
+        /// Offset of the first free byte.
         taken: u64,
     },
-    /// Bytes that belong to no section.
-    #[error("is damaged: bytes {offset} to {end} belong to no section; prepare it again")]
+    /// Some bytes belong to no section.
+    #[error(
+        "damaged section table: expected a section at byte {offset}, got unused bytes up to byte {end}; prepare it \
+         again"
+    )]
     Unclaimed {
-        /// The first.
+        /// Offset of the first such byte.
         offset: u64,
-        /// The one behind the last.
+        /// Offset behind the last such byte.
         end: u64,
     },
-    /// Elements without a size, or a section that ends inside one.
+    /// The element size is zero, or the length of the section is not a multiple of it.
     #[error(
-        "is damaged: section {section} of {length} bytes cannot hold elements of {element_size}; prepare it again"
+        "damaged section table: expected whole elements of {} in section {section}, got {}; prepare it again",
+        bytes(element_size),
+        bytes(length)
     )]
     ElementSize {
-        /// Which.
+        /// Name of the section.
         section: SectionId,
-        /// Bytes of one element as stated.
+        /// Size of one element in bytes, as in the table.
         element_size: u32,
-        /// Bytes of the section.
+        /// Length of the section in bytes.
         length: u64,
     },
-    /// A byte that is always zero is not.
-    #[error("is damaged: byte {offset} is padding and ought to be zero; copy it again or prepare it again")]
+    /// A byte of padding is not zero.
+    #[error(
+        "damaged padding: expected zero, got another value (byte {offset}); copy it again or prepare it again"
+    )]
     Padding {
-        /// Where.
+        /// Offset of the byte.
         offset: u64,
     },
     /// A section does not match its checksum.
     #[error(
-        "is damaged: section {section} at byte {offset} does not match its checksum; copy it again or prepare it again"
+        "damaged section {section}: expected checksum {stored:016x}, got {computed:016x} (byte {offset}); copy it \
+         again or prepare it again"
     )]
     Checksum {
-        /// Which.
+        /// Name of the section.
         section: SectionId,
-        /// Its first byte.
+        /// Offset of its first byte.
         offset: u64,
-        /// As stated in the table.
+        /// Checksum in the table.
         stored: u64,
-        /// Of the bytes found.
+        /// Checksum of the bytes read.
         computed: u64,
     },
-    /// A section that was asked for is not there.
-    #[error("has no section {section}; prepare it again with `preprocess`")]
+    /// The container does not have the requested section.
+    #[error("section {section} is missing; prepare it again with `preprocess`")]
     MissingSection {
-        /// Which.
+        /// Name of the section.
         section: SectionId,
     },
-    /// A section holds elements of another size than those asked for.
+    /// The elements of a section differ in size from the requested type.
     #[error(
-        "holds elements of {found} bytes in section {section} at byte {offset}, expected {expected}; prepare it again \
-         with `preprocess`"
+        "expected elements of {} in section {section}, got {found} (byte {offset}); prepare it again with `preprocess`",
+        bytes(expected)
     )]
     WrongElementSize {
-        /// Which.
+        /// Name of the section.
         section: SectionId,
-        /// Its first byte.
+        /// Offset of its first byte.
         offset: u64,
-        /// Bytes of the element asked for.
+        /// Size of the requested type in bytes.
         expected: u32,
-        /// Bytes of an element as stored.
+        /// Size of a stored element in bytes.
         found: u32,
     },
-    /// The metadata are not what was asked for.
-    #[error("has metadata at byte {offset} that cannot be decoded; prepare it again with `preprocess`")]
+    /// The metadata do not decode to the requested type.
+    #[error("the metadata cannot be decoded (byte {offset}); prepare it again with `preprocess`")]
     Metadata {
-        /// Where they begin.
+        /// Offset of the metadata.
         offset: u64,
-        /// What the decoder says.
+        /// The decoder's error.
         source: Box<dyn Error + Send + Sync>,
     },
-    /// The metadata are followed by more bytes in their section.
+    /// The metadata section continues after the metadata.
     #[error(
-        "has {count} bytes too many at byte {offset}, behind the metadata; prepare it again with `preprocess`"
+        "expected the metadata to end at byte {offset}, got {} more; prepare it again with `preprocess`",
+        bytes(count)
     )]
     MetadataTrailing {
-        /// First byte left over.
+        /// Offset of the first byte left over.
         offset: u64,
-        /// How many.
+        /// Number of bytes left over.
         count: usize,
     },
-    /// The metadata section is longer than any that is written.
-    #[error("has {length} bytes of metadata at byte {offset}, at most {limit} are allowed; prepare it again")]
+    /// The metadata section is too long.
+    #[error("expected at most {limit} bytes of metadata, got {length} (byte {offset}); prepare it again")]
     MetadataTooLarge {
-        /// Where they begin.
+        /// Offset of the metadata.
         offset: u64,
-        /// Bytes.
+        /// Length in bytes.
         length: u64,
         /// [`METADATA_LIMIT`](crate::METADATA_LIMIT).
         limit: usize,
@@ -296,12 +324,16 @@ impl From<io::Error> for Fault {
 fn io_words(source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => "no such file; check the path".to_owned(),
-        io::ErrorKind::PermissionDenied => "may not be read; change its permissions".to_owned(),
+        io::ErrorKind::PermissionDenied => "permission denied; make the file readable".to_owned(),
         io::ErrorKind::OutOfMemory => {
-            "does not fit in memory; map it instead, or close other programs".to_owned()
+            "the file exceeds the available memory; map it, or close other programs".to_owned()
         }
-        kind => format!("cannot be read ({kind}); check the disk and try again"),
+        _ => format!("cannot read the file ({}); check the disk and try again", plain(source)),
     }
+}
+
+fn not_a_file(directory: bool) -> &'static str {
+    if directory { "a folder" } else { "a device or pipe" }
 }
 
 fn versions(supported: &RangeInclusive<u32>) -> String {
@@ -312,77 +344,77 @@ fn versions(supported: &RangeInclusive<u32>) -> String {
     }
 }
 
-/// A container could not be written. The file that was there before, if any, is as it was.
+/// Error of writing a container. A file that existed before is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
-    /// The operating system refused.
-    #[error("{}cannot {step} ({}); {}", name(path.as_ref()), source.kind(), step.remedy())]
+    /// The operating system reported an error.
+    #[error("{}cannot {step} ({}); {}", name(path.as_ref()), plain(source), step.remedy())]
     Io {
-        /// The file to be written; `None` where the caller gave a stream.
+        /// The target; `None` for a stream.
         path: Option<PathBuf>,
-        /// What was being done.
+        /// The step that failed.
         step: WriteStep,
-        /// Its answer.
+        /// The operating system's error.
         source: io::Error,
     },
     /// The target is a folder or a device.
-    #[error("{}: is {}, not a file; name a file", path.display(), if *directory { "a folder" } else { "a device or pipe" })]
+    #[error("{}: expected a file, got {}; name a file", path.display(), not_a_file(*directory))]
     NotAFile {
         /// The target.
         path: PathBuf,
-        /// Whether it is a folder.
+        /// `true` for a folder.
         directory: bool,
     },
-    /// Two sections with one name, or metadata given twice; nothing was added.
-    #[error("section {section} was added twice; give each part its own number")]
+    /// Two sections have the same name, or the metadata were given twice. Nothing was added.
+    #[error("expected distinct sections, got {section} twice; give each part its own number")]
     DuplicateSection {
-        /// Their name.
+        /// Name of both sections.
         section: SectionId,
     },
-    /// The tag `META` belongs to the metadata; nothing was added.
-    #[error("section {section} would bear the tag of the metadata; choose another tag")]
+    /// The tag `META` is reserved for the metadata. Nothing was added.
+    #[error("expected a tag other than `META`, got section {section}; choose another tag")]
     ReservedTag {
-        /// The name asked for.
+        /// The requested name.
         section: SectionId,
     },
-    /// The metadata cannot be represented.
+    /// The metadata cannot be encoded.
     #[error(
         "the metadata cannot be encoded; use plain structs, numbers, strings and sequences of known length"
     )]
     Metadata {
-        /// What the encoder says.
+        /// The encoder's error.
         source: Box<dyn Error + Send + Sync>,
     },
-    /// The metadata are too long; what grows with the data belongs in a section.
-    #[error("the metadata take {length} bytes, at most {limit} are allowed; put bulk values in a section")]
+    /// The metadata are too long. Data that grow with the input belong in a section.
+    #[error("expected at most {limit} bytes of metadata, got {length}; put bulk values in a section")]
     MetadataTooLarge {
-        /// Bytes encoded.
+        /// Encoded length in bytes.
         length: usize,
         /// [`METADATA_LIMIT`](crate::METADATA_LIMIT).
         limit: usize,
     },
-    /// More sections than the header can count.
-    #[error("{count} sections are more than the {} a container can list; join some", u32::MAX)]
+    /// The number of sections exceeds `u32`.
+    #[error("expected at most {} sections, got {count}; join some", u32::MAX)]
     TooManySections {
-        /// How many were added.
+        /// Number of sections.
         count: usize,
     },
 }
 
-/// What a writer was doing when it failed.
+/// A step of replacing a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum WriteStep {
-    /// Looking at the target, following a link.
+    /// Inspecting the target, following a link.
     Inspect,
-    /// Making the temporary file beside the target.
+    /// Creating the temporary file beside the target.
     Create,
-    /// Writing bytes.
+    /// Writing the content.
     Write,
-    /// Waiting until they are on the disk.
+    /// Syncing the content to the disk.
     Sync,
-    /// Putting the finished file in the target's place.
+    /// Renaming the temporary file to the target.
     Rename,
 }
 
@@ -390,22 +422,22 @@ impl WriteStep {
     fn remedy(self) -> &'static str {
         match self {
             Self::Inspect => "check the path and its permissions",
-            Self::Create => "check that the folder exists and may be written to",
-            Self::Write | Self::Sync => "check the space left and try again",
-            Self::Rename => "check that no other program holds the file",
+            Self::Create => "check that the folder exists and is writable",
+            Self::Write | Self::Sync => "check the space left on the disk and try again",
+            Self::Rename => "close other programs that use the file",
         }
     }
 }
 
-/// Completes "cannot …".
+/// A verb phrase that completes "cannot …".
 impl fmt::Display for WriteStep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Inspect => "look at the target",
+            Self::Inspect => "inspect the target",
             Self::Create => "create a file beside the target",
             Self::Write => "write",
-            Self::Sync => "bring the bytes to the disk",
-            Self::Rename => "put the finished file in place",
+            Self::Sync => "sync the file to the disk",
+            Self::Rename => "replace the target",
         })
     }
 }

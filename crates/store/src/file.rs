@@ -18,21 +18,23 @@ use crate::id::SectionId;
 use crate::section::{Section, Table, element_size};
 use crate::{map, metadata};
 
-/// How much of a file is checked when it is opened.
+/// The checks made when a file is opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Check {
-    /// Everything: structure, the checksum of every section, zeros in the padding. Reads the whole file once.
+    /// All checks: the structure, the checksum of every section, and zeros in the padding. Reads
+    /// the whole file once.
     #[default]
     Full,
-    /// Header and table with their checksums; bounds, alignment, order and element sizes of the sections.
-    /// Their contents are neither read nor compared: for files one has written oneself. Some microseconds,
-    /// whatever the size.
+    /// Header and table with their checksums, and bounds, alignment, order and element sizes of the
+    /// sections. The contents of sections are not read. For trusted files. Takes some microseconds
+    /// for any file size.
     Structure,
 }
 
-/// An opened container: a table of sections over bytes that are mapped, read or given.
+/// An opened container: a table of sections, and the bytes, which are mapped, read or given.
 ///
-/// A clone costs reference counts. Arrays keep the bytes alive; the `File` may be dropped before them.
+/// Cloning increments reference counts. Arrays keep the bytes alive, so the `File` may be dropped
+/// first.
 #[derive(Clone)]
 pub struct File {
     bytes: Bytes,
@@ -42,44 +44,47 @@ pub struct File {
 }
 
 impl File {
-    /// Opens the file at `path` by mapping it, or by reading it where there is no map: without the feature
-    /// `mmap`, and on file systems that refuse.
+    /// Opens the file at `path` by mapping it. Without the feature `mmap`, and on file systems that
+    /// cannot map, it is read instead.
     ///
-    /// **While a map is in use the file must not be changed in place or shortened.** Touching a page that is
-    /// no longer there ends the process (`SIGBUS`), and changed bytes show through arrays that were checked.
-    /// Replacing the file by [`Writer::save`](crate::Writer::save), or by any rename, is harmless on Unix;
-    /// Windows refuses it while mapped. Where others may write to the file, use [`File::read`].
+    /// **The file must not be changed in place or shortened while a map is in use.** Access to a
+    /// page beyond the new end kills the process (`SIGBUS`), and changed bytes appear in arrays
+    /// after their checks. Replacing the file by [`Writer::save`](crate::Writer::save), or by any
+    /// rename, is safe on Unix. Windows does not allow it while the file is mapped. If other
+    /// programs may write to the file, use [`File::read`].
     ///
-    /// Costs some microseconds with [`Check::Structure`], one pass over the file with [`Check::Full`].
+    /// Takes some microseconds with [`Check::Structure`], and one pass over the file with
+    /// [`Check::Full`].
     ///
     /// # Errors
-    /// [`OpenError`] if it is not a file, cannot be opened, or fails the checks asked for.
+    /// Returns [`OpenError`] if `path` is not a file, cannot be opened, or fails a check.
     pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Self, OpenError> {
         Self::from_path(path.as_ref(), check, |file, length| {
             map::map(file).or_else(|_| Bytes::read(file, length)).map_err(Fault::from)
         })
     }
 
-    /// Reads the file at `path` into memory aligned to 64 bytes: what happens to the file later does not
-    /// matter.
+    /// Reads the file at `path` into memory aligned to 64 bytes. Later changes to the file have no
+    /// effect.
     ///
-    /// Costs the file's length in memory. A file whose header is wrong is refused before that is allocated.
+    /// Allocates as many bytes as the file has, after the header has passed its checks.
     ///
     /// # Errors
-    /// [`OpenError`] if it is not a file, cannot be read, does not fit in memory, or fails the checks asked
-    /// for.
+    /// Returns [`OpenError`] if `path` is not a file, cannot be read, exceeds the memory, or fails
+    /// a check.
     pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Self, OpenError> {
         Self::from_path(path.as_ref(), check, |file, length| Bytes::read(file, length).map_err(Fault::from))
     }
 
-    /// Takes a container that is in memory, say an asset from an archive, without copying it.
+    /// Opens a container in memory, such as an asset from an archive, without copying it.
     ///
-    /// The bytes may have any alignment. Allocators align to 16 bytes or so, enough for elements made of
-    /// numbers, which are then used in place; an array whose elements need more is copied by [`File::array`].
+    /// The bytes may have any alignment. Allocators usually align to 16 bytes, which suffices to
+    /// use numbers in place. [`File::array`] copies an array whose elements need a greater
+    /// alignment.
     ///
     /// # Errors
-    /// [`OpenError`] without a path if the bytes fail the checks asked for; [`OpenError::with_path`] can name
-    /// them.
+    /// Returns [`OpenError`] without a path if the bytes fail a check. [`OpenError::with_path`]
+    /// adds a name.
     pub fn from_bytes(bytes: impl Into<Bytes>, check: Check) -> Result<Self, OpenError> {
         Self::assemble(bytes.into(), None, check).map_err(|fault| OpenError { path: None, fault })
     }
@@ -90,7 +95,7 @@ impl File {
         load: impl FnOnce(&mut fs::File, u64) -> Result<Bytes, Fault>,
     ) -> Result<Self, OpenError> {
         let attempt = || {
-            // Before opening: to open a pipe would wait for its other end.
+            // Checked before opening, since opening a pipe blocks until its other end is opened.
             let kind = fs::metadata(path)?;
             if !kind.is_file() {
                 return Err(Fault::NotAFile { directory: kind.is_dir() });
@@ -117,19 +122,20 @@ impl File {
         Ok(Self { bytes, header, table: Arc::new(table), path })
     }
 
-    /// Compares every section with its checksum and requires zeros in the padding: what [`Check::Full`] does
-    /// beyond [`Check::Structure`]. Reads the whole file once.
+    /// Verifies the checksum of every section and zeros in the padding: the checks of
+    /// [`Check::Full`] that [`Check::Structure`] leaves out. Reads the whole file once.
     ///
     /// # Errors
-    /// [`Fault::Checksum`] names the first section that differs, [`Fault::Padding`] the first byte.
+    /// Returns [`Fault::Checksum`] for the first section that differs, or [`Fault::Padding`] for
+    /// the first byte.
     pub fn verify(&self) -> Result<(), OpenError> {
         self.table.verify(self.bytes.as_slice()).map_err(|fault| self.error(fault))
     }
 
-    /// Requires content of one kind, in a version that the caller reads.
+    /// Checks the kind and the version of the content.
     ///
     /// # Errors
-    /// [`Fault::Kind`] or [`Fault::Version`].
+    /// Returns [`Fault::Kind`] or [`Fault::Version`].
     pub fn expect(&self, kind: [u8; 4], versions: RangeInclusive<u32>) -> Result<(), OpenError> {
         if self.kind() != kind {
             return Err(self.error(Fault::Kind { found: self.kind(), expected: kind }));
@@ -140,14 +146,16 @@ impl File {
         Ok(())
     }
 
-    /// The elements of a section, in place: no copy, unless the container was given with an alignment that
-    /// does not suit `T` (never for files that were opened or read).
+    /// Returns the elements of a section, in place. They are copied only if the container was given
+    /// in memory with an alignment that does not suit `T`.
     ///
-    /// Only the size of an element is stored; that the section holds `T`s follows from kind and version. `T`
-    /// has a size and an alignment of at most 64 bytes, or it does not compile.
+    /// The file stores the size of an element, but not its type: kind and version imply the type.
+    /// `T` must not be zero-sized, and its alignment must be at most 64 bytes; otherwise the call
+    /// does not compile.
     ///
     /// # Errors
-    /// [`Fault::MissingSection`], or [`Fault::WrongElementSize`] if the elements have another size than `T`.
+    /// Returns [`Fault::MissingSection`], or [`Fault::WrongElementSize`] if the elements differ in
+    /// size from `T`.
     pub fn array<T: Pod>(&self, tag: [u8; 4], part: u32) -> Result<Array<T>, OpenError> {
         let section = self.find(SectionId { tag, part })?;
         let (expected, found) = (element_size::<T>(), section.element_size);
@@ -158,51 +166,53 @@ impl File {
         Ok(Array::in_place(self.bytes.clone(), section.range()))
     }
 
-    /// The metadata, decoded.
+    /// Decodes the metadata.
     ///
-    /// The type must be the one that was written, field by field: the encoding names none. At most
-    /// [`METADATA_LIMIT`](crate::METADATA_LIMIT) bytes are decoded, all of which must be used.
+    /// `M` must have the same fields, in the same order, as the written type, because the encoding
+    /// stores no field names. The metadata have at most [`METADATA_LIMIT`](crate::METADATA_LIMIT)
+    /// bytes, and the value must use all of them.
     ///
     /// # Errors
-    /// [`Fault::MissingSection`] if none were written, [`Fault::Metadata`], [`Fault::MetadataTrailing`] or
-    /// [`Fault::MetadataTooLarge`] if they are not an `M`.
+    /// Returns [`Fault::MissingSection`] if there are no metadata. Returns [`Fault::Metadata`],
+    /// [`Fault::MetadataTrailing`] or [`Fault::MetadataTooLarge`] if they do not decode to an `M`.
     pub fn metadata<M: DeserializeOwned>(&self) -> Result<M, OpenError> {
         let section = self.find(SectionId::META)?;
         let bytes = &self.bytes.as_slice()[section.range()];
         metadata::decode(bytes, section.offset).map_err(|fault| self.error(fault))
     }
 
-    /// Whether there is such a section.
+    /// Returns `true` if the container has this section.
     #[must_use]
     pub fn has(&self, tag: [u8; 4], part: u32) -> bool {
         self.table.find(SectionId { tag, part }).is_some()
     }
 
-    /// All sections in file order, the metadata first.
+    /// Returns all sections in file order, metadata first.
     #[must_use]
     pub fn sections(&self) -> &[Section] {
         &self.table.sections
     }
 
-    /// What the content is, as given to [`Writer::new`](crate::Writer::new).
+    /// Returns the kind of the content, as given to [`Writer::new`](crate::Writer::new).
     #[must_use]
     pub fn kind(&self) -> [u8; 4] {
         self.header.kind
     }
 
-    /// The version of the content's format, as given to [`Writer::new`](crate::Writer::new).
+    /// Returns the version of the content's format, as given to
+    /// [`Writer::new`](crate::Writer::new).
     #[must_use]
     pub fn version(&self) -> u32 {
         self.header.version
     }
 
-    /// Length of the whole container in bytes, a multiple of 64.
+    /// Returns the length of the whole container in bytes, a multiple of 64.
     #[must_use]
     pub fn byte_len(&self) -> u64 {
         self.header.length
     }
 
-    /// The path it was opened from; `None` for bytes in memory.
+    /// Returns the path of the file; `None` for bytes in memory.
     #[must_use]
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
@@ -217,7 +227,7 @@ impl File {
     }
 }
 
-/// Without the table, which may be long; [`File::sections`] has it.
+/// Shows all but the table, which may be long; see [`File::sections`].
 impl fmt::Debug for File {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("File")

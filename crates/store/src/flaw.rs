@@ -1,75 +1,79 @@
-//! Flaws in the contents of a container that opens.
+//! Errors of loading the contents of a container.
 
 use thiserror::Error;
 
 use crate::error::OpenError;
+use crate::words::counted;
 
-/// Why a container does not hold what is loaded from it.
+/// Error of loading data from a container.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LoadError {
-    /// It cannot be opened, or a section is missing or damaged.
+    /// The container cannot be opened, or a section is missing or damaged.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// Its sections contradict each other.
+    /// The sections contradict each other.
     #[error(transparent)]
     Flaw(#[from] Flaw),
 }
 
-/// A flaw in stored arrays, or in the metadata.
+/// An inconsistency in the stored arrays or the metadata.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum Flaw {
-    /// Two arrays do not fit each other.
-    #[error("{array} has {found} entries where {expected} belong; prepare the scan again")]
+    /// An array has the wrong length.
+    #[error(
+        "expected {} in {array}, got {found}; prepare the scan again",
+        counted(expected, "entry", "entries")
+    )]
     Length {
-        /// Which array.
+        /// Name of the array.
         array: &'static str,
-        /// How many entries it has.
+        /// Number of entries.
         found: usize,
-        /// How many it should have.
+        /// Expected number of entries.
         expected: usize,
     },
-    /// A value that no build writes, or that contradicts other values.
-    #[error("{what} {index} is wrong; prepare the scan again")]
+    /// A value is out of range, or contradicts other values.
+    #[error("{what} {index} is invalid; prepare the scan again")]
     Value {
-        /// The kind of value.
+        /// Name of the value.
         what: &'static str,
-        /// The index of the point, node or block it belongs to.
+        /// Index of its point, node or block.
         index: usize,
     },
-    /// A number in the metadata that no build writes, or that contradicts the arrays.
-    #[error("{what} is wrong; prepare the scan again")]
+    /// A number in the metadata is out of range, or contradicts the arrays.
+    #[error("{what} is invalid; prepare the scan again")]
     Metadata {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
     },
-    /// Options that are out of range, or that need an array which is absent.
+    /// The options are out of range, or need an array that is missing.
     #[error("{cause}; prepare the scan again")]
     Options {
-        /// What is out of range, or missing.
+        /// Message of the failed check.
         cause: String,
     },
 }
 
 impl Flaw {
-    /// Checks that an array has so many entries.
+    /// Checks the length of an array.
     ///
     /// # Errors
-    /// [`Flaw::Length`] when it has not.
+    /// Returns [`Flaw::Length`] if `found` differs from `expected`.
     pub fn length(array: &'static str, found: usize, expected: usize) -> Result<(), Self> {
         if found == expected { Ok(()) } else { Err(Self::Length { array, found, expected }) }
     }
 
-    /// Turns the index of the first wrong value, if there is one, into an error.
+    /// Returns an error if there is an invalid value.
     ///
     /// # Errors
-    /// [`Flaw::Value`] with that index.
+    /// Returns [`Flaw::Value`] if `index`, the index of the first invalid value, is `Some`.
     pub fn first(what: &'static str, index: Option<usize>) -> Result<(), Self> {
         index.map_or(Ok(()), |index| Err(Self::Value { what, index }))
     }
 
-    /// Returns the flaw of options that a build refuses, with the reason.
+    /// Creates a [`Flaw::Options`] with the given cause.
     pub fn options(cause: impl ToString) -> Self {
         Self::Options { cause: cause.to_string() }
     }

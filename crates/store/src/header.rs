@@ -1,7 +1,7 @@
-//! The first 64 bytes of a container: who wrote it, how long it is, where the table ends.
+//! The header: the first 64 bytes of a container, with its layout, kind, version and length.
 //!
-//! The header carries a checksum of itself, so that its length and count can be believed before anything they
-//! point at is read, and a checksum of the section table behind it.
+//! The header has a checksum of itself, so its length and section count are verified before the
+//! table is read. It also has a checksum of the section table, which follows it.
 
 use bytemuck::{Pod, Zeroable};
 use xxhash_rust::xxh3::xxh3_64;
@@ -9,29 +9,30 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::error::Fault;
 use crate::sniff::Looks;
 
-/// Layout number that this crate writes and reads: the meaning of the header, the table and the padding.
+/// The layout number that this crate writes and reads. It defines the header, the table and the
+/// padding.
 ///
-/// What the sections mean is the caller's; it has its own kind and version, see
+/// The caller defines the content of the sections, with its own kind and version; see
 /// [`File::expect`](crate::File::expect).
 pub const LAYOUT: u32 = 1;
 
-/// Not ASCII in the first byte, so no text file begins like this; `\r\n` shows a transfer that changed line
-/// ends.
+/// The magic number. The first byte is not ASCII, so no text file starts like this. The `\r\n`
+/// reveals a transfer that translated line ends.
 pub(crate) const MAGIC: [u8; 8] = *b"\x8Enmiss\r\n";
 
-/// Sections begin at multiples of this many bytes: one cache line, and enough for every SIMD load.
+/// Alignment of sections in bytes: one cache line, enough for every SIMD load.
 pub(crate) const ALIGN: usize = 64;
 
-/// The header's length in bytes, also its alignment unit.
+/// Length of the header in bytes.
 pub(crate) const HEADER_LEN: usize = 64;
 
-/// The length in bytes of a row of the table.
+/// Length of a row of the table in bytes.
 pub(crate) const ENTRY_LEN: usize = 40;
 
-/// Bytes of the header that its own checksum covers: all before the checksum.
+/// Number of header bytes that its checksum covers: all bytes before the checksum.
 const SEALED: usize = HEADER_LEN - size_of::<u64>();
 
-/// The header as it lies in the file.
+/// The header as stored in the file.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Header {
@@ -40,19 +41,19 @@ pub(crate) struct Header {
     pub(crate) kind: [u8; 4],
     pub(crate) version: u32,
     pub(crate) count: u32,
-    /// Bytes of the whole file, a multiple of [`ALIGN`].
+    /// Length of the whole file in bytes, a multiple of [`ALIGN`].
     pub(crate) length: u64,
     /// xxh3-64 of the section table.
     pub(crate) table_checksum: u64,
     reserved: [u8; 16],
-    /// xxh3-64 of the 56 bytes before it.
+    /// xxh3-64 of the 56 bytes before the checksum.
     checksum: u64,
 }
 
 const _: () = assert!(size_of::<Header>() == HEADER_LEN, "the header is 64 bytes on disk");
 
 impl Header {
-    /// A sealed header for a table of `count` sections.
+    /// Creates a header for a table of `count` sections, with its checksum.
     pub(crate) fn new(kind: [u8; 4], version: u32, count: u32, length: u64, table: &[u8]) -> Self {
         let mut header = Self {
             magic: MAGIC,
@@ -69,8 +70,8 @@ impl Header {
         header
     }
 
-    /// Reads and checks the header of a file of `found` bytes that begins with `head`: the whole file, or its
-    /// first 64 bytes where it has as many.
+    /// Reads and checks the header of a file of `found` bytes. `head` is the whole file, or at
+    /// least its first 64 bytes.
     pub(crate) fn parse(head: &[u8], found: u64) -> Result<Self, Fault> {
         let start = &head[..head.len().min(MAGIC.len())];
         if start.is_empty() {
@@ -90,7 +91,8 @@ impl Header {
         if header.layout == LAYOUT.swap_bytes() {
             return Err(Fault::ByteOrder);
         }
-        // The layout comes before the checksum: another layout may well keep its checksum elsewhere.
+        // The layout is checked before the checksum, because another layout may have the checksum
+        // elsewhere.
         if header.layout != LAYOUT {
             return Err(Fault::Layout { found: header.layout, supported: LAYOUT });
         }
@@ -98,7 +100,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Everything but magic and layout.
+    /// Checks all fields except magic and layout.
     fn check(&self, found: u64) -> Result<(), Fault> {
         let computed = self.seal();
         if computed != self.checksum {
@@ -126,7 +128,7 @@ impl Header {
         Ok(())
     }
 
-    /// Offset of the first byte behind the table; cannot overflow, as the count is a `u32`.
+    /// Returns the offset behind the table. Cannot overflow, as the count is a `u32`.
     pub(crate) fn table_end(&self) -> u64 {
         HEADER_LEN as u64 + u64::from(self.count) * ENTRY_LEN as u64
     }
@@ -136,7 +138,7 @@ impl Header {
     }
 }
 
-/// The least multiple of [`ALIGN`] that is not below `offset`.
+/// Rounds `offset` up to a multiple of [`ALIGN`].
 pub(crate) fn align_up(offset: u64) -> u64 {
     offset.next_multiple_of(ALIGN as u64)
 }

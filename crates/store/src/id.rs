@@ -1,18 +1,19 @@
-//! The names of sections.
+//! `SectionId`: the name of a section.
 
 use std::fmt;
 
-/// Names a section: four bytes that say what it is, and a number that tells several of a kind apart.
+/// The name of a section: a tag of four bytes, and a number for each of several sections with one
+/// tag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SectionId {
-    /// What the section holds, by custom four upper-case ASCII letters. `META` is taken.
+    /// The tag, by convention four upper-case ASCII letters. `META` is reserved.
     pub tag: [u8; 4],
-    /// Which of several sections with one tag; 0 where there is one.
+    /// The number among the sections with this tag; 0 for a single section.
     pub part: u32,
 }
 
 impl SectionId {
-    /// The one metadata section.
+    /// The metadata section.
     pub(crate) const META: Self = Self { tag: *b"META", part: 0 };
 }
 

@@ -5,7 +5,7 @@ compile_error!(
     "nearmiss-store uses arrays in place from a little-endian file; big-endian targets are not supported"
 );
 
-// In reading order: the bytes on disk, what holds them, how they are read, how they are written.
+// In reading order: the bytes on disk, their storage in memory, reading, writing.
 mod header;
 mod id;
 mod section;
@@ -31,6 +31,7 @@ mod work_error;
 
 mod error;
 mod flaw;
+mod words;
 
 pub use array::Array;
 pub use atomic::replace_file;

@@ -1,19 +1,20 @@
-//! The metadata section: one small serde value. The only module that names the encoder.
+//! The metadata section: one small serde value. Only this module depends on the encoder.
 //!
-//! The format is bincode 2's standard one: little-endian, integers in variable length. Two limits bound what
-//! a hostile file can cost: the section's length, and what decoding may claim in memory.
+//! The format is the standard configuration of bincode 2: little-endian, with integers of variable
+//! length. Two limits bound the cost of a malicious file: the length of the section, and the memory
+//! for decoding.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Fault, WriteError};
 
-/// Longest metadata section in bytes: 64 KiB. It is for numbers and names; whatever grows with the data is a
-/// section.
+/// Maximum length of the metadata section in bytes: 64 KiB. It is for numbers and names. Data that
+/// grow with the input belong in a section.
 pub const METADATA_LIMIT: usize = 64 * 1024;
 
-/// The decoder counts bytes of values, not of their encoding; the widest integer has 16 bytes and may take
-/// one encoded. With this factor no value that fits [`METADATA_LIMIT`] is refused.
+/// The decoder's limit in bytes of decoded values. The widest integer has 16 bytes and may be
+/// encoded in one, so this factor accepts every value that fits [`METADATA_LIMIT`].
 const CLAIM_LIMIT: usize = 16 * METADATA_LIMIT;
 
 pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, WriteError> {
@@ -25,7 +26,7 @@ pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, WriteError> {
     Ok(bytes)
 }
 
-/// Decodes the section that lies at `offset`; bytes left over are an error.
+/// Decodes the section at `offset`. Bytes left over are an error.
 pub(crate) fn decode<M: DeserializeOwned>(bytes: &[u8], offset: u64) -> Result<M, Fault> {
     if bytes.len() > METADATA_LIMIT {
         return Err(Fault::MetadataTooLarge { offset, length: bytes.len() as u64, limit: METADATA_LIMIT });
@@ -45,7 +46,7 @@ mod tests {
 
     #[test]
     fn whatever_fits_the_limit_comes_back() {
-        // One byte each encoded, sixteen claimed when decoded: the worst ratio there is.
+        // One byte each when encoded, sixteen when decoded: the worst ratio.
         let value = vec![7_u128; METADATA_LIMIT - 5];
         let bytes = encode(&value).unwrap();
         assert_eq!(decode::<Vec<u128>>(&bytes, 0).unwrap(), value);
@@ -65,7 +66,7 @@ mod tests {
         bytes.push(0);
         let trailing = decode::<(String, u32)>(&bytes, 100).unwrap_err();
         assert!(matches!(trailing, Fault::MetadataTrailing { offset: 106, count: 1 }), "{trailing:?}");
-        // 253 announces a u64: a string of 2^63 bytes.
+        // 253 precedes a u64: the length of a string of 2^63 bytes.
         let huge = [253, 0, 0, 0, 0, 0, 0, 0, 0x80];
         assert!(matches!(decode::<String>(&huge, 0), Err(Fault::Metadata { .. })));
         assert!(matches!(decode::<Vec<u64>>(&huge, 0), Err(Fault::Metadata { .. })));

@@ -1,4 +1,4 @@
-//! A large array that can be written, in memory or in a file.
+//! `Room`: a large writable array, in memory or in a file.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
@@ -12,10 +12,10 @@ use crate::bytes::Bytes;
 use crate::own_map::OwnMap;
 use crate::work_error::WorkError;
 
-/// An array from a [`Workspace`](crate::Workspace).
+/// A writable array of a [`Workspace`](crate::Workspace).
 ///
-/// Derefs to `[T]`. Each deref of one that lies in a file checks bounds and alignment again: take the slice
-/// once, outside the loop.
+/// Derefs to `[T]`. Each deref of an array in a file checks bounds and alignment again. Take the
+/// slice once, outside the loop.
 pub struct Room<T> {
     backing: Backing<T>,
 }
@@ -41,7 +41,7 @@ impl<T: Pod> Room<T> {
         Self { backing: Backing::File { map, len } }
     }
 
-    /// Keeps the first `len` elements alone.
+    /// Shortens the array to its first `len` elements.
     pub fn truncate(&mut self, len: usize) {
         match &mut self.backing {
             Backing::Memory(elements) => elements.truncate(len),
@@ -89,7 +89,7 @@ impl<T: Pod> From<Room<T>> for Array<T> {
     }
 }
 
-/// Says how many elements there are, not which: there may be millions.
+/// Shows the number of elements, but not the elements: there may be millions.
 impl<T: Pod> fmt::Debug for Room<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Room").field("len", &self.len()).finish_non_exhaustive()

@@ -1,8 +1,9 @@
-//! The section table: what lies where, and the checks that let every later read be a plain slice.
+//! The section table, and its checks, after which every read is a plain slice.
 //!
-//! The layout is canonical: sections stand in table order, each at the first multiple of 64 behind the one
-//! before, and the file ends with the padding of the last. So no byte of a file is without an owner, two
-//! sections never overlap, and one pass over the table proves both.
+//! The layout is canonical: sections follow in table order, each at the first multiple of 64 behind
+//! the previous one, and the file ends with the padding of the last. One pass over the table proves
+//! that sections do not overlap and that every byte belongs to a section, its padding, the table or
+//! the header.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,40 +15,41 @@ use crate::error::Fault;
 use crate::header::{ALIGN, ENTRY_LEN, HEADER_LEN, Header, align_up};
 use crate::id::SectionId;
 
-/// Where a section lies; every value was checked against the file when it was opened.
+/// A row of the section table. All values were checked when the file was opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Section {
-    /// Its name.
+    /// Name of the section.
     pub id: SectionId,
-    /// First byte, counted from the start of the file; a multiple of 64.
+    /// Offset of the first byte from the start of the file; a multiple of 64.
     pub offset: u64,
-    /// Bytes, a multiple of the element size; padding is not counted.
+    /// Length in bytes without padding; a multiple of the element size.
     pub length: u64,
-    /// Bytes of one element, at least 1.
+    /// Size of one element in bytes, at least 1.
     pub element_size: u32,
-    /// xxh3-64 (seed 0) of the section's bytes, as the file states it.
+    /// xxh3-64 (seed 0) of the section's bytes, as stored in the table.
     pub checksum: u64,
 }
 
 impl Section {
-    /// Number of elements.
+    /// Returns the number of elements.
     #[must_use]
     pub fn elements(&self) -> u64 {
         self.length / u64::from(self.element_size)
     }
 
-    /// First byte behind the section. Cannot overflow once [`Section::check`] has passed.
+    /// Returns the offset behind the section. Cannot overflow once [`Section::check`] has passed.
     pub(crate) fn end(&self) -> u64 {
         self.offset + self.length
     }
 
-    /// The section's bytes as a range of the file's bytes.
+    /// Returns the range of the section's bytes in the file.
     pub(crate) fn range(&self) -> Range<usize> {
         span(self.offset, self.end())
     }
 
-    /// Checks a table row of a file of `limit` bytes whose next free offset is `expected`.
+    /// Checks a row of the table. The file has `limit` bytes, and the section must start at
+    /// `expected`.
     fn check(&self, expected: u64, limit: u64) -> Result<(), Fault> {
         let Self { id: section, offset, length, element_size, .. } = *self;
         if element_size == 0 || !length.is_multiple_of(u64::from(element_size)) {
@@ -69,7 +71,7 @@ impl Section {
     }
 }
 
-/// A row of the table as it lies in the file.
+/// A row of the table as stored in the file.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(crate) struct Entry {
@@ -98,20 +100,21 @@ impl From<Entry> for Section {
     }
 }
 
-/// All sections of a file, checked.
+/// The checked section table of a file.
 #[derive(Debug)]
 pub(crate) struct Table {
     /// In file order.
     pub(crate) sections: Vec<Section>,
     positions: BTreeMap<SectionId, usize>,
-    /// First byte behind the table itself.
+    /// Offset behind the table.
     end: u64,
 }
 
 impl Table {
-    /// Reads the table of `bytes`, the whole file, whose header was checked against their number.
+    /// Reads the table from `bytes`, the whole file. `header` must have been checked against their
+    /// length.
     ///
-    /// Touches the table and nothing behind it; costs O(n log n) for n sections.
+    /// Reads no byte behind the table. Takes O(n log n) time for n sections.
     pub(crate) fn parse(header: &Header, bytes: &[u8]) -> Result<Self, Fault> {
         let limit = header.length;
         let end = header.table_end();
@@ -147,7 +150,7 @@ impl Table {
         self.positions.get(&id).map(|&position| &self.sections[position])
     }
 
-    /// Compares every section with its checksum, and requires zeros between them. Reads the whole file once.
+    /// Checks the checksum of every section, and zeros in the padding. Reads the whole file once.
     pub(crate) fn verify(&self, bytes: &[u8]) -> Result<(), Fault> {
         check_padding(bytes, self.end)?;
         for section in &self.sections {
@@ -162,7 +165,7 @@ impl Table {
     }
 }
 
-/// Requires zeros from `offset` up to the next multiple of 64.
+/// Checks for zeros from `offset` up to the next multiple of 64.
 fn check_padding(bytes: &[u8], offset: u64) -> Result<(), Fault> {
     let padding = &bytes[span(offset, align_up(offset))];
     match padding.iter().zip(offset..).find(|&(&byte, _)| byte != 0) {
@@ -171,10 +174,9 @@ fn check_padding(bytes: &[u8], offset: u64) -> Result<(), Fault> {
     }
 }
 
-/// A range of a file that is in memory.
+/// Converts offsets to a range of a slice.
 ///
-/// The bounds were checked against the number of bytes held, which is a `usize`, so the conversion loses
-/// nothing.
+/// Both were checked against the length of the slice, a `usize`, so the conversion is exact.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "both ends are at most the length of a slice, checked at open"
@@ -184,10 +186,10 @@ fn span(start: u64, end: u64) -> Range<usize> {
     start as usize..end as usize
 }
 
-/// Bytes of one `T` as the table states them.
+/// Returns the size of `T` in bytes, as stored in the table.
 ///
-/// Refused when compiled: types without a size, and types that ask for more than the 64 bytes of alignment
-/// that sections have.
+/// Does not compile for zero-sized types, nor for types whose alignment exceeds the 64 bytes of
+/// sections.
 #[expect(clippy::cast_possible_truncation, reason = "asserted in the line above, when compiled")]
 pub(crate) const fn element_size<T>() -> u32 {
     const {

@@ -1,12 +1,13 @@
-//! A guess at what a file is that is not a container, so that the message can say what to do with it.
+//! A guess at the format of a file that is not a container, so that the error can name a remedy.
 
 use std::fmt;
 
-/// What a file that is not a container looks like, by its first bytes. A guess, for messages only.
+/// The likely format of a file that is not a container, guessed from its first bytes. For messages
+/// only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Looks {
-    /// Stanford polygon file.
+    /// Stanford PLY file.
     Ply,
     /// Point Cloud Library file.
     Pcd,
@@ -28,13 +29,13 @@ pub enum Looks {
     Text,
     /// A container whose line ends were translated in transfer.
     LineEnds,
-    /// Zero bytes only, as a crash or an unfinished copy leaves them.
+    /// Zero bytes only, as left by a crash or an unfinished copy.
     Zeros,
-    /// None of these.
+    /// None of the above.
     Unknown,
 }
 
-/// First bytes and what they mean; the first match counts.
+/// First bytes and their formats. The first match counts.
 const STARTS: [(&[u8], Looks); 12] = [
     (b"\x8Enmiss", Looks::LineEnds),
     (b"ply\n", Looks::Ply),
@@ -51,7 +52,7 @@ const STARTS: [(&[u8], Looks); 12] = [
 ];
 
 impl Looks {
-    /// Guesses from the first bytes of a file; the first 64 are looked at.
+    /// Guesses the format from the first 64 bytes of a file.
     pub(crate) fn of(head: &[u8]) -> Self {
         let head = &head[..head.len().min(64)];
         if let Some((_, looks)) = STARTS.iter().find(|(start, _)| head.starts_with(start)) {
@@ -68,28 +69,28 @@ impl Looks {
     }
 }
 
-/// Completes "it …": what it looks like and what would mend it.
+/// A noun phrase with a remedy that completes "got …".
 impl fmt::Display for Looks {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let prepare = "prepare it with `preprocess`";
         match self {
-            Self::Ply => write!(f, "looks like a PLY file, {prepare}"),
-            Self::Pcd => write!(f, "looks like a PCD file, {prepare}"),
-            Self::Las => write!(f, "looks like a LAS or LAZ file, {prepare}"),
-            Self::E57 => write!(f, "looks like an E57 file, {prepare}"),
-            Self::Gltf => write!(f, "looks like a binary glTF file, {prepare}"),
-            Self::Stl => write!(f, "looks like an STL file, {prepare}"),
-            Self::Png => f.write_str("looks like a PNG image, name another file"),
-            Self::Gzip => f.write_str("looks like a gzip stream, unpack it first"),
-            Self::Zip => f.write_str("looks like a zip archive, unpack it first"),
-            Self::Text => write!(f, "looks like text; if it holds points, {prepare}"),
+            Self::Ply => write!(f, "a PLY file; {prepare}"),
+            Self::Pcd => write!(f, "a PCD file; {prepare}"),
+            Self::Las => write!(f, "a LAS or LAZ file; {prepare}"),
+            Self::E57 => write!(f, "an E57 file; {prepare}"),
+            Self::Gltf => write!(f, "a binary glTF file; {prepare}"),
+            Self::Stl => write!(f, "an STL file; {prepare}"),
+            Self::Png => f.write_str("a PNG image; name another file"),
+            Self::Gzip => f.write_str("a gzip stream; unpack it first"),
+            Self::Zip => f.write_str("a zip archive; unpack it first"),
+            Self::Text => write!(f, "text; if it holds points, {prepare}"),
             Self::LineEnds => {
-                f.write_str("was one until its line ends were translated, copy it again in binary mode")
+                f.write_str("one whose line ends were translated; copy it again in binary mode")
             }
             Self::Zeros => {
-                f.write_str("begins with zero bytes, as after an unfinished copy, copy or prepare it again")
+                f.write_str("zero bytes, as after an unfinished copy; copy it again or prepare it again")
             }
-            Self::Unknown => f.write_str("is of no known kind, prepare a scan with `preprocess` first"),
+            Self::Unknown => f.write_str("a file of an unknown format; prepare a scan with `preprocess`"),
         }
     }
 }

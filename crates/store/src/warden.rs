@@ -1,5 +1,8 @@
-//! Keeps the memory of mapped arrays within bounds: when the process holds too much, it gives all of it back
-//! to the system, in whose cache the content stays as long as there is room, and on the disk after.
+//! `Warden`: a limit on the memory of mapped arrays.
+//!
+//! When the process exceeds the limit, the warden returns the memory of all mapped arrays to the
+//! system. The content stays in the system's cache while there is space, and on the disk
+//! afterwards.
 
 use std::fs;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -9,28 +12,28 @@ use std::time::Duration;
 
 use crate::own_map::Tenant;
 
-/// How often it looks: in this time two cores that go through an array touch some 20 MB anew, and as much as
-/// 100 MB if they jump about in one that the system has in its cache.
+/// Interval between two checks. In this time two cores that read an array sequentially load some 20
+/// MB, and up to 100 MB if they read a cached array in random order.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// It acts when this share of what is allowed is held. To give a gigabyte back takes some 20 ms, in which
-/// others touch more.
+/// Share of the limit at which memory is returned. Returning a gigabyte takes some 20 ms, in which
+/// other threads load more.
 const SHARE: f64 = 0.15;
 
 type Tenants = Arc<Mutex<Vec<Tenant>>>;
 
-/// A thread that watches how much memory is held.
+/// A thread that watches the resident memory of the process.
 #[derive(Debug)]
 pub(crate) struct Warden {
     tenants: Tenants,
-    /// Dropped to end the thread.
+    /// Channel to the thread. Dropping it ends the thread.
     end: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Warden {
-    /// Begins to watch that no more than `resident` bytes are held. Does nothing where the system does not
-    /// tell.
+    /// Starts a thread that keeps the resident memory below `resident` bytes. Has no effect on
+    /// systems that do not report it.
     pub(crate) fn new(resident: u64) -> Self {
         let tenants = Tenants::default();
         let (end, ended) = channel();
@@ -47,7 +50,7 @@ impl Warden {
         Self { tenants, end: Some(end), thread }
     }
 
-    /// Watches another map.
+    /// Adds a map to those whose memory is returned.
     pub(crate) fn watch(&self, tenant: Tenant) {
         self.tenants.lock().unwrap_or_else(PoisonError::into_inner).push(tenant);
     }
@@ -70,7 +73,7 @@ fn watch(tenants: &Tenants, ended: &Receiver<()>, most: u64) {
     }
 }
 
-/// How many bytes of memory the process holds.
+/// Returns the resident memory of the process in bytes.
 #[cfg(any(target_os = "linux", target_os = "android"))]
 fn held() -> Option<u64> {
     let text = fs::read_to_string("/proc/self/statm").ok()?;

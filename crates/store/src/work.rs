@@ -1,8 +1,8 @@
-//! Where large arrays are made: in memory, or in files that are mapped, so that they may exceed it.
+//! Workspaces for large arrays: in memory, or in mapped files, which may exceed the memory.
 //!
-//! Work of hours survives the end of its process: arrays that belong to a finished [`Stage`] are found again
-//! by the next workspace of the same folder and key. All others are files without a name, which the system
-//! removes with the process.
+//! Long work survives the end of its process: the arrays of a finished [`Stage`] are reused by the
+//! next workspace with the same folder and key. All other arrays are unnamed files, which the
+//! system removes when the process ends.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -23,46 +23,46 @@ use crate::room::Room;
 use crate::warden::Warden;
 use crate::work_error::WorkError;
 
-/// The file that holds the lock of a folder, and says what it is for.
+/// Name of the file that carries the lock and the key of a folder.
 const KEY: &str = "work.key";
 
-/// What the files of arrays, and of what was said of finished stages, end in.
+/// File extensions of arrays and of finished stages.
 const ARRAY: &str = "room";
 const DONE: &str = "done";
 
-/// A place for large arrays: in memory, or in mapped files of a folder.
+/// An allocator of large arrays: in memory, or in mapped files of a folder.
 #[derive(Debug, Default)]
 pub struct Workspace {
     folder: Option<Folder>,
     progress: Progress,
 }
 
-/// A folder whose lock is held.
+/// A folder that this process has locked.
 #[derive(Debug)]
 struct Folder {
     path: PathBuf,
-    /// Whoever holds its lock owns the folder.
+    /// The key file. The process that has locked it owns the folder.
     key: fs::File,
     #[cfg(feature = "mmap")]
     warden: Warden,
 }
 
-/// How far work has come, as shares of the whole. Clones tell the same.
+/// The progress of the work, as a share of the whole. Clones share one value.
 #[derive(Debug, Clone, Default)]
 pub struct Progress {
-    /// Millionths that are done.
+    /// Finished share, in millionths.
     done: Arc<AtomicU64>,
 }
 
 impl Progress {
-    /// The share that is done, from 0 to 1.
+    /// Returns the finished share, from 0 to 1.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "at most a million")]
     pub fn share(&self) -> f64 {
         self.done.load(Ordering::Relaxed) as f64 * 1e-6
     }
 
-    /// Says that so much of the whole is done.
+    /// Sets the finished share, from 0 to 1.
     pub fn reach(&self, share: f64) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to a million")]
         self.done.store((share.clamp(0.0, 1.0) * 1e6) as u64, Ordering::Relaxed);
@@ -70,20 +70,20 @@ impl Progress {
 }
 
 impl Workspace {
-    /// One in memory.
+    /// Creates a workspace in memory.
     #[must_use]
     pub fn in_memory() -> Self {
         Self::default()
     }
 
-    /// One in the folder `path`, which is made. Work that an ended process has left there is gone on with if
-    /// its `key` is the same and the system was not started anew since, and removed otherwise.
+    /// Creates a workspace in the folder `path`, which is created if needed.
     ///
-    /// Of the arrays no more than about `resident` bytes stay in memory, where the system tells and heeds it
-    /// (Linux).
+    /// Work that an ended process left there is resumed if it has the same `key` and the system has
+    /// not been restarted since. Otherwise it is removed. On Linux, about `resident` bytes of the
+    /// arrays stay in memory at most.
     ///
     /// # Errors
-    /// When the folder cannot be made or written, holds other files, or is another process's; without the
+    /// Fails if the folder cannot be created or written, if another process uses it, or without the
     /// feature `mmap`.
     pub fn in_folder(path: impl Into<PathBuf>, key: &str, resident: u64) -> Result<Self, WorkError> {
         let path = path.into();
@@ -91,8 +91,8 @@ impl Workspace {
             .map(|folder| Self { folder: Some(folder), progress: Progress::default() })
     }
 
-    /// Removes what an ended process has left in the folder `path`, if that is a workspace's and no living
-    /// process's.
+    /// Removes the work that an ended process left in the folder `path`. Does nothing if the folder
+    /// is not a workspace, or if a running process uses it.
     pub fn clear(path: &Path) {
         if let Ok(key) = fs::File::options().read(true).open(path.join(KEY))
             && key.try_lock().is_ok()
@@ -101,22 +101,22 @@ impl Workspace {
         }
     }
 
-    /// Returns `true` if arrays are in memory.
+    /// Returns `true` if the arrays are in memory.
     #[must_use]
     pub fn is_in_memory(&self) -> bool {
         self.folder.is_none()
     }
 
-    /// How far the work has come, for whoever watches.
+    /// Returns the progress of the work.
     #[must_use]
     pub fn progress(&self) -> &Progress {
         &self.progress
     }
 
-    /// Room for `len` elements, all zero.
+    /// Allocates an array of `len` elements, all zero.
     ///
     /// # Errors
-    /// When the disk is full, or the system gives no memory.
+    /// Fails if the disk is full or the system is out of memory.
     pub fn room<T: Pod>(&self, len: usize) -> Result<Room<T>, WorkError> {
         match &self.folder {
             None => Room::in_memory(len),
@@ -124,14 +124,15 @@ impl Workspace {
         }
     }
 
-    /// A stage of the work, which may be done already.
+    /// Returns a stage of the work. An earlier process may have finished it.
     #[must_use]
     pub fn stage(&self, name: &'static str) -> Stage<'_> {
         let done = self.folder.as_ref().and_then(|folder| fs::read(folder.file(name, DONE)).ok());
         Stage { work: self, name, done }
     }
 
-    /// Ends the work: removes the folder. Arrays that are in use keep their content until they are dropped.
+    /// Ends the work and removes the folder. Arrays in use keep their content until they are
+    /// dropped.
     pub fn remove(self) {
         if let Some(folder) = self.folder {
             remove(&folder.path, &folder.key);
@@ -139,7 +140,7 @@ impl Workspace {
     }
 }
 
-/// A stage of work in a [`Workspace`], the arrays of which are kept once it is closed.
+/// A stage of the work in a [`Workspace`]. Its arrays are kept once it is closed.
 #[derive(Debug)]
 pub struct Stage<'a> {
     work: &'a Workspace,
@@ -148,17 +149,19 @@ pub struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// What was said of the stage when it was closed, by a process that has ended maybe; `None` if it is
-    /// still to be done.
+    /// Returns the value that the stage was closed with, possibly by an earlier process; `None` if
+    /// the stage is unfinished.
     #[must_use]
     pub fn done<V: DeserializeOwned>(&self) -> Option<V> {
         metadata::decode(self.done.as_deref()?, 0).ok()
     }
 
-    /// Room for `len` elements: with what the stage has put there if it is done, else all zero.
+    /// Allocates the array `name` of `len` elements: with its stored content if the stage is
+    /// finished, otherwise all zero.
     ///
     /// # Errors
-    /// When the disk is full, the system gives no memory, or what was there is gone.
+    /// Fails if the disk is full, the system is out of memory, or the stored array is missing or
+    /// has another length.
     pub fn room<T: Pod>(&self, name: &str, len: usize) -> Result<Room<T>, WorkError> {
         match &self.work.folder {
             None => Room::in_memory(len),
@@ -169,10 +172,10 @@ impl Stage<'_> {
         }
     }
 
-    /// Makes `room` one of the arrays of the stage.
+    /// Copies `room` into the array `name` of the stage. In memory, returns `room` itself.
     ///
     /// # Errors
-    /// When the disk is full.
+    /// Fails if the disk is full.
     pub fn keep<T: Pod>(&self, name: &str, room: Room<T>) -> Result<Room<T>, WorkError> {
         if self.work.is_in_memory() {
             return Ok(room);
@@ -182,46 +185,46 @@ impl Stage<'_> {
         Ok(kept)
     }
 
-    /// Closes the stage: from now on its arrays are to be found again, and so is what is said of it.
+    /// Finishes the stage: later workspaces find its arrays and `value`.
     ///
     /// # Errors
-    /// When the folder cannot be written.
+    /// Fails if the folder cannot be written.
     pub fn close(self, value: &impl Serialize) -> Result<(), WorkError> {
         let Some(folder) = &self.work.folder else { return Ok(()) };
         let (new, done) = (folder.file(self.name, "new"), folder.file(self.name, DONE));
         let encoded = metadata::encode(value).map_err(|cause| WorkError {
             path: done.clone(),
-            step: "note what is done",
-            kind: io::ErrorKind::InvalidData,
+            step: "record the finished stage",
+            kind: io::ErrorKind::InvalidInput,
             cause: cause.to_string(),
         })?;
         let write = || fs::write(&new, encoded).and_then(|()| fs::rename(&new, &done));
-        write().map_err(WorkError::new(&done, "note what is done"))
+        write().map_err(WorkError::new(&done, "record the finished stage"))
     }
 }
 
 impl Folder {
     #[cfg(not(feature = "mmap"))]
     fn new(path: PathBuf, _: &str, _: u64) -> Result<Self, WorkError> {
-        let without = || io::Error::new(io::ErrorKind::Unsupported, "built without the feature `mmap`");
+        let without = || io::Error::new(io::ErrorKind::Unsupported, "this build cannot map files");
         Err(WorkError::new(&path, "work in a folder")(without()))
     }
 
     #[cfg(feature = "mmap")]
     fn new(path: PathBuf, key: &str, resident: u64) -> Result<Self, WorkError> {
-        fs::create_dir_all(&path).map_err(WorkError::new(&path, "make the folder"))?;
+        fs::create_dir_all(&path).map_err(WorkError::new(&path, "create the folder"))?;
         let place = path.join(KEY);
         let failed = |step| WorkError::new(&place, step);
         let mut options = fs::File::options();
         options.read(true).write(true).create(true).truncate(false);
-        let mut file = options.open(&place).map_err(failed("open"))?;
+        let mut file = options.open(&place).map_err(failed("open the file"))?;
         match file.try_lock() {
             Ok(()) => {}
             Err(fs::TryLockError::WouldBlock) => {
-                let used = io::Error::new(io::ErrorKind::WouldBlock, "another process works there");
-                return Err(WorkError::new(&path, "use the folder")(used));
+                let used = io::Error::new(io::ErrorKind::WouldBlock, "another process uses it");
+                return Err(WorkError::new(&path, "lock the folder")(used));
             }
-            // A file system without locks: the folder is as much ours as can be known.
+            // On a file system without locks, assume that the folder is free.
             Err(fs::TryLockError::Error(_)) => {}
         }
         let key = format!("{key}\n{}\n", boot());
@@ -233,7 +236,7 @@ impl Folder {
                 io::Seek::rewind(&mut file)?;
                 file.write_all(key.as_bytes())
             });
-            written.map_err(failed("write"))?;
+            written.map_err(failed("write the file"))?;
         }
         Ok(Self { path, key: file, warden: Warden::new(resident) })
     }
@@ -247,7 +250,8 @@ impl Folder {
         Room::in_memory(len)
     }
 
-    /// Room in a file: of this name, which is `kept` with its content or made anew, or without one.
+    /// Allocates an array in a file: an unnamed one, or one at a path. The flag keeps the content
+    /// of that file instead of creating it anew.
     #[cfg(feature = "mmap")]
     fn room<T: Pod>(&self, name: Option<(&Path, bool)>, len: usize) -> Result<Room<T>, WorkError> {
         use crate::own_map::OwnMap;
@@ -261,28 +265,30 @@ impl Folder {
         options.read(true).write(true);
         let file = match name {
             Some((path, true)) => {
-                let file = options.open(path).map_err(at("open"))?;
-                let length = file.metadata().map_err(at("open"))?.len();
+                let file = options.open(path).map_err(at("open the file"))?;
+                let length = file.metadata().map_err(at("open the file"))?.len();
                 if length != bytes {
-                    let cause = format!("expected {bytes} bytes, got {length}; remove the folder");
-                    return Err(at("go on with")(io::Error::new(io::ErrorKind::InvalidData, cause)));
+                    let cause = format!("expected {bytes} bytes, got {length}");
+                    return Err(at("reuse the file")(io::Error::new(io::ErrorKind::InvalidData, cause)));
                 }
                 file
             }
-            Some((path, false)) => options.create(true).truncate(true).open(path).map_err(at("create"))?,
-            None => tempfile::tempfile_in(&self.path).map_err(at("create a file in"))?,
+            Some((path, false)) => {
+                options.create(true).truncate(true).open(path).map_err(at("create the file"))?
+            }
+            None => tempfile::tempfile_in(&self.path).map_err(at("create a file in the folder"))?,
         };
         if !matches!(name, Some((_, true))) {
-            claim(&file, bytes).map_err(at("claim space for"))?;
+            claim(&file, bytes).map_err(at("allocate disk space"))?;
         }
-        let map = OwnMap::new(&file).map_err(at("map"))?;
+        let map = OwnMap::new(&file).map_err(at("map the file"))?;
         self.warden.watch(map.tenant());
         Ok(Room::in_file(map, len))
     }
 }
 
-/// Lengthens a new file, so that writing to its map finds space: a disk that is full then would end the
-/// process.
+/// Allocates disk space for a new file. Without it, writing to the map of the file ends the process
+/// when the disk is full.
 #[cfg(all(feature = "mmap", any(target_os = "linux", target_os = "android")))]
 fn claim(file: &fs::File, bytes: u64) -> io::Result<()> {
     use rustix::fs::{FallocateFlags, fallocate};
@@ -300,28 +306,28 @@ fn claim(file: &fs::File, bytes: u64) -> io::Result<()> {
     fill(file, bytes)
 }
 
-/// The same by zeros, where nothing else is possible.
+/// Allocates disk space by writing zeros, where the system has no call for it.
 #[cfg(feature = "mmap")]
 fn fill(mut file: &fs::File, bytes: u64) -> io::Result<()> {
     io::copy(&mut io::repeat(0).take(bytes), &mut file).map(|_| ())
 }
 
-/// What differs after each start of the system: what was not yet on the disk is lost then.
+/// Returns an id of the current boot, as data that had not reached the disk are lost on a restart.
 #[cfg(feature = "mmap")]
 fn boot() -> String {
     fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default()
 }
 
-/// Removes a workspace's folder, whose key is held.
+/// Removes the folder of a workspace. The caller has locked `key`.
 fn remove(path: &Path, key: &fs::File) {
     clear_files(path);
     let _left = fs::remove_file(path.join(KEY));
     let _unlocked = key.unlock();
-    // Stays if it holds anything else.
+    // Fails, as intended, if the folder holds other files.
     let _left = fs::remove_dir(path);
 }
 
-/// Removes the files of a workspace but its key.
+/// Removes the files of a workspace, except its key.
 fn clear_files(path: &Path) {
     let ours =
         |name: &Path| name.extension().is_some_and(|e| e == ARRAY || e == DONE || e == OsStr::new("new"));

@@ -1,19 +1,21 @@
-//! Why an array of a workspace could not be made or kept.
+//! `WorkError`: the error of creating or keeping an array of a workspace.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// An array of a [`Workspace`](crate::Workspace) could not be made or kept.
+use crate::words::{bytes, plain};
+
+/// Error of creating or keeping an array of a [`Workspace`](crate::Workspace).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WorkError {
-    /// The file or folder; empty if arrays are in memory.
+    /// The file or folder; empty for arrays in memory.
     pub path: PathBuf,
     /// The step that failed, as a verb phrase.
     pub step: &'static str,
-    /// The kind of the system's answer.
+    /// Kind of the operating system's error.
     pub kind: io::ErrorKind,
-    /// The system's words.
+    /// Message of the operating system's error.
     pub cause: String,
 }
 
@@ -22,15 +24,18 @@ impl fmt::Display for WorkError {
         if !self.path.as_os_str().is_empty() {
             write!(f, "{}: ", self.path.display())?;
         }
-        write!(f, "cannot {}: {}", self.step, self.cause)?;
-        match self.kind {
+        let remedy = match self.kind {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-                f.write_str("; free some space, or write the output to another disk")
+                "free some space, or write the output to another disk"
             }
-            io::ErrorKind::OutOfMemory => f.write_str("; work in a folder, or with less detail"),
-            io::ErrorKind::WouldBlock => f.write_str("; wait for the other process to end"),
-            _ => Ok(()),
-        }
+            io::ErrorKind::OutOfMemory => "work on disk, or with less detail",
+            io::ErrorKind::WouldBlock => "wait for that process to end",
+            io::ErrorKind::InvalidData => "remove the folder and start again",
+            io::ErrorKind::InvalidInput => "close the stage with a smaller value of plain types",
+            io::ErrorKind::Unsupported => "enable the feature `mmap` of nearmiss-store",
+            _ => "check the path and its permissions",
+        };
+        write!(f, "cannot {} ({}); {remedy}", self.step, self.cause)
     }
 }
 
@@ -39,13 +44,13 @@ impl std::error::Error for WorkError {}
 impl WorkError {
     pub(crate) fn new(path: &Path, step: &'static str) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        move |cause| Self { path, step, kind: cause.kind(), cause: cause.to_string() }
+        move |cause| Self { path, step, kind: cause.kind(), cause: plain(&cause) }
     }
 
-    /// The system gives no memory.
-    pub(crate) fn memory(bytes: usize) -> Self {
+    /// The error of an allocation that failed.
+    pub(crate) fn memory(length: usize) -> Self {
         let kind = io::ErrorKind::OutOfMemory;
-        let cause = format!("the system gives no {bytes} bytes");
-        Self { path: PathBuf::new(), step: "get memory for an array", kind, cause }
+        let cause = format!("out of memory: {} needed", bytes(length));
+        Self { path: PathBuf::new(), step: "allocate an array", kind, cause }
     }
 }

@@ -1,4 +1,4 @@
-//! Writing a container: sections are borrowed, hashed, and written where they lie.
+//! `Writer`: writes a container from borrowed sections.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -17,10 +17,10 @@ use crate::id::SectionId;
 use crate::metadata;
 use crate::section::{Entry, Section, element_size};
 
-/// Collects the sections of a container, then writes it.
+/// A builder that collects the sections of a container, then writes it.
 ///
-/// The bytes are a function of what was added, in which order, and nothing else: no time, no name, no
-/// machine. Sections are borrowed until then and never copied; writing reads them twice, once for the
+/// The output depends only on the added sections and their order, not on time, file name or
+/// machine. Sections are borrowed and never copied. Writing reads them twice, once for the
 /// checksums.
 #[derive(Debug)]
 pub struct Writer<'a> {
@@ -37,20 +37,21 @@ struct Pending<'a> {
 }
 
 impl<'a> Writer<'a> {
-    /// Begins a container of content `kind` in `version` of that content's format; see
-    /// [`File::expect`](crate::File::expect) for the other end.
+    /// Creates a writer for content of this kind, in this version of its format.
+    /// [`File::expect`](crate::File::expect) checks both.
     #[must_use]
     pub fn new(kind: [u8; 4], version: u32) -> Self {
         Self { kind, version, sections: Vec::new(), ids: BTreeSet::new() }
     }
 
-    /// Adds a section. Sections lie in the file in the order in which they are added.
+    /// Adds a section. The file has the sections in the order in which they are added.
     ///
-    /// `T` has a size and an alignment of at most 64 bytes, or it does not compile. An empty slice is a
-    /// section too.
+    /// `T` must not be zero-sized, and its alignment must be at most 64 bytes; otherwise the call
+    /// does not compile. A section may be empty.
     ///
     /// # Errors
-    /// [`WriteError::DuplicateSection`] if `(tag, part)` was used, [`WriteError::ReservedTag`] for `META`.
+    /// Returns [`WriteError::DuplicateSection`] if `(tag, part)` was used before, and
+    /// [`WriteError::ReservedTag`] for `META`.
     pub fn section<T: Pod>(
         &mut self,
         tag: [u8; 4],
@@ -67,15 +68,17 @@ impl<'a> Writer<'a> {
         Ok(self)
     }
 
-    /// Sets the metadata: one serde value of at most [`METADATA_LIMIT`](crate::METADATA_LIMIT) bytes encoded.
-    /// It comes first in the file, whenever it is set, so that it shares a page with the table.
+    /// Sets the metadata: one serde value of at most [`METADATA_LIMIT`](crate::METADATA_LIMIT)
+    /// bytes when encoded. The metadata are always the first section, so that they share a page
+    /// with the table.
     ///
-    /// Field names are not stored, so what serde can only read back by name (`flatten`, `untagged`,
-    /// `skip_serializing_if`) is out.
+    /// Field names are not stored, so the serde attributes `flatten`, `untagged` and
+    /// `skip_serializing_if`, which need them, are not supported.
     ///
     /// # Errors
-    /// [`WriteError::DuplicateSection`] if it was set before, [`WriteError::Metadata`] if the value cannot be
-    /// encoded, [`WriteError::MetadataTooLarge`].
+    /// Returns [`WriteError::DuplicateSection`] if the metadata were set before,
+    /// [`WriteError::Metadata`] if the value cannot be encoded, and
+    /// [`WriteError::MetadataTooLarge`] if it is too long.
     pub fn metadata(&mut self, value: &impl Serialize) -> Result<&mut Self, WriteError> {
         let bytes = Cow::Owned(metadata::encode(value)?);
         self.claim(SectionId::META)?;
@@ -83,7 +86,7 @@ impl<'a> Writer<'a> {
         Ok(self)
     }
 
-    /// Length in bytes of what [`Writer::write_to`] would write now.
+    /// Returns the number of bytes that [`Writer::write_to`] would write.
     #[must_use]
     pub fn byte_len(&self) -> u64 {
         self.sections.iter().fold(self.table_end(), |end, section| align_up(end + section.bytes.len() as u64))
@@ -92,7 +95,8 @@ impl<'a> Writer<'a> {
     /// Writes the container, flushes, and returns the number of bytes written, a multiple of 64.
     ///
     /// # Errors
-    /// [`WriteError::Io`] without a path if `out` fails; what it has got by then is no valid container.
+    /// Returns [`WriteError::Io`] without a path if `out` fails. The bytes written until then are
+    /// not a valid container.
     pub fn write_to(&self, mut out: impl Write) -> Result<u64, WriteError> {
         let (header, table) = self.plan()?;
         self.write_all(&mut out, &header, &table).map_err(|source| WriteError::Io {
@@ -103,22 +107,22 @@ impl<'a> Writer<'a> {
         Ok(header.length)
     }
 
-    /// Writes the container to `path`, replacing a file that is there in one step, and returns its length in
-    /// bytes.
+    /// Writes the container to `path`, atomically replacing an existing file, and returns its
+    /// length in bytes.
     ///
-    /// It is written to `NAME.tmp-` and twelve random letters and digits in the same folder, synced, and
-    /// renamed; on Unix the folder is synced too, as far as its file system can. Whatever goes wrong, a file
-    /// that was there before is whole, and so is the new one once it bears the name. A link is followed and
-    /// stays a link; a folder or device is refused; permissions of a replaced file are kept, ownership is
-    /// not. Programs that have the old file mapped keep the old bytes (Windows refuses to replace it
-    /// instead).
+    /// The container is written to a temporary file in the same folder, synced, and renamed. The
+    /// temporary name is `NAME.tmp-` with twelve random letters and digits. On Unix the folder is
+    /// synced too, if its file system supports that. After any failure, `path` is either the
+    /// complete old file or the complete new one. A link is followed and stays a link. A folder or
+    /// device is rejected. A replaced file keeps its permissions, but not its owner. Programs that
+    /// have mapped the old file keep the old bytes; on Windows, a mapped file cannot be replaced.
     ///
-    /// A writer that fails removes its temporary file; one that was killed cannot. The next save of the same
-    /// name removes what such writers left: files with just that pattern on which no living process holds the
-    /// lock that every writer takes. Where the file system knows no locks, none is removed.
+    /// A writer that fails removes its temporary file. A killed writer leaves it, and the next save
+    /// of the same name removes it: every writer locks its temporary file, and unlocked files of
+    /// that pattern are removed. On file systems without locks, none is removed.
     ///
     /// # Errors
-    /// [`WriteError::NotAFile`], or [`WriteError::Io`] with the step that failed.
+    /// Returns [`WriteError::NotAFile`], or [`WriteError::Io`] with the step that failed.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<u64, WriteError> {
         let (header, table) = self.plan()?;
         atomic::replace(path.as_ref(), |file| self.write_all(&mut BufWriter::new(file), &header, &table))?;
@@ -129,12 +133,12 @@ impl<'a> Writer<'a> {
         if self.ids.insert(id) { Ok(()) } else { Err(WriteError::DuplicateSection { section: id }) }
     }
 
-    /// Where the first section begins.
+    /// Returns the offset of the first section.
     fn table_end(&self) -> u64 {
         align_up((HEADER_LEN + self.sections.len() * size_of::<Entry>()) as u64)
     }
 
-    /// Lays the sections out and hashes them.
+    /// Computes the layout and the checksums.
     fn plan(&self) -> Result<(Header, Vec<Entry>), WriteError> {
         let count = self.sections.len();
         let count = u32::try_from(count).map_err(|_too_large| WriteError::TooManySections { count })?;
@@ -159,14 +163,14 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Writes `bytes`, which begin at a multiple of 64, and zeros up to the next.
+/// Writes `bytes` and pads them with zeros to a multiple of 64.
 fn write_padded(out: &mut impl Write, bytes: &[u8]) -> io::Result<()> {
     const ZEROS: [u8; ALIGN] = [0; ALIGN];
     out.write_all(bytes)?;
     out.write_all(&ZEROS[..bytes.len().next_multiple_of(ALIGN) - bytes.len()])
 }
 
-/// Without the bytes: there may be gigabytes.
+/// Shows all but the bytes: there may be gigabytes.
 impl fmt::Debug for Pending<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} ({} bytes)", self.id, self.bytes.len())

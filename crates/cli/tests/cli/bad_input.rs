@@ -20,13 +20,13 @@ fn raw_inputs_are_refused_with_file_and_place() {
     place.write("vast.ply", format!("{binary}end_header\nabcdefghijklmnop"));
     for (file, words) in [
         ("missing.ply", &["missing.ply: no such file; check the path"][..]),
-        ("folder", &["folder", "not a regular file"]),
+        ("folder", &["folder", "a regular file"]),
         ("empty.ply", &["empty.ply", "empty"]),
         ("unknown.bin", &["unknown.bin", "unknown format", "--format"]),
         ("short.ply", &["short.ply", "line", "9", "2"]),
         ("words.xyz", &["words.xyz", "line 3", "`one`"]),
         ("few.xyz", &["few.xyz", "3 distinct", "at least 8"]),
-        ("scan.las", &["scan.las", "byte 14", "ends here"]),
+        ("scan.las", &["scan.las", "byte 14", "end of the file"]),
         ("vast.ply", &["vast.ply", "4000000000"]),
     ] {
         place.refused(1, &["preprocess", file, "-o", "out.nm"], words);

@@ -168,7 +168,7 @@ fn two_runs_of_one_output_are_not_mixed() {
     std::thread::sleep(Duration::from_millis(20));
     let second = place.run(&on_disk);
     assert_eq!(second.status, 1, "{}", second.errors);
-    assert!(second.errors.contains("another process works there"), "{}", second.errors);
+    assert!(second.errors.contains("another process uses it"), "{}", second.errors);
     assert!(child.wait().unwrap().success(), "the first one goes on");
     place.ok(&["inspect", "disk.nm", "--verify"]);
 }

@@ -1,5 +1,5 @@
-//! COPC: LAZ whose chunks are the nodes of an octree, so that a part of space can be read alone, and
-//! coarsely.
+//! COPC: LAZ whose chunks are the nodes of an octree, so that a region or a level of detail can be
+//! read alone.
 
 use std::collections::BTreeSet;
 use std::io::Read;
@@ -11,22 +11,22 @@ use crate::input::{Input, Stop};
 use crate::scalar::{Order, Scalar};
 use crate::selection::Selection;
 
-/// Bytes of an entry of the hierarchy.
+/// Length of an entry of the hierarchy in bytes.
 const ENTRY: usize = 32;
 
-/// The octree, as its header has it.
+/// The octree as described in the COPC record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Octree {
     centre: [f64; 3],
     half: f64,
-    /// How far the points of the root are apart.
+    /// Distance between points of the root.
     spacing: f64,
-    /// Where the first page of the hierarchy is, and its length in bytes.
+    /// Offset and length of the first page of the hierarchy, in bytes.
     root: [u64; 2],
 }
 
 impl Octree {
-    /// That of a file that begins like this, if it is COPC.
+    /// Reads the octree from the start of a file. Returns `None` if the file is not COPC.
     pub(super) fn of(head: &[u8], header: &Header) -> Option<Self> {
         let (_, content) = record(head, header, b"copc", 1)?;
         let real = |i: usize| Scalar::F64.read(content.get(8 * i..)?, Order::Little);
@@ -42,7 +42,7 @@ impl Octree {
         is_sound.then_some(octree)
     }
 
-    /// The chunks of the nodes that are selected, in the order of the file.
+    /// Returns the chunks of the selected nodes, in file order.
     pub(super) fn chunks(
         &self,
         input: Input<'_>,
@@ -55,9 +55,9 @@ impl Octree {
         let mut page = Vec::new();
         while let Some([offset, bytes]) = pages.pop() {
             let at = |cause: &str| Fault::Decoder { cause: cause.into() }.at(crate::At::Byte(offset));
-            // A page that is read twice would never end.
+            // A repeated page would lead to an endless loop.
             if offset.checked_add(bytes).is_none_or(|end| end > length) || !seen.insert(offset) {
-                return Err(at("a page of the hierarchy lies outside the file, or twice in it").into());
+                return Err(at("expected distinct pages within the file, got one outside or twice").into());
             }
             page.clear();
             input.reader(offset)?.take(bytes).read_to_end(&mut page)?;
@@ -74,7 +74,7 @@ impl Octree {
                     continue;
                 }
                 if start < header.start || start.checked_add(bytes).is_none_or(|end| end > length) {
-                    return Err(at("a node lies outside the points of the file").into());
+                    return Err(at("expected nodes within the points of the file, got one outside").into());
                 }
                 chunks.push(Chunk { start, bytes, points: u64::try_from(points).unwrap_or_default() });
             }
@@ -86,12 +86,12 @@ impl Octree {
 
     fn is_selected(&self, level: i32, place: [i32; 3], selection: &Selection) -> bool {
         let share = 0.5_f64.powi(level.clamp(0, 60));
-        // A level is needed if the one above is not fine enough.
+        // A level is needed if the previous level is too coarse.
         let is_coarse =
             level == 0 || selection.spacing.is_none_or(|wanted| 2.0 * self.spacing * share > wanted);
         let is_inside = selection.bounds.is_none_or(|bounds| {
             let edge = 2.0 * self.half * share;
-            // Points of a node may lie on its upper border, and rounding may move them.
+            // Points may be on the upper border of a node, and rounding may move them across.
             let slack = edge * 1e-6;
             (0..3).all(|k| {
                 let low = self.centre[k] - self.half + edge * f64::from(place[k]);
@@ -102,7 +102,7 @@ impl Octree {
     }
 }
 
-/// Four bytes of an entry.
+/// Reads a signed 32-bit integer of an entry.
 fn signed(entry: &[u8], at: usize) -> i32 {
     entry[at..].first_chunk().map_or(0, |bytes| i32::from_le_bytes(*bytes))
 }

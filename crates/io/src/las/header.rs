@@ -1,4 +1,4 @@
-//! The header of LAS 1.0 to 1.4, as far as points need it.
+//! The header of LAS 1.0 to 1.4: the fields needed to read points.
 
 use nearmiss_geometry::Aabb;
 
@@ -6,19 +6,19 @@ use crate::columns::Holds;
 use crate::error::{Broken, Fault};
 use crate::scalar::{Order, Scalar};
 
-/// Bytes of the longest header.
+/// Length of the longest header in bytes.
 pub(super) const LONGEST: usize = 375;
 
-/// Bytes of the shortest.
+/// Length of the shortest header in bytes.
 const SHORTEST: usize = 227;
 
-/// Bytes before the content of a variable-length record.
+/// Length of the header of a variable-length record in bytes.
 const RECORD: usize = 54;
 
-/// Bytes of a record of each point format, without extra bytes.
+/// Length of a point record in bytes, for each point format, without extra bytes.
 const SIZES: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
 
-/// Where in the header its fields start.
+/// Offsets of the fields of the header.
 mod field {
     pub(super) const MINOR_VERSION: usize = 25;
     pub(super) const HEADER_SIZE: usize = 94;
@@ -29,24 +29,24 @@ mod field {
     pub(super) const COUNT: usize = 107;
     pub(super) const SCALE: usize = 131;
     pub(super) const OFFSET: usize = 155;
-    /// Greatest and least x, greatest and least y, …
+    /// Maximum and minimum of x, maximum and minimum of y, …
     pub(super) const BOUNDS: usize = 179;
     pub(super) const LONG_COUNT: usize = 247;
 }
 
-/// What the header says of the points.
+/// The fields of the header that describe the points.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
-    /// Where records of any kind start, in bytes.
+    /// Offset of the first variable-length record.
     pub(super) header_size: usize,
-    /// Where points start, in bytes.
+    /// Offset of the first point.
     pub(super) start: u64,
-    /// How many variable-length records it declares.
+    /// Number of variable-length records.
     pub(super) records: u32,
     pub(super) format: u8,
-    /// Whether points are compressed by laszip.
+    /// `true` if the points are compressed by laszip.
     pub(super) compressed: bool,
-    /// Bytes of a point that is not compressed.
+    /// Length of an uncompressed point record in bytes.
     pub(super) stride: usize,
     pub(super) count: u64,
     pub(super) scale: [f64; 3],
@@ -55,7 +55,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// The header that `head` begins with.
+    /// Parses the header at the start of `head`.
     pub(super) fn parse(head: &[u8]) -> Result<Self, Broken> {
         if head.len() < SHORTEST {
             return Err(Fault::PastEnd.at_byte(head.len()));
@@ -74,17 +74,19 @@ impl Header {
             Err(Fault::Expected { expected, found: found.to_string().into() }.at_byte(at))
         };
         let minor = whole(Scalar::U8, field::MINOR_VERSION);
-        if minor > 4 || head[field::MINOR_VERSION - 1] != 1 {
-            return expected("LAS 1.0 to 1.4", minor, field::MINOR_VERSION);
+        let major = head[field::MINOR_VERSION - 1];
+        if minor > 4 || major != 1 {
+            let found = format!("{major}.{minor}").into();
+            return Err(Fault::Expected { expected: "LAS 1.0 to 1.4", found }.at_byte(field::MINOR_VERSION));
         }
         // laszip sets the two highest bits.
         let format = head[field::FORMAT] & 0x3f;
         let Some(&least) = SIZES.get(usize::from(format)) else {
-            return expected("a point format of 0 to 10", format.into(), field::FORMAT);
+            return expected("a point format from 0 to 10", format.into(), field::FORMAT);
         };
         let stride = whole(Scalar::U16, field::STRIDE);
         if stride < least.into() {
-            return expected("the length of a record of this point format or more", stride, field::STRIDE);
+            return expected("a record length that fits the point format", stride, field::STRIDE);
         }
         let short = whole(Scalar::U32, field::COUNT);
         let long = head.get(field::LONG_COUNT..).and_then(<[u8]>::first_chunk).copied();
@@ -97,7 +99,7 @@ impl Header {
                 let is_none = !value.is_finite() || at == field::SCALE && value == 0.0;
                 if is_none && count > 0 {
                     let found = value.to_string().into();
-                    let expected = "finite scales other than zero, and finite offsets";
+                    let expected = "finite nonzero scales and finite offsets";
                     return Err(Fault::Expected { expected, found }.at_byte(at + 8 * k));
                 }
             }
@@ -121,12 +123,12 @@ impl Header {
         })
     }
 
-    /// What points of this format hold. Intensities and classes are always there.
+    /// Returns the attributes of the point format. Every format has intensities and classes.
     pub(super) fn holds(&self) -> Holds {
         Holds { normals: false, colours: self.colours().is_some(), intensities: true, classes: true }
     }
 
-    /// Where in a record its colours start, if it has any.
+    /// Returns the offset of the colour in a record, if the point format has colours.
     pub(super) fn colours(&self) -> Option<usize> {
         match self.format {
             2 => Some(20),
@@ -136,11 +138,12 @@ impl Header {
         }
     }
 
-    /// Checks that points start where they may, and, uncompressed, that all are there.
+    /// Checks that the points start behind the header and, if uncompressed, that the file contains
+    /// all of them.
     pub(super) fn check(&self, length: u64) -> Result<(), Broken> {
         if self.start < SHORTEST as u64 || self.start > length {
             let found = self.start.to_string().into();
-            let expected = "points to start after the header and within the file";
+            let expected = "points that start behind the header and within the file";
             return Err(Fault::Expected { expected, found }.at_byte(field::POINTS));
         }
         let present = (length - self.start) / self.stride as u64;
@@ -150,18 +153,18 @@ impl Header {
         Ok(())
     }
 
-    /// The fault of a file that holds only so many of its points.
+    /// Returns the fault of a file that contains only `present` of its points.
     pub(super) fn promised(&self, present: u64) -> Broken {
         let fault = Fault::Promised { element: "point".into(), promised: self.count, present };
         fault.at_byte(if self.count > u64::from(u32::MAX) { field::LONG_COUNT } else { field::COUNT })
     }
 }
 
-/// The content of the variable-length record by this user with this id, and where it starts; `head` is all
-/// that stands before the points.
+/// Finds the variable-length record with this user id and record id. Returns its offset and
+/// content. `head` is the part of the file before the points.
 pub(super) fn record<'a>(head: &'a [u8], header: &Header, user: &[u8], id: u16) -> Option<(usize, &'a [u8])> {
     let mut at = header.header_size.max(SHORTEST);
-    // As many as there is space for, whatever the header declares.
+    // Ends at the end of `head`, whatever number the header declares.
     for _ in 0..header.records {
         let start = at + RECORD;
         let about = head.get(at..start)?;

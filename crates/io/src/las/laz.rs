@@ -1,8 +1,8 @@
 //! LAZ: chunks of points compressed by laszip.
 //!
-//! The decoder trusts what it reads: it allocates as many entries as a table of chunks declares, and as many
-//! bytes as a layer declares. Both are held against the length of the file first, and each chunk is decoded
-//! from its own bytes alone.
+//! The decoder of the crate `laz` trusts its input: it allocates as many entries as the chunk table
+//! declares, and as many bytes as a layer declares. Both are checked against the length of the file
+//! first, and each chunk is decoded from its own bytes alone.
 
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::ops::ControlFlow;
@@ -16,29 +16,31 @@ use super::times::Times;
 use crate::error::{Broken, Fault};
 use crate::guard::guarded;
 use crate::input::{Input, Stop};
+use crate::text::{bytes, counted};
 
-/// Bytes before the points that are read: more than all variable-length records of any scan.
+/// Maximum number of bytes read before the points: more than all variable-length records of any
+/// scan.
 const HEAD: usize = 1 << 26;
 
-/// The fields that are read, where they stand in layers of their own. Times are not: damaged ones lead the
-/// decoder of `laz` into a recursion without end.
+/// The fields that are decoded in layered formats. Times are left out, because damaged times lead
+/// the decoder of `laz` into an endless recursion.
 const FIELDS: u32 = DecompressionSelection::Z
     | DecompressionSelection::CLASSIFICATION
     | DecompressionSelection::INTENSITY
     | DecompressionSelection::RGB;
 
-/// Chunks that take the rest of the file, by the code of laszip's compressors.
+/// Compressor code of laszip for files with a single chunk up to the end of the file.
 const ONE_CHUNK: u16 = 1;
 
-/// Bytes before the entries of a table of chunks: its version, and how many there are.
+/// Length of the header of the chunk table in bytes: its version and the number of entries.
 const TABLE: u64 = 8;
 
-/// Bytes of the place of the table, before the first chunk.
+/// Length in bytes of the offset of the chunk table, stored before the first chunk.
 const PLACE: u64 = 8;
 
 type Decoder<'a> = Box<dyn RecordDecompressor<Cursor<&'a [u8]>> + 'a>;
 
-/// Where a chunk is, and how many points it has.
+/// A chunk: its offset, its length in bytes, and its number of points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chunk {
     pub(super) start: u64,
@@ -46,17 +48,17 @@ pub(super) struct Chunk {
     pub(super) points: u64,
 }
 
-/// What laszip says of the file.
+/// The compression described by the record of laszip.
 struct Packing {
     vlr: LazVlr,
-    /// Where that stands.
+    /// Offset of the record.
     at: usize,
     layered: bool,
     one_chunk: bool,
 }
 
-/// Goes over all records, so many of them `together`; `chosen` are the chunks that are wanted, if not all
-/// are.
+/// Passes all records to `take`, at most `together` at a time. `chosen` restricts them to some
+/// chunks.
 pub(super) fn each(
     input: Input<'_>,
     header: &Header,
@@ -97,7 +99,7 @@ pub(super) fn each(
             let many = usize::try_from(points - so_far).unwrap_or(usize::MAX).min(together);
             records.clear();
             records.resize(many * header.stride, 0);
-            // Damaged data may lead the decoder's models out of their tables.
+            // Damaged data may make the decoder panic.
             let mut decoded = 0;
             let each = || {
                 for record in records.chunks_exact_mut(header.stride) {
@@ -109,7 +111,7 @@ pub(super) fn each(
             match guarded(each) {
                 Some(Ok(())) => (),
                 Some(Err(cause)) => return Err(corrupt(cause.to_string(), so_far + decoded)),
-                None => return Err(corrupt("it gave up".into(), so_far + decoded)),
+                None => return Err(corrupt("the decoder panicked".into(), so_far + decoded)),
             }
             if take(&records).is_break() {
                 return Ok(());
@@ -124,22 +126,22 @@ pub(super) fn each(
 impl Packing {
     fn of(head: &[u8], header: &Header) -> Result<Self, Broken> {
         let Some((at, content)) = record(head, header, LazVlr::USER_ID.as_bytes(), LazVlr::RECORD_ID) else {
-            return Err(Fault::Undeclared { what: "how points are compressed" }.at_byte(header.header_size));
+            return Err(Fault::Undeclared { what: "a laszip record" }.at_byte(header.header_size));
         };
         let wrong = |cause: String| Fault::Decoder { cause: cause.into() }.at_byte(at);
         let vlr = LazVlr::from_buffer(content).map_err(|cause| wrong(cause.to_string()))?;
         let sizes: usize = vlr.items().iter().map(|item| usize::from(item.size())).sum();
         let as_declared = vlr.items().iter().all(|item| size_of_item(item) == usize::from(item.size()));
         if sizes != header.stride || !as_declared {
-            return Err(wrong(format!("items of {sizes} bytes make no point of {}", header.stride)));
+            return Err(wrong(format!("expected items of {} in all, got {sizes}", bytes(header.stride))));
         }
         let layers = vlr.items().iter().filter(|item| item.version() >= 3).count();
         if layers != 0 && layers != vlr.items().len() {
-            return Err(wrong("some items are in layers and some are not".into()));
+            return Err(wrong("expected all items or none in layers, got some".into()));
         }
         let one_chunk = content.get(..2) == Some(&ONE_CHUNK.to_le_bytes());
         let packing = Self { layered: layers > 0, vlr, at, one_chunk };
-        // Whether all items are known does not depend on the data.
+        // Fails if an item is unknown, which does not depend on the data.
         packing.decoder(&[]).map(drop)?;
         Ok(packing)
     }
@@ -166,7 +168,7 @@ impl Packing {
     }
 }
 
-/// All chunks, which lie one after the other from the start of the points to the table of chunks.
+/// Returns all chunks. They are contiguous from the start of the points to the chunk table.
 fn chunks(input: Input<'_>, header: &Header, packing: &Packing, length: u64) -> Result<Vec<Chunk>, Stop> {
     if packing.one_chunk {
         return Ok(vec![Chunk { start: header.start, bytes: length - header.start, points: header.count }]);
@@ -183,36 +185,39 @@ fn chunks(input: Input<'_>, header: &Header, packing: &Packing, length: u64) -> 
         return Err(Fault::PastEnd.at(crate::At::Byte(length)).into());
     }
     let mut table = place(header.start)?;
-    // A writer that could not go back leaves the place at the end.
+    // A writer that cannot seek stores the offset at the end of the file.
     if table <= header.start || i64::try_from(table).is_err() {
         table = place(length - 8)?;
     }
     if table < first || table > length - TABLE {
-        let cause =
-            "there is no table of chunks; the file was not finished: `las2las` or PDAL mends it".into();
+        let cause = "expected a chunk table, got an unfinished file; repair it with `las2las` or PDAL".into();
         return Err(wrong(cause, header.start));
     }
     let mut reader = input.reader(table + 4)?;
     let mut count = [0; 4];
     reader.read_exact(&mut count)?;
     let count = u64::from(u32::from_le_bytes(count));
-    // The first point of each chunk is not compressed.
+    // The first point of each chunk is stored uncompressed.
     let most = (table - first) / header.stride as u64;
     if count > most {
-        return Err(wrong(format!("{count} chunks do not fit into {} bytes", table - first), table));
+        return Err(wrong(
+            format!("expected at most {}, got {count}", counted(most, "chunk", "chunks")),
+            table,
+        ));
     }
-    // So that the decoder cannot read past the end of the table.
+    // The decoder reads the header of the table again.
     reader.seek(SeekFrom::Start(table))?;
     let is_variable = packing.vlr.uses_variable_size_chunks();
     let entries = guarded(|| ChunkTable::read(&mut reader, is_variable))
-        .ok_or_else(|| wrong("the table of chunks is damaged".into(), table))?
+        .ok_or_else(|| wrong("the decoder panicked at the chunk table".into(), table))?
         .map_err(|cause| wrong(cause.to_string(), table))?;
     let mut start = first;
     let mut chunks = Vec::new();
     for entry in entries.as_ref() {
         let points = if is_variable { entry.point_count } else { packing.vlr.chunk_size().into() };
         if entry.byte_count > table - start {
-            return Err(wrong(format!("a chunk of {} bytes ends after the last", entry.byte_count), table));
+            let (left, found) = (bytes(table - start), entry.byte_count);
+            return Err(wrong(format!("expected a chunk within the {left} left, got {found}"), table));
         }
         chunks.push(Chunk { start, bytes: entry.byte_count, points });
         start += entry.byte_count;
@@ -220,7 +225,7 @@ fn chunks(input: Input<'_>, header: &Header, packing: &Packing, length: u64) -> 
     Ok(chunks)
 }
 
-/// Bytes of an item by its kind; the decoder takes them for granted.
+/// Returns the size of an item of this kind in bytes, which the decoder assumes.
 fn size_of_item(item: &LazItem) -> usize {
     match item.item_type() {
         LazItemType::Byte(count) | LazItemType::Byte14(count) => count.into(),
@@ -232,7 +237,7 @@ fn size_of_item(item: &LazItem) -> usize {
     }
 }
 
-/// Layers of an item in a chunk.
+/// Returns the number of layers of an item in a chunk.
 fn layers_of(item: &LazItem) -> usize {
     match item.item_type() {
         LazItemType::Point14 => 9,
@@ -243,7 +248,7 @@ fn layers_of(item: &LazItem) -> usize {
     }
 }
 
-/// Checks that a chunk holds its first point, and all layers that it declares.
+/// Checks that a chunk contains its first point and all layers that it declares.
 fn check_layers(chunk: &[u8], items: &[LazItem], stride: usize, points: u64) -> Result<(), Fault> {
     let layers: usize = items.iter().map(layers_of).sum();
     let content = stride + 4 + 4 * layers;

@@ -1,4 +1,4 @@
-//! LAS 1.4 and LAZ: point format 6, or 7 where points have colours.
+//! LAS 1.4 and LAZ: point format 6, or 7 if the points have colours.
 
 use std::io::{Seek, Write};
 
@@ -7,19 +7,19 @@ use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 use super::survey::{Lattice, OutError, Survey};
 use crate::points::Points;
 
-/// Bytes of the header.
+/// Length of the header in bytes.
 const HEADER: u16 = 375;
 
-/// Bytes before the content of a variable-length record.
+/// Length of the header of a variable-length record in bytes.
 const RECORD: usize = 54;
 
-/// Bytes of a point, without and with a colour.
+/// Length of a point record in bytes, without and with a colour.
 const STRIDES: [u16; 2] = [30, 36];
 
-/// The first return of one, as of a scanner that reports no more.
+/// Return number 1 of 1, as reported by a scanner with single returns.
 const ONLY_RETURN: u8 = 0x11;
 
-/// Writes the points of a LAS file.
+/// A writer of LAS and LAZ.
 pub(super) struct LasWriter<W: Write + Seek + Send + Sync + 'static> {
     out: Out<W>,
     lattice: Lattice,
@@ -32,7 +32,7 @@ enum Out<W: Write + Seek + Send + Sync + 'static> {
 }
 
 impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
-    /// Writes the header.
+    /// Creates a writer and writes the header.
     pub(super) fn new(mut out: W, survey: &Survey, compressed: bool) -> Result<Self, OutError> {
         let (lattice, bounds) = (survey.lattice(), survey.bounds());
         let fits = |x: f64, k: usize| {
@@ -73,7 +73,7 @@ impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
         Ok(Self { out, lattice, has_colours })
     }
 
-    /// Writes some points; `records` is for reuse, and empty.
+    /// Writes a block of points. `records` is an empty buffer for reuse.
     pub(super) fn write(
         &mut self,
         points: &Points,
@@ -89,7 +89,7 @@ impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
             let intensity = points.intensities.get(i).map_or(0, |intensity| survey.intensity(*intensity));
             records.extend(intensity.to_le_bytes());
             records.extend([ONLY_RETURN, 0, points.classes.get(i).copied().unwrap_or(0), 0]);
-            // Scan angle, source and time.
+            // Zeros for scan angle, source and time.
             records.extend([0; 12]);
             if self.has_colours {
                 let colour = points.colours.get(i).copied().unwrap_or_default();
@@ -114,12 +114,12 @@ impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
     }
 }
 
-/// The header; `packed` is the length of laszip's record, if there is one.
+/// Builds the header. `packed` is the length of the laszip record, if the file is compressed.
 fn header(survey: &Survey, format: u8, lattice: Lattice, packed: Option<usize>) -> Vec<u8> {
     let mut bytes = vec![0; usize::from(HEADER)];
     let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
     put(0, b"LASF");
-    // Coordinate systems, where there are any, are told as well-known text.
+    // Declares that coordinate systems are given as well-known text, as LAS 1.4 requires.
     put(6, &[0x10]);
     put(24, &[1, 4]);
     put(26, b"OTHER");
@@ -135,7 +135,7 @@ fn header(survey: &Survey, format: u8, lattice: Lattice, packed: Option<usize>) 
         put(131 + 8 * k, &lattice.scale[k].to_le_bytes());
         put(155 + 8 * k, &lattice.offset[k].to_le_bytes());
         let bounds = survey.bounds();
-        // As they come out again.
+        // The bounds after rounding, as they are read back.
         let stored = |x: f64| {
             ((x - lattice.offset[k]) / lattice.scale[k]).round() * lattice.scale[k] + lattice.offset[k]
         };
@@ -145,7 +145,7 @@ fn header(survey: &Survey, format: u8, lattice: Lattice, packed: Option<usize>) 
         put(187 + 16 * k, &least.to_le_bytes());
     }
     put(247, &survey.points().to_le_bytes());
-    // All are first returns.
+    // All points are first returns.
     put(255, &survey.points().to_le_bytes());
     bytes
 }

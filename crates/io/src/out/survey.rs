@@ -1,4 +1,5 @@
-//! What a header says of points, found by a first pass over them; and why they cannot be written.
+//! `Survey`: the contents of a header, collected by a first pass over the points. Also the errors
+//! of writing.
 
 use std::io;
 
@@ -7,26 +8,27 @@ use thiserror::Error;
 
 use crate::columns::Holds;
 use crate::points::Points;
+use crate::text::plain;
 
-/// Steps in which coordinates are counted, and where they are counted from: those of LAS.
+/// The scale and offset of LAS: coordinates are `offset + n * scale` for 32-bit integers `n`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lattice {
-    /// The length of a step along each axis.
+    /// Step size along each axis, in the units of the file.
     pub scale: [f64; 3],
-    /// Where counting starts.
+    /// Origin of the steps, in the units of the file.
     pub offset: [f64; 3],
 }
 
-/// What a header must say of the points that follow it.
+/// The number, bounds, attributes and precision of all points of a file, as needed for its header.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
     pub(super) points: u64,
     bounds: Aabb,
     pub(super) holds: Holds,
-    /// Whether single precision holds every coordinate.
+    /// `true` if every coordinate is exact in single precision.
     pub(super) is_single: bool,
     intensities: [f32; 2],
-    /// Whether every intensity is a whole number of 16 bits.
+    /// `true` if every intensity is a whole number of 16 bits.
     is_whole: bool,
     lattice: Option<Lattice>,
 }
@@ -46,7 +48,7 @@ impl Default for Survey {
 }
 
 impl Survey {
-    /// Looks at some more points, all of which must be finite.
+    /// Adds a block of points, all of which must be finite.
     pub fn add(&mut self, points: &Points) {
         self.points += points.len() as u64;
         self.holds = Holds {
@@ -67,26 +69,26 @@ impl Survey {
         }
     }
 
-    /// The same, with coordinates to be counted in the steps of the input.
+    /// Sets the lattice of the coordinates, usually that of the input.
     #[must_use]
     pub fn with_lattice(self, lattice: Option<Lattice>) -> Self {
         Self { lattice, ..self }
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     #[must_use]
     pub fn points(&self) -> u64 {
         self.points
     }
 
-    /// Their bounds; empty if there are none.
+    /// Returns the bounds of the points; empty without points.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// The steps that LAS counts coordinates in: those of the input if it has some, else a power of ten of
-    /// which a hundred million make the greatest extent.
+    /// Returns the lattice for LAS: that of [`Self::with_lattice`] if given. Otherwise the step is
+    /// the least power of ten of which 100 million cover the greatest extent.
     #[must_use]
     pub fn lattice(&self) -> Lattice {
         self.lattice.unwrap_or_else(|| {
@@ -97,7 +99,8 @@ impl Survey {
         })
     }
 
-    /// How many decimals write coordinates exactly, where the input counted them in decimal steps.
+    /// Returns the number of decimals that write coordinates exactly, if the lattice has decimal
+    /// steps.
     pub(super) fn decimals(&self) -> Option<usize> {
         let Lattice { scale, offset } = self.lattice?;
         (0..=9_u8)
@@ -109,8 +112,8 @@ impl Survey {
             .map(usize::from)
     }
 
-    /// What LAS stores for an intensity: itself if all are whole, else its place between the least and the
-    /// greatest, up to 65535.
+    /// Returns the intensity as stored in LAS: unchanged if all are whole numbers, otherwise scaled
+    /// from the range of all intensities to 0..=65535.
     #[cfg(feature = "laz")]
     pub(super) fn intensity(&self, intensity: f32) -> u16 {
         let [least, most] = self.intensities;
@@ -121,26 +124,28 @@ impl Survey {
     }
 }
 
-/// Why points could not be written.
+/// Error of writing points.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OutError {
-    /// The output failed.
-    #[error("{0}")]
+    /// The operating system reported an error.
+    #[error("cannot write the points ({}); check the space left on the disk and try again", plain(.0))]
     Io(#[from] io::Error),
-    /// Coordinates that LAS cannot count in 32 bits.
+    /// Coordinates that exceed the 32-bit range of LAS.
     #[error(
-        "expected coordinates within 2^31 steps of {step} from {offset:?}, got {bounds:?}; write another format"
+        "expected coordinates within 2^31 steps of {step} from {offset:?}, got {:?} to {:?}; write another format",
+        .bounds[0],
+        .bounds[1]
     )]
     TooWide {
-        /// The length of a step.
+        /// Step size.
         step: f64,
-        /// Where counting starts.
+        /// Origin of the steps.
         offset: [f64; 3],
-        /// The least and the greatest coordinates.
+        /// Minimum and maximum of the coordinates.
         bounds: [[f64; 3]; 2],
     },
-    /// A format that this build was made without.
-    #[error("LAS and LAZ cannot be written by this build; build nearmiss-io with the feature `laz`")]
+    /// LAS or LAZ, in a build without the feature `laz`.
+    #[error("this build cannot write LAS or LAZ; enable the feature `laz` of nearmiss-io")]
     Feature,
 }

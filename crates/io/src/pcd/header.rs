@@ -1,4 +1,4 @@
-//! The header: which fields a point has, how many points there are, and how they are encoded.
+//! The header of PCD: the fields of a point, the number of points, and their encoding.
 
 use std::ops::Range;
 
@@ -12,9 +12,9 @@ pub(super) struct Header {
     pub(super) fields: Vec<Field>,
     pub(super) points: u64,
     pub(super) holds: Holds,
-    /// Bytes of a point in binary files; never 0.
+    /// Length of a point in binary files, in bytes; never 0.
     pub(super) stride: usize,
-    /// Where the number of points is declared.
+    /// Line that declares the number of points.
     pub(super) line: u64,
 }
 
@@ -27,16 +27,16 @@ pub(super) enum Encoding {
 
 pub(super) struct Field {
     pub(super) name: Box<str>,
-    /// Bytes of one value.
+    /// Size of one value in bytes.
     pub(super) size: usize,
-    /// Values a point.
+    /// Number of values per point.
     pub(super) count: usize,
-    /// From the start of a point.
+    /// Offset from the start of a point, in bytes.
     pub(super) offset: usize,
     pub(super) part: Part,
 }
 
-/// What a field means to us.
+/// The use of a field.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Slot(usize, Scalar),
@@ -46,7 +46,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// Slots of a row that the field fills.
+    /// Returns the slots of a row that the field fills.
     fn slots(self) -> Range<usize> {
         match self {
             Self::Slot(slot, _) => slot..slot + 1,
@@ -56,7 +56,7 @@ impl Part {
     }
 }
 
-/// The lines that declare something, as they come.
+/// The lines of the header read so far.
 #[derive(Default)]
 struct Declared<'a> {
     fields: Option<Line<'a>>,
@@ -68,7 +68,7 @@ struct Declared<'a> {
     points: Option<(u64, u64)>,
 }
 
-/// The header, and the lines after it.
+/// Parses the header. Returns it with an iterator over the lines after it.
 pub(super) fn parse(bytes: &[u8]) -> Result<(Header, Lines<'_>), Broken> {
     let mut lines = Lines::new(bytes);
     let mut declared = Declared::default();
@@ -102,7 +102,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Header, Lines<'_>), Broken> {
                 return Err(Fault::NoHeader.on_line(line.number));
             }
             other => {
-                let header = "a line of a PCD header, as `FIELDS x y z` or `DATA ascii`";
+                let header = "a line of a PCD header, such as `FIELDS x y z` or `DATA ascii`";
                 return Err(expected(header, other).on_line(line.number));
             }
         }
@@ -130,19 +130,20 @@ impl Declared<'_> {
 
     fn header(&self, encoding: Encoding, last: u64) -> Result<Header, Broken> {
         let undeclared = |what| Fault::Undeclared { what }.on_line(last);
-        let names = self.fields.ok_or_else(|| undeclared("its fields, `FIELDS x y z`"))?;
-        let sizes = self.size.ok_or_else(|| undeclared("sizes, `SIZE 4 4 4`"))?;
-        let kinds = self.kind.ok_or_else(|| undeclared("types, `TYPE F F F`"))?;
+        let names = self.fields.ok_or_else(|| undeclared("fields, such as `FIELDS x y z`,"))?;
+        let sizes = self.size.ok_or_else(|| undeclared("sizes, such as `SIZE 4 4 4`,"))?;
+        let kinds = self.kind.ok_or_else(|| undeclared("types, such as `TYPE F F F`,"))?;
         let (points, line) = self.points(last)?;
         let fields = fields(names, sizes, kinds, self.count)?;
         let slots = fields.iter().flat_map(|field| field.part.slots());
         let holds = Holds::among(slots).map_err(|fault| fault.on_line(names.number))?;
-        // Offsets and sizes were added up without overflow, and coordinates have a size.
+        // Cannot overflow, as `fields` has checked the sum, and is not 0, as coordinates have a
+        // size.
         let stride = fields.last().map_or(1, |f| f.offset + f.size * f.count);
         Ok(Header { encoding, fields, points, holds, stride, line })
     }
 
-    /// How many points, and where that is declared.
+    /// Returns the number of points and the line that declares it.
     fn points(&self, last: u64) -> Result<(u64, u64), Broken> {
         let height = self.height.map_or(1, |(height, _)| height);
         match (self.width, self.points) {
@@ -156,14 +157,14 @@ impl Declared<'_> {
                 Err(grid.on_line(line))
             }
             (None, None) => {
-                let what = "how many points there are, `POINTS`";
+                let what = "the number of points, `POINTS`,";
                 Err(Fault::Undeclared { what }.on_line(last))
             }
         }
     }
 }
 
-/// Puts the four lines together, entry by entry.
+/// Combines the four lines, entry by entry.
 fn fields(
     names: Line<'_>,
     sizes: Line<'_>,
@@ -187,13 +188,12 @@ fn fields(
         let size: usize = whole(size_word)
             .ok_or_else(|| expected("the size of a field in bytes", size_word).on_line(sizes.number))?;
         let count: usize = match (count_word, counts) {
-            (Some(word), Some(line)) => {
-                whole(word).ok_or_else(|| expected("a count of values", word).on_line(line.number))?
-            }
+            (Some(word), Some(line)) => whole(word)
+                .ok_or_else(|| expected("the number of values of a field", word).on_line(line.number))?,
             _ => 1,
         };
         let part = part(name, kind, size, count).map_err(|fault| fault.on_line(kinds.number))?;
-        // Few fields get past the first test, so the second costs little.
+        // At most a dozen fields pass the first test, so the search is cheap.
         let is_second = part != Part::Nothing && fields.iter().any(|f| f.part.slots() == part.slots());
         let part = match part {
             Part::Slot(slot, _) if is_second && !is_unique(slot) => Part::Nothing,
@@ -203,7 +203,8 @@ fn fields(
         let end = size.checked_mul(count).and_then(|bytes| offset.checked_add(bytes));
         let end = end.filter(|&end| end <= isize::MAX.cast_unsigned());
         fields.push(Field { name: shown(name), size, count, offset, part });
-        offset = end.ok_or_else(|| expected("sizes that add up", size_word).on_line(sizes.number))?;
+        let too_long = || expected("points shorter than 2^63 bytes", size_word).on_line(sizes.number);
+        offset = end.ok_or_else(too_long)?;
     }
     Ok(fields)
 }
@@ -230,7 +231,7 @@ fn part(name: &[u8], kind: &[u8], size: usize, count: usize) -> Result<Part, Fau
         }
     };
     Ok(match slot {
-        // Colours of other types are in no agreed range.
+        // Separate colours of other types have no agreed range.
         Some(slot) if !(6..9).contains(&slot) || scalar == Scalar::U8 => Part::Slot(slot, scalar),
         None if size == 4 => Part::Packed(scalar),
         _ => Part::Nothing,
@@ -238,12 +239,12 @@ fn part(name: &[u8], kind: &[u8], size: usize, count: usize) -> Result<Part, Fau
 }
 
 impl Header {
-    /// The points, unless fewer fit.
+    /// Returns the number of points, limited to `fit`.
     pub(super) fn capacity(&self, fit: usize) -> usize {
         usize::try_from(self.points).unwrap_or(usize::MAX).min(fit)
     }
 
-    /// That there are fewer points than promised.
+    /// Returns the fault of a file that contains only `present` points.
     pub(super) fn promised(&self, present: u64) -> Broken {
         let promised = Fault::Promised { element: "point".into(), promised: self.points, present };
         promised.on_line(self.line)

@@ -1,13 +1,14 @@
-//! The inverse of Marc Lehmann's LZF compression, as PCD uses it.
+//! Decompression of LZF (Marc Lehmann), as used by PCD.
 //!
-//! A control byte below 32 copies that many bytes and one from the input; any other holds in its upper three
-//! bits a length, with 7 for "more in the next byte", and in its lower five the high bits of how far back in
-//! the output the copy starts. Lengths count from 2, distances from 1.
+//! A control byte `c` below 32 copies `c + 1` bytes from the input. Any other control byte copies
+//! from earlier output. Its upper three bits are the length minus 2; 7 means that the next byte is
+//! added. Its lower five bits are the high bits of the distance minus 1, and the following byte is
+//! the low bits.
 
-/// Three bytes of input make at most 264 of output, so that many a byte bound what can be promised.
+/// Maximum expansion: three bytes of input give at most 264 bytes of output, 88 per byte.
 const EXPANSION: usize = 88;
 
-/// Exactly `size` bytes from `input`; the error is how far into the input the fault was noticed.
+/// Decompresses `input` to exactly `size` bytes. The error is the offset in the input of the fault.
 pub(super) fn unpack(input: &[u8], size: u32) -> Result<Vec<u8>, usize> {
     let size = usize::try_from(size).ok().filter(|&size| size / EXPANSION <= input.len());
     let size = size.ok_or(0_usize)?;
@@ -30,7 +31,8 @@ pub(super) fn unpack(input: &[u8], size: u32) -> Result<Vec<u8>, usize> {
             at += 1;
             let back = (usize::from(control & 31) << 8 | low) + 1;
             let from = out.len().checked_sub(back).ok_or(start)?;
-            // Source and copy overlap where the length exceeds the distance; then the copy repeats itself.
+            // If the length exceeds the distance, source and copy overlap, and the copy repeats
+            // itself.
             if back >= length {
                 out.extend_from_within(from..from + length);
             } else {

@@ -1,4 +1,4 @@
-//! The header: what elements there are, in what order, of what properties.
+//! The header of PLY: the elements, in file order, with their properties.
 
 use crate::columns::{is_unique, slot};
 use crate::error::{Broken, Fault};
@@ -8,7 +8,7 @@ use crate::text::{Lines, number, shown, whole, words};
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// The last line.
+    /// Number of the last line.
     line: u64,
 }
 
@@ -23,7 +23,7 @@ pub(super) struct Element {
     pub(super) count: u64,
     pub(super) properties: Vec<Property>,
     pub(super) role: Role,
-    /// Where it is declared.
+    /// Line that declares the element.
     pub(super) line: u64,
 }
 
@@ -34,20 +34,20 @@ pub(super) enum Role {
     Face {
         corners: bool,
     },
-    /// Triangle strips, divided by -1.
+    /// Triangle strips, separated by -1.
     Strips,
     Other,
 }
 
 pub(super) struct Property {
     pub(super) name: Box<str>,
-    /// Type of a list's length.
+    /// Type of the length, for a list.
     pub(super) list: Option<Scalar>,
     pub(super) scalar: Scalar,
     pub(super) part: Part,
 }
 
-/// What a property means to us.
+/// The use of a property.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     Slot(usize),
@@ -55,7 +55,7 @@ pub(super) enum Part {
     Nothing,
 }
 
-/// The header, and the lines after it.
+/// Parses the header. Returns it with an iterator over the lines after it.
 pub(super) fn parse(bytes: &[u8]) -> Result<(Header, Lines<'_>), Broken> {
     let mut lines = Lines::new(bytes);
     let mut encoding = None;
@@ -65,7 +65,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Header, Lines<'_>), Broken> {
         if words(first).next().is_some_and(|word| number(word).is_some()) {
             return Err(Fault::NoHeader.on_line(1));
         }
-        return Err(expected("`ply`, with which PLY files start", first).on_line(1));
+        return Err(expected("`ply`", first).on_line(1));
     }
     loop {
         let Some(line) = lines.next() else {
@@ -85,7 +85,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<(Header, Lines<'_>), Broken> {
         .map_err(|fault| fault.on_line(line.number))?;
     }
     let line = lines.number();
-    let what = "its encoding, `format ascii 1.0` or one of the binary ones";
+    let what = "an encoding, such as `format ascii 1.0`,";
     let encoding = encoding.ok_or_else(|| Fault::Undeclared { what }.on_line(line))?;
     let header = Header { encoding, elements, line };
     Ok((header, lines))
@@ -101,7 +101,7 @@ impl Header {
 }
 
 impl Element {
-    /// Slots of a row that the properties fill.
+    /// Returns the slots of a row that the properties fill.
     pub(super) fn slots(&self) -> impl Iterator<Item = usize> {
         self.properties.iter().filter_map(|p| match p.part {
             Part::Slot(slot) => Some(slot),
@@ -136,7 +136,7 @@ fn element(elements: &mut Vec<Element>, line: u64, name: &[u8], count: &[u8]) ->
     }
     elements.push(Element {
         name: shown(name),
-        count: whole(count).ok_or_else(|| expected("how many there are of the element", count))?,
+        count: whole(count).ok_or_else(|| expected("the number of elements", count))?,
         properties: Vec::new(),
         role,
         line,
@@ -149,16 +149,20 @@ fn property<'a>(element: Option<&mut Element>, mut next: impl FnMut() -> &'a [u8
     let list = if kind == b"list" { Some(scalar(next())?) } else { None };
     let scalar = scalar(if list.is_some() { next() } else { kind })?;
     let name = next();
-    let element = element.ok_or_else(|| expected("`element` before its first property", b"property"))?;
+    let element = element.ok_or_else(|| expected("`element` before the first property", b"property"))?;
+    let is_coordinate = element.role == Role::Vertex && slot(name).is_some_and(|slot| slot < 3);
+    if list.is_some() && is_coordinate {
+        return Err(expected("a number as coordinate, such as `property float x`", b"property list"));
+    }
     let part = match (element.role, list, name) {
         (Role::Vertex, None, name) => slot(name)
-            // Colours of other types are in no agreed range.
+            // Colours of other types have no agreed range.
             .filter(|&slot| !(6..9).contains(&slot) || scalar == Scalar::U8)
             .map_or(Part::Nothing, Part::Slot),
         (Role::Face { .. } | Role::Strips, Some(_), b"vertex_indices" | b"vertex_index") => Part::Corners,
         _ => Part::Nothing,
     };
-    // At most a dozen properties get past the first test, so the second costs little.
+    // At most a dozen properties pass the first test, so the search is cheap.
     let is_second = part != Part::Nothing && element.properties.iter().any(|p| p.part == part);
     let part = match part {
         Part::Slot(slot) if is_second && !is_unique(slot) => Part::Nothing,
@@ -183,7 +187,9 @@ fn scalar(word: &[u8]) -> Result<Scalar, Fault> {
         b"float" | b"float32" => Scalar::F32,
         b"double" | b"float64" => Scalar::F64,
         _ => {
-            return Err(expected("the type of a property, such as `float` or `uint8`", word));
+            let types = "a type of property: char, uchar, short, ushort, int, uint, float, double, int8, uint8, \
+                         int16, uint16, int32, uint32, float32 or float64";
+            return Err(expected(types, word));
         }
     })
 }

@@ -1,31 +1,31 @@
-//! The values of the elements, one after the other, from text or from bytes.
+//! Sources of the values of elements: text or bytes.
 
 use super::header::{Element, Property};
 use crate::error::{At, Broken, Fault};
 use crate::scalar::{Order, Scalar};
 use crate::text::{Line, Lines, number, shown, whole};
 
-/// The elements' values in the order of the header.
+/// A source of the values of all elements, in the order of the header.
 pub(super) trait Source<'a> {
-    /// Bytes not yet read.
+    /// Returns the number of unread bytes.
     fn left(&self) -> usize;
-    /// The fewest bytes that a row of the element can take; never 0.
+    /// Returns the minimum length of a row of the element in bytes; never 0.
     fn least_size(&self, element: &Element) -> usize;
-    /// Goes to the next row; false when there is none.
+    /// Advances to the next row. Returns `false` at the end.
     fn start_row(&mut self, element: &Element) -> bool;
-    /// The next value.
+    /// Reads the next value.
     fn number(&mut self, property: &Property, scalar: Scalar) -> Result<f64, Fault>;
-    /// The next value as the length of a list.
+    /// Reads the next value as the length of a list.
     fn length(&mut self, property: &Property, scalar: Scalar) -> Result<u64, Fault>;
-    /// Leaves out so many values of the property.
+    /// Skips `values` values of the property.
     fn skip(&mut self, property: &Property, values: u64) -> Result<(), Fault>;
-    /// Checks that nothing is left over.
+    /// Checks that the row has no further values.
     fn finish_row(&mut self) -> Result<(), Fault>;
-    /// Where the row is.
+    /// Returns the position of the row.
     fn at(&self) -> At;
 }
 
-/// One line a row.
+/// A source of text, with one row per line.
 pub(super) struct Ascii<'a> {
     lines: Lines<'a>,
     row: &'a [u8],
@@ -37,7 +37,7 @@ impl<'a> Ascii<'a> {
         Self { lines, row: &[], number: 0 }
     }
 
-    /// A row of which the line is at hand.
+    /// Creates a source of a single row.
     pub(super) fn of_line(line: Line<'a>) -> Self {
         Self { lines: Lines::new(&[]), row: line.text, number: line.number }
     }
@@ -67,7 +67,7 @@ impl<'a> Source<'a> for Ascii<'a> {
         self.lines.left()
     }
 
-    /// A digit and a space, or the line's end, a property.
+    /// Counts a digit and a space for each property.
     fn least_size(&self, element: &Element) -> usize {
         (2 * element.properties.len()).max(2) - 1
     }
@@ -87,7 +87,7 @@ impl<'a> Source<'a> for Ascii<'a> {
 
     fn length(&mut self, property: &Property, _: Scalar) -> Result<u64, Fault> {
         let word = self.word(property)?;
-        whole(word).ok_or_else(|| Fault::NotWhole { expected: "the length of a list", found: shown(word) })
+        whole(word).ok_or_else(|| Fault::NotWhole { expected: "a list length", found: shown(word) })
     }
 
     fn skip(&mut self, property: &Property, values: u64) -> Result<(), Fault> {
@@ -106,7 +106,7 @@ impl<'a> Source<'a> for Ascii<'a> {
     }
 }
 
-/// Rows without anything between them.
+/// A source of bytes, with contiguous rows.
 pub(super) struct Binary<'a> {
     bytes: &'a [u8],
     offset: usize,
@@ -115,7 +115,7 @@ pub(super) struct Binary<'a> {
 }
 
 impl<'a> Binary<'a> {
-    /// From `offset` on.
+    /// Creates a source that starts at `offset`.
     pub(super) fn new(bytes: &'a [u8], offset: usize, order: Order) -> Self {
         Self { bytes, offset, row: offset, order }
     }
@@ -126,7 +126,7 @@ impl<'a> Source<'a> for Binary<'a> {
         self.bytes.len() - self.offset
     }
 
-    /// Each property, lists with their length only.
+    /// Counts the size of each property, and of lists only the length.
     fn least_size(&self, element: &Element) -> usize {
         let sizes = element.properties.iter().map(|p| p.list.unwrap_or(p.scalar).size());
         sizes.sum::<usize>().max(1)
@@ -148,10 +148,7 @@ impl<'a> Source<'a> for Binary<'a> {
     fn length(&mut self, property: &Property, scalar: Scalar) -> Result<u64, Fault> {
         let value = self.number(property, scalar)?;
         if value < 0.0 || value.fract() != 0.0 {
-            return Err(Fault::NotWhole {
-                expected: "the length of a list",
-                found: value.to_string().into(),
-            });
+            return Err(Fault::NotWhole { expected: "a list length", found: value.to_string().into() });
         }
         #[expect(
             clippy::cast_possible_truncation,

@@ -1,27 +1,28 @@
-//! The meaning of columns without names, guessed from the first rows.
+//! Columns without names: their meaning is guessed from the first rows.
 //!
-//! x, y and z come first. What follows is normals if three columns are vectors of unit length, and colours if
-//! they are whole numbers from 0 to 255. One column before these is an intensity, as in PTS; one that stands
-//! alone is an intensity only in PTS, which begins with a count.
+//! The first three columns are x, y and z. Three further columns are normals if they are vectors of
+//! unit length, and colours if they are whole numbers from 0 to 255. A single column before these
+//! is an intensity, as in PTS. A single column without others is an intensity only in PTS, which
+//! starts with a count.
 
 use crate::text::{Line, Lines, has_values};
 
-/// Rows that are looked at.
+/// Number of rows examined.
 const ROWS: usize = 32;
 
-/// Bytes that are looked at: fewer than are read to recognise a format, so that a file tells the same of
-/// itself in pieces and as a whole.
+/// Number of bytes examined. Smaller than the head that is read to recognise a format, so that the
+/// guess is the same for pieces and for the whole file.
 const BYTES: usize = 60_000;
 
-/// The squared length of normals that were rounded to two digits is off by no more.
+/// Tolerance of the squared length of normals, which allows rounding to two digits.
 const ROUNDED: f64 = 0.03;
 
 const NORMAL: usize = 3;
 const COLOUR: usize = 6;
 const INTENSITY: usize = 9;
 
-/// Which value of a row each column holds, up to the last of use. `values` makes numbers of a line, if it is
-/// a row of numbers; `is_counted` tells that the text begins with a count.
+/// Returns the slot of each column, up to the last column that is read. `values` parses a row of
+/// numbers. `is_counted` is `true` if the text starts with a count.
 pub(super) fn columns(
     lines: Lines<'_>,
     values: impl Fn(Line<'_>) -> Option<Vec<f64>>,
@@ -61,7 +62,7 @@ fn first_rows(mut lines: Lines<'_>, values: impl Fn(Line<'_>) -> Option<Vec<f64>
     rows
 }
 
-/// The first of the three values that these columns hold.
+/// Returns the first slot of three columns: that of normals or of colours.
 fn first_of(triples: &[[f64; 3]]) -> Option<usize> {
     let finite: Vec<&[f64; 3]> = triples.iter().filter(|row| row.iter().all(|x| x.is_finite())).collect();
     let is_unit = |row: &&[f64; 3]| (row.iter().map(|x| x * x).sum::<f64>() - 1.0).abs() <= ROUNDED;
@@ -94,7 +95,7 @@ mod tests {
             ("1 2 3 -1200 255 128 0\n", true, &[0, 1, 2, 9, 6, 7, 8]),
             ("1 2 3 0.5 255 128 0\n", false, &[0, 1, 2, 9, 6, 7, 8]),
             ("1 2 3 0.5\n", true, &[0, 1, 2, 9]),
-            // Nobody knows what these are.
+            // Columns of unknown meaning.
             ("1 2 3 0.5\n", false, &[0, 1, 2]),
             ("1 2 3 0.5 0.5\n", true, &[0, 1, 2]),
             ("1 2 3 256 0 0\n", false, &[0, 1, 2]),

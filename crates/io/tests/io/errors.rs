@@ -1,4 +1,4 @@
-//! Each kind of error, with its place and the very words that a user reads.
+//! Every kind of error, with its place and its exact message.
 
 use std::fs;
 use std::path::Path;
@@ -37,6 +37,7 @@ fn files_that_are_none() {
     let missing = folder.path().join("missing.ply");
     let absent = read(&missing, None).unwrap_err();
     assert!(absent.to_string().starts_with(missing.to_str().unwrap()), "{absent}");
+    assert!(absent.to_string().ends_with("missing.ply: no such file; check the path"), "{absent}");
     assert!(matches!(absent, ReadError::Io { .. }));
     let empty = folder.path().join("empty.ply");
     fs::write(&empty, "").unwrap();
@@ -54,53 +55,67 @@ fn formats_that_are_none_of_ours() {
     says(
         "some words\n",
         "notes.md",
-        "notes.md: unknown format; known are ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off \
-         and gltf; say which with `--format`",
+        "notes.md: expected ply, pcd, las, laz, e57, xyz (also csv and other text), npy, obj, stl, off or gltf, got an \
+         unknown format; name the format with `--format`",
     );
     says(
         "PK\u{3}\u{4}...",
         "hall.zip",
-        "hall.zip: this is a zip archive, which this version cannot read; unpack it first",
+        "hall.zip: expected points or a mesh, got a zip archive; unpack it first",
     );
     let told = read_bytes(b"1 2 3\n", Some(Format::Ply), Path::new("a")).unwrap_err();
     assert_eq!(
         told.to_string(),
-        "a: line 1: numbers instead of a header; if its lines are points, read it with `--format xyz`"
+        "a: line 1: expected a header, got numbers; if the lines are points, read the file with `--format xyz`"
     );
 }
 
 #[test]
 fn headers_of_ply() {
     let cases = [
-        ("plx\n", "line 1: expected `ply`, with which PLY files start, found `plx`"),
+        ("plx\n", "line 1: expected `ply`, got `plx`"),
         (
             "ply\nformat ascii 1.0\n",
-            "line 2: the header never ends: no line `end_header`; the file is cut off or not what its start says",
+            "line 2: expected `end_header` at the end of the header, got the end of the file; export the file again",
         ),
         (
             "ply\nformat text 1.0\n",
-            "line 2: expected `ascii`, `binary_little_endian` or `binary_big_endian`, found `text`",
+            "line 2: expected `ascii`, `binary_little_endian` or `binary_big_endian`, got `text`",
         ),
-        ("ply\nproperty float x\n", "line 2: expected `element` before its first property, found `property`"),
+        ("ply\nproperty float x\n", "line 2: expected `element` before the first property, got `property`"),
         (
             "ply\nelement vertex 3\nproperty half x\n",
-            "line 3: expected the type of a property, such as `float` or `uint8`, found `half`",
+            "line 3: expected a type of property: char, uchar, short, ushort, int, uint, float, double, int8, uint8, int16, \
+             uint16, int32, uint32, float32 or float64, got `half`",
         ),
-        ("ply\nelement vertex -3\n", "line 2: expected how many there are of the element, found `-3`"),
+        ("ply\nelement vertex -3\n", "line 2: expected the number of elements, got `-3`"),
+        (
+            "ply\nelement vertex 3\nproperty list uchar float x\n",
+            "line 3: expected a number as coordinate, such as `property float x`, got `property list`",
+        ),
         (
             "ply\nelements\n",
-            "line 2: expected `element`, `property`, `comment` or `end_header`, found `elements`",
+            "line 2: expected `element`, `property`, `comment` or `end_header`, got `elements`",
         ),
-        ("ply\nelement vertex 0\nelement vertex 1\n", "line 3: `vertex` is declared twice"),
-        ("ply\nelement vertex 0\nproperty int x\nproperty int x\n", "line 4: `x` is declared twice"),
+        (
+            "ply\nelement vertex 0\nelement vertex 1\n",
+            "line 3: expected one `vertex`, got two; remove one of them",
+        ),
+        (
+            "ply\nelement vertex 0\nproperty int x\nproperty int x\n",
+            "line 4: expected one `x`, got two; remove one of them",
+        ),
         (
             "ply\nend_header\n",
-            "line 2: the header does not declare its encoding, `format ascii 1.0` or one of the binary ones",
+            "line 2: expected an encoding, such as `format ascii 1.0`, in the header, got none",
         ),
-        ("ply\nformat ascii 1.0\nend_header\n", "line 3: the header does not declare an element `vertex`"),
+        (
+            "ply\nformat ascii 1.0\nend_header\n",
+            "line 3: expected an element `vertex` in the header, got none",
+        ),
         (
             "ply\nformat ascii 1.0\nelement vertex 0\nproperty int x\nproperty int z\nend_header\n",
-            "line 3: the header does not declare a coordinate y",
+            "line 3: expected the coordinate y in the header, got none",
         ),
     ];
     for (text, message) in cases {
@@ -111,47 +126,53 @@ fn headers_of_ply() {
 #[test]
 fn rows_of_ascii_ply() {
     let cases = [
-        (ascii_ply("4", "1", "0 0 0\n\n1 0 O\n"), "line 12, vertex 1: `O` in column `z` is not a number"),
-        (ascii_ply("4", "1", "0 0 0\n1 0\n"), "line 11, vertex 1: the line ends before column `z`"),
+        (
+            ascii_ply("4", "1", "0 0 0\n\n1 0 O\n"),
+            "line 12, vertex 1: expected a number in column `z`, got `O`",
+        ),
+        (
+            ascii_ply("4", "1", "0 0 0\n1 0\n"),
+            "line 11, vertex 1: expected a value in column `z`, got the end of the line",
+        ),
         (
             ascii_ply("4", "1", "0 0 0 7\n"),
-            "line 10, vertex 0: the line has more values than the header declares columns",
+            "line 10, vertex 0: expected one value for each column of the header, got more",
         ),
         (
             ascii_ply("99999999999", "1", SQUARE),
-            "line 3: 99999999999 of `vertex` promised, but the file holds 4; it is cut off, or this count is wrong",
+            "line 3: expected 99999999999 `vertex` elements, got 4; the file is cut off, or this count is wrong",
         ),
         (
             ascii_ply("4", "2", &format!("{SQUARE}3 0 1 2\n")),
-            "line 7: 2 of `face` promised, but the file holds 1; it is cut off, or this count is wrong",
+            "line 7: expected 2 `face` elements, got 1; the file is cut off, or this count is wrong",
         ),
         (
             ascii_ply("4", "1", &format!("{SQUARE}3 0 1 2\n3 0 1 3\n")),
-            "line 15: text after the last element; the header promises too few, or the file is damaged",
+            "line 15: expected the end of the file after the last element, got more text; correct the count in the header",
         ),
         (
             ascii_ply("4", "1", &format!("{SQUARE}3 0 1 4\n")),
-            "line 14, face 0: the face names vertex 4, but there are 4, counted from 0",
+            "line 14, face 0: expected a vertex index from 0 to 3, got 4",
         ),
         (
             ascii_ply("4", "1", &format!("{SQUARE}3 0 1 -1\n")),
-            "line 14, face 0: the face names vertex -1, but there are 4, counted from 0",
+            "line 14, face 0: expected a vertex index from 0 to 3, got -1",
         ),
         (
             ascii_ply("4", "1", &format!("{SQUARE}3 0 1 1.5\n")),
-            "line 14, face 0: `1.5` is not the index of a vertex",
+            "line 14, face 0: expected a vertex index (a whole number), got `1.5`",
         ),
         (
             ascii_ply("4", "1", &format!("{SQUARE}-3 0 1 2\n")),
-            "line 14, face 0: `-3` is not the length of a list",
+            "line 14, face 0: expected a list length (a whole number), got `-3`",
         ),
         (
             ascii_ply("4", "1", &format!("{SQUARE}9999999999999 0 1 2\n")),
-            "line 14, face 0: the line ends before column `vertex_indices`",
+            "line 14, face 0: expected a value in column `vertex_indices`, got the end of the line",
         ),
         (
             ascii_ply("4", "1", &format!("{SQUARE}2 0 1\n")),
-            "line 14, face 0: the face has 2 corners; at least 3 are needed",
+            "line 14, face 0: expected at least 3 corners of the face, got 2",
         ),
     ];
     for (text, message) in cases {
@@ -163,12 +184,12 @@ fn rows_of_ascii_ply() {
 fn rows_of_binary_ply() {
     let whole = plain::ply(Encoding::Little, "float", "int");
     let start = whole.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-    // Two cameras, one with three floats; then vertices, the first without tags.
+    // Two cameras, the second with three floats, then vertices, the first without tags.
     let vertices = start + (8 + 2) + (8 + 2 + 12);
     let cut = error(&whole[..vertices + 10], "a.ply").to_string();
     assert_eq!(
         cut,
-        "a.ply: line 9: 20 of `vertex` promised, but the file holds 0; it is cut off, or this count is wrong"
+        "a.ply: line 9: expected 20 `vertex` elements, got 0; the file is cut off, or this count is wrong"
     );
     let mut long = whole[..vertices + 40].to_vec();
     long[vertices + 9] = 200;
@@ -178,13 +199,16 @@ fn rows_of_binary_ply() {
     assert_eq!(fault, Fault::ListPastEnd { values: 200, left: 30 });
     long[vertices + 9] = 10;
     let past = error(&long, "a.ply").to_string();
-    assert_eq!(past, format!("a.ply: byte {vertices}, vertex 0: the file ends here, within an element"));
+    assert_eq!(
+        past,
+        format!("a.ply: byte {vertices}, vertex 0: expected the rest of an element, got the end of the file")
+    );
     let header = "ply\nformat binary_big_endian 1.0\nelement vertex 18446744073709551615\nproperty float x\n\
         property float y\nproperty float z\nend_header\n0123456789ab";
     says(
         header,
         "a.ply",
-        "a.ply: line 3: 18446744073709551615 of `vertex` promised, but the file holds 1; it is cut off, or this count is wrong",
+        "a.ply: line 3: expected 18446744073709551615 `vertex` elements, got 1; the file is cut off, or this count is wrong",
     );
 }
 
@@ -201,69 +225,81 @@ fn pcd(change: (&str, &str)) -> Vec<u8> {
 #[test]
 fn pcd_in_text() {
     let cases = [
-        (("FIELDS x y z t\n", ""), "line 8: the header does not declare its fields, `FIELDS x y z`"),
-        (("SIZE 4 4 4 2\n", ""), "line 8: the header does not declare sizes, `SIZE 4 4 4`"),
-        (("TYPE F F F U\n", ""), "line 8: the header does not declare types, `TYPE F F F`"),
-        (("SIZE 4 4 4 2", "SIZE 4 4"), "line 3: SIZE has 2 entries for 4 fields"),
-        (("COUNT 1 1 1 2", "COUNT 1 1 1 2 1"), "line 5: COUNT has 5 entries for 4 fields"),
+        (
+            ("FIELDS x y z t\n", ""),
+            "line 8: expected fields, such as `FIELDS x y z`, in the header, got none",
+        ),
+        (("SIZE 4 4 4 2\n", ""), "line 8: expected sizes, such as `SIZE 4 4 4`, in the header, got none"),
+        (("TYPE F F F U\n", ""), "line 8: expected types, such as `TYPE F F F`, in the header, got none"),
+        (("SIZE 4 4 4 2", "SIZE 4 4"), "line 3: expected 4 entries in SIZE, one for each field, got 2"),
+        (
+            ("COUNT 1 1 1 2", "COUNT 1 1 1 2 1"),
+            "line 5: expected 4 entries in COUNT, one for each field, got 5",
+        ),
         (
             ("SIZE 4", "SIZE 3"),
-            "line 4: field `x` has type F and size 3; readable are F 4, F 8, and I or U of size 1, 2, 4, 8",
+            "line 4: expected type F of 4 or 8 bytes, or I or U of 1, 2, 4 or 8 bytes, for field `x`, got F of 3 bytes",
         ),
         (
             ("SIZE 4 4 4 2", "SIZE 4 4 4 18446744073709551615"),
-            "line 3: expected sizes that add up, found `18446744073709551615`",
+            "line 3: expected points shorter than 2^63 bytes, got `18446744073709551615`",
         ),
-        (("SIZE 4 4 4 2", "SIZE 4 4 4 two"), "line 3: expected the size of a field in bytes, found `two`"),
-        (("COUNT 1 1 1 2", "COUNT 1 1 1 -2"), "line 5: expected a count of values, found `-2`"),
-        (("x y z t", "x y w t"), "line 2: the header does not declare a coordinate z"),
+        (("SIZE 4 4 4 2", "SIZE 4 4 4 two"), "line 3: expected the size of a field in bytes, got `two`"),
+        (("COUNT 1 1 1 2", "COUNT 1 1 1 -2"), "line 5: expected the number of values of a field, got `-2`"),
+        (("x y z t", "x y w t"), "line 2: expected the coordinate z in the header, got none"),
         (("x y z t", "x y z X"), ""),
-        (("WIDTH 2", "WIDTH"), "line 6: expected a count, found ``"),
-        (("HEIGHT 2", "HEIGHT 3"), "line 8: 4 points declared, but width 2 times height 3 is another number"),
+        (("WIDTH 2", "WIDTH"), "line 6: expected a count, got ``"),
+        (("HEIGHT 2", "HEIGHT 3"), "line 8: expected POINTS to equal WIDTH × HEIGHT, 2 × 3, got 4"),
         (
             ("WIDTH 2\nHEIGHT 2\nPOINTS 4\n", ""),
-            "line 6: the header does not declare how many points there are, `POINTS`",
+            "line 6: expected the number of points, `POINTS`, in the header, got none",
         ),
         (
             ("WIDTH 2\nHEIGHT 2\nPOINTS 4\n", "POINTS 5\n"),
-            "line 6: 5 of `point` promised, but the file holds 4; it is cut off, or this count is wrong",
+            "line 6: expected 5 `point` elements, got 4; the file is cut off, or this count is wrong",
         ),
         (
             ("WIDTH 2\nHEIGHT 2\nPOINTS 4\n", "POINTS 3\n"),
-            "line 11: text after the last element; the header promises too few, or the file is damaged",
+            "line 11: expected the end of the file after the last element, got more text; correct the count in the header",
         ),
         (
             ("DATA ascii", "DATA base64"),
-            "line 9: expected `ascii`, `binary` or `binary_compressed`, found `base64`",
+            "line 9: expected `ascii`, `binary` or `binary_compressed`, got `base64`",
         ),
         (
             ("DATA ascii\n", ""),
-            "line 9: expected a line of a PCD header, as `FIELDS x y z` or `DATA ascii`, found `0`",
+            "line 9: expected a line of a PCD header, such as `FIELDS x y z` or `DATA ascii`, got `0`",
         ),
-        (("0 0 0 5 5", "0 0 0 5"), "line 10, point 0: the line ends before column `t`"),
+        (
+            ("0 0 0 5 5", "0 0 0 5"),
+            "line 10, point 0: expected a value in column `t`, got the end of the line",
+        ),
         (
             ("0 0 0 5 5", "0 0 0 5 5 5"),
-            "line 10, point 0: the line has more values than the header declares columns",
+            "line 10, point 0: expected one value for each column of the header, got more",
         ),
-        (("0 0 0 5 5", "0 0,0 0 5 5"), "line 10, point 0: `0,0` in column `y` is not a number"),
+        (("0 0 0 5 5", "0 0,0 0 5 5"), "line 10, point 0: expected a number in column `y`, got `0,0`"),
     ];
     for (change, message) in cases {
         let found = error(&pcd(change), "a.pcd").to_string();
         if message.is_empty() {
-            // A field of two values is none of the coordinates, even if it is called so.
+            // A field with two values is not a coordinate, whatever its name.
             assert!(found.contains("distinct finite points"), "{found}");
         } else {
             assert_eq!(found, format!("a.pcd: {message}"), "{change:?}");
         }
     }
     let twice = error(b"FIELDS x y z z\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 1\nDATA ascii\n", "a");
-    assert_eq!(twice.to_string(), "a: line 1: `z` is declared twice");
+    assert_eq!(twice.to_string(), "a: line 1: expected one `z`, got two; remove one of them");
     let endless = error(b"# .PCD v0.7\nFIELDS x y z\n", "a").to_string();
-    assert!(endless.contains("line 2: the header never ends: no line `DATA`"), "{endless}");
+    assert!(
+        endless.contains("line 2: expected `DATA` at the end of the header, got the end of the file"),
+        "{endless}"
+    );
     says(
         "1 2 3\n",
         "a.pcd",
-        "a.pcd: line 1: numbers instead of a header; if its lines are points, read it with `--format xyz`",
+        "a.pcd: line 1: expected a header, got numbers; if the lines are points, read the file with `--format xyz`",
     );
 }
 
@@ -272,7 +308,7 @@ fn pcd_in_bytes() {
     let binary = plain::pcd("binary");
     assert_eq!(
         error(&binary[..binary.len() - 1], "a").to_string(),
-        "a: line 10: 22 of `point` promised, but the file holds 21; it is cut off, or this count is wrong"
+        "a: line 10: expected 22 `point` elements, got 21; the file is cut off, or this count is wrong"
     );
     let whole = plain::pcd("binary_compressed");
     let start = whole.windows(11).position(|w| w == b"compressed\n").unwrap() + 11;
@@ -294,36 +330,42 @@ fn pcd_in_bytes() {
     assert_eq!(changed(8, 0xff), (at(8), Fault::Corrupt));
     assert!(matches!(changed(0, whole[start] - 1), (At::Byte(_), Fault::Corrupt)));
     let cut = error(&whole[..start + 7], "a").to_string();
-    assert_eq!(cut, format!("a: byte {start}: the file ends here, within an element"));
+    assert_eq!(cut, format!("a: byte {start}: expected the rest of an element, got the end of the file"));
 }
 
 #[test]
 fn text() {
     let cases = [
-        ("0 0 0\n1 zero 0\n", "line 2, point 1: `zero` in column `y` is not a number"),
-        ("# two\n0 0 0\n\n1 0\n", "line 4, point 1: the line ends before column `z`"),
+        ("0 0 0\n1 zero 0\n", "line 2, point 1: expected a number in column `y`, got `zero`"),
+        ("# two\n0 0 0\n\n1 0\n", "line 4, point 1: expected a value in column `z`, got the end of the line"),
         (
             "1,5;2,5;0,0\n",
-            "line 1: expected three numbers (with decimal points), or names of columns with x, y and z among them, found `1,5;2,5;0,0`",
+            "line 1: expected three numbers (with decimal points), or column names that include x, y and z, got `1,5;2,5;0,0`",
         ),
-        ("0;0;0\n1;2,5;0\n", "line 2, point 1: `2,5` in column `y` is not a number"),
-        ("0,0,0\n1,,0\n", "line 2, point 1: `` in column `y` is not a number"),
+        ("0;0;0\n1;2,5;0\n", "line 2, point 1: expected a number in column `y`, got `2,5`"),
+        ("0,0,0\n1,,0\n", "line 2, point 1: expected a number in column `y`, got ``"),
         (
             "a,b,c\n0,0,0\n",
-            "line 1: expected three numbers (with decimal points), or names of columns with x, y and z among them, found `a,b,c`",
+            "line 1: expected three numbers (with decimal points), or column names that include x, y and z, got `a,b,c`",
         ),
-        ("x,y,z,X\n0,0,0,0\n", "line 1: `x` is declared twice"),
-        ("x y z w nx ny nz\n1 2 3 4\n", "line 2, point 0: the line ends before column `nx`"),
-        ("x y z w nx ny nz\n1 2 3\n", "line 2, point 0: the line ends before column `nx`"),
+        ("x,y,z,X\n0,0,0,0\n", "line 1: expected one `x`, got two; remove one of them"),
+        (
+            "x y z w nx ny nz\n1 2 3 4\n",
+            "line 2, point 0: expected a value in column `nx`, got the end of the line",
+        ),
+        (
+            "x y z w nx ny nz\n1 2 3\n",
+            "line 2, point 0: expected a value in column `nx`, got the end of the line",
+        ),
         (
             "\n3\n0 0 0\n1 1 1\n",
-            "line 2: 3 of `point` promised, but the file holds 2; it is cut off, or this count is wrong",
+            "line 2: expected 3 `point` elements, got 2; the file is cut off, or this count is wrong",
         ),
         (
             "1\n0 0 0\n1 1 1\n",
-            "line 3: text after the last element; the header promises too few, or the file is damaged",
+            "line 3: expected the end of the file after the last element, got more text; correct the count in the header",
         ),
-        ("7\n", "line 1: 7 of `point` promised, but the file holds 0; it is cut off, or this count is wrong"),
+        ("7\n", "line 1: expected 7 `point` elements, got 0; the file is cut off, or this count is wrong"),
         ("# nothing\n", "0 distinct finite points of 0 given; at least 8 are needed"),
     ];
     for (text, message) in cases {
@@ -335,21 +377,21 @@ fn text() {
 fn obj() {
     let square = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
     let cases = [
-        ("v 1 2\n", "line 1, vertex 0: the line ends before column `z`"),
-        ("# o\nv 1 2 c\n", "line 2, vertex 0: `c` in column `z` is not a number"),
-        ("f 1 2 5\n", "line 5, face 0: the face names vertex 5, but there are 4, counted from 1"),
-        ("f 1 2 0\n", "line 5, face 0: the face names vertex 0, but there are 4, counted from 1"),
-        ("f 1 2 3\nf 1 2 -5\n", "line 6, face 1: the face names vertex -5, but there are 4, counted from 1"),
-        ("f 1 2\n", "line 5, face 0: the face has 2 corners; at least 3 are needed"),
-        ("f 1/1 /2 3\n", "line 5, face 0: `/2` is not the index of a vertex"),
-        ("f 1 2 3.5\n", "line 5, face 0: `3.5` is not the index of a vertex"),
+        ("v 1 2\n", "line 1, vertex 0: expected a value in column `z`, got the end of the line"),
+        ("# o\nv 1 2 c\n", "line 2, vertex 0: expected a number in column `z`, got `c`"),
+        ("f 1 2 5\n", "line 5, face 0: expected a vertex index from 1 to 4, got 5"),
+        ("f 1 2 0\n", "line 5, face 0: expected a vertex index from 1 to 4, got 0"),
+        ("f 1 2 3\nf 1 2 -5\n", "line 6, face 1: expected a vertex index from -4 to -1, got -5"),
+        ("f 1 2\n", "line 5, face 0: expected at least 3 corners of the face, got 2"),
+        ("f 1/1 /2 3\n", "line 5, face 0: expected a vertex index (a whole number), got `/2`"),
+        ("f 1 2 3.5\n", "line 5, face 0: expected a vertex index (a whole number), got `3.5`"),
         (
             "f 1 2 9223372036854775807\n",
-            "line 5, face 0: the face names vertex 9223372036854775807, but there are 4, counted from 1",
+            "line 5, face 0: expected a vertex index from 1 to 4, got 9223372036854775807",
         ),
         (
             "f 1 2 -9223372036854775808\n",
-            "line 5, face 0: the face names vertex -9223372036854775808, but there are 4, counted from 1",
+            "line 5, face 0: expected a vertex index from -4 to -1, got -9223372036854775808",
         ),
     ];
     for (text, message) in cases {
@@ -357,7 +399,7 @@ fn obj() {
         says(&text, "a.obj", &format!("a.obj: {message}"));
     }
     let joined = format!("{square}f 1 \\\n2 \\\n3\nf 1 2 7\n");
-    says(&joined, "a.obj", "a.obj: line 8, face 1: the face names vertex 7, but there are 4, counted from 1");
+    says(&joined, "a.obj", "a.obj: line 8, face 1: expected a vertex index from 1 to 4, got 7");
 }
 
 #[test]
@@ -368,16 +410,17 @@ fn meshes() {
     let mesh = read_mesh_bytes(square.as_bytes(), None, Path::new("a.ply")).unwrap();
     assert_eq!((mesh.vertices().len(), mesh.triangles()), (4, &[[0, 1, 2]][..]));
     let none = read_mesh_bytes(SQUARE.as_bytes(), None, Path::new("a.xyz")).unwrap_err();
-    assert_eq!(none.to_string(), "a.xyz: the file has points but no faces; a mesh is needed here");
+    assert_eq!(none.to_string(), "a.xyz: expected a mesh, got points without faces; name a file with faces");
     let broken = square.replace("1 1 0", "1 nan 0");
     let broken = read_mesh_bytes(broken.as_bytes(), None, Path::new("a.ply")).unwrap_err();
     assert_eq!(
         broken.to_string(),
-        "a.ply: vertex 3 of a mesh has a coordinate that is not finite; repair it, or remove the faces to use the points alone"
+        "a.ply: expected finite coordinates in a mesh, got NaN or infinity (vertex 3); repair it, or remove the faces to \
+         use the points alone"
     );
 }
 
-/// Found by fuzzing: a buffer that is named by a kilobyte was named by all of it in the message.
+/// Found by fuzzing: a URI of a kilobyte was quoted in full in the message.
 #[test]
 fn what_a_decoder_repeats_of_the_file_is_cut() {
     let uri = "A".repeat(1000);
@@ -390,9 +433,12 @@ fn what_a_decoder_repeats_of_the_file_is_cut() {
     assert!(message.chars().count() < 300 && message.contains('…'), "{message}");
 }
 
-/// The decoder of `laz` 0.13 calls itself for each switch, and overflows the stack.
+/// The decoder of `laz` 0.13 recurses for each switch, and overflows the stack.
 #[test]
 fn times_of_laz_that_switch_without_end() {
     let refused = error(&foreign::laz_of_endless_times(), "a.laz").to_string();
-    assert_eq!(refused, "a.laz: byte 384, point 1: the data are damaged: a GPS time that is in no sequence");
+    assert_eq!(
+        refused,
+        "a.laz: byte 384, point 1: cannot decode the data: expected a GPS time, got a second switch of sequences"
+    );
 }

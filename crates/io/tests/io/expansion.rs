@@ -1,10 +1,11 @@
-//! Compressed files that are to give far more than they are.
+//! Compressed files that expand to far more than their length.
 
 use std::path::Path;
 
 use nearmiss_io::{Fault, ReadError, read_bytes};
 
-/// A `binary_compressed` file of points of one-byte coordinates, the columns of which are `column`, packed.
+/// Creates a `binary_compressed` file of points with one-byte coordinates, whose compressed data
+/// are `packed`.
 fn file(points: usize, packed: &[u8]) -> Vec<u8> {
     let mut bytes = format!(
         "VERSION .7\nFIELDS x y z\nSIZE 1 1 1\nTYPE U U U\nCOUNT 1 1 1\nWIDTH {points}\nHEIGHT 1\nPOINTS {points}\n\
@@ -18,7 +19,8 @@ fn file(points: usize, packed: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// `length` zeros as runs of 264, which take three bytes each; a byte and less than a run are written out.
+/// Compresses `length` zeros as runs of 264, which take three bytes each. The first byte and the
+/// rest are literals.
 fn zeros(length: usize) -> Vec<u8> {
     let (runs, rest) = ((length - 1) / 264, (length - 1) % 264);
     let mut packed = vec![0, 0];
@@ -40,7 +42,7 @@ fn twenty_million_points_from_two_thirds_of_a_megabyte_are_refused() {
     assert!(refused.to_string().ends_with("save the file with `DATA binary`"), "{refused}");
 }
 
-/// A camera's frame that saw little: two million pixels, of which one in fifty has a point.
+/// A camera frame of two million pixels, of which one in fifty has a point.
 #[test]
 fn a_frame_that_saw_little_is_read() {
     let count = 2_000_000_u32;

@@ -1,4 +1,4 @@
-//! What a first look at a file tells, against what is in it.
+//! The estimates of `glance`, compared with the contents of files.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What readers and the writer promise, on made and on real files.
+//! Tests of readers and writers, with generated and real files.
 
 mod errors;
 mod expansion;

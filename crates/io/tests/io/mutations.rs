@@ -1,5 +1,5 @@
-//! Whatever happens to a file, a reader gives a model or an error, and never more points than there is space
-//! for.
+//! Damaged files: a reader returns a model or an error, and at most as many points as fit into the
+//! file.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ fn check(bytes: &[u8], format: Option<Format>, name: &str) {
         Ok(model) => {
             let given =
                 model.cloud.len() + model.cloud.dropped().duplicate + model.cloud.dropped().not_finite;
-            // The least that a point can take: three bytes, and compression makes at most 88 out of one.
+            // A point takes at least three bytes, and compression expands a byte to at most 88.
             assert!(given * 3 <= bytes.len() * 88, "{name}: {given} points");
             let source = model.cloud.source();
             assert!(source.iter().all(|&i| (i as usize) < given), "{name}");
@@ -33,7 +33,7 @@ fn check(bytes: &[u8], format: Option<Format>, name: &str) {
     let _mesh_or_error = read_mesh_bytes(bytes, format, Path::new(name));
 }
 
-/// In pieces, a few rows each, there are the same points, or the same is wrong.
+/// Checks that reading in pieces of a few rows gives the same points or the same error.
 fn check_pieces(bytes: &[u8], format: Option<Format>, name: &str) {
     let place = tempfile::tempdir().expect("a folder for a file");
     let path = place.path().join(name);
@@ -63,7 +63,7 @@ fn check_pieces(bytes: &[u8], format: Option<Format>, name: &str) {
                     );
                 }
             }
-            // Too few, too large: a matter of clouds.
+            // Too few points and too large coordinates are errors of the cloud only.
             (Err(ReadError::Cloud { .. }), Ok(_) | Err(ReadError::MeshNotFinite { .. })) => {}
             (Err(broken), Err(in_pieces)) => {
                 assert_eq!(broken.to_string(), in_pieces.to_string(), "in the same words");
@@ -81,7 +81,7 @@ fn any_format() -> impl Strategy<Value = Option<Format>> {
     proptest::sample::select(Format::ALL.map(Some).into_iter().chain([None]).collect::<Vec<_>>())
 }
 
-/// Bytes that readers look for.
+/// Bytes with a meaning in some format.
 const TELLING: &[u8] = b"0123456789-+.eE \n\r\t#/,;\\\"xyzfvn\0\xff\x80";
 
 fn any_byte() -> impl Strategy<Value = u8> {
@@ -172,7 +172,7 @@ fn cut_off_anywhere() {
             check(&bytes[..end], None, name);
             refused += usize::from(read_bytes(&bytes[..end], None, Path::new(name)).is_err());
         }
-        // Formats with counts notice every cut but that of the last line's end, or within the last number.
+        // Formats with counts detect every cut, except within the last number or line end.
         if ["ply", "pcd", "las", "laz", "npy"].iter().any(|ending| name.ends_with(ending)) {
             for end in 0..bytes.len() - 11 {
                 let cut = read_bytes(&bytes[..end], None, Path::new(name));

@@ -1,11 +1,11 @@
-//! Files longer than what the header is looked for in, gone over in pieces.
+//! Reading in pieces of files that are longer than the head in which the header is parsed.
 
 use std::fs;
 use std::path::Path;
 
 use nearmiss_io::{Pieces, PlyPoints, read_in_pieces};
 
-/// Points of the file, and the most that were handed out at a time.
+/// Returns the points of a file, and the largest number of points in a block.
 fn gone_over(path: &Path, block: usize) -> (Vec<[f64; 3]>, usize) {
     let Ok(Pieces::Points(pieces)) = read_in_pieces(path, None, block) else { panic!("{}", path.display()) };
     let (mut points, mut most) = (Vec::new(), 0);
@@ -45,7 +45,7 @@ fn long_files_come_piece_by_piece_and_long_headers_whole() {
                 points.iter().map(|p| p.map(|x| if x.is_nan() { 1 } else { x.to_bits() })).collect()
             };
             assert!(bits(&found) == bits(&points), "{name}, blocks of {block}: {} points", found.len());
-            // Six bytes a point at least.
+            // A point takes at least six bytes.
             assert!(is_whole || most <= block / 6 + 1, "{name}, blocks of {block}: {most} at a time");
             assert_eq!(most == points.len(), is_whole || block == 1 << 30, "{name}, blocks of {block}");
         }

@@ -1,4 +1,4 @@
-//! Real files, where the folder with them stands beside the workspace; else there is nothing to check.
+//! Tests with real files, skipped unless their folder exists beside the workspace.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::time::Duration;
 use nearmiss_geometry::Aabb;
 use nearmiss_io::{Model, Pieces, PointPieces, ReadError, read, read_in_pieces};
 
-/// The folder, unless it is absent or the variable `NEARMISS_NO_DATA` is set.
+/// Returns the folder, unless it is missing or the variable `NEARMISS_NO_DATA` is set.
 #[expect(clippy::print_stdout, reason = "says why nothing is checked")]
 fn data() -> Option<PathBuf> {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data"));
@@ -44,7 +44,8 @@ fn files(folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
     files
 }
 
-/// Points in the file, and triangles after polygons are cut (0: no faces), as catalogued or counted by hand.
+/// Numbers of points, and of triangles after polygons are cut (0 without faces), as catalogued or
+/// counted by hand.
 const KNOWN: [(&str, usize, usize); 39] = [
     ("objects/dragon-5k.ply", 5_205, 11_102),
     ("objects/dragon-23k.ply", 22_998, 47_794),
@@ -142,7 +143,7 @@ fn every_file_of_a_known_format_reads() {
             let name = path.strip_prefix(&data).unwrap();
             match read(&path, None) {
                 Ok(model) => assert!(given(&model) >= 8, "{}", name.display()),
-                // Two samples of the format have three points and are refused for that alone.
+                // Two samples of the format have only three points.
                 Err(ReadError::Cloud { .. }) => {
                     assert!(name.starts_with("formats") && name.to_string_lossy().contains("simple_"));
                 }
@@ -194,7 +195,7 @@ fn broken_files_get_a_clear_answer_in_time() {
     }
 }
 
-/// The same building, as it was scanned with y up and turned so that z is.
+/// Compares the scan of a building, with y up, and the same scan rotated to z up.
 #[test]
 fn two_versions_of_a_building_agree_after_their_change_of_axes() {
     let Some(data) = data() else { return };

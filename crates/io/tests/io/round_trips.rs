@@ -1,4 +1,4 @@
-//! What is written in a format comes back out of it, whatever the encoding.
+//! Round trips: content is read back as written, in every format and encoding.
 
 use std::path::Path;
 
@@ -179,12 +179,18 @@ fn what_does_not_fit_the_points_is_not_written() {
     let points = points();
     let mut out = Vec::new();
     let short = PlyPoints::single(&points).with_source(&[1, 2]).write(&mut out);
-    assert_eq!(short.unwrap_err().to_string(), "2 source indices for 20 points; give one for each");
+    assert_eq!(
+        short.unwrap_err().to_string(),
+        "expected source indices for each of 20 points, got 2; give one for each"
+    );
     let missing = PlyPoints::single(&points).with_edges(&[[0, 1], [2, 20]]).write(&mut out);
-    assert_eq!(missing.unwrap_err().to_string(), "edge 1 names point 20, but there are 20 points");
+    assert_eq!(missing.unwrap_err().to_string(), "expected point indices below 20, got 20 (edge 1)");
     let columns = [Column::Uint("node", &source_of(20)), Column::Float("radius", &[0.5; 19])];
     let short = PlyPoints::single(&points).with_columns(&columns).write(&mut out);
-    assert_eq!(short.unwrap_err().to_string(), "19 numbers of a column for 20 points; give one for each");
+    assert_eq!(
+        short.unwrap_err().to_string(),
+        "expected values of a column for each of 20 points, got 19; give one for each"
+    );
     assert!(out.is_empty(), "nothing written before the checks");
     PlyPoints::single(&points).with_columns(&columns[..1]).write(&mut out).unwrap();
     assert_eq!(out[out.len() - 4..], 119_u32.to_le_bytes(), "the last of the last point");
@@ -192,14 +198,14 @@ fn what_does_not_fit_the_points_is_not_written() {
     assert!(text.contains("property uint node\nend_header"), "{text}");
     let mut full: &mut [u8] = &mut [0; 10];
     let failed = PlyPoints::single(&points).write(&mut full).unwrap_err();
-    assert!(failed.to_string().starts_with("writing PLY: "), "{failed}");
+    assert!(failed.to_string().starts_with("cannot write the PLY file ("), "{failed}");
 }
 
 #[test]
 fn las_and_laz_in_all_point_formats() {
     for format in 0..=10 {
         for (extra, packed) in [(0, None), (3, None), (0, Some(50_000)), (2, Some(7)), (0, Some(1))] {
-            // The compressor for waves in the new formats is not there.
+            // `laz` has no compressor for waveforms in the new formats.
             let bytes = foreign::las(format, extra, packed);
             let cloud = model(&bytes, "a").cloud;
             let case = format!("format {format}, {extra} extra bytes, chunks {packed:?}");
@@ -250,7 +256,7 @@ fn meshes_of_engines() {
         for (n, unit) in found.cloud.normals().unwrap().iter().zip(foreign::unit_normals()) {
             assert!((0..3).all(|k| (n[k] - unit[k]).abs() < 1e-6), "{n:?}");
         }
-        // Corners that are written out come in the order of the triangles.
+        // The corners of STL are in the order of the triangles.
         let mesh = model(&foreign::stl(is_binary), "a").mesh.unwrap();
         assert_eq!(mesh.vertices().len(), 20, "corners at one place are one vertex");
         for (found, exact) in mesh.triangles().iter().zip(triangles()) {

@@ -1,4 +1,4 @@
-//! Points that are written come back as they were.
+//! Round trips of points through all output formats.
 
 use std::io::Cursor;
 
@@ -19,7 +19,7 @@ fn written(points: &Points, format: OutputFormat, lattice: Option<Lattice>) -> R
     let mut survey = Survey::default();
     survey.add(points);
     let mut writer = PointWriter::new(Cursor::new(Vec::new()), format, &survey.with_lattice(lattice))?;
-    // In two blocks.
+    // Written in two blocks.
     let middle = points.len() / 2;
     for part in [0..middle, middle..points.len()] {
         let mut some = points.clone();

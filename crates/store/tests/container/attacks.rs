@@ -1,4 +1,4 @@
-//! Tables made by someone who knows the format: the checksums of header and table fit, the contents lie.
+//! Forged tables: the checksums of header and table match, the contents are wrong.
 
 use crate::sample::{Content, put, repair};
 use nearmiss_store::{Check, Fault, File, Writer};
@@ -17,7 +17,7 @@ const fn element_size(row: usize) -> usize {
     tag(row) + 24
 }
 
-/// Applies `change` to a good file, repairs the checksums, and returns why it is refused.
+/// Applies `change` to a valid file, repairs the checksums, and returns the fault of opening it.
 fn attack(change: impl Fn(&mut Vec<u8>)) -> Fault {
     let mut bytes = Content::small().bytes();
     change(&mut bytes);
@@ -78,7 +78,7 @@ fn overlapping_and_wandering_sections_are_refused() {
         put(bytes, offset(2), a);
     });
     assert!(matches!(swapped, Fault::Unclaimed { .. }), "{swapped:?}");
-    // 65 flags need two units of 64, so halving them leaves one that nobody owns.
+    // 65 flags take two units of 64 bytes. 32 flags take one, so the second belongs to no section.
     let hidden = attack(|bytes| put(bytes, length(5), 32));
     assert!(matches!(hidden, Fault::Unclaimed { .. }), "{hidden:?}");
 }
@@ -104,7 +104,7 @@ fn element_sizes_that_do_not_divide_are_refused() {
             "{found:?}"
         );
     }
-    // An empty section of elements without a size: nothing to divide, refused all the same.
+    // An empty section of zero-sized elements is rejected too.
     let found = attack(|bytes| bytes[element_size(4)..element_size(4) + 4].fill(0));
     assert!(matches!(found, Fault::ElementSize { element_size: 0, length: 0, .. }), "{found:?}");
 }
@@ -164,8 +164,7 @@ fn names_listed_twice_and_reserved_bytes_are_refused() {
 
 #[test]
 fn hostile_metadata_cost_nothing() {
-    // A string of 2^62 bytes, a list of as many numbers, more depth than there is: whatever META holds is an
-    // error.
+    // A string of 2^62 bytes, and other invalid encodings, are errors.
     for bytes in [vec![253_u8, 0, 0, 0, 0, 0, 0, 0, 0x40], vec![0xFF; 4096], vec![255; 60_000], vec![]] {
         let mut writer = Writer::new(*b"TEST", 1);
         writer.section(*b"METB", 0, &bytes).unwrap();

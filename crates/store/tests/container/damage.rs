@@ -1,4 +1,4 @@
-//! Accidents: flipped, missing and added bytes, and files that are something else.
+//! Accidental damage: flipped, missing and added bytes, and files of other formats.
 
 use std::path::Path;
 
@@ -125,7 +125,7 @@ fn random_damage_never_panics_repaired_checksums_or_not() {
     for round in 0..60_000 {
         let mut bytes = good.clone();
         for _ in 0..=random.below(4) {
-            // Mostly where it hurts: header fields and the table.
+            // Mostly header fields and the table.
             let at = if random.below(4) == 0 { random.below(bytes.len()) } else { 12 + random.below(292) };
             match random.below(4) {
                 0 => bytes[at] = random.next().to_le_bytes()[0],

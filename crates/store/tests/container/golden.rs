@@ -1,5 +1,5 @@
-//! The layout, held fast by a file that is never written again: every later version reads it, or refuses it
-//! by name.
+//! A golden file that is never rewritten: every later version reads it, or rejects it with an error
+//! that names the version.
 
 use nearmiss_store::{Check, File, LAYOUT, Writer};
 use xxhash_rust::xxh3::xxh3_64;
@@ -52,7 +52,7 @@ fn todays_writer_makes_the_same_bytes() {
     assert_eq!(written_today(), GOLDEN);
 }
 
-/// The naive twin: reads by the README's table alone, with nothing of the crate.
+/// A naive reader, written from the tables of the README, without code of the crate.
 #[test]
 fn the_layout_is_the_one_in_the_readme() {
     let u32_at = |at: usize| u32::from_le_bytes(GOLDEN[at..at + 4].try_into().unwrap());

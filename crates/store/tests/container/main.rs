@@ -1,4 +1,4 @@
-//! The container as its users see it, through the public interface only.
+//! Tests of the container through the public interface.
 
 #![cfg(test)]
 

@@ -1,4 +1,4 @@
-//! What goes in comes out, by every way in.
+//! Round trips: written content is read back, with every constructor of `File`.
 
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ fn opened_and_read_files_serve_every_alignment_in_place() {
         assert_eq!(*array, lanes);
         assert!(file.array::<u8>(*b"BYTE", 0).unwrap().is_in_place());
     }
-    // Bytes in memory at any address, also an odd one: right values, copied where they must be.
+    // Bytes in memory may start at an odd address. Then the elements are copied.
     let mut bytes = vec![0];
     writer.write_to(&mut bytes).unwrap();
     let shifted: &'static [u8] = &Box::leak(bytes.into_boxed_slice())[1..];
@@ -135,7 +135,7 @@ fn asking_for_what_is_not_there_says_so() {
     assert!(matches!(missing.fault, Fault::MissingSection { .. }));
     assert_eq!(
         missing.to_string(),
-        "town.zip/scan.nm: has no section NONE/2; prepare it again with `preprocess`"
+        "town.zip/scan.nm: section NONE/2 is missing; prepare it again with `preprocess`"
     );
 
     let wrong = file.array::<[f32; 4]>(*b"POSN", 0).unwrap_err();
@@ -144,7 +144,9 @@ fn asking_for_what_is_not_there_says_so() {
 
     let kind = file.expect(*b"SLIC", 1..=9).unwrap_err();
     assert!(matches!(kind.fault, Fault::Kind { found: KIND, expected: [b'S', b'L', b'I', b'C'] }), "{kind}");
-    for (supported, advice) in [(1..=2, "versions 1 to 2; update"), (4..=4, "version 4; prepare")] {
+    for (supported, advice) in
+        [(1..=2, "versions 1 to 2, got version 3; update"), (4..=4, "version 4, got version 3; prepare")]
+    {
         let version = file.expect(KIND, supported).unwrap_err();
         assert!(matches!(version.fault, Fault::Version { found: 3, .. }));
         assert!(version.to_string().contains(advice), "{version}");
@@ -166,7 +168,7 @@ fn a_writer_refuses_names_that_are_taken() {
     assert!(matches!(reserved, WriteError::ReservedTag { section: SectionId { part: 5, .. } }), "{reserved}");
     writer.metadata(&1_u8).unwrap();
     assert!(matches!(writer.metadata(&2_u8), Err(WriteError::DuplicateSection { .. })));
-    // What was refused was not added.
+    // Rejected sections were not added.
     let mut bytes = Vec::new();
     writer.write_to(&mut bytes).unwrap();
     let file = File::from_bytes(bytes, Check::Full).unwrap();
@@ -190,7 +192,7 @@ fn metadata_that_serde_cannot_number_are_an_error() {
     assert!(matches!(error, WriteError::MetadataTooLarge { limit: 65_536, .. }), "{error}");
 }
 
-/// The kernel's own books say which pages of the map were touched.
+/// Reads from the kernel which pages of the map were accessed.
 #[cfg(all(target_os = "linux", feature = "mmap"))]
 #[test]
 fn opening_without_checksums_leaves_the_bulk_alone() {

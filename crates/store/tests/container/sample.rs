@@ -1,4 +1,4 @@
-//! A small container that every kind of section occurs in, and the tools to damage it.
+//! A small container with every kind of section, and functions that damage it.
 
 use bytemuck::{Pod, Zeroable};
 use nearmiss_store::{Array, File, OpenError, Writer};
@@ -66,7 +66,7 @@ impl Content {
         bytes
     }
 
-    /// Everything in `file` is what was written.
+    /// Checks that `file` has the written content.
     pub(crate) fn check(&self, file: &File) {
         file.expect(KIND, 3..=3).unwrap();
         assert_eq!(file.metadata::<About>().unwrap(), self.about);
@@ -80,8 +80,7 @@ impl Content {
     }
 }
 
-/// Touches everything a caller could ask for; errors are welcome, panics are not. Returns the number of good
-/// answers.
+/// Calls every accessor, which may fail but must not panic. Returns the number of successes.
 pub(crate) fn use_all(file: &File) -> usize {
     fn total<T: Pod>(array: Result<Array<T>, OpenError>) -> usize {
         array.map_or(0, |array| 1 + array.iter().filter(|e| bytemuck::bytes_of(*e)[0] == 1).count().min(1))
@@ -93,7 +92,7 @@ pub(crate) fn use_all(file: &File) -> usize {
     good + file.sections().iter().map(|s| usize::try_from(s.elements()).unwrap().min(1)).sum::<usize>()
 }
 
-/// Makes both header checksums fit again, as an attacker would.
+/// Recomputes both checksums in the header, as an attacker would.
 pub(crate) fn repair(bytes: &mut [u8]) {
     let count = u32::from_le_bytes(bytes[20..24].try_into().unwrap()) as usize;
     if let Some(table) = count.checked_mul(40).and_then(|length| bytes.get(64..64 + length)) {
@@ -109,7 +108,7 @@ pub(crate) fn put(bytes: &mut [u8], at: usize, value: u64) {
     bytes[at..at + 8].copy_from_slice(&value.to_le_bytes());
 }
 
-/// The same random numbers on every run: `SplitMix64`.
+/// The random number generator `SplitMix64`, with the same numbers on every run.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {

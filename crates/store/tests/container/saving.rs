@@ -1,4 +1,4 @@
-//! Saving that cannot succeed fails cleanly.
+//! Failed saves: they report an error and change nothing.
 
 use std::fs;
 use std::io::{self, Write};
@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use crate::sample::{Content, KIND};
 use nearmiss_store::{Check, File, WriteError, WriteStep, Writer};
 
-/// Takes `room` bytes, then fails; counts what it was given.
+/// A stream that fails after `room` bytes. Counts the bytes taken.
 struct Full {
     room: usize,
     taken: usize,
@@ -76,7 +76,7 @@ fn places_that_cannot_be_written_are_refused_and_nothing_changes() {
     );
     let text = nowhere.to_string();
     assert!(
-        text.contains("nowhere") && text.ends_with("check that the folder exists and may be written to"),
+        text.contains("nowhere") && text.ends_with("check that the folder exists and is writable"),
         "{text}"
     );
     assert!(content.writer().save(path.join("below-a-file.nm")).is_err());
@@ -107,7 +107,7 @@ fn a_folder_that_may_not_be_written_keeps_its_file() {
     let permit = |mode| fs::set_permissions(folder.path(), fs::Permissions::from_mode(mode)).unwrap();
 
     permit(0o555);
-    // Whoever is root may write all the same; then the save succeeds, and that is right too.
+    // Root may write in spite of the permissions. Then the save must succeed.
     let bound_by_permissions = fs::write(folder.path().join("probe"), b"").is_err();
     let mut other = Writer::new(KIND, 9);
     other.section(*b"POSN", 0, &[1_u8]).unwrap();
@@ -125,7 +125,7 @@ fn a_folder_that_may_not_be_written_keeps_its_file() {
     }
 }
 
-/// A limit that binds root too: the device that is always full, as the folder's only file system.
+/// Uses `/dev/full`, which fails for root too.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_device_is_reported() {
@@ -135,7 +135,10 @@ fn a_full_device_is_reported() {
         matches!(&error, WriteError::Io { source, .. } if source.kind() == io::ErrorKind::StorageFull),
         "{error}"
     );
-    assert_eq!(error.to_string(), "cannot write (no storage space); check the space left and try again");
+    assert_eq!(
+        error.to_string(),
+        "cannot write (no space left on device); check the space left on the disk and try again"
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Workspaces: arrays in files, stages that are kept, folders that are one's own.
+//! Workspaces: arrays in files, finished stages, and locked folders.
 
 use std::fs;
 
@@ -53,7 +53,7 @@ fn a_closed_stage_is_found_again_for_the_same_key_alone() {
         assert_eq!(stage.room::<u32>("x", 1000).unwrap()[..3], [1, 2, 3]);
         assert_eq!(stage.room::<u32>("y", 10).unwrap()[9], 10);
         let wrong = stage.room::<u32>("x", 999).unwrap_err();
-        assert!(wrong.to_string().contains("expected 3996 bytes, got 4000; remove the folder"), "{wrong}");
+        assert!(wrong.to_string().contains("(expected 3996 bytes, got 4000); remove the folder"), "{wrong}");
         let stage = work.stage("two");
         assert_eq!(stage.done::<u64>(), None, "it was not closed");
         assert!(stage.room::<u32>("x", 1000).unwrap().iter().all(|x| *x == 0), "made anew");
@@ -69,7 +69,7 @@ fn a_folder_is_one_workspaces_and_other_files_stay() {
     let work = open(&folder, "a").unwrap();
     fs::write(folder.join("notes.txt"), "mine").unwrap();
     let refused = open(&folder, "a").unwrap_err().to_string();
-    assert!(refused.contains("another process works there; wait for the other process to end"), "{refused}");
+    assert!(refused.contains("(another process uses it); wait for that process to end"), "{refused}");
     let stage = work.stage("one");
     drop(filled(stage.room("x", 10).unwrap()));
     stage.close(&()).unwrap();
@@ -82,10 +82,10 @@ fn a_folder_is_one_workspaces_and_other_files_stay() {
     Workspace::clear(&place.path().join("none"));
     let file = place.path().join("file");
     fs::write(&file, "").unwrap();
-    assert!(open(&file, "a").unwrap_err().to_string().contains("cannot make the folder"));
+    assert!(open(&file, "a").unwrap_err().to_string().contains("cannot create the folder"));
 }
 
-/// Touches ten times as much as may be held, and looks what is held meanwhile.
+/// Fills an array of several times the memory limit, and checks the resident memory meanwhile.
 #[cfg(target_os = "linux")]
 #[test]
 fn little_memory_is_held() {

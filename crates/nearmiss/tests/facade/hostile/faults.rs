@@ -1,4 +1,5 @@
-//! Files cut short, of other machines and versions, and replaced under an open scan.
+//! Files that are truncated, come from other machines or versions, or are replaced while a scan is
+//! open.
 
 use std::io;
 
@@ -21,7 +22,7 @@ fn bytes_of(scan: &Scan) -> Vec<u8> {
     bytes
 }
 
-/// Why `bytes` are refused as a scan, with and without their checksums compared.
+/// The errors of opening `bytes` with and without comparing checksums.
 fn refusals(bytes: &[u8]) -> [LoadError; 2] {
     [Check::Full, Check::Structure].map(|check| Scan::from_bytes(bytes.to_vec(), check).unwrap_err())
 }
@@ -44,7 +45,7 @@ fn a_scan_cut_anywhere_is_refused_even_if_its_header_owns_up() {
             };
             assert!(told, "cut after {end}: {refused}");
         }
-        // The last section may be followed by padding, the lack of which alone is made good here.
+        // Padding may follow the last section. If only padding is missing, this restores it.
         restate_length(&mut cut);
         repair(&mut cut);
         if cut.len() < whole.len() {
@@ -58,8 +59,8 @@ fn a_scan_cut_anywhere_is_refused_even_if_its_header_owns_up() {
 #[test]
 fn a_file_of_a_machine_of_the_other_byte_order_is_named_as_such() {
     let whole = bytes_of(&scan(1));
-    // Such a machine writes its numbers the other way round; the first eight bytes are bytes, or are swapped
-    // as one.
+    // Such a machine writes numbers in the opposite byte order. The first eight bytes are bytes, or
+    // are swapped as one number.
     for swapped in [&[(0, 8)][..], &[(8, 12)], &[(8, 12), (16, 20), (20, 24), (24, 32), (32, 40), (56, 64)]] {
         let mut other = whole.clone();
         for &(start, end) in swapped {
@@ -84,7 +85,7 @@ fn parts_that_are_not_the_components_are_refused() {
     let file = File::from_bytes(whole.clone(), Check::Full).unwrap();
     let parts = file.sections().iter().find(|section| section.id.tag == *b"PART").unwrap();
     let first = usize::try_from(parts.offset).unwrap();
-    // The number of points of the first part; the first part in place of the second.
+    // Overwrites the number of points of the first part, or the second part with the first.
     for (from, to) in [(first..first + 4, first + 4), (first..first + 12, first + 12)] {
         let mut lying = whole.clone();
         lying.copy_within(from, to);
@@ -115,7 +116,7 @@ fn a_scan_answers_the_same_while_its_file_is_replaced_and_removed() {
     assert_eq!(exercise(&open, &first), before, "even without a name");
 }
 
-/// A folder in which nobody, not even root, makes files.
+/// A folder in which nobody, not even root, can create files.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_folder_that_takes_no_files_is_reported() {
@@ -124,5 +125,5 @@ fn a_folder_that_takes_no_files_is_reported() {
     assert_eq!(path.as_deref(), Some(std::path::Path::new("/proc/scan.nm")));
     let kinds = [io::ErrorKind::NotFound, io::ErrorKind::PermissionDenied];
     assert!(kinds.contains(&source.kind()), "{source:?}");
-    assert!(refused.to_string().ends_with("may be written to"), "{refused}");
+    assert!(refused.to_string().ends_with("is writable"), "{refused}");
 }
