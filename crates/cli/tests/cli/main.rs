@@ -10,6 +10,7 @@ mod distances;
 mod estimating;
 mod faults;
 mod filtering;
+mod guides;
 mod independent;
 mod interpolating;
 mod looking_inside;
