@@ -8,6 +8,11 @@ mod scan;
 #[doc = include_str!("../../../README.md")]
 struct FrontPage;
 
+/// The examples of the guide compile and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/guide/in-rust.md")]
+struct Guide;
+
 #[cfg(feature = "filter")]
 pub use nearmiss_filter as filter;
 pub use nearmiss_geometry as geometry;

@@ -11,6 +11,7 @@ mod distances;
 mod estimating;
 mod faults;
 mod filtering;
+mod guides;
 mod independent;
 mod interpolating;
 mod looking_inside;
