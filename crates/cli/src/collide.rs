@@ -302,7 +302,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     if let Some(path) = &args.prove {
         output::check_apart(path, &args.pair.inputs())?;
     }
-    args.path.check(&args.pair.inputs(), args.all)?;
+    args.path.check(&args.pair.inputs(), Some(args.all))?;
     args.contacts.check(args.path.csv.as_deref(), &args.pair.inputs())?;
     let matrices = args.pair.matrices()?;
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;

@@ -113,7 +113,7 @@ pub(crate) fn run(args: &DistanceArgs) -> Result<(), CliError> {
         output::check_apart(path, &args.pair.inputs())?;
         picture::check_name(path)?;
     }
-    args.path.check(&args.pair.inputs(), false)?;
+    args.path.check(&args.pair.inputs(), None)?;
     let matrices = args.pair.matrices()?;
     let mut poses = args.pair.pose_file(args.path.poses.as_ref())?;
     let inputs = args.pair.inputs();

@@ -30,11 +30,11 @@ pub struct PathArgs {
 }
 
 impl PathArgs {
-    /// Checks the names of the outputs before any work is done. `has_table` tells that there is something to
-    /// write to a table without --poses too.
-    pub(crate) fn check(&self, inputs: &[&Path], has_table: bool) -> Result<(), CliError> {
-        if self.csv.is_some() && self.poses.is_none() && !has_table {
-            return Err(CliError::Usage("--csv needs many answers: give --poses".into()));
+    /// Checks the outputs before any work is done. `all` is the option --all, where a command has it.
+    pub(crate) fn check(&self, inputs: &[&Path], all: Option<bool>) -> Result<(), CliError> {
+        if self.csv.is_some() && self.poses.is_none() && all != Some(true) {
+            let or_all = if all.is_some() { " or --all" } else { "" };
+            return Err(CliError::Usage(format!("--csv writes a table of several answers; give --poses{or_all}")));
         }
         let mut inputs = inputs.to_vec();
         inputs.extend(self.poses.as_deref());

@@ -49,7 +49,7 @@ fn what_is_no_shape_is_refused_with_its_line() {
         (r#"{"sphere":{"centre":[0,0,0],"radius":-1}}"#, &["line 2", "radius", "must be at least 0"][..]),
         (r#"{"sphere":{"centre":[0,0],"radius":1}}"#, &["line 2", "column"]),
         (r#"{"sphere":{"centre":[0,0,0]}}"#, &["line 2", "radius"]),
-        (r#"{"cone":{}}"#, &["line 2", "not one shape", "capsule"]),
+        (r#"{"cone":{}}"#, &["line 2", "unknown shape `cone`; known: sphere, capsule, box"]),
         (
             r#"{"box":{"pose":[1,0,0,0,0,2,0,0,0,0,1,0,0,0,0,1],"half":[1,1,1]}}"#,
             &["line 2", "pose", "rotation"],
