@@ -1,4 +1,4 @@
-//! `collide`: tests whether, where and how near two scans meet.
+//! `collide`: tests whether two scans touch, and where.
 
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -33,10 +33,10 @@ use crate::{output, picture, proof};
 /// Options of `collide`.
 #[derive(Debug, Clone, Args)]
 pub struct CollideArgs {
-    /// What is asked about
+    /// The scans and their poses
     #[command(flatten)]
     pub pair: PairArgs,
-    /// Many poses
+    /// The options for many poses
     #[command(flatten)]
     pub path: PathArgs,
     /// Stop at the first contact of --poses
@@ -54,7 +54,7 @@ pub struct CollideArgs {
     /// Report scans that come nearer than this as touching, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub margin: f64,
-    /// How sure a separation must be
+    /// Evidence required of a separation
     ///
     /// A certified separation is proven; trying for one takes half as much time again, near
     /// contact two to three times as much. The default is certified, with the geodesic kernel
@@ -75,7 +75,7 @@ pub struct CollideArgs {
     /// A unit is one evaluation of f or one node pair; 500 to 10000 is common.
     #[arg(long, value_name = "N", help_heading = "Budget and evidence")]
     pub work: Option<u64>,
-    /// How much to find out about a contact
+    /// Detail to find of a contact
     #[arg(long, value_enum, default_value_t = DetailName::Witness)]
     pub detail: DetailName,
     /// Find all contacts, not one
@@ -84,10 +84,10 @@ pub struct CollideArgs {
     /// first order.
     #[arg(long)]
     pub all: bool,
-    /// What is done with all contacts
+    /// What to do with the contacts
     #[command(flatten)]
     pub contacts: ContactArgs,
-    /// How to search
+    /// The search options
     #[command(flatten)]
     pub search: SearchArgs,
     /// Threads; 0 for all cores
@@ -110,10 +110,10 @@ pub struct CollideArgs {
     pub quiet: bool,
 }
 
-/// How much to find out about a contact, by name.
+/// The names of the levels of detail of a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DetailName {
-    /// Only that there is one, to first order; fastest
+    /// Only its existence, to first order; fastest
     Verdict,
     /// A point on both surfaces, verified where possible
     Witness,
@@ -121,7 +121,7 @@ pub enum DetailName {
     Manifold,
 }
 
-/// How sure a separation should be, by name.
+/// The names of the kinds of evidence of a separation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum EvidenceName {
     /// Proven: volumes that enclose the scans are disjoint
@@ -130,7 +130,7 @@ pub enum EvidenceName {
     Estimated,
 }
 
-/// What all queries have in common.
+/// The scans and settings that all queries share.
 struct Question {
     a: Scan,
     b: Scan,
@@ -141,13 +141,13 @@ struct Question {
     prove: bool,
     all: bool,
     manifold: bool,
-    /// How clearance is found along a path, if it is.
+    /// The plan of distance queries for the clearance along a path, if it is needed.
     clearance: Option<DistancePlan>,
     sizes: SizeCheck,
 }
 
 impl Question {
-    /// Answers one query; `line` is its line in the file of poses.
+    /// Answers one query. `line` is the number of its line in the file of poses.
     fn ask(&self, line: Option<u64>, posed: Posed, scratch: &mut Scratch) -> Asked {
         let Posed { poses, time } = posed;
         let start = now();
@@ -175,7 +175,7 @@ impl Question {
         Asked { line, time, poses, answer, clearance, proof, contacts, manifold, micros }
     }
 
-    /// The budget of a query that starts at `start`.
+    /// Returns the budget of a query that starts at `start`.
     fn budget_from(&self, start: std::time::Instant) -> Budget {
         let mut budget = Budget::UNLIMITED;
         if let Some(units) = self.work {
@@ -239,26 +239,26 @@ impl Question {
     }
 }
 
-/// Returns `true` if the distance says more than the answer: not of a contact without a margin.
+/// Returns `true` if the distance adds to the answer. For a contact without a margin it is 0.
 fn needs_clearance(answer: &Answer, options: &CollideOptions) -> bool {
     !answer.verdict.is_intersecting() || options.margin > 0.0
 }
 
 /// A query and its answer.
 struct Asked {
-    /// The line of the file of poses.
+    /// The number of the line in the file of poses.
     line: Option<u64>,
     /// The time of that line.
     time: Option<f64>,
     poses: [Pose; 2],
     answer: Answer,
-    /// The distance, if it was asked for.
+    /// The distance, if it was computed.
     clearance: Option<Distance>,
-    /// What it rests on, if that is to be written.
+    /// The proof, if it is to be written.
     proof: Option<Proof>,
-    /// All contacts, if they are wanted.
+    /// All contacts, with `--all`.
     contacts: Option<Contacts>,
-    /// The manifold, if it is wanted.
+    /// The manifold, with `--detail manifold`.
     manifold: Option<Vec<ManifoldPoint>>,
     micros: f64,
 }
@@ -285,11 +285,11 @@ impl Asked {
     }
 }
 
-/// Where answers go.
+/// The outputs that answers are written to.
 struct Outputs<'a, 'p, 'c> {
     results: &'a mut Results,
     proof: Option<(&'a Path, &'p mut (dyn Write + 'p))>,
-    /// Of many poses.
+    /// The log of a path, for many poses.
     log: Option<PathLog<'c>>,
 }
 
@@ -359,7 +359,7 @@ pub(crate) fn run(args: &CollideArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// Says, and draws, what the answers along a path come to.
+/// Writes the summary of the answers along a path, and draws their plot.
 fn conclude(question: &Question, args: &CollideArgs, out: &mut Outputs<'_, '_, '_>) -> Result<(), CliError> {
     let Some(log) = &out.log else { return Ok(()) };
     log.draw(&args.path, &picture::names(args.pair.inputs()), args.margin)?;
@@ -370,7 +370,8 @@ fn conclude(question: &Question, args: &CollideArgs, out: &mut Outputs<'_, '_, '
     out.results.line(log.summary(unit))
 }
 
-/// Opens both scans. Balls about points need no kernel, so scans of different kernels may be mixed for them.
+/// Opens both scans. Scans with different kernels may be mixed for `--thickened`, which uses no
+/// kernel.
 fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2], CliError> {
     let opening = args.pair.opening(Some(threads), console);
     if args.meaning.thickened.is_some() {
@@ -383,17 +384,19 @@ fn open(args: &CollideArgs, threads: usize, console: Console) -> Result<[Scan; 2
         opening.open_both(kernel, args.pair.inputs())?
     };
     if args.prove.is_some() && scans[0].metric() == Metric::Geodesic {
-        let what = "--prove needs the euclidean kernel: with the geodesic kernel no separation is proven; prepare the \
-                    scans with `--kernel euclidean`";
+        let what = "--prove needs scans prepared for the euclidean kernel, got the geodesic kernel, which proves no \
+                    separation; prepare the scans again with `--kernel euclidean`";
         return Err(CliError::Usage(what.into()));
     }
     if args.evidence == Some(EvidenceName::Certified) && scans[0].metric() == Metric::Geodesic {
-        console::warn("with the geodesic kernel no separation is proven; all are estimated");
+        console::warn(
+            "--evidence certified: with the geodesic kernel no separation is proven, so separations are estimated",
+        );
     }
     Ok(scans)
 }
 
-/// Answers for the poses of the command line.
+/// Answers the query with the poses of the command line.
 fn answer_one(
     question: &Question,
     matrices: &[[f64; 16]; 2],
@@ -429,10 +432,11 @@ fn answer_one(
     question.tell(out, &asked, args)
 }
 
-/// Number of lines held at a time when several threads answer.
+/// The number of lines read at a time if several threads answer.
 const BATCH: usize = 1024;
 
-/// Answers line by line, in order, with --first up to the first contact. Holds at most a batch of lines.
+/// Answers line by line, in order; with `--first`, up to the first contact. Holds at most [`BATCH`]
+/// lines.
 fn answer_all(
     question: &Question,
     poses: &mut PoseFile,
@@ -440,7 +444,7 @@ fn answer_all(
     out: &mut Outputs<'_, '_, '_>,
 ) -> Result<(), CliError> {
     let threads = args.threads.unwrap_or(1);
-    // One thread, this one, answers each line before it reads the next.
+    // With one thread, each line is answered before the next is read.
     let (pool, most) = if threads == 1 { (None, 1) } else { (Some(pool(threads)?), BATCH) };
     let (mut lines, mut answers) = (Vec::with_capacity(most), Vec::with_capacity(most));
     let mut scratch = BatchScratch::default();
@@ -451,7 +455,7 @@ fn answer_all(
             let (line, text): &(u64, String) = &lines[i];
             let posed = poses.poses(*line, text, [&question.a, &question.b]);
             let asked = posed.map(|posed| question.ask(Some(*line), posed, scratch));
-            // What comes after a fault, or after the hit that was looked for, is not told.
+            // Nothing is written after a fault, or after the first contact with --first.
             let is_last = asked.as_ref().map_or(true, |asked| args.first && asked.is_hit());
             if is_last { ControlFlow::Break(Some(asked)) } else { ControlFlow::Continue(Some(asked)) }
         };
@@ -463,7 +467,7 @@ fn answer_all(
             None => answer(),
         };
         for asked in answers.drain(..).take(told).flatten().chain(read.err().map(Err)) {
-            // What was answered before a faulty line is told before the fault.
+            // Answers to the lines before a faulty one are written before the error.
             let asked = asked.or_else(|fault| out.results.flush().and(Err(fault)))?;
             question.tell(out, &asked, args)?;
             if args.first && asked.is_hit() {
@@ -481,7 +485,7 @@ fn pool(threads: usize) -> Result<rayon::ThreadPool, CliError> {
     pool.or(Err(CliError::Threads(threads)))
 }
 
-/// Reads up to `most` lines; those before a fault are read.
+/// Reads up to `most` lines. After an error, `lines` holds the lines before the faulty one.
 fn read_lines(poses: &mut PoseFile, most: usize, lines: &mut Vec<(u64, String)>) -> Result<(), CliError> {
     while lines.len() < most
         && let Some(line) = poses.next_line()?

@@ -1,4 +1,4 @@
-//! What people see beside the results: progress, warnings, errors; and the clock.
+//! Standard error (progress, notes, warnings and errors), standard output, and the clock.
 
 use std::fmt::{self, Display};
 use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::digits::grouped;
 use crate::error::CliError;
 
-/// Standard error. Failing to write there is ignored: there is nowhere left to say so.
+/// Standard error. Errors of writing to it are ignored, because they could not be reported.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Console {
     bars: bool,
@@ -25,14 +25,14 @@ impl Console {
         Self { bars: !quiet && io::stderr().is_terminal(), quiet }
     }
 
-    /// A line about what was done, unless `--quiet` was given.
+    /// Prints a line, unless `--quiet` is given.
     pub(crate) fn note(self, what: impl Display) {
         if !self.quiet {
             let _ = writeln!(io::stderr().lock(), "{what}");
         }
     }
 
-    /// A sign of life for a step of unknown length; gone when dropped.
+    /// Returns a spinner, for a step of unknown length; it disappears when dropped.
     pub(crate) fn spinner(self, what: impl Display) -> Bar {
         let bar = self.bar(ProgressBar::new_spinner(), "{spinner} {msg} {elapsed}");
         bar.set_message(what.to_string());
@@ -42,14 +42,15 @@ impl Console {
         Bar(bar)
     }
 
-    /// A bar for `length` steps; gone when dropped.
+    /// Returns a progress bar for `length` steps; it disappears when dropped.
     pub(crate) fn steps(self, what: impl Display, length: u64) -> Bar {
         let bar = self.bar(ProgressBar::new(length), "{msg} [{bar:30}] {pos}/{len} {eta}");
         bar.set_message(what.to_string());
         Bar(bar)
     }
 
-    /// A bar for about `length` points, with their rate and the time that is left; gone when dropped.
+    /// Returns a progress bar for about `length` points, with the rate and the time left; it
+    /// disappears when dropped.
     pub(crate) fn rate(self, what: impl Display, length: u64) -> Bar {
         let template = "{msg} [{bar:30}] {human_pos} points, {rate}/s, {eta} left";
         let bar = self.bar(ProgressBar::new(length), template);
@@ -57,8 +58,8 @@ impl Console {
         Bar(bar)
     }
 
-    /// A bar for work that tells the share of it that is done, and how many points it is about; with the
-    /// rate and the time that is left. Gone when dropped.
+    /// Returns a progress bar for work on points, with the rate and the time left; it disappears
+    /// when dropped. `told` returns the share that is done and the number of points.
     pub(crate) fn share(self, what: impl Display, told: impl Fn() -> (f64, usize) + Send + 'static) -> Watch {
         const STEPS: f64 = 1000.0;
         let bar = self.bar(ProgressBar::new(1000), "{msg} [{bar:30}] {percent} %, {eta} left");
@@ -98,7 +99,7 @@ impl Console {
     }
 }
 
-/// Progress on a terminal, which leaves no trace.
+/// Progress on a terminal, which disappears when dropped.
 #[derive(Debug)]
 pub(crate) struct Bar(ProgressBar);
 
@@ -114,10 +115,10 @@ impl Drop for Bar {
     }
 }
 
-/// Progress that a thread watches.
+/// Progress that a thread updates at intervals.
 #[derive(Debug)]
 pub(crate) struct Watch {
-    /// Dropped to end the thread.
+    /// Ends the thread when dropped.
     end: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -131,12 +132,12 @@ impl Drop for Watch {
     }
 }
 
-/// Something that the user ought to know, on standard error.
+/// Prints a warning on standard error.
 pub(crate) fn warn(what: impl Display) {
     let _ = writeln!(io::stderr().lock(), "warning: {what}");
 }
 
-/// Says why the command failed, if there is anything to say.
+/// Prints an error, unless it is silent, and returns the exit status.
 pub(crate) fn fail(error: &CliError) -> ExitCode {
     if !error.is_silent() {
         say_error(error);
@@ -144,12 +145,12 @@ pub(crate) fn fail(error: &CliError) -> ExitCode {
     ExitCode::from(error.status())
 }
 
-/// Says what has gone wrong, on standard error.
+/// Prints an error on standard error.
 pub(crate) fn say_error(what: impl Display) {
     let _ = writeln!(io::stderr().lock(), "error: {what}");
 }
 
-/// Standard output, for results alone.
+/// Standard output, which carries nothing but results.
 #[derive(Debug)]
 pub(crate) struct Results {
     out: BufWriter<StdoutLock<'static>>,
@@ -160,24 +161,24 @@ impl Results {
         Self { out: BufWriter::with_capacity(1 << 16, io::stdout().lock()) }
     }
 
-    /// A line for people.
+    /// Writes a line of text.
     pub(crate) fn line(&mut self, text: impl Display) -> Result<(), CliError> {
         writeln!(self.out, "{text}").map_err(CliError::Stdout)
     }
 
-    /// A line of JSON.
+    /// Writes a line of JSON.
     pub(crate) fn json(&mut self, value: &impl Serialize) -> Result<(), CliError> {
         serde_json::to_writer(&mut self.out, value).map_err(|e| CliError::Stdout(e.into()))?;
         self.line("")
     }
 
-    /// Hands over what has been gathered; without it, errors at the end would go unnoticed.
+    /// Writes out the buffer. Without this call, an error of the last write would go unnoticed.
     pub(crate) fn flush(&mut self) -> Result<(), CliError> {
         self.out.flush().map_err(CliError::Stdout)
     }
 }
 
-/// The time. Binaries may read clocks; this is the one place where ours does.
+/// Returns the current time. This is the only place where the binary reads a clock.
 #[expect(clippy::disallowed_methods, reason = "answers and reports say how long they took")]
 pub(crate) fn now() -> Instant {
     Instant::now()

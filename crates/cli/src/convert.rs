@@ -1,4 +1,4 @@
-//! `convert`: points from one file format to another, in pieces.
+//! `convert`: converts points from one file format to another, piece by piece.
 
 mod spill;
 mod voxel;
@@ -14,7 +14,7 @@ use nearmiss::store::replace_file;
 use serde::Serialize;
 
 use crate::console::{self, Bar, Console, Results, now};
-use crate::digits::{count, grouped};
+use crate::digits::{grouped, grouped_count};
 use crate::error::CliError;
 use crate::filters::{ClassList, CropBox, parse_classes, parse_crop};
 use crate::parse::parse_length;
@@ -65,10 +65,10 @@ pub struct ConvertArgs {
     pub quiet: bool,
 }
 
-/// Bytes of a file that are read at a time.
+/// The number of bytes of a file that are read at a time.
 const BLOCK: usize = 1 << 20;
 
-/// What `convert` has done.
+/// The JSON output of `convert`.
 #[derive(Debug, Serialize)]
 struct Report {
     read: u64,
@@ -78,20 +78,20 @@ struct Report {
     seconds: f64,
 }
 
-/// Points that are left out whatever is asked.
+/// The points that are removed whatever the options are.
 #[derive(Debug, Serialize)]
 struct Dropped {
     not_finite: u64,
 }
 
-/// Where points come from, as often as they are asked for.
+/// A source of points that can be read repeatedly.
 enum Source {
     Pieces(PointPieces),
     Vertices(Points),
     Spilled(Spill),
 }
 
-/// What is done to points on their way.
+/// The changes applied to points.
 struct Steps<'a> {
     args: &'a ConvertArgs,
     factor: f64,
@@ -113,13 +113,16 @@ pub(crate) fn run(args: &ConvertArgs) -> Result<(), CliError> {
     drop(bar);
     let Found { read, not_finite, survey } = found;
     if survey.points() == 0 {
-        let what = format!("none of its {} is left to write", count(read, "point"));
+        let what = format!(
+            "expected points to write, got none of its {}; widen --crop or --class, or check the input",
+            grouped_count(read, "point")
+        );
         return Err(CliError::Unfit { path: args.input.clone(), what });
     }
     let lost = format.loses(&survey);
     if !lost.is_empty() {
         console::warn(format_args!(
-            "{}: written without {}; this format has no place for them",
+            "{}: written without {}, which this format cannot store",
             args.output.display(),
             lost.join(", ")
         ));
@@ -150,15 +153,15 @@ fn open(args: &ConvertArgs) -> Result<Source, CliError> {
         Pieces::Mesh { vertices, mesh } => (vertices, mesh),
     };
     console::warn(format_args!(
-        "{}: only the {} vertices are written, not the {}; `sample` makes points all over the surface",
+        "{}: the output holds the {} of this mesh, but no points on its {}; use `sample` for points on the faces",
         args.input.display(),
-        grouped(mesh.vertices().len() as u64),
-        count(mesh.triangles().len() as u64, "triangle"),
+        grouped_count(mesh.vertices().len() as u64, "point"),
+        grouped_count(mesh.triangles().len() as u64, "triangle"),
     ));
     Ok(Source::Vertices(vertices))
 }
 
-/// What has to be read of the points for what is asked.
+/// Restricts reading to the parts of the file that the options need.
 fn part(args: &ConvertArgs, points: PointPieces) -> Result<PointPieces, CliError> {
     let points = match args.crop {
         Some(CropBox { min, max }) => points.near(Aabb { min, max }),
@@ -168,18 +171,20 @@ fn part(args: &ConvertArgs, points: PointPieces) -> Result<PointPieces, CliError
     if points.has_levels() {
         return Ok(points.at_resolution(spacing));
     }
-    let what = "this file has no levels of detail, as COPC has; for fewer points, use `--voxel`".into();
+    let what =
+        "expected a COPC file for --resolution, got a file that has no levels of detail; use `--voxel`"
+            .into();
     Err(CliError::Unfit { path: args.input.clone(), what })
 }
 
-/// What a first pass over the points has found.
+/// The results of the first pass over the points.
 struct Found {
     read: u64,
     not_finite: u64,
     survey: Survey,
 }
 
-/// Goes over all points for the first time. What is surveyed is what is written.
+/// Makes the first pass over all points, and surveys the points that will be written.
 fn look(
     source: Source,
     steps: &Steps<'_>,
@@ -195,7 +200,7 @@ fn look(
         not_finite += steps.select(&mut points)?;
         Ok(points)
     };
-    // A change of units changes the steps.
+    // A change of units changes the steps of the lattice.
     let lattice = source.lattice().filter(|_| !steps.changes_units());
     let source = match steps.args.voxel {
         None => {
@@ -226,7 +231,7 @@ fn progress(console: Console, what: &str, points: Option<u64>) -> Bar {
     }
 }
 
-/// Hands points to a function, as they come.
+/// A function that takes points piece by piece.
 type Take<'a> = &'a mut dyn FnMut(&Points) -> Result<(), CliError>;
 
 fn write(
@@ -256,12 +261,15 @@ fn tell(args: &ConvertArgs, report: &Report) -> Result<(), CliError> {
         let Report { read, written, dropped: Dropped { not_finite }, bytes, seconds } = *report;
         #[expect(clippy::cast_precision_loss, reason = "a rate to two digits")]
         let rate = read as f64 / seconds.max(1e-9) / 1e6;
-        let dropped =
-            if not_finite > 0 { format!(", {} not finite", grouped(not_finite)) } else { String::new() };
+        let dropped = if not_finite > 0 {
+            format!(", {} dropped as not finite", grouped(not_finite))
+        } else {
+            String::new()
+        };
         results.line(format_args!(
-            "{} of {} points written to {} ({} bytes{dropped}), {seconds:.2} s, {rate:.1} million points/s",
+            "{} of {} written to {} ({} bytes{dropped}), {seconds:.2} s, {rate:.1} million points/s",
             grouped(written),
-            grouped(read),
+            grouped_count(read, "point"),
             args.output.display(),
             grouped(bytes),
         ))?;
@@ -287,12 +295,15 @@ impl Source {
 }
 
 impl Steps<'_> {
-    /// Keeps what is asked for. Returns how many points were left out because they are not finite.
+    /// Removes the points that do not pass the filters. Returns the number of points that are not
+    /// finite.
     fn select(&self, points: &mut Points) -> Result<u64, CliError> {
         let Points { positions, classes, .. } = &*points;
         let wanted = self.args.class.as_ref().map(|ClassList(wanted)| wanted);
         if wanted.is_some() && classes.is_empty() && !positions.is_empty() {
-            let what = "its points have no classes, so that `--class` says nothing; leave it out".into();
+            let what =
+                "expected points with classes for --class, got points that have no classes; leave it out"
+                    .into();
             return Err(CliError::Unfit { path: self.args.input.clone(), what });
         }
         let finite = |p: &[f64; 3]| p.iter().all(|x| x.is_finite());

@@ -1,4 +1,4 @@
-//! `curve`: all curves in which two scans cut each other.
+//! `curve`: finds all curves in which two scans intersect.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::console::{Console, Results, now};
 use crate::curve_picture;
-use crate::digits::{count, rough, short};
+use crate::digits::{count, rough, short, work};
 use crate::error::CliError;
 use crate::eval::KernelName;
 use crate::export::refused;
@@ -26,7 +26,7 @@ use crate::{output, picture, posing};
 /// Options of `curve`.
 #[derive(Debug, Clone, Args)]
 pub struct CurveArgs {
-    /// What is asked about
+    /// The scans and their poses
     #[command(flatten)]
     pub pair: PairArgs,
     /// Distances that define the surfaces; by default those that the scans were prepared for
@@ -70,28 +70,28 @@ pub struct CurveArgs {
 
 fn parse_length(text: &str) -> Result<f64, String> {
     let length = text.parse().ok().filter(|l: &f64| *l > 0.0 && l.is_finite());
-    length.ok_or_else(|| "expected a length, more than zero, in world units".into())
+    length.ok_or_else(|| "expected a length of more than zero, in world units".into())
 }
 
-/// What `curve` finds.
+/// The JSON output of `curve`.
 #[derive(Debug, Serialize)]
 struct CurveReport {
-    /// Whether the scans meet: no curve does not mean that they do not.
+    /// The verdict on contact; scans without a curve may still touch.
     verdict: &'static str,
     points: usize,
     curves: usize,
     closed: usize,
     length: f64,
     max_residual: f64,
-    /// False where the budget ended the search, else not said.
+    /// `false` if the budget ended the search; absent otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     complete: Option<bool>,
     evaluations: u64,
     micros: f64,
-    /// The answer of `collide` about the surfaces; only where no curve was found.
+    /// The answer of `collide` for the surfaces; only if no curve was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     surfaces: Option<AnswerReport>,
-    /// The same of obstacles.
+    /// The answer of `collide` for the obstacles; only if no curve was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     obstacles: Option<AnswerReport>,
 }
@@ -104,7 +104,10 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
         output::check_apart(path, &inputs)?;
         picture::check_name(path)?;
         if *path == args.output {
-            return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
+            return Err(CliError::Usage(format!(
+                "{}: expected one output for each file, got two outputs; name another file",
+                path.display()
+            )));
         }
     }
     let matrices = args.pair.matrices()?;
@@ -147,7 +150,7 @@ pub(crate) fn run(args: &CurveArgs) -> Result<(), CliError> {
     tell(&found, missed.as_ref(), [&a, &b], micros, args.json)
 }
 
-/// The points in the world, each with the number of its curve, and the edges.
+/// Writes the points in the world frame, each with the number of its curve, and the edges.
 fn write(path: &Path, found: &Curves) -> Result<(), CliError> {
     let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let all = || (0..).zip(&found.curves);
@@ -202,16 +205,16 @@ fn tell(
         results.line(unfinished(views))?;
     }
     results.line(format_args!(
-        "{}, {}, {}, {:.1} µs",
-        count(report.points as u64, "point"),
-        count(node_pairs, "node pair"),
-        count(report.evaluations, "evaluation"),
-        micros
+        "{}",
+        work(
+            [(report.points as u64, "point"), (node_pairs, "node pair"), (report.evaluations, "evaluation")],
+            micros
+        )
     ))?;
     results.flush()
 }
 
-/// The curves, for people.
+/// Returns a description of the curves.
 fn sentence(found: &Curves) -> String {
     let touching = found.curves.iter().filter(|curve| curve.count == 1).count();
     let closed = found.closed();
@@ -236,9 +239,10 @@ fn sentence(found: &Curves) -> String {
         }
     };
     if open + closed > 0 {
-        text += &format!(", {} long together", short(found.length()));
+        let total = if open + closed > 1 { "total length" } else { "length" };
+        text += &format!(", {total} {}", short(found.length()));
     }
-    text += &format!(", within {} of both.", rough(found.max_residual));
+    text += &format!(", within {} of both surfaces.", rough(found.max_residual));
     let ends = |wanted: CurveEnd| {
         let ends = found.curves.iter().filter(|curve| curve.count > 1).filter_map(|curve| curve.ends);
         ends.flatten().filter(|&end| end == wanted).count()
@@ -247,7 +251,7 @@ fn sentence(found: &Curves) -> String {
         (CurveEnd::BorderOfA, "at the border of a"),
         (CurveEnd::BorderOfB, "at the border of b"),
         (CurveEnd::Tangent, "where they touch"),
-        (CurveEnd::Lost, "where points do not look like one sheet"),
+        (CurveEnd::Lost, "where the points do not look like a single surface"),
         (CurveEnd::Budget, "where the budget ran out"),
     ]
     .into_iter()
@@ -259,12 +263,12 @@ fn sentence(found: &Curves) -> String {
     text
 }
 
-/// Why curves may be missing.
+/// Returns the reason why curves may be missing.
 fn unfinished(views: [&Placed<'_>; 2]) -> &'static str {
     let is_finite = |view: &&Placed<'_>| view.placed().to_row_major().iter().all(|c| c.is_finite());
     if views.iter().all(is_finite) {
-        "The budget ran out first; curves may be missing. Try a greater --budget or --work."
+        "The budget ran out, so curves may be missing. Raise --budget or --work."
     } else {
-        "A pose is not finite."
+        "A pose is not finite; check --pose-a and --pose-b."
     }
 }

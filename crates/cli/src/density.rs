@@ -1,8 +1,10 @@
-//! `density`: how many points `--method interpolation --flat` has to draw for a wanted error rate.
+//! `density`: finds the number of random points that `--method interpolation --flat` needs for an
+//! error rate.
 //!
-//! Measured as in S1 §5.1: the scan against a copy of itself over the sweep of `poses`, once for each
-//! density; an error is a hit of the traversal that is not found, or the other way round. Derived from Lemma
-//! 1: that each surfel gets a point, by inclusion and exclusion.
+//! The number is measured as in Klein & Zachmann 2005, section 5.1: the scan is tested against a
+//! copy of itself over the sweep of `poses`, once for each density. An error is a contact that only
+//! one of traversal and interpolation finds. The number is also derived from Lemma 1 of that paper,
+//! the probability that each surfel gets a point, by inclusion and exclusion.
 
 use std::path::PathBuf;
 
@@ -60,19 +62,19 @@ pub struct DensityArgs {
 
 fn parse_rate(text: &str) -> Result<f64, String> {
     let rate = text.parse().ok().filter(|rate: &f64| *rate > 0.0 && *rate < 1.0);
-    rate.ok_or_else(|| "expected a share of all tests, more than 0 and less than 1".into())
+    rate.ok_or_else(|| "expected a share of the tests of more than 0 and less than 1".into())
 }
 
-/// Finer than this no surface is cut.
+/// The largest number of surfels that is tried.
 const FINEST: u32 = 8192;
 
 #[derive(Debug, Serialize)]
 struct Report {
-    /// Points to draw, measured.
+    /// The measured number of points.
     samples: u32,
-    /// And for the wanted rate, derived.
+    /// The number of points derived from Lemma 1, for `--surfels`.
     derived: u32,
-    /// Of what was measured.
+    /// The measured error rate with `samples` points.
     error: f64,
     surfels: u32,
     tests: usize,
@@ -82,13 +84,16 @@ struct Report {
 pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
     let console = Console::new(args.quiet);
     if args.store && !input::is_prepared(&args.a) {
-        let what = "--store keeps the density in a prepared scan; prepare it first";
-        return Err(CliError::Usage(what.into()));
+        let path = args.a.display();
+        let what = format!(
+            "{path}: expected a prepared scan for --store, got a raw input; run `preprocess --graph` first"
+        );
+        return Err(CliError::Usage(what));
     }
     let scan = Opening::new(true, console).open_with_graph(&args.a)?;
     let base = poses::normalised(&scan).ok_or_else(|| CliError::Unfit {
         path: args.a.clone(),
-        what: "all points lie in one place, so it cannot be scaled to a size of 2".into(),
+        what: "expected a scan with an extent, got points at one place only".into(),
     })?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
     let pool = pool.or(Err(CliError::Threads(args.threads)))?;
@@ -109,7 +114,9 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
     if args.store {
         if found.error > args.error {
             let what = format!(
-                "{} of all tests are wrong however many points are drawn; nothing is stored",
+                "expected at most {} wrong verdicts, got {} at the largest number of points, so nothing is stored; \
+                 raise --error",
+                rate(args.error),
                 rate(found.error)
             );
             return Err(CliError::Unfit { path: args.a.clone(), what });
@@ -122,7 +129,7 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
         return results.flush();
     }
     results.line(format_args!(
-        "measured   {}, of {}, for {} wrong of {}, {} of which touch",
+        "measured   {} on {}: {} of {} wrong, {} with contact",
         count(u64::from(report.samples), "point"),
         count(u64::from(surfels), "surfel"),
         rate(report.error),
@@ -131,10 +138,10 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
     ))?;
     if report.error > args.error {
         results
-            .line(format_args!("           more than {}: finer surfels are not tried", rate(args.error)))?;
+            .line(format_args!("           above {}, but more surfels are not tried", rate(args.error)))?;
     }
     results.line(format_args!(
-        "derived    {} for {} of which none is empty but in {}",
+        "derived    {} on {}: a surfel without a point in {} of the tests",
         count(u64::from(report.derived), "point"),
         count(u64::from(args.surfels), "surfel"),
         rate(args.error)
@@ -142,12 +149,12 @@ pub(crate) fn run(args: &DensityArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// A small share.
+/// Formats a small share.
 fn rate(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)
 }
 
-/// Points that are drawn for so many surfels.
+/// Returns the number of points that are drawn for a number of surfels.
 fn points(surfels: u32) -> u32 {
     search(surfels).points().unwrap_or(0)
 }
@@ -156,7 +163,7 @@ fn search(surfels: u32) -> Interpolation {
     Interpolation::default().with_flat(true).with_surfels(SurfelSize::Count(surfels))
 }
 
-/// Questions whose answers the traversal knows.
+/// Tests whose results are compared with those of the traversal.
 struct Tests<'a> {
     scan: &'a Scan,
     base: &'a Pose,
@@ -165,7 +172,8 @@ struct Tests<'a> {
 }
 
 impl Tests<'_> {
-    /// The fewest surfels, and with them points, that err no more than is wanted; and how many tests touch.
+    /// Returns the smallest number of surfels found with at most the error rate `--error`, and the
+    /// number of tests with contact.
     fn coarsest(&self, args: &DensityArgs) -> Result<(Density, usize), CliError> {
         let touching = self.verdicts(Method::Traversal)?;
         let error = |surfels: u32| {
@@ -183,8 +191,8 @@ impl Tests<'_> {
             coarse = fine.surfels;
             fine = error(2 * fine.surfels)?;
         }
-        // Errors do not fall evenly; what is found is one of the densities that suffice, and the last tried
-        // below does not.
+        // The error is not monotonic. The result is sufficient, and the next smaller number tried
+        // is not, but still smaller ones may be.
         while fine.error <= args.error && fine.surfels - coarse > 1 + fine.surfels / 16 {
             let middle = error(coarse + (fine.surfels - coarse) / 2)?;
             if middle.error <= args.error {

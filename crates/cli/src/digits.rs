@@ -1,24 +1,24 @@
-//! Numbers for people: as many digits as mean something.
+//! Numbers formatted for people, with significant digits only.
 
-/// Fewer digits after the point than this are written out.
+/// The largest number of decimals that are written out.
 const MOST_DECIMALS: i32 = 9;
 
-/// Magnitudes, but for zero, that are written out; what lies outside is easier to read with an exponent.
+/// Magnitudes that are written without an exponent, apart from zero.
 const PLAIN: std::ops::Range<f64> = 1e-6..1e15;
 
-/// More digits than this double precision does not hold.
+/// The number of significant decimal digits of double precision.
 const MOST_DIGITS: i32 = 15;
 
-/// A point, to the nearest `unit` or finer.
+/// Formats a point, rounded to `unit` or finer.
 pub(crate) fn place(p: [f64; 3], unit: f64) -> String {
     let [x, y, z] = p.map(|c| rounded(c, unit));
     format!("({x}, {y}, {z})")
 }
 
-/// A length to the nearest `unit` or finer.
+/// Formats a length, rounded to `unit` or finer.
 pub(crate) fn rounded(x: f64, unit: f64) -> String {
     let decimals = decimals(unit);
-    // What rounds to zero needs no exponent.
+    // Values that round to zero need no exponent.
     let is_plain = PLAIN.contains(&x.abs()) || x.abs() < PLAIN.start.min(0.5 * unit);
     if let Some(decimals) = decimals.filter(|_| is_plain || x == 0.0) {
         let text = format!("{x:.decimals$}");
@@ -33,7 +33,7 @@ pub(crate) fn rounded(x: f64, unit: f64) -> String {
     format!("{x:.digits$e}")
 }
 
-/// A positive length, never rounded up: a lower bound stays one.
+/// Formats a positive length, never rounding up, so that a lower bound stays one.
 pub(crate) fn rounded_down(x: f64, unit: f64) -> String {
     match decimals(unit) {
         Some(decimals) if x >= unit && PLAIN.contains(&x) => {
@@ -44,24 +44,25 @@ pub(crate) fn rounded_down(x: f64, unit: f64) -> String {
     }
 }
 
-/// Decimals that show `unit`; none if it is beyond what is pleasant to read.
+/// Returns the number of decimals that show `unit`, or `None` if there are more than
+/// [`MOST_DECIMALS`].
 fn decimals(unit: f64) -> Option<usize> {
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
     let decimals = (-unit.log10()).ceil() as i32;
     if decimals > MOST_DECIMALS { None } else { usize::try_from(decimals.max(0)).ok() }
 }
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 pub(crate) fn short(x: f64) -> String {
     significant(x, 3)
 }
 
-/// Two significant digits.
+/// Formats a number with two significant digits.
 pub(crate) fn rough(x: f64) -> String {
     significant(x, 2)
 }
 
-/// Two significant digits, rounded up: a length that is to be enough.
+/// Formats a length that has to be sufficient, rounded up to two significant digits.
 pub(crate) fn short_up(x: f64) -> String {
     significant(x * 1.05, 2)
 }
@@ -82,13 +83,13 @@ fn significant(x: f64, digits: i32) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// The power of ten of the first digit; that of zero is far below all.
+/// Returns the power of ten of the first digit; for zero, the least integer.
 #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
 fn magnitude(x: f64) -> i32 {
     x.abs().log10().floor() as i32
 }
 
-/// A size of a file.
+/// Formats the size of a file.
 #[expect(clippy::cast_precision_loss, reason = "for people")]
 pub(crate) fn bytes(n: u64) -> String {
     match n {
@@ -98,12 +99,34 @@ pub(crate) fn bytes(n: u64) -> String {
     }
 }
 
-/// A number and what it counts, `thing` being one of them.
+/// Formats a number with the thing that it counts, `thing` being the singular.
 pub(crate) fn count(n: u64, thing: &str) -> String {
-    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+    match thing.strip_suffix("leaf") {
+        Some(start) if n != 1 => format!("{n} {start}leaves"),
+        _ => format!("{n} {thing}{}", if n == 1 { "" } else { "s" }),
+    }
 }
 
-/// A whole number with its digits in groups of three.
+/// As [`count`], with the digits of the number in groups of three.
+pub(crate) fn grouped_count(n: u64, thing: &str) -> String {
+    format!("{} {thing}{}", grouped(n), if n == 1 { "" } else { "s" })
+}
+
+/// Formats several numbers with the things that they count, leaving out zeros; empty if all are
+/// zero.
+pub(crate) fn counts<'a>(things: impl IntoIterator<Item = (u64, &'a str)>) -> String {
+    let things = things.into_iter().filter(|(n, _)| *n > 0);
+    things.map(|(n, thing)| count(n, thing)).collect::<Vec<_>>().join(", ")
+}
+
+/// Formats the work of a search and its time.
+pub(crate) fn work<'a>(things: impl IntoIterator<Item = (u64, &'a str)>, micros: f64) -> String {
+    let counts = counts(things);
+    let divider = if counts.is_empty() { "" } else { ", " };
+    format!("{counts}{divider}{micros:.1} µs")
+}
+
+/// Formats a whole number with its digits in groups of three.
 pub(crate) fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut text = String::with_capacity(digits.len() + digits.len() / 3);
@@ -116,7 +139,7 @@ pub(crate) fn grouped(n: u64) -> String {
     text
 }
 
-/// A share in whole percent.
+/// Formats a share in whole percent.
 pub(crate) fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
@@ -143,6 +166,13 @@ mod tests {
     fn large_numbers_are_grouped() {
         let shown = [0, 999, 1000, 12_345, 100_000, 1_234_567].map(grouped);
         assert_eq!(shown, ["0", "999", "1,000", "12,345", "100,000", "1,234,567"]);
+    }
+
+    #[test]
+    fn counts_have_plurals_and_no_zeros() {
+        assert_eq!(counts([(1, "leaf"), (0, "edge"), (2, "leaf"), (3, "edge")]), "1 leaf, 2 leaves, 3 edges");
+        assert_eq!(work([(0, "node pair")], 1.25), "1.2 µs");
+        assert_eq!(work([(1, "node pair"), (0, "leaf pair")], 0.5), "1 node pair, 0.5 µs");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! `distance`: finds how far apart two scans are.
+//! `distance`: finds the distance between two scans.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -10,7 +10,7 @@ use nearmiss::{
 use serde::Serialize;
 
 use crate::console::{Console, Results, now};
-use crate::digits::{count, rough};
+use crate::digits::{rough, work};
 use crate::distance_picture::paint_distance;
 use crate::error::CliError;
 use crate::eval::KernelName;
@@ -29,10 +29,10 @@ use crate::{output, picture};
 /// Options of `distance`.
 #[derive(Debug, Clone, Args)]
 pub struct DistanceArgs {
-    /// What is asked about
+    /// The scans and their poses
     #[command(flatten)]
     pub pair: PairArgs,
-    /// Many poses
+    /// The options for many poses
     #[command(flatten)]
     pub path: PathArgs,
     /// Distances that define the surfaces; by default those that the scans were prepared for
@@ -84,7 +84,7 @@ struct DistanceReport {
     lower: f64,
     upper: f64,
     points: [[f64; 3]; 2],
-    /// The accuracy of the scans where they are nearest, in world units.
+    /// The local spacing of the scans where they are nearest, in world units.
     band: f64,
     /// The evidence of the upper bound.
     evidence: &'static str,
@@ -99,7 +99,7 @@ struct DistanceReport {
     micros: f64,
 }
 
-/// What all queries have in common.
+/// The scans and settings that all queries share.
 struct Question<'a> {
     scans: [&'a Scan; 2],
     plan: DistancePlan,
@@ -165,7 +165,7 @@ impl Question<'_> {
         Ok(())
     }
 
-    /// Answers for one pair of poses. Returns the distance and the time it took.
+    /// Answers the query for one pair of poses. Returns the distance and the time in microseconds.
     fn answer(
         &self,
         line: Option<u64>,
@@ -202,12 +202,17 @@ impl Question<'_> {
         }
         results.line(sentence)?;
         results.line(format_args!(
-            "between point {} of a and point {} of b, counted from 0; {}, {}, {}, {micros:.1} µs",
+            "between point {} of a and point {} of b (counted from 0); {}",
             found.sources[0].0,
             found.sources[1].0,
-            count(found.statistics.node_pairs, "node pair"),
-            count(found.statistics.leaf_pairs, "leaf pair"),
-            count(found.statistics.evaluations, "evaluation"),
+            work(
+                [
+                    (found.statistics.node_pairs, "node pair"),
+                    (found.statistics.leaf_pairs, "leaf pair"),
+                    (found.statistics.evaluations, "evaluation"),
+                ],
+                micros
+            )
         ))?;
         Ok((found, micros))
     }
@@ -232,7 +237,8 @@ fn report(found: &Distance, micros: f64) -> DistanceReport {
 
 /// Returns the distance as a sentence.
 fn sentence(found: &Distance, views: [&Placed<'_>; 2], semantics: Semantics) -> String {
-    let unfinished = if found.complete { "" } else { " The budget ran out first." };
+    let unfinished =
+        if found.complete { "" } else { " The budget ran out; raise --budget or --work for tighter bounds." };
     if found.upper <= 0.0 {
         let untold = match semantics {
             Semantics::Thickened(_) => String::new(),
@@ -244,22 +250,22 @@ fn sentence(found: &Distance, views: [&Placed<'_>; 2], semantics: Semantics) -> 
     match semantics {
         Semantics::Thickened(_) => format!("They are {bracket}.{unfinished}"),
         _ => format!(
-            "They are {bracket} ({}), within the local spacing of {}.{unfinished}",
+            "They are {bracket} ({}), accurate to the local spacing of {}.{unfinished}",
             word(found.evidence),
             rough(found.band)
         ),
     }
 }
 
-/// Finds the distance of two scans within a budget, to be stated beside a separation.
+/// Returns the distance of two scans, found within a budget, to state it with a separation.
 pub(crate) fn beside(views: [&Placed<'_>; 2], semantics: Semantics, budget: &Budget) -> Option<Distance> {
     let options = DistanceOptions::default().with_semantics(semantics);
     let plan = DistancePlan::new(&options, views[0].scan(), views[1].scan()).ok()?;
     Some(Pair::new(*views[0], *views[1]).within(budget).distance(&plan, &mut Scratch::default()))
 }
 
-/// Reads a relative precision.
+/// Parses a relative precision.
 fn parse_relative(text: &str) -> Result<f64, String> {
     let relative = text.parse().ok().filter(|relative| (0.0..1.0).contains(relative));
-    relative.ok_or_else(|| "expected a number from 0 to less than 1".into())
+    relative.ok_or_else(|| "expected a number of at least 0 and less than 1".into())
 }

@@ -1,4 +1,4 @@
-//! Why a command fails: which file, what is wrong, where, and what would mend it.
+//! Errors of commands: the file, the place in it, the fault and a remedy.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,11 +11,11 @@ use thiserror::Error;
 
 use crate::matrix::PoseRefused;
 
-/// Why a command failed.
+/// An error of a command.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CliError {
-    /// The command line asks for something that makes no sense; exit status 2.
+    /// Wrong usage of the command line; exit status 2.
     #[error("{0}")]
     Usage(String),
     /// A point cloud or mesh could not be read.
@@ -26,15 +26,15 @@ pub enum CliError {
     Load {
         /// The file.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         cause: LoadError,
     },
-    /// A prepared scan contradicts itself.
+    /// A prepared scan is inconsistent.
     #[error("{}: {what}; prepare it again with `preprocess`", path.display())]
     Insane {
         /// The file.
         path: PathBuf,
-        /// How.
+        /// The inconsistency.
         what: String,
     },
     /// A scan could not be prepared.
@@ -42,7 +42,7 @@ pub enum CliError {
     Build {
         /// The input.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         cause: BuildError,
     },
     /// A graph could not be built.
@@ -50,13 +50,13 @@ pub enum CliError {
     Graph {
         /// The input.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         cause: GraphError,
     },
     /// A prepared scan could not be saved.
     #[error(transparent)]
     Save(#[from] SaveError),
-    /// The folder that the work is done in fails.
+    /// Work on disk failed.
     #[error(transparent)]
     Work(#[from] WorkError),
     /// A mesh could not be sampled.
@@ -64,47 +64,45 @@ pub enum CliError {
     Sample {
         /// The mesh.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         cause: SampleError,
     },
-    /// No slice map can be made of these points with these options.
+    /// A slice map could not be built from these points with these options.
     #[error("{}: {cause}", path.display())]
     Slices {
         /// The input.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         cause: SliceError,
     },
     /// A slice map could not be saved or loaded.
     #[error(transparent)]
     SliceStore(#[from] StoreError),
-    /// A question that cannot be asked; exit status 2.
+    /// Options that do not fit together or do not fit the scans; exit status 2.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// A matrix that is no pose.
-    #[error(
-        "{place}: {refused}; give a rotation, one scale and a translation, or re-export it with more digits"
-    )]
+    /// A matrix is not a pose.
+    #[error("{place}: {refused}")]
     Pose {
-        /// The option that gave it.
+        /// The option that gave the matrix.
         place: String,
-        /// Why not.
+        /// The reason.
         refused: PoseRefused,
     },
-    /// A line of a text file is not what it should be.
+    /// A line of a text file is invalid.
     #[error("{}: line {line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// Counted from 1.
+        /// The number of the line, counted from 1.
         line: u64,
-        /// What is wrong there, and what belongs there.
+        /// The fault and a remedy.
         what: String,
     },
-    /// There is no such file.
+    /// A file does not exist.
     #[error("{}: no such file; check the path", path.display())]
     Missing {
-        /// Where it was looked for.
+        /// The missing file.
         path: PathBuf,
     },
     /// A file could not be read or written.
@@ -112,31 +110,31 @@ pub enum CliError {
     File {
         /// The file.
         path: PathBuf,
-        /// What was being done.
+        /// The operation that failed.
         verb: &'static str,
-        /// What the operating system said.
+        /// The error of the operating system.
         cause: io::Error,
-        /// What would mend it.
+        /// A remedy.
         remedy: &'static str,
     },
-    /// A file of the right form that does not serve.
+    /// A file that was read, or a path, that is unsuitable.
     #[error("{}: {what}", path.display())]
     Unfit {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and what would mend it.
+        /// The fault and a remedy.
         what: String,
     },
     /// Threads could not be started.
-    #[error("cannot start {0} threads; ask for fewer with --threads")]
+    #[error("cannot start {0} threads; use fewer with --threads")]
     Threads(usize),
-    /// Standard output is gone.
+    /// Standard output could not be written.
     #[error("cannot write to standard output: {}", plain(.0))]
     Stdout(io::Error),
 }
 
 impl CliError {
-    /// A file that cannot be read.
+    /// Returns a function that wraps an error of reading `path`.
     pub(crate) fn reading(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |cause| match cause.kind() {
@@ -145,7 +143,7 @@ impl CliError {
         }
     }
 
-    /// A file that cannot be written.
+    /// Returns a function that wraps an error of writing `path`.
     pub(crate) fn writing(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         |cause| Self::File {
@@ -156,13 +154,13 @@ impl CliError {
         }
     }
 
-    /// A prepared scan that cannot be opened.
+    /// Returns a function that wraps an error of opening the prepared scan at `path`.
     pub(crate) fn loading(path: &Path) -> impl FnOnce(LoadError) -> Self {
         let path = path.to_owned();
         |cause| Self::Load { path, cause }
     }
 
-    /// The status that the process ends with.
+    /// Returns the exit status of the process.
     #[must_use]
     pub fn status(&self) -> u8 {
         match self {
@@ -172,14 +170,16 @@ impl CliError {
         }
     }
 
-    /// Whether there is anything to tell: whoever closes our output has read enough.
+    /// Returns `true` if no message is printed, which is the case after the reader of a pipe has
+    /// closed it.
     #[must_use]
     pub fn is_silent(&self) -> bool {
         self.status() == 0
     }
 }
 
-/// Returns what the operating system said, in lower case and without its number.
+/// Returns the message of the operating system, starting in lower case and without its error
+/// number.
 pub(crate) fn plain(cause: &io::Error) -> String {
     let text = cause.to_string();
     let text = text.split(" (os error ").next().unwrap_or_default();
@@ -187,7 +187,7 @@ pub(crate) fn plain(cause: &io::Error) -> String {
     letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
 }
 
-/// What the container says names the file already.
+/// Returns the path as a prefix of a message, unless `cause` names the file itself.
 fn prefix(cause: &LoadError, path: &Path) -> String {
     match cause {
         LoadError::Open(_) => String::new(),

@@ -1,4 +1,4 @@
-//! Memory and time that a command will need, estimated before it starts.
+//! Estimates of the memory and time that a command will need, made before it starts.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,14 +10,15 @@ use crate::digits::{grouped, short_up};
 use crate::error::CliError;
 use crate::memory::Limit;
 
-/// A run that is expected to take longer than this many seconds is announced.
+/// Runs expected to take longer than this many seconds are announced.
 const LONG: f64 = 10.0;
 
-/// Memory of the process itself, whatever it does, in bytes.
+/// Memory of the process itself, in bytes, whatever it does.
 const BASE: f64 = 2e7;
 
-/// Bytes a point while a file is read, beside the file itself: its row in double precision, the rounded point
-/// and what finds duplicates. Counted from the arrays of `io` and `PointCloud::cleaned`.
+/// Bytes per point while a file is read, in addition to the file itself: the coordinates in double
+/// precision, the rounded point, and the table that finds duplicates. Counted from the arrays of
+/// `io` and `PointCloud::cleaned`.
 const READING: f64 = 72.0;
 
 /// The cost of a step per point.
@@ -29,22 +30,23 @@ struct Cost {
     micros: f64,
 }
 
-/// The products of `preprocess`, the cheapest first.
+/// The products of `preprocess`, in ascending order of cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Preparation {
     /// The hierarchy alone.
     Hierarchy,
     /// A graph without the map of close pairs.
     Graph,
-    /// A graph with it.
+    /// A graph with the map of close pairs.
     ClosePairs,
-    /// All of it, for the geodesic kernel.
+    /// A graph with the map of close pairs, for the geodesic kernel.
     Geodesic,
 }
 
 impl Preparation {
-    /// Measured, bytes a point: peak resident memory less [`BASE`], by getrusage, of release builds on x86-64
-    /// with AVX2. And microseconds a point, user and system time.
+    /// Returns the measured cost per point: bytes of peak resident memory less [`BASE`], and
+    /// microseconds of user and system time. Measured with getrusage, with release builds on x86-64
+    /// with AVX2.
     ///
     /// | points | hierarchy | graph | with close pairs |
     /// | --: | --: | --: | --: |
@@ -67,19 +69,20 @@ impl Preparation {
         BASE + self.cost().bytes * points
     }
 
-    /// Cheaper products, and what asks for them.
+    /// Returns cheaper products, each with the remedy that leads to it.
     fn lighter(self) -> &'static [(Self, &'static str)] {
         match self {
-            Self::ClosePairs => {
-                &[(Self::Graph, "to do without --close-pairs"), (Self::Hierarchy, "to do without a graph")]
-            }
-            Self::Graph => &[(Self::Hierarchy, "to do without a graph")],
+            Self::ClosePairs => &[(Self::Graph, "leave out --close-pairs"), (Self::Hierarchy, NO_GRAPH)],
+            Self::Graph => &[(Self::Hierarchy, NO_GRAPH)],
             Self::Hierarchy | Self::Geodesic => &[],
         }
     }
 }
 
-/// Checks whether points can be prepared, and announces long runs once.
+/// The remedy that leads to the cheapest product.
+const NO_GRAPH: &str = "leave out the graph";
+
+/// Refuses points that cannot be prepared in memory, and announces long runs.
 #[derive(Debug)]
 pub(crate) struct Forecast<'a> {
     pub(crate) path: &'a Path,
@@ -87,20 +90,22 @@ pub(crate) struct Forecast<'a> {
     pub(crate) threads: usize,
     pub(crate) console: Console,
     pub(crate) preparation: Preparation,
-    /// Whether all that is asked for beside the preparation can be done on disk, in less memory.
+    /// `true` if all filters can be applied on disk, in less memory.
     pub(crate) filters_on_disk: bool,
 }
 
-/// Bytes of memory that it takes to read a file of `points` points and `bytes` bytes, itself included.
+/// Returns the bytes of memory needed to read a file of `points` points and `bytes` bytes, the file
+/// included.
 pub(crate) fn reading(points: u64, bytes: u64) -> f64 {
     BASE + to_float(bytes) + READING * to_float(points)
 }
 
-/// Less memory than this is not enough to work on disk with.
+/// The least memory, in bytes, with which work on disk is possible.
 const LEAST_MEMORY: f64 = 1e8;
 
 impl Forecast<'_> {
-    /// The memory that was asked for, if so many points do not fit into it but can be prepared on disk.
+    /// Returns the limit of `--memory` if `points` points do not fit into it but can be prepared on
+    /// disk.
     pub(crate) fn on_disk(&self, points: u64) -> Option<u64> {
         let Limit::Asked(most) = self.limit else { return None };
         let fits = self.preparation.bytes(to_float(points)) <= to_float(most);
@@ -108,15 +113,15 @@ impl Forecast<'_> {
         (can && !fits && to_float(most) >= LEAST_MEMORY).then_some(most)
     }
 
-    /// Refuses a file of `points` points and `bytes` bytes that cannot even be read.
+    /// Fails if a file of `points` points and `bytes` bytes cannot be read in memory.
     pub(crate) fn check_reading(&self, points: u64, bytes: u64) -> Result<(), CliError> {
         let need = reading(points, bytes);
         let what = format!("reading {} points needs", grouped(points));
-        self.refuse(&what, need, &["a part of the file".to_owned()])
+        self.refuse(&what, need, &["use a part of the file".to_owned()])
     }
 
-    /// Refuses points that do not fit into memory once they are prepared. `bounds` are those of the points,
-    /// if known.
+    /// Fails if `points` points cannot be prepared in memory. `bounds` is the bounding box of the
+    /// points, if known.
     pub(crate) fn check_preparing(&self, points: u64, bounds: Option<&Aabb>) -> Result<(), CliError> {
         let count = to_float(points);
         let need = self.preparation.bytes(count);
@@ -124,18 +129,18 @@ impl Forecast<'_> {
         if let Some(most) = self.limit.bytes() {
             let fitting = (0.8 * (most - BASE) / self.preparation.cost().bytes).max(8.0);
             remedies.push(match bounds.and_then(|bounds| voxel_for(bounds, fitting)) {
-                Some(size) => format!("--voxel {}", short_up(size)),
-                None => "--voxel with a length".to_owned(),
+                Some(size) => format!("use --voxel {}", short_up(size)),
+                None => "use --voxel".to_owned(),
             });
             let lighter = self.preparation.lighter().iter().find(|(lighter, _)| lighter.bytes(count) <= most);
             let on_disk = self.filters_on_disk && self.preparation != Preparation::Hierarchy;
-            let on_disk = (on_disk && most >= LEAST_MEMORY).then_some("to do without a graph");
+            let on_disk = (on_disk && most >= LEAST_MEMORY).then_some(NO_GRAPH);
             remedies.extend(lighter.map(|(_, option)| *option).or(on_disk).map(str::to_owned));
         }
         self.refuse(&format!("{} points need", grouped(points)), need, &remedies)
     }
 
-    /// Says how long it will take to prepare so many points, if that is long.
+    /// Announces the time and memory that it takes to prepare `points` points, if the time is long.
     pub(crate) fn announce(&self, points: u64) {
         let seconds = seconds(self.preparation.cost().micros * to_float(points), self.threads);
         if seconds > LONG {
@@ -152,17 +157,17 @@ impl Forecast<'_> {
         let on_disk = self.filters_on_disk && self.preparation == Preparation::Hierarchy;
         let within = self.limit.bytes().map_or(1e9, |most| (0.5 * most).clamp(LEAST_MEMORY, 1e9));
         let on_disk = (on_disk && need > within)
-            .then(|| format!("--memory {:.0}MB to work on disk", (within / 1e6).floor()));
+            .then(|| format!("set --memory {:.0}MB to work on disk", (within / 1e6).floor()));
         let remedies: Vec<String> = on_disk.into_iter().chain(remedies.iter().cloned()).collect();
         refuse(self.path, self.limit, what, need, &remedies)
     }
 }
 
-/// Measured, bytes a sample: 24.2 at 3,453,074 and at 11,932,842 samples of an atrium. The file is written as
-/// it goes.
+/// The cost of a sample. Measured: 24.2 bytes at 3,453,074 and at 11,932,842 samples of an atrium.
+/// The file is written while samples are made.
 const SAMPLE: Cost = Cost { bytes: 24.5, micros: 0.12 };
 
-/// Refuses to sample `mesh` where the samples would not fit into memory, and announces long runs.
+/// Fails if the samples of `mesh` would not fit into memory, and announces long runs.
 pub(crate) fn check_sampling(
     path: &Path,
     limit: Limit,
@@ -171,7 +176,7 @@ pub(crate) fn check_sampling(
     (spacing, is_jittered): (f64, bool),
 ) -> Result<(), CliError> {
     let points = samples(mesh, spacing, is_jittered);
-    // Numbers beyond those of points are refused by name.
+    // `sample` itself refuses more samples than a point cloud can hold.
     let is_sensible = spacing > 0.0 && points < f64::from(u32::MAX);
     if !is_sensible {
         return Ok(());
@@ -181,7 +186,7 @@ pub(crate) fn check_sampling(
     let need = BASE + SAMPLE.bytes * points;
     let wider = limit.bytes().map(|most| {
         let factor = (need / (most - BASE).max(0.01 * most)).sqrt();
-        format!("--spacing {}", short_up(1.1 * factor * spacing))
+        format!("use --spacing {}", short_up(1.1 * factor * spacing))
     });
     refuse(path, limit, &format!("about {shown} samples need"), need, &Vec::from_iter(wider))?;
     let seconds = 1e-6 * SAMPLE.micros * points;
@@ -192,8 +197,9 @@ pub(crate) fn check_sampling(
     Ok(())
 }
 
-/// About how many samples `nearmiss::mesh::sample` makes at a spacing: those of the triangles' areas, and
-/// what rounding up of rows and places adds.
+/// Estimates the number of samples that `nearmiss::mesh::sample` makes at a spacing: proportional
+/// to the areas of the triangles, plus an allowance for the rounding up of rows and of places in a
+/// row.
 fn samples(mesh: &TriangleMesh, spacing: f64, is_jittered: bool) -> f64 {
     // The steps between rows, and between the places in a row, as in `sample`.
     let step = 2.0 / 5.0_f64.sqrt() * spacing * if is_jittered { 0.8 } else { 1.0 };
@@ -209,12 +215,12 @@ fn samples(mesh: &TriangleMesh, spacing: f64, is_jittered: bool) -> f64 {
     mesh.triangles().iter().enumerate().map(of_triangle).sum()
 }
 
-/// An edge length of voxels of which about `points` are occupied, if the points lie on surfaces whose area is
-/// that of their bounding box.
+/// Returns an edge length at which about `points` voxels are occupied, assuming that the points lie
+/// on surfaces with the area of their bounding box.
 fn voxel_for(bounds: &Aabb, points: f64) -> Option<f64> {
     let [x, y, z] = bounds.half_extents().map(|h| 2.0 * h);
     let area = 2.0 * (x * y + y * z + z * x);
-    // A surface at an angle passes about one and a half times as many cells as one along the axes.
+    // A tilted surface crosses about one and a half times as many cells as one along the axes.
     let size = (1.5 * area / points).sqrt();
     (size > 0.0 && size.is_finite()).then_some(size)
 }
@@ -222,12 +228,12 @@ fn voxel_for(bounds: &Aabb, points: f64) -> Option<f64> {
 fn refuse(path: &Path, limit: Limit, what: &str, need: f64, remedies: &[String]) -> Result<(), CliError> {
     let Some(most) = limit.bytes().filter(|most| need > *most) else { return Ok(()) };
     let of = if matches!(limit, Limit::Asked(_)) { "allowed by --memory" } else { "available" };
-    let mut said = format!("{what} about {}, {} are {of}; try ", size(need), size(most));
+    let mut said = format!("{what} about {}, but {} are {of}; ", size(need), size(most));
     for remedy in remedies {
         let _ = write!(said, "{remedy}, ");
     }
     let or = if remedies.is_empty() { "" } else { "or " };
-    let _ = write!(said, "{or}--memory {} to run anyway", enough(need));
+    let _ = write!(said, "{or}set --memory {} to run anyway", enough(need));
     Err(CliError::Unfit { path: path.to_owned(), what: said })
 }
 
@@ -240,8 +246,8 @@ impl Limit {
     }
 }
 
-/// Work of so many microseconds on some threads, 0 for all. Measured runs keep a second thread busy for five
-/// sixths of the time.
+/// Returns the duration, in seconds, of `micros` microseconds of work on some threads; 0 for all
+/// cores. Measured runs keep a second thread busy for five sixths of the time.
 #[expect(clippy::cast_precision_loss, reason = "a few")]
 fn seconds(micros: f64, threads: usize) -> f64 {
     let all = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
@@ -254,13 +260,13 @@ fn to_float(n: u64) -> f64 {
     n as f64
 }
 
-/// Two significant digits.
+/// Rounds to two significant digits.
 fn rounded(x: f64) -> f64 {
     let unit = 10.0_f64.powf((x.max(1.0).log10().floor() - 1.0).max(0.0));
     (x / unit).round() * unit
 }
 
-/// A size of memory, to two digits.
+/// Formats a size of memory, with two digits.
 fn size(bytes: f64) -> String {
     let (number, unit) = match bytes {
         ..1e6 => (bytes / 1e3, "kB"),
@@ -270,7 +276,7 @@ fn size(bytes: f64) -> String {
     if number < 10.0 { format!("{number:.1} {unit}") } else { format!("{:.0} {unit}", rounded(number)) }
 }
 
-/// A size that is enough, as `--memory` takes it.
+/// Formats a size that is sufficient, in the form that `--memory` takes.
 fn enough(bytes: f64) -> String {
     let (number, unit) = if bytes < 1e9 { (bytes / 1e6, "MB") } else { (bytes / 1e9, "GB") };
     format!("{}{unit}", (1.05 * number).ceil())
@@ -305,9 +311,9 @@ mod tests {
         let refused =
             forecast(limit, Preparation::ClosePairs, &path).check_preparing(30_000_000, Some(&bounds));
         let message = refused.unwrap_err().to_string();
-        let expected = "big.ply: 30,000,000 points need about 44 GB, 8.0 GB are available; try --voxel ";
+        let expected = "big.ply: 30,000,000 points need about 44 GB, but 8.0 GB are available; use --voxel ";
         assert!(message.starts_with(expected), "{message}");
-        assert!(message.ends_with(", to do without a graph, or --memory 46GB to run anyway"), "{message}");
+        assert!(message.ends_with(", leave out the graph, or set --memory 46GB to run anyway"), "{message}");
         let size: f64 = message[expected.len()..].split(',').next().unwrap().parse().unwrap();
         assert!((0.01..0.1).contains(&size), "{message}");
 
@@ -315,7 +321,7 @@ mod tests {
         let message = refused.check_preparing(30_000_000, None).unwrap_err().to_string();
         assert!(
             message.contains(
-                "20 GB are allowed by --memory; try --voxel with a length, to do without --close-pairs, or"
+                "but 20 GB are allowed by --memory; use --voxel, leave out --close-pairs, or set --memory "
             ),
             "{message}"
         );

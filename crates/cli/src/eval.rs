@@ -1,4 +1,4 @@
-//! `eval`: the implicit function at given points.
+//! `eval`: evaluates the implicit function at given points.
 
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub struct EvalArgs {
     pub verify: bool,
 }
 
-/// A metric, by name.
+/// The names of the metrics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum KernelName {
     /// Straight distances
@@ -43,7 +43,7 @@ pub enum KernelName {
 }
 
 impl KernelName {
-    /// What it names.
+    /// Returns the metric of this name.
     pub(crate) const fn metric(self) -> Metric {
         match self {
             Self::Euclidean => Metric::Euclidean,
@@ -64,15 +64,16 @@ struct Report {
 pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     input::check_there(&args.points)?;
     if input::is_prepared(&args.points) {
-        let what = "this is, or is named like, a prepared scan, not text with a point x y z a line; are the two \
-                    files swapped?";
+        let what = "expected text with a line x y z for each point, got a prepared scan (by its content or name); \
+                    check that the two files are not swapped";
         return Err(CliError::Unfit { path: args.points.clone(), what: what.into() });
     }
     let mut lines = TextLines::open(&args.points)?;
-    // Before the scan is opened, which files that are swapped would make fail in another way.
+    // The points are read before the scan is opened, for a clear error if the two files are
+    // swapped.
     let mut next = next_point(&mut lines)?;
     if next.is_none() {
-        return Err(lines.unfit("holds no points; a line is x y z"));
+        return Err(lines.unfit("expected points, got none; a line is x y z"));
     }
     let opening = Opening::new(args.verify, Console::new(false));
     let scan = match args.kernel {
@@ -81,7 +82,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     };
     let unit = scan.sampling_radius() / 100.0;
     let kernel = kernel(&scan, args)?;
-    // Without its graph a scan has straight distances alone.
+    // Without a graph, distances are straight.
     let placed = Placed::new(&scan, &Pose::IDENTITY);
     let (mut scratch, mut geodesic) = (Scratch::default(), KernelScratch::default());
     let mut results = Results::new();
@@ -107,14 +108,15 @@ pub(crate) fn run(args: &EvalArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// The geodesic kernel, if that is asked for.
+/// Returns the geodesic kernel, or `None` for the euclidean one. Fails if the scan lacks the map of
+/// close pairs.
 fn kernel<'a>(scan: &'a Scan, args: &EvalArgs) -> Result<Option<GeodesicKernel<'a>>, CliError> {
     match args.kernel.map_or(scan.metric(), KernelName::metric) {
         Metric::Euclidean => Ok(None),
         Metric::Geodesic => {
             let missing = || {
-                let what = "this scan was prepared without a map of close pairs, along which the geodesic \
-                            kernel measures; prepare it again with `--close-pairs`";
+                let what = "expected a scan with close pairs for the geodesic kernel, got one without; prepare it \
+                            again with `--close-pairs`";
                 CliError::Unfit { path: args.file.clone(), what: what.into() }
             };
             scan.geodesic_kernel().ok_or_else(missing).map(Some)
@@ -133,35 +135,40 @@ fn sentence(at: &Evaluation, unit: f64) -> String {
                 place(at.centroid, unit)
             )
         }
-        Status::Outside => format!("outside: {support} points reach here, too few or from too far away"),
-        Status::Border => format!("border: off the surface, or beyond its border; support {support}"),
-        _ => format!("ambiguous: the points here do not look like one sheet; support {support}"),
+        Status::Outside => format!("outside: too few points nearby, or too far away, support {support}"),
+        Status::Border => format!("border: too far off the surface, or beyond its border, support {support}"),
+        _ => format!("ambiguous: the points nearby do not look like a single surface, support {support}"),
     }
 }
 
-/// How the first line of a point cloud begins that is no text with a point a line.
+/// Starts of the first line of point clouds that are not plain rows of coordinates.
 const STARTS_OF_SCANS: [&str; 2] = ["ply", "VERSION"];
 
-/// The point on the next line that holds one; comments start with `#` or `//`.
+/// Returns the next point. Blank lines are skipped, and comments, which start with `#` or `//`.
 fn next_point(lines: &mut TextLines) -> Result<Option<[f64; 3]>, CliError> {
     while let Some((_, text)) = lines.next_filled()? {
         if text.starts_with('#') || text.starts_with("//") {
             continue;
         }
         if STARTS_OF_SCANS.iter().any(|start| text.starts_with(start)) {
-            let what = "this is a scan, not text with a point x y z a line; are the two files swapped?";
+            let what = "expected text with a line x y z for each point, got a scan; check that the two files are not \
+                        swapped";
             return Err(lines.unfit(what));
         }
         let mut columns = pieces(&text);
         let mut point = [0.0; 3];
         for (name, slot) in ["x", "y", "z"].into_iter().zip(&mut point) {
             let Some(piece) = columns.next() else {
-                return Err(lines.fault(format!("the line ends before column `{name}`; a line is x y z")));
+                return Err(
+                    lines.fault(format!("expected a number in column `{name}`, got none; a line is x y z"))
+                );
             };
             let number = piece.parse::<f64>().ok().filter(|c| c.is_finite());
             *slot = number.ok_or_else(|| {
                 let shown: String = piece.chars().take(40).flat_map(char::escape_debug).collect();
-                lines.fault(format!("`{shown}` in column `{name}` is not a finite number; a line is x y z"))
+                lines.fault(format!(
+                    "expected a finite number in column `{name}`, got `{shown}`; a line is x y z"
+                ))
             })?;
         }
         return Ok(Some(point));

@@ -1,4 +1,4 @@
-//! `export`: look inside a prepared scan.
+//! `export`: writes the contents of a prepared scan to common file formats.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::kinds_picture::{self, colour};
 use crate::viewpoint::ViewArgs;
 use crate::{digits, output, picture, report};
 
-/// Options of `export`. At least one output is asked for.
+/// Options of `export`. At least one output is required.
 #[derive(Debug, Clone, Args)]
 #[command(group = clap::ArgGroup::new("outputs").required(true).multiple(true).args(["points", "samples", "boxes", "radii", "edges", "close_pairs", "image"]))]
 #[command(group = clap::ArgGroup::new("levelled").multiple(true).args(["samples", "boxes"]))]
@@ -80,7 +80,10 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
             output::check_apart(path, &[&args.file])?;
         }
         if outputs[..i].contains(&Some(path)) {
-            return Err(CliError::Usage(format!("{}: named for two outputs", path.display())));
+            return Err(CliError::Usage(format!(
+                "{}: expected one output for each file, got two outputs; name another file",
+                path.display()
+            )));
         }
     }
     let opening = Opening::new(args.verify, Console::new(args.quiet));
@@ -90,10 +93,9 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
         opening.open(&args.file)?
     };
     let pairs = scan.graph().and_then(SurfaceGraph::close_pairs);
-    // Before anything is written.
+    // Checked before anything is written.
     if args.close_pairs.is_some() && pairs.is_none() {
-        let what = "this scan was prepared without a map of close pairs; prepare it again with \
-                    `--close-pairs`";
+        let what = "expected a scan with close pairs, got one without; prepare it again with `--close-pairs`";
         return Err(CliError::Unfit { path: args.file.clone(), what: what.into() });
     }
     let console = Console::new(args.quiet);
@@ -144,7 +146,8 @@ pub(crate) fn refused(path: &Path, error: WriteError) -> CliError {
     }
 }
 
-/// In the frame of the input: in single precision where that is what is stored, else in double.
+/// Writes the points in the frame of the input, in single precision if that is the stored frame,
+/// else in double.
 fn points(scan: &Scan, out: &mut impl Write) -> Result<(), WriteError> {
     let frame = scan.frame();
     let kinds = || (0..scan.len()).map(|i| scan.kind(i));
@@ -162,7 +165,7 @@ fn points(scan: &Scan, out: &mut impl Write) -> Result<(), WriteError> {
     told(PlyPoints::double(&positions), out)
 }
 
-/// The nodes at a depth, and leaves above it; all of them if no depth is given.
+/// Returns the nodes at a depth and the leaves above it, or all nodes if no depth is given.
 pub(crate) fn at_depth<'a>(
     scan: &'a Scan,
     depths: &'a [u8],
@@ -178,7 +181,8 @@ pub(crate) fn at_depth<'a>(
     (0..depths.len()).filter(move |&i| is_wanted(i))
 }
 
-/// The samples of all nodes at a depth, and of leaves above it; lengths in the units of the input.
+/// Writes the samples of all nodes at a depth, and of the leaves above it, with lengths in the
+/// units of the input.
 fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), WriteError> {
     let (slices, frame) = (scan.slices(), scan.frame());
     let (mut positions, mut source, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
@@ -202,7 +206,7 @@ fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), WriteErr
     PlyPoints::double(&positions).with_source(&source).with_columns(&columns).write(out)
 }
 
-/// Corners of a box that an edge joins: those that differ in one bit.
+/// The edges of a box, as pairs of corners whose numbers differ in one bit.
 const EDGES: [[u64; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 

@@ -1,4 +1,4 @@
-//! Filters of `preprocess`: points that are left out before anything else is done.
+//! The filters of `preprocess`, which remove points before anything else is done.
 
 use std::fmt::Display;
 use std::path::Path;
@@ -9,11 +9,11 @@ use nearmiss::filter::{self, FilterError};
 use serde::Serialize;
 
 use crate::console::Console;
-use crate::digits::grouped;
+use crate::digits::{grouped, grouped_count};
 use crate::error::CliError;
 use crate::input::pieces;
 
-/// Options that leave points out, in the order in which they are applied.
+/// Options that remove points, in the order in which they are applied.
 #[derive(Debug, Clone, Default, Args)]
 pub struct FilterArgs {
     /// Keep the points within a box, given by its lower and upper corner
@@ -50,7 +50,7 @@ pub struct CropBox {
     pub max: [f64; 3],
 }
 
-/// Classes of points, by their numbers.
+/// A list of classes of points, by number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ClassList(pub Vec<u8>);
 
@@ -68,11 +68,11 @@ pub struct Outliers {
 pub struct LeastNeighbours {
     /// Number of neighbours.
     pub n: usize,
-    /// Radius within which they count.
+    /// Radius within which neighbours count.
     pub radius: f64,
 }
 
-/// How many points each filter removed, if it was asked for.
+/// The number of points that each filter removed; `None` for filters that were not applied.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub(crate) struct Filtered {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -88,17 +88,17 @@ pub(crate) struct Filtered {
 }
 
 impl Filtered {
-    /// By the filters of single points.
+    /// Creates the counts of the filters that look at single points.
     pub(crate) fn by_point(crop: Option<usize>, class: Option<usize>) -> Self {
         Self { crop, class, ..Self::default() }
     }
 }
 
-/// Finds the points that stay.
+/// A function that returns the indices of the points to keep.
 type Keep<'a> = &'a dyn Fn(&PointCloud) -> Result<Vec<u32>, FilterError>;
 
 impl FilterArgs {
-    /// Returns `true` if no filter is asked for.
+    /// Returns `true` if there is no filter.
     pub(crate) fn is_empty(&self) -> bool {
         let Self { crop, class, voxel, remove_outliers, min_neighbours } = self;
         crop.is_none()
@@ -108,13 +108,14 @@ impl FilterArgs {
             && min_neighbours.is_none()
     }
 
-    /// Returns `true` if points are left out one by one, whatever the others are.
+    /// Returns `true` if all filters look at single points, independently of the others.
     pub(crate) fn is_by_point(&self) -> bool {
         let Self { voxel, remove_outliers, min_neighbours, .. } = self;
         voxel.is_none() && remove_outliers.is_none() && min_neighbours.is_none()
     }
 
-    /// Applies the filters to `cloud`, which was read from `path`, on `threads` threads.
+    /// Applies the filters to `cloud`, which was read from `path`, on `threads` threads; 0 for all
+    /// cores.
     pub(crate) fn apply(
         &self,
         path: &Path,
@@ -137,7 +138,7 @@ impl FilterArgs {
     ) -> Result<Filtered, CliError> {
         let mut step = |option: String, keep: Keep<'_>| -> Result<usize, CliError> {
             let before = cloud.len();
-            let bar = console.spinner(format_args!("{option} of {} points", grouped(before as u64)));
+            let bar = console.spinner(format_args!("{option} of {}", grouped_count(before as u64, "point")));
             let unfit = |what: &dyn Display| CliError::Unfit {
                 path: path.to_owned(),
                 what: format!("{option}: {what}"),
@@ -146,8 +147,8 @@ impl FilterArgs {
             *cloud = cloud.select(&kept).map_err(|cause| unfit(&cause))?;
             drop(bar);
             let removed = before - cloud.len();
-            let [shown, of] = [removed, before].map(|n| grouped(n as u64));
-            console.note(format_args!("{option} removed {shown} of {of} points"));
+            let (shown, of) = (grouped(removed as u64), grouped_count(before as u64, "point"));
+            console.note(format_args!("{option} removed {shown} of {of}"));
             Ok(removed)
         };
         let mut filtered = Filtered::default();
@@ -181,11 +182,11 @@ fn positive(text: &str) -> Option<f64> {
 }
 
 fn parse_length(text: &str) -> Result<f64, String> {
-    positive(text).ok_or_else(|| "expected a positive length in the units of the input".into())
+    positive(text).ok_or_else(|| "expected a length of more than zero, in the units of the input".into())
 }
 
 pub(crate) fn parse_crop(text: &str) -> Result<CropBox, String> {
-    let expected = || "expected six numbers, x0,y0,z0,x1,y1,z1, the lower corner first".to_owned();
+    let expected = || "expected six numbers x0,y0,z0,x1,y1,z1, the lower corner first".to_owned();
     let numbers: Option<Vec<f64>> = pieces(text).map(|piece| piece.parse().ok()).collect();
     let numbers = <[f64; 6]>::try_from(numbers.ok_or_else(expected)?).map_err(|_other_count| expected())?;
     let [x0, y0, z0, x1, y1, z1] = numbers;
@@ -207,10 +208,10 @@ pub(crate) fn parse_crop(text: &str) -> Result<CropBox, String> {
 pub(crate) fn parse_classes(text: &str) -> Result<ClassList, String> {
     let classes: Option<Vec<u8>> = pieces(text).map(|piece| piece.parse().ok()).collect();
     let classes = classes.filter(|classes| !classes.is_empty());
-    classes.map(ClassList).ok_or_else(|| "expected numbers from 0 to 255, as in 2,6".into())
+    classes.map(ClassList).ok_or_else(|| "expected numbers from 0 to 255, such as 2,6".into())
 }
 
-/// A whole number from 1 on, and a positive number.
+/// Parses a whole number of at least 1, and a positive number.
 fn parse_two(text: &str) -> Option<(usize, f64)> {
     let mut pieces = pieces(text);
     let count = pieces.next()?.parse().ok().filter(|n: &usize| *n > 0)?;
@@ -219,12 +220,14 @@ fn parse_two(text: &str) -> Option<(usize, f64)> {
 }
 
 fn parse_outliers(text: &str) -> Result<Outliers, String> {
-    let expected = "expected K,SIGMA: a number of neighbours, 1 or more, and a positive number, as in 16,2";
+    let expected =
+        "expected K,SIGMA, a number of neighbours of 1 or more and a number of more than zero, such as 16,2";
     parse_two(text).map(|(k, sigma)| Outliers { k, sigma }).ok_or_else(|| expected.into())
 }
 
 fn parse_neighbours(text: &str) -> Result<LeastNeighbours, String> {
-    let expected = "expected N,R: a number of neighbours, 1 or more, and a positive length, as in 4,0.1";
+    let expected =
+        "expected N,R, a number of neighbours of 1 or more and a length of more than zero, such as 4,0.1";
     parse_two(text).map(|(n, radius)| LeastNeighbours { n, radius }).ok_or_else(|| expected.into())
 }
 

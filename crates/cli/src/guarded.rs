@@ -1,9 +1,9 @@
-//! The second line of defence against damaged files: a command that reads a format which a library decodes
-//! (LAZ, E57, glTF) runs in a child process, whose memory is limited while it reads.
+//! The second line of defence against damaged files: a child process.
 //!
-//! The first line is `nearmiss::io`, which checks sizes and counts before the library sees a byte. If a
-//! library ends the process nevertheless, by running out of memory for example, the parent says so, with the
-//! name of the file, as for any other error.
+//! A command whose input is decoded by a library (LAZ, E57, glTF) runs in a child process, with
+//! limited memory while it reads. The first line of defence is `nearmiss::io`, which checks sizes
+//! and counts before the library sees a byte. If the library still ends the process, for example
+//! because memory runs out, the parent prints an error with the name of the file.
 
 use std::env;
 use std::ffi::OsString;
@@ -14,15 +14,16 @@ use nearmiss::io::{Format, format_of};
 
 use crate::console;
 
-/// Set in the child, so that it does the work.
+/// The environment variable that is set in the child.
 const IN_CHILD: &str = "NEARMISS_IN_CHILD";
 
-/// Exit status after Ctrl-C, by the custom of shells.
+/// The exit status after Ctrl-C, by the convention of shells.
 #[cfg(unix)]
 const INTERRUPTED: u8 = 130;
 
-/// Runs this program again, in a child process, if one of the inputs is decoded by a library. Returns `None`
-/// if the work is to be done here: in the child, for all other inputs, and where no child can be started.
+/// Runs this program again in a child process if one of the inputs is decoded by a library. Returns
+/// `None` if this process has to do the work: in the child, for all other inputs, and if no child
+/// can be started.
 pub(crate) fn run_in_child(args: &[OsString], inputs: &[&Path]) -> Option<ExitCode> {
     if env::var_os(IN_CHILD).is_some() {
         end_with_parent();
@@ -40,7 +41,7 @@ fn is_decoded_by_library(path: &Path) -> bool {
     matches!(format_of(path), Ok(Format::Las | Format::E57 | Format::Gltf))
 }
 
-/// The exit status of the child, or an error if a signal has ended it.
+/// Returns the exit status of the child, or prints an error if a signal has ended it.
 fn exit_code(status: ExitStatus, file: &Path) -> ExitCode {
     if let Some(code) = status.code() {
         return ExitCode::from(u8::try_from(code).unwrap_or(1));
@@ -50,24 +51,24 @@ fn exit_code(status: ExitStatus, file: &Path) -> ExitCode {
         return ExitCode::from(INTERRUPTED);
     }
     console::say_error(format_args!(
-        "{}: expected a file that can be decoded, got a decoder that ended its process ({status}); write the \
-         file anew if it is damaged, or free some memory; the output is as it was",
+        "{}: expected a file that can be decoded, got an abnormal end of the decoder ({status}), so the output is \
+         unchanged; write the file again if it is damaged, or free some memory",
         file.display()
     ));
     ExitCode::FAILURE
 }
 
-/// Sees to it that a child does not outlive the parent.
+/// Makes the system end this child when its parent ends.
 fn end_with_parent() {
     #[cfg(target_os = "linux")]
     let _asked = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
 }
 
-/// Bytes that a child may allocate while it reads, beyond the expected ones.
+/// The bytes that a child may allocate while it reads, in addition to the expected ones.
 #[cfg(target_os = "linux")]
 const SPARE: f64 = 512e6;
 
-/// A limit on the memory of a child, until it is dropped.
+/// A limit on the memory of a child, which applies until it is dropped.
 #[derive(Debug)]
 pub(crate) struct ReadingLimit {
     #[cfg(target_os = "linux")]
@@ -110,7 +111,7 @@ impl Drop for ReadingLimit {
     }
 }
 
-/// Bytes of memory that the process has asked for, mapped files apart.
+/// Returns the bytes of memory that the process has allocated, without mapped files.
 #[cfg(target_os = "linux")]
 fn allocated() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;

@@ -1,59 +1,59 @@
-//! How well a scan is sampled, in numbers.
+//! The sampling quality of a scan in numbers.
 
 use nearmiss::PointKind;
 use nearmiss::Scan;
 use serde::Serialize;
 
-/// Points this many times further from their neighbours than the median point are sparse beside it.
+/// Points whose spacing exceeds the median spacing by this factor are sparse.
 const UNEVEN: f64 = 4.0;
 
-/// Sparse points matter from this share of all points on, or from this share of the area.
+/// Sparse points are reported from this share of all points on, or from this share of the area.
 const MANY: f64 = 0.02;
 const LARGE: f64 = 0.1;
 
-/// Fewer sampled points than this show neither a hole nor a sparse part.
+/// Fewer surveyed points than this are too few to report holes or sparse points.
 const FEW: usize = 4;
 
-/// Chooses the points that are looked at.
+/// Seed of the choice of surveyed points.
 const SEED: u64 = 0;
 
-/// How well a scan is sampled. Shares are of all points, lengths in the units of the input.
+/// The sampling quality of a scan. Shares are of all points, lengths in the units of the input.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Health {
-    /// Share of the points that stand for themselves as balls.
+    /// Share of the points that count as balls, because they sample no surface.
     pub(crate) balls: f64,
-    /// Radius of the largest of these balls; 0 without any.
+    /// Radius of the largest of these balls; 0 without balls.
     pub(crate) largest_ball: f64,
-    /// Share of the points at borders of sheets, estimated.
+    /// Estimated share of the points at borders of surfaces.
     pub(crate) border: f64,
-    /// Share of the points that lie alone beside much denser ones, estimated.
+    /// Estimated share of the isolated points near much denser ones.
     pub(crate) outliers: f64,
     /// Points much sparser than the others, if there are enough to matter.
     pub(crate) uneven: Option<Uneven>,
     /// Holes wider than the reach, if any were found.
     pub(crate) holes: Option<Holes>,
-    /// 0.9-quantile of the spacing of the points whose spacing exceeds the reach, estimated; 0
-    /// without any.
+    /// Estimated 0.9-quantile of the spacing of the points whose spacing exceeds the reach; 0
+    /// without such points.
     pub(crate) beyond_reach: f64,
 }
 
-/// Points much sparser than the others. The spacing is the distance to the sixth neighbour.
+/// Points much sparser than the others. The spacing is the distance to the sixth nearest neighbour.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Uneven {
     pub(crate) share: f64,
-    /// Estimated share of the scanned area that they cover.
+    /// Estimated share of the scanned area that these points cover.
     pub(crate) area: f64,
-    /// Their median spacing over that of all points.
+    /// The ratio of their median spacing to that of all points.
     pub(crate) times: f64,
     pub(crate) spacing: f64,
     /// The median spacing of all points.
     pub(crate) median: f64,
 }
 
-/// Holes in sheets, wider than the reach.
+/// Holes in surfaces, wider than the reach.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Holes {
-    /// Share of the points that face one.
+    /// Share of the points at the rim of a hole.
     pub(crate) share: f64,
     /// Least, median and greatest width.
     pub(crate) widths: [f64; 3],
@@ -85,12 +85,13 @@ impl Health {
 }
 
 impl Uneven {
-    /// From spacings, ascending, with their weights.
+    /// Creates the statistics from pairs of spacing and weight, in ascending order of spacing.
     fn of(spacings: &[(f64, f64)]) -> Option<Self> {
         let median = quantile(spacings, 0.5);
         let sparse = &spacings[spacings.partition_point(|&(spacing, _)| spacing <= UNEVEN * median)..];
         let spacing = quantile(sparse, 0.5);
-        // A stray stands for no area of the square of its distance.
+        // The area of a point is the square of its spacing, which would be far too large for
+        // isolated points.
         let most = UNEVEN * spacing;
         let area = |&(spacing, weight): &(f64, f64)| weight * spacing.min(most).powi(2);
         let whole = spacings.iter().map(area).sum::<f64>().max(f64::MIN_POSITIVE);
@@ -101,7 +102,7 @@ impl Uneven {
     }
 }
 
-/// The value below which this share of the weight lies, of values ascending; 0 without any.
+/// Returns the weighted quantile of pairs of value and weight in ascending order; 0 without values.
 fn quantile(values: &[(f64, f64)], share: f64) -> f64 {
     let whole: f64 = values.iter().map(|&(_, weight)| weight).sum();
     let mut sum = 0.0;
@@ -112,7 +113,7 @@ fn quantile(values: &[(f64, f64)], share: f64) -> f64 {
     reached.or(values.last()).map_or(0.0, |&(value, _)| value)
 }
 
-/// What people call points of each kind, and the field of the JSON.
+/// Returns the name of a kind, which is also its field in the JSON output.
 pub(crate) const fn kind_name(kind: PointKind) -> &'static str {
     match kind {
         PointKind::Sheet => "sheet",

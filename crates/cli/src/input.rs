@@ -1,4 +1,4 @@
-//! Scans, prepared or raw, and rows of text.
+//! Reading of scans, prepared or raw, and of text files line by line.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
@@ -14,29 +14,29 @@ use crate::error::CliError;
 use crate::estimate;
 use crate::guarded::ReadingLimit;
 
-/// First bytes of a prepared scan, also of one whose line ends were translated on the way.
+/// The first bytes of a prepared scan. They do not change if a transfer translates line ends.
 const MAGIC: &[u8] = b"\x8Enmiss";
 
-/// A mesh whose faces cover more than this share of its surface with longer edges than [`LONG`] is warned
-/// about.
+/// A warning is given if faces with an edge longer than [`LONG`] cover more than this share of a
+/// mesh.
 const LONG_SHARE: f64 = 0.05;
 
-/// In sampling radii.
+/// The length of a long edge, in sampling radii.
 const LONG: f64 = 3.0;
 
-/// A line longer than this is no line of ours.
+/// The largest length of a line of text, in bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
-/// Whether the file is, or by its name ought to be, a prepared scan.
+/// Returns `true` if the file is a prepared scan, or is named like one.
 pub(crate) fn is_prepared(path: &Path) -> bool {
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("nm"));
     let mut head = [0; MAGIC.len()];
-    // Asked first, because opening a pipe waits for its other end.
+    // Checked before opening, because opening a pipe waits for its other end.
     let is_file = path.metadata().is_ok_and(|m| m.is_file());
     named || is_file && File::open(path).and_then(|mut f| f.read_exact(&mut head)).is_ok() && head == MAGIC
 }
 
-/// Says of every missing input the same.
+/// Fails if there is no file at `path`, with the same message for every kind of input.
 pub(crate) fn check_there(path: &Path) -> Result<(), CliError> {
     match path.metadata() {
         Err(cause) if cause.kind() == ErrorKind::NotFound => Err(CliError::Missing { path: path.to_owned() }),
@@ -44,18 +44,19 @@ pub(crate) fn check_there(path: &Path) -> Result<(), CliError> {
     }
 }
 
-/// How scans are opened.
+/// The settings for opening scans.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Opening {
-    /// Threads to prepare raw inputs, 0 for all cores.
+    /// Number of threads to prepare raw inputs; 0 for all cores.
     pub(crate) threads: usize,
-    /// Whether all of a prepared scan is checked, or only what keeps queries in their arrays.
+    /// `true` to check prepared scans in full; `false` to check only what keeps indices within
+    /// their arrays.
     pub(crate) verify: bool,
     pub(crate) console: Console,
 }
 
 impl Opening {
-    /// On all cores.
+    /// Creates settings with all cores.
     pub(crate) fn new(verify: bool, console: Console) -> Self {
         Self { threads: 0, verify, console }
     }
@@ -65,7 +66,8 @@ impl Opening {
         self.open_for(None, path)
     }
 
-    /// As [`Self::open`], for this kernel if any: a raw input is prepared for it, else for the euclidean one.
+    /// As [`Self::open`], for this kernel if one is given. Raw inputs are prepared for it, by
+    /// default for the euclidean kernel. Fails for a scan prepared for another kernel.
     fn open_for(self, kernel: Option<Metric>, path: &Path) -> Result<Scan, CliError> {
         check_there(path)?;
         if is_prepared(path) {
@@ -75,8 +77,8 @@ impl Opening {
                 Some(kernel) => {
                     let (path, stored) = (path.display(), scan.metric());
                     let what = format!(
-                        "{path}: this scan was prepared for the {stored} kernel, not the {kernel} one; prepare it \
-                         again with `--kernel {kernel}`, or the other one with `--kernel {stored}`"
+                        "{path}: expected a scan prepared for the {kernel} kernel, got one for the {stored} kernel; \
+                         prepare it again with `--kernel {kernel}`, or the other scan with `--kernel {stored}`"
                     );
                     Err(CliError::Usage(what))
                 }
@@ -97,8 +99,8 @@ impl Opening {
         }
     }
 
-    /// Opens two scans for this kernel, or for one and the same: that of the first that is prepared. The same
-    /// file twice is one scan.
+    /// Opens two scans for the same kernel: the one given, or that of the first prepared scan. If
+    /// both paths are equal, the file is opened once.
     pub(crate) fn open_both(self, kernel: Option<Metric>, [a, b]: [&Path; 2]) -> Result<[Scan; 2], CliError> {
         if a == b {
             let scan = self.open_for(kernel, a)?;
@@ -113,14 +115,14 @@ impl Opening {
         Ok([open_next(&b, a)?, b])
     }
 
-    /// Opens two scans of whose points alone something is asked, so that any kernel will do.
+    /// Opens two scans for queries about points only, for which the kernels do not matter.
     pub(crate) fn open_points(self, [a, b]: [&Path; 2]) -> Result<[Scan; 2], CliError> {
         let first = self.open(a)?;
         let second = if a == b { first.clone() } else { self.open(b)? };
         Ok([first, second])
     }
 
-    /// As [`Self::open_points`], with graphs for raw inputs.
+    /// As [`Self::open_points`], and builds graphs for raw inputs.
     pub(crate) fn open_both_with_graphs(self, [a, b]: [&Path; 2]) -> Result<[Scan; 2], CliError> {
         let open = |path: &Path| {
             if is_prepared(path) {
@@ -135,12 +137,12 @@ impl Opening {
         Ok([first, second])
     }
 
-    /// As [`Self::open`], for what cannot do without a graph.
+    /// As [`Self::open`], with a graph. Fails for a prepared scan without one.
     pub(crate) fn open_with_graph(self, path: &Path) -> Result<Scan, CliError> {
         if is_prepared(path) {
             let scan = self.open(path)?;
             if scan.graph().is_none() {
-                let what = "this scan was prepared without a graph; prepare it again with `--graph`";
+                let what = "expected a scan with a graph, got one without; prepare it again with `--graph`";
                 return Err(CliError::Unfit { path: path.to_owned(), what: what.into() });
             }
             return Ok(scan);
@@ -151,12 +153,12 @@ impl Opening {
     }
 }
 
-/// The scan for the geodesic kernel.
+/// Returns the scan, changed to the geodesic kernel.
 pub(crate) fn with_geodesic_kernel(path: &Path, scan: Scan) -> Result<Scan, CliError> {
     scan.with_geodesic_kernel().map_err(|cause| CliError::Graph { path: path.to_owned(), cause })
 }
 
-/// The scan with a graph over its points.
+/// Returns the scan with a proximity graph of its points.
 pub(crate) fn with_graph(
     path: &Path,
     scan: Scan,
@@ -175,12 +177,13 @@ pub(crate) fn read(path: &Path, format: Option<Format>) -> Result<Model, CliErro
     Ok(nearmiss::io::read(path, format)?)
 }
 
-/// Limits the memory that a child process may take to read a file.
+/// Limits the memory that a child process may use to read a file.
 pub(crate) fn limit_reading(path: &Path, format: Option<Format>) -> ReadingLimit {
     ReadingLimit::new(|| glance(path, format).map_or(0.0, |seen| estimate::reading(seen.points, seen.bytes)))
 }
 
-/// The identity of work on disk: the version of the program, and the path, length and age of the input.
+/// Returns the key of work on disk: the version of the program, and the path, length and
+/// modification time of the input.
 pub(crate) fn identity(path: &Path) -> Result<String, CliError> {
     let about = path.metadata().map_err(CliError::reading(path))?;
     let whole = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -188,18 +191,19 @@ pub(crate) fn identity(path: &Path) -> Result<String, CliError> {
     Ok(format!("{} {whole:?} {} {changed:?}", env!("CARGO_PKG_VERSION"), about.len()))
 }
 
-/// Checks that an input is there and no prepared scan.
+/// Fails if an input does not exist or is a prepared scan.
 pub(crate) fn check_raw(path: &Path) -> Result<(), CliError> {
     check_there(path)?;
     if is_prepared(path) {
-        let what =
-            "this is, or is named like, a prepared scan; name the point cloud or mesh it came from".into();
+        let what = "expected a point cloud or mesh, got a prepared scan (by its content or name); give the file that \
+                    it was prepared from"
+            .into();
         return Err(CliError::Unfit { path: path.to_owned(), what });
     }
     Ok(())
 }
 
-/// Prepares what was read, and warns where the points do not do the input justice.
+/// Prepares a model, and warns if its points represent the input badly.
 pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Result<Scan, CliError> {
     let scan = Scan::build(&model.cloud, options)
         .map_err(|cause| CliError::Build { path: path.to_owned(), cause })?;
@@ -208,8 +212,8 @@ pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Resul
     let share = share_of_long_faces(model, LONG * radius);
     if share > LONG_SHARE {
         console::warn(format_args!(
-            "{}: {:.0} % of the mesh's surface lies in faces with edges longer than {LONG} sampling radii \
-             ({}); only vertices become points, so it has holes there: subdivide the faces or sample them",
+            "{}: {:.0} % of the mesh's surface is in faces with edges longer than {LONG} sampling radii ({}), and the \
+             scan has holes there because only vertices become points; put points on the faces with `sample`",
             path.display(),
             100.0 * share,
             short(LONG * radius),
@@ -218,13 +222,13 @@ pub(crate) fn build(path: &Path, model: &Model, options: &BuildOptions) -> Resul
     Ok(scan)
 }
 
-/// Warns where rounding moves points by as much as matters.
+/// Warns if rounding to single precision moves points by a relevant distance.
 pub(crate) fn check_step(path: &Path, scan: &Scan) {
     let radius = scan.sampling_radius();
     if scan.step() > radius / 100.0 {
         console::warn(format_args!(
             "{}: single precision moves points by up to {}, more than a hundredth of the sampling radius \
-             {}; shift or split the input, so that it spans less",
+             ({}); split the input into parts of smaller extent",
             path.display(),
             short(scan.step()),
             short(radius)
@@ -232,7 +236,7 @@ pub(crate) fn check_step(path: &Path, scan: &Scan) {
     }
 }
 
-/// By area; 0 of what has no faces.
+/// Returns the share of the area in faces with an edge longer than `long`; 0 without faces.
 fn share_of_long_faces(model: &Model, long: f64) -> f64 {
     let Some(mesh) = &model.mesh else { return 0.0 };
     let (mut whole, mut in_long) = (0.0, 0.0);
@@ -249,7 +253,7 @@ fn share_of_long_faces(model: &Model, long: f64) -> f64 {
     if whole > 0.0 { in_long / whole } else { 0.0 }
 }
 
-/// The filled lines of a text file, one at a time.
+/// A reader of the lines of a text file that are not blank.
 pub(crate) struct TextLines {
     path: PathBuf,
     reader: BufReader<Box<dyn Read + Send + Sync>>,
@@ -275,7 +279,7 @@ impl TextLines {
         Ok(Self { path, reader: BufReader::with_capacity(1 << 16, source), number: 0 })
     }
 
-    /// The next line that is not blank, with its number, counted from 1.
+    /// Returns the number of the next line that is not blank, counted from 1, and its text.
     pub(crate) fn next_filled(&mut self) -> Result<Option<(u64, String)>, CliError> {
         loop {
             let mut bytes = Vec::new();
@@ -286,34 +290,40 @@ impl TextLines {
                 return Ok(None);
             }
             if length as u64 == LONGEST_LINE {
-                return Err(self.fault("the line is longer than a mebibyte; is this a text file?"));
+                return Err(self.fault(
+                    "expected lines of less than 1 MiB, got a longer one; check that this is a text file",
+                ));
             }
             let start: &[u8] = if self.number == 1 { b"\xef\xbb\xbf" } else { b"" };
             let text = std::str::from_utf8(bytes.strip_prefix(start).unwrap_or(&bytes)).ok();
-            let text = text.ok_or_else(|| self.fault("the line is no UTF-8 text"))?.trim();
+            let text = text
+                .ok_or_else(|| {
+                    self.fault("expected UTF-8 text, got other bytes; check that this is a text file")
+                })?
+                .trim();
             if !text.is_empty() {
                 return Ok(Some((self.number, text.to_owned())));
             }
         }
     }
 
-    /// What the file lacks as a whole.
+    /// Returns an error about the file as a whole.
     pub(crate) fn unfit(&self, what: impl Into<String>) -> CliError {
         CliError::Unfit { path: self.path.clone(), what: what.into() }
     }
 
-    /// A fault on the line returned last.
+    /// Returns an error about the line returned last.
     pub(crate) fn fault(&self, what: impl Into<String>) -> CliError {
         self.fault_on(self.number, what)
     }
 
-    /// A fault on the line of this number.
+    /// Returns an error about a line, given by its number.
     pub(crate) fn fault_on(&self, line: u64, what: impl Into<String>) -> CliError {
         CliError::Line { path: self.path.clone(), line, what: what.into() }
     }
 }
 
-/// The pieces of a row of numbers: divided by white space, commas or semicolons.
+/// Splits a row of numbers at white space, commas and semicolons.
 pub(crate) fn pieces(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| c.is_whitespace() || matches!(c, ',' | ';')).filter(|p| !p.is_empty())
 }

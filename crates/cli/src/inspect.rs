@@ -1,4 +1,4 @@
-//! `inspect`: what a prepared scan holds.
+//! `inspect`: describes a prepared scan.
 
 use std::path::PathBuf;
 
@@ -55,7 +55,7 @@ pub(crate) fn run(args: &InspectArgs) -> Result<(), CliError> {
         results.line(line)?;
     }
     if args.verify {
-        results.line("verified   every checksum and every id is right")?;
+        results.line("verified   all checksums, ids and numbers are valid")?;
     }
     results.flush()
 }

@@ -259,7 +259,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let bin_name =
         match args.first().map(Path::new).unwrap_or(Path::new("")).file_stem().and_then(|stem| stem.to_str())
         {
-            // The way to call it is an alias in the repository's configuration.
+            // Users call xtask by an alias in the repository's configuration.
             Some("xtask") => "cargo xtask",
             Some(stem) => stem,
             None => "nearmiss",
@@ -275,15 +275,15 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
         Err(mut refused) => {
             suggest_output(&mut refused);
-            // Help and version go to standard output, errors to standard error; a closed pipe is nobody's
-            // concern.
+            // Help and version go to standard output, errors to standard error. A closed pipe is
+            // ignored.
             let _ = refused.print();
             ExitCode::from(u8::try_from(refused.exit_code()).unwrap_or(2))
         }
     }
 }
 
-/// Suggests `-o` to users who name the output of `preprocess` without it.
+/// Adds a suggestion to use `-o` if the output of `preprocess` was given without it.
 fn suggest_output(refused: &mut clap::Error) {
     let Some(ContextValue::String(extra)) = refused.get(ContextKind::InvalidArg) else { return };
     if refused.kind() == ErrorKind::UnknownArgument && !extra.starts_with('-') && extra.ends_with(".nm") {

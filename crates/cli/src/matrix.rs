@@ -1,4 +1,4 @@
-//! Matrices as given, and why they are no poses.
+//! Matrices as given by the user, and the reasons why one is not a pose.
 
 use std::fmt;
 
@@ -6,33 +6,38 @@ use nearmiss::PoseError;
 
 use crate::digits::short;
 
-/// A matrix as given, row-major.
+/// A 4×4 matrix, row-major.
 pub(crate) type Matrix = [f64; 16];
 
-/// Why a matrix is no pose; displayed with few digits.
+/// The reason why a matrix is not a pose, displayed with a remedy and with few digits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseRefused {
-    /// Why not.
+    /// The reason.
     pub cause: PoseError,
-    /// Whether its transpose has the form of a pose.
+    /// `true` if the transpose has the form of a pose.
     pub is_transposed: bool,
 }
 
 impl fmt::Display for PoseRefused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.cause {
-            PoseError::NotAffine if self.is_transposed => {
-                f.write_str("the last row of the pose is not 0 0 0 1; it looks column-major; transpose it")
-            }
+            PoseError::NotAffine if self.is_transposed => f.write_str(
+                "expected a last row of 0 0 0 1, got a last column of 0 0 0 1; transpose the matrix, which looks column-\
+                 major",
+            ),
+            PoseError::NotAffine => f.write_str(
+                "expected a last row of 0 0 0 1, got another one; give the matrix row-major, with the translation in \
+                 the last column",
+            ),
             PoseError::NotProper { determinant } => write!(
                 f,
-                "the pose has determinant {}; a rotation with uniform scale has a positive one",
+                "expected a positive determinant, got {}; give a rotation with uniform scale, without reflection",
                 short(*determinant)
             ),
             PoseError::NotRigid { moved, tolerance } => write!(
                 f,
-                "the pose is not a rotation with uniform scale: the nearest one moves the object's bounds by {}, \
-                 more than {} (a tenth of the sampling radius)",
+                "expected a rotation with uniform scale, got a matrix whose nearest rotation moves the object's bounds \
+                 by {}, more than {} (a tenth of the sampling radius); give it with more digits, or as a quaternion",
                 short(*moved),
                 short(*tolerance)
             ),

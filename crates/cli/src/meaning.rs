@@ -1,13 +1,13 @@
-//! What `collide` and `distance` compare: obstacles, surfaces, or balls about the points.
+//! Options for what `collide` and `distance` compare: obstacles, surfaces, or balls about the
+//! points.
 
 use clap::Args;
 use nearmiss::{Metric, Scan, Semantics};
 
 use crate::parse::parse_radius;
 
-/// Options that say what of two scans is compared. By default their obstacles: surfaces where
-/// points sample a sheet, balls of half the local spacing about all other points, and every
-/// measured point.
+/// Options for what is compared. The default is obstacles: the surface where points sample a sheet,
+/// balls of half the local spacing about all other points, and every measured point.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct MeaningArgs {
     /// Compare surfaces alone, and ignore points that sample no sheet
@@ -25,7 +25,7 @@ pub struct MeaningArgs {
 }
 
 impl MeaningArgs {
-    /// The semantics for two scans like `a`.
+    /// Returns the semantics for two scans with the metric of `a`.
     pub(crate) fn semantics(self, a: &Scan) -> Semantics {
         match self.thickened {
             Some(radius) => Semantics::Thickened(radius),

@@ -1,11 +1,11 @@
-//! How much memory there is for this process, and sizes of memory as people write them.
+//! The memory available to this process, and the option that limits it.
 
 use std::fs;
 use std::path::Path;
 
 use clap::Args;
 
-/// The option that sets a limit.
+/// The option that limits memory.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct MemoryArgs {
     /// Memory limit, such as 500MB or 16GB
@@ -18,12 +18,12 @@ pub struct MemoryArgs {
     pub memory: Option<u64>,
 }
 
-/// A number of bytes that a command may use, and where it comes from.
+/// The number of bytes that a command may use, and the origin of that limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Limit {
     /// Set by `--memory`.
     Asked(u64),
-    /// What the machine, or the control group of the process, has left.
+    /// The memory that the machine, or the control group of the process, has left.
     Available(u64),
     /// Not known on this system.
     Unknown,
@@ -38,7 +38,7 @@ impl MemoryArgs {
     }
 }
 
-/// The least of what the machine and the control groups have left. Linux only.
+/// Returns the smaller of the memory left to the machine and to the control groups. Linux only.
 fn available() -> Option<u64> {
     let machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| mem_available(&text));
     let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
@@ -46,15 +46,15 @@ fn available() -> Option<u64> {
     machine.into_iter().chain(group).min()
 }
 
-/// `MemAvailable` of `/proc/meminfo`, in bytes.
+/// Returns `MemAvailable` of `/proc/meminfo`, in bytes.
 fn mem_available(text: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kilobytes.checked_mul(1024)
 }
 
-/// The least that any control group of a process has left; `text` is `/proc/self/cgroup`, and groups lie
-/// below `root`.
+/// Returns the smallest amount that any control group of a process has left. `text` is the content
+/// of `/proc/self/cgroup`; the folders of groups are below `root`.
 fn groups_left(text: &str, root: &Path) -> Option<u64> {
     // A line is `number:controllers:path`; version 2 names no controllers.
     let places = text.lines().filter_map(|line| {
@@ -67,8 +67,8 @@ fn groups_left(text: &str, root: &Path) -> Option<u64> {
         };
         Some((folder, path.trim_start_matches('/').to_owned()))
     });
-    // Every group above counts too. In a container the path may be that of the host, so missing files are
-    // passed over.
+    // The limits of parent groups apply too. In a container the path may be that of the host, so
+    // missing files are skipped.
     let left = places.flat_map(|(folder, path)| {
         let groups: Vec<_> = Path::new(&path).ancestors().map(|group| folder.join(group)).collect();
         groups.into_iter().filter_map(|group| group_left(&group))
@@ -76,7 +76,8 @@ fn groups_left(text: &str, root: &Path) -> Option<u64> {
     left.min()
 }
 
-/// What a control group has left: its limit less what it uses, but for file pages that can be dropped.
+/// Returns what a control group has left: its limit less its usage, not counting file pages that
+/// can be dropped.
 fn group_left(group: &Path) -> Option<u64> {
     let number = |name: &str| fs::read_to_string(group.join(name)).ok()?.trim().parse::<u64>().ok();
     let limit = number("memory.max").or_else(|| number("memory.limit_in_bytes"))?;
@@ -90,9 +91,9 @@ fn group_left(group: &Path) -> Option<u64> {
     Some(limit.saturating_sub(used.saturating_sub(droppable)))
 }
 
-/// A number with a unit of memory, or of bytes without one.
+/// Parses a number with a unit of memory; without a unit, the number counts bytes.
 fn parse_size(text: &str) -> Result<u64, String> {
-    let expected = || format!("expected a size of memory, as in 500MB, 1.5GiB or 16GB, got `{text}`");
+    let expected = || "expected a size of memory, such as 500MB, 1.5GiB or 16GB".to_owned();
     let lower = text.trim().to_ascii_lowercase();
     let unit = lower.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
     let number: f64 = lower[..lower.len() - unit.len()].parse().map_err(|_not_a_number| expected())?;

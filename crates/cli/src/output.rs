@@ -1,4 +1,4 @@
-//! Files written whole or not at all.
+//! Output files, which are written whole or not at all.
 
 use std::ffi::OsString;
 use std::fs;
@@ -9,37 +9,39 @@ use nearmiss::store::replace_file;
 
 use crate::error::CliError;
 
-/// Checks that a file can be put at `path`, before the work that would fill it.
+/// Fails if no file can be written at `path`. Called before the work whose result goes there.
 pub(crate) fn check(path: &Path) -> Result<(), CliError> {
     let unfit = |what: &str| Err(CliError::Unfit { path: path.to_owned(), what: what.to_owned() });
     if is_stdout(path) {
-        return unfit("cannot be written to standard output; name a file");
+        return unfit("expected a file to write to, got standard output; name a file");
     }
     match fs::metadata(path) {
-        Ok(there) if there.is_dir() => return unfit("is a folder; name a file to write to"),
+        Ok(there) if there.is_dir() => {
+            return unfit("expected a file to write to, got a folder; name a file in it");
+        }
         Ok(there) if !there.is_file() => {
-            return unfit("is a device or pipe; name a regular file to write to");
+            return unfit("expected a regular file to write to, got a device or pipe; name a regular file");
         }
         _ => {}
     }
     if path.file_name().is_none() {
-        return unfit("is no name of a file; name a file to write to");
+        return unfit("expected a file to write to, got a path without a file name; name a file");
     }
     let folder = folder(path);
     if folder.is_dir() {
         Ok(())
     } else {
-        unfit(&format!("there is no folder {} to write to; make it first", folder.display()))
+        unfit(&format!("there is no folder {}; create it first", folder.display()))
     }
 }
 
-/// Refuses to replace one of the files read.
+/// As [`check`], and fails if the file would replace one of `inputs`.
 pub(crate) fn check_apart(path: &Path, inputs: &[&Path]) -> Result<(), CliError> {
     check(path)?;
     let Ok(target) = path.canonicalize() else { return Ok(()) };
     match inputs.iter().find(|i| i.canonicalize().is_ok_and(|i| i == target)) {
         Some(input) => Err(CliError::Usage(format!(
-            "{}: this would replace the input {}; name another file to write to",
+            "{}: the output would replace the input {}; name another file",
             path.display(),
             input.display()
         ))),
@@ -47,7 +49,7 @@ pub(crate) fn check_apart(path: &Path, inputs: &[&Path]) -> Result<(), CliError>
     }
 }
 
-/// Whether both name one file, there or not, however they spell it.
+/// Returns `true` if both paths name the same file, which need not exist.
 pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
     let place = |path: &Path| {
         path.canonicalize().or_else(|_| {
@@ -58,8 +60,8 @@ pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
     matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Replaces the file at `path` by what `write` writes, or leaves everything as it was; hands on what `write`
-/// tells.
+/// Replaces the file at `path` by what `write` writes, and returns the result of `write`. After an
+/// error, the old file is unchanged.
 pub(crate) fn replace<T>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> Result<T, CliError>,
@@ -73,7 +75,7 @@ pub(crate) fn replace<T>(
     })
 }
 
-/// As [`replace`], where there may be no file to write.
+/// As [`replace`], if there is a path; otherwise calls `write` without a file.
 pub(crate) fn replace_if_any<T>(
     path: Option<&Path>,
     write: impl for<'w> FnOnce(Option<&'w mut (dyn Write + 'w)>) -> Result<T, CliError>,
@@ -84,7 +86,7 @@ pub(crate) fn replace_if_any<T>(
     }
 }
 
-/// The same for writers that fail with the system's errors alone.
+/// As [`replace`], for functions that fail with I/O errors only.
 pub(crate) fn replace_plain(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&fs::File>) -> io::Result<()>,
@@ -92,7 +94,7 @@ pub(crate) fn replace_plain(
     replace(path, |out| write(out).map_err(CliError::writing(path)))
 }
 
-/// As [`replace_plain`], or writes to standard output for `-`.
+/// As [`replace_plain`], but writes to standard output if `path` is `-`.
 pub(crate) fn replace_or_print(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -116,7 +118,7 @@ fn folder(path: &Path) -> PathBuf {
     }
 }
 
-/// The folder beside an output that work on disk for it is done in.
+/// Returns the folder next to `output` in which work on disk is done.
 pub(crate) fn work_folder(output: &Path) -> PathBuf {
     let mut name = output.file_name().map(OsString::from).unwrap_or_default();
     name.push(".work");

@@ -1,20 +1,20 @@
-//! Values of options.
+//! Parsers of option values.
 
 use std::time::Duration;
 
-/// Reads a length.
+/// Parses a length of zero or more.
 pub(crate) fn parse_radius(text: &str) -> Result<f64, String> {
     let radius = text.parse().ok().filter(|r: &f64| *r >= 0.0 && r.is_finite());
-    radius.ok_or_else(|| "expected a length, zero or more, in world units".into())
+    radius.ok_or_else(|| "expected a length of zero or more, in world units".into())
 }
 
-/// A length above zero.
+/// Parses a length of more than zero.
 pub(crate) fn parse_length(text: &str) -> Result<f64, String> {
     let length = text.parse().ok().filter(|l: &f64| *l > 0.0 && l.is_finite());
-    length.ok_or_else(|| "expected a length, more than zero, in the units of the input".into())
+    length.ok_or_else(|| "expected a length of more than zero, in the units of the input".into())
 }
 
-/// Reads a time with its unit.
+/// Parses a time with its unit.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     let unit =
         text.trim_start_matches(|c: char| c.is_ascii_digit() || matches!(c, '.' | '+' | 'e' | 'E' | '-'));
@@ -24,10 +24,10 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
         "us" | "µs" | "μs" => 1e-6,
         "ms" => 1e-3,
         "s" => 1.0,
-        _ => return Err("expected a number with one of the units ns, us, ms, s, as in 200us".into()),
+        _ => return Err("expected a number with the unit ns, us, ms or s, such as 200us".into()),
     };
     let time = number.parse::<f64>().ok().and_then(|n| Duration::try_from_secs_f64(n * seconds).ok());
-    time.ok_or_else(|| "expected a time from zero on, as in 200us".into())
+    time.ok_or_else(|| "expected a time of zero or more, such as 200us".into())
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Answers along a path of poses: a summary, a table and a plot.
+//! Answers along a path of poses, as a summary, a table and a plot.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,9 @@ impl PathArgs {
     pub(crate) fn check(&self, inputs: &[&Path], all: Option<bool>) -> Result<(), CliError> {
         if self.csv.is_some() && self.poses.is_none() && all != Some(true) {
             let or_all = if all.is_some() { " or --all" } else { "" };
-            return Err(CliError::Usage(format!("--csv writes a table of several answers; give --poses{or_all}")));
+            return Err(CliError::Usage(format!(
+                "--csv writes a table of several answers; give --poses{or_all}"
+            )));
         }
         let mut inputs = inputs.to_vec();
         inputs.extend(self.poses.as_deref());
@@ -50,7 +52,7 @@ impl PathArgs {
         }
     }
 
-    /// Returns `true` if the clearance of each pose is needed even where answers are not for people.
+    /// Returns `true` if an output file needs the clearance of each pose.
     pub(crate) fn wants_clearance(&self) -> bool {
         self.csv.is_some() || self.plot.is_some()
     }
@@ -59,7 +61,7 @@ impl PathArgs {
 /// The answer for one pose.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PathEntry {
-    /// The line of the pose in its file, counted from 1.
+    /// The number of the line of the pose, counted from 1.
     pub(crate) line: u64,
     pub(crate) time: Option<f64>,
     pub(crate) verdict: PathVerdict,
@@ -67,12 +69,12 @@ pub(crate) struct PathEntry {
     pub(crate) reason: Option<&'static str>,
     /// Bounds of the distance, lower and upper, in world units.
     pub(crate) clearance: Option<[f64; 2]>,
-    /// The witness of a contact, else the nearest place on a.
+    /// The witness of a contact, or else the nearest point on a.
     pub(crate) place: Option<[f64; 3]>,
     pub(crate) micros: f64,
 }
 
-/// A verdict, ordered from the best to the worst news.
+/// A verdict, in ascending order of severity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum PathVerdict {
     Separated,
@@ -90,15 +92,15 @@ impl PathVerdict {
     }
 }
 
-/// Gathers the answers along a path. Keeps them all only for a plot.
+/// Collects the answers along a path. All answers are kept only if there is a plot.
 pub(crate) struct PathLog<'a> {
     csv: Option<(PathBuf, &'a mut (dyn Write + 'a))>,
     kept: Option<Vec<PathEntry>>,
-    /// Separated, undecided, intersecting.
+    /// The number of separated, undecided and intersecting poses.
     counts: [u64; 3],
     /// The first contact.
     first: Option<PathEntry>,
-    /// The pose of least clearance of those that are apart.
+    /// The separated pose with the smallest clearance.
     least: Option<PathEntry>,
 }
 
@@ -138,7 +140,8 @@ impl<'a> PathLog<'a> {
         Ok(())
     }
 
-    /// Draws the plot, if one is wanted, of scans with these names; `margin` as in the question.
+    /// Draws the plot, if there is one. `names` are those of the scans, `margin` is that of the
+    /// queries.
     pub(crate) fn draw(&self, args: &PathArgs, names: &[String; 2], margin: f64) -> Result<(), CliError> {
         match (&args.plot, &self.kept) {
             (Some(path), Some(kept)) => PathPlot { names, margin }.save(path, kept),
@@ -146,28 +149,29 @@ impl<'a> PathLog<'a> {
         }
     }
 
-    /// Returns the summary for people. Places are told to the nearest `unit`.
+    /// Returns the summary as a sentence, with points rounded to `unit`.
     pub(crate) fn summary(&self, unit: f64) -> String {
         let [apart, unknown, touching] = self.counts;
         let total = count(apart + unknown + touching, "pose");
-        let mut text = format!("{total}: {touching} touch");
-        if let Some(first) = &self.first {
-            text += &format!(" (first on {})", first.where_found(unit));
-        }
-        text += &format!(", {apart} apart");
-        if unknown > 0 {
-            text += &format!(", {unknown} undecided");
-        }
-        text.push('.');
+        let first = self.first.as_ref().map(|first| format!(" (first on {})", first.where_found(unit)));
+        let verb = if touching == 1 { "touches" } else { "touch" };
+        let counts = [
+            (touching, format!("{verb}{}", first.unwrap_or_default())),
+            (apart, "apart".to_owned()),
+            (unknown, "undecided".to_owned()),
+        ];
+        let counts = counts.into_iter().filter(|(n, _)| *n > 0);
+        let counts: Vec<String> = counts.map(|(n, verdict)| format!("{n} {verdict}")).collect();
+        let mut text = format!("{total}: {}.", counts.join(", "));
         if let Some(PathEntry { clearance: Some(bounds), .. }) = &self.least {
             let where_found = self.least.as_ref().map(|least| least.where_found(unit)).unwrap_or_default();
-            text += &format!(" Least clearance of those apart: {}, on {where_found}.", between(*bounds));
+            text += &format!(" Smallest clearance without contact: {}, on {where_found}.", between(*bounds));
         }
         text
     }
 }
 
-/// Returns a clearance in words.
+/// Returns the bounds of a clearance as text.
 fn between([lower, upper]: [f64; 2]) -> String {
     match (short(lower.max(0.0)), short(upper)) {
         (lower, upper) if lower == upper => upper,
@@ -183,7 +187,7 @@ impl PathEntry {
         format!("line {}{time}{at}", self.line)
     }
 
-    /// Returns the row of the table; what is unknown is empty.
+    /// Returns the row of the table; unknown values are empty.
     fn row(&self) -> String {
         let number = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
         let [lower, upper] = [0, 1].map(|k| number(self.clearance.map(|bounds| bounds[k])));

@@ -1,4 +1,4 @@
-//! A plot, as SVG, of clearance and verdict over a path of poses.
+//! An SVG plot of clearance and verdict along a path of poses.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -14,10 +14,10 @@ const SIZE: [f64; 2] = [960.0, 360.0];
 /// The left, right, top and bottom of the plot area.
 const AREA: [f64; 4] = [72.0, 944.0, 40.0, 268.0];
 
-/// The height of the strip of verdicts below the plot area, and its distance from it.
+/// The height of the strip of verdicts, and its distance from the plot area above.
 const STRIP: [f64; 2] = [14.0, 8.0];
 
-/// More poses than columns share columns.
+/// The largest number of columns; if there are more poses, several share a column.
 const COLUMNS: usize = 800;
 
 const CLEARANCE: &str = "#1f6fb2";
@@ -33,24 +33,24 @@ fn colour(verdict: PathVerdict) -> &'static str {
     }
 }
 
-/// What the plot shows beside the answers.
+/// The settings of the plot.
 #[derive(Debug)]
 pub(crate) struct PathPlot<'a> {
     /// The names of both scans.
     pub(crate) names: &'a [String; 2],
-    /// Distances below it count as contact.
+    /// The distance below which scans count as touching.
     pub(crate) margin: f64,
 }
 
-/// The answers that share a column.
+/// A summary of the answers that share a column.
 #[derive(Debug, Clone, Copy)]
 struct Column {
-    /// The places of its first and last answer along the horizontal axis.
+    /// The coordinates of its first and last answer on the horizontal axis.
     from: f64,
     to: f64,
-    /// The least lower and the least upper bound.
+    /// The smallest lower and the smallest upper bound.
     clearance: Option<[f64; 2]>,
-    /// The worst one.
+    /// The most severe verdict.
     verdict: PathVerdict,
 }
 
@@ -188,8 +188,8 @@ impl PathPlot<'_> {
     }
 }
 
-/// Returns the name of the horizontal axis and the columns. The axis is time where every pose has one and
-/// times do not go back, else the number of the line.
+/// Returns the name of the horizontal axis and the columns. The axis is the time if every pose has
+/// one and times do not decrease, and the number of the line otherwise.
 fn columns(entries: &[PathEntry]) -> (&'static str, Vec<Column>) {
     let has_times = entries.iter().all(|entry| entry.time.is_some_and(f64::is_finite))
         && entries.windows(2).all(|pair| pair[0].time <= pair[1].time);
@@ -211,7 +211,8 @@ fn columns(entries: &[PathEntry]) -> (&'static str, Vec<Column>) {
     (if has_times { "time" } else { "line" }, columns.collect())
 }
 
-/// Returns a step of 1, 2 or 5 times a power of ten, and how many of them reach `highest`: 3 to 8.
+/// Returns a step of 1, 2 or 5 times a power of ten, and the number of steps, 3 to 8, that reach
+/// `highest`.
 fn ticks(highest: f64) -> (f64, u32) {
     if highest <= 0.0 || !highest.is_finite() {
         return (1.0, 1);
@@ -224,13 +225,13 @@ fn ticks(highest: f64) -> (f64, u32) {
     (step, count)
 }
 
-/// Returns a place on the horizontal axis without needless digits.
+/// Formats a coordinate of the horizontal axis, without trailing zeros.
 fn place(x: f64) -> String {
     let text = format!("{x:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Returns text as it may stand in SVG.
+/// Escapes text for SVG.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

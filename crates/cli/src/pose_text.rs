@@ -1,5 +1,4 @@
-//! Poses as text: on the command line, and on the lines of a file, in the formats that robots and trackers
-//! write.
+//! Poses as text, on the command line and in files, in the formats that robots and trackers write.
 
 use nearmiss::Pose;
 use serde::Deserialize;
@@ -12,12 +11,12 @@ const NORM_TOLERANCE: f64 = 0.01;
 
 /// The forms of a pose, for messages.
 pub(crate) const FORMS: &str =
-    "16 (a row-major 4×4 matrix), 12 (its first three rows) or 7 (x y z qx qy qz qw)";
+    "16 numbers (a row-major 4×4 matrix), 12 (its first three rows) or 7 (x y z qx qy qz qw)";
 
 /// The formats of a file of poses, for messages.
 pub(crate) const FILE_FORMS: &str = r#"a line is {"a":[…],"b":[…]} (either may be left out) or the pose of b alone: 16, 12 or 7 numbers, or 8 with the time first (TUM), or columns named x,y,z,qx,qy,qz,qw"#;
 
-/// Returns the matrix that 16, 12 or 7 numbers stand for.
+/// Returns the matrix given by 16, 12 or 7 numbers.
 pub(crate) fn from_numbers(numbers: &[f64]) -> Result<Matrix, String> {
     if let Ok(matrix) = numbers.try_into() {
         return Ok(matrix);
@@ -30,19 +29,20 @@ pub(crate) fn from_numbers(numbers: &[f64]) -> Result<Matrix, String> {
     if let Ok(&[x, y, z, qx, qy, qz, qw]) = <&[f64; 7]>::try_from(numbers) {
         return from_quaternion([x, y, z], [qx, qy, qz, qw]);
     }
-    Err(format!("expected {FORMS} numbers, got {}", numbers.len()))
+    Err(format!("expected {FORMS}, got {}", numbers.len()))
 }
 
 fn from_quaternion(translation: [f64; 3], quaternion: [f64; 4]) -> Result<Matrix, String> {
     let norm = quaternion.iter().map(|q| q * q).sum::<f64>().sqrt();
-    // NaN is refused as well.
+    // The comparison also rejects NaN.
     if (norm - 1.0).abs() <= NORM_TOLERANCE {
         return Ok(Pose::new(translation, quaternion).to_row_major());
     }
     Err(format!("expected a unit quaternion in the order qx qy qz qw, got one of norm {norm:.3}"))
 }
 
-/// Reads one pose: 16, 12 or 7 numbers divided by spaces, commas or semicolons, brackets allowed.
+/// Parses one pose: 16, 12 or 7 numbers separated by spaces, commas or semicolons, with optional
+/// brackets.
 pub(crate) fn parse(text: &str) -> Result<Matrix, String> {
     from_numbers(&numbers(&text.replace(['[', ']'], " "))?)
 }
@@ -56,12 +56,12 @@ fn number(piece: &str) -> Result<f64, String> {
     piece.parse().map_err(|_not_a_number| format!("expected a number, got `{}`", shown()))
 }
 
-/// What a line of a file says about the poses of a query.
+/// The poses of a query as given on one line of a file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PoseRow {
-    /// Of a and b; `None` where the line does not give one.
+    /// The matrices of a and b; `None` for those that the line leaves out.
     pub(crate) matrices: [Option<Matrix>; 2],
-    /// The time of the pose, in the file's unit.
+    /// The time of the pose, in the unit of the file.
     pub(crate) time: Option<f64>,
 }
 
@@ -71,19 +71,19 @@ impl PoseRow {
     }
 }
 
-/// The format of a file of poses, which its first line shows.
+/// The format of a file of poses, detected from its first line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum PoseFormat {
-    /// An object of JSON, or an array, a line.
+    /// A JSON object or array on each line.
     Json,
-    /// So many numbers a line, the first of 8 being the time.
+    /// This number of numbers on each line; of 8 numbers, the first is the time.
     Numbers(usize),
-    /// Named columns; the first line is no pose.
+    /// Named columns; the first line is the header.
     Columns(Columns),
 }
 
 impl PoseFormat {
-    /// Tells the format by the first line that is neither blank nor a comment.
+    /// Detects the format from the first line that is neither blank nor a comment.
     pub(crate) fn of(first: &str) -> Result<Self, String> {
         if first.starts_with(['{', '[']) {
             return Ok(Self::Json);
@@ -107,7 +107,7 @@ impl PoseFormat {
         matches!(self, Self::Columns(_))
     }
 
-    /// Reads a line of this format.
+    /// Parses a line of this format.
     pub(crate) fn read(&self, line: &str) -> Result<PoseRow, String> {
         match self {
             Self::Json => json(line),
@@ -129,7 +129,7 @@ impl PoseFormat {
     }
 }
 
-/// The numbers of a pose in JSON: in a row, or row by row.
+/// The numbers of a pose in JSON, flat or in rows.
 #[derive(Debug, Deserialize)]
 #[serde(untagged, expecting = "expected the numbers of a pose: [16, 12 or 7 numbers], or 4 or 3 rows of 4")]
 enum JsonPose {
@@ -178,12 +178,12 @@ fn json(line: &str) -> Result<PoseRow, String> {
     Ok(PoseRow { matrices, time: row.time })
 }
 
-/// Where the columns of a table of poses are.
+/// The positions of the columns in a table of poses.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Columns {
     divider: Option<char>,
     count: usize,
-    /// x, y, z, qx, qy, qz, qw.
+    /// The positions of x, y, z, qx, qy, qz and qw.
     pose: [usize; 7],
     time: Option<usize>,
 }
@@ -192,16 +192,16 @@ pub(crate) struct Columns {
 const POSE_COLUMNS: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 
 impl Columns {
-    /// Finds the columns by the names in a header.
+    /// Finds the columns by their names in a header.
     fn of(header: &str) -> Result<Self, String> {
-        // Empty cells count only where something other than space divides.
+        // Empty cells exist only if the separator is not white space.
         let divider = [',', ';', '\t'].into_iter().find(|&divider| header.contains(divider));
         let names: Vec<Option<&str>> = split(header, divider).map(meaning).collect();
         let find = |name: &str| names.iter().position(|found| *found == Some(name));
         let missing: Vec<&str> = POSE_COLUMNS.into_iter().filter(|&column| find(column).is_none()).collect();
         if !missing.is_empty() {
             return Err(format!(
-                "expected columns x, y, z, qx, qy, qz, qw, found none for {}",
+                "expected columns x, y, z, qx, qy, qz and qw, got none for {}",
                 missing.join(", ")
             ));
         }
@@ -218,13 +218,13 @@ impl Columns {
         for ((slot, &column), name) in pose.iter_mut().zip(&self.pose).zip(POSE_COLUMNS) {
             *slot = number(cells[column]).map_err(|what| format!("column {name}: {what}"))?;
         }
-        // Times may be dates; these are left out.
+        // A time that is not a number, such as a date, is ignored.
         let time = self.time.and_then(|column| cells[column].parse().ok());
         Ok(PoseRow::of_b(from_numbers(&pose)?, time))
     }
 }
 
-/// The cells of a line.
+/// Returns the cells of a line.
 fn split(line: &str, divider: Option<char>) -> impl Iterator<Item = &str> {
     let by_divider = divider.map(|divider| line.split(divider));
     let by_space = divider.is_none().then(|| line.split_whitespace());
@@ -235,8 +235,8 @@ fn split(line: &str, divider: Option<char>) -> impl Iterator<Item = &str> {
         .map(|cell| cell.trim().trim_matches('"'))
 }
 
-/// The column that a name means, as `x`, `tx`, `pos_x`, `pose.position.x`, `qx`, `rot_x`,
-/// `pose.orientation.x`.
+/// Returns the column that a name stands for. Names may be `x`, `tx`, `pos_x`, `pose.position.x`,
+/// `qx`, `rot_x`, `pose.orientation.x` and the like.
 fn meaning(name: &str) -> Option<&'static str> {
     let name = name.to_ascii_lowercase();
     let words: Vec<&str> =
@@ -319,11 +319,11 @@ mod tests {
         for (text, what) in [
             ("1 2 3", "expected 7, 8, 12 or 16 numbers, got 3"),
             ("1 2 3 0 0 0 x", "expected a number, got `x`"),
-            ("time,x,y,z,roll,pitch,yaw", "found none for qx, qy, qz, qw"),
+            ("time,x,y,z,roll,pitch,yaw", "got none for qx, qy, qz, qw"),
             ("1 2 3 1 1 1 1", "expected a unit quaternion in the order qx qy qz qw, got one of norm 2.000"),
             ("1 2 3 nan 0 0 1", "expected a unit quaternion"),
             ("{\"c\":1}", "expected `a`, `b` or both, got neither"),
-            ("{\"b\":[1,2]}", "`b`: expected 16 (a row-major 4×4 matrix)"),
+            ("{\"b\":[1,2]}", "`b`: expected 16 numbers (a row-major 4×4 matrix)"),
             ("{\"b\":3}", "column 7: expected the numbers of a pose"),
             ("{\"b\":", "column 5: EOF"),
         ] {

@@ -63,10 +63,10 @@ pub struct PosesArgs {
     pub verify: bool,
 }
 
-/// Distances of a sweep: 0, 0.25, … 3.
+/// The number of distances of a sweep: 0, 0.25, … 3.
 const DISTANCES: u32 = 13;
 
-/// Between two of them.
+/// The step between the distances of a sweep.
 const STEP: f64 = 0.25;
 
 /// A line of the file.
@@ -76,12 +76,12 @@ struct Line {
     b: [f64; 16],
     /// The distance of the centres.
     d: f64,
-    /// The shift from first contact, positive apart.
+    /// The shift from first contact; positive if the scans are apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     offset: Option<f64>,
 }
 
-/// The world in which poses are made, and the way back to that of the file.
+/// The world in which poses are generated, and the transform back to the world of the file.
 #[derive(Debug)]
 struct Stage {
     /// The poses of a, and of b before it is turned and moved.
@@ -93,10 +93,10 @@ struct Stage {
 }
 
 impl Stage {
-    /// Fails for scans without extent.
+    /// Creates the stage. Fails for scans without an extent.
     fn new(args: &PosesArgs, [a, b]: [&Scan; 2]) -> Result<Self, CliError> {
         let base = |path: &PathBuf, scan| {
-            let what = "all points are at one place, so the scan has no size; poses need one with an extent";
+            let what = "expected a scan with an extent, got points at one place only";
             normalised(scan).ok_or_else(|| CliError::Unfit { path: path.clone(), what: what.into() })
         };
         let [base_a, base_b] = [base(&args.a, a)?, base(&args.b, b)?];
@@ -108,7 +108,7 @@ impl Stage {
         Ok(Self { bases: [base_a, resized], size_of_b, back: Some(base_a.inverse()) })
     }
 
-    /// Returns the line for a pose of b and the lengths that go with it.
+    /// Returns the line of the file for a pose of b, a distance and an offset.
     fn line(&self, b: &Pose, d: f64, offset: Option<f64>) -> Line {
         match &self.back {
             None => Line { a: self.bases[0].to_row_major(), b: b.to_row_major(), d, offset },
@@ -154,7 +154,7 @@ fn write(args: &PosesArgs, mut lines: impl Iterator<Item = Line>) -> Result<(), 
     })
 }
 
-/// Poses of a second copy, scaled like the first by `base`: so many at each distance of the sweep.
+/// Returns the poses of b in a sweep, `per_distance` at each distance. `base` scales and centres b.
 pub(crate) fn sweep(per_distance: u32, seed: u64, base: &Pose) -> impl Iterator<Item = Pose> {
     (0..u64::from(DISTANCES) * u64::from(per_distance)).map(move |i| {
         let (turn, direction) = placement(&mut rng(seed, i));
@@ -162,14 +162,14 @@ pub(crate) fn sweep(per_distance: u32, seed: u64, base: &Pose) -> impl Iterator<
     })
 }
 
-/// The distance of the `i`-th pose of a sweep.
+/// Returns the distance of the `i`-th pose of a sweep.
 #[expect(clippy::cast_precision_loss, reason = "0 to 12")]
 fn distance(i: u64, per_distance: u32) -> f64 {
     (i / u64::from(per_distance)) as f64 * STEP
 }
 
-/// Scale and shift that make the longest side of the bounds 2, and centre them; none for bounds without
-/// extent.
+/// Returns the pose that centres the bounds of a scan and scales their longest side to 2, or `None`
+/// for bounds without an extent.
 pub(crate) fn normalised(scan: &Scan) -> Option<Pose> {
     let bounds = scan.bounds();
     let scale = 1.0 / bounds.half_extents().into_iter().fold(0.0, f64::max);
@@ -178,21 +178,22 @@ pub(crate) fn normalised(scan: &Scan) -> Option<Pose> {
         .then(|| Pose::IDENTITY.with_scale(scale).with_translation(centre.map(|c| -c * scale)))
 }
 
-/// b turned and at distance `d`.
+/// Returns the pose of b, turned and at distance `d`.
 fn at(turn: &Pose, direction: [f64; 3], d: f64, base: &Pose) -> Pose {
     turn.with_translation(direction.map(|c| c * d)).after(base)
 }
 
-/// The generator of the `i`-th pose, so that poses can be made in any order.
+/// Returns the random generator of the `i`-th pose. Each pose has its own, so poses can be
+/// generated in any order.
 fn rng(seed: u64, i: u64) -> Xoshiro256PlusPlus {
-    // Consecutive states of a generator of its own, so that seeds 0 and 1 share no pose.
+    // The key comes from a generator too, so that seeds 0 and 1 share no pose.
     let mut of_seed = Xoshiro256PlusPlus::seed_from_u64(seed);
     let key: u64 = of_seed.random();
     Xoshiro256PlusPlus::seed_from_u64(key ^ i.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
-/// A uniform rotation (Shoemake, "Uniform random rotations", Graphics Gems III, 1992) and a uniform
-/// direction.
+/// Returns a uniform random rotation (Shoemake, "Uniform random rotations", Graphics Gems III,
+/// 1992) and a uniform random direction.
 fn placement(rng: &mut Xoshiro256PlusPlus) -> (Pose, [f64; 3]) {
     let share: f64 = rng.random();
     let [s, t, phi] = [0; 3].map(|_| rng.random::<f64>() * TAU);
@@ -203,10 +204,10 @@ fn placement(rng: &mut Xoshiro256PlusPlus) -> (Pose, [f64; 3]) {
     (turn, [level * phi.cos(), level * phi.sin(), z])
 }
 
-/// Shifts go as far as this many sampling radii from first touch.
+/// The largest shift from first contact, in sampling radii.
 const FARTHEST: f64 = 10.0;
 
-/// Turns and directions that are tried before it is given up that two scans touch at all.
+/// The number of rotations and directions that are tried before `--near` gives up.
 const TRIES: usize = 200;
 
 fn near(args: &PosesArgs, scans: [&Scan; 2], stage: &Stage, console: Console) -> Result<Vec<Line>, CliError> {
@@ -232,7 +233,7 @@ fn near(args: &PosesArgs, scans: [&Scan; 2], stage: &Stage, console: Console) ->
             path: args.b.clone(),
             what: format!(
                 "expected contact with {}, got none in {TRIES} random directions; check that both scans sample \
-                 surfaces, and are in the same units",
+                 surfaces and have the same units",
                 args.a.display()
             ),
         })

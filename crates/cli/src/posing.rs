@@ -44,17 +44,17 @@ pub struct PairArgs {
 }
 
 impl PairArgs {
-    /// The files.
+    /// Returns the paths of both scans.
     pub(crate) fn inputs(&self) -> [&Path; 2] {
         [&self.a, &self.b]
     }
 
-    /// How the scans are opened.
+    /// Returns the settings for opening the scans.
     pub(crate) fn opening(&self, threads: Option<usize>, console: Console) -> Opening {
         Opening { threads: threads.unwrap_or(0), verify: self.verify, console }
     }
 
-    /// The matrices of both poses.
+    /// Returns the matrices of both poses, with the units applied.
     pub(crate) fn matrices(&self) -> Result<[Matrix; 2], CliError> {
         let [a, b] = [("--pose-a", &self.pose_a), ("--pose-b", &self.pose_b)]
             .map(|(name, given)| from_option(name, given.as_deref()));
@@ -72,24 +72,24 @@ impl PairArgs {
         PoseFile::open(path, fixed, self.factors().unwrap_or([1.0; 2])).map(Some)
     }
 
-    /// A check that asks about units once if the scans differ too much in size.
+    /// Returns a check that warns about units once if the scans differ too much in size.
     pub(crate) fn size_check(&self, console: Console) -> SizeCheck {
         SizeCheck::new(console, self.factors())
     }
 
-    /// The unit of lengths in the world.
+    /// Returns the unit of lengths in the world.
     pub(crate) fn world_unit(&self) -> WorldUnit {
         if self.factors().is_some() { WorldUnit::Metres } else { WorldUnit::OfFile }
     }
 
-    /// The units in metres, if any is given.
+    /// Returns the units in metres if at least one is given.
     fn factors(&self) -> Option<[f64; 2]> {
         let units = [self.units_a, self.units_b];
         units.iter().any(Option::is_some).then(|| units.map(|unit| unit.map_or(1.0, UnitName::metres)))
     }
 }
 
-/// The poses of two scans nearest to the matrices of their options.
+/// Returns the poses nearest to the matrices of `--pose-a` and `--pose-b`.
 pub(crate) fn of_options(matrices: &[Matrix; 2], scans: [&Scan; 2]) -> Result<[Pose; 2], CliError> {
     let placed = |name: &str, side: usize| {
         of_scan(&matrices[side], scans[side])
@@ -114,19 +114,17 @@ pub(crate) fn from_option(option: &str, given: Option<&str>) -> Result<Matrix, C
     if pieces(given).nth(1).is_some() {
         return Err(CliError::Usage(format!("{option}: {what}")));
     }
-    Err(CliError::Usage(format!(
-        "{option}: expected {FORMS} numbers or a file that holds them, got `{given}`"
-    )))
+    Err(CliError::Usage(format!("{option}: expected {FORMS}, or a file that holds them, got `{given}`")))
 }
 
-/// The pose nearest to `matrix`, unless that moves the scan's bounds by more than a tenth of its sampling
-/// radius.
+/// Returns the pose nearest to `matrix`. Fails if it moves the scan's bounds by more than a tenth
+/// of its sampling radius.
 pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseRefused> {
     let row = |i: usize| [matrix[4 * i], matrix[4 * i + 1], matrix[4 * i + 2]];
     let [x, y, z] = [row(0), row(1), row(2)];
     let determinant = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
         + x[2] * (y[0] * z[1] - y[1] * z[0]);
-    // Both in world units, so lengths of the object scale.
+    // In world units, so the sampling radius is scaled as the object is.
     let tolerance = 0.1 * scan.sampling_radius() * determinant.abs().cbrt();
     Pose::from_row_major(matrix, scan.bounds(), tolerance).map_err(|cause| {
         let last_column = [3, 7, 11, 15].map(|i| matrix[i]);
@@ -138,21 +136,22 @@ pub(crate) fn of_scan(matrix: &Matrix, scan: &Scan) -> Result<Pose, PoseRefused>
 /// The poses of a query, from a line of a file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Posed {
-    /// Of a and b.
+    /// The poses of a and b.
     pub(crate) poses: [Pose; 2],
     /// The time of the line, if it has one.
     pub(crate) time: Option<f64>,
 }
 
-/// A file with the poses of a query on each line. Lines are read in order; they can be parsed by many threads.
+/// A file with the poses of one query on each line. Lines are read in order, but can be parsed on
+/// many threads.
 #[derive(Debug)]
 pub(crate) struct PoseFile {
     lines: TextLines,
-    /// Known from the first line on.
+    /// The format, once the first line has been read.
     format: Option<PoseFormat>,
-    /// No line with poses has been met so far.
+    /// `true` until a line with poses has been read.
     is_empty: bool,
-    /// The poses of the command line, for what lines leave out.
+    /// The poses given on the command line, for scans whose pose lines leave out.
     fixed: [Option<Matrix>; 2],
     /// The units of both scans in metres.
     factors: [f64; 2],
@@ -189,7 +188,7 @@ impl PoseFile {
         }
     }
 
-    /// Returns the poses on a line of this number and text.
+    /// Parses the poses on line `number`, whose text is `text`.
     pub(crate) fn poses(&self, number: u64, text: &str, scans: [&Scan; 2]) -> Result<Posed, CliError> {
         let format = self.format.as_ref().unwrap_or(&PoseFormat::Json);
         let row = format.read(text).map_err(|what| self.lines.fault_on(number, what))?;
@@ -197,7 +196,9 @@ impl PoseFile {
             let name = ["a", "b"][side];
             let matrix = match (row.matrices[side], self.fixed[side]) {
                 (Some(_), Some(_)) => {
-                    return Err(format!("the line has a pose of {name}, and --pose-{name} is given as well"));
+                    return Err(format!(
+                        "expected one pose of {name}, got one here and one in --pose-{name}; leave one out"
+                    ));
                 }
                 (Some(matrix), None) => matrix,
                 (None, Some(fixed)) => fixed,

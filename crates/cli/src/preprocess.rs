@@ -1,4 +1,4 @@
-//! `preprocess`: build once, save to disk.
+//! `preprocess`: prepares a scan and saves it.
 
 mod args;
 mod on_disk;
@@ -7,6 +7,7 @@ mod outcome;
 use nearmiss::Workspace;
 
 use crate::console::{Console, now};
+use crate::digits::count;
 use crate::error::CliError;
 use crate::estimate::{Forecast, Preparation};
 use crate::eval::KernelName;
@@ -29,7 +30,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
         Plan::InMemory { is_announced } => is_announced,
         Plan::OnDisk { memory, points } => return on_disk::run(args, memory, points, console),
     };
-    // Clears up after a run on disk that was killed.
+    // Removes the files of a killed run on disk.
     Workspace::clear(&output::work_folder(&args.output));
     let start = now();
     let bar = console.spinner(format_args!("reading {name}"));
@@ -44,7 +45,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     }
 
     let start = now();
-    let bar = console.spinner(format_args!("preparing {} points", model.cloud.len()));
+    let bar = console.spinner(format_args!("preparing {}", count(model.cloud.len() as u64, "point")));
     let scan = input::build(&args.input, &model, &options(args))?;
     drop(bar);
     let hierarchy = start.elapsed().as_secs_f64();
@@ -52,7 +53,8 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     let start = now();
     let scan = match graph_options(args) {
         Some((options, scanner)) => {
-            let _bar = console.spinner(format_args!("joining {} points", scan.len()));
+            let _bar =
+                console.spinner(format_args!("building the graph of {}", count(scan.len() as u64, "point")));
             let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build();
             let pool = pool.or(Err(CliError::Threads(args.threads)))?;
             pool.install(|| {
@@ -72,7 +74,7 @@ pub(crate) fn run(args: &PreprocessArgs) -> Result<(), CliError> {
     tell(args, &scan, report, Seconds { read, hierarchy, graph, write })
 }
 
-/// What to expect of the preparation.
+/// Returns the forecast of memory and time.
 fn forecast(args: &PreprocessArgs, console: Console) -> Forecast<'_> {
     let preparation = match (args.wants_graph(), args.wants_close_pairs(), args.kernel) {
         (false, ..) => Preparation::Hierarchy,
@@ -85,15 +87,16 @@ fn forecast(args: &PreprocessArgs, console: Console) -> Forecast<'_> {
     Forecast { path: &args.input, limit, threads, console, preparation, filters_on_disk }
 }
 
-/// How points are prepared.
+/// The way in which points are prepared.
 enum Plan {
-    /// In memory; a long run may have been announced.
+    /// In memory. `is_announced` is `true` if a long run would have been announced by now.
     InMemory { is_announced: bool },
-    /// So many points, within so many bytes, because they do not fit into that.
+    /// On disk, because the points do not fit into `memory` bytes.
     OnDisk { memory: u64, points: u64 },
 }
 
-/// Finds out whether the input fits into memory, as far as its header and length tell, before it is read.
+/// Chooses the plan from the header and the length of the input, before it is read. Fails if the
+/// input does not fit into memory.
 fn foresee(args: &PreprocessArgs, forecast: &Forecast<'_>) -> Result<Plan, CliError> {
     input::check_raw(&args.input)?;
     let unknown = Plan::InMemory { is_announced: false };
@@ -103,7 +106,7 @@ fn foresee(args: &PreprocessArgs, forecast: &Forecast<'_>) -> Result<Plan, CliEr
     }
     forecast.check_reading(seen.points, seen.bytes)?;
     if !args.filters.is_empty() {
-        // How many points stay is known once they are filtered.
+        // The number of points that are kept is not known before they are filtered.
         return Ok(unknown);
     }
     forecast.check_preparing(seen.points, seen.bounds.as_ref())?;

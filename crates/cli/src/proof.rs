@@ -1,4 +1,4 @@
-//! What answers rest on, a line of JSON each, for a checker that shares nothing with the search.
+//! The proofs of answers, one line of JSON each, for an independent checker.
 
 use std::io::{self, Write};
 use std::ops::Range;
@@ -13,27 +13,29 @@ use crate::report::word;
 /// A line of the file.
 #[derive(Serialize)]
 struct Line {
-    /// Line of the file of poses, or 0.
+    /// The line in the file of poses, or 0 without one.
     query: u64,
-    /// From stored positions to the world, row-major, as the search placed the scans.
+    /// The row-major matrix that the search used from stored positions of a to the world.
     placed_a: [f64; 16],
+    /// The same for b.
     placed_b: [f64; 16],
     margin: f64,
-    /// What is enclosed: `obstacle`, `surface`, or `points`.
+    /// The set that is enclosed: `obstacle`, `surface`, or `points`.
     semantics: &'static str,
     verdict: &'static str,
     evidence: Option<&'static str>,
     gap: Option<f64>,
     witness: Option<[f64; 3]>,
     residual: Option<f64>,
-    /// The nodes of the pairs, each once.
+    /// The nodes of a in the pairs, without duplicates.
     nodes_a: Vec<Enclosure>,
+    /// The same for b.
     nodes_b: Vec<Enclosure>,
-    /// Indices into the two lists.
+    /// The pairs, as indices into the lists of nodes.
     pairs: Vec<[usize; 2]>,
 }
 
-/// A node: its points, as stored, and its enclosure in the stored frame.
+/// A node: its range of stored points, and its enclosure in the stored frame.
 #[derive(Serialize)]
 struct Enclosure {
     first: usize,
@@ -50,7 +52,7 @@ impl Enclosure {
     }
 }
 
-/// Writes what `answer` to a question with these `options` rests on.
+/// Writes the proof of `answer`, the answer to a query with these `options`.
 pub(crate) fn write(
     out: &mut impl Write,
     query: u64,
@@ -92,7 +94,7 @@ pub(crate) fn write(
     out.write_all(b"\n")
 }
 
-/// The nodes of these ids, each once, and where each id is among them.
+/// Returns the enclosures of the distinct nodes in `ids`, and the index of each id among them.
 fn nodes(
     view: &Placed<'_>,
     of: Semantics,

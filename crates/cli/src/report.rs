@@ -1,4 +1,4 @@
-//! Results: the fields of the JSON lines, and the same as text.
+//! Results, as JSON and as text.
 
 use nearmiss::graph::ClosePairs;
 use nearmiss::{
@@ -8,39 +8,40 @@ use nearmiss::{
 use serde::Serialize;
 
 use crate::contacts::{GroupReport, Grouped};
-use crate::digits::{bytes, count, percent, place, short};
+use crate::digits::{bytes, count, counts, percent, place, short, work};
 use crate::filters::Filtered;
 use crate::health::Health;
 
-/// What a prepared scan holds.
+/// The description of a prepared scan.
 #[derive(Debug, Serialize)]
 pub(crate) struct ScanReport {
     points: usize,
     dropped: DroppedReport,
     bounds: [[f64; 3]; 2],
-    /// That the discs, and what is about them, are for.
+    /// The metric of the kernel that the scan was prepared for.
     kernel: Metric,
     sampling_radius: f64,
-    /// No gap wider than this is bridged, and no local radius exceeds it.
+    /// The widest gap that is bridged, and the upper limit of local radii.
     reach: f64,
-    /// The median, as `horizon`.
+    /// The bandwidth at the median local radius.
     bandwidth: f64,
+    /// The support radius at the median local radius.
     horizon: f64,
     support_min: u32,
     nodes: usize,
     leaves: usize,
     depth_mean: f64,
     bytes: u64,
-    /// Of what nodes take; what points do is not in it.
+    /// Bytes of the nodes, without those of the points, per node.
     bytes_per_node: f64,
     usable: f64,
     kinds: KindsReport,
     pub(crate) health: Health,
-    /// If there is one.
+    /// The description of the graph, if there is one.
     graph: Option<GraphReport>,
 }
 
-/// What a graph holds.
+/// The description of a graph.
 #[derive(Debug, Serialize)]
 struct GraphReport {
     edges: usize,
@@ -48,11 +49,11 @@ struct GraphReport {
     components: usize,
     close_pairs: usize,
     border: f64,
-    /// Share of the points whose normals are on one side for certain.
+    /// Share of the points whose normals are oriented with certainty.
     oriented: f64,
 }
 
-/// From this confidence on a normal's side is certain.
+/// The confidence from which on the orientation of a normal counts as certain.
 const CERTAIN: u8 = 128;
 
 impl GraphReport {
@@ -76,15 +77,15 @@ impl GraphReport {
 struct DroppedReport {
     not_finite: usize,
     duplicate: usize,
-    /// By all filters together, if any were applied.
+    /// Points removed by all filters together, if any were applied.
     #[serde(skip_serializing_if = "Option::is_none")]
     filtered: Option<usize>,
-    /// By each filter, of `preprocess` only.
+    /// Points removed by each filter; of `preprocess` only.
     #[serde(flatten)]
     by_filter: Filtered,
 }
 
-/// Shares of the points of each kind; together 1.
+/// Shares of the points of each kind, which add up to 1.
 #[derive(Debug, Serialize)]
 struct KindsReport {
     sheet: f64,
@@ -103,7 +104,7 @@ impl KindsReport {
 }
 
 impl ScanReport {
-    /// Of a scan that takes `bytes` in its file.
+    /// Creates the description of a scan whose file has `bytes` bytes.
     #[expect(clippy::cast_precision_loss, reason = "statistics")]
     pub(crate) fn new(scan: &Scan, bytes: u64) -> Self {
         let scale = scan.frame().scale;
@@ -137,26 +138,26 @@ impl ScanReport {
         }
     }
 
-    /// The same with the numbers of points that filters removed.
+    /// Adds the numbers of points that filters removed.
     pub(crate) fn with_filtered(mut self, filtered: Filtered) -> Self {
         self.dropped.by_filter = filtered;
         self
     }
 
-    /// The same for people, some lines.
+    /// Returns the description as lines of text.
     #[expect(clippy::cast_precision_loss, reason = "statistics")]
     pub(crate) fn lines(&self) -> Vec<String> {
         let unit = self.sampling_radius / 100.0;
         let [min, max] = self.bounds.map(|p| place(p, unit));
         let DroppedReport { not_finite, duplicate, filtered, .. } = self.dropped;
-        let filtered = filtered.map_or(String::new(), |n| format!("; {n} removed by filters"));
+        let dropped = counts([(duplicate as u64, "duplicate"), (not_finite as u64, "non-finite point")]);
+        let dropped =
+            Some(dropped).filter(|dropped| !dropped.is_empty()).map(|dropped| format!("{dropped} dropped"));
+        let filtered = filtered.map(|n| format!("{n} removed by filters"));
+        let without: Vec<String> = dropped.into_iter().chain(filtered).collect();
+        let without = if without.is_empty() { String::new() } else { format!(" ({})", without.join("; ")) };
         vec![
-            format!(
-                "points     {} ({} and {} dropped{filtered})",
-                self.points,
-                count(duplicate as u64, "duplicate"),
-                count(not_finite as u64, "non-finite point"),
-            ),
+            format!("points     {}{without}", self.points),
             format!("bounds     {min} to {max}"),
             format!(
                 "surface    {} kernel, sampling radius {}, bandwidth {}, support radius {}, minimum support {}",
@@ -167,24 +168,25 @@ impl ScanReport {
                 self.support_min
             ),
             format!(
-                "hierarchy  {} nodes, {} leaves, mean depth {:.1}",
-                self.nodes, self.leaves, self.depth_mean
+                "hierarchy  {}, {}, mean depth {:.1}",
+                count(self.nodes as u64, "node"),
+                count(self.leaves as u64, "leaf"),
+                self.depth_mean
             ),
             self.graph.as_ref().map_or_else(
                 || "graph      none".to_owned(),
                 |graph| {
-                    format!(
-                        "graph      {} edges, {} virtual, {} components, {} close pairs, {} of the normals oriented",
-                        graph.edges,
-                        graph.virtual_edges,
-                        graph.components,
-                        graph.close_pairs,
-                        percent(graph.oriented)
-                    )
+                    let parts = counts([
+                        (graph.edges as u64, "edge"),
+                        (graph.virtual_edges as u64, "virtual edge"),
+                        (graph.components as u64, "component"),
+                        (graph.close_pairs as u64, "close pair"),
+                    ]);
+                    format!("graph      {parts}, {} of the normals oriented", percent(graph.oriented))
                 },
             ),
             format!(
-                "file       {}, {:.0} bytes a point",
+                "file       {}, {:.0} bytes per point",
                 bytes(self.bytes),
                 self.bytes as f64 / self.points as f64
             ),
@@ -192,7 +194,7 @@ impl ScanReport {
     }
 }
 
-/// Number of leaves and their mean depth; the root has depth 0.
+/// Returns the number of leaves and their mean depth. The root has depth 0.
 #[expect(clippy::cast_precision_loss, reason = "statistics")]
 fn leaves(scan: &Scan) -> (usize, f64) {
     let depths = depths(scan);
@@ -201,10 +203,11 @@ fn leaves(scan: &Scan) -> (usize, f64) {
     (of_leaves.len(), sum as f64 / of_leaves.len() as f64)
 }
 
-/// The depth of each node, at most 32. Parents come before their children.
+/// Returns the depth of each node, at most 32.
 pub(crate) fn depths(scan: &Scan) -> Vec<u8> {
     let topology = scan.topology();
     let mut depths = vec![0; topology.len()];
+    // Parents come before their children.
     for id in topology.ids().take(topology.inner()) {
         let below = depths[id.index()] + 1;
         for child in topology.children(id).iter() {
@@ -214,17 +217,17 @@ pub(crate) fn depths(scan: &Scan) -> Vec<u8> {
     depths
 }
 
-/// The middle value, or the mean of the two in the middle. Copies nothing: there may be more values than fit
-/// into memory twice.
+/// Returns the median: the middle value, or the mean of the two in the middle. Copies nothing,
+/// because there may be more values than fit into memory twice.
 pub(crate) fn median(values: &[f32]) -> f32 {
     let upper = ranked(values, values.len() / 2);
     if values.len() % 2 == 1 { upper } else { 0.5 * (ranked(values, values.len() / 2 - 1) + upper) }
 }
 
-/// The value of this rank, counted from 0, by two passes that count halves of the values' bits.
+/// Returns the value of a rank, counted from 0, by radix selection in two passes of 16 bits.
 fn ranked(values: &[f32], rank: usize) -> f32 {
     const SIGN: u32 = 1 << 31;
-    // Of the order of the values: negative ones come first, the largest in magnitude before the others.
+    // Keys have the order of the values, because the bits of negative values are inverted.
     let key = |value: &f32| {
         let bits = value.to_bits();
         if bits & SIGN == 0 { bits | SIGN } else { !bits }
@@ -236,7 +239,8 @@ fn ranked(values: &[f32], rank: usize) -> f32 {
     f32::from_bits(if key & SIGN == 0 { !key } else { key & !SIGN })
 }
 
-/// Of numbers below 2¹⁶ the one of this rank, and its rank among those that are equal to it.
+/// Returns the number of a rank among numbers below 2¹⁶, and the rank left among the numbers equal
+/// to it.
 fn ranked_half(halves: impl Iterator<Item = u32>, mut rank: usize) -> (u32, usize) {
     let mut counts = vec![0_usize; 1 << 16];
     halves.for_each(|half| counts[half as usize] += 1);
@@ -249,7 +253,7 @@ fn ranked_half(halves: impl Iterator<Item = u32>, mut rank: usize) -> (u32, usiz
     (0, 0)
 }
 
-/// What `collide` answers.
+/// The JSON output of `collide`.
 #[derive(Debug, Serialize)]
 pub(crate) struct AnswerReport {
     verdict: &'static str,
@@ -263,17 +267,18 @@ pub(crate) struct AnswerReport {
     source_b: Option<u32>,
     gap: Option<f64>,
     distance_estimate: Option<f64>,
-    /// Nothing is promised of where the scanned things are within it; null for invalid poses.
+    /// The length up to which the scanned surfaces may deviate from the scans; null for invalid
+    /// poses.
     band: f64,
     likelihood: Option<f64>,
     evaluations: u64,
     node_pairs: u64,
     leaf_pairs: u64,
-    /// Of searches along graphs only.
+    /// Steps of searches along graphs; absent for other searches.
     #[serde(skip_serializing_if = "Option::is_none")]
     neighbour_steps: Option<u64>,
     micros: f64,
-    /// Whether the contacts are all there are.
+    /// `true` if `contacts` lists all contacts.
     #[serde(skip_serializing_if = "Option::is_none")]
     complete: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -286,12 +291,12 @@ pub(crate) struct AnswerReport {
     /// The groups of contacts, the greatest first.
     #[serde(skip_serializing_if = "Option::is_none")]
     clashes: Option<Vec<GroupReport>>,
-    /// The deepest place first.
+    /// The manifold, the deepest point first.
     #[serde(skip_serializing_if = "Option::is_none")]
     manifold: Option<Vec<PlaceReport>>,
 }
 
-/// One place of a manifold.
+/// A point of a manifold.
 #[derive(Debug, Serialize)]
 struct PlaceReport {
     point: [f64; 3],
@@ -308,7 +313,7 @@ impl PlaceReport {
     }
 }
 
-/// One of all contacts.
+/// A contact in the list of all contacts.
 #[derive(Debug, Serialize)]
 struct ContactReport {
     point: [f64; 3],
@@ -396,18 +401,18 @@ impl AnswerReport {
         report
     }
 
-    /// Returns how sure the verdict is, and why there is none.
+    /// Returns the evidence of the verdict, and the reason for an undecided one.
     pub(crate) fn evidence_and_reason(&self) -> (Option<&'static str>, Option<&'static str>) {
         (self.evidence, self.reason)
     }
 
-    /// The same with a manifold.
+    /// Adds a manifold.
     pub(crate) fn with_manifold(self, places: Option<&[ManifoldPoint]>) -> Self {
         let manifold = places.map(|places| places.iter().map(PlaceReport::new).collect());
         Self { manifold, ..self }
     }
 
-    /// The same with the clashes that all contacts are grouped into.
+    /// Returns the report with the clashes into which the contacts are grouped.
     pub(crate) fn with_clashes(mut self, grouped: Option<&(&[Contact], Grouped)>) -> Self {
         if let Some((contacts, grouped)) = grouped {
             self.link = Some(grouped.link);
@@ -419,47 +424,40 @@ impl AnswerReport {
         self
     }
 
-    /// The places of a manifold, if it was asked for, for people.
+    /// Returns a line of text for each point of the manifold, if there is one.
     pub(crate) fn manifold(&self) -> impl Iterator<Item = String> {
         self.manifold.iter().flatten().map(|place| {
             let ([x, y, z], [u, v, w]) = (place.point, place.normal);
-            let depth = if place.gap < 0.0 { "deep" } else { "apart" };
-            format!(
-                "  ({x}, {y}, {z}), {:.4e} {depth}, push a along ({u:.4}, {v:.4}, {w:.4})",
-                place.gap.abs()
-            )
+            let gap = if place.gap < 0.0 { "penetration depth" } else { "gap" };
+            format!("  ({x}, {y}, {z}), {gap} {:.4e}, push a along ({u:.4}, {v:.4}, {w:.4})", place.gap.abs())
         })
     }
 
-    /// All contacts, if they were asked for, for people.
+    /// Returns a line of text for each contact, if all were searched for.
     pub(crate) fn contacts(&self) -> impl Iterator<Item = String> {
         self.contacts.iter().flatten().map(|contact| {
             let [x, y, z] = contact.point;
             let (a, b) = (contact.source_a, contact.source_b);
             format!(
-                "  ({x}, {y}, {z}), between point {a} of a and point {b} of b, to {:.2e}",
+                "  ({x}, {y}, {z}), between point {a} of a and point {b} of b, residual {:.2e}",
                 contact.residual
             )
         })
     }
 
-    /// What it cost, and between which points, for people.
+    /// Returns a line of text with the points of a contact and the work of the search.
     pub(crate) fn details(&self) -> String {
         let between = match (self.source_a, self.source_b) {
-            (Some(a), Some(b)) => format!("between point {a} of a and point {b} of b, counted from 0; "),
+            (Some(a), Some(b)) => format!("between point {a} of a and point {b} of b (counted from 0); "),
             _ => String::new(),
         };
-        let steps = match self.neighbour_steps {
-            None => String::new(),
-            Some(steps) => format!("{} to nearest points, ", count(steps, "step")),
-        };
-        format!(
-            "{between}{}, {}, {}, {steps}{:.1} µs",
-            count(self.node_pairs, "node pair"),
-            count(self.leaf_pairs, "leaf pair"),
-            count(self.evaluations, "evaluation"),
-            self.micros
-        )
+        let counts = [
+            (self.node_pairs, "node pair"),
+            (self.leaf_pairs, "leaf pair"),
+            (self.evaluations, "evaluation"),
+            (self.neighbour_steps.unwrap_or(0), "neighbour step"),
+        ];
+        format!("{between}{}", work(counts, self.micros))
     }
 }
 

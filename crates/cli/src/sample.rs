@@ -1,4 +1,4 @@
-//! `sample`: points on a mesh.
+//! `sample`: samples points on the surface of a mesh.
 
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ pub struct SampleArgs {
     /// Seed; with --spacing, it moves points at random instead of leaving them in rows
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// How much memory may be used
+    /// The memory limit
     #[command(flatten)]
     pub memory: MemoryArgs,
     /// Print one JSON object
@@ -44,7 +44,7 @@ pub struct SampleArgs {
     pub quiet: bool,
 }
 
-/// What `sample` has done.
+/// The JSON output of `sample`.
 #[derive(Debug, Serialize)]
 struct Report {
     points: usize,

@@ -1,4 +1,4 @@
-//! The search options of `collide`: methods, orders, resolution.
+//! The search options of `collide`: methods, orders and resolution.
 
 use clap::{Args, ValueEnum};
 use nearmiss::{
@@ -8,10 +8,10 @@ use nearmiss::{
 use crate::error::CliError;
 use crate::parse::parse_radius;
 
-/// Options of `collide` that say how to search.
+/// Options of `collide` that control the search.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct SearchArgs {
-    /// How leaves are compared
+    /// Method that compares leaves
     ///
     /// `sampling` and `interpolation` compare surfaces alone, as --surface-only does.
     #[arg(long, value_enum, default_value_t = MethodName::Traversal, help_heading = "Research", hide_short_help = true)]
@@ -39,7 +39,7 @@ pub struct SearchArgs {
     /// Source of the second end of a bracket, with `--method interpolation --flat`
     #[arg(long, value_enum, default_value_t = BracketsName::Drawn, help_heading = "Research", hide_short_help = true)]
     pub brackets: BracketsName,
-    /// How a point on both surfaces is found, with `--method interpolation`
+    /// Method that finds a point on both surfaces, with `--method interpolation`
     #[arg(long, value_enum, default_value_t = RefinementName::Newton, help_heading = "Research", hide_short_help = true)]
     pub refinement: RefinementName,
     /// Seed of random points
@@ -58,7 +58,7 @@ pub struct SearchArgs {
     pub resolution: Option<f64>,
 }
 
-/// How leaves are compared, by name.
+/// The names of the methods that compare leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
     /// By the tangent discs of their points
@@ -69,7 +69,7 @@ pub enum MethodName {
     Interpolation,
 }
 
-/// Where the other ends of brackets come from, by name.
+/// The names of the sources of the second end of a bracket.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum BracketsName {
     /// The nearest of the drawn points
@@ -78,7 +78,7 @@ pub enum BracketsName {
     Annulus,
 }
 
-/// How a place on both surfaces is found, by name.
+/// The names of the methods that find a point on both surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RefinementName {
     /// By Newton's method on both
@@ -89,10 +89,11 @@ pub enum RefinementName {
     Grid,
 }
 
-/// How near both surfaces, in sampling radii, a point in a sphere is to come.
+/// The tolerance of `Sphere` and `Grid`: the largest distance from both surfaces, in sampling
+/// radii.
 const IN_A_SPHERE: f64 = 0.1;
 
-/// Surfels adapted to the sampling density are so many sampling radii wide.
+/// The width of surfels adapted to the sampling density, in sampling radii.
 const ADAPTED: f64 = 8.0;
 
 fn parse_surfels(text: &str) -> Result<SurfelSize, String> {
@@ -103,42 +104,42 @@ fn parse_surfels(text: &str) -> Result<SurfelSize, String> {
     count.ok_or_else(|| "expected a number from 1 to 65536, or `adapted`".into())
 }
 
-/// Orders, by name.
+/// The names of the traversal orders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum OrderName {
-    /// Depth first, of siblings the deepest overlap first
+    /// Depth first, with the deepest overlap of siblings first
     Depth,
-    /// Of all pairs those whose boxes overlap most of each other
+    /// Pairs whose boxes overlap most come first
     Overlap,
-    /// Of all pairs those with most sample points on either side of the other surface (section 5.2)
+    /// Pairs with most sample points on either side of the other surface come first (section 5.2)
     Sides,
-    /// The same, weighing with the eigenvalue gap
+    /// The same, weighted by the eigenvalue gap
     SidesByGap,
 }
 
 impl SearchArgs {
-    /// Whether searches go along the scans' graphs.
+    /// Returns `true` if the method searches along the proximity graphs of the scans.
     pub(crate) fn wants_graphs(&self) -> bool {
         self.method == MethodName::Interpolation
     }
 
-    /// Whether the scans have what the method needs.
+    /// Fails if the method needs a proximity graph and a scan has none.
     pub(crate) fn check(&self, a: &Scan, b: &Scan) -> Result<(), CliError> {
         let lacks = |scan: &Scan| scan.graph().is_none();
         if self.wants_graphs() && (lacks(a) || lacks(b)) {
             let which = if lacks(a) { "the first" } else { "the second" };
             return Err(CliError::Usage(format!(
-                "--method interpolation searches along the proximity graph, which {which} scan has not: prepare it with \
-                 --graph, or use --method traversal"
+                "--method interpolation needs scans with a proximity graph, but {which} scan has none; prepare it again \
+                 with `--graph`, or use --method traversal"
             )));
         }
         Ok(())
     }
 
-    /// `options` with these.
+    /// Returns `options` with these options applied. `a` provides the stored density.
     pub(crate) fn apply(&self, options: CollideOptions, a: &Scan) -> Result<CollideOptions, CliError> {
         if self.flat && self.method == MethodName::Traversal {
-            let what = "--flat leaves the hierarchy out of --method sampling or interpolation; say one, or leave --flat out";
+            let what = "--flat needs --method sampling or interpolation, got --method traversal; change the method, or leave out --flat";
             return Err(CliError::Usage(what.into()));
         }
         let sampling = Sampling::default()

@@ -84,7 +84,7 @@ pub(crate) fn bracket(found: &Distance, unit: f64) -> String {
     }
 }
 
-/// Returns what the band means for a contact.
+/// Returns a clause about the gaps that are too small to tell apart from contact.
 pub(crate) fn untold(band: f64) -> String {
     format!("gaps below {} cannot be distinguished from contact", rough(band))
 }
@@ -101,7 +101,8 @@ fn points_apart(contact: &Contact, views: [&Placed<'_>; 2]) -> f64 {
     (at(1) - at(0)).norm()
 }
 
-/// Returns a hint if two scans are further apart than they are large, which is rarely intended.
+/// Returns a hint if the gap between the bounding boxes exceeds the size of both scans, which is
+/// rarely intended.
 pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
     if !answer.verdict.is_separated() {
         return None;
@@ -110,8 +111,12 @@ pub(crate) fn hint(answer: &Answer, views: [&Placed<'_>; 2]) -> Option<String> {
     let apart = (0..3).map(|k| (a.min[k] - b.max[k]).max(b.min[k] - a.max[k]).max(0.0).powi(2)).sum::<f64>();
     let apart = apart.sqrt();
     let size = [a, b].map(|bounds| 2.0 * bounds.half_extents().into_iter().fold(0.0, f64::max));
-    (apart > size[0].max(size[1]))
-        .then(|| format!("hint: their bounds are {} apart; are both in the same frame?", short(apart)))
+    (apart > size[0].max(size[1])).then(|| {
+        format!(
+            "hint: the bounding boxes are {} apart; check the frames and poses of the scans",
+            short(apart)
+        )
+    })
 }
 
 /// Returns the bounds of a posed scan, in world units.
@@ -121,13 +126,14 @@ fn world_bounds(view: &Placed<'_>) -> Aabb {
     Aabb::of(view.scan().bounds().corners().map(|p| view.placed().apply(to_stored(p))))
 }
 
-/// Returns why there is no verdict, and what would help.
+/// Returns the reason for an undecided answer, with remedies.
 pub(crate) fn why(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOptions) -> String {
-    // Only surfaces leave doubts: in obstacles, all other points are balls.
+    // Obstacles are never undecided for lack of samples, because points that sample no surface are
+    // balls.
     let first = match (options.method, options.metric) {
         (_, Some(Metric::Geodesic)) => None,
-        (Method::Traversal, _) => Some("leave --surface-only out"),
-        _ => Some("--method traversal"),
+        (Method::Traversal, _) => Some("leave out --surface-only"),
+        _ => Some("use --method traversal"),
     };
     let worse = |share: fn(&Placed<'_>) -> f64| {
         let [of_a, of_b] = views.map(share);
@@ -136,9 +142,7 @@ pub(crate) fn why(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOpti
     let radius = views.map(world_radius).into_iter().fold(0.0, f64::max);
     match reason {
         Reason::Budget { likelihood } => {
-            format!(
-                "the budget ran out (likelihood of contact {likelihood:.2}); try a larger --budget or --work"
-            )
+            format!("the budget ran out (likelihood of contact {likelihood:.2}); raise --budget or --work")
         }
         Reason::Undersampled => {
             let lines = |v: &Placed<'_>| v.scan().share(PointKind::Line);
@@ -146,21 +150,25 @@ pub(crate) fn why(reason: Reason, views: [&Placed<'_>; 2], options: &CollideOpti
             let (name, view, share) = worse(sparse);
             let how = if lines(view) >= 0.5 * share { "sampled as lines" } else { "sampled too sparsely" };
             let ways = advice::for_sparse(view, radius, first);
-            let near =
-                if share < 0.2 { "they come close only where points are too sparse, and " } else { "" };
-            format!("{near}{} of {name} is {how}; try {ways}", percent(share))
+            let found = format!("{} of {name} is {how}", percent(share));
+            if share < 0.2 {
+                format!("the points are too sparse where the scans come close ({found}); {ways}")
+            } else {
+                format!("{found}; {ways}")
+            }
         }
         Reason::Ambiguous => {
             let (name, _, share) = worse(|v| v.scan().share(PointKind::Noisy));
             let ways = advice::for_ambiguous(views, radius, first);
             format!(
-                "where they meet, the points do not sample one sheet, like {} of {name}; try {ways}",
+                "where they meet, the points do not look like a single surface ({} of {name} do not); {ways}",
                 percent(share)
             )
         }
-        Reason::NoGraph => "the first scan has no graph; prepare it with --graph".to_owned(),
+        Reason::NoGraph => "the first scan has no graph; prepare it again with `--graph`".to_owned(),
         Reason::Pose => {
-            "a pose is not finite, or its scale makes one object vanish beside the other".to_owned()
+            "a pose is not finite, or makes one scan vanishingly small beside the other; check the poses"
+                .to_owned()
         }
         _ => "the reason is unknown to this version; update nearmiss".to_owned(),
     }

@@ -45,7 +45,7 @@ pub struct TouchArgs {
     pub quiet: bool,
 }
 
-/// What `touch` finds.
+/// The JSON output of `touch`.
 #[derive(Debug, Serialize)]
 struct TouchReport {
     touches: bool,
@@ -64,12 +64,12 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     let pose = posing::of_scan(&matrix, &scan)
         .map_err(|refused| CliError::Pose { place: "--pose".into(), refused })?;
     let (placed, mut index) = (scan.at(&pose), None);
-    // Lengths that the sampling carries.
+    // The sampling radius in world units.
     let r = scan.sampling_radius() * pose.scale();
     let mut results = Results::new();
     let mut asked = 0;
     while let Some((line, text)) = shapes.next_line()? {
-        // What was answered before a faulty line is told before the fault.
+        // Answers to the lines before a faulty one are written before the error.
         let read = shapes.shape(line, &text, r);
         let shape = read.or_else(|fault| results.flush().and(Err(fault)))?;
         asked += 1;
@@ -79,9 +79,8 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
         let placed = index.as_ref().map_or(placed, |index| placed.with_shapes(index));
         let (touches, nearest, micros) = answer(&placed, &shape);
         let Some(nearest) = nearest else {
-            return Err(shapes
-                .lines
-                .fault_on(line, "the shape is too far away, or too large, to be measured"));
+            let what = "expected a shape within measurable distance, got one too far away or too large; check its units";
+            return Err(shapes.lines.fault_on(line, what));
         };
         if args.json {
             let NearestPoint { source, point, gap } = nearest;
@@ -93,7 +92,7 @@ pub(crate) fn run(args: &TouchArgs) -> Result<(), CliError> {
     results.flush()
 }
 
-/// From so many shapes on an index pays for itself.
+/// The number of shapes from which on an index pays off.
 const MANY: u32 = 256;
 
 fn answer(placed: &Placed<'_>, shape: &Shape) -> (bool, Option<NearestPoint>, f64) {
@@ -104,7 +103,7 @@ fn answer(placed: &Placed<'_>, shape: &Shape) -> (bool, Option<NearestPoint>, f6
     (touches, nearest, micros)
 }
 
-/// The answer, for people.
+/// Returns the answer as a sentence.
 fn sentence(touches: bool, nearest: &NearestPoint, unit: f64) -> String {
     let at = format!("point {} at {}", nearest.source.0, place(nearest.point, unit));
     if touches {
@@ -113,13 +112,13 @@ fn sentence(touches: bool, nearest: &NearestPoint, unit: f64) -> String {
     format!("No contact; {} from {at}.", short(nearest.gap))
 }
 
-/// What the messages show.
+/// The form of a line, for messages.
 const SHAPE_LINE: &str = r#"a line is {"sphere":{"centre":[x,y,z],"radius":r}}, {"capsule":{"ends":[[x,y,z],[x,y,z]],"radius":r}} or {"box":{"pose":[16 numbers],"half":[x,y,z]}}"#;
 
 /// The names of the shapes.
 const SHAPES: [&str; 3] = ["sphere", "capsule", "box"];
 
-/// A line of a file of shapes: one of them. Other fields are ignored.
+/// A line of a file of shapes, which holds one shape. Other fields are ignored.
 #[derive(Debug, Deserialize)]
 #[serde(expecting = "an object")]
 struct ShapeLine {
@@ -131,7 +130,7 @@ struct ShapeLine {
 }
 
 impl ShapeLine {
-    /// Returns what is wrong with a line that has no shape, or several.
+    /// Returns the error about a line without a shape, or with several.
     fn fault(&self) -> String {
         let count = [self.sphere.is_some(), self.capsule.is_some(), self.r#box.is_some()];
         match (count.iter().filter(|is_there| **is_there).count(), self.others.keys().next()) {
@@ -166,7 +165,7 @@ struct BoxLine {
 /// A file with a shape on each line.
 struct ShapeFile {
     lines: TextLines,
-    /// No line with a shape has been met so far.
+    /// `true` until a line with a shape has been read.
     is_empty: bool,
 }
 
@@ -175,7 +174,7 @@ impl ShapeFile {
         Ok(Self { lines: TextLines::open(path)?, is_empty: true })
     }
 
-    /// The next line that is not blank, and its number, counted from 1.
+    /// Returns the number of the next line that is not blank, counted from 1, and its text.
     fn next_line(&mut self) -> Result<Option<(u64, String)>, CliError> {
         let line = self.lines.next_filled()?;
         if line.is_none() && self.is_empty {
@@ -185,8 +184,8 @@ impl ShapeFile {
         Ok(line)
     }
 
-    /// The shape on a line of this number and text; the pose of a box may be off a rotation by a tenth of
-    /// `r`.
+    /// Parses the shape on line `number`, whose text is `text`. The pose of a box may deviate from
+    /// a rotation by a tenth of `r`.
     fn shape(&self, number: u64, text: &str, r: f64) -> Result<Shape, CliError> {
         let line: ShapeLine = serde_json::from_str(text).map_err(|e| {
             let message = e.to_string();
@@ -221,6 +220,6 @@ fn positive(name: &str, length: f64) -> Result<f64, String> {
     if length >= 0.0 {
         Ok(length)
     } else {
-        Err(format!("`{name}` must be at least 0, got {}", short(length)))
+        Err(format!("expected a length of zero or more in `{name}`, got {}", short(length)))
     }
 }

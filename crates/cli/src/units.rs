@@ -1,4 +1,4 @@
-//! Units of two scans: their options, and a warning where sizes look wrong.
+//! The units of two scans: their options, and a warning if the sizes of the scans differ too much.
 
 use std::sync::Once;
 
@@ -9,9 +9,9 @@ use crate::console::Console;
 use crate::digits::{rough, short};
 use crate::matrix::Matrix;
 
-/// Scans whose bounds differ more than this in their diagonals may be in different units. An object in a room
-/// is commonly 1 to 30 times smaller than the room; the factors from inches, centimetres and millimetres to
-/// metres are 39, 100 and 1000.
+/// Scans are suspected to be in different units if the diagonals of their bounds differ by more
+/// than this factor. An object in a room is commonly 1 to 30 times smaller than the room; the
+/// factors from inches, centimetres and millimetres to metres are 39, 100 and 1000.
 const SUSPICIOUS: f64 = 30.0;
 
 /// A unit of length, by name.
@@ -94,11 +94,11 @@ pub(crate) fn scaled(mut matrix: Matrix, factor: f64) -> Matrix {
     matrix
 }
 
-/// Compares the sizes of two scans, and asks about their units once if these differ too much.
+/// Compares the sizes of two scans, and warns about their units once if the sizes differ too much.
 #[derive(Debug)]
 pub(crate) struct SizeCheck {
     console: Console,
-    /// The factors that the units given stand for, if any is given.
+    /// The units in metres, if at least one is given.
     factors: Option<[f64; 2]>,
     once: Once,
 }
@@ -108,7 +108,7 @@ impl SizeCheck {
         Self { console, factors, once: Once::new() }
     }
 
-    /// Asks if the first views to be compared differ too much in size.
+    /// Warns if the first views compared differ too much in size.
     pub(crate) fn compare(&self, views: [&Placed<'_>; 2]) {
         self.once.call_once(|| {
             let size = |view: &Placed<'_>| {
@@ -126,20 +126,20 @@ fn diagonal(bounds: &Aabb) -> f64 {
     2.0 * bounds.half_extents().iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The scan with the larger numbers is the one in the smaller unit. Whoever has named a unit is asked only
-/// where that makes sizes differ more.
+/// Returns the warning, if one is due. The scan with the larger numbers is the one in the smaller
+/// unit. Once the user has named a unit, a warning is due only if that makes the sizes differ more.
 fn question(sizes: [f64; 2], factors: Option<[f64; 2]>) -> Option<String> {
     let ratio = |[a, b]: [f64; 2]| (a / b).max(b / a);
     let (large, small) = if sizes[0] > sizes[1] { ("a", "b") } else { ("b", "a") };
     let now = ratio(sizes);
-    // A NaN raises no question.
+    // NaN is not suspicious.
     let is_suspicious = now > SUSPICIOUS;
     let said = format!("{large} is {} times larger than {small}", rough(now));
     match factors {
         _ if !is_suspicious => None,
         None => Some(format!(
-            "{said}: is {large} in millimetres and {small} in metres? `--units-{large} mm` says so, \
-             `--units-{large} m` that it is not"
+            "{said}; if {large} is in millimetres and {small} in metres, add `--units-{large} mm`, otherwise add \
+             `--units-{large} m` to confirm the sizes"
         )),
         Some([a, b]) if now > 1.001 * ratio([sizes[0] / a, sizes[1] / b]) => {
             Some(format!("{said} in the units given; check --units-a and --units-b"))
@@ -158,7 +158,7 @@ mod tests {
         assert_eq!(question([30.0, 1.0], None), None);
         assert_eq!(question([f64::NAN, 1.0], None), None);
         let said = question([1.0, 41.2], None).unwrap();
-        assert!(said.starts_with("b is 41 times larger than a: is b in millimetres"), "{said}");
+        assert!(said.starts_with("b is 41 times larger than a; if b is in millimetres"), "{said}");
         assert!(said.contains("--units-b mm"), "{said}");
     }
 

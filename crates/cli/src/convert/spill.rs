@@ -1,4 +1,4 @@
-//! Points on disk, for a while.
+//! Temporary storage of points on disk.
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
@@ -8,21 +8,21 @@ use nearmiss::io::Points;
 
 use crate::error::CliError;
 
-/// Points that are handed out together.
+/// The number of points in a piece.
 const TOGETHER: usize = 1 << 15;
 
-/// Points in a file without a name, which is gone with the program, however that ends.
+/// Points in an unnamed temporary file, which the system removes when the process ends in any way.
 pub(super) struct Spill {
-    /// Where it is, for messages.
+    /// The folder of the file, for error messages.
     folder: PathBuf,
     out: BufWriter<File>,
-    /// Whether points have normals, colours, intensities and classes.
+    /// `true` for each of normals, colours, intensities and classes that the points have.
     holds: [bool; 4],
     points: u64,
 }
 
 impl Spill {
-    /// Without points, in the folder of `beside`.
+    /// Creates an empty file in the folder of `beside`.
     pub(super) fn new(beside: &Path) -> Result<Self, CliError> {
         let folder = match beside.parent() {
             Some(folder) if folder != Path::new("") => folder.to_owned(),
@@ -32,7 +32,7 @@ impl Spill {
         Ok(Self { folder, out: BufWriter::with_capacity(1 << 16, file), holds: [false; 4], points: 0 })
     }
 
-    /// Adds the points with these indices; all that are ever added hold the same.
+    /// Adds the points with these indices. All points added must have the same attributes.
     pub(super) fn add(
         &mut self,
         points: &Points,
@@ -57,18 +57,18 @@ impl Spill {
         self.out.write_all(&bytes).map_err(CliError::writing(&self.folder))
     }
 
-    /// How many points there are.
+    /// Returns the number of points.
     pub(super) fn len(&self) -> u64 {
         self.points
     }
 
-    /// Writes out what is still in memory.
+    /// Writes out the buffer.
     pub(super) fn finished(mut self) -> Result<Self, CliError> {
         self.out.flush().map_err(CliError::writing(&self.folder))?;
         Ok(self)
     }
 
-    /// Hands out all points in their order; they must be [finished](Self::finished).
+    /// Calls `take` with all points, in order. The spill must be [finished](Self::finished).
     pub(super) fn each(&self, mut take: impl FnMut(&Points) -> Result<(), CliError>) -> Result<(), CliError> {
         let failed = |cause| CliError::reading(&self.folder)(cause);
         let mut file = self.out.get_ref();

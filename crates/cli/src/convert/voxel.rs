@@ -1,5 +1,5 @@
-//! One point for each cell of a grid, of more points than fit into memory: points are spread over files by
-//! their cells, and each file is gone through alone.
+//! A voxel filter for more points than fit into memory. Points are distributed over files by their
+//! cells, and each file is filtered alone.
 
 use std::path::{Path, PathBuf};
 
@@ -8,18 +8,19 @@ use nearmiss::io::Points;
 use super::spill::Spill;
 use crate::error::CliError;
 
-/// Points of a file that fit into memory with what is computed of them.
+/// The number of points per file that can be filtered in memory.
 const POINTS_A_FILE: u64 = 1 << 21;
 
-/// Files that may be open at a time.
+/// The largest number of open files.
 const MOST_FILES: u64 = 256;
 
-/// A little less than 2⁶³, so that a quotient below it fits into 64 bits whatever its rounding.
+/// A bound of cell numbers, a little less than 2⁶³, so that numbers below it fit into 64 bits after
+/// rounding.
 const MOST_CELLS: f64 = 9.2e18;
 
 type Cell = [i64; 3];
 
-/// Points by the cells of a grid.
+/// Points, distributed over files by the cells of a grid.
 pub(super) struct Grid {
     size: f64,
     output: PathBuf,
@@ -27,14 +28,14 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// A grid of cubes with edges of length `size`, for about so many points if that is known.
+    /// Creates a grid of cubes with edges of length `size`, for about `expected` points, if known.
     pub(super) fn new(size: f64, expected: Option<u64>, output: &Path) -> Result<Self, CliError> {
         let files = expected.map_or(MOST_FILES, |points| points.div_ceil(POINTS_A_FILE)).clamp(1, MOST_FILES);
         let files = (0..files).map(|_| Spill::new(output)).collect::<Result<_, _>>()?;
         Ok(Self { size, output: output.to_owned(), files })
     }
 
-    /// Spreads points, which are finite, over the files.
+    /// Distributes points over the files. All points must be finite.
     pub(super) fn add(&mut self, points: &Points) -> Result<(), CliError> {
         let mut of_file = vec![Vec::new(); self.files.len()];
         for (i, p) in points.positions.iter().enumerate() {
@@ -47,8 +48,8 @@ impl Grid {
         Ok(())
     }
 
-    /// Keeps of each cell the point nearest to the mean of its points, the first of those that are equally
-    /// near; `change` may look at the points that stay, and move them.
+    /// Keeps the point of each cell that is nearest to the mean of the cell's points, the first one
+    /// if several are equally near. `change` may inspect and move the points that are kept.
     pub(super) fn thin(self, mut change: impl FnMut(&mut Points)) -> Result<Spill, CliError> {
         let mut kept = Spill::new(&self.output)?;
         let (cell, files) = (Cells { size: self.size }, self.files);
@@ -82,12 +83,12 @@ impl Grid {
         }
         let size = self.size;
         Err(CliError::Usage(format!(
-            "--voxel {size}: cells so small at {p:?} cannot be numbered; choose a larger size"
+            "--voxel {size}: cells of this size cannot be numbered at {p:?}; use a larger size"
         )))
     }
 }
 
-/// Numbers of points from this one on.
+/// Returns the numbers of points from `first` on.
 fn points_from(first: usize) -> impl Iterator<Item = u32> {
     (first..).map(|i| u32::try_from(i).unwrap_or(u32::MAX))
 }
@@ -105,7 +106,7 @@ impl Cells {
     }
 }
 
-/// The bits of a cell, mixed.
+/// Returns a hash of a cell.
 fn mixed(cell: Cell) -> u64 {
     let [x, y, z] = cell.map(i64::cast_unsigned);
     let mixed = x.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ y.wrapping_mul(0xc2b2_ae3d_27d4_eb4f).rotate_left(21);
@@ -114,10 +115,10 @@ fn mixed(cell: Cell) -> u64 {
     mixed ^ mixed >> 32
 }
 
-/// The index of the point of a cell that is nearest to the mean of its points.
+/// Returns the index of the point of a cell that is nearest to the mean of the cell's points.
 fn most_central(positions: &[[f64; 3]], cell: &[(Cell, u32)]) -> usize {
     let first = positions[cell[0].1 as usize];
-    // About the first point, so that little is lost far from the origin.
+    // Relative to the first point, to keep precision far from the origin.
     let relative = |id: u32| [0, 1, 2].map(|k| positions[id as usize][k] - first[k]);
     #[expect(clippy::cast_precision_loss, reason = "a count of points")]
     let share = 1.0 / cell.len() as f64;

@@ -1,45 +1,46 @@
-//! Where a sliding scan first touches another: by the least distance of their points, found without
-//! `collide`.
+//! First contact of a sliding scan with another one, found by the smallest distance of their
+//! points, without `collide`.
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::geometry::NodeId;
 use nearmiss::{Pose, Scan};
 
-/// How many balls a descent may have open: one sibling a level, and no tree of 2³² points is deeper.
+/// The capacity of the stack of a descent: one sibling per level, and no tree of 2³² points is
+/// deeper.
 const ROOM: usize = 64;
 
-/// Bisections of the last step: enough for a thousandth of it.
+/// The number of bisections of the last step, enough for a thousandth of its length.
 const HALVINGS: u32 = 10;
 
-/// One scan on its way to another.
+/// A scan that moves towards another one.
 #[derive(Debug)]
 pub(crate) struct Approach<'a> {
-    /// a's points, in its stored frame.
+    /// The points of a, in its stored frame.
     tree: Option<ImmutableKdTree<f32, 3>>,
     b: &'a Scan,
-    /// A ball about the points of each node of b, in its stored frame.
+    /// A bounding ball of the points of each node of b, in its stored frame.
     balls: Vec<([f64; 3], f64)>,
-    /// World → a's stored frame.
+    /// The transform from the world to a's stored frame.
     to_a: Pose,
-    /// Least point distance at which they touch, in the world.
+    /// The smallest point distance at which the scans touch, in world units.
     touch: f64,
-    /// Least step.
+    /// The smallest step.
     step: f64,
-    /// Distance of the centres from which on the scans cannot touch.
+    /// The distance of the centres beyond which the scans cannot touch.
     far: f64,
 }
 
-/// The stored frame of a scan in the frame of its input.
+/// Returns the transform from the stored frame of a scan to the frame of its input.
 fn stored(scan: &Scan) -> Pose {
     Pose::IDENTITY.with_scale(scan.frame().scale).with_translation(scan.frame().origin)
 }
 
 impl<'a> Approach<'a> {
-    /// `base` is a's pose; touching means a least point distance of `touch`, and `step` is a length that does
-    /// not matter.
+    /// Creates an approach. `base` is the pose of a. The scans touch at a smallest point distance
+    /// of `touch`. `step` is a negligible length.
     pub(super) fn new([a, b]: [&'a Scan; 2], base: &Pose, touch: f64, step: f64, far: f64) -> Self {
         Self {
-            // Only points that are not finite are refused, and a scan has none.
+            // This fails only for points that are not finite, and a scan has none.
             tree: ImmutableKdTree::new_from_slice(a.positions()).ok(),
             b,
             balls: b.topology().ids().map(|id| ball(&b.positions()[b.topology().points(id)])).collect(),
@@ -50,11 +51,12 @@ impl<'a> Approach<'a> {
         }
     }
 
-    /// The distance at which b, on its way in, first touches a; none if it slides through to distance 0.
-    /// `pose` is b's pose at a distance, along a straight line.
+    /// Returns the distance at which b first touches a on its way in, or `None` if it reaches
+    /// distance 0 without contact. `pose` returns the pose of b at a distance, along a straight
+    /// line.
     ///
-    /// The least point distance g changes by no more than the shift, so steps of g − touch never skip a
-    /// touch. The last step is bisected.
+    /// The smallest point distance g changes by no more than the shift, so steps of g − touch never
+    /// skip a contact. The last step is bisected.
     pub(super) fn first_touch(&self, pose: impl Fn(f64) -> Pose) -> Option<f64> {
         let apart = |d: f64| self.least_distance(&pose(d)) - self.touch;
         let mut far = self.far;
@@ -79,8 +81,8 @@ impl<'a> Approach<'a> {
         None
     }
 
-    /// The least distance of a point of b in `pose` to a point of a, in the world; what is beyond doubt
-    /// greater than the least so far is left out.
+    /// Returns the smallest distance of a point of b in `pose` to a point of a, in world units.
+    /// Nodes of b that cannot contain it are pruned.
     fn least_distance(&self, pose: &Pose) -> f64 {
         let Some(tree) = &self.tree else { return f64::INFINITY };
         let motion = self.to_a.after(pose).after(&stored(self.b));
@@ -114,14 +116,14 @@ impl<'a> Approach<'a> {
                 stack[top] = (bound(child), child);
                 top += 1;
             }
-            // The nearest one last, to be looked at first.
+            // The nearest child comes last, so that it is visited first.
             stack[bottom..top].sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
         }
         best / self.to_a.scale()
     }
 }
 
-/// A ball about `points`.
+/// Returns a bounding ball of `points`: its centre and radius.
 fn ball(points: &[[f32; 3]]) -> ([f64; 3], f64) {
     let points = || points.iter().map(|p| p.map(f64::from));
     let centre = nearmiss::Aabb::of(points()).centre();

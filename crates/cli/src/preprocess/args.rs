@@ -17,7 +17,7 @@ pub struct PreprocessArgs {
     /// Point cloud (PLY, PCD, LAS, LAZ, E57, NPY, text) or mesh (OBJ, STL, OFF, glTF, PLY with
     /// faces)
     ///
-    /// Of a mesh, the vertices are the points; `nearmiss sample` puts points on its faces.
+    /// The points of a mesh are its vertices; `nearmiss sample` puts points on its faces.
     pub input: PathBuf,
     /// Prepared scan to write, usually named .nm; an existing file is replaced in one step
     #[arg(short, long, value_name = "OUT.nm")]
@@ -27,7 +27,7 @@ pub struct PreprocessArgs {
     /// Known formats: ply, pcd, las, e57, npy, xyz, obj, stl, off, gltf.
     #[arg(long, default_value = "auto", value_parser = parse_format)]
     pub format: FormatChoice,
-    /// Which points to leave out
+    /// The filters
     #[command(flatten)]
     pub filters: FilterArgs,
     /// Neighbours that set the local radius of a point; more where points lie on lines; 3 to 32
@@ -81,7 +81,7 @@ pub struct PreprocessArgs {
     /// Threads; 0 for all cores; the result does not depend on it
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_threads, help_heading = "Output")]
     pub threads: usize,
-    /// How much memory may be used
+    /// The memory limit
     #[command(flatten)]
     pub memory: MemoryArgs,
     /// Print one JSON object
@@ -92,14 +92,14 @@ pub struct PreprocessArgs {
     pub quiet: bool,
 }
 
-/// A format, or none for whatever content and name say.
+/// A format, or `None` to detect it from content and name.
 #[derive(Debug, Clone, Copy)]
 pub struct FormatChoice(
     /// The format.
     pub Option<Format>,
 );
 
-/// A weight function, by name.
+/// The names of the weight functions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum WeightName {
     /// exp(−d²/h²), cut off where it is small (Klein & Zachmann 2004)
@@ -108,7 +108,7 @@ pub enum WeightName {
     Wendland,
 }
 
-/// What becomes of shortest paths, by name.
+/// The names of the ways to keep shortest paths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum PathsName {
     /// Stored in the file
@@ -117,7 +117,7 @@ pub enum PathsName {
     Rebuilt,
 }
 
-/// A place in the frame of the input.
+/// A point in the frame of the input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScannerPosition(
     /// Its coordinates.
@@ -146,22 +146,22 @@ fn parse_bandwidth(text: &str) -> Result<Bandwidth, String> {
         ("local", _) => Ok(Bandwidth::Local),
         ("global", _) => Ok(Bandwidth::Global),
         (_, Ok(h)) if h > 0.0 && h.is_finite() => Ok(Bandwidth::Fixed(h)),
-        _ => Err("expected local, global, or a positive length".into()),
+        _ => Err("expected local, global, or a length of more than zero".into()),
     }
 }
 
 fn parse_reach(text: &str) -> Result<f64, String> {
     let reach = text.parse().ok().filter(|reach: &f64| *reach > 0.0 && reach.is_finite());
-    reach.ok_or_else(|| "expected a positive length, in the units of the input".into())
+    reach.ok_or_else(|| "expected a length of more than zero, in the units of the input".into())
 }
 
-/// More threads than this help nobody, and may not start.
+/// The largest number of threads; more do not help, and may not start.
 const MOST_THREADS: usize = 1024;
 
 pub(crate) fn parse_threads(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(n) if n <= MOST_THREADS => Ok(n),
-        _ => Err(format!("expected a number from 0, for all cores, to {MOST_THREADS}")),
+        _ => Err(format!("expected a number from 0 (all cores) to {MOST_THREADS}")),
     }
 }
 
@@ -189,7 +189,7 @@ pub(crate) fn options(args: &PreprocessArgs) -> BuildOptions {
         .with_threads(args.threads)
 }
 
-/// What graph is wanted, if any, and where the scanner stood.
+/// Returns the options of the graph and the position of the scanner, or `None` without a graph.
 pub(crate) fn graph_options(args: &PreprocessArgs) -> Option<(GraphOptions, Option<[f64; 3]>)> {
     if !args.wants_graph() {
         return None;

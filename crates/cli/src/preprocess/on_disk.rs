@@ -1,5 +1,5 @@
-//! `preprocess` of points that do not fit into memory: what is made of them lies in files beside the output,
-//! and a run that was ended is gone on with.
+//! `preprocess` for points that do not fit into memory. Intermediate results are kept in files
+//! beside the output, and an interrupted run is resumed.
 
 use std::cell::Cell;
 
@@ -15,7 +15,7 @@ use crate::filters::{ClassList, Filtered};
 use crate::report::ScanReport;
 use crate::{input, output};
 
-/// Bytes of a file that are read at a time.
+/// The number of bytes of a file that are read at a time.
 const BLOCK: usize = 1 << 20;
 
 /// Prepares `points` points within `memory` bytes.
@@ -25,7 +25,7 @@ pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Cons
     let pieces = match read_in_pieces(&args.input, args.format.0, BLOCK)? {
         Pieces::Points(pieces) => pieces,
         Pieces::Mesh { .. } => {
-            let what = "this is a mesh, which is read whole; expected points, or more --memory".into();
+            let what = "expected points, got a mesh, which cannot be prepared on disk; raise --memory".into();
             return Err(unfit(what));
         }
     };
@@ -35,11 +35,11 @@ pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Cons
     let start = now();
     let (gathered, filtered) = match GatheredPoints::kept(&work)? {
         Some(kept) => {
-            console.note(format_args!("going on with the work of an ended run in {place}"));
+            console.note(format_args!("resuming an interrupted run in {place}"));
             (kept, Filtered::default())
         }
         None => {
-            console.note(format_args!("working on disk, in {place}, which is removed at the end"));
+            console.note(format_args!("working on disk in {place}, which is removed at the end"));
             match gather(args, &pieces, &work, points, console) {
                 Ok(gathered) => gathered,
                 Err(cause) => {
@@ -73,14 +73,15 @@ pub(super) fn run(args: &PreprocessArgs, memory: u64, points: u64, console: Cons
     Ok(())
 }
 
-/// What the work in a folder is for: the input as it is, and the options that change the result.
+/// Returns the key of the work in a folder: the identity of the input, and the options that change
+/// the result.
 fn key(args: &PreprocessArgs) -> Result<String, CliError> {
     let options = options(args).with_threads(0);
     let (crop, class, format) = (args.filters.crop, &args.filters.class, args.format.0);
     Ok(format!("{} {format:?} {options:?} {crop:?} {class:?}", input::identity(&args.input)?))
 }
 
-/// Reads the points twice: for their frame, and to gather them.
+/// Reads the points twice: first to find their frame, then to gather them.
 fn gather(
     args: &PreprocessArgs,
     pieces: &PointPieces,
@@ -93,7 +94,7 @@ fn gather(
         other => CliError::Unfit { path: args.input.clone(), what: other.to_string() },
     };
     let name = args.input.display();
-    let bar = console.rate(format_args!("looking through {name}"), expected);
+    let bar = console.rate(format_args!("measuring {name}"), expected);
     let mut intake = Intake::default();
     pieces.each(|points| {
         points.positions.iter().for_each(|p| intake.add(*p));
@@ -121,7 +122,7 @@ fn gather(
         let what = "expected points with classes for --class, got points without; leave it out".into();
         return Err(CliError::Unfit { path: args.input.clone(), what });
     }
-    let bar = console.spinner("looking for points at the place of others");
+    let bar = console.spinner("removing duplicate points");
     let gathered = gatherer.finish().map_err(unfit)?;
     drop(bar);
     let of_class = args.filters.class.as_ref().map(|_| of_other_class.get());
@@ -129,7 +130,8 @@ fn gather(
     Ok((gathered, filtered))
 }
 
-/// The classes of some points, and those that are wanted, if some are.
+/// Returns the classes of the points and those to keep, or `None` without `--class`. Sets `without`
+/// if points have no classes.
 fn wanted_classes<'a>(
     args: &'a PreprocessArgs,
     points: &'a Points,

@@ -1,4 +1,4 @@
-//! What `preprocess` writes and tells in the end.
+//! The output of `preprocess`.
 
 use nearmiss::Scan;
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub(super) struct Seconds {
     pub(super) write: f64,
 }
 
-/// Writes the scan; returns its length in bytes and how many seconds that took.
+/// Saves the scan. Returns its length in bytes and the time in seconds.
 pub(super) fn save(args: &PreprocessArgs, scan: &Scan, console: Console) -> Result<(u64, f64), CliError> {
     let start = now();
     let _bar = console.spinner(format_args!("writing {}", args.output.display()));
@@ -47,8 +47,9 @@ pub(super) fn tell(
             results.line(line)?;
         }
         let Seconds { read, hierarchy, graph, write } = report.seconds;
+        let graph = if scan.graph().is_some() { format!("graph {graph:.2}, ") } else { String::new() };
         results.line(format_args!(
-            "seconds    read {read:.2}, hierarchy {hierarchy:.2}, graph {graph:.2}, write {write:.2}"
+            "seconds    read {read:.2}, hierarchy {hierarchy:.2}, {graph}write {write:.2}"
         ))?;
         for line in health(scan, &report.scan.health) {
             results.line(line)?;

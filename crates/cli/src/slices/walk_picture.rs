@@ -318,7 +318,8 @@ mod tests {
         let empty = shown(&way[..1], &[], false);
         // The patch of the legend is below the drawing, in the last rows.
         let (width, height) = empty.size();
-        let drawn = empty.pixels().chunks(3).take(width * (height - 60)).filter(|pixel| *pixel == WAY).count();
+        let drawn =
+            empty.pixels().chunks(3).take(width * (height - 60)).filter(|pixel| *pixel == WAY).count();
         assert!((2..40).contains(&drawn), "{drawn} pixels of the dot at the start");
         let uneven: Vec<[f64; 3]> =
             way.iter().zip(0_u8..).map(|(p, i)| [p[0], p[1], 0.01 * f64::from(i % 2)]).collect();

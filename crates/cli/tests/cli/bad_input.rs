@@ -1,4 +1,4 @@
-//! What is refused, and how it is said.
+//! Invalid inputs, and the errors about them.
 
 use nearmiss_testdata::shapes::sphere;
 
@@ -67,7 +67,7 @@ fn prepared_files_are_refused_when_anything_is_off() {
         with(&name, &|b| b[place_of_flip] ^= 0x10);
         names.push(name);
     }
-    // A wrong number shows when all are looked at.
+    // A flipped bit is found by --verify, which checks all numbers.
     for file in &names {
         let file = file.as_str();
         place.refused(1, &["inspect", file, "--verify"], &[file]);
@@ -100,7 +100,7 @@ fn outputs_that_cannot_be_are_refused_before_the_work() {
     std::fs::create_dir(place.path("folder")).unwrap();
     place.refused(2, &["collide", "ball.xyz", "ball.xyz", "--image", "out.jpg"], &["out.jpg", ".png"]);
     place.refused(2, &["preprocess", "ball.xyz", "out.nm"], &["use `-o out.nm`"]);
-    for (output, word) in [("folder", "is a folder"), ("nowhere/out", "no folder nowhere")] {
+    for (output, word) in [("folder", "got a folder"), ("nowhere/out", "no folder nowhere")] {
         place.refused(1, &["preprocess", "ball.xyz", "-o", output], &[output, word]);
         place.refused(1, &["export", "ball.xyz", "--radii", output], &[output, word]);
         place.refused(1, &["collide", "ball.xyz", "ball.xyz", "--image", output], &[output, word]);

@@ -1,4 +1,4 @@
-//! `convert`, and what is kept on the way.
+//! `convert`, and the attributes that it keeps.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use nearmiss_testdata::shapes::{Sampling, sphere};
 
 use crate::running::{Place, keys, sorted, text};
 
-/// A table with a class for each point, every third of which is ground.
+/// Returns a table with a class for each point; every third point is ground.
 fn table(points: &[[f64; 3]]) -> String {
     let mut table = String::from("x y z classification\n");
     for (i, [x, y, z]) in points.iter().enumerate() {
@@ -19,7 +19,7 @@ fn table(points: &[[f64; 3]]) -> String {
 #[test]
 fn round_trips_through_all_formats_are_exact() {
     let place = Place::new();
-    // Whole multiples of a step, so that LAS is exact too.
+    // Multiples of a step, so that LAS is exact too.
     let points: Vec<[f64; 3]> = (0..500_i32)
         .map(|i| [i % 20, i / 20 % 5, i / 100].map(|k| 4_000_000.0 + f64::from(k) * 0.125))
         .collect();
@@ -41,7 +41,7 @@ fn round_trips_through_all_formats_are_exact() {
     assert!(done.errors.contains("intensities, classes"), "{}", done.errors);
     place.ok(&["convert", "a.npy", "c.xyz"]);
     assert_eq!(fs::read_to_string(place.path("c.xyz")).unwrap().lines().count(), 500);
-    // Nothing is left behind.
+    // No temporary files are left.
     assert!(place.files().iter().all(|name| !name.contains("tmp")), "{:?}", place.files());
 }
 
@@ -64,7 +64,7 @@ fn points_are_chosen_by_box_and_class() {
     place.refused(2, &["convert", "all.xyz", "./all.xyz"], &["would replace the input"]);
     place.write("plain.xyz", text(&points));
     place.refused(1, &["convert", "plain.xyz", "x.ply", "--class", "2"], &["have no classes"]);
-    // `preprocess` knows them too.
+    // `preprocess` selects classes too.
     let report = place
         .ok(&["preprocess", "all.xyz", "-o", "a.nm", "--json", "--quiet", "--class", "2"])
         .json()

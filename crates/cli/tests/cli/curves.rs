@@ -47,7 +47,7 @@ fn two_spheres_cut_each_other_in_a_circle() {
     assert!(std::fs::read(place.path("c.png")).unwrap().starts_with(b"\x89PNG"));
 
     let people = place.ok(&asked[..7]).results;
-    assert!(people.starts_with("They cut each other in 1 closed curve, 5.4"), "{people}");
+    assert!(people.starts_with("They cut each other in 1 closed curve, length 5.4"), "{people}");
     let finer = [&asked[..8], &["--spacing", "0.01", "--tolerance", "1e-7"]].concat();
     let finer = place.ok(&finer).json().remove(0);
     assert!(
@@ -65,7 +65,7 @@ fn ends_misses_and_budgets_are_said() {
     let upright = "1 0 0 0 0 0 -1 0.3 0 1 0 0 0 0 0 1";
     let asked = ["curve", "bowl.nm", "wall.xyz", "--pose-b", upright, "-o", "c.ply"];
     let people = place.ok(&asked).results;
-    assert!(people.starts_with("They cut each other in 1 open curve, 3"), "{people}");
+    assert!(people.starts_with("They cut each other in 1 open curve, length 3"), "{people}");
     assert!(people.contains("Ends: 2 at the border of a."), "{people}");
     let short = place.ok(&[&asked[..], &["--work", "300", "--json"]].concat()).json().remove(0);
     assert_eq!(short["complete"], false, "{short}");
@@ -97,8 +97,8 @@ fn ends_misses_and_budgets_are_said() {
     assert!(std::fs::read_to_string(place.path("none.ply")).unwrap().contains("element vertex 0\n"));
 }
 
-/// Scans that meet without a curve are not said to be apart, nor is a contact of points said to be one of
-/// surfaces.
+/// If scans touch without a curve, the answer does not call them apart, and does not call a contact
+/// of points one of surfaces.
 #[test]
 fn contacts_without_a_curve_are_said() {
     let place = Place::new();
@@ -121,7 +121,7 @@ fn contacts_without_a_curve_are_said() {
     let witness = numbers(&told["obstacles"]["witness"]);
     assert!((witness[2] - 1.0).abs() < 0.05, "{told}");
 
-    // A ball that rests on a plate: their discs cross, and no curve leads anywhere.
+    // A ball rests on a plate: their discs intersect, but there is no curve to follow.
     place.cloud("ball.xyz", sphere(1.0), 0.1);
     let mut met = 0;
     for height in ["0.97", "0.98", "0.99", "1", "1.01", "1.02", "1.03"] {

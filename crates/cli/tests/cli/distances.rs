@@ -15,7 +15,7 @@ fn two_spheres_are_as_far_apart_as_they_are() {
         "lower upper points band evidence source_a source_b evaluations node_pairs leaf_pairs micros";
     assert_eq!(keys(&told), sorted(expected));
     let [lower, upper] = ["lower", "upper"].map(|key| told[key].as_f64().unwrap());
-    // Both surfaces lie a little inside their spheres.
+    // Both surfaces are slightly inside their spheres.
     assert!(lower > 0.7 && lower <= upper && (1.0..1.01).contains(&upper), "{told}");
     assert_eq!(told["evidence"], "certified", "{told}");
     let points = numbers(&serde_json::json!([told["points"][0][0], told["points"][1][0]]));
@@ -23,7 +23,7 @@ fn two_spheres_are_as_far_apart_as_they_are() {
 
     let people = place.ok(&asked[..5]).results;
     assert!(people.starts_with("They are between 0.9") && people.contains(" and 1.0"), "{people}");
-    assert!(people.contains(" apart (certified), within the local spacing of 0."), "{people}");
+    assert!(people.contains(" apart (certified), accurate to the local spacing of 0."), "{people}");
     let band = told["band"].as_f64().unwrap();
     assert!((0.05..0.15).contains(&band), "a spacing of 0.05: {told}");
     let thick = [&asked[..], &["--thickened", "0.25"]].concat();
@@ -84,7 +84,7 @@ fn a_picture_shows_the_segment() {
     let [blue, orange] =
         [count(|p| p[2] > p[0].saturating_add(60)), count(|p| p[0] > p[2].saturating_add(60))];
     assert!(blue > 10_000 && orange > 10_000, "{blue} blue and {orange} orange pixels");
-    // A dark line runs level through the middle of the close view, half a width of the view or more.
+    // A dark horizontal line crosses the close view, over half its width or more.
     let longest = pixels
         .chunks(3 * width)
         .take(780)
@@ -146,8 +146,8 @@ fn distances_are_refused_with_a_reason() {
     let both = |options: &[&'static str]| [&["distance", "ball.xyz", "ball.xyz"][..], options].concat();
     for (options, word) in [
         (&["--thickened", "-1"][..], "zero or more"),
-        (&["--budget", "5"], "units"),
-        (&["--relative", "1"], "from 0 to less than 1"),
+        (&["--budget", "5"], "the unit ns"),
+        (&["--relative", "1"], "at least 0 and less than 1"),
         (&["--pose-b", "1 2 3"], "got 3"),
         (&["--thickened", "1", "--kernel", "geodesic"], "cannot be used with"),
     ] {

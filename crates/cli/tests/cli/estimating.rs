@@ -1,4 +1,4 @@
-//! Estimates of memory, and units of pairs: what is asked and refused before a command starts.
+//! Estimates of memory, and units of pairs of scans.
 
 use nearmiss_testdata::shapes::{Sampling, sphere};
 
@@ -14,14 +14,14 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
     };
     let all = [
         "points need about 2",
-        "22 MB are allowed by --memory",
-        "try --voxel 0.",
-        ", or --memory 2",
+        "but 22 MB are allowed by --memory",
+        "use --voxel 0.",
+        ", or set --memory 2",
         "MB to run anyway",
     ];
     refused(&["--memory", "22MB"], &all);
-    refused(&["--memory", "24MB"], &["to do without --close-pairs, or --memory"]);
-    refused(&["--memory", "1MB"], &["reading ", "a part of the file, or --memory 2"]);
+    refused(&["--memory", "24MB"], &["leave out --close-pairs, or set --memory"]);
+    refused(&["--memory", "1MB"], &["reading ", "a part of the file, or set --memory 2"]);
     refused(&["--memory", "22MB", "--voxel", "0.01", "--quiet"], &["points need about", "--memory 2"]);
     place.refused(2, &["preprocess", "ball.xyz", "-o", "b.nm", "--memory", "big"], &["--memory", "500MB"]);
     for fitting in [
@@ -32,7 +32,7 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
         let done = place.ok(&[&["preprocess", "ball.xyz", "-o", "ball.nm"], fitting].concat());
         assert!(!done.errors.contains("takes about"), "a short run: {}", done.errors);
     }
-    // Nothing is read before it is refused: the file is broken further on.
+    // The refusal comes before the file is read: its invalid last line goes unnoticed.
     let rows = text(&sphere(1.0).sample(Sampling::clean(0.02)).points);
     place.write("broken.xyz", format!("{rows}one two three\n"));
     place.refused(1, &["preprocess", "broken.xyz", "-o", "b.nm", "--memory", "25MB"], &["points need about"]);
@@ -42,7 +42,7 @@ fn what_does_not_fit_into_memory_is_refused_with_remedies() {
 #[test]
 fn long_runs_are_announced() {
     let place = Place::new();
-    // 600,000 points at zero, which are refused once they are read.
+    // 600,000 equal points, which are refused only after they have been read.
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 600000\nproperty float x\nproperty float y\n\
                   property float z\nend_header\n";
     let path = place.write("zeros.ply", header);
@@ -72,7 +72,7 @@ fn samples_that_do_not_fit_into_memory_are_refused_before_they_are_made() {
     place.ok(&["sample", "plate.obj", "-o", "plate.ply", "--spacing", "0.2", "--memory", "40MB"]);
 }
 
-/// A ball, and the same in millimetres.
+/// Writes and prepares a ball in metres, and the same ball in millimetres.
 fn balls(place: &Place) {
     let ball = sphere(1.0).sample(Sampling::clean(0.1)).points;
     let large: Vec<[f64; 3]> = ball.iter().map(|p| p.map(|x| 1000.0 * x)).collect();
@@ -93,7 +93,7 @@ fn sizes_that_differ_much_raise_a_question_of_units() {
         };
         let done = ask(["m.nm", "mm.nm"], &[]);
         assert!(
-            done.errors.starts_with("warning: b is 1000 times larger than a: is b in millimetres"),
+            done.errors.starts_with("warning: b is 1000 times larger than a; if b is in millimetres"),
             "{}",
             done.errors
         );

@@ -1,5 +1,5 @@
-//! Disks that are full, processes that are killed, and files that change while they are read: there is the
-//! old file or the new one, and a clear answer.
+//! Full disks, killed processes, and files that change while they are read. In each case the old or
+//! the new file is left whole, and the error is clear.
 #![cfg(unix)]
 
 use std::process::{Child, Command, Stdio};
@@ -9,7 +9,7 @@ use nearmiss_testdata::shapes::{bowl, sphere};
 
 use crate::running::{Done, Place};
 
-/// Names of what writers leave that did not end.
+/// Returns the names of temporary files of writers that did not finish.
 fn litter(place: &Place) -> Vec<String> {
     place.files().into_iter().filter(|name| name.contains(".tmp-")).collect()
 }
@@ -22,7 +22,8 @@ fn a_disk_with_no_room_left_keeps_the_previous_file() {
     place.ok(&["preprocess", "bowl.xyz", "-o", "out.nm", "--quiet"]);
     let before = std::fs::read(place.path("out.nm")).unwrap();
     assert!(before.len() > 8 * 512, "{} bytes", before.len());
-    // No file may grow beyond four blocks, and what would make it ends with an error instead of a signal.
+    // No file may grow beyond four blocks. With the signal ignored, a larger write fails with an
+    // error.
     let script = "trap '' XFSZ; ulimit -f 4; exec \"$0\" \"$@\"";
     let args = ["preprocess", "ball.xyz", "-o", "out.nm", "--quiet"];
     let output = Command::new("sh")
@@ -53,7 +54,8 @@ pub(crate) fn spawn(place: &Place, args: &[&str]) -> Child {
         .unwrap()
 }
 
-/// Kills commands that write `out` at many moments: it is always one of the two files that they write.
+/// Kills two commands that write `out` at many moments. `out` must always be the whole output of
+/// one of them.
 fn killed_at_any_time(place: &Place, out: &str, commands: [&[&str]; 2]) {
     let content = commands.map(|args| {
         place.ok(args);
@@ -87,9 +89,9 @@ fn killed_at_any_time(place: &Place, out: &str, commands: [&[&str]; 2]) {
     assert_eq!(litter(place), [""; 0], "the last run leaves nothing behind");
 }
 
-/// Runs a command on a disk of its own, mounted at `disk` with what `before` puts there: `limit` says how.
-/// The status, and then what is there, a name and a checksum a line; `None` where the system allows no such
-/// disk.
+/// Runs a command with a disk of its own, mounted at `disk` with the options `limit`, after the
+/// shell commands `before`. Returns the result and a list of the files on the disk with their
+/// checksums, or `None` if the system does not allow the mount.
 pub(crate) fn on_own_disk(place: &Place, limit: &str, before: &str, args: &[&str]) -> Option<(Done, String)> {
     let script = format!(
         "mkdir -p disk && mount -t tmpfs -o {limit} none disk 2>/dev/null || exit 77
@@ -114,7 +116,7 @@ pub(crate) fn on_own_disk(place: &Place, limit: &str, before: &str, args: &[&str
     Some((done, left))
 }
 
-/// A full disk, and one that cannot be written: one error, and what was there is there.
+/// On a full or read-only disk there is one error, and the old files are unchanged.
 #[test]
 fn a_disk_that_takes_nothing_keeps_what_was_there() {
     let place = Place::new();
@@ -145,7 +147,7 @@ fn a_disk_that_takes_nothing_keeps_what_was_there() {
     }
 }
 
-/// A prepared scan that is removed is still there for whoever has opened it; one that is cut short is not.
+/// A prepared scan that is removed while it is open can still be read; a truncated one cannot.
 #[test]
 fn a_file_that_vanishes_or_is_cut_short_while_it_is_read() {
     let place = Place::new();
@@ -159,7 +161,7 @@ fn a_file_that_vanishes_or_is_cut_short_while_it_is_read() {
         })
         .collect();
     place.write("poses.jsonl", far);
-    for (is_cut, words) in [(false, ""), (true, "error: a file was cut short while it was read")] {
+    for (is_cut, words) in [(false, ""), (true, "error: a prepared file was cut short while it was read")] {
         place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
         let mut child = Command::new(env!("CARGO_BIN_EXE_nearmiss"))
             .args(["collide", "ball.nm", "ball.nm", "--poses", "poses.jsonl", "--json"])
@@ -168,7 +170,7 @@ fn a_file_that_vanishes_or_is_cut_short_while_it_is_read() {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        // The first answers are there: both scans are open.
+        // Once there is an answer, both scans are open.
         let mut out = child.stdout.take().unwrap();
         let mut first = [0; 1];
         std::io::Read::read_exact(&mut out, &mut first).unwrap();
@@ -186,7 +188,7 @@ fn a_file_that_vanishes_or_is_cut_short_while_it_is_read() {
     }
 }
 
-/// Ctrl-C, at many moments.
+/// Interrupts a command with Ctrl-C at many moments.
 #[test]
 fn an_interrupted_command_leaves_the_old_file_or_the_new_one() {
     let place = Place::new();
@@ -227,7 +229,8 @@ fn a_process_killed_while_it_converts_leaves_the_old_file_or_the_new_one() {
     killed_at_any_time(&place, "out.laz", [&convert("bowl.xyz"), &convert("ball.xyz")]);
 }
 
-/// A decoder that ends its process, here because there is no memory left, ends in an error like any other.
+/// If a decoder ends its process, here for lack of memory, the command fails with an ordinary
+/// error.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_decoder_that_ends_the_process_is_an_error_by_name() {
@@ -258,7 +261,8 @@ fn a_decoder_that_ends_the_process_is_an_error_by_name() {
     assert_eq!(place.ok(&["collide", "ball.laz", "ball.nm", "--json"]).json().len(), 1);
 }
 
-/// Two commands that write one file at the same time: one of their outputs is there in the end, whole.
+/// If two commands write the same file at the same time, the result is the whole output of one of
+/// them.
 #[test]
 fn two_commands_that_write_one_file() {
     let place = Place::new();

@@ -5,7 +5,8 @@ use serde_json::json;
 
 use crate::running::{Place, keys, text};
 
-/// A ball of radius 1, whose points have a distance of 0.1, with strays before it and after it.
+/// Returns a ball of radius 1 with a spacing of 0.1, with isolated points before and after it in
+/// the list, and the number of points of the ball.
 fn ball_and_strays() -> (Vec<[f64; 3]>, usize) {
     let strays: Vec<[f64; 3]> = (0..20_u8).map(|i| [f64::from(i) - 9.5, 5.0, 0.0]).collect();
     let ball = sphere(1.0).sample(Sampling::clean(0.1)).points;
@@ -121,8 +122,8 @@ fn senseless_filters_are_refused() {
     let points: Vec<[f64; 3]> = ball_and_strays().0.iter().map(|p| p.map(|x| x + 10.0)).collect();
     place.write("all.xyz", text(&points));
     for (option, value, words) in [
-        ("--voxel", "0", &["--voxel", "positive"][..]),
-        ("--voxel", "-0.1", &["--voxel", "positive"]),
+        ("--voxel", "0", &["--voxel", "more than zero"][..]),
+        ("--voxel", "-0.1", &["--voxel", "more than zero"]),
         ("--remove-outliers", "16", &["--remove-outliers", "K,SIGMA"]),
         ("--remove-outliers", "0,2", &["--remove-outliers", "1 or more"]),
         ("--min-neighbours", "4,nan", &["--min-neighbours", "N,R"]),

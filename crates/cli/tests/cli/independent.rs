@@ -1,5 +1,5 @@
-//! The points that are read, beside those that independent readers find: laspy with lazrs, plyfile, pye57,
-//! trimesh and NumPy, where `cargo xtask readers` has installed them.
+//! A comparison of the points read with those of independent readers: laspy with lazrs, plyfile,
+//! pye57, trimesh and NumPy, if `cargo xtask readers` has installed them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,7 +14,7 @@ const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 /// The formats that independent readers know.
 const ENDINGS: [&str; 11] = ["las", "laz", "e57", "ply", "npy", "xyz", "csv", "stl", "off", "glb", "gltf"];
 
-/// Real files, where the folder with them stands beside the repository.
+/// Returns real files, if the folder `shared` is beside the repository.
 fn real() -> Vec<PathBuf> {
     let folder = Path::new(ROOT).join("../shared/data");
     let mut found = Vec::new();

@@ -14,7 +14,8 @@ fn ask(place: &Place, scans: [&str; 2], options: &[&str]) -> Value {
     done.json().remove(0)
 }
 
-/// Two unit spheres whose centres are 1.2 apart meet in a circle of radius 0.8.
+/// Returns `true` for a point on the circle of radius 0.8 in which two unit spheres intersect if
+/// their centres are 1.2 apart.
 fn is_on_the_circle(place: &Value, off: f64) -> bool {
     let p = numbers(place);
     (p[0] - 0.6).abs() < off && (p[1].hypot(p[2]) - 0.8).abs() < off
@@ -81,7 +82,7 @@ fn numbers_of_the_search_count_or_are_refused() {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.04);
     place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--close-pairs", "--quiet"]);
-    // Nothing is found: all that is drawn is evaluated.
+    // There is no contact, so all points drawn are evaluated.
     let apart = shift(1.7, 1.2, 0.0);
     let evaluations = |options: &[&str]| {
         let options = [&["--flat", "--pose-b", &apart], options].concat();

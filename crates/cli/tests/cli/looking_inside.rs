@@ -67,13 +67,17 @@ fn points_that_are_none_are_named_by_line() {
     );
     for text in ["", "\n# nothing but a comment\n"] {
         place.write("at.txt", text);
-        place.refused(1, &["eval", "ball.xyz", "--points", "at.txt"], &["at.txt: holds no points"]);
+        place.refused(1, &["eval", "ball.xyz", "--points", "at.txt"], &["at.txt: expected points, got none"]);
     }
     place.write("at.txt", "0 0 1\n");
     place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm", "--quiet"]);
     place.ok(&["export", "ball.nm", "--points", "ball.ply"]);
     for scan in ["ball.nm", "ball.ply"] {
-        place.refused(1, &["eval", "at.txt", "--points", scan], &[scan, "are the two files swapped?"]);
+        place.refused(
+            1,
+            &["eval", "at.txt", "--points", scan],
+            &[scan, "check that the two files are not swapped"],
+        );
     }
 }
 
@@ -93,7 +97,7 @@ fn an_export_comes_back() {
         let cosine = (0..3).map(|k| p[k] * n[k] / 2.0).sum::<f64>();
         assert!(cosine.abs() > 0.97, "the normal of a sphere at {p:?}: {n:?}");
     }
-    // Six values of four bytes, a colour of three, then the source and the kind.
+    // A row has six values of four bytes, a colour of three bytes, the source and the kind.
     let ply = std::fs::read(place.path("p.ply")).unwrap();
     let header = String::from_utf8_lossy(&ply[..400]).into_owned();
     assert!(header.contains("uchar red") && header.contains("property uint kind"), "{header}");
@@ -124,7 +128,7 @@ fn an_export_comes_back() {
     place.refused(2, &["export", "ball.nm", "--points", "x", "--radii", "x"], &["two outputs"]);
 }
 
-/// A plate, and beside it points along a line: exported and painted in the colours of their kinds.
+/// A plate and points along a line are exported and drawn in the colours of their kinds.
 #[test]
 fn kinds_are_exported_and_painted() {
     let place = Place::new();
@@ -164,7 +168,8 @@ fn the_samples_of_a_level_come_with_their_coverings() {
     let back = nearmiss::io::read(place.path("s.ply"), None).unwrap().cloud;
     assert_eq!(back.len(), 8 * 16, "eight nodes of sixteen samples");
     let ply = std::fs::read(place.path("s.ply")).unwrap();
-    // Three values of eight bytes, then source, node, covering radius and sampling radius.
+    // A row has three values of eight bytes, the source, the node, the covering radius and the
+    // sampling radius.
     let rows = &ply[ply.len() - 40 * back.len()..];
     let mut nodes = Vec::new();
     for (i, row) in rows.chunks(40).enumerate() {

@@ -1,4 +1,4 @@
-//! The built command, as scripts and people run it.
+//! Tests of the built command.
 #![cfg(test)]
 
 mod bad_input;

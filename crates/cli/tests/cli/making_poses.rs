@@ -80,7 +80,7 @@ fn poses_keep_the_units_of_the_files() {
             let row: f64 = m[..3].iter().map(|x| x * x).sum();
             assert!((row - 1.0).abs() < 1e-12, "b keeps its size: {row}");
         }
-        // Of one size, both conventions ask the same questions.
+        // For scans of the same size, both conventions give equivalent poses.
         let ask = |file: &str, extra: &[&str]| {
             let args = ["poses", "d.nm", "d.nm", kind, "--per-distance", "6", "-o", file];
             place.ok(&[&args[..], extra].concat());

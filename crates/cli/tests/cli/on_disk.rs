@@ -1,4 +1,5 @@
-//! `preprocess` within less memory than the points need: the same file, whatever happens on the way.
+//! `preprocess` in less memory than the points need. The resulting file is the same, even after
+//! interruptions.
 #![cfg(unix)]
 
 use std::time::Duration;
@@ -6,12 +7,12 @@ use std::time::Duration;
 use crate::faults::{on_own_disk, spawn};
 use crate::running::Place;
 
-/// So many points do not fit into [`MEMORY`].
+/// A number of points that do not fit into [`MEMORY`].
 const POINTS: usize = 400_000;
 
 const MEMORY: &str = "100MB";
 
-/// A rough floor with a step, points of which are repeated or not finite, as an array of NumPy.
+/// Writes a rough floor with a step as a NumPy array. Some points are duplicates or not finite.
 fn floor(place: &Place, name: &str) {
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({POINTS}, 3), }}");
     while (header.len() + 11) % 64 != 0 {
@@ -29,10 +30,10 @@ fn floor(place: &Place, name: &str) {
     for i in 0..POINTS {
         let [x, y, z] = [random(), random(), random()];
         let p = match i % 1000 {
-            // Sparse points, and lines.
+            // Sparse points, and points on lines.
             0 => [5.0 * x, 5.0 * y, 5.0 * z],
             1..=4 => [x, 3.0, 2.0],
-            // Repeated, and not finite.
+            // Duplicates, and points that are not finite.
             5 => [0.5, 0.5, 0.0],
             6 => [f64::NAN, y, z],
             _ => [x, y, if x < 0.5 { 0.002 * z } else { 0.3 + 0.002 * z }],
@@ -60,7 +61,7 @@ fn the_same_file_comes_out_on_disk() {
     {
         place.ok(&prepare("floor.npy", "memory.nm", options));
         let done = place.ok(&prepare("floor.npy", "disk.nm", &[options, &["--memory", MEMORY]].concat()));
-        assert!(done.errors.contains("working on disk, in disk.nm.work"), "{}", done.errors);
+        assert!(done.errors.contains("working on disk in disk.nm.work"), "{}", done.errors);
         assert_eq!(read(&place, "memory.nm"), read(&place, "disk.nm"), "{options:?}");
         assert_eq!(place.files(), ["disk.nm", "floor.npy", "memory.nm"]);
     }
@@ -82,16 +83,16 @@ fn what_cannot_be_done_on_disk_is_refused_with_remedies() {
             words,
         );
     };
-    refused(&["--graph"], &["points need about", "to do without a graph"]);
+    refused(&["--graph"], &["points need about", "leave out the graph"]);
     let args = prepare("floor.npy", "f.nm", &["--memory", "40MB", "--remove-outliers", "8,2"]);
     place.refused(1, &args, &["reading 400,000 points needs"]);
     refused(&["--class", "2"], &["points with classes", "leave it out"]);
     place.refused(
         1,
         &prepare("floor.npy", "f.nm", &["--memory", "60MB"]),
-        &["--memory 100MB to work on disk"],
+        &["set --memory 100MB to work on disk"],
     );
-    // Somebody else's files stay.
+    // Files of others in the folder are kept.
     std::fs::create_dir(place.path("f.nm.work")).unwrap();
     place.write("f.nm.work/notes.txt", "mine");
     place.ok(&prepare("floor.npy", "f.nm", &["--memory", MEMORY]));
@@ -112,7 +113,7 @@ fn a_disk_that_is_too_small_is_an_error_by_name() {
             "{}",
             done.errors
         );
-        // What is closed is kept for the next run.
+        // Finished files are kept for the next run.
         assert!(left.lines().all(|line| line.contains("f.nm.work/")), "{size}: {left}");
     }
     let (done, left) = on_own_disk(&place, "size=300m", ":", &args).unwrap();
@@ -136,16 +137,16 @@ fn a_run_that_was_killed_is_gone_on_with() {
         assert!(!child.wait().unwrap().success(), "round {round}: killed");
         assert!(is_done(stage), "round {round}: {stage}");
         if round == 0 {
-            // Another input begins anew.
+            // With another input, the work starts from the beginning.
             floor(&place, "other.npy");
             place.ok(&prepare("other.npy", "disk.nm", &["--memory", MEMORY]));
             continue;
         }
         let done = place.ok(&on_disk);
-        assert!(done.errors.contains("going on with the work of an ended run"), "{}", done.errors);
+        assert!(done.errors.contains("resuming an interrupted run"), "{}", done.errors);
         assert_eq!(read(&place, "disk.nm"), expected, "round {round}");
     }
-    // A run in memory clears up too.
+    // A run in memory removes the files of a killed run too.
     let mut child = spawn(&place, &on_disk);
     while !is_done("points.done") && child.try_wait().unwrap().is_none() {
         std::thread::sleep(Duration::from_millis(1));

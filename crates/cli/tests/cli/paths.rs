@@ -7,7 +7,7 @@ use nearmiss_testdata::shapes::sphere;
 
 use crate::running::Place;
 
-/// A ball of radius 1, prepared.
+/// Returns a folder with a prepared ball of radius 1.
 fn ball() -> Place {
     let place = Place::new();
     place.cloud("ball.xyz", sphere(1.0), 0.08);
@@ -15,7 +15,7 @@ fn ball() -> Place {
     place
 }
 
-/// Poses of a ball that is turned and comes nearer, touches, and goes away again.
+/// Returns poses of a turning ball that approaches, touches, and moves away again.
 fn quaternions() -> Vec<([f64; 3], [f64; 4])> {
     (0..40_u32)
         .map(|i| {
@@ -96,7 +96,7 @@ fn a_pose_of_the_command_line_stands_for_what_lines_leave_out() {
     place.refused(
         1,
         &["collide", "ball.nm", "ball.nm", "--poses", "path", "--pose-b", "0 0 0 0 0 0 1"],
-        &["path: line 1: the line has a pose of b, and --pose-b is given as well"],
+        &["path: line 1: expected one pose of b, got one here and one in --pose-b; leave one out"],
     );
 }
 
@@ -112,7 +112,7 @@ fn a_path_is_summed_up_tabled_and_drawn() {
             [command, "ball.nm", "ball.nm", "--poses", "path.tum", "--csv", "t.csv", "--plot", "t.svg"];
         let done = place.ok(&args);
         let summary = done.results.lines().last().unwrap();
-        // The balls touch from a distance of 2 on, the twenty-first line, give or take the spacing.
+        // The balls touch at distances up to 2, from line 21 on, within the spacing.
         assert!(summary.starts_with("30 poses: "), "{summary}");
         let table = std::fs::read_to_string(place.path("t.csv")).unwrap();
         let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
@@ -128,7 +128,7 @@ fn a_path_is_summed_up_tabled_and_drawn() {
             assert!(lower <= truth + 0.02 && upper >= truth - 0.12 && upper <= truth + 0.05, "{row:?}");
         }
         let least = rows[first - 1][6].parse::<f64>().unwrap();
-        assert!(summary.contains("Least clearance of those apart: "), "{summary}");
+        assert!(summary.contains("Smallest clearance without contact: "), "{summary}");
         assert!(summary.contains(&format!(", on line {}, time", first - 1)), "{summary}, {least}");
         let plot = std::fs::read_to_string(place.path("t.svg")).unwrap();
         assert!(plot.starts_with("<svg") && plot.contains("time 14.5") && !plot.contains("NaN"), "{plot}");

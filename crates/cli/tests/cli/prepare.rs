@@ -76,7 +76,7 @@ fn a_graph_is_made_where_it_is_asked_for() {
     assert!(sizes.is_sorted_by(|a, b| a < b), "{sizes:?}");
     place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm"]);
     place.refused(1, &["export", "ball.nm", "--edges", "e.csv"], &["ball.nm", "--graph"]);
-    // Its options ask for it.
+    // Options of the graph imply --graph.
     for asked in [["--neighbours", "5"], ["--scanner", "0,0,0"]] {
         let words = [&["preprocess", "ball.xyz", "-o", "ball.nm", "--json"][..], &asked].concat();
         let report = place.ok(&words).json().remove(0);
@@ -92,7 +92,8 @@ fn a_graph_is_made_where_it_is_asked_for() {
     place.refused(2, &["preprocess", "ball.xyz", "-o", "ball.nm", "--scanner", "1,2"], &["--scanner"]);
 }
 
-/// Edges and close pairs name exported points, and their lengths are those between these.
+/// The indices of edges and close pairs are those of exported points, and their lengths match these
+/// points.
 #[test]
 fn edges_and_close_pairs_are_exported() {
     let place = Place::new();
@@ -131,13 +132,9 @@ fn people_read_a_health_line_and_advice() {
     place.cloud("ball.xyz", sphere(1.0), 0.1);
     let done = place.ok(&["preprocess", "ball.xyz", "-o", "ball.nm"]);
     assert!(done.results.lines().last().unwrap().starts_with("health"), "{}", done.results);
-    assert!(
-        done.results.contains("100 % of the points sample sheets, 0 % at their borders"),
-        "{}",
-        done.results
-    );
+    assert!(done.results.contains("100 % of the points sample a surface\n"), "{}", done.results);
 
-    // Rings a thousand times as far from each other as their points.
+    // Rings whose distance is a thousand times the spacing of their points.
     let rings: Vec<[f64; 3]> = (0..20_u8)
         .flat_map(|ring| (0..600_u16).map(move |i| (f64::from(ring), f64::from(i) * 0.01)))
         .map(|(ring, turn)| [3.0 * turn.cos(), 3.0 * turn.sin(), 30.0 * ring])
@@ -146,16 +143,13 @@ fn people_read_a_health_line_and_advice() {
     let done = place.ok(&["preprocess", "rings.xyz", "-o", "rings.nm"]);
     let advice = done.results.lines().find(|line| line.contains("lie on lines")).unwrap();
     assert!(
-        advice.contains("try `preprocess --reach ") && advice.contains("merge several frames"),
+        advice.contains("use `preprocess --reach ") && advice.contains("merge several frames"),
         "{advice}"
     );
     assert!(!advice.contains("--radius-neighbours"), "radii grow along lines by themselves: {advice}");
     let health = done.results.lines().find(|line| line.starts_with("health")).unwrap();
-    assert!(
-        health.contains("stand for themselves as balls of up to") && health.contains("on lines"),
-        "{health}"
-    );
-    // As balls they are decided; the surfaces alone are in doubt, and the doubt says what helps.
+    assert!(health.contains("count as balls of radius up to") && health.contains("on lines"), "{health}");
+    // Balls give a verdict. Surfaces alone give none, but the answer names remedies.
     let pose = ["--pose-b", "1 0 0 .09 0 1 0 .03 0 0 1 .01 0 0 0 1"];
     let ask = |options: &[&str]| {
         place.ok(&[&["collide", "rings.nm", "rings.nm"], &pose[..], options].concat()).results
@@ -163,8 +157,8 @@ fn people_read_a_health_line_and_advice() {
     let told = ask(&[]);
     assert!(told.starts_with("They touch at ") && told.contains("(certified)"), "{told}");
     let told = ask(&["--surface-only"]);
-    assert!(told.contains("sampled as lines; try leave --surface-only out, or --thickened"), "{told}");
-    // Following it gives an answer.
+    assert!(told.contains("sampled as lines; leave out --surface-only, set --thickened"), "{told}");
+    // The remedy gives a verdict.
     let radius = told.split_once("--thickened ").unwrap().1.split([',', ' ']).next().unwrap();
     let decided = ask(&["--thickened", radius]);
     assert!(decided.starts_with("Balls of radius"), "{decided}");
@@ -172,7 +166,7 @@ fn people_read_a_health_line_and_advice() {
     assert!(seen.results.contains("advice") && seen.results.contains("verified"), "{}", seen.results);
 }
 
-/// A grid of points `step` apart in the plane z = 0.
+/// Returns a grid of points `step` apart in the plane z = 0.
 fn grid(from: [f64; 2], counts: [u16; 2], step: f64) -> Vec<[f64; 3]> {
     let row = |i: u16| {
         (0..counts[1]).map(move |j| [from[0] + f64::from(i) * step, from[1] + f64::from(j) * step, 0.0])
@@ -180,7 +174,7 @@ fn grid(from: [f64; 2], counts: [u16; 2], step: f64) -> Vec<[f64; 3]> {
     (0..counts[0]).flat_map(row).collect()
 }
 
-/// The health of some points as JSON, and all lines of advice.
+/// Returns the report of some points as JSON, and the lines of health and advice.
 fn examined(points: &[[f64; 3]], options: &[&str]) -> (serde_json::Value, Vec<String>) {
     let place = Place::new();
     place.write("scan.xyz", text(points));
@@ -197,7 +191,7 @@ fn find<'a>(lines: &'a [String], word: &str) -> &'a str {
 
 #[test]
 fn uneven_spacing_is_told_with_its_share_of_the_area() {
-    // Two plates of the same area beside each other, of steps 0.02 and 0.4.
+    // Two adjacent plates of the same area, with spacings of 0.02 and 0.4.
     let dense = grid([0.0, 0.0], [150, 150], 0.02);
     let sparse = grid([3.0, 0.0], [8, 8], 0.4);
     let (report, told) = examined(&[dense, sparse].concat(), &[]);
@@ -210,7 +204,7 @@ fn uneven_spacing_is_told_with_its_share_of_the_area() {
     let advice = find(&told, "times sparser than the rest");
     let reach = advice.split("--reach ").nth(1).and_then(|t| t.split('`').next()).unwrap();
     assert!((0.4..1.2).contains(&reach.parse().unwrap()), "{advice}");
-    // The command that it names makes one sheet of both.
+    // The recommended command joins both plates.
     assert!(report["kinds"]["sheet"].as_f64().unwrap() < 0.9985, "{report}");
     let place = Place::new();
     let points = [grid([0.0, 0.0], [150, 150], 0.02), grid([3.0, 0.0], [8, 8], 0.4)].concat();
@@ -222,18 +216,18 @@ fn uneven_spacing_is_told_with_its_share_of_the_area() {
 
 #[test]
 fn borders_holes_and_strays_are_told() {
-    // A plate of 60 by 60 points, a tenth apart, with a hole of 20 by 20 and five points far above it.
+    // A plate of 60 by 60 points, 0.1 apart, with a hole of 20 by 20, and five points far above it.
     let mut points = grid([0.0, 0.0], [60, 60], 0.1);
     points.retain(|p| !((1.95..3.95).contains(&p[0]) && (1.95..3.95).contains(&p[1])));
     for i in 0..5_u8 {
         points.push([f64::from(i), 1.0, 4.0 + 3.0 * f64::from(i)]);
     }
     let (report, told) = examined(&points, &[]);
-    // 236 outside and 84 about the hole, of 3205.
+    // Of 3205 points, 236 are at the outer border and 84 at the hole.
     let border = report["health"]["border"].as_f64().unwrap();
     assert!((0.05..0.16).contains(&border), "about a tenth: {border}");
     let health = find(&told, "health");
-    assert!(health.contains("% at their borders") && !health.contains(" 0 % at their"), "{health}");
+    assert!(health.contains("% lie at its border") && !health.contains(" 0 % lie"), "{health}");
     assert!(find(&told, "lie at borders").contains("`collide --margin 0."), "{told:?}");
     let holes = &report["health"]["holes"];
     let widths = numbers(&holes["widths"]);
@@ -243,7 +237,7 @@ fn borders_holes_and_strays_are_told() {
     let closing: f64 = closing.split('`').next().unwrap().parse().unwrap();
     assert!((0.75..1.2).contains(&closing), "half the hole, less in its corners: {told:?}");
     assert!(!told.iter().any(|line| line.contains("times sparser")), "strays are no sheet: {told:?}");
-    assert!(find(&told, "much denser points").contains("of the points, about 5, are strays"), "{told:?}");
+    assert!(find(&told, "much denser points").contains("of the points (about 5) are outliers"), "{told:?}");
     let kinds = &report["kinds"];
     let alone = kinds["stray"].as_f64().unwrap() + kinds["sparse"].as_f64().unwrap();
     assert!(alone >= 5.0 / 3205.0 - 1e-9, "{kinds}");
@@ -253,8 +247,8 @@ fn borders_holes_and_strays_are_told() {
 fn more_neighbours_are_advised_where_they_help() {
     use nearmiss_testdata::scanner::{Frame, frame};
     let place = Place::new();
-    // Noise as large as the steps along a ring: six neighbours spread, twelve see the ring and reach the
-    // next.
+    // The noise is as large as the spacing along a ring: six neighbours spread in all directions,
+    // twelve reach the next ring.
     let points = frame(&Frame { beams: 16, steps: 1800, noise: 0.01, seed: 1 });
     place.write("frame.xyz", text(&points));
     let prepare = |k: &str, json: &[&str]| {
@@ -263,7 +257,8 @@ fn more_neighbours_are_advised_where_they_help() {
     };
     let told = prepare("6", &[]).results;
     assert!(
-        told.contains("lie on lines") && told.contains("try --radius-neighbours 12, or `preprocess --reach "),
+        told.contains("lie on lines")
+            && told.contains("use `preprocess --radius-neighbours 12`, use `preprocess --reach "),
         "{told}"
     );
     let lines = |k: &str| prepare(k, &["--json"]).json()[0]["kinds"]["line"].as_f64().unwrap();
@@ -274,13 +269,14 @@ fn more_neighbours_are_advised_where_they_help() {
 #[test]
 fn advice_is_given_once() {
     let place = Place::new();
-    // A blob: no sheet anywhere. Steps of a Kronecker sequence, even in three dimensions.
+    // A solid blob without surfaces: a Kronecker sequence, which is evenly distributed in three
+    // dimensions.
     let blob: Vec<[f64; 3]> =
         (1..3000_u16).map(|i| [0.8192, 0.6711, 0.5497].map(|step| f64::from(i) * step % 1.0)).collect();
     place.write("blob.xyz", text(&blob));
     let advice = |options: &[&str]| {
         let done = place.ok(&[&["preprocess", "blob.xyz", "-o", "blob.nm"], options].concat());
-        done.results.lines().find(|l| l.contains("one sheet")).expect("a blob is ambiguous").to_owned()
+        done.results.lines().find(|l| l.contains("a single surface")).expect("a blob is ambiguous").to_owned()
     };
     assert!(advice(&[]).contains("`preprocess --bandwidth 0."), "{}", advice(&[]));
     let chosen = advice(&["--bandwidth", "0.1"]);
@@ -299,7 +295,7 @@ fn sizes_are_told_a_point_and_odd_numbers_with_exponents() {
             .collect();
         place.write(name, text(&points));
         let told = place.ok(&["preprocess", name, "-o", "out.nm"]).results;
-        assert!(told.contains(" bytes a point"), "{told}");
+        assert!(told.contains(" bytes per point"), "{told}");
         assert!(told.lines().filter(|l| !l.starts_with("advice")).all(|l| l.len() < 150), "{told}");
     }
 }
@@ -356,7 +352,7 @@ fn what_is_dropped_is_counted_and_large_faces_are_warned_about() {
     assert_eq!((&report["dropped"]["not_finite"], &report["dropped"]["duplicate"]), (&1.into(), &1.into()));
     assert_eq!(numbers(&report["bounds"][1]), [5.0, 3.0, 0.0]);
 
-    // A dense patch, and one face that goes far beyond it.
+    // A dense patch, and one face that extends far beyond it.
     let mut mesh = String::new();
     for i in 0..100_u8 {
         mesh += &format!("v {} {} 0\n", i % 10, i / 10);
@@ -410,7 +406,7 @@ fn far_from_the_origin_nothing_is_lost() {
     assert!((middle - 1.0).abs() < 0.02 && (local[0] - 0.15).abs() < 0.02, "the circle x = 0.15: {local:?}");
 }
 
-/// What a scan is for is asked for, kept, told, and held to.
+/// The kernel of a scan is chosen by `preprocess`, stored, reported, and enforced.
 #[test]
 fn scans_are_prepared_for_a_kernel() {
     let place = Place::new();
@@ -433,7 +429,7 @@ fn scans_are_prepared_for_a_kernel() {
     let geodesic = ["--kernel", "geodesic"];
     let expected = ask("along.nm", "along.nm", &geodesic);
     assert_eq!((&expected["verdict"], &expected["evidence"]), (&"intersecting".into(), &"certified".into()));
-    // Raw inputs are prepared for the same, or for what the other is for.
+    // Raw inputs are prepared for the kernel given, or for that of the other scan.
     for (a, b, options) in [
         ("along.nm", "along.nm", &[][..]),
         ("ball.xyz", "ball.xyz", &geodesic),
@@ -466,7 +462,7 @@ fn scans_are_prepared_for_a_kernel() {
         assert_eq!(done.errors.contains("no separation is proven"), warned, "{options:?}: {}", done.errors);
     }
 
-    // f is asked for by either, whatever the scan is for; by default by its own.
+    // `eval` takes either kernel; the default is that of the scan.
     place.write("at.txt", "0.99 0 0");
     let f = |file: &str, options: &[&str]| {
         place.ok(&[&["eval", file, "--points", "at.txt", "--json"], options].concat()).json().remove(0)

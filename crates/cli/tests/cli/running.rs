@@ -1,4 +1,4 @@
-//! A folder, small clouds, and the command.
+//! Helpers that run the command in a temporary folder, and write small clouds.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use nearmiss_testdata::shapes::{Form, Sampling};
 use serde_json::Value;
 
-/// A folder of its own for each test.
+/// A temporary folder, one for each test.
 pub(crate) struct Place(tempfile::TempDir);
 
 impl Place {
@@ -24,7 +24,7 @@ impl Place {
         self.path(name)
     }
 
-    /// Names of all files.
+    /// Returns the names of all files, sorted.
     pub(crate) fn files(&self) -> Vec<String> {
         let mut names: Vec<String> = std::fs::read_dir(self.0.path())
             .unwrap()
@@ -34,12 +34,12 @@ impl Place {
         names
     }
 
-    /// The points of `form` as text.
+    /// Writes points of `form` as text.
     pub(crate) fn cloud(&self, name: &str, form: Form, spacing: f64) -> PathBuf {
         self.write(name, text(&form.sample(Sampling::clean(spacing)).points))
     }
 
-    /// Width in pixels and bytes, red green blue, of a picture.
+    /// Returns the width of a picture in pixels, and its bytes (red, green, blue).
     pub(crate) fn picture(&self, name: &str) -> (usize, Vec<u8>) {
         let file = std::fs::File::open(self.path(name)).unwrap();
         let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().unwrap();
@@ -79,7 +79,7 @@ impl Place {
     }
 }
 
-/// What a run left.
+/// The result of a run.
 pub(crate) struct Done {
     pub(crate) status: i32,
     pub(crate) results: String,
@@ -96,7 +96,7 @@ impl Done {
         }
     }
 
-    /// One object of JSON a line.
+    /// Parses one JSON object per line.
     pub(crate) fn json(&self) -> Vec<Value> {
         self.results.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
@@ -109,7 +109,7 @@ pub(crate) fn text(points: &[[f64; 3]]) -> String {
     })
 }
 
-/// The keys of an object, sorted.
+/// Returns the keys of an object, sorted.
 pub(crate) fn keys(value: &Value) -> Vec<&str> {
     let mut keys: Vec<&str> = value.as_object().unwrap().keys().map(String::as_str).collect();
     keys.sort_unstable();
