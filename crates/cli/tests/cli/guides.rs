@@ -97,7 +97,8 @@ fn every_command_of_the_pages_runs() {
 
 #[test]
 fn only_blocks_marked_sh_run() {
-    let page = "# Title\n```text\nnearmiss no\n```\n\n```sh\nnearmiss yes <<'END'\nx\nEND\n```\n```\nsh\n```\n";
+    let page =
+        "# Title\n```text\nnearmiss no\n```\n\n```sh\nnearmiss yes <<'END'\nx\nEND\n```\n```\nsh\n```\n";
     let expected = Block { line: 7, script: "nearmiss yes <<'END'\nx\nEND\n".into() };
     assert_eq!(blocks(page), [expected]);
     assert_eq!(blocks("no block"), []);
