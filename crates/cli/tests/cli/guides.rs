@@ -1,7 +1,7 @@
 //! The commands of the front page and of the guides run as they stand there.
 //!
-//! Each page gets a folder of its own with `testdata/data`. Its blocks marked `sh` run in order, each by `sh -e`
-//! with the built `nearmiss` first in `PATH`. Blocks with other marks are not run.
+//! Each page gets a folder of its own with `testdata/data`. Its blocks marked `sh` run in order,
+//! each by `sh -e` with the built `nearmiss` first in `PATH`. Blocks with other marks are not run.
 #![cfg(unix)]
 
 use std::fs;
