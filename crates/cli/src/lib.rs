@@ -28,6 +28,7 @@ mod memory;
 mod output;
 mod parse;
 mod path;
+mod path_entry;
 mod path_plot;
 mod pose_text;
 mod posing;

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::digits::short;
 use crate::error::CliError;
 use crate::output;
-use crate::path::{PathEntry, PathVerdict};
+use crate::path_entry::{PathEntry, PathVerdict};
 
 /// Width and height of the picture.
 const SIZE: [f64; 2] = [960.0, 360.0];
