@@ -76,7 +76,7 @@ fn triangles(criterion: &mut Criterion) {
         group.bench_function("parry-f32", |bencher| {
             bencher.iter(|| {
                 let meet = |[a, b]: &&[Triangle; 2]| {
-                    intersection_test(&place, black_box(a), &place, b).unwrap_or(false)
+                    intersection_test(&place, black_box(a), &place, b).is_ok_and(|found| found.intersecting)
                 };
                 singles.iter().filter(meet).count()
             });

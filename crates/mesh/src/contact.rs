@@ -24,11 +24,10 @@ pub struct TriangleContact {
 /// Returns the contact of two triangles, or `None` if they do not meet.
 ///
 /// Whether they meet, and which edges bound the common segment, is decided exactly, as by
-/// [`triangles_meet`](crate::triangles_meet). The points are then computed from exact volumes, so each
-/// coordinate is within four units of rounding (4 · 2^-52) of the exact one, relative to the largest
-/// magnitude of that coordinate at the ends of the edge it lies on. This holds for nearly parallel
-/// planes too. For finite corners the result is finite, and always within the boxes of both triangles
-/// up to that rounding.
+/// [`triangles_meet`](crate::triangles_meet). The ends are then computed from exact volumes, so each
+/// of their coordinates is within four units of rounding (4 · 2^-52) of the exact one, relative to the
+/// largest magnitude of that coordinate at the corners of the edge on which the end lies. This holds
+/// for nearly parallel planes too. For finite corners the result is finite.
 ///
 /// # Cost
 /// About 1 µs for a pair that meets, as [`triangles_meet`](crate::triangles_meet) for one that does not.

@@ -98,7 +98,7 @@ impl<const N: usize> Wide<N> {
     }
 
     /// The quotient of two nonnegative numbers, `other` not zero. The relative error is at most
-    /// 2^-50; a quotient below about 2^-1000 is returned as 0.
+    /// 2^-51; a quotient below about 2^-1000 is returned as 0.
     pub(crate) fn ratio(&self, other: &Self) -> f64 {
         let (high, high_exponent) = self.rounded();
         let (low, low_exponent) = other.rounded();
