@@ -144,15 +144,14 @@ impl Face {
         let (edge, side) = (between(a, b), between(a, c));
         let base = length(edge);
         let along = edge.map(|x| x / base);
-        // The second pass removes what rounding left of the component along a needle.
+        // Corners are projected in the same two steps (modified Gram-Schmidt), which is accurate for
+        // needles even though their `away` is not quite perpendicular to `along`.
         let foot = dot(side, along);
-        let rough = minus(side, along, foot);
-        let rest = dot(rough, along);
-        let away = minus(rough, along, rest);
+        let away = minus(side, along, foot);
         let height = length(away);
         (base > 0.0 && height > 0.0).then(|| {
             let away = away.map(|x| x / height);
-            Self { first, along, away, base, tip: [foot + rest, height] }
+            Self { first, along, away, base, tip: [foot, height] }
         })
     }
 }

@@ -62,9 +62,8 @@ pub(crate) fn arrangement(a: &Corners, b: &Corners) -> Arrangement {
     if !boxes_meet(a, b) {
         return Arrangement::Apart;
     }
-    let (of_a, of_b) = (PlaneSides::new(a), PlaneSides::new(b));
-    let Some(sides_a) = sides(&of_b, a) else { return Arrangement::Apart };
-    let Some(sides_b) = sides(&of_a, b) else { return Arrangement::Apart };
+    let Some(sides_a) = PlaneSides::new(b).sides(a) else { return Arrangement::Apart };
+    let Some(sides_b) = PlaneSides::new(a).sides(b) else { return Arrangement::Apart };
     let (Some((at_a, above_a)), Some((at_b, above_b))) = (apex(sides_a), apex(sides_b)) else {
         return Arrangement::Flat;
     };
@@ -93,35 +92,37 @@ fn boxes_meet(a: &Corners, b: &Corners) -> bool {
     })
 }
 
-/// The exact side of each corner; `None` if all lie strictly on one side.
-#[inline]
-fn sides(plane: &PlaneSides<'_>, corners: &Corners) -> Option<[Ordering; 3]> {
-    let filtered = corners.map(|p| plane.filtered(p));
-    let [i, j, k] = filtered;
-    if i == j && j == k && i.is_some() {
-        return None;
-    }
-    let exact = [0, 1, 2].map(|k| filtered[k].unwrap_or_else(|| plane.side(corners[k])));
-    (exact[0] == Ordering::Equal || exact != [exact[0]; 3]).then_some(exact)
-}
-
 /// The corner that lies alone on its side of a plane, and whether that is the upper side. The other two
 /// may lie in the plane, or the corner itself if both others are strictly on one side. `None` if all
 /// three lie in the plane.
 #[inline]
 fn apex(sides: [Ordering; 3]) -> Option<(usize, bool)> {
-    let alone = |side: Ordering, others: [Ordering; 2]| {
-        let strictly = others.iter().all(|&other| other != Ordering::Equal);
-        side.is_ge() && others.iter().all(|other| other.is_le()) && (side.is_gt() || strictly)
-    };
-    (0..3).find_map(|i| {
-        let others = [sides[(i + 1) % 3], sides[(i + 2) % 3]];
-        if alone(sides[i], others) {
-            Some((i, true))
-        } else if alone(sides[i].reverse(), others.map(Ordering::reverse)) {
-            Some((i, false))
-        } else {
-            None
+    let [a, b, c] = sides.map(|side| usize::from(side.is_gt()) + usize::from(side.is_ge()));
+    APEX[9 * a + 3 * b + c]
+}
+
+/// [`apex_of`] for all sides; each is 0 below the plane, 1 in it, and 2 above it.
+const APEX: [Option<(usize, bool)>; 27] = {
+    let mut table = [None; 27];
+    let mut code = 0;
+    while code < 27 {
+        table[code] = apex_of([code / 9, code / 3 % 3, code % 3]);
+        code += 1;
+    }
+    table
+};
+
+const fn apex_of(sides: [usize; 3]) -> Option<(usize, bool)> {
+    let mut i = 0;
+    while i < 3 {
+        let (side, e, f) = (sides[i], sides[(i + 1) % 3], sides[(i + 2) % 3]);
+        if side >= 1 && e <= 1 && f <= 1 && (side == 2 || (e == 0 && f == 0)) {
+            return Some((i, true));
         }
-    })
+        if side <= 1 && e >= 1 && f >= 1 && (side == 0 || (e == 2 && f == 2)) {
+            return Some((i, false));
+        }
+        i += 1;
+    }
+    None
 }

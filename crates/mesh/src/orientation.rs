@@ -11,7 +11,7 @@ use std::cmp::Ordering;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
 use crate::triangle::between;
-use crate::wide::{ANY, NARROW, NARROW_SPAN, Wide, lowest_bit};
+use crate::wide::{ANY, MEDIUM, MEDIUM_SPAN, SMALL, SMALL_SPAN, Wide, lowest_bit};
 
 /// 2^-250. All bits of such numbers are at or above 2^-302, so each product of three differences is a
 /// multiple of 2^-906, and the least error bound of the expansions, 2^-104 times that, is normal.
@@ -26,6 +26,23 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Covers underflow: a product is off by at most 2^-1075, which is far below this times [`ROUNDING`].
 const UNDERFLOW: f64 = 1e-290;
+
+/// Evaluates an expression with the least width of integers that is enough for determinants of the points.
+macro_rules! wide_enough {
+    ($points:expr, |$unit:ident, $width:ident| $value:expr) => {{
+        let ($unit, span) = span($points);
+        if span <= SMALL_SPAN {
+            const $width: usize = SMALL;
+            $value
+        } else if span <= MEDIUM_SPAN {
+            const $width: usize = MEDIUM;
+            $value
+        } else {
+            const $width: usize = ANY;
+            $value
+        }
+    }};
+}
 
 /// The plane of a triangle, ready to tell the sides of many points.
 ///
@@ -51,25 +68,44 @@ impl<'a> PlaneSides<'a> {
         }
     }
 
-    /// The side of `p` if rounding leaves no doubt. Overflow makes the bound infinite or NaN.
+    /// The volume of `p` and a bound on its rounding error. Overflow makes the bound infinite or NaN.
     #[inline]
-    pub(crate) fn filtered(&self, p: [f64; 3]) -> Option<Ordering> {
+    fn rounded(&self, p: [f64; 3]) -> [f64; 2] {
         let d = between(self.corners[0], p);
         let volume = self.normal[0] * d[0] + self.normal[1] * d[1] + self.normal[2] * d[2];
         let scale = self.scale[0] * d[0].abs() + self.scale[1] * d[1].abs() + self.scale[2] * d[2].abs();
-        settled(volume, scale)
+        [volume, ROUNDING * scale + UNDERFLOW]
     }
 
     /// The side of `p`, exactly.
     #[inline]
     pub(crate) fn side(&self, p: [f64; 3]) -> Ordering {
-        self.filtered(p).unwrap_or_else(|| exact_side(self.corners, p))
+        let [volume, bound] = self.rounded(p);
+        settled(volume, bound).unwrap_or_else(|| exact_side(self.corners, p))
+    }
+
+    /// The sides of the corners of a triangle, exactly; `None` if all lie strictly on one side.
+    #[inline]
+    pub(crate) fn sides(&self, corners: &[[f64; 3]; 3]) -> Option<[Ordering; 3]> {
+        let [p, q, r] = corners.map(|p| self.rounded(p));
+        // Without branches for single corners, which would be mispredicted.
+        let above = [p, q, r].map(|[volume, bound]| volume > bound);
+        let below = [p, q, r].map(|[volume, bound]| volume < -bound);
+        if above[0] & above[1] & above[2] | below[0] & below[1] & below[2] {
+            return None;
+        }
+        let sides = [0, 1, 2].map(|k| i8::from(above[k]).cmp(&i8::from(below[k])));
+        if sides.iter().all(|side| side.is_ne()) {
+            return Some(sides);
+        }
+        let open = |k: usize| if sides[k].is_ne() { sides[k] } else { exact_side(self.corners, corners[k]) };
+        let exact = [open(0), open(1), open(2)];
+        (exact[0].is_eq() || exact != [exact[0]; 3]).then_some(exact)
     }
 }
 
 #[inline]
-fn settled(value: f64, scale: f64) -> Option<Ordering> {
-    let bound = ROUNDING * scale + UNDERFLOW;
+fn settled(value: f64, bound: f64) -> Option<Ordering> {
     if value > bound {
         Some(Ordering::Greater)
     } else if value < -bound {
@@ -89,15 +125,15 @@ pub(crate) fn volume_sign(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) ->
 #[inline(never)]
 fn exact_side(corners: &[[f64; 3]; 3], p: [f64; 3]) -> Ordering {
     let [a, b, c] = *corners;
+    if plainly_flat(&[a, b, c, p]) {
+        return Ordering::Equal;
+    }
     if [a, b, c, p].iter().flatten().all(|&x| in_range(x)) {
         let [a, b, c, p] = [a, b, c, p].map(|[x, y, z]| Coord3D { x, y, z });
         // Shewchuk's sign is that of the side from which a, b, c turn clockwise.
         return sign(-orient3d(a, b, c, p));
     }
-    match Unit::of(&[a, b, c, p]) {
-        Unit::Narrow(unit) => volume::<NARROW>(corners, p, unit).signum().cmp(&0),
-        Unit::Any(unit) => volume::<ANY>(corners, p, unit).signum().cmp(&0),
-    }
+    wide_enough!(&[a, b, c, p], |unit, N| volume::<N>(corners, p, unit).signum().cmp(&0))
 }
 
 /// The sign of the area of a triangle in the plane, exactly: `Greater` if a, b, c turn
@@ -105,20 +141,28 @@ fn exact_side(corners: &[[f64; 3]; 3], p: [f64; 3]) -> Ordering {
 #[inline]
 pub(crate) fn area_sign(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Ordering {
     let [left, right] = [(b[0] - a[0]) * (c[1] - a[1]), (b[1] - a[1]) * (c[0] - a[0])];
-    settled(left - right, left.abs() + right.abs()).unwrap_or_else(|| exact_area(a, b, c))
+    let bound = ROUNDING * (left.abs() + right.abs()) + UNDERFLOW;
+    settled(left - right, bound).unwrap_or_else(|| exact_area(a, b, c))
 }
 
 #[cold]
 #[inline(never)]
 fn exact_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Ordering {
+    if plainly_flat(&[a, b, c]) {
+        return Ordering::Equal;
+    }
     if [a, b, c].iter().flatten().all(|&x| in_range(x)) {
         let [a, b, c] = [a, b, c].map(|[x, y]| Coord { x, y });
         return sign(orient2d(a, b, c));
     }
-    match Unit::of(&[a, b, c]) {
-        Unit::Narrow(unit) => area::<NARROW>([a, b], c, unit).signum().cmp(&0),
-        Unit::Any(unit) => area::<ANY>([a, b], c, unit).signum().cmp(&0),
-    }
+    wide_enough!(&[a, b, c], |unit, N| area::<N>([a, b], c, unit).signum().cmp(&0))
+}
+
+/// Returns `true` if two points are equal, or all points share a coordinate: then they have no volume, or
+/// no area. This is common in meshes: neighbours share corners, and walls are aligned.
+fn plainly_flat<const D: usize>(points: &[[f64; D]]) -> bool {
+    let aligned = (0..D).any(|k| points.iter().all(|p| p[k] == points[0][k]));
+    aligned || points.iter().enumerate().any(|(i, p)| points[..i].contains(p))
 }
 
 fn in_range(x: f64) -> bool {
@@ -129,25 +173,13 @@ fn sign(x: f64) -> Ordering {
     x.partial_cmp(&0.0).unwrap_or(Ordering::Equal)
 }
 
-/// The place of the lowest bit of some coordinates, and the width that their determinants need.
-#[derive(Debug, Clone, Copy)]
-enum Unit {
-    Narrow(i32),
-    Any(i32),
-}
-
-impl Unit {
-    fn of<const D: usize>(points: &[[f64; D]]) -> Self {
-        let lowest = |[low, high]: [i32; 2], bit: i32| [low.min(bit), high.max(bit + 53)];
-        let bits = points.iter().flatten().filter_map(|&x| lowest_bit(x));
-        let [low, high] = bits.fold([i32::MAX, i32::MIN], lowest);
-        match high.checked_sub(low) {
-            // Only zeros.
-            None => Self::Narrow(0),
-            Some(span) if span <= NARROW_SPAN => Self::Narrow(low),
-            Some(_) => Self::Any(low),
-        }
-    }
+/// The place of the lowest bit of some coordinates, and the number of bits from there to the highest.
+fn span<const D: usize>(points: &[[f64; D]]) -> (i32, i32) {
+    let bits = points.iter().flatten().filter_map(|&x| lowest_bit(x));
+    let widen = |[low, high]: [i32; 2], bit: i32| [low.min(bit), high.max(bit + 53)];
+    let [low, high] = bits.fold([i32::MAX, i32::MIN], widen);
+    // Without any number but 0 the unit does not matter.
+    if low > high { (0, 0) } else { (low, high - low) }
 }
 
 /// Six times the volume of the tetrahedron, in cubic units.
@@ -172,18 +204,13 @@ fn area<const N: usize>([a, b]: [[f64; 2]; 2], c: [f64; 2], unit: i32) -> Wide<N
 /// exact volumes. `p` and `q` must not lie strictly on the same side, nor both in the plane.
 pub(crate) fn plane_weights(corners: &[[f64; 3]; 3], p: [f64; 3], q: [f64; 3]) -> [f64; 2] {
     let [a, b, c] = *corners;
-    match Unit::of(&[a, b, c, p, q]) {
-        Unit::Narrow(unit) => weights([p, q].map(|x| volume::<NARROW>(corners, x, unit))),
-        Unit::Any(unit) => weights([p, q].map(|x| volume::<ANY>(corners, x, unit))),
-    }
+    wide_enough!(&[a, b, c, p, q], |unit, N| weights([p, q].map(|x| volume::<N>(corners, x, unit))))
 }
 
 /// The weights of `p` and `q` at the point where the segment between them meets a line in the plane.
 pub(crate) fn line_weights(line: [[f64; 2]; 2], p: [f64; 2], q: [f64; 2]) -> [f64; 2] {
-    match Unit::of(&[line[0], line[1], p, q]) {
-        Unit::Narrow(unit) => weights([p, q].map(|x| area::<NARROW>(line, x, unit))),
-        Unit::Any(unit) => weights([p, q].map(|x| area::<ANY>(line, x, unit))),
-    }
+    let [a, b] = line;
+    wide_enough!(&[a, b, p, q], |unit, N| weights([p, q].map(|x| area::<N>(line, x, unit))))
 }
 
 fn weights<const N: usize>(sides: [Wide<N>; 2]) -> [f64; 2] {

@@ -1,15 +1,20 @@
 //! Fixed-width integers for determinants that no floating-point expansion can hold.
 
-/// Limbs for coordinates whose bits span at most [`NARROW_SPAN`] places.
-pub(crate) const NARROW: usize = 8;
+/// Limbs for coordinates whose bits span at most [`SMALL_SPAN`] places.
+pub(crate) const SMALL: usize = 4;
 
-/// Limbs for any finite coordinates.
+/// Greatest span, in bits, that fits [`SMALL`] limbs: a volume of coordinates below 2^D is a sum of
+/// six products of three differences, each below 2^(D + 1), so it is below 2^(3 D + 6) ≤ 2^246.
+pub(crate) const SMALL_SPAN: i32 = 80;
+
+/// Limbs for coordinates whose bits span at most [`MEDIUM_SPAN`] places.
+pub(crate) const MEDIUM: usize = 8;
+
+/// As [`SMALL_SPAN`]: volumes are below 2^486.
+pub(crate) const MEDIUM_SPAN: i32 = 160;
+
+/// Limbs for any finite coordinates: they span 2098 bits, and a volume takes 6300 of 6400 bits.
 pub(crate) const ANY: usize = 100;
-
-/// Greatest span, in bits, that fits [`NARROW`] limbs: a volume of coordinates below 2^D is a sum of
-/// six products of three differences, each below 2^(D + 1), so it is below 2^(3 D + 6) ≤ 2^486.
-/// Any finite doubles span 2098 bits, which takes 6300 of the 6400 bits of [`ANY`] limbs.
-pub(crate) const NARROW_SPAN: i32 = 160;
 
 /// Bits of the significand of an `f64` below its leading one.
 const FRACTION: i32 = 52;
