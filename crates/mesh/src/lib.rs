@@ -1,9 +1,21 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod clean;
+mod contact;
+mod distance;
+mod flat;
 mod lattice;
+mod meet;
+mod orientation;
 mod sample;
 mod triangle;
+mod weld;
+mod wide;
 
+pub use clean::{CleanError, CleanMesh, CleanOptions, CleanReport};
+pub use contact::{TriangleContact, triangle_contact, unit_normal};
+pub use distance::{TriangleDistance, triangle_distance};
 pub use lattice::{Lattice, lattice_samples};
+pub use meet::{Corners, triangles_meet};
 pub use sample::{SampleError, SampleOptions, SampleSize, sample};

@@ -1,0 +1,253 @@
+//! `CleanMesh`: a mesh without repeated vertices and without useless triangles.
+
+use nearmiss_geometry::TriangleMesh;
+use thiserror::Error;
+
+use crate::flat::has_area;
+use crate::meet::Corners;
+use crate::weld;
+
+/// Options of [`CleanMesh`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
+pub struct CleanOptions {
+    /// Greatest distance over which vertices are welded, in the units of the vertices. 0, the default,
+    /// welds vertices with equal coordinates only.
+    pub weld: f64,
+}
+
+impl CleanOptions {
+    /// The same options with this weld distance.
+    #[must_use]
+    pub const fn with_weld(self, weld: f64) -> Self {
+        Self { weld }
+    }
+}
+
+/// Why a mesh cannot be cleaned.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CleanError {
+    /// A coordinate is NaN or infinite.
+    #[error("expected finite coordinates, got {position:?} (vertex {vertex}); correct or remove the vertex")]
+    NotFinite {
+        /// Index of the vertex.
+        vertex: usize,
+        /// Its coordinates.
+        position: [f64; 3],
+    },
+    /// A triangle refers to a vertex that does not exist.
+    #[error(
+        "expected a vertex index below {vertices}, got {vertex} (triangle {triangle}); \
+         correct the triangle or add the vertex"
+    )]
+    NoSuchVertex {
+        /// Index of the triangle.
+        triangle: usize,
+        /// The vertex index.
+        vertex: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// The weld distance is negative, NaN or infinite.
+    #[error("expected a finite weld distance of 0 or more, got {weld}; give 0 to weld equal vertices only")]
+    Weld {
+        /// The distance.
+        weld: f64,
+    },
+    /// There are more vertices or triangles than 32-bit indices can number.
+    #[error("expected at most 4294967295 {what}, got {count}; split the mesh")]
+    TooMany {
+        /// "vertices" or "triangles".
+        what: &'static str,
+        /// Their number.
+        count: usize,
+    },
+}
+
+/// Counts of what cleaning a mesh removed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub struct CleanReport {
+    /// Vertices before.
+    pub vertices: usize,
+    /// Triangles before.
+    pub triangles: usize,
+    /// Vertices replaced by another one at the same place, or within the weld distance.
+    pub welded_vertices: usize,
+    /// Vertices that no remaining triangle uses, welded ones not counted.
+    pub unused_vertices: usize,
+    /// Triangles with two equal corners or, exactly, with collinear corners.
+    pub degenerate_triangles: usize,
+    /// Triangles with the same three corners as an earlier one, in any order.
+    pub duplicate_triangles: usize,
+}
+
+/// A triangle mesh in which all vertices are finite, distinct and used, all triangles have an area
+/// greater than zero, and no two triangles have the same three corners.
+///
+/// Vertices and triangles keep their order. Orientation is kept; nothing is promised about
+/// closedness or manifoldness.
+///
+/// ```
+/// use nearmiss_mesh::{CleanMesh, CleanOptions};
+///
+/// // Two triangles of a square as a triangle soup: the corners of their common edge are repeated.
+/// let vertices = [
+///     [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0],
+///     [0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0],
+/// ];
+/// let mesh = CleanMesh::from_parts(&vertices, &[[0, 1, 2], [3, 4, 5]], &CleanOptions::default())?;
+/// assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3]]);
+/// assert_eq!(mesh.report().welded_vertices, 2);
+/// # Ok::<(), nearmiss_mesh::CleanError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CleanMesh {
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+    sources: Vec<u32>,
+    report: CleanReport,
+}
+
+impl CleanMesh {
+    /// Cleans a mesh. See [`CleanMesh::from_parts`].
+    ///
+    /// # Errors
+    /// As [`CleanMesh::from_parts`].
+    pub fn new(mesh: &TriangleMesh, options: &CleanOptions) -> Result<Self, CleanError> {
+        Self::from_parts(mesh.vertices(), mesh.triangles(), options)
+    }
+
+    /// Cleans vertices and triangles that refer to them.
+    ///
+    /// Vertices are welded first: equal ones become the one with the lowest index. With a weld
+    /// distance above 0, each vertex in turn is replaced by the nearest vertex kept before it if that is
+    /// within the distance, up to rounding. So no vertex moves farther than the distance, and kept
+    /// vertices are farther apart than it. Then degenerate triangles are dropped, then duplicates
+    /// except the first, then unused vertices. A mesh may end up empty.
+    ///
+    /// # Cost
+    /// O(n log n) in time for n vertices and triangles, O(n) in memory.
+    ///
+    /// # Errors
+    /// If a vertex, also an unused one, has a coordinate that is NaN or infinite, if a triangle refers to a
+    /// vertex that does not exist, if the weld distance is negative or not finite, or if there are more
+    /// than 2^32 − 1 vertices or triangles.
+    pub fn from_parts(
+        vertices: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+        options: &CleanOptions,
+    ) -> Result<Self, CleanError> {
+        check(vertices, triangles, options)?;
+        let replacements =
+            if options.weld > 0.0 { weld::within(vertices, options.weld) } else { weld::equal(vertices) };
+        let kept = (0_u32..).zip(&replacements).filter(|(v, replacement)| v == *replacement).count();
+
+        let welded = triangles.iter().map(|t| t.map(|v| replacements[v as usize]));
+        let proper = |t: &[u32; 3]| {
+            t[0] != t[1] && t[1] != t[2] && t[2] != t[0] && has_area(&t.map(|v| vertices[v as usize]))
+        };
+        let mut remaining: Vec<(u32, [u32; 3])> = (0..).zip(welded).filter(|(_, t)| proper(t)).collect();
+        let degenerate_triangles = triangles.len() - remaining.len();
+        let duplicate_triangles = drop_duplicates(&mut remaining);
+
+        let mut used = vec![false; vertices.len()];
+        for &v in remaining.iter().flat_map(|(_, t)| t) {
+            used[v as usize] = true;
+        }
+        let mut numbers = vec![0_u32; vertices.len()];
+        let chosen = vertices.iter().zip(&mut numbers).zip(&used).filter(|(_, used)| **used);
+        let left: Vec<[f64; 3]> = (0..)
+            .zip(chosen)
+            .map(|(number, ((position, place), _))| {
+                *place = number;
+                *position
+            })
+            .collect();
+        let report = CleanReport {
+            vertices: vertices.len(),
+            triangles: triangles.len(),
+            welded_vertices: vertices.len() - kept,
+            unused_vertices: kept - left.len(),
+            degenerate_triangles,
+            duplicate_triangles,
+        };
+        Ok(Self {
+            vertices: left,
+            triangles: remaining.iter().map(|(_, t)| t.map(|v| numbers[v as usize])).collect(),
+            sources: remaining.iter().map(|(source, _)| *source).collect(),
+            report,
+        })
+    }
+
+    /// Positions of the vertices.
+    #[must_use]
+    pub fn vertices(&self) -> &[[f64; 3]] {
+        &self.vertices
+    }
+
+    /// Vertex indices of each triangle.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// For each triangle, its index in the mesh it was made from, in ascending order.
+    #[must_use]
+    pub fn sources(&self) -> &[u32] {
+        &self.sources
+    }
+
+    /// The corners of the `i`-th triangle.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    #[must_use]
+    pub fn corners(&self, i: usize) -> Corners {
+        self.triangles[i].map(|v| self.vertices[v as usize])
+    }
+
+    /// Counts of what was removed.
+    #[must_use]
+    pub const fn report(&self) -> &CleanReport {
+        &self.report
+    }
+}
+
+fn check(vertices: &[[f64; 3]], triangles: &[[u32; 3]], options: &CleanOptions) -> Result<(), CleanError> {
+    if !(options.weld >= 0.0 && options.weld.is_finite()) {
+        return Err(CleanError::Weld { weld: options.weld });
+    }
+    for (what, count) in [("vertices", vertices.len()), ("triangles", triangles.len())] {
+        if u32::try_from(count).is_err() {
+            return Err(CleanError::TooMany { what, count });
+        }
+    }
+    if let Some(vertex) = vertices.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
+        return Err(CleanError::NotFinite { vertex, position: vertices[vertex] });
+    }
+    for (triangle, corners) in triangles.iter().enumerate() {
+        if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices.len()) {
+            return Err(CleanError::NoSuchVertex { triangle, vertex, vertices: vertices.len() });
+        }
+    }
+    Ok(())
+}
+
+/// Keeps the first of the triangles with the same corners, and returns the number of others.
+fn drop_duplicates(triangles: &mut Vec<(u32, [u32; 3])>) -> usize {
+    let before = triangles.len();
+    let sorted = |&(source, mut corners): &(u32, [u32; 3])| {
+        corners.sort_unstable();
+        (corners, source)
+    };
+    let mut keys: Vec<([u32; 3], u32)> = triangles.iter().map(sorted).collect();
+    keys.sort_unstable();
+    keys.dedup_by_key(|(corners, _)| *corners);
+    let mut firsts: Vec<u32> = keys.into_iter().map(|(_, source)| source).collect();
+    firsts.sort_unstable();
+    let mut firsts = firsts.into_iter().peekable();
+    triangles.retain(|(source, _)| firsts.next_if_eq(source).is_some());
+    before - triangles.len()
+}
