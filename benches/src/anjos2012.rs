@@ -1,4 +1,4 @@
-//! What the tables and figures of dos Anjos, Pereira & Oliveira 2012 (S4) are measured on, and how.
+//! Scenes and measurements for the tables and figures of dos Anjos, Pereira & Oliveira 2012.
 
 pub mod columns;
 pub mod headroom;
@@ -14,19 +14,19 @@ use nearmiss_testdata::scenes::TWO_STOREYS;
 use crate::Failure;
 use crate::clock::timed;
 
-/// What maps are made of.
+/// The input of a slice map.
 #[derive(Debug)]
 pub enum Source {
     /// A scan.
     Points(PointCloud),
-    /// Sampled for the map.
+    /// A mesh, which is sampled for the map.
     Mesh(TriangleMesh),
 }
 
-/// A map of a source, and how many points are in it.
+/// Builds a slice map of `source`; returns it with its number of points.
 ///
 /// # Errors
-/// When the system gives no memory.
+/// When memory for the map cannot be allocated.
 pub fn made(plan: &SlicePlan, source: &Source) -> Result<(SliceMap, u64), Failure> {
     let mut builder = SliceBuilder::new(plan)?;
     match source {
@@ -37,17 +37,17 @@ pub fn made(plan: &SlicePlan, source: &Source) -> Result<(SliceMap, u64), Failur
     Ok((builder.finish(), points))
 }
 
-/// What is walked in, up and down stairs.
+/// A scan with a route that climbs and descends stairs.
 #[derive(Debug)]
 pub struct Walked {
     /// The points.
     pub cloud: PointCloud,
-    /// The way.
+    /// The route.
     pub route: Route,
 }
 
 impl Walked {
-    /// The scan of two storeys and its staircase, in the folder of data.
+    /// Reads the scan of two storeys and their staircase from the data folder `data`.
     ///
     /// # Errors
     /// When it cannot be read.
@@ -56,10 +56,10 @@ impl Walked {
         Ok(Self { cloud, route: serde_json::from_str(TWO_STOREYS.route)? })
     }
 
-    /// The generated house, in its place.
+    /// Generates the house and its route.
     ///
     /// # Errors
-    /// None, but for points that are no cloud.
+    /// When the generated points do not make a valid cloud.
     pub fn house(spacing: f64, seed: u64) -> Result<Self, Failure> {
         let y = 0.5 * (STAIRS[0] + STAIRS[1]);
         let points = scanned(&house(), spacing, 0.003, seed);
@@ -70,10 +70,11 @@ impl Walked {
         Ok(Self { cloud: PointCloud::from_positions(&points)?, route })
     }
 
-    /// Its map in a folder, and how many seconds it took to get there from the points.
+    /// Builds the map and saves it to the folder `place`; returns the opened folder and the seconds
+    /// from points to saved map.
     ///
     /// # Errors
-    /// When no map can be made of it, or it cannot be written.
+    /// When the map cannot be built or written.
     pub fn folder(&self, place: &Path, options: &SliceOptions) -> Result<(SliceFolder, f64), Failure> {
         let plan = SlicePlan::new(options, &self.cloud.bounds())?;
         let (saved, time) = timed(|| {

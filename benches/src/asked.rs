@@ -1,4 +1,4 @@
-//! Options of the command line that several programs share: how ours is asked, and what that may cost.
+//! Command-line options that several programs share: options and budgets of a nearmiss query.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use nearmiss::{
     PointId, Reason, Sampling, SurfelSize, Verdict,
 };
 
-/// Orders by name.
+/// Traversal orders by name.
 pub const ORDERS: [(&str, Order); 4] = [
     ("depth", Order::DepthFirst),
     ("overlap", Order::Overlap),
@@ -17,48 +17,49 @@ pub const ORDERS: [(&str, Order); 4] = [
     ("sides-by-gap", Order::SidesByGap),
 ];
 
-/// How leaves are compared, by name.
+/// Leaf tests by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
-    /// By tangent discs of their points
+    /// Tangent discs of the points
     Traversal,
-    /// By random test points (Klein & Zachmann 2004, section 5.3)
+    /// Random test points (Klein & Zachmann 2004, section 5.3)
     Sampling,
-    /// By searches along paths of the proximity graph (Klein & Zachmann 2005)
+    /// Searches along paths of the proximity graph (Klein & Zachmann 2005)
     Interpolation,
 }
 
-/// How a program asks ours.
+/// Options of a nearmiss query.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Asking {
-    /// Ask for a witness, not for the verdict alone
+    /// Ask for a witness, not only for the verdict
     #[arg(long)]
     pub witness: bool,
     /// Ask for certified evidence
     #[arg(long)]
     pub certified: bool,
-    /// How leaves are compared
+    /// The leaf test
     #[arg(long, value_enum, default_value_t = MethodName::Traversal)]
     pub method: MethodName,
-    /// Test points of a pair of leaves, with `--method sampling`
+    /// Test points per pair of leaves, with `--method sampling`
     #[arg(long, value_name = "N", default_value_t = Sampling::default().test_points)]
     pub test_points: u32,
-    /// What |f_A| + |f_B| of a test point must be less than, in sampling radii, with `--method sampling`
+    /// Upper limit of |f_A| + |f_B| at a test point, in sampling radii, with `--method sampling`
     #[arg(long, value_name = "RADII", default_value_t = Sampling::default().tolerance)]
     pub tolerance: f64,
     /// The number of surfels, with `--method interpolation`
     #[arg(long, value_name = "N")]
     pub surfels: Option<u32>,
-    /// The width of a surfel in sampling radii, with `--method interpolation`; overrides `--surfels`
+    /// The width of a surfel in sampling radii, with `--method interpolation`; overrides
+    /// `--surfels`
     #[arg(long, value_name = "RADII")]
     pub surfel_radius: Option<f64>,
-    /// Leave the hierarchy out, with `--method sampling` or `interpolation`
+    /// Skip the hierarchy, with `--method sampling` or `interpolation`
     #[arg(long)]
     pub flat: bool,
-    /// Which pairs of nodes are looked at first
+    /// The order in which node pairs are visited
     #[arg(long, value_parser = orders())]
     pub order: Option<Order>,
-    /// Let sphere coverings part nodes whose boxes overlap
+    /// Also prune node pairs with overlapping boxes whose sphere coverings are disjoint
     #[arg(long)]
     pub coverings: bool,
 }
@@ -89,19 +90,19 @@ impl Asking {
     }
 }
 
-/// The parser of the name of an order.
+/// The parser of a traversal order's name.
 #[must_use]
 pub fn orders() -> impl TypedValueParser<Value = Order> {
     named(ORDERS)
 }
 
-/// The parser of the name of a kernel.
+/// The parser of a kernel's name.
 #[must_use]
 pub fn kernels() -> impl TypedValueParser<Value = Metric> {
     named([Metric::Euclidean, Metric::Geodesic].map(|kernel| (kernel.name(), kernel)))
 }
 
-/// The parser of these names, which gives what each stands for.
+/// The parser of these names; it returns the value that belongs to the name.
 fn named<T, const N: usize>(all: [(&'static str, T); N]) -> impl TypedValueParser<Value = T>
 where
     T: Clone + Send + Sync + 'static,
@@ -112,13 +113,13 @@ where
     })
 }
 
-/// What a query may cost.
+/// The limits of a query.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub struct Limits {
-    /// Work units of a query
+    /// Work units per query
     #[arg(long, value_name = "N")]
     pub work: Option<u64>,
-    /// Time of a query, in microseconds
+    /// Time per query, in microseconds
     #[arg(long = "micros", value_name = "T", value_parser = microseconds)]
     pub time: Option<Duration>,
     /// Resolution, in the units of the poses
@@ -134,7 +135,7 @@ fn microseconds(text: &str) -> Result<Duration, String> {
 }
 
 impl Limits {
-    /// The budget of a query that begins now.
+    /// The budget of a query that starts now.
     #[must_use]
     pub fn begin(&self) -> Budget {
         let mut budget = Budget::UNLIMITED;
@@ -151,7 +152,7 @@ impl Limits {
     }
 }
 
-/// The best-effort answer: what is likelier, where a budget ended the search.
+/// The best-effort answer: the likelier verdict if a budget ended the search.
 #[must_use]
 pub fn best_effort(verdict: Verdict) -> Verdict {
     let evidence = Evidence::Estimated;

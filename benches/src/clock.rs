@@ -1,34 +1,36 @@
-//! The one place of this member that reads a clock.
+//! The only place of this crate that reads a clock.
 
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// Clock reads from which [`cost`] takes the least.
+/// Clock reads that [`cost`] averages.
 const READS: u32 = 1000;
 
-/// Of the times that Linux tells of a process.
+/// Milliseconds in a tick, the unit of process times on Linux.
 const MILLIS_A_TICK: u64 = 10;
 
-/// Now.
+/// The current time.
 #[must_use]
 #[expect(clippy::disallowed_methods, reason = "benchmarks are what a clock is for")]
 pub fn now() -> Instant {
     Instant::now()
 }
 
-/// What `work` returns, and how long it took, one read of the clock included.
+/// Runs `work`; returns its result and its duration, which includes one clock read.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     let start = now();
     let result = work();
     (result, start.elapsed())
 }
 
-/// Processor time that this process has spent, on all its threads, to a hundredth of a second; where the
-/// system does not tell, the time that has passed. Unlike a clock it leaves out what other programs take.
+/// Processor time of this process, all threads together, to a hundredth of a second. Unlike
+/// wall-clock time it excludes other programs. Returns the elapsed time where the system does not
+/// report it.
 #[must_use]
 pub fn processor_time() -> Duration {
     static START: OnceLock<Instant> = OnceLock::new();
-    // After the name, which is in parentheses: user and system time are the twelfth and thirteenth field.
+    // User and system time are the twelfth and thirteenth field after the name, which is in
+    // parentheses.
     let told = std::fs::read_to_string("/proc/self/stat").ok().and_then(|text| {
         let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
         let ticks = |i: usize| fields.get(i)?.parse::<u64>().ok();
@@ -37,8 +39,8 @@ pub fn processor_time() -> Duration {
     told.unwrap_or_else(|| START.get_or_init(now).elapsed())
 }
 
-/// How long an empty measurement takes, in nanoseconds: the mean of many. It is part of every time that is
-/// reported for a single query, and not taken off.
+/// The mean duration of an empty measurement, in nanoseconds. It is part of every reported time of
+/// a single query and is not subtracted.
 #[must_use]
 pub fn cost() -> f64 {
     let total: Duration = (0..READS).map(|_| timed(|| ()).1).sum();

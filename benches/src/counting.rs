@@ -1,14 +1,14 @@
-//! An allocator that counts: how often, how much is live, and the most that was.
+//! An allocator that counts its calls, the live bytes and their peak.
 //!
-//! A program or test that wants the figures declares
-//! `#[global_allocator] static ALLOCATOR: Counting = Counting::new();`.
+//! A program or test that needs the counts declares `#[global_allocator] static ALLOCATOR: Counting
+//! = Counting::new();`.
 
 #![expect(unsafe_code, reason = "a global allocator cannot be written without")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// The system's allocator with counters. Counts are of the whole process.
+/// The system's allocator with counters. The counts cover the whole process.
 #[derive(Debug, Default)]
 pub struct Counting {
     calls: AtomicUsize,
@@ -17,31 +17,31 @@ pub struct Counting {
 }
 
 impl Counting {
-    /// With all counters at zero.
+    /// An allocator with all counters at zero.
     #[must_use]
     pub const fn new() -> Self {
         Self { calls: AtomicUsize::new(0), live: AtomicUsize::new(0), peak: AtomicUsize::new(0) }
     }
 
-    /// Calls so far that asked for memory.
+    /// Allocations so far.
     #[must_use]
     pub fn calls(&self) -> usize {
         self.calls.load(Relaxed)
     }
 
-    /// Bytes asked for and not given back.
+    /// Bytes allocated and not freed.
     #[must_use]
     pub fn live(&self) -> usize {
         self.live.load(Relaxed)
     }
 
-    /// The most bytes that were live since [`Counting::restart`].
+    /// The most live bytes since [`Counting::restart`].
     #[must_use]
     pub fn peak(&self) -> usize {
         self.peak.load(Relaxed)
     }
 
-    /// Forgets the peak: it is now what is live.
+    /// Resets the peak to the live bytes.
     pub fn restart(&self) {
         self.peak.store(self.live(), Relaxed);
     }
@@ -57,8 +57,8 @@ impl Counting {
     }
 }
 
-// SAFETY: every call is handed to `System` unchanged, whose contract is the trait's; counters are atomics and
-// allocate nothing.
+// SAFETY: every call is forwarded to `System` unchanged, whose contract is the trait's; counters
+// are atomics and allocate nothing.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         self.grow(layout.size());
@@ -74,16 +74,17 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
         self.shrink(layout.size());
-        // SAFETY: `memory` came from `System` with this layout, for all of ours does.
+        // SAFETY: `memory` came from `System` with this layout, as all memory of this allocator
+        // does.
         unsafe { System.dealloc(memory, layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // While it moves both blocks may be live; the system may also grow in place, which is not counted
-        // twice.
+        // While the block moves, both may be live. A block that the system grows in place is not
+        // counted twice.
         self.grow(size);
         self.shrink(layout.size());
-        // SAFETY: as in `dealloc`; `size` is the caller's, who keeps the contract of `realloc`.
+        // SAFETY: as in `dealloc`; the caller keeps the contract of `realloc` for `size`.
         unsafe { System.realloc(memory, layout, size) }
     }
 }

@@ -1,4 +1,4 @@
-//! Options that the programs share which make the figures of a paper, and where these figures go.
+//! Options that the programs for figures of papers share, and the writing of figures.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,10 @@ use clap::Args;
 use crate::Failure;
 use crate::plot::{Panel, figure};
 
-/// Which figures are made, of what, and where they go.
+/// Options of a program that makes the figures of a paper.
 #[derive(Debug, Clone, Args)]
 pub struct FigureOptions {
-    /// The folder to write to; it is made if it is not there
+    /// The folder to write to; created if it does not exist
     #[arg(short = 'o', value_name = "FOLDER")]
     pub out: PathBuf,
     /// The folder of objects
@@ -19,34 +19,34 @@ pub struct FigureOptions {
     /// Poses at each distance
     #[arg(long, value_name = "N")]
     pub poses: Option<usize>,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Only the figure of this number
+    /// Only the figure with this number
     #[arg(long, value_name = "NUMBER")]
     pub only: Option<u32>,
-    /// A look rather than a measurement
+    /// A quick look, with fewer poses
     #[arg(long)]
     pub quick: bool,
 }
 
 impl FigureOptions {
-    /// Poses at each distance: by default the first number if quick, otherwise the second.
+    /// Poses at each distance: by default `quick` with `--quick`, otherwise `full`.
     #[must_use]
     pub fn poses(&self, [quick, full]: [usize; 2]) -> usize {
         self.poses.unwrap_or(if self.quick { quick } else { full })
     }
 
-    /// Whether any of these figures is asked for.
+    /// Returns `true` if any of these figures is wanted.
     #[must_use]
     pub fn wants(&self, figures: &[u32]) -> bool {
         self.only.is_none_or(|only| figures.contains(&only))
     }
 
-    /// Writes a figure of `panels`, as SVG.
+    /// Writes a figure of `panels` as SVG.
     ///
     /// # Errors
-    /// When it cannot be drawn or written.
+    /// When the figure cannot be drawn or written.
     pub fn save(&self, name: &str, panels: &[Panel]) -> Result<(), Failure> {
         Ok(std::fs::write(self.out.join(name), figure(panels)?)?)
     }

@@ -1,8 +1,8 @@
-//! The guard: answers and instruction counts on record, to compare those of today with.
+//! Regression checks: answers and instruction counts, compared with those on record.
 //!
-//! A record holds what a release answered and how many instructions it took, not what is true. It finds what
-//! a change of the inside alters by mistake. `verify answers` and `verify counts` are its programs; the
-//! answers to shipped cases are compared in the tests as well.
+//! A record holds the answers and instruction counts of a release, which need not be true. It
+//! reveals unintended changes. `verify answers` and `verify counts` are its programs; the tests
+//! compare the answers to the shipped cases too.
 
 pub mod answers;
 pub mod cases;

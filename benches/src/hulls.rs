@@ -1,6 +1,6 @@
-//! The volumes of Klein & Zachmann 2004, §4.2, measured: H, the union of the convex hulls of each leaf's
-//! points with those of its border, and K, the union of a node's balls; and the radius as the paper grows it,
-//! without a certificate.
+//! Volumes of Klein & Zachmann 2004, §4.2, measured. H is the union of the convex hulls of each
+//! leaf's points with those of its border. K is the union of a node's balls. The radius can also be
+//! grown as in the paper, without a certificate.
 
 use nearmiss::PointHierarchy;
 use nearmiss::geometry::NodeId;
@@ -9,14 +9,13 @@ use nearmiss::hierarchy::{OrientedBox, Part, Slices};
 
 use crate::sample::count;
 
-/// Directions in which hulls are bounded, the axes first: from outside, by a few hundredths of their volume
-/// too large.
+/// Directions that bound a hull, the axes first. The bounded volume is a few hundredths too large.
 const DIRECTIONS: usize = 64;
 
-/// Test points in a row that must be inside before the radius is left as it is.
+/// Consecutive test points that must be inside before the growth of the radius ends.
 const INSIDE_IN_A_ROW: usize = 256;
 
-/// Test points near one that was outside.
+/// Test points drawn near one that was outside.
 const NEAR_A_MISS: usize = 8;
 
 /// A leaf's points with those of its border.
@@ -26,19 +25,19 @@ struct Hull {
     extent: [[f64; 2]; DIRECTIONS],
 }
 
-/// H of a scan, leaf by leaf.
+/// The volume H of a scan, leaf by leaf.
 #[derive(Debug, Clone)]
 pub struct Hulls {
     directions: [Vector3<f64>; DIRECTIONS],
     of_leaves: Vec<Hull>,
 }
 
-/// Shares of a box that a node's volumes fill.
+/// Shares of a box that the volumes of a node fill.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Volumes {
-    /// K: the balls.
+    /// K, the balls.
     pub balls: f64,
-    /// H: the hulls.
+    /// H, the hulls.
     pub hulls: f64,
     /// The enclosures of the leaves.
     pub enclosures: f64,
@@ -57,7 +56,7 @@ fn centres(slices: &Slices<'_>, node: usize) -> Vec<Vector3<f64>> {
 }
 
 impl Hulls {
-    /// Those of a scan.
+    /// Computes the hulls of a scan.
     #[must_use]
     pub fn new(scan: &PointHierarchy) -> Self {
         let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -83,8 +82,8 @@ impl Hulls {
         hulls.iter().any(|hull| self.directions.iter().zip(&hull.extent).all(|(d, extent)| inside(d, extent)))
     }
 
-    /// Shares of a common box of a node that `draws` random places find filled; `share` draws numbers from 0
-    /// to 1.
+    /// Estimates the volumes of a node with `draws` random points in a common box. `share` draws
+    /// numbers from 0 to 1.
     pub fn volumes(
         &self,
         slices: &Slices<'_>,
@@ -121,9 +120,9 @@ impl Hulls {
         Volumes { balls, hulls, enclosures }
     }
 
-    /// The radius of a node's balls as the paper finds it: test points in H, weighted means of the points of
-    /// random leaves with their borders, make it grow; after a miss the next are drawn near it. `share` draws
-    /// numbers from 0 to 1.
+    /// The radius of a node's balls as the paper finds it. Test points in H, weighted means of the
+    /// points of random leaves with their borders, make it grow. After a miss the next points are
+    /// drawn near it. `share` draws numbers from 0 to 1.
     pub fn grown_radius(&self, slices: &Slices<'_>, node: usize, share: &mut impl FnMut() -> f64) -> f64 {
         let (centres, hulls) = (centres(slices, node), self.under(slices, node));
         let (mut radius_sq, mut inside, mut near) = (0.0_f64, 0, 0);
@@ -137,7 +136,7 @@ impl Hulls {
             near = near.max(1) - 1;
             let mut sum = (0.0, Vector3::zeros());
             for p in &hull.points {
-                // Skewed, so that means do not gather in the middle.
+                // Skewed, so that the means do not cluster in the middle.
                 let weight = share().powi(16);
                 sum = (sum.0 + weight, sum.1 + weight * wide(*p));
             }
@@ -151,12 +150,12 @@ impl Hulls {
     }
 }
 
-/// The node with an index.
+/// The identifier of the node at an index.
 fn node_id(index: usize) -> NodeId {
     NodeId(u32::try_from(index).unwrap_or(u32::MAX))
 }
 
-/// The points within a horizon of a leaf's box.
+/// The hull of the points whose support reaches the box of a leaf.
 fn hull(scan: &PointHierarchy, bounds: &OrientedBox, directions: &[Vector3<f64>; DIRECTIONS]) -> Hull {
     let mut points = Vec::new();
     let (tree, mut open) = (scan.tree(), vec![NodeId::ROOT]);

@@ -1,8 +1,9 @@
-//! The table and the plots of Klein & Zachmann 2004, §6: what is measured, and on what.
+//! The table and the plots of Klein & Zachmann 2004, §6: measurements and objects.
 //!
-//! Their objects are not to be had in their sizes; others stand in for them, and where there is no folder of
-//! objects, the dragon that comes with the tests. Their two artificial models are made here: a lattice of
-//! crossing bars of 197,000 points, which is no manifold, and spheres that do not touch.
+//! The paper's objects are not available in their sizes, so others stand in for them; without a
+//! folder of objects, it is the dragon that the tests ship. The paper's two artificial models are
+//! generated: a lattice of crossing bars of 197,000 points, which is not a manifold, and spheres
+//! that do not touch.
 
 pub mod course;
 pub mod hierarchy;
@@ -26,20 +27,20 @@ const OBJECTS: [&str; 4] = [
     "deforming/elephant-gallop/frame_0001.ply",
 ];
 
-/// Sizes of one object.
+/// One object in several sizes.
 const SIZES: [&str; 4] = ["dragon-5k", "dragon-23k", "truth/dragon70k.ply", "objects/dragon-100k.ply"];
 
-/// Objects with or without a mesh, scaled for the sweep.
+/// Reads the objects, with or without a mesh, scaled for the sweep.
 ///
 /// # Errors
-/// When one is there and cannot be read.
+/// When a file exists but cannot be read.
 pub fn objects(folder: Option<&Path>) -> Result<Vec<Object>, Failure> {
     let mut found = Vec::new();
     for file in OBJECTS {
         let path = folder.map(|folder| folder.join(file)).filter(|path| path.is_file());
         if let Some(path) = path {
             let object = Object::read(&path.to_string_lossy())?;
-            // A frame of an animation is called after the animation.
+            // A frame of an animation is named after the animation.
             let is_frame = object.name.starts_with("frame");
             let folder = path.parent().and_then(Path::file_name).filter(|_| is_frame);
             let name = folder.map_or_else(|| object.name.clone(), |f| f.to_string_lossy().into_owned());
@@ -52,7 +53,7 @@ pub fn objects(folder: Option<&Path>) -> Result<Vec<Object>, Failure> {
     Ok(found)
 }
 
-/// One object in as many sizes as there are.
+/// One object in all available sizes.
 ///
 /// # Errors
 /// As [`objects`].
@@ -66,7 +67,7 @@ pub fn sizes(folder: Option<&Path>) -> Result<Vec<Object>, Failure> {
     SIZES.iter().filter_map(|name| source(name)).map(|source| Object::read(&source)?.scaled()).collect()
 }
 
-/// The paper's artificial models with about so many points, and exact triangles.
+/// The paper's artificial models with about this many points, and exact triangles.
 ///
 /// # Errors
 /// When they cannot be scaled.
@@ -81,10 +82,10 @@ pub fn artificial(points: u32) -> Result<[Object; 2], Failure> {
     Ok([made("grid", bars(9, 1.0, 0.3))?, made("spheres", field([3, 3, 3], 1.0, 0.4))?])
 }
 
-/// A random subset of so many points, without mesh; the whole cloud if it has no more.
+/// A random subset of this many points, without a mesh, or the whole cloud if it has no more.
 ///
 /// # Errors
-/// When no cloud can be made of so few.
+/// When so few points do not make a valid cloud.
 pub fn subset(object: &Object, points: usize, seed: u64) -> Result<PointCloud, Failure> {
     let mut order: Vec<usize> = (0..object.cloud.len()).collect();
     order.shuffle(&mut rng(seed));
@@ -110,7 +111,7 @@ mod tests {
             let half = object.cloud.bounds().half_extents();
             assert!((half.into_iter().fold(0.0, f64::max) - 1.0).abs() < 1e-6, "{} is scaled", object.name);
         }
-        // Two triangles a face, four faces a bar, nine bars each way.
+        // Two triangles per face, four faces per bar, nine bars in each direction.
         assert_eq!(grid.mesh.unwrap().triangles().len(), 2 * 4 * 18);
         assert!(spheres.mesh.unwrap().triangles().len() > 20_000);
     }

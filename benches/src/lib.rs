@@ -19,5 +19,5 @@ pub mod scorer;
 pub mod sweep;
 pub mod truth;
 
-/// What the programs here end with when something is wrong.
+/// The error type of the programs here.
 pub type Failure = Box<dyn std::error::Error>;

@@ -1,8 +1,8 @@
-//! Where and of what a figure was taken: the lines that a record needs.
+//! Description of the machine and the build that a record needs.
 
 use std::process::Command;
 
-/// Instruction sets beyond the baseline, as far as the processor has them.
+/// Instruction sets beyond the baseline that the processor has.
 fn processor_features() -> Vec<&'static str> {
     #[cfg(target_arch = "x86_64")]
     {
@@ -21,7 +21,7 @@ fn processor_features() -> Vec<&'static str> {
     Vec::new()
 }
 
-/// Those of them that this program was compiled for; run-time dispatch may use more.
+/// Instruction sets that this program was compiled for. Run-time dispatch may use more.
 fn compiled_features() -> Vec<&'static str> {
     let all = [
         ("sse2", cfg!(target_feature = "sse2")),
@@ -35,7 +35,7 @@ fn compiled_features() -> Vec<&'static str> {
     all.iter().filter(|(_, has)| *has).map(|(name, _)| *name).collect()
 }
 
-/// The first line of a program's output, or a word that says there is none.
+/// The first line of a program's output, or "unknown".
 fn line_of(program: &str, arguments: &[&str]) -> String {
     let output = Command::new(program).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output();
     let text = output.ok().filter(|o| o.status.success()).and_then(|o| String::from_utf8(o.stdout).ok());
@@ -48,9 +48,10 @@ fn processor() -> String {
     model.map_or_else(|| std::env::consts::ARCH.into(), |(_, name)| name.trim().into())
 }
 
-/// Commit, compiler, processor, instruction sets, threads and what a clock read costs, as a Markdown list.
+/// Commit, compiler, processor, instruction sets, threads and the cost of a clock read, as a
+/// Markdown list.
 ///
-/// The commit is that of the source tree the program was compiled in, looked up when it runs.
+/// The commit is that of the source tree the program was compiled in, looked up at run time.
 #[must_use]
 pub fn description() -> String {
     let commit = line_of("git", &["rev-parse", "--short=12", "HEAD"]);

@@ -1,4 +1,4 @@
-//! What is measured: points, their mesh where there is one, and the radius that scoring goes by.
+//! Objects to measure: points, their mesh if they have one, and the radius r that scores use.
 
 use std::path::Path;
 
@@ -11,25 +11,25 @@ use crate::scorer::radius;
 /// Longest side of an object's bounding box in a sweep (Zachmann 2002).
 const SIDE: f64 = 2.0;
 
-/// An object to measure with.
+/// An object to measure.
 #[derive(Debug, Clone)]
 pub struct Object {
-    /// What to call it.
+    /// The name shown in tables.
     pub name: String,
     /// Its points: distinct and finite.
     pub cloud: PointCloud,
     /// Its mesh, if it has one.
     pub mesh: Option<TriangleMesh>,
-    /// r, as scoring computes it, in the units of the cloud.
+    /// The radius r of scores, in the units of the cloud.
     pub r: f64,
 }
 
 impl Object {
-    /// Reads `source`: the path of a file, `dragon-5k` or `dragon-23k` for what the tests ship, or
-    /// `bumpy:POINTS` for a generated surface.
+    /// Reads `source`: the path of a file, `dragon-5k` or `dragon-23k` (shipped with the tests), or
+    /// `bumpy:POINTS` (a generated surface).
     ///
     /// # Errors
-    /// When there is no such object.
+    /// When the object cannot be read or generated.
     pub fn read(source: &str) -> Result<Self, Failure> {
         let shipped = match source {
             "dragon-5k" => Some(dragon_path(Dragon::Points5k)),
@@ -68,7 +68,7 @@ impl Object {
         Ok(Self { name: self.name.clone(), r: self.r * scale, cloud, mesh })
     }
 
-    /// Points over the volume of the bounding box: the density of Klein and Zachmann 2005.
+    /// Points per volume of the bounding box: the density of Klein & Zachmann 2005.
     #[must_use]
     pub fn density(&self) -> f64 {
         let Aabb { min, max } = self.cloud.bounds();
@@ -76,8 +76,8 @@ impl Object {
     }
 }
 
-/// `count` points on a sphere with bumps, evenly spread over the directions along a Fibonacci spiral: a
-/// closed surface of uneven curvature, smooth where a scan is.
+/// `count` points on a sphere with bumps, spread evenly over the directions along a Fibonacci
+/// spiral. The surface is closed and smooth, with varying curvature.
 #[must_use]
 pub fn bumpy_sphere(count: u32) -> Vec<[f64; 3]> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
@@ -95,8 +95,8 @@ pub fn bumpy_sphere(count: u32) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// The object of this file name in the folder that the environment names in `NEARMISS_DATA`; `None` where it
-/// names none or the file is not there.
+/// The object with this file name in the folder `NEARMISS_DATA`. `None` if the variable is not set
+/// or the file does not exist.
 ///
 /// # Errors
 /// When the file cannot be read as an object.

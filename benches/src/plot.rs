@@ -1,4 +1,4 @@
-//! Figures of lines over one or two pairs of axes, as SVG.
+//! Line plots with one or two panels, as SVG.
 
 use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
@@ -14,7 +14,7 @@ use crate::Failure;
 /// Width and height of a panel, in pixels.
 const SIZE: (u32, u32) = (560, 420);
 
-/// Colours that people who see few colours can tell apart (Okabe & Ito).
+/// Colours that are distinguishable with colour blindness (Okabe & Ito).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -25,36 +25,36 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(70, 70, 70),
 ];
 
-/// A line with its points marked.
+/// A line with marked points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Line {
-    /// In the legend; a line without a name is not in it.
+    /// Name in the legend; an empty name is not shown.
     pub name: String,
-    /// Places, in the units of the axes.
+    /// Points, in the units of the axes.
     pub points: Vec<[f64; 2]>,
-    /// Lines of one number have one colour.
+    /// Index of the colour.
     pub colour: usize,
-    /// Whether it is broken.
+    /// `true` if the line is dashed.
     pub dashed: bool,
 }
 
-/// What an axis shows.
+/// Name and scale of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// With its unit.
+    /// Name with the unit.
     pub name: String,
-    /// In powers of ten; then nothing at or below zero is shown.
+    /// `true` for a logarithmic scale, which shows nothing at or below zero.
     pub logarithmic: bool,
 }
 
 impl Axis {
-    /// An even axis.
+    /// A linear axis.
     #[must_use]
     pub fn even(name: &str) -> Self {
         Self { name: name.into(), logarithmic: false }
     }
 
-    /// An axis in powers of ten.
+    /// A logarithmic axis.
     #[must_use]
     pub fn logarithmic(name: &str) -> Self {
         Self { name: name.into(), logarithmic: true }
@@ -64,15 +64,15 @@ impl Axis {
 /// Lines over a pair of axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Above it.
+    /// Title above the panel.
     pub title: String,
-    /// Across and up.
+    /// Horizontal and vertical axis.
     pub axes: [Axis; 2],
-    /// What it shows.
+    /// The lines it shows.
     pub lines: Vec<Line>,
 }
 
-/// The panels side by side.
+/// Draws the panels side by side.
 ///
 /// # Errors
 /// When a panel has nothing to show.
@@ -97,15 +97,15 @@ pub fn figure(panels: &[Panel]) -> Result<String, Failure> {
     Ok(text)
 }
 
-/// Errors of the drawing name no lifetime that outlives it.
+/// Converts an error of the drawing, which borrows the drawing area, to an owned one.
 fn failure(error: impl std::fmt::Display) -> Failure {
     error.to_string().into()
 }
 
-/// Room above the lines for the legend, as a share of what they span.
+/// Room above the lines for the legend, as a share of their range.
 const HEADROOM: f64 = 0.4;
 
-/// From zero, or from below the least, to above the greatest.
+/// The range of an axis: from zero, or from below the least value, to above the greatest.
 fn range(panel: &Panel, k: usize) -> Result<std::ops::Range<f64>, Failure> {
     let values = panel.lines.iter().flat_map(|line| &line.points).map(|p| p[k]);
     let is_logarithmic = panel.axes[k].logarithmic;
@@ -180,14 +180,14 @@ where
         .map_err(failure)
 }
 
-/// Whether most lines end higher than they begin.
+/// Returns `true` if most lines end higher than they begin.
 fn rises(panel: &Panel) -> bool {
     let ends = panel.lines.iter().filter_map(|line| Some((line.points.first()?[1], line.points.last()?[1])));
     let (up, all) = ends.fold((0, 0), |(up, all), (first, last)| (up + usize::from(last > first), all + 1));
     2 * up > all
 }
 
-/// A number without digits that say nothing.
+/// Formats a number without redundant digits.
 fn plain(v: f64) -> String {
     let text = if v != 0.0 && v.abs() < 0.01 { format!("{v:.4}") } else { format!("{v:.2}") };
     let text = text.trim_end_matches('0').trim_end_matches('.');

@@ -1,4 +1,5 @@
-//! Poses to ask: of the sweep, and near first touch. Drawn before anything is timed, from a fixed seed.
+//! Poses of the sweep and near first touch. They are drawn from a fixed seed before anything is
+//! timed.
 
 use nearmiss::Pose;
 use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
@@ -24,8 +25,8 @@ pub fn distance(i: usize) -> f64 {
     0.25 * crate::sample::count(i)
 }
 
-/// For each distance of the sweep `count` poses of the second copy, the first one resting; fresh for each
-/// `pass`. Rotations and directions are uniform.
+/// `count` poses of the second copy for each distance of the sweep, with the first copy at rest.
+/// Each `pass` has new poses. Rotations and directions are uniform.
 #[must_use]
 pub fn sweep(count: usize, seed: u64, pass: u64) -> [Vec<Pose>; DISTANCES] {
     std::array::from_fn(|i| {
@@ -45,15 +46,15 @@ pub fn sweep(count: usize, seed: u64, pass: u64) -> [Vec<Pose>; DISTANCES] {
 pub struct NearPose {
     /// Pose of the second copy.
     pub pose: Pose,
-    /// Shift from first touch along the approach, in r; positive is apart.
+    /// Shift from first touch along the approach, in r; positive if the copies are apart.
     pub offset: f64,
 }
 
-/// `count` poses of a scaled object shifted by up to 10 r from where it first touches its resting copy when
-/// it comes from outside; every other one is apart.
+/// `count` poses of a scaled object, shifted by up to 10 r from its first touch with the resting
+/// copy on an approach from outside. Every other pose is apart.
 ///
-/// First touch is that of the meshes where there is one, else where points first come within r/2. It is
-/// searched in steps of r/4, so a graze shorter than that may be stepped over.
+/// First touch is that of the meshes or, without a mesh, of points within r/2. The search takes
+/// steps of r/4, so it may miss a graze shorter than that.
 ///
 /// # Errors
 /// When the points cannot be searched.
@@ -77,7 +78,7 @@ pub fn near(object: &Object, count: usize, seed: u64) -> Result<Vec<NearPose>, F
     Ok(poses)
 }
 
-/// The greatest distance at which `touching` finds a hit, coming from outside.
+/// The greatest distance at which `touching` reports a hit, approached from outside.
 fn first_touch(object: &Object, touching: &mut dyn Method, at: &impl Fn(f64) -> Pose) -> Option<f64> {
     let half = object.cloud.bounds().half_extents();
     let mut apart = 2.0 * half.iter().map(|x| x * x).sum::<f64>().sqrt();

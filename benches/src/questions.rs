@@ -1,4 +1,4 @@
-//! Questions with answers: poses of one object against itself, and whether they meet.
+//! Poses with answers: two copies of an object, or an object in a room, and whether they meet.
 
 use nearmiss::{CollideOptions, Detail, Pose, Scan};
 use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
@@ -11,16 +11,17 @@ use crate::rivals::Method;
 use crate::rivals::ours::Ours;
 use crate::rivals::parry::MeshTree;
 
-/// A pose of the second copy, the first one resting.
+/// A pose of the second object, with the first one at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asked {
     /// The pose.
     pub pose: Pose,
-    /// Whether the two meet: as the meshes say, or, where there is none, the search to the end.
+    /// `true` if the two meet, by the meshes or, without a mesh, by the unlimited search.
     pub meets: bool,
 }
 
-/// `near` poses within 10 r of first touch, and `swept` at each distance of the sweep, of a scaled object.
+/// `near` poses of a scaled object within 10 r of first touch, and `swept` poses at each distance
+/// of the sweep.
 ///
 /// # Errors
 /// When the object cannot be searched.
@@ -42,10 +43,10 @@ pub fn asked(
     Ok(poses.into_iter().map(judged).collect())
 }
 
-/// `near` poses of a body about contact with a room, and as many as that at random within its bounds.
+/// `near` poses of a body near contact with a room, and as many random poses within its bounds.
 ///
-/// About contact a random point of the body, turned at random, lies up to ten of its room's local radii away
-/// from a random point of the room. Whether they meet is what the search to the end says.
+/// Near contact, a random point of the randomly rotated body lies up to ten local radii away from a
+/// random point of the room. The unlimited search decides whether they meet.
 ///
 /// # Errors
 /// When the scans cannot be searched.
@@ -75,7 +76,7 @@ pub fn in_room([room, body]: [&Scan; 2], scale: f64, near: usize, seed: u64) -> 
     Ok(poses.into_iter().map(judged).collect())
 }
 
-/// The interval in which the share of which `wrong` of `all` is a sample lies, to 95 % (Wilson, "Probable
+/// The 95 % confidence interval of a share, given `wrong` of `all` in a sample (Wilson, "Probable
 /// inference, the law of succession, and statistical inference", JASA 22, 1927).
 #[must_use]
 pub fn interval(wrong: usize, all: usize) -> [f64; 2] {

@@ -1,4 +1,5 @@
-//! What is measured beside each other: ours, and what users would pick instead, behind one trait.
+//! Methods that are measured against each other, ours and those that users would pick instead,
+//! behind one trait.
 
 pub mod eigen;
 pub mod grid;
@@ -20,10 +21,11 @@ use crate::object::Object;
 /// Names of rivals.
 pub const NAMES: [&str; 3] = ["parry", "trimesh", "kiddo"];
 
-/// A rival by its name, one of [`NAMES`]; `None` if it needs a mesh and the object has none.
+/// Returns a rival by its name, one of [`NAMES`], or `None` if it needs a mesh and the object has
+/// none.
 ///
 /// # Errors
-/// When there is no such rival, or it refuses the object.
+/// When there is no such rival, or it rejects the object.
 pub fn rival(name: &str, object: &Object) -> Result<Option<Box<dyn Method>>, Failure> {
     let of_mesh = |make: fn(&nearmiss::TriangleMesh) -> Result<Box<dyn Method>, Failure>| {
         object.mesh.as_ref().map(make).transpose()
@@ -36,8 +38,8 @@ pub fn rival(name: &str, object: &Object) -> Result<Option<Box<dyn Method>>, Fai
     }
 }
 
-/// Calls `measure` with ours, asking for a verdict and for a witness, and with the rivals parry and kiddo as
-/// far as they take the object.
+/// Calls `measure` with ours, once for a verdict and once for a witness, and with the rivals parry
+/// and kiddo if they accept the object.
 ///
 /// # Errors
 /// When the object cannot be prepared.

@@ -1,6 +1,6 @@
-//! Times of single queries, and what is told of them.
+//! Times of single queries, and their summary.
 
-/// Times in nanoseconds, one a query.
+/// Times in nanoseconds, one per query.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sample {
     times: Vec<f64>,
@@ -13,7 +13,7 @@ pub struct Summary {
     pub mean: f64,
     /// Median.
     pub median: f64,
-    /// 99th percentile, nearest rank.
+    /// 99th percentile (nearest rank).
     pub p99: f64,
     /// Largest.
     pub worst: f64,
@@ -30,19 +30,19 @@ impl Sample {
         self.times.extend_from_slice(&other.times);
     }
 
-    /// How many times there are.
+    /// The number of times.
     #[must_use]
     pub fn len(&self) -> usize {
         self.times.len()
     }
 
-    /// Whether there is none.
+    /// Returns `true` if there are no times.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
 
-    /// What is told of them; zeros of an empty sample.
+    /// The summary of the times; zeros for an empty sample.
     #[must_use]
     pub fn summary(&self) -> Summary {
         let mut sorted = self.times.clone();
@@ -55,7 +55,8 @@ impl Sample {
     }
 }
 
-/// The least of sorted values that at least this share of them does not exceed; `share` in (0, 1].
+/// The least of the sorted values that at least this share of them does not exceed. `share` is in
+/// (0, 1].
 ///
 /// # Panics
 /// When there are no values.
@@ -69,7 +70,7 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[(share * count(sorted.len())).ceil().max(1.0) as usize - 1]
 }
 
-/// A count as a number to reckon with.
+/// Converts a count to floating point.
 #[must_use]
 #[expect(clippy::cast_precision_loss, reason = "counts here are far below 2^52")]
 pub fn count(n: usize) -> f64 {

@@ -1,4 +1,4 @@
-//! Scoring against exact answers: the radius, the counts, and what is a defect.
+//! Scores against exact answers: the radius r, the counts, and the defects.
 
 use std::fmt;
 use std::num::NonZero;
@@ -10,34 +10,34 @@ use crate::Failure;
 use crate::sample::quantile;
 use crate::truth::Question;
 
-/// The neighbour whose distance is a point's spacing.
+/// Rank of the neighbour whose distance is the spacing of a point.
 const RANK: usize = 6;
 
-/// r is this quantile of the spacings.
+/// The quantile of the spacings that defines r.
 const QUANTILE: f64 = 0.9;
 
-/// Along no direction that scans prefer.
+/// An axis that is not aligned with any preferred direction of a scan.
 const AXIS: [f64; 3] = [0.36, 0.48, 0.8];
 
-/// Within this many r no method that sees only points can be right. A little less than one, for depths in
-/// truth sets are steps of a ladder, one of which is r itself: rounding of r must not decide who is judged,
-/// so they are.
+/// Half-width of the band in r, within which a method that sees only points cannot be expected to
+/// be right. It is slightly less than one because depths in truth sets come in steps, one of which
+/// is r. These cases are judged regardless of rounding of r.
 const BAND: f64 = 0.999;
 
-/// Deeper than this many r no separation may be certified, inside the band or not.
+/// Separations with a gap below this many r must not be certified, inside the band or not.
 const DEEP: f64 = -0.3;
 
-/// From this many r on at least [`CERTIFIED_SHARE`] of separations are to be certified.
+/// Of the separations from this many r on, at least [`CERTIFIED_SHARE`] must be certified.
 const CLEAR: f64 = 6.0;
 
 /// See [`CLEAR`].
 const CERTIFIED_SHARE: f64 = 0.95;
 
-/// r: the 0.9-quantile over all points of the distance to the 6th distinct neighbour, computed from the
-/// points alone.
+/// The radius r: the 0.9-quantile over all points of the distance to the 6th distinct neighbour,
+/// computed from the points alone.
 ///
 /// # Errors
-/// When the tree refuses the points.
+/// When the tree rejects the points.
 pub fn radius(cloud: &PointCloud) -> Result<f64, Failure> {
     let mut spacings = spacings(cloud)?;
     spacings.sort_unstable_by(f64::total_cmp);
@@ -47,13 +47,14 @@ pub fn radius(cloud: &PointCloud) -> Result<f64, Failure> {
 /// The distance from each point to its 6th distinct neighbour, in the caller's units.
 ///
 /// # Errors
-/// When the tree refuses the points.
+/// When the tree rejects the points.
 pub fn spacings(cloud: &PointCloud) -> Result<Vec<f64>, Failure> {
-    // Turned, because the tree cannot split many points of one coordinate; distances do not change.
+    // Rotated, because the tree cannot split many points with one equal coordinate; distances do
+    // not change.
     let turn = Pose::from_axis_angle(AXIS, 1.0);
     let points: Vec<[f64; 3]> = cloud.positions().iter().map(|p| turn.apply(p.map(f64::from))).collect();
     let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&points).map_err(|e| format!("{e:?}"))?;
-    // The point itself comes first: a cloud's points are distinct.
+    // The point itself comes first, because the points of a cloud are distinct.
     let wanted = NonZero::new(RANK + 1).ok_or("no rank")?;
     let spacing = |p: &[f64; 3]| {
         let near = tree.query(p).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
@@ -67,39 +68,39 @@ pub fn spacings(cloud: &PointCloud) -> Result<Vec<f64>, Failure> {
 pub struct Case {
     /// Index of the question.
     pub index: usize,
-    /// Its gap in multiples of r.
+    /// Gap in multiples of r.
     pub gap: f64,
-    /// What was answered, where more is to be said.
+    /// The answer, if it adds something.
     pub answer: String,
 }
 
-/// Separations from some gap on, and how many of them are certified.
+/// Separations from some gap on, and the number of certified ones.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Share {
     /// Separations.
     pub all: usize,
-    /// Those of them that are certified.
+    /// Certified separations.
     pub certified: usize,
 }
 
-/// How many questions were answered how.
+/// Counts of the answers by outcome.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Score {
-    /// Questions with |gap| > r, and their hits that are none, misses, and missing verdicts.
+    /// Questions with |gap| > r.
     pub outside: usize,
-    /// Hits of what is apart by more than r.
+    /// False hits: intersections reported although the gap exceeds r.
     pub false_hits: Vec<Case>,
-    /// Separations of what intersects by more than r.
+    /// Misses: separations reported although the depth exceeds r.
     pub misses: Vec<Case>,
-    /// No verdict, outside the band.
+    /// Missing verdicts outside the band.
     pub undecided: Vec<Case>,
-    /// Separations certified although deeper than 0.3 r.
+    /// Certified separations with a depth of more than 0.3 r.
     pub certified_wrongly: Vec<Case>,
     /// Questions with |gap| ≤ r.
     pub band: usize,
-    /// Wrong verdicts among them.
+    /// Wrong verdicts in the band.
     pub band_wrong: usize,
-    /// Missing verdicts among them.
+    /// Missing verdicts in the band.
     pub band_undecided: usize,
     /// All verdicts: intersecting certified, estimated; separated certified, estimated; undecided.
     pub verdicts: [usize; 5],
@@ -110,7 +111,7 @@ pub struct Score {
 }
 
 impl Score {
-    /// Counts the verdict on the question of this index; `r` in the units of its gap.
+    /// Counts the verdict on the question of this index; `r` is in the units of its gap.
     pub fn count(&mut self, index: usize, question: &Question, r: f64, verdict: &Verdict) {
         let gap = question.gap / r;
         let kind = match verdict {
@@ -148,7 +149,8 @@ impl Score {
         }
     }
 
-    /// Whether nothing is wrong or undecided outside the band, and nothing deep is certified apart.
+    /// Returns `true` if no verdict outside the band is wrong or missing, and no deep separation is
+    /// certified.
     #[must_use]
     pub fn is_clean(&self) -> bool {
         self.false_hits.is_empty()
@@ -157,7 +159,7 @@ impl Score {
             && self.certified_wrongly.is_empty()
     }
 
-    /// Whether enough of what is clearly apart is certified so.
+    /// Returns `true` if enough of the clear separations are certified.
     #[must_use]
     pub fn is_certified_enough(&self) -> bool {
         let Share { all, certified } = self.clear;

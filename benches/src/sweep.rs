@@ -1,9 +1,10 @@
-//! The sweep: all methods on the same poses in the same run, each pose asked once.
+//! The sweep: all methods on the same poses in the same run, each pose queried once.
 //!
-//! Two copies of an object, the longest side of its box 2, their centres 0 to 3 apart in thirteen steps,
-//! turned and shifted at random: Zachmann, "Minimal Hierarchical Collision Detection", VRST 2002. Repeating a
-//! few poses would flatter by a quarter to a half, so a pass asks each once, and every pass draws new ones.
-//! Before each distance a method is warmed up with poses of a pass that is never timed.
+//! Two copies of an object with longest side 2, their centres 0 to 3 apart in thirteen steps, with
+//! random rotations and directions: Zachmann, "Minimal Hierarchical Collision Detection", VRST
+//! 2002. Repeating a few poses would make times a quarter to a half too short, so a pass queries
+//! each once, and every pass draws new ones. Before each distance a method is warmed up with poses
+//! of a pass that is never timed.
 
 use std::hint::black_box;
 
@@ -14,24 +15,24 @@ use crate::poses::{DISTANCES, NearPose};
 use crate::rivals::Method;
 use crate::sample::{Sample, count};
 
-/// Poses to warm up with before a distance.
+/// Warm-up poses before each distance.
 const WARM_UP: usize = 20;
 
 /// Times, hits and costs of one method at one distance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Column {
-    /// One time a query, in nanoseconds.
+    /// One time per query, in nanoseconds.
     pub times: Sample,
-    /// How many poses intersect, as the method says.
+    /// Number of poses that the method reports as intersecting.
     pub hits: usize,
-    /// Evaluations, or tests of triangles or points.
+    /// Evaluations, or triangle or point tests.
     pub evaluations: u64,
     /// Node pairs.
     pub node_pairs: u64,
 }
 
 impl Column {
-    /// Asks all `poses` once.
+    /// Queries all `poses` once.
     pub fn ask<'a>(&mut self, method: &mut dyn Method, poses: impl IntoIterator<Item = &'a Pose>) {
         for pose in poses {
             method.prepare();
@@ -43,14 +44,14 @@ impl Column {
         }
     }
 
-    /// Evaluations for each query.
+    /// Mean evaluations per query.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a mean of counts")]
     pub fn mean_evaluations(&self) -> f64 {
         self.evaluations as f64 / count(self.times.len().max(1))
     }
 
-    /// Node pairs for each query.
+    /// Mean node pairs per query.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "a mean of counts")]
     pub fn mean_node_pairs(&self) -> f64 {
@@ -65,21 +66,22 @@ impl Column {
     }
 }
 
-/// What one method did in all passes.
+/// Results of one method over all passes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Track {
-    /// The method.
+    /// Name of the method.
     pub name: String,
     /// All passes together, by distance.
     pub columns: [Column; DISTANCES],
     /// The sweep mean of each pass, in nanoseconds.
     pub pass_means: Vec<f64>,
-    /// Poses near first touch.
+    /// Results near first touch.
     pub near: Column,
 }
 
 impl Track {
-    /// The sweep mean: average over the thirteen means; the median of all passes.
+    /// The sweep mean of a pass is the average of its thirteen means; returns the median over all
+    /// passes.
     #[must_use]
     pub fn sweep_mean(&self) -> f64 {
         let mut means = self.pass_means.clone();
@@ -87,14 +89,15 @@ impl Track {
         if means.is_empty() { 0.0 } else { crate::sample::quantile(&means, 0.5) }
     }
 
-    /// The distance with the greatest mean, and that mean.
+    /// The index of the distance with the greatest mean, and that mean.
     #[must_use]
     pub fn worst_distance(&self) -> (usize, f64) {
         let means = self.columns.iter().map(|column| column.times.summary().mean).enumerate();
         means.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
     }
 
-    /// Average of the means of distances 0 to 1.5, which Klein and Zachmann 2005 plot against density.
+    /// Average of the means of distances 0 to 1.5, which Klein & Zachmann 2005 plot against
+    /// density.
     #[must_use]
     pub fn inner_mean(&self) -> f64 {
         let inner = &self.columns[..=6];
@@ -102,13 +105,13 @@ impl Track {
     }
 }
 
-/// Tracks for these methods, without any query yet.
+/// Empty tracks for these methods.
 #[must_use]
 pub fn tracks(methods: &[Box<dyn Method + '_>]) -> Vec<Track> {
     methods.iter().map(|method| Track { name: method.name(), ..Track::default() }).collect()
 }
 
-/// One pass: at each distance every method in turn. `warm` holds poses that are asked untimed.
+/// Runs one pass: each method in turn at each distance. `warm` holds poses for the untimed warm-up.
 pub fn pass(
     methods: &mut [Box<dyn Method + '_>],
     tracks: &mut [Track],
@@ -130,7 +133,7 @@ pub fn pass(
     }
 }
 
-/// All methods on poses near first touch, the first few of which warm up and are not timed.
+/// Runs all methods on poses near first touch. The first few poses are an untimed warm-up.
 pub fn near(methods: &mut [Box<dyn Method + '_>], tracks: &mut [Track], poses: &[NearPose]) {
     let (warm, poses) = poses.split_at(WARM_UP.min(poses.len() / 2));
     for (method, track) in methods.iter_mut().zip(tracks) {

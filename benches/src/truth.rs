@@ -1,4 +1,4 @@
-//! Truth sets: poses with exact answers, one JSON object a line.
+//! Truth sets: poses with exact answers, one JSON object per line.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use nearmiss::{Aabb, Pose};
 
 use crate::Failure;
 
-/// Poses of a truth set are exact to more digits than this, relative to the bounds.
+/// Greatest error of the poses of a truth set, relative to the bounds.
 const TOLERANCE: f64 = 1e-3;
 
 /// A question with its exact answer.
@@ -16,16 +16,16 @@ pub struct Question {
     pub a: Pose,
     /// Pose of the second.
     pub b: Pose,
-    /// Whether the exact surfaces intersect.
+    /// `true` if the exact surfaces intersect.
     pub truth: bool,
-    /// Exact distance, or minus a depth when they intersect.
+    /// Exact distance, or minus the depth if they intersect.
     pub gap: f64,
 }
 
 /// Reads the questions of `path` about an object with these `bounds`.
 ///
 /// # Errors
-/// Names the first line that is not a scored question.
+/// When a line is not a scored question; the error names the first one.
 pub fn read(path: &Path, bounds: &Aabb) -> Result<Vec<Question>, Failure> {
     let text = std::fs::read_to_string(path)?;
     let question = |(number, line): (usize, &str)| {

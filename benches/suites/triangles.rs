@@ -66,6 +66,7 @@ fn triangles(criterion: &mut Criterion) {
         group.bench_function("rounded", |bencher| {
             bencher.iter(|| pairs.iter().filter(|[a, b]| intersect(black_box(a), b)).count());
         });
+        #[expect(clippy::cast_possible_truncation, reason = "parry's triangles are single precision")]
         let single = |t: &Corners| {
             let [a, b, c] = t.map(|p| parry3d::math::Vector::from(p.map(|x| x as f32)));
             Triangle::new(a, b, c)

@@ -1,4 +1,4 @@
-//! Answers are those on record.
+//! Compares answers with those on record.
 use std::fs;
 use std::path::Path;
 
@@ -24,18 +24,19 @@ fn what_is_worse_is_a_fault() {
     let good = "Sc,Se,Sc,Se,2e-1,9e-1,1e0,1,1,5e0,5";
     let count = |row: &str| faults(&rows(row), &rows(good)).len();
     assert_eq!(count(good), 0);
-    // A verdict that differs, a certificate lost, a gap lost, and its mean; one gained is no fault.
+    // A changed verdict, a lost certificate, a lost gap with its lower mean. A gained certificate
+    // is no fault.
     assert_eq!(count("Ic,Se,Sc,Se,2e-1,9e-1,1e0,1,1,5e0,5"), 1);
     assert_eq!(count("Se,Se,Sc,Se,2e-1,9e-1,1e0,1,1,5e0,5"), 1);
     assert_eq!(count("Sc,Se,Sc,Se,0e0,9e-1,1e0,1,1,5e0,5"), 2);
     assert_eq!(count("Sc,Sc,Sc,Se,3e-1,9.5e-1,1e0,1,1,5e0,5"), 0);
-    // A certificate of more than the distance.
+    // A certified gap that exceeds the distance.
     assert_eq!(count("Sc,Se,Sc,Se,1.01e0,9e-1,1e0,1,1,5e0,5"), 1);
-    // An upper bound that is looser, one below the lower bound on record, a lower bound that is looser.
+    // A looser upper bound, an upper bound below the lower bound on record, a looser lower bound.
     assert_eq!(count("Sc,Se,Sc,Se,2e-1,9e-1,1.1e0,1,1,5e0,5"), 1);
     assert_eq!(count("Sc,Se,Sc,Se,2e-1,8.95e-1,8e-1,1,1,5e0,5"), 1);
     assert_eq!(count("Sc,Se,Sc,Se,2e-1,5e-1,1e0,1,1,5e0,5"), 1);
-    // Curves and touches; answers that are missing.
+    // Changed curves and touches; missing answers.
     assert_eq!(count("Sc,Se,Sc,Se,2e-1,9e-1,1e0,1,0,5e0,5"), 1);
     assert_eq!(count("Sc,Se,Sc,Se,2e-1,9e-1,1e0,1,1,5.2e0,5"), 1);
     assert_eq!(count("Sc,Se,Sc,Se,2e-1,9e-1,1e0,1,1,5e0,4"), 1);

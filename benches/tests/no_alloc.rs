@@ -1,6 +1,7 @@
-//! Once their scratch is warm, queries and evaluations ask for no memory.
+//! Queries and evaluations allocate no memory once their scratch is warm.
 //!
-//! One test alone: the counter is of the whole process, and a second test would run beside it.
+//! This is a single test because the counter covers the whole process, and a second test would run
+//! at the same time.
 
 use nearmiss::hierarchy::GatherScratch;
 use nearmiss::{
@@ -17,10 +18,10 @@ use std::time::Duration;
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
 
-/// Poses of each kind that are asked while the counter is watched.
+/// Poses of each kind that are queried while the counter is watched.
 const POSES: usize = 300;
 
-/// What is asked, and within what.
+/// The plans of the queries, with their budgets.
 fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
     let options = CollideOptions::default();
     let [verdict, witness] = [Detail::Verdict, Detail::Witness].map(|detail| options.with_detail(detail));
@@ -47,7 +48,7 @@ fn questions(scan: &Scan, r: f64) -> Vec<(CollidePlan, Budget)> {
     asked.map(|(options, budget)| (plan(&options), budget)).to_vec()
 }
 
-/// The poses asked of a scan, and how many verdicts of each kind they had.
+/// Queries the poses of a scan; returns the number of verdicts of each kind.
 fn ask_all(
     scan: &Scan,
     questions: &[(CollidePlan, Budget)],
@@ -80,7 +81,7 @@ fn warm_queries_and_evaluations_allocate_nothing() {
     let (mut scratch, mut places) = (Scratch::default(), Vec::new());
     for scan in [&scan, &along] {
         let (questions, kernel) = (questions(scan, object.r), scan.metric());
-        // The very same questions: buffers grow to what these need and no further.
+        // Exactly the same queries: buffers grow to what these need and no further.
         let first = ask_all(scan, &questions, &poses, (&mut scratch, &mut places));
         let before = ALLOCATOR.calls();
         let second = ask_all(scan, &questions, &poses, (&mut scratch, &mut places));

@@ -1,7 +1,7 @@
-//! Once their scratch is warm, batches and broad phases ask for no memory; what rayon takes to spread work
-//! over threads does not grow with the questions.
+//! Batches and broad phases allocate no memory once their scratch is warm. The allocations of rayon
+//! for spreading work over threads do not grow with the number of queries.
 //!
-//! One test alone: the counter is of the whole process.
+//! This is a single test because the counter covers the whole process.
 
 use std::ops::ControlFlow;
 
@@ -16,7 +16,7 @@ use nearmiss_benches::poses;
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
 
-/// Memory asked for by `work`, in calls.
+/// The number of allocations of `work`.
 fn calls(work: impl FnOnce()) -> usize {
     let before = ALLOCATOR.calls();
     work();
@@ -48,7 +48,8 @@ fn warm_batches_and_broad_phases_allocate_nothing() {
                     ControlFlow::Continue(Pair::new(a, b).collide(&plan, scratch))
                 })
             };
-            // Which thread asks what differs from time to time, so scratches need some rounds to be warm.
+            // The assignment of queries to threads varies, so scratches need several rounds to be
+            // warm.
             (0..10).for_each(|_| assert_eq!(ask(poses.len()), poses.len()));
             let [few, many] = [50, poses.len()].map(|n| calls(|| _ = ask(n)));
             if threads == 1 {

@@ -1,6 +1,6 @@
-//! Once their scratch is warm, searches in a graph and evaluations along it ask for no memory.
+//! Searches in a graph and evaluations along it allocate no memory once their scratch is warm.
 //!
-//! One test alone: the counter is of the whole process.
+//! This is a single test because the counter covers the whole process.
 
 use nearmiss::graph::{
     ClosePairs, GeodesicKernel, GeodesicScratch, GraphOptions, KernelScratch, LevelScratch, Levels, Network,

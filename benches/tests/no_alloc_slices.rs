@@ -1,4 +1,4 @@
-//! Boxes against slices, and steps of avatars, ask for no memory.
+//! Tests of boxes against slices and steps of avatars allocate no memory.
 
 use nearmiss::Aabb;
 use nearmiss::slices::{

@@ -1,4 +1,4 @@
-//! What holds of every reader of others' files.
+//! Checks that every reader of a foreign file format must pass.
 
 use std::panic;
 use std::path::Path;

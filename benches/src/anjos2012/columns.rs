@@ -1,4 +1,4 @@
-//! §4: how far from a round column an avatar is stopped, by slices and by half-spacing boxes.
+//! §4: the gap at which a round column stops an avatar, by slices and by boxes of half the spacing.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -13,25 +13,25 @@ use super::{Source, made};
 use crate::Failure;
 use crate::sample::count;
 
-/// Ways towards each column.
+/// Directions from which each column is approached.
 const WAYS: u32 = 90;
 
-/// How far apart points are.
+/// Spacings of the points.
 const SPACINGS: [f64; 6] = [0.01, 0.02, 0.04, 0.08, 0.16, 0.32];
 const PIXELS: [f64; 2] = [0.04, 0.08];
 
-/// Height of the columns, and of the box: between these.
+/// Height of the columns. `BODY` is the vertical extent of the box.
 const TALL: f64 = 2.5;
 const BODY: [f64; 2] = [0.6, 2.1];
 
-/// The box reaches so far to each side.
+/// Half the width of the box.
 const HALF: f64 = 0.15;
 
-/// Gaps where the box is first stopped: mean, least, most.
+/// Mean, least and greatest gap at which the box is first stopped.
 struct Gaps([f64; 3]);
 
 impl Gaps {
-    /// `stops` says whether it is, coming nearer from every side.
+    /// Moves the box towards every column from every direction until `stops` returns `true`.
     fn new(stops: impl Fn(&Aabb) -> bool) -> Self {
         let mut gaps = Vec::new();
         for [cx, cy] in COLUMNS {
@@ -46,7 +46,7 @@ impl Gaps {
                     d[0].hypot(d[1]) - COLUMN
                 };
                 let places = (0..1000_u16).map(|i| body(0.9 - 0.0009 * f64::from(i)));
-                // What is never stopped ends in the column's middle.
+                // A box that is never stopped ends in the middle of the column.
                 gaps.push(places.into_iter().find(&stops).map_or(-COLUMN, |b| gap(&b)));
             }
         }
@@ -55,14 +55,14 @@ impl Gaps {
         Self([mean, least, gaps.iter().copied().fold(f64::NEG_INFINITY, f64::max)])
     }
 
-    /// In millimetres.
+    /// The gaps in millimetres, as cells of a table.
     fn told(&self) -> String {
         let [mean, least, most] = self.0.map(|gap| 1e3 * gap);
         format!("{mean:.0} | {least:.0} to {most:.0}")
     }
 }
 
-/// Points on the columns, a jittered lattice on each.
+/// Points on the columns: a jittered lattice on each.
 fn points(spacing: f64, seed: u64) -> Vec<[f64; 3]> {
     let rng = &mut rng(seed);
     let [around, rows] = [TAU * COLUMN, TALL].map(|length| (length / spacing).ceil());
@@ -80,7 +80,7 @@ fn points(spacing: f64, seed: u64) -> Vec<[f64; 3]> {
     points
 }
 
-/// Half the mean distance of a point from its nearest.
+/// Half the mean distance of a point to its nearest neighbour.
 fn half_spacing(points: &[[f64; 3]]) -> f64 {
     let nearest = |p: &[f64; 3]| {
         let away = points.iter().map(|q| (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>());
@@ -90,10 +90,10 @@ fn half_spacing(points: &[[f64; 3]]) -> f64 {
     0.5 * sample.iter().map(|p| nearest(p)).sum::<f64>() / count(sample.len())
 }
 
-/// Slices against boxes over the spacing of points.
+/// Writes the table that compares slices with boxes, by spacing.
 ///
 /// # Errors
-/// When no map can be made.
+/// When a map cannot be built.
 pub fn table(text: &mut String, seed: u64) -> Result<(), Failure> {
     let over = PIXELS.map(|pixel| format!(" slices, t = {pixel}: mean | least to most |")).concat();
     writeln!(

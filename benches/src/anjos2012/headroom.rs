@@ -1,4 +1,5 @@
-//! How high a box fits up a staircase: by the points alone, and by walking on maps.
+//! The greatest height of a box that fits up a staircase, by the points alone and by walks on slice
+//! maps.
 
 use std::fmt::Write;
 
@@ -14,20 +15,21 @@ const PIXELS: [f64; 4] = [0.03, 0.04, 0.05, 0.06];
 /// Heights that are tried, in centimetres.
 const HEIGHTS: std::ops::RangeInclusive<u16> = 100..=220;
 
-/// How far the box moves at a time, how far beside the way room is looked for, and in what steps.
+/// Step of the box along the route, greatest sideways offset at which headroom is measured, and
+/// step of that offset.
 const STEP: f64 = 0.04;
 const ASIDE: f64 = 0.5;
 const ASIDE_STEP: f64 = 0.05;
 
-/// What lies no higher than this above the highest point of a step belongs to the step: points are rounded to
-/// a centimetre.
+/// Points at most this far above the highest point of a step belong to the step, because points are
+/// rounded to a centimetre.
 const SAME: f64 = 0.02;
 
-/// The greatest height of boxes of some widths that get up, by the points and by maps of several sizes of
-/// pixels.
+/// Writes the greatest height at which boxes of several widths get up the stairs, by the points and
+/// by maps of several pixel sizes.
 ///
 /// # Errors
-/// When no map can be made.
+/// When a map cannot be built.
 pub fn table(text: &mut String, walked: &Walked) -> Result<(), Failure> {
     let up = Route {
         start: walked.route.start,
@@ -61,7 +63,7 @@ pub fn table(text: &mut String, walked: &Walked) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The greatest height of a box of this width that arrives; below all that are tried, 0.
+/// The greatest height at which a box of this width arrives; 0 if none of the tried heights does.
 fn highest(map: &SliceMap, up: &Route, width: f64) -> Result<f64, Failure> {
     for height in HEIGHTS.rev().map(|height| f64::from(height) / 100.0) {
         let options = AvatarOptions::default().with_box([width; 2], height).with_step(map.grid().pixel);
@@ -74,7 +76,7 @@ fn highest(map: &SliceMap, up: &Route, width: f64) -> Result<f64, Failure> {
     Ok(0.0)
 }
 
-/// The least room on the way, and the least of what is the most beside it.
+/// The least headroom along the route, and the least of the greatest headrooms found beside it.
 fn room(cloud: &PointCloud, up: &Route, width: f64) -> [f64; 2] {
     let near = near(cloud, up);
     let places: Vec<[f64; 2]> =
@@ -99,14 +101,14 @@ fn room(cloud: &PointCloud, up: &Route, width: f64) -> [f64; 2] {
     least
 }
 
-/// Numbers from one to another.
+/// Numbers from `from` to `to`, `step` apart.
 fn steps(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(0.0), |i| Some(i + 1.0))
         .map(move |i| from + i * step)
         .take_while(move |x| *x <= to)
 }
 
-/// Points about the way.
+/// Points within 1 of the bounding rectangle of the route.
 fn near(cloud: &PointCloud, up: &Route) -> Vec<[f64; 3]> {
     let places = || up.points.iter().copied().chain([[up.start[0], up.start[1]]]);
     let ends = |k: usize| {
@@ -119,8 +121,8 @@ fn near(cloud: &PointCloud, up: &Route) -> Vec<[f64; 3]> {
     (0..cloud.len()).map(|i| cloud.point(i)).filter(is_near).collect()
 }
 
-/// Height of the highest thing under a square that can be stepped on from `feet`, and the room between that
-/// and what is above.
+/// Height of the highest step within a square that can be reached from `feet`, and the headroom
+/// above it.
 fn above(points: &[[f64; 3]], [x, y]: [f64; 2], width: f64, feet: f64) -> Option<[f64; 2]> {
     let climb = AvatarOptions::default().climb;
     let under = || {

@@ -15,19 +15,19 @@ use crate::figures::FigureOptions;
 use crate::plot::{Axis, Line, Panel};
 use crate::sample::count;
 
-/// The paper's resolution.
+/// The paper's resolution, in pixels.
 pub const PIXELS: u32 = 700;
 
-/// How many slices the paper's avatar spans.
+/// Slices that the paper's avatar spans.
 const SPANNED: f64 = 6.0;
 
-/// Steps that a mark in a figure stands for, so that peaks are seen.
+/// Steps that one mark of a figure stands for; it shows their peak.
 const TOGETHER: usize = 8;
 
-/// Walks of which each step's least time is told.
+/// Walks per measurement; the least time of each step counts.
 const PASSES: usize = 7;
 
-/// Of each step: time in microseconds, and bytes of slices in memory.
+/// Time in microseconds and bytes of slices in memory, for each step.
 struct Steps {
     times: Vec<f64>,
     bytes: Vec<usize>,
@@ -64,14 +64,14 @@ fn walk(
     Ok(steps)
 }
 
-/// The greatest of every few values, over the number of the first.
+/// The greatest of each group of values, over the index of the first.
 fn peaks(values: &[f64]) -> Vec<[f64; 2]> {
     let groups = values.chunks(TOGETHER).enumerate();
     groups.map(|(i, group)| [count(TOGETHER * i), group.iter().copied().fold(0.0, f64::max)]).collect()
 }
 
-/// Walks with the paper's avatar of six slices, of which 10 or 16 are kept, and with slices of three pixels;
-/// writes both figures and a table.
+/// Walks with the paper's avatar of six slices, of which 10 or 16 are kept, and with slices of
+/// three pixels. Writes both figures and a table.
 ///
 /// # Errors
 /// When a map or a figure cannot be written, or the walk ends early.

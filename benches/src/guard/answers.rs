@@ -1,4 +1,4 @@
-//! What is answered, written down and compared.
+//! Answers to the questions of a case: asked, written and compared.
 
 use std::fmt::{self, Display};
 use std::str::FromStr;
@@ -11,19 +11,20 @@ use nearmiss::{
 use super::cases::{Case, Question};
 use crate::Failure;
 
-/// One of so many questions is also asked for curves, and about shapes.
+/// One in this many questions is also asked for curves and shapes.
 const ONE_OF: usize = 10;
 
-/// Numbers are written with so many digits behind the first.
+/// Digits behind the first that numbers are written with.
 const DIGITS: usize = 8;
 
-/// By this share a number may differ that was the same before it was written.
+/// Relative difference that rounding to [`DIGITS`] can cause.
 const ROUNDING: f64 = 1e-6;
 
-/// By this share the length of curves may differ, and the mean of bounds may be less.
+/// Greatest relative change of the length of curves, and greatest relative loss of the mean of
+/// bounds.
 const TOLERANCE: f64 = 0.01;
 
-/// A verdict in a letter, and how sure it is in a second: `S` separated, `I` intersecting, `U` undecided; `c`
+/// A verdict and its evidence as two letters. `S` separated, `I` intersecting, `U` undecided; `c`
 /// certified, `e` estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Said {
@@ -69,24 +70,24 @@ struct Aside {
     curves: usize,
     closed: usize,
     length: f64,
-    /// Which of the shapes touch, as bits.
+    /// A bit for each shape that touches.
     touches: u32,
 }
 
-/// What is answered to one question.
+/// The answers to one question.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
-    /// Obstacles, with certified evidence and a witness.
+    /// Verdict about obstacles, with certified evidence and a witness.
     certified: Said,
-    /// Obstacles, estimated, without a witness.
+    /// Verdict about obstacles, estimated, without a witness.
     estimated: Said,
-    /// Surfaces alone, with certified evidence.
+    /// Verdict about surfaces alone, with certified evidence.
     surface: Said,
-    /// Balls of half the band about all points.
+    /// Verdict about balls of half the band around all points.
     thickened: Said,
     /// The certified gap.
     gap: f64,
-    /// The bounds of the distance.
+    /// The lower bound of the distance.
     lower: f64,
     upper: f64,
     aside: Option<Aside>,
@@ -141,7 +142,7 @@ impl FromStr for Row {
 }
 
 impl Row {
-    /// What is wrong with `self` if `old` was answered before.
+    /// The faults of `self` compared with the earlier answers `old`.
     fn faults(&self, old: &Self) -> Vec<String> {
         let mut faults = Vec::new();
         let verdicts = [
@@ -179,16 +180,16 @@ impl Row {
     }
 }
 
-/// The record of a case as text: a header and a line for each answer.
+/// The text of a record: a header and a line for each question.
 #[must_use]
 pub fn written(rows: &[Row]) -> String {
     rows.iter().fold(format!("{HEADER}\n"), |text, row| format!("{text}{row}\n"))
 }
 
-/// The rows of a record.
+/// Parses the rows of a record.
 ///
 /// # Errors
-/// Names the first line that is no row.
+/// When a line is not a row; the error names the first one.
 pub fn read(text: &str) -> Result<Vec<Row>, Failure> {
     let mut lines = text.lines().enumerate();
     if lines.next().map(|(_, line)| line) != Some(HEADER) {
@@ -199,7 +200,7 @@ pub fn read(text: &str) -> Result<Vec<Row>, Failure> {
         .collect()
 }
 
-/// What is worse in `new` than in `old`, a line each: verdicts that differ, evidence that was lost, bounds
+/// The regressions of `new` against `old`, one line each: changed verdicts, lost evidence, bounds
 /// that contradict the old ones, and bounds that are looser on average.
 #[must_use]
 pub fn faults(new: &[Row], old: &[Row]) -> Vec<String> {
@@ -285,7 +286,7 @@ impl Asker {
     }
 }
 
-/// Which of a sphere, a capsule and a box, where b lies, touch the points of a, as bits.
+/// A bit for each of a sphere, a capsule and a box at b's position that touches the points of a.
 fn touches(a: &Scan, question: &Question) -> u32 {
     let [pose, at] = question.poses;
     let size = a.bounds().half_extents().into_iter().fold(0.0, f64::max) * pose.scale();

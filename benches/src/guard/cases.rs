@@ -1,4 +1,4 @@
-//! What the guard asks: scans, and pairs of them at fixed poses.
+//! The cases of the regression checks: scans, and pairs of them at fixed poses.
 
 use std::path::Path;
 
@@ -19,15 +19,15 @@ const IN_ROOM: usize = 150;
 /// Length of that object's longest side, as a share of the scan's diagonal.
 const SHARE: f64 = 0.04;
 
-/// One of so many poses of a truth set is asked.
+/// One in this many poses of a truth set is asked.
 const ONE_OF: usize = 8;
 
-/// A pair of scans at a pose each.
+/// Two scans, each with a pose.
 #[derive(Debug, Clone, Copy)]
 pub struct Question {
-    /// Which scan a is, among those of its case.
+    /// Index of scan a in its case.
     pub a: usize,
-    /// Which scan b is.
+    /// Index of scan b in its case.
     pub b: usize,
     /// Poses of a and b.
     pub poses: [Pose; 2],
@@ -36,7 +36,7 @@ pub struct Question {
 /// Scans and the questions about them.
 #[derive(Debug)]
 pub struct Case {
-    /// The name of its record.
+    /// The name of the record.
     pub name: String,
     /// The scans.
     pub scans: Vec<Scan>,
@@ -45,15 +45,15 @@ pub struct Case {
 }
 
 impl Case {
-    /// The object with itself, one copy at rest.
+    /// The object against itself, at these pairs of poses.
     pub(super) fn with_itself(name: &str, scan: Scan, at: impl IntoIterator<Item = [Pose; 2]>) -> Self {
         let questions = at.into_iter().map(|poses| Question { a: 0, b: 0, poses }).collect();
         Self { name: name.into(), scans: vec![scan], questions }
     }
 }
 
-/// The cases about shipped and generated scans: objects with themselves, with either kernel, a dragon before
-/// a simulated scanner, and shapes with known answers.
+/// The cases about shipped and generated scans: objects against themselves with either kernel, a
+/// dragon in a simulated LiDAR frame, and shapes with known answers.
 ///
 /// # Errors
 /// When a scan cannot be prepared.
@@ -76,10 +76,10 @@ pub fn shipped() -> Result<Vec<Case>, Failure> {
     ])
 }
 
-/// The cases about the scans and truth sets in a folder, as far as they are there.
+/// The cases about the scans and truth sets that the folder contains.
 ///
 /// # Errors
-/// When a file is there that cannot be read.
+/// When a file exists but cannot be read.
 pub fn of_folder(folder: &Path) -> Result<Vec<Case>, Failure> {
     let mut cases = Vec::new();
     for set in ["dragon70k", "happy-buddha"] {
@@ -111,7 +111,7 @@ fn prepared(cloud: &PointCloud) -> Result<Scan, Failure> {
     Ok(Scan::build(cloud, &BuildOptions::default())?)
 }
 
-/// An object anywhere within the bounds of a scan.
+/// An object at random poses within the bounds of a scan.
 pub(super) fn in_room(
     name: &str,
     room: &PointCloud,

@@ -1,6 +1,7 @@
-//! Instructions that queries take, counted by valgrind: no clock, so a slow day changes nothing.
+//! Instruction counts of queries, by valgrind. Unlike times they do not depend on the load of the
+//! machine.
 //!
-//! Valgrind runs the code for AVX2, whatever else the processor has. On a processor without AVX2 counts
+//! Valgrind runs the AVX2 code on every processor that has AVX2. On other processors the counts
 //! differ.
 
 use std::path::Path;
@@ -17,7 +18,7 @@ use super::cases::{Case, in_room};
 use crate::object::Object;
 use crate::{Failure, poses};
 
-/// What is counted.
+/// A scenario whose instructions are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scenario {
     /// Estimated verdicts of the sweep.
@@ -38,12 +39,12 @@ pub enum Scenario {
     View,
     /// Opening a prepared scan, its structure checked.
     Open,
-    /// Reading a file and preparing a scan on one thread, the whole process.
+    /// Reading a file and preprocessing a scan on one thread; counts the whole process.
     Build,
 }
 
 impl Scenario {
-    /// All of them, with their names.
+    /// All scenarios with their names.
     pub const ALL: [(Self, &'static str); 10] = [
         (Self::Sweep, "sweep"),
         (Self::Near, "near"),
@@ -66,7 +67,7 @@ impl Scenario {
         known.map(|(scenario, _)| *scenario).ok_or_else(|| format!("no scenario {name:?}").into())
     }
 
-    /// Prepares the scenario, then works through it once, which valgrind counts.
+    /// Prepares the scenario, then runs it once; valgrind counts the run only.
     ///
     /// # Errors
     /// When it cannot be prepared.
@@ -102,13 +103,14 @@ impl Scenario {
         }
     }
 
-    /// Which function's instructions are counted; all of the process where that works on threads of its own.
+    /// Valgrind's option that limits the count to one function; empty if the whole process is
+    /// counted.
     fn toggle(self) -> &'static [&'static str] {
         if self == Self::Build { &[] } else { &["--toggle-collect=*counts::counted*"] }
     }
 }
 
-/// Why nothing can be counted here that compares with the record; `None` if it can.
+/// The reason why counts cannot be compared with the record here, or `None`.
 #[must_use]
 pub fn obstacle() -> Option<&'static str> {
     let installed =
@@ -132,10 +134,10 @@ const fn has_avx2() -> bool {
     false
 }
 
-/// The count of a scenario by valgrind. `program` runs the scenario when given `arguments`.
+/// Counts a scenario with valgrind. `program` runs the scenario when given `arguments`.
 ///
 /// # Errors
-/// When valgrind is not there, or the scenario fails.
+/// When valgrind is not installed, or the scenario fails.
 pub fn count(scenario: Scenario, program: &Path, arguments: &[&str]) -> Result<u64, Failure> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
@@ -152,7 +154,7 @@ pub fn count(scenario: Scenario, program: &Path, arguments: &[&str]) -> Result<u
     }
 }
 
-/// All that valgrind counts.
+/// The only function whose instructions valgrind counts.
 #[inline(never)]
 fn counted(work: &mut dyn FnMut()) {
     work();
@@ -183,7 +185,7 @@ fn hall() -> Result<Case, Failure> {
     in_room("hall", &hall, &Object::read("dragon-5k")?.cloud, 3)
 }
 
-/// Of a case whose questions are all about its first and its last scan.
+/// Verdicts for a case whose questions are all about its first and last scan.
 fn verdicts(case: &Case, options: &CollideOptions) -> Result<(), Failure> {
     let [a, b] = [&case.scans[0], &case.scans[case.scans.len() - 1]];
     let (plan, mut scratch) = (CollidePlan::new(options, a, b)?, Scratch::default());

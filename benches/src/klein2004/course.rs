@@ -1,4 +1,4 @@
-//! Figs 9 to 12: time over distance, and differences to an exact test of polygons.
+//! Figs 9 to 12: time over distance, and differences from an exact test of polygons.
 
 use std::hint::black_box;
 
@@ -14,52 +14,52 @@ use crate::sample::{Sample, count};
 /// Distances over which the paper averages differences.
 const AVERAGED: std::ops::RangeInclusive<f64> = 0.6..=2.0;
 
-/// Poses to warm up with before a distance.
+/// Warm-up poses before each distance.
 const WARM_UP: usize = 20;
 
-/// How answers compare with the exact test at one distance, of poses at which the boxes of the roots
-/// intersect.
+/// Comparison of the answers with the exact test at one distance, for the poses at which the root
+/// boxes intersect.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Difference {
-    /// Such poses.
+    /// Poses at which the root boxes intersect.
     pub tests: usize,
-    /// Hits that are none, and misses.
+    /// False hits and misses.
     pub differ: usize,
-    /// No verdict, and no time left to find one: then the better guess is what differs or not.
+    /// Searches ended by the budget. Their likelier verdict counts in `differ`.
     pub unfinished: usize,
-    /// No verdict, for other reasons: neither a difference nor an agreement.
+    /// Undecided for other reasons; neither a difference nor an agreement.
     pub undecided: usize,
 }
 
 impl Difference {
-    /// In percent of the tests; zero of none.
+    /// Differences in percent of the tests; zero without tests.
     #[must_use]
     pub fn percent(&self) -> f64 {
         100.0 * count(self.differ) / count(self.tests.max(1))
     }
 }
 
-/// What one way to ask did over the distances of the sweep.
+/// Results of one method over the distances of the sweep.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Course {
     /// Times of single queries.
     pub times: [Sample; DISTANCES],
-    /// Against the exact test; of none where there is no mesh.
+    /// Comparison with the exact test; empty without a mesh.
     pub differences: [Difference; DISTANCES],
 }
 
-/// The poses of a course with what is known of them.
+/// Poses with known facts about them.
 #[derive(Debug, Clone)]
 pub struct Questions {
     poses: [Vec<Pose>; DISTANCES],
-    /// Whether the meshes intersect.
+    /// `true` where the meshes intersect.
     exact: Option<[Vec<bool>; DISTANCES]>,
-    /// Whether the boxes of the roots do.
+    /// `true` where the root boxes intersect.
     close: [Vec<bool>; DISTANCES],
 }
 
 impl Questions {
-    /// Asks `exact`, of the mesh of the scan, about all poses.
+    /// Prepares the poses; `exact` tests the meshes in all of them.
     #[must_use]
     pub fn new(poses: [Vec<Pose>; DISTANCES], scan: &Scan, exact: Option<&mut dyn Method>) -> Self {
         let close = poses.each_ref().map(|poses| poses.iter().map(|pose| roots_meet(scan, pose)).collect());
@@ -72,8 +72,8 @@ impl Questions {
     }
 }
 
-/// Whether the boxes of the roots overlap, the second copy of the scan being at `pose`. Objects scaled for
-/// the sweep are stored in their own frame.
+/// Returns `true` if the root boxes overlap with the second copy of the scan at `pose`. Objects
+/// scaled for the sweep are stored in their own frame.
 fn roots_meet(scan: &Scan, pose: &Pose) -> bool {
     let root = &scan.tree().bounds(NodeId::ROOT);
     let relative = Relative::new(pose, f64::from(root.radius()));
@@ -81,7 +81,7 @@ fn roots_meet(scan: &Scan, pose: &Pose) -> bool {
 }
 
 impl Difference {
-    /// Counts an answer, `exact` being the truth about polygons.
+    /// Counts an answer; `exact` is the truth about the polygons.
     fn count(&mut self, verdict: &Verdict, exact: bool) {
         self.tests += 1;
         let hit = match verdict {
@@ -107,10 +107,10 @@ impl Difference {
 }
 
 impl Course {
-    /// Asks all questions `passes` times, distance by distance; the time of a question is the least it took,
-    /// which leaves out what other programs took. Answers that count are the first.
+    /// Runs all queries `passes` times, distance by distance. The least time of a query counts,
+    /// which reduces the effect of other load. The verdicts of the first pass are compared.
     ///
-    /// Thousands of other questions come between those that are the same.
+    /// Thousands of other queries run between two runs of the same one.
     pub fn run(questions: &Questions, passes: usize, mut ask: impl FnMut(&Pose) -> Answer) -> Self {
         let mut course = Self::default();
         let mut least = questions.poses.each_ref().map(|poses| vec![f64::INFINITY; poses.len()]);
@@ -135,26 +135,26 @@ impl Course {
         course
     }
 
-    /// Distance and mean time in microseconds.
+    /// Pairs of distance and mean time in microseconds.
     #[must_use]
     pub fn mean_times(&self) -> Vec<[f64; 2]> {
         (0..DISTANCES).map(|i| [distance(i), self.times[i].summary().mean / 1e3]).collect()
     }
 
-    /// Distance and median time in microseconds.
+    /// Pairs of distance and median time in microseconds.
     #[must_use]
     pub fn median_times(&self) -> Vec<[f64; 2]> {
         (0..DISTANCES).map(|i| [distance(i), self.times[i].summary().median / 1e3]).collect()
     }
 
-    /// Distance and differences in percent, where there were tests.
+    /// Pairs of distance and differences in percent, for the distances with tests.
     #[must_use]
     pub fn percents(&self) -> Vec<[f64; 2]> {
         let tested = (0..DISTANCES).filter(|&i| self.differences[i].tests > 0);
         tested.map(|i| [distance(i), self.differences[i].percent()]).collect()
     }
 
-    /// The average of mean times over all distances, in microseconds.
+    /// The average of the mean times over all distances, in microseconds.
     #[must_use]
     pub fn sweep_mean(&self) -> f64 {
         self.mean_times().iter().map(|p| p[1]).sum::<f64>() / count(DISTANCES)
@@ -219,7 +219,7 @@ mod tests {
         let poses = sweep(30, 1, 0);
         let questions = Questions::new(poses, &scan, Some(&mut mesh));
         let exact = questions.exact.as_ref().unwrap();
-        // What intersects has boxes that do; some boxes do although nothing else does.
+        // Intersecting meshes have intersecting root boxes; the reverse does not hold.
         let pairs = || exact.iter().flatten().zip(questions.close.iter().flatten());
         assert!(pairs().all(|(&hit, &close)| close || !hit), "a hit with boxes apart");
         assert!(pairs().any(|(&hit, &close)| close && !hit), "boxes meet, meshes do not");

@@ -1,4 +1,4 @@
-//! Table 1 and Fig. 8: what hierarchies consist of, and how long it takes to build them.
+//! Table 1 and Fig. 8: the make-up of hierarchies and the time to build them.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -9,28 +9,28 @@ use crate::Failure;
 use crate::clock::processor_time;
 use crate::sample::count;
 
-/// What a hierarchy consists of.
+/// The make-up of a hierarchy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Makeup {
     /// Cloud points.
     pub points: usize,
     /// Sample points of all inner nodes together.
     pub samples: usize,
-    /// Nodes, leaves included.
+    /// Nodes, including leaves.
     pub nodes: usize,
-    /// Average depth of a node, the root's being 0.
+    /// Average depth of a node; the root has depth 0.
     pub depth: f64,
-    /// Bytes of the file for each point.
+    /// Bytes of the file per point.
     pub bytes_a_point: f64,
-    /// Bytes that nodes take, for each.
+    /// Bytes of the nodes per node.
     pub bytes_a_node: f64,
 }
 
 impl Makeup {
-    /// Of a prepared scan.
+    /// The make-up of a prepared scan.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// When the scan cannot be written.
     pub fn of(scan: &Scan) -> Result<Self, Failure> {
         let (slices, nodes) = (scan.slices(), scan.topology());
         let mut depths = vec![0_u32; nodes.len()];
@@ -53,13 +53,14 @@ impl Makeup {
     }
 }
 
-/// Builds go on until they have taken so long, so that a hundredth of a second is little.
+/// Builds repeat for at least this long, so that the resolution of a hundredth of a second is
+/// small.
 const LONG_ENOUGH: Duration = Duration::from_millis(500);
 
-/// Seconds of processor time that a build takes, on one thread.
+/// Seconds of processor time per build, on one thread.
 ///
 /// # Errors
-/// When it cannot be built.
+/// When the scan cannot be built.
 pub fn build_seconds(cloud: &PointCloud) -> Result<f64, Failure> {
     let options = BuildOptions::default().with_threads(1);
     let (start, mut builds) = (processor_time(), 0);
@@ -85,7 +86,7 @@ mod tests {
         let leaves = scan.len().div_ceil(16);
         let inner = scan.topology().inner();
         assert_eq!((makeup.points, makeup.nodes), (5205, leaves + inner));
-        // 326 leaves lie under 128 nodes at depth 4, these under 32, 8 and 2.
+        // 326 leaves are below 128 nodes at depth 4, these below 32, 8 and 2.
         assert_eq!(inner, 128 + 32 + 8 + 2 + 1);
         assert!((4.0..5.0).contains(&makeup.depth), "{makeup:?}");
         assert!(makeup.samples == 16 * inner, "{makeup:?}");

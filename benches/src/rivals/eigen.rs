@@ -1,4 +1,4 @@
-//! Solvers of the symmetric 3×3 eigenproblem side by side: ours, and what one would take instead.
+//! Solvers of the symmetric 3×3 eigenproblem: ours, and what users would pick instead.
 
 use faer::Side;
 use glamx::DSymmetricEigen3;
@@ -10,31 +10,31 @@ use nearmiss::surface::{
 
 use super::jacobi::jacobi;
 
-/// More than any matrix that converges takes; nalgebra's own default is no limit at all.
+/// More iterations than any convergent matrix takes. The default of nalgebra is unlimited.
 const ITERATIONS: usize = 1000;
 
-/// A solver with its problems, in its own form, and room for its answers.
+/// A solver with its problems in its own format, and memory for its results.
 pub trait Contender {
     /// The name shown in tables.
     fn name(&self) -> String;
 
-    /// Takes these problems; no part of the time.
+    /// Converts the problems to the solver's format; not timed.
     fn take(&mut self, matrices: &[[f64; 6]]);
 
-    /// Solves them all.
+    /// Solves all problems.
     fn solve(&mut self);
 
-    /// What came of them, `None` where the solver gave up; without vectors for all but the least eigenvalue
-    /// where it gives no others.
+    /// The results; `None` where the solver gave up. A solver of one eigenpair gives the least
+    /// eigenvalue with its vector.
     fn answers(&self) -> Vec<Option<Answer>>;
 }
 
 /// One solved problem.
 #[derive(Debug, Clone, Copy)]
 pub enum Answer {
-    /// Three pairs.
+    /// Three eigenpairs.
     All(Eigen3),
-    /// The least, with its vector.
+    /// The least eigenvalue with its eigenvector.
     Least(f64, [f64; 3]),
 }
 
@@ -69,7 +69,7 @@ impl<M, R, F: Fn(&M) -> R, A: Fn(&R) -> Option<Answer>> Contender for OneByOne<M
     }
 }
 
-/// Our batch, by one instruction set.
+/// Our batch solver with one instruction set.
 struct Batch {
     name: &'static str,
     level: Level,
@@ -102,7 +102,7 @@ impl Contender for Batch {
     }
 }
 
-/// All solvers, ours first; of the batch one for each instruction set that this machine has.
+/// All solvers, ours first. The batch solver occurs once for each instruction set of this machine.
 #[must_use]
 pub fn contenders() -> Vec<Box<dyn Contender>> {
     let mut all: Vec<Box<dyn Contender>> = vec![one_by_one("single", |m| m, |m| symmetric_eigen(*m), all_of)];
@@ -185,7 +185,8 @@ fn sorted(values: [f64; 3], vectors: [[f64; 3]; 3]) -> Answer {
     Answer::All(Eigen3 { values: order.map(|i| values[i]), vectors: order.map(|i| vectors[i]) })
 }
 
-/// Singular values are magnitudes: an eigenvalue is negative where the two singular vectors are opposite.
+/// Singular values are magnitudes: the eigenvalue is negative if its two singular vectors are
+/// opposite.
 fn of_svd(svd: &Option<SVD<f64, nalgebra::U3, nalgebra::U3>>) -> Option<Answer> {
     let svd = svd.as_ref()?;
     let (u, v) = (svd.u?, svd.v_t?.transpose());

@@ -1,7 +1,7 @@
-//! A plain grid of points: what one writes for spheres of one radius. Cells have that radius, so 27 are
-//! looked at.
+//! A plain grid of points, as users would write for spheres of one radius. Its cells have that
+//! radius, so a query visits 27 of them.
 
-/// Points by cell, and where each cell's begin.
+/// Points sorted by cell, and the index of each cell's first point.
 #[derive(Debug, Clone)]
 pub struct Grid {
     min: [f32; 3],
@@ -12,7 +12,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// That of `points`, with cells of this size.
+    /// Sorts `points` into cells of this size.
     #[must_use]
     #[expect(
         clippy::cast_possible_truncation,
@@ -46,7 +46,8 @@ impl Grid {
         grid
     }
 
-    /// Whether a point is within `radius`, at most a cell, of `centre`.
+    /// Returns `true` if a point lies within `radius` of `centre`. `radius` may be at most the cell
+    /// size.
     #[must_use]
     #[expect(
         clippy::cast_possible_truncation,
@@ -66,7 +67,7 @@ impl Grid {
                 if row.is_empty() {
                     return false;
                 }
-                // Cells of a row lie side by side.
+                // The cells of a row are contiguous.
                 let (from, to) = (self.number([x, y, row.start]), self.number([x, y, row.end - 1]) + 1);
                 let points = &self.points[self.first[from] as usize..self.first[to] as usize];
                 points.iter().any(|p| {

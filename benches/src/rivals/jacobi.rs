@@ -1,10 +1,10 @@
-//! Eigenpairs of a symmetric 3×3 matrix by cyclic Jacobi rotations (Golub & Van Loan, "Matrix Computations",
-//! 4th ed. 2013, §8.5): converges for every symmetric matrix, and its eigenvectors are orthogonal to
-//! rounding.
+//! Eigenpairs of a symmetric 3×3 matrix by cyclic Jacobi rotations (Golub & Van Loan, "Matrix
+//! Computations", 4th ed. 2013, §8.5). The method converges for every symmetric matrix, and its
+//! eigenvectors are orthogonal up to rounding.
 
 use nearmiss::surface::Eigen3;
 
-/// An off-diagonal entry this small, of a matrix whose largest entry is 1, is rounding.
+/// Off-diagonal entries below this are rounding errors in a matrix whose largest entry is 1.
 const NEGLIGIBLE: f64 = 1e-16;
 
 /// The index pairs of the three off-diagonal entries.
@@ -12,8 +12,9 @@ const PAIRS: [(usize, usize); 3] = [(0, 1), (0, 2), (1, 2)];
 
 /// The eigenpairs of the symmetric matrix with rows [xx xy xz], [xy yy yz], [xz yz zz].
 ///
-/// The input is scaled by its largest entry, so any finite magnitudes do; a matrix that is zero or not finite
-/// gives zeros (or its own non-finite trace) with the coordinate axes. Three to five sweeps.
+/// The input is scaled by its largest entry, so any finite magnitudes are valid. A matrix that is
+/// zero or not finite gives its largest absolute entry three times, with the coordinate axes. Three
+/// to five sweeps.
 #[must_use]
 pub fn jacobi([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Eigen3 {
     /// Convergence is quadratic: six sweeps reduce any off-diagonal part below rounding.

@@ -1,8 +1,8 @@
-//! A scan of all points through kiddo's kd-tree: two copies meet if a point of one lies within r of a point
-//! of the other. What a user without a mesh writes in ten lines.
+//! A scan of all points through kiddo's kd-tree, as a user without a mesh would write in ten lines.
+//! Two copies meet if a point of one lies within r of a point of the other.
 //!
-//! Points outside the grown bounding box of the other copy are passed over, and the first point that is near
-//! enough ends the scan.
+//! Points outside the inflated bounding box of the other copy are skipped. The first point that is
+//! near enough ends the scan.
 
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nearmiss::{Aabb, PointCloud, Pose};
@@ -10,7 +10,7 @@ use nearmiss::{Aabb, PointCloud, Pose};
 use crate::Failure;
 use crate::rivals::method::{Method, Reply};
 
-/// Points under a kd-tree, and how near is a hit.
+/// Points in a kd-tree, and the distance that counts as a hit.
 #[expect(missing_debug_implementations, reason = "the tree's is a dump of all its points")]
 pub struct PointScan {
     tree: ImmutableKdTree<f32, 3>,
@@ -23,15 +23,14 @@ impl PointScan {
     /// Points that meet when they are within `reach`.
     ///
     /// # Errors
-    /// When the tree refuses the points.
+    /// When the tree rejects the points.
     pub fn new(cloud: &PointCloud, reach: f64) -> Result<Self, Failure> {
         let points: Vec<[f32; 3]> = (0..cloud.len()).map(|i| single(cloud.point(i))).collect();
         let tree = ImmutableKdTree::new_from_slice(&points).map_err(|e| format!("{e:?}"))?;
         Ok(Self { tree, points, bounds: cloud.bounds(), reach })
     }
 
-    /// The distance of the nearest points of the copy at `pose` and the resting one: the nearest
-    /// of each point.
+    /// The least distance between a point of the copy at `pose` and a point of the resting copy.
     #[must_use]
     pub fn least_distance(&self, pose: &Pose) -> f32 {
         let mut least_sq = f32::INFINITY;
@@ -45,8 +44,8 @@ impl PointScan {
 }
 
 impl PointScan {
-    /// The nearest pair of one of these points and one of `body` at `pose`: their distance in double
-    /// precision and their indices.
+    /// The nearest pair of one of these points and one of `body` at `pose`: their distance in
+    /// double precision and their indices.
     #[must_use]
     pub fn nearest_pair(&self, body: &PointCloud, pose: &Pose) -> (f64, usize, usize) {
         let mut best = (f64::INFINITY, 0, 0);
@@ -76,7 +75,7 @@ impl Method for PointScan {
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply {
         let pose = a.inverse().after(b);
         let Aabb { min, max } = self.bounds;
-        // The other copy's box, turned, first: far copies cost nothing.
+        // Tests the rotated box of the other copy first: far copies cost nothing.
         let half = self.bounds.half_extents();
         let (centre, moved) = (self.bounds.centre(), pose.apply(self.bounds.centre()));
         let apart = (0..3).any(|i| {
@@ -93,12 +92,14 @@ impl Method for PointScan {
         let mut evaluations = 0;
         let hit = self.points.iter().any(|&[x, y, z]| {
             let p = [0, 1, 2].map(|i| rows[i][0] * x + rows[i][1] * y + rows[i][2] * z + shift[i]);
-            // All six at once: where boxes overlap in part, branches would be guessed wrongly.
+            // All six comparisons at once: branches would be mispredicted where boxes overlap in
+            // part.
             if (0..3).fold(false, |beyond, k| beyond | (p[k] < low[k]) | (p[k] > high[k])) {
                 return false;
             }
             evaluations += 1;
-            // Bounded by the radius: an unbounded search for the nearest takes microseconds from afar.
+            // Limited to the radius: from afar an unlimited nearest-neighbour search takes
+            // microseconds.
             let query = self.tree.query(&p).within::<SquaredEuclidean<f32>>(reach * reach);
             query.unsorted().iter().next().is_some()
         });

@@ -2,25 +2,26 @@
 
 use nearmiss::Pose;
 
-/// An answer to the boolean question, with what it cost where that is counted.
+/// A boolean answer, and its cost where it is counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Reply {
-    /// Whether the two copies meet.
+    /// `true` if the two copies meet.
     pub hit: bool,
-    /// Evaluations of an implicit function; triangle or point tests of a rival.
+    /// Evaluations of an implicit function, or triangle or point tests of a rival.
     pub evaluations: u64,
     /// Node pairs.
     pub node_pairs: u64,
 }
 
-/// A way to answer whether two posed copies of one object meet.
+/// A method to decide whether two posed copies of one object meet.
 pub trait Method {
     /// The name shown in tables.
     fn name(&self) -> String;
 
-    /// Done before each question, and not timed.
+    /// Runs before each query; not timed.
     fn prepare(&mut self) {}
 
-    /// Whether the copies at `a` and `b` meet. Poses are rigid; all work that depends on them is done here.
+    /// Decides whether the copies at `a` and `b` meet. Poses are rigid. All work that depends on
+    /// them is timed.
     fn ask(&mut self, a: &Pose, b: &Pose) -> Reply;
 }

@@ -1,4 +1,4 @@
-//! Ours, as a user would call it.
+//! The nearmiss library, as a user would call it.
 
 use std::hint::black_box;
 
@@ -12,7 +12,7 @@ use crate::Failure;
 use crate::asked::{Limits, best_effort};
 use crate::rivals::method::{Method, Reply};
 
-/// Two prepared scans, often one and a copy of itself, with a scratch that is kept.
+/// Two prepared scans, often one and a copy of itself, with a scratch that is reused.
 #[derive(Debug, Clone)]
 pub struct Ours<'a> {
     scans: [&'a Scan; 2],
@@ -20,51 +20,51 @@ pub struct Ours<'a> {
     limits: Limits,
     scratch: Scratch,
     level: Option<Level>,
-    /// What is read before each question, so that nothing of the scan is left in any cache.
+    /// Data read before each query to evict the scan from all caches.
     evicting: Vec<u64>,
 }
 
-/// Words to read before a question: 96 MiB, more than any last level cache leaves to one core.
+/// Words to read before a query: 96 MiB, more than any last-level cache gives one core.
 const EVICTING: usize = 12 << 20;
 
 impl<'a> Ours<'a> {
-    /// Asks with these `options`, without a limit.
+    /// Queries with these `options`, without limits.
     ///
     /// # Errors
-    /// When there is no plan for that.
+    /// When the options do not fit the scan.
     pub fn new(scan: &'a Scan, options: &CollideOptions) -> Result<Self, Failure> {
         Self::of([scan, scan], options)
     }
 
-    /// Asks about two scans.
+    /// Queries about two scans.
     ///
     /// # Errors
-    /// When there is no plan for that.
+    /// When the options do not fit the scans.
     pub fn of(scans: [&'a Scan; 2], options: &CollideOptions) -> Result<Self, Failure> {
         let plan = CollidePlan::new(options, scans[0], scans[1])?;
         let scratch = Scratch::default();
         Ok(Self { scans, plan, limits: Limits::default(), scratch, level: None, evicting: Vec::new() })
     }
 
-    /// The same, each question within `limits`; hits are then best efforts.
+    /// The same method with each query within `limits`; hits are then best efforts.
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
     }
 
-    /// The same by this instruction set.
+    /// The same method with this instruction set.
     #[must_use]
     pub fn by_level(self, level: Level) -> Self {
         Self { scratch: Scratch::by_level(level), level: Some(level), ..self }
     }
 
-    /// The same with nothing in the caches when asked.
+    /// The same method with cold caches.
     #[must_use]
     pub fn evicted(self) -> Self {
         Self { evicting: (0..EVICTING as u64).collect(), ..self }
     }
 
-    /// The whole answer.
+    /// The complete answer.
     pub fn answer(&mut self, a: &Pose, b: &Pose) -> Answer {
         let (a, b) = (self.scans[0].at(a), self.scans[1].at(b));
         Pair::new(a, b).within(&self.limits.begin()).collide(&self.plan, &mut self.scratch)
@@ -103,7 +103,7 @@ impl Method for Ours<'_> {
     }
 }
 
-/// What an instruction set is called.
+/// The name of an instruction set.
 fn level_name(level: Level) -> String {
     let name = format!("{level:?}");
     name.split('(').next().unwrap_or_default().to_owned()

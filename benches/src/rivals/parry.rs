@@ -1,8 +1,8 @@
-//! Parry's bounding volume hierarchy of a mesh's triangles, traversed against itself, with a double-precision
-//! triangle test: what a user who has a mesh and wants speed would write.
+//! Parry's bounding volume hierarchy of a mesh's triangles, traversed in pairs, with a
+//! double-precision triangle test, as a user with a mesh would write for speed.
 //!
-//! Boxes of a pair of nodes are compared along the six axes of their faces in single precision, a little
-//! inflated, so that no pair is lost; triangles are compared in double precision.
+//! Boxes are compared along their six face axes in single precision, slightly inflated so that no
+//! pair is lost. Triangles are compared in double precision.
 
 use std::cell::Cell;
 
@@ -15,22 +15,22 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 use crate::rivals::method::{Method, Reply};
 use crate::rivals::triangles::{Triangle, intersect, normal};
 
-/// Added to the absolute values of a rotation: more than single precision rounds.
+/// Added to the absolute values of a rotation; exceeds the rounding of single precision.
 const ROUNDING: f32 = 1e-6;
 
-/// A mesh's triangles under a hierarchy.
+/// The triangles of a mesh in a hierarchy.
 #[derive(Clone)]
 #[expect(missing_debug_implementations, reason = "the hierarchy has none")]
 pub struct MeshTree {
     tree: Bvh,
     root: BvhNode,
     triangles: Vec<Triangle>,
-    /// Rounding of coordinates, in units of the mesh.
+    /// Bound of the rounding of coordinates, in units of the mesh.
     slack: f32,
 }
 
 impl MeshTree {
-    /// Triangles without area are left out.
+    /// Builds the hierarchy, without triangles of zero area.
     #[must_use]
     pub fn new(mesh: &TriangleMesh) -> Self {
         let corners = |t: &[u32; 3]| t.map(|v| mesh.vertices()[v as usize]);
@@ -44,7 +44,7 @@ impl MeshTree {
     }
 }
 
-/// Nearest single-precision number.
+/// Rounds to single precision.
 #[expect(clippy::cast_possible_truncation, reason = "that is what it is for; callers add slack")]
 fn single(x: f64) -> f32 {
     x as f32
@@ -56,7 +56,7 @@ fn bounds(t: &Triangle) -> Aabb {
     Aabb::new(corner(f64::min), corner(f64::max))
 }
 
-/// A motion in single precision, with what comparing boxes needs.
+/// A motion in single precision, with precomputed values for comparing boxes.
 struct Motion {
     turn: Mat3A,
     back: Mat3A,
@@ -80,7 +80,7 @@ impl Motion {
         Self { turn, back: turn.transpose(), spread, spread_back: spread.transpose(), shift, slack }
     }
 
-    /// Whether the boxes of two nodes, the second one moved, may overlap.
+    /// Returns `true` if the boxes of two nodes may overlap; the second one is moved.
     fn overlap(&self, a: &BvhNode, b: &BvhNode) -> bool {
         let centre_and_half = |node: &BvhNode| {
             let (min, max) = (Vec3A::from(node.mins()), Vec3A::from(node.maxs()));

@@ -1,11 +1,14 @@
-//! Whether two triangles share a point, in double precision.
+//! Intersection test of two triangles, in double precision.
 //!
-//! The three corners of each against the plane of the other, then two signs of volumes that order the ends of
-//! the two chords on the common line: Guigue and Devillers, "Fast and Robust Triangle-Triangle Overlap Test
-//! Using Orientation Predicates", Journal of Graphics Tools 8(1), 2003, doi:10.1080/10867651.2003.10487580.
-//! Triangles in one plane are compared in the two axes along which they are widest. Triangles are closed:
-//! touching counts. Volumes are rounded, not exact, so configurations within some 1e-16 of touching may go
-//! either way. A triangle without area has no plane and must be left out; in a mesh its neighbours cover it.
+//! The test compares the three corners of each triangle with the plane of the other. Two signs of
+//! volumes then order the ends of the two chords on the common line: Guigue and Devillers, "Fast
+//! and Robust Triangle-Triangle Overlap Test Using Orientation Predicates", Journal of Graphics
+//! Tools 8(1), 2003, doi:10.1080/10867651.2003.10487580. Coplanar triangles are compared in the two
+//! axes along which they are widest.
+//!
+//! Triangles are closed: touching counts. Volumes are rounded, so configurations within some 1e-16
+//! of touching may give either answer. A triangle of zero area has no plane and must be left out;
+//! in a mesh its neighbours cover it.
 
 /// Three corners.
 pub type Triangle = [[f64; 3]; 3];
@@ -26,20 +29,21 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Normal, as long as twice the area.
+/// The normal of a triangle; its length is twice the area.
 #[inline]
 #[must_use]
 pub fn normal(t: &Triangle) -> [f64; 3] {
     cross(sub(t[1], t[0]), sub(t[2], t[0]))
 }
 
-/// Six times the volume of a tetrahedron: positive if `d` is where the normal of a, b, c points.
+/// Six times the volume of a tetrahedron: positive if `d` is on the side that the normal of a, b, c
+/// points to.
 #[inline]
 fn volume(a: [f64; 3], b: [f64; 3], c: [f64; 3], d: [f64; 3]) -> f64 {
     dot(cross(sub(b, a), sub(c, a)), sub(d, a))
 }
 
-/// Whether two triangles, neither without area, share a point.
+/// Returns `true` if two triangles of non-zero area share a point.
 #[must_use]
 pub fn intersect(s: &Triangle, t: &Triangle) -> bool {
     let normal_t = normal(t);
@@ -55,8 +59,9 @@ pub fn intersect(s: &Triangle, t: &Triangle) -> bool {
     let (Some((at_s, above_s)), Some((at_t, above_t))) = (apex(&sides_s), apex(&sides_t)) else {
         return in_one_plane(s, t, &normal_s);
     };
-    // Turned so that the apex of each lies above the plane of the other. Turning a triangle over flips the
-    // sides of the other one's corners: `t` where the apex of `s` is below it, and the other way round.
+    // Rotated so that the apex of each lies above the plane of the other. Reversing a triangle
+    // swaps the sides of the other one's corners: reverse `t` if the apex of `s` is below it, and
+    // vice versa.
     let [p, mut q, mut r] = [0, 1, 2].map(|k| s[(at_s + k) % 3]);
     let [u, mut v, mut w] = [0, 1, 2].map(|k| t[(at_t + k) % 3]);
     if !above_s {
@@ -68,14 +73,14 @@ pub fn intersect(s: &Triangle, t: &Triangle) -> bool {
     volume(p, q, u, v) <= 0.0 && volume(p, r, w, u) <= 0.0
 }
 
-/// Whether all corners lie strictly on one side.
+/// Returns `true` if all corners lie strictly on one side.
 #[inline]
 fn beside(sides: &[f64; 3]) -> bool {
     sides.iter().all(|&d| d > 0.0) || sides.iter().all(|&d| d < 0.0)
 }
 
-/// The corner that the other two do not share the side of, and whether it is above; `None` if all are in the
-/// plane.
+/// The corner that is alone on its side, and `true` if it is above the plane; `None` if all corners
+/// are in the plane.
 #[inline]
 fn apex(sides: &[f64; 3]) -> Option<(usize, bool)> {
     let others = |i: usize| [sides[(i + 1) % 3], sides[(i + 2) % 3]];
@@ -91,7 +96,7 @@ fn apex(sides: &[f64; 3]) -> Option<(usize, bool)> {
     })
 }
 
-/// Two triangles of one plane with this normal.
+/// Intersection test of two triangles of one plane with this normal.
 fn in_one_plane(s: &Triangle, t: &Triangle, normal: &[f64; 3]) -> bool {
     let steepest = (0..3).max_by(|&i, &j| normal[i].abs().total_cmp(&normal[j].abs())).unwrap_or(2);
     let [x, y] = [(steepest + 1) % 3, (steepest + 2) % 3];
@@ -100,7 +105,7 @@ fn in_one_plane(s: &Triangle, t: &Triangle, normal: &[f64; 3]) -> bool {
         if area(a, b, c) < 0.0 { [a, c, b] } else { [a, b, c] }
     };
     let (s, t) = (flat(s), flat(t));
-    // Convex sets in a plane are apart if and only if an edge of one has the other beyond it.
+    // Two convex polygons are disjoint if and only if an edge of one separates them.
     let parted = |s: &[[f64; 2]; 3], t: &[[f64; 2]; 3]| {
         (0..3).any(|i| t.iter().all(|&p| area(s[i], s[(i + 1) % 3], p) < 0.0))
     };
@@ -117,7 +122,8 @@ mod tests {
     use super::*;
     use nearmiss_testdata::arbitrary::{point_in, rng};
 
-    /// By the separating axis theorem: the eleven directions of two triangles, and those within a plane.
+    /// The separating axis theorem with the eleven directions of two triangles, and those within a
+    /// plane.
     fn naive(s: &Triangle, t: &Triangle) -> bool {
         let edges = |t: &Triangle| [sub(t[1], t[0]), sub(t[2], t[1]), sub(t[0], t[2])];
         let (normal_s, normal_t) = (normal(s), normal(t));
@@ -150,7 +156,8 @@ mod tests {
         assert!((30_000..170_000).contains(&hits), "{hits}");
     }
 
-    /// Corners on a small lattice: most pairs touch, lie in one plane or share edges, and all sums are exact.
+    /// Corners on a small lattice: most pairs touch, are coplanar or share edges, and all sums are
+    /// exact.
     #[test]
     fn lattice_triangles_agree_with_separating_axes() {
         let rng = &mut rng(8);

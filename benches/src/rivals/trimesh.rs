@@ -1,4 +1,5 @@
-//! Parry's own test of two triangle meshes: what a user of a physics engine calls. Single precision.
+//! Parry's own test of two triangle meshes, as a user of a physics engine would call. Single
+//! precision.
 
 use nearmiss::{Pose, TriangleMesh};
 use parry3d::math::{Matrix, Pose as Placement, Rotation, Vector};
@@ -15,10 +16,10 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// The mesh in single precision.
+    /// Converts the mesh to single precision.
     ///
     /// # Errors
-    /// When parry refuses it.
+    /// When parry rejects the mesh.
     pub fn new(mesh: &TriangleMesh) -> Result<Self, Failure> {
         let vertices = mesh.vertices().iter().map(|&p| vector(p)).collect();
         Ok(Self { mesh: TriMesh::new(vertices, mesh.triangles().to_vec())? })

@@ -1,4 +1,5 @@
-//! Pixels with depth: discs of points under an orthographic camera, and lines, rings and letters over them.
+//! A canvas of pixels with depth. Paints discs and balls under an orthographic camera, with lines,
+//! rings and letters over them.
 
 use nearmiss::geometry::nalgebra::Vector3;
 
@@ -8,7 +9,7 @@ use crate::image::Picture;
 /// Red, green, blue.
 pub type Colour = [u8; 3];
 
-/// Pixels are painted this much finer than they are kept, in both directions.
+/// Supersampling factor in both directions: fine pixels per pixel of the picture.
 pub const FINE: usize = 2;
 
 /// A rectangle of fine pixels.
@@ -24,25 +25,25 @@ pub struct Area {
     pub height: usize,
 }
 
-/// An orthographic camera that paints into an area.
+/// An orthographic camera for an area of the canvas.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Camera {
     /// Unit directions: to the right, up, and towards the viewer.
     pub(crate) axes: [Vector3<f64>; 3],
-    /// Seen in the middle of the area.
+    /// The point shown in the middle of the area.
     pub(crate) centre: Vector3<f64>,
-    /// Pixels of a unit of length.
+    /// Fine pixels per unit of length.
     pub(crate) scale: f64,
     pub(crate) area: Area,
 }
 
 impl Camera {
-    /// A direction or offset, to the right, up and towards the viewer.
+    /// Returns the components of a direction or offset: to the right, up and towards the viewer.
     pub(crate) fn turn(&self, v: Vector3<f64>) -> [f64; 3] {
         self.axes.map(|axis| axis.dot(&v))
     }
 
-    /// Column, row, and nearness in pixels.
+    /// Returns column, row, and nearness to the viewer, in fine pixels.
     pub(crate) fn project(&self, p: Vector3<f64>) -> [f64; 3] {
         let [x, y, z] = self.turn(p - self.centre);
         [self.middle(0) + self.scale * x, self.middle(1) - self.scale * y, self.scale * z]
@@ -64,22 +65,22 @@ pub(crate) struct Splat {
     pub(crate) radius: f64,
 }
 
-/// From over the viewer's left shoulder: right, up, towards.
+/// Direction to the light, over the viewer's left shoulder: right, up, towards the viewer.
 const LIGHT: [f64; 3] = [-0.36, 0.48, 0.8];
 
-/// What is not lit keeps so much.
+/// Share of the colour that is kept without light.
 const AMBIENT: f64 = 0.3;
 
-/// Discs seen more edge-on than this are painted as dots.
+/// Discs whose normals have a smaller component towards the viewer are painted as dots.
 const EDGE_ON: f64 = 0.12;
 
-/// No point is smaller than this, in pixels.
+/// The least radius of a disc, in fine pixels.
 const DOT: f64 = 1.4;
 
-/// No splat is larger than this, in pixels, however near the camera.
+/// The greatest radius of a disc, in fine pixels.
 const LARGEST: f64 = 200.0;
 
-/// Fine pixels to paint on, and at last a [`Picture`].
+/// A canvas of fine pixels, from which a [`Picture`] is made.
 #[derive(Debug, Clone)]
 pub struct Canvas {
     width: usize,
@@ -89,14 +90,14 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Fine pixels of one colour.
+    /// Returns a canvas of one colour. Width and height are in fine pixels.
     #[must_use]
     pub fn new(width: usize, height: usize, ground: Colour) -> Self {
         let count = width * height;
         Self { width, height, pixels: vec![ground; count], depth: vec![f64::NEG_INFINITY; count] }
     }
 
-    /// Fills what of `area` is on the canvas.
+    /// Fills the part of `area` that is on the canvas.
     pub fn fill(&mut self, area: Area, colour: Colour) {
         for y in area.top..(area.top + area.height).min(self.height) {
             let row = y * self.width;
@@ -105,7 +106,7 @@ impl Canvas {
         }
     }
 
-    /// A disc, lit and in front of what lies behind it.
+    /// Paints a lit disc, hidden by anything nearer to the viewer.
     pub(crate) fn splat(&mut self, camera: &Camera, splat: &Splat, colour: Colour) {
         let [x, y, z] = camera.project(splat.centre);
         let n = camera.turn(splat.normal);
@@ -131,7 +132,7 @@ impl Canvas {
         }
     }
 
-    /// A ball, lit and in front of what lies behind it.
+    /// Paints a lit ball, hidden by anything nearer to the viewer.
     pub(crate) fn ball(&mut self, camera: &Camera, centre: Vector3<f64>, radius: f64, colour: Colour) {
         let [x, y, z] = camera.project(centre);
         let radius = camera.scale * radius;
@@ -156,12 +157,12 @@ impl Canvas {
         }
     }
 
-    /// Width and height in fine pixels.
+    /// Returns width and height in fine pixels.
     pub(crate) fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
-    /// Lays what is painted on `other`, of the same size, over this, with some opacity.
+    /// Blends the painted pixels of `other`, a canvas of the same size, over `area` of this one.
     pub(crate) fn veil(&mut self, other: &Self, area: Area, opacity: f64) {
         for y in area.top..area.top + area.height {
             let row = y * self.width + area.left..y * self.width + area.left + area.width;
@@ -171,7 +172,8 @@ impl Canvas {
         }
     }
 
-    /// Blends `colour` over every pixel of `area` as far as `cover`, of a place, says.
+    /// Blends `colour` over the pixels of `area` within `reach` of a place. `cover` gives the
+    /// opacity at each pixel.
     fn overlay(
         &mut self,
         area: Area,
@@ -190,7 +192,7 @@ impl Canvas {
         }
     }
 
-    /// A line of a given width with round ends, as far as it is in `area`, which is on the canvas.
+    /// Draws a line with round ends, clipped to `area`, which must be on the canvas.
     pub fn line(&mut self, area: Area, [from, to]: [[f64; 2]; 2], width: f64, colour: Colour) {
         let middle = [0, 1].map(|k| 0.5 * (from[k] + to[k]));
         let length = distance(from, to);
@@ -202,7 +204,7 @@ impl Canvas {
         });
     }
 
-    /// A line of a given width where nothing is in front of it by more than `lift`, a length.
+    /// Draws the parts of a line that nothing hides by more than `lift`, a length in the world.
     pub(crate) fn edge(
         &mut self,
         camera: &Camera,
@@ -231,15 +233,15 @@ impl Canvas {
         }
     }
 
-    /// A circle of a given line width.
+    /// Draws a circle with lines of the given width.
     pub(crate) fn ring(&mut self, area: Area, centre: [f64; 2], radius: f64, width: f64, colour: Colour) {
         self.overlay(area, centre, radius + width, colour, |p| {
             0.5 * width - (distance(p, centre) - radius).abs() + 0.5
         });
     }
 
-    /// Writes a line of letters. Capitals are 7 `size` high, their upper left corner is at `[x,
-    /// y]`, and letters reach at most 2 `size` below them. All lengths are in fine pixels.
+    /// Writes a line of letters. Capitals are 7 `size` high, and their upper left corner is at `[x,
+    /// y]`. Letters reach at most 2 `size` below the baseline. All lengths are in fine pixels.
     pub fn text(&mut self, [x, y]: [usize; 2], size: usize, colour: Colour, text: &str) {
         font::cover(size, text, |column, row, share| {
             let at = |start: usize, offset: i32| start.checked_add_signed(isize::try_from(offset).ok()?);
@@ -251,20 +253,20 @@ impl Canvas {
         });
     }
 
-    /// Returns how wide such letters are, in fine pixels.
+    /// Returns the width of a line of letters, in fine pixels.
     #[must_use]
     pub fn text_width(size: usize, text: &str) -> usize {
         font::width(size, text)
     }
 
-    /// What was painted, [`FINE`]² pixels joined to one.
+    /// Returns the picture. Each of its pixels is the mean of [`FINE`]² fine pixels.
     #[must_use]
     pub fn picture(&self) -> Picture {
         let (width, height, pixels) = self.averaged();
         Picture { width, height, pixels }
     }
 
-    /// Width, height and bytes, red green blue.
+    /// Returns width, height and the bytes of the averaged pixels: red, green, blue.
     fn averaged(&self) -> (usize, usize, Vec<u8>) {
         let (width, height) = (self.width / FINE, self.height / FINE);
         let mut bytes = Vec::with_capacity(3 * width * height);
@@ -284,7 +286,7 @@ impl Canvas {
     }
 }
 
-/// Columns and rows of `area` within `reach` of a place.
+/// Returns the columns and rows of `area` within `reach` of a place.
 fn pixels_about(
     area: Area,
     [x, y]: [f64; 2],

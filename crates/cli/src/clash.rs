@@ -1,4 +1,4 @@
-//! `clash`: the list of all places where two scans meet or come nearer than a clearance.
+//! `clash`: lists every place where two scans meet or come nearer than a clearance.
 
 mod html;
 mod list;
@@ -26,43 +26,46 @@ use table::Summary;
 /// Options of `clash`.
 #[derive(Debug, Clone, Args)]
 pub struct ClashArgs {
-    /// What is asked about
+    /// The scans and their poses
     #[command(flatten)]
     pub pair: PairArgs,
-    /// Which distances define the surfaces; by default as prepared, else straight ones
+    /// Distances that define the surfaces; by default those that the scans were prepared for
+    ///
+    /// Raw inputs are prepared for it, by default for straight distances.
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans
     #[command(flatten)]
     pub meaning: MeaningArgs,
-    /// List places that come nearer than this as well, in world units: clearance clashes
+    /// List clearance clashes as well: places that come nearer than this, in world units
     #[arg(long, value_name = "D", allow_hyphen_values = true, value_parser = parse_radius, default_value = "0")]
     pub clearance: f64,
-    /// Contacts that are at most this far from each other, in world units, belong to one clash. By default
-    /// four times the greater sampling radius
+    /// Put contacts into one clash if they are at most this far apart, in world units
+    ///
+    /// The default is four times the larger sampling radius.
     #[arg(long, value_name = "LEN", allow_hyphen_values = true, value_parser = parse_radius)]
     pub link: Option<f64>,
-    /// Write the list as a table for spreadsheets, a line a clash
+    /// Write the list as a table for spreadsheets, one line for each clash
     #[arg(long, value_name = "OUT.csv")]
     pub csv: Option<PathBuf>,
-    /// Write a page with pictures, all in one file
+    /// Write the list as one HTML file, with pictures
     #[arg(long, value_name = "OUT.html")]
     pub html: Option<PathBuf>,
-    /// The page has a close picture of so many clashes at most, the first of the list
+    /// Show at most this many clashes of the list from near on the page
     #[arg(long, value_name = "N", requires = "html", default_value_t = 50)]
     pub pictures: usize,
-    /// Threads to prepare raw inputs, 0 for all cores
+    /// Threads to prepare raw inputs; 0 for all cores
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,
-    /// Lines of JSON instead of a table: one of the whole list, then one of each clash
+    /// Print lines of JSON instead of a table: one for the whole list, then one for each clash
     #[arg(long)]
     pub json: bool,
-    /// No progress on the terminal
+    /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
 
-/// No more clashes are listed for people than this; files and JSON hold all.
+/// The most clashes printed for people; files and JSON hold all.
 const SHOWN: usize = 40;
 
 pub(crate) fn run(args: &ClashArgs) -> Result<(), CliError> {
@@ -102,7 +105,8 @@ pub(crate) fn run(args: &ClashArgs) -> Result<(), CliError> {
     tell(&list, args.json, micros)
 }
 
-/// The scans: balls about points know no kernel, so any do for these.
+/// Opens both scans. The kernel does not matter for balls about points, so scans prepared for any
+/// kernel are accepted for these.
 fn open(args: &ClashArgs, console: Console) -> Result<[Scan; 2], CliError> {
     let opening = args.pair.opening(args.threads, console);
     if args.meaning.thickened.is_some() {
@@ -111,7 +115,7 @@ fn open(args: &ClashArgs, console: Console) -> Result<[Scan; 2], CliError> {
     opening.open_both(args.kernel.map(KernelName::metric), args.pair.inputs())
 }
 
-/// The list on standard output.
+/// Prints the list on standard output.
 fn tell(list: &List<'_>, json: bool, micros: f64) -> Result<(), CliError> {
     let mut results = Results::new();
     if json {

@@ -1,4 +1,4 @@
-//! All contacts of two scans, as a table and as points, and the clashes that they are grouped into.
+//! All contacts of two scans, as a table and as points, and their grouping into clashes.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -11,11 +11,10 @@ use serde::Serialize;
 
 use crate::digits::{count, place, rough, short};
 use crate::error::CliError;
-use crate::export::refused;
 use crate::output;
 use crate::parse::parse_radius;
 
-/// What is done with all contacts.
+/// Options for the contacts that were found.
 #[derive(Debug, Clone, Args)]
 pub struct ContactArgs {
     /// Put contacts into one clash if they are at most this far apart, in world units
@@ -29,18 +28,18 @@ pub struct ContactArgs {
 }
 
 impl ContactArgs {
-    /// Refuses outputs that cannot be written, or would replace an input or each other.
+    /// Rejects outputs that cannot be written, or that would replace an input or each other.
     pub(crate) fn check(&self, csv: Option<&Path>, inputs: &[&Path]) -> Result<(), CliError> {
         let outputs: Vec<&Path> = csv.into_iter().chain(self.ply.as_deref()).collect();
         check_outputs(&outputs, inputs)
     }
 
-    /// Groups `contacts` by the link length, by default one that suits the scans.
+    /// Groups `contacts` by the link length of the options, or else by the default for these scans.
     pub(crate) fn group(&self, contacts: &[Contact], views: [&Placed<'_>; 2]) -> Grouped {
         Grouped::new(contacts, self.link.unwrap_or_else(|| default_link(views)))
     }
 
-    /// Writes the files that were asked for.
+    /// Writes the requested files.
     pub(crate) fn write(
         &self,
         csv: Option<&Path>,
@@ -57,7 +56,7 @@ impl ContactArgs {
     }
 }
 
-/// Refuses outputs that cannot be written, or would replace an input or each other.
+/// Rejects outputs that cannot be written, or that would replace an input or each other.
 pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), CliError> {
     for (i, path) in outputs.iter().enumerate() {
         output::check_apart(path, inputs)?;
@@ -68,11 +67,11 @@ pub(crate) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), C
     Ok(())
 }
 
-/// Contacts in clashes.
+/// Contacts grouped into clashes.
 #[derive(Debug)]
 pub(crate) struct Grouped {
     pub(crate) link: f64,
-    /// The greatest clash first.
+    /// The clashes, the greatest first.
     pub(crate) groups: Vec<ContactGroup>,
     /// The number of the clash of each contact, counted from 1.
     pub(crate) numbers: Vec<u32>,
@@ -86,12 +85,12 @@ impl Grouped {
         Self { link, groups, numbers }
     }
 
-    /// The clashes, for scripts.
+    /// Returns the clashes, for scripts.
     pub(crate) fn reports(&self, contacts: &[Contact]) -> Vec<GroupReport> {
         self.groups.iter().map(|group| GroupReport::new(contacts, group)).collect()
     }
 
-    /// How many contacts there are, and the clashes, for people.
+    /// Returns the number of contacts and the clashes, for people.
     pub(crate) fn lines(&self, contacts: &[Contact], unit: f64) -> Vec<String> {
         let head = format!(
             "{} in {} (contacts up to {} apart are in one)",
@@ -108,12 +107,13 @@ impl Grouped {
     }
 }
 
-/// A number of clashes in words.
+/// Returns a number of clashes in words.
 pub(crate) fn clash_count(n: usize) -> String {
     format!("{n} clash{}", if n == 1 { "" } else { "es" })
 }
 
-/// The number of the list, counted from 1, that each of `n` contacts is in; 0 for those in none.
+/// Returns for each of `n` contacts the number of the list that holds it, counted from 1, or 0 if
+/// none does.
 pub(crate) fn numbers<'a>(n: usize, lists: impl Iterator<Item = &'a Vec<usize>>) -> Vec<u32> {
     let mut numbers = vec![0; n];
     for (number, list) in (1..).zip(lists) {
@@ -131,9 +131,9 @@ pub(crate) struct GroupReport {
     centre: [f64; 3],
     size: [f64; 3],
     bounds: [[f64; 3]; 2],
-    /// Null: no search tells yet how deep one scan is in the other.
+    /// The penetration depth. Always null: no search computes it yet.
     depth: Option<f64>,
-    /// The contact with the least residual.
+    /// The place of the contact with the least residual.
     point: [f64; 3],
     residual: f64,
     source_a: u32,
@@ -157,7 +157,7 @@ impl GroupReport {
     }
 }
 
-/// A header line and a line for each contact. Normals are empty where points are compared.
+/// Writes a header line and a line for each contact. Normals are empty if points are compared.
 fn write_csv(contacts: &[Contact], numbers: &[u32], out: &mut impl Write) -> io::Result<()> {
     writeln!(
         out,
@@ -175,7 +175,8 @@ fn write_csv(contacts: &[Contact], numbers: &[u32], out: &mut impl Write) -> io:
     Ok(())
 }
 
-/// Points in double precision with the normal of a, zero where points are compared, and `uint clash`.
+/// Writes the contacts as points in double precision, with the normal of a (zero if points are
+/// compared) and the property `uint clash`.
 fn write_ply(path: &Path, contacts: &[Contact], numbers: &[u32]) -> Result<(), CliError> {
     let points: Vec<[f64; 3]> = contacts.iter().map(|contact| contact.point).collect();
     #[expect(clippy::cast_possible_truncation, reason = "unit vectors")]
@@ -184,6 +185,6 @@ fn write_ply(path: &Path, contacts: &[Contact], numbers: &[u32]) -> Result<(), C
     let columns = [Column::Uint("clash", numbers)];
     output::replace(path, |out| {
         let ply = PlyPoints::double(&points).with_normals(&normals).with_columns(&columns);
-        ply.write(out).map_err(|error| refused(path, error))
+        ply.write(out).map_err(CliError::writing_ply(path))
     })
 }

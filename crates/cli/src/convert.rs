@@ -8,7 +8,8 @@ use std::path::PathBuf;
 use clap::Args;
 use nearmiss::Aabb;
 use nearmiss::io::{
-    Glance, Lattice, OutputFormat, Pieces, PointPieces, PointWriter, Points, Survey, glance, read_in_pieces,
+    Glance, OutputFormat, Pieces, PointPieces, PointWriter, Points, ScaleOffset, Survey, glance,
+    read_in_pieces,
 };
 use nearmiss::store::replace_file;
 use serde::Serialize;
@@ -286,7 +287,7 @@ impl Source {
         }
     }
 
-    fn lattice(&self) -> Option<Lattice> {
+    fn lattice(&self) -> Option<ScaleOffset> {
         match self {
             Self::Pieces(pieces) => pieces.lattice(),
             Self::Vertices(_) | Self::Spilled(_) => None,

@@ -13,7 +13,6 @@ use crate::curve_picture;
 use crate::digits::{count, rough, short, work};
 use crate::error::CliError;
 use crate::eval::KernelName;
-use crate::export::refused;
 use crate::no_curve::NoCurve;
 use crate::parse::parse_duration;
 use crate::picture::names;
@@ -160,7 +159,7 @@ fn write(path: &Path, found: &Curves) -> Result<(), CliError> {
     output::replace(path, |out| {
         let columns = [Column::Uint("curve", &curve)];
         let ply = PlyPoints::double(&found.points).with_columns(&columns).with_edges(&edges);
-        ply.write(out).map_err(|error| refused(path, error))
+        ply.write(out).map_err(CliError::writing_ply(path))
     })
 }
 

@@ -1,4 +1,4 @@
-//! A picture of two scans and the curves in which they cut each other.
+//! A picture of two scans and their curves of intersection.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Curve, Curves, Placed};
@@ -11,41 +11,43 @@ use crate::marks::{frame, mark, scale_bar_in, title};
 use crate::picture::{self, GAP, LEGEND, PANEL, Style, paint_both, splat};
 use crate::viewpoint::sample;
 
-/// Height and width in fine pixels: of the whole view alone, or of it and of a close view beside it.
+/// Size in fine pixels of the whole view, or of the whole view and the close view beside it.
 const HEIGHT: usize = PANEL;
 const WIDTH: usize = 2 * PANEL + GAP;
 
 const GROUND: Colour = [255, 255, 255];
 const PANEL_GROUND: Colour = [246, 247, 249];
-/// Paler than where a contact is shown: the curves count.
+/// Paler than in pictures of contacts, so that the curves stand out.
 const SOFT: [Colour; 2] = [[176, 205, 236], [246, 210, 170]];
 const CURVE: Colour = [200, 0, 70];
-/// Where a curve runs behind a surface.
+/// The colour of hidden parts of curves.
 const BEHIND: Colour = [216, 104, 146];
 
-/// A curve that is within so many sampling radii behind what is painted is seen: discs stand out as far.
+/// A curve counts as visible up to this many sampling radii behind a surface, because discs
+/// protrude that far.
 const LIFT: f64 = 1.5;
 
-/// Points of curves and of scans that are looked at to choose a view.
+/// The number of points of curves, and of scans, that are sampled to choose a view.
 const CURVE_SAMPLE: usize = 64;
 const POINT_SAMPLE: usize = 3000;
 
-/// Curves that reach further than this share of what both scans do need no close view.
+/// The close view is left out if its half width exceeds this share of the radius of both scans.
 const SMALL: f64 = 0.35;
 
-/// Half the width of a close view: so many times what the curves in it reach, and this many
-/// sampling radii at least.
+/// Half width of a close view: `AROUND` times the radius of its curves, and at least `LEAST`
+/// sampling radii.
 const AROUND: f64 = 1.3;
 const LEAST: f64 = 8.0;
 
-/// Both scans, softly, and their curves, from where most of these are seen; thin where they are
-/// hidden. Where the curves are small, a close view of them or of the longest lies beside that.
+/// Paints both scans in pale colours with their curves, from a direction in which most of the
+/// curves are visible. Hidden parts of curves are thin. If the curves are small, a close view of
+/// all of them or of the longest is added.
 #[must_use]
 pub fn curve_picture(a: &Placed<'_>, b: &Placed<'_>, found: &Curves) -> Picture {
     paint([a, b], found, &Style { names: ["A", "B"].map(Into::into), ..Style::default() })
 }
 
-/// [`curve_picture`] in a style.
+/// Paints a [`curve_picture`] in a style.
 pub(crate) fn paint(views: [&Placed<'_>; 2], found: &Curves, style: &Style) -> Picture {
     let mut canvas = Canvas::new(WIDTH + 2 * GAP, HEIGHT + LEGEND + 2 * GAP, GROUND);
     let radius = |view: &Placed<'_>| view.sampling_radius();
@@ -82,7 +84,7 @@ struct Close {
     centre: Vector3<f64>,
     /// Half the width of the view.
     reach: f64,
-    /// Points of the curves in it.
+    /// The points of the curves in the view.
     points: Vec<Vector3<f64>>,
     is_of_all: bool,
     /// The greater sampling radius.
@@ -90,7 +92,8 @@ struct Close {
 }
 
 impl Close {
-    /// Returns `None` where the curves are not small beside both scans, of which these are some points.
+    /// Returns `None` if the curves are not small compared with the scans. `points` is a sample of
+    /// both scans.
     fn new(found: &Curves, points: &[Vector3<f64>], radius: f64) -> Option<Self> {
         let small = SMALL * ball(points).1;
         let all: Vec<Vector3<f64>> = found.points.iter().map(|&p| p.into()).collect();
@@ -115,7 +118,7 @@ impl Close {
 
     fn paint(&self, canvas: &mut Canvas, area: Area, views: [&Placed<'_>; 2], found: &Curves, style: &Style) {
         canvas.fill(area, PANEL_GROUND);
-        // What is further away than what is looked at is not in the way.
+        // Points further away are neither shown nor count as hiding the curves.
         let is_near = |p: Vector3<f64>| (p - self.centre).norm() < 1.5 * self.reach;
         let mut near = sample(views);
         near.retain(|&p| is_near(p));
@@ -133,7 +136,7 @@ impl Close {
     }
 }
 
-/// Returns the centre of the bounding box of some points and how far they are from it at most.
+/// Returns the centre of the bounding box of some points, and their greatest distance from it.
 fn ball(points: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
     let Some(&first) = points.first() else { return (Vector3::zeros(), 0.0) };
     let (low, high) = points.iter().fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)));
@@ -141,7 +144,8 @@ fn ball(points: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
     (centre, points.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max))
 }
 
-/// Every curve thinly, and what is seen of it strongly; points of mere touching as dots.
+/// Draws every curve as a thin line and its visible parts as a thick line. Points where the
+/// surfaces only touch are dots.
 fn draw(canvas: &mut Canvas, camera: &Camera, found: &Curves, lift: f64) {
     let place = |i: usize| Vector3::from(found.points[i]);
     let edges = || found.curves.iter().flat_map(Curve::edges).map(|edge| edge.map(place));
@@ -160,7 +164,7 @@ fn draw(canvas: &mut Canvas, camera: &Camera, found: &Curves, lift: f64) {
     }
 }
 
-/// Some points of the curves.
+/// A sample of the points of the curves, and the sampling radius.
 struct Visibility {
     points: Vec<Vector3<f64>>,
     radius: f64,
@@ -172,7 +176,7 @@ impl Visibility {
         Self { points: points.step_by(stride).collect(), radius }
     }
 
-    /// The share of the curves that lies behind points, seen from `toward`.
+    /// Estimates the share of the curves that is hidden by points, seen from `toward`.
     fn hidden(&self, points: &[Vector3<f64>], toward: &Vector3<f64>) -> f64 {
         if self.points.is_empty() {
             return 0.0;
@@ -223,7 +227,8 @@ mod tests {
 
     use super::*;
 
-    /// The picture of a plate of 20 by 20 and the same plate on edge, which reaches `depth` into it.
+    /// Returns the picture of a plate of 20 by 20 and of the same plate on edge, which cuts into it
+    /// by `depth`.
     fn cut(depth: f64) -> (Curves, Picture) {
         let points: Vec<[f64; 3]> =
             (0..3600_u32).map(|i| [f64::from(i % 60), f64::from(i / 60), 0.0].map(|c| c / 3.0)).collect();

@@ -1,4 +1,4 @@
-//! Pictures of two scans, of their nearest places and the segment between these.
+//! Pictures of two scans, their nearest places and the segment between these.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Distance, Evidence, Placed};
@@ -13,12 +13,12 @@ use crate::picture::{
 use crate::sentence::{bracket, unit};
 use crate::viewpoint::{Upright, scale_of};
 
-/// Half the width of the close view, in lengths of the segment and in bands; the greater counts.
+/// Half width of the close view: the greater of `OF_LENGTH` segment lengths and `OF_BAND` bands.
 const OF_LENGTH: f64 = 0.8;
 const OF_BAND: f64 = 5.0;
 
-/// How much the close view is turned towards the first scan: by 15 degrees, which shortens the
-/// segment by 4 %.
+/// Tangent of the angle by which the close view is turned towards the first scan. These 15 degrees
+/// shorten the segment by 4 %.
 const TILT: f64 = 0.27;
 
 /// Radii of points in fine pixels, and of the ends of the segment.
@@ -26,8 +26,8 @@ const WHOLE_DOT: f64 = 2.5;
 const CLOSE_DOT: f64 = 7.0;
 const END: f64 = 9.0;
 
-/// Both scans as they lie in the world; beside that a close view across the segment between the
-/// nearest places, what is before it taken away.
+/// Paints both scans in the world, and beside them a close view across the segment between the
+/// nearest places. The part in front of the segment is cut away.
 pub(crate) fn paint_distance(views: [&Placed<'_>; 2], found: &Distance, style: &Style) -> Picture {
     let told = if found.upper > 0.0 {
         let apart = bracket(found, unit(views));
@@ -43,7 +43,7 @@ pub(crate) fn paint_distance(views: [&Placed<'_>; 2], found: &Distance, style: &
     paint_told(views, found, &told, style)
 }
 
-/// The same of two scans that `collide` found apart.
+/// Paints the same picture for two scans that `collide` found separated.
 pub(crate) fn paint_apart(
     views: [&Placed<'_>; 2],
     found: &Distance,
@@ -92,11 +92,11 @@ fn paint_told(views: [&Placed<'_>; 2], found: &Distance, told: &str, style: &Sty
     canvas.picture()
 }
 
-/// How scans are shown in a view.
+/// The style of the points in a view.
 struct Look {
-    /// Points instead of obstacles.
+    /// `true` to show points instead of obstacles.
     points: bool,
-    /// No disc or ball has a larger radius, in fine pixels.
+    /// The greatest radius of a disc or ball, in fine pixels.
     largest: f64,
     /// The radius of points, in fine pixels.
     dot: f64,
@@ -124,13 +124,13 @@ impl Segment {
         0.5 * (self.ends[0] + self.ends[1])
     }
 
-    /// A camera that sees both scans and the segment.
+    /// Returns a camera that shows both scans and the segment.
     fn whole(&self, views: [&Placed<'_>; 2], area: Area, style: &Style) -> Camera {
         let hides = |points: &[Vector3<f64>], toward: &Vector3<f64>| 4.0 * self.hidden(points, *toward);
         style.view.camera(views, area, &self.ends, hides)
     }
 
-    /// How much is before the segment, seen from `toward`: about 0 to 1.
+    /// Estimates how much of the segment is hidden, seen from `toward`: 0 to about 1.
     fn hidden(&self, points: &[Vector3<f64>], toward: Vector3<f64>) -> f64 {
         let before = points.iter().filter(|p| {
             let offset = *p - self.middle();
@@ -142,9 +142,10 @@ impl Segment {
         count / (count + 4.0)
     }
 
-    /// Obliquely across the segment with as little before it as may be; and the direction at right
-    /// angles to it from which what is before it is cut away. A surface at right angles to the
-    /// segment is seen as one. The segment lies level, unless the picture stands upright.
+    /// Returns a camera that looks obliquely across the segment with little in front of it, so that
+    /// a surface perpendicular to the segment is not seen edge-on. Also returns the direction,
+    /// perpendicular to the segment, in which everything in front is cut away. The segment is level
+    /// in the picture unless the picture is upright.
     fn camera(
         &self,
         points: &[Vector3<f64>],
@@ -157,7 +158,7 @@ impl Segment {
         let about_up = upright.map_or_else(|| Vector3::new(0.0, 0.7, 0.7), |upright| upright.up());
         let cost = |toward: &Vector3<f64>| {
             let rise = toward.dot(&about_up);
-            // Looked at from above, walls are seen edge-on.
+            // Walls are seen edge-on from above.
             let steep = if upright.is_some() { (rise - 0.7).max(0.0) } else { 0.0 };
             self.hidden(points, *toward) + 0.3 * (-rise).max(0.0) + steep
         };
@@ -176,7 +177,7 @@ impl Segment {
         (Camera { axes, centre: self.middle(), scale: scale_of(area, self.reach), area }, cut)
     }
 
-    /// The points of both scans that are `shown`.
+    /// Paints the points of both scans for which `shown` is `true`.
     fn paint(
         &self,
         canvas: &mut Canvas,
@@ -197,7 +198,7 @@ impl Segment {
         });
     }
 
-    /// Draws the segment over everything, hidden or not, and returns its ends.
+    /// Draws the segment over everything, even if it is hidden, and returns its ends.
     fn mark(&self, canvas: &mut Canvas, camera: &Camera) -> [[f64; 2]; 2] {
         let ends = self.ends.map(|p| camera.project(p)).map(|[x, y, _]| [x, y]);
         for (width, colour) in [(5.0 + 2.0 * HALO, GROUND), (5.0, INK)] {
@@ -235,7 +236,8 @@ mod tests {
     use super::*;
     use crate::viewpoint::ViewArgs;
 
-    /// A square plate in the plane of x and y, and the same raised by `height` and made smaller.
+    /// Returns a square plate in the plane of x and y, and the same plate scaled by `size` and
+    /// raised by `height`.
     fn plates(height: f64, size: f64) -> (Scan, [Pose; 2]) {
         let points: Vec<[f64; 3]> =
             (0..40_u32).flat_map(|i| (0..40).map(move |j| [i, j, 0].map(f64::from))).collect();

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use nearmiss::io::ReadError;
+use nearmiss::io::{PlyError, ReadError};
 use nearmiss::mesh::SampleError;
 use nearmiss::slices::{SliceError, StoreError};
 use nearmiss::{BuildError, GraphError, LoadError, PlanError, SaveError, WorkError};
@@ -151,6 +151,15 @@ impl CliError {
             verb: "write it",
             cause,
             remedy: "check that the folder exists, may be written to and has space left",
+        }
+    }
+
+    /// Returns the error of a PLY file that cannot be written.
+    pub(crate) fn writing_ply(path: &Path) -> impl FnOnce(PlyError) -> Self {
+        let path = path.to_owned();
+        move |error| match error {
+            PlyError::Io { cause } => Self::writing(&path)(cause),
+            error => Self::Unfit { path, what: error.to_string() },
         }
     }
 

@@ -7,7 +7,7 @@ use clap::Args;
 use nearmiss::geometry::Frame;
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::graph::{ClosePairs, PointGraph};
-use nearmiss::io::{Column, PlyPoints, WriteError};
+use nearmiss::io::{Column, PlyError, PlyPoints};
 use nearmiss::{Scan, SurfaceGraph};
 
 use crate::console::Console;
@@ -115,13 +115,13 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
         wrote(pairs.pair_count(), "close pair", path);
     }
     if let Some(path) = &args.points {
-        output::replace(path, |out| points(&scan, out).map_err(|e| refused(path, e)))?;
+        output::replace(path, |out| points(&scan, out).map_err(CliError::writing_ply(path)))?;
         wrote(scan.len(), "point", path);
     }
     let depths = report::depths(&scan);
     let nodes = at_depth(&scan, &depths, args.level).count();
     if let (Some(path), Some(level)) = (&args.samples, args.level) {
-        output::replace(path, |out| samples(&scan, level, out).map_err(|e| refused(path, e)))?;
+        output::replace(path, |out| samples(&scan, level, out).map_err(CliError::writing_ply(path)))?;
         let of_node = |node| scan.slices().samples(node).iter().count();
         wrote(at_depth(&scan, &depths, Some(level)).map(of_node).sum(), "sample", path);
     }
@@ -139,16 +139,9 @@ pub(crate) fn run(args: &ExportArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-pub(crate) fn refused(path: &Path, error: WriteError) -> CliError {
-    match error {
-        WriteError::Io { cause } => CliError::writing(path)(cause),
-        error => CliError::Unfit { path: path.into(), what: error.to_string() },
-    }
-}
-
 /// Writes the points in the frame of the input, in single precision if that is the stored frame,
 /// else in double.
-fn points(scan: &Scan, out: &mut impl Write) -> Result<(), WriteError> {
+fn points(scan: &Scan, out: &mut impl Write) -> Result<(), PlyError> {
     let frame = scan.frame();
     let kinds = || (0..scan.len()).map(|i| scan.kind(i));
     let codes: Vec<u32> = kinds().map(|kind| u32::from(kind.code())).collect();
@@ -183,7 +176,7 @@ pub(crate) fn at_depth<'a>(
 
 /// Writes the samples of all nodes at a depth, and of the leaves above it, with lengths in the
 /// units of the input.
-fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), WriteError> {
+fn samples(scan: &Scan, level: u32, out: &mut impl Write) -> Result<(), PlyError> {
     let (slices, frame) = (scan.slices(), scan.frame());
     let (mut positions, mut source, mut nodes) = (Vec::new(), Vec::new(), Vec::new());
     let (mut covering, mut sampling) = (Vec::new(), Vec::new());

@@ -4,22 +4,22 @@ use std::sync::LazyLock;
 
 use ab_glyph::{Font, FontRef, GlyphId, PxScale, ScaleFont, point};
 
-/// A capital letter is this many sizes high.
+/// Height of a capital letter, in letter sizes.
 pub(crate) const CAPITAL: usize = 7;
 
-/// A line of letters is this many sizes high, from the top of capitals to the lowest descender.
+/// Height of a line of letters, in letter sizes, from the top of capitals to the lowest descender.
 pub(crate) const LINE: usize = 9;
 
-/// The strokes of this light face are widened by this share of the size: it is read in pictures
-/// that are often shown smaller than they are.
+/// Widening of the strokes, as a share of the letter size. The face is light, and pictures are
+/// often shown reduced.
 const WIDENED: f32 = 0.2;
 
-/// Stands where letters were left out.
+/// Replaces letters that are left out.
 const ELLIPSIS: char = '…';
 
 struct Face {
     font: FontRef<'static>,
-    /// Height of a capital letter as a share of the height that a scale stands for.
+    /// Height of a capital letter as a share of the scale.
     capital: f32,
 }
 
@@ -36,7 +36,8 @@ impl Face {
         PxScale::from((CAPITAL * size) as f32 / self.capital)
     }
 
-    /// Calls `visit` with each glyph of `text` and its left end, and returns the right end of the last.
+    /// Calls `visit` with each glyph of `text` and the position of its left end. Returns the right
+    /// end of the last glyph.
     fn lay_out(&self, size: usize, text: &str, mut visit: impl FnMut(GlyphId, f32)) -> f32 {
         let scaled = self.font.as_scaled(self.scale(size));
         let mut x = 0.0;
@@ -52,9 +53,9 @@ impl Face {
     }
 }
 
-/// Calls `paint` with the column, the row and the coverage, 0 to 1, of every pixel that a line of
-/// letters covers, of some pixels more than once. Columns count from the left end of the first
-/// letter, rows from the top of capital letters; accents and overhangs have negative ones.
+/// Calls `paint` with column, row and coverage (0 to 1) of each pixel that a line of letters
+/// covers; some pixels are visited more than once. Columns count from the left end of the first
+/// letter, rows from the top of capital letters. Accents and overhangs have negative ones.
 pub(crate) fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32)) {
     let Some(face) = &*FACE else { return };
     let scale = face.scale(size);
@@ -77,7 +78,7 @@ pub(crate) fn cover(size: usize, text: &str, mut paint: impl FnMut(i32, i32, f32
     });
 }
 
-/// Returns how wide a line of letters is, in whole pixels.
+/// Returns the width of a line of letters, in whole pixels.
 pub(crate) fn width(size: usize, text: &str) -> usize {
     let width = FACE.as_ref().map_or(0.0, |face| face.lay_out(size, text, |_, _| ()));
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
@@ -85,8 +86,8 @@ pub(crate) fn width(size: usize, text: &str) -> usize {
     width
 }
 
-/// Returns `text`, or as much of its start and its end as fits into `most` pixels, with an ellipsis
-/// in between.
+/// Returns `text` if it fits into `most` pixels. Otherwise, returns as much of its start and end as
+/// fits, with an ellipsis in between.
 pub(crate) fn elided(size: usize, text: &str, most: usize) -> String {
     if width(size, text) <= most {
         return text.to_owned();
@@ -104,7 +105,7 @@ pub(crate) fn elided(size: usize, text: &str, most: usize) -> String {
 mod tests {
     use super::*;
 
-    /// The covered pixels of a line of letters, rounded.
+    /// Returns the pixels of a line of letters that are covered by more than half.
     fn covered(text: &str) -> Vec<[i32; 2]> {
         let mut all = Vec::new();
         cover(4, text, |x, y, share| all.extend((share > 0.5).then_some([x, y])));

@@ -1,4 +1,4 @@
-//! A picture of a graph: how far all is from a point, along the surface.
+//! A picture of a graph: the distances of all points from one point, along the surface.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::graph::{GeodesicScratch, SurfaceGraph};
@@ -10,7 +10,7 @@ use crate::image::Picture;
 use crate::legend;
 use crate::picture::{scale_bar, scan_camera, splat};
 
-/// In fine pixels.
+/// Sizes in fine pixels.
 const PANEL: usize = 800 * FINE;
 const GAP: usize = 12 * FINE;
 const LINE: usize = legend::LINE;
@@ -18,26 +18,28 @@ const LINE: usize = legend::LINE;
 const GROUND: Colour = [255, 255, 255];
 const PANEL_GROUND: Colour = [238, 240, 243];
 const INK: Colour = [30, 34, 40];
-/// Where no way leads.
+/// The colour of points that no path reaches.
 const ELSEWHERE: Colour = [176, 180, 188];
 const VIRTUAL: Colour = [214, 39, 40];
 const PATH: Colour = [255, 255, 255];
 
-/// From near to far; told apart in grey too.
+/// Colours from near to far, distinguishable in grey as well.
 const FAR: [Colour; 5] = [[253, 231, 37], [94, 201, 98], [33, 145, 140], [59, 82, 139], [68, 1, 84]];
 
-/// Rings of equal distance.
+/// The number of rings of equal distance.
 const RINGS: f64 = 24.0;
 
-/// Half the width of the close view, in sampling radii.
+/// Half width of the close view, in sampling radii.
 const CLOSE: f64 = 14.0;
 
-/// The discs behind the edges of the close view.
+/// Share of its colour that a disc behind the edges of the close view keeps.
 const PALE: f64 = 0.45;
 
-/// `scan` coloured by the distance of its points from point `from` along its graph, in rings, with the
-/// shortest path to the furthest; and its edges about that point, virtual ones red. `None` without a graph,
-/// or such a point.
+/// Paints two views of `scan`. The first is coloured by the distance along the graph from point
+/// `from`, in rings, with the shortest path to the furthest point. The second shows the edges about
+/// point `from`, virtual ones in red.
+///
+/// Returns `None` if there is no graph or no such point.
 #[must_use]
 pub fn geodesic_picture(scan: &Scan, from: usize) -> Option<Picture> {
     let graph = scan.graph().filter(|_| from < scan.len())?;
@@ -126,7 +128,7 @@ struct Ways {
     distances: Vec<f64>,
     furthest: f64,
     path: Vec<u32>,
-    /// A stored unit, in the input's.
+    /// The length of a stored unit, in units of the input.
     unit: f64,
 }
 
@@ -162,7 +164,7 @@ impl Ways {
     }
 }
 
-/// Between two parts of a colour.
+/// Interpolates between two components of a colour.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255")]
 fn blend(from: u8, to: u8, share: f64) -> u8 {
     (f64::from(from) + (f64::from(to) - f64::from(from)) * share).round().clamp(0.0, 255.0) as u8

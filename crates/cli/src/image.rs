@@ -1,4 +1,4 @@
-//! Pictures that are painted, and how they are saved.
+//! Finished pictures, and writing them as PNG.
 
 use std::io::Write;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::output;
 pub struct Picture {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Red, green, blue, row by row.
+    /// Red, green and blue of each pixel, row by row.
     pub(crate) pixels: Vec<u8>,
 }
 
@@ -21,16 +21,16 @@ impl Picture {
         &self.pixels
     }
 
-    /// Width and height in pixels.
+    /// Returns width and height in pixels.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
-    /// Writes the picture as PNG, whole or not at all.
+    /// Writes the picture as PNG. If that fails, no partial file is left.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), CliError> {
         output::replace_plain(path, |out| self.encode(out))
     }

@@ -1,4 +1,4 @@
-//! A picture of the kinds of a scan's points: a colour each, with a legend.
+//! A picture of a scan in which each point has the colour of its kind, with a legend.
 
 use nearmiss::{PointKind, Pose, Scan};
 
@@ -9,7 +9,7 @@ use crate::image::Picture;
 use crate::viewpoint::ViewArgs;
 use crate::{legend, picture};
 
-/// In fine pixels.
+/// Sizes in fine pixels.
 const WIDTH: usize = 1572 * FINE;
 const HEIGHT: usize = 900 * FINE;
 const GAP: usize = 12 * FINE;
@@ -18,8 +18,8 @@ const LEGEND: usize = 2 * legend::LINE + 2 * FINE;
 const GROUND: Colour = [255, 255, 255];
 const PANEL_GROUND: Colour = [238, 240, 243];
 
-/// The colour of a kind in pictures and exported points. All are told apart by eyes that do not see
-/// all colours.
+/// Returns the colour of a kind in pictures and exported points. Colour-blind readers can tell all
+/// of them apart.
 pub(crate) const fn colour(kind: PointKind) -> Colour {
     match kind {
         PointKind::Sheet => [158, 166, 178],
@@ -31,14 +31,14 @@ pub(crate) const fn colour(kind: PointKind) -> Colour {
     }
 }
 
-/// The obstacle of `scan`: points on sheets as discs, all others as the balls that they stand for,
-/// in the colours of their kinds.
+/// Paints the obstacle of `scan` in the colours of its kinds. Points on sheets are discs, all
+/// others are the balls that represent them.
 #[must_use]
 pub fn kinds_picture(scan: &Scan) -> Picture {
     paint(scan, &ViewArgs::default())
 }
 
-/// [`kinds_picture`] from where `from` says.
+/// Paints a [`kinds_picture`] from the viewpoint `from`.
 pub(crate) fn paint(scan: &Scan, from: &ViewArgs) -> Picture {
     let mut canvas = Canvas::new(WIDTH + 2 * GAP, HEIGHT + 2 * GAP + LEGEND, GROUND);
     let area = Area { left: GAP, top: GAP, width: WIDTH, height: HEIGHT };

@@ -1,9 +1,9 @@
-//! The lines below a picture: what its colours mean and what it shows.
+//! The legend below a picture: the meaning of its colours, and a sentence about it.
 
 use crate::canvas::{Area, Canvas, Colour, FINE};
 use crate::font;
 
-/// Size of letters, see [`Canvas::text`].
+/// Size of letters; see [`Canvas::text`].
 pub(crate) const LETTERS: usize = 2 * FINE;
 
 /// Height of a line, in fine pixels.
@@ -13,11 +13,11 @@ const INK: Colour = [30, 34, 40];
 const PATCH: usize = font::CAPITAL * LETTERS;
 const GAP: usize = 8 * FINE;
 
-/// Between entries.
+/// Space between entries.
 const SPACE: usize = 26 * FINE;
 
-/// Writes entries beside each other, a patch of colour before each that has one, from `[left, top]`
-/// and at most `width` wide. The longest are shortened until all fit.
+/// Writes entries beside each other from `[left, top]`, `width` wide at most. An entry with a
+/// colour has a patch of it in front. The longest entries are shortened until all fit.
 pub(crate) fn entries(
     canvas: &mut Canvas,
     [mut left, top]: [usize; 2],
@@ -39,12 +39,12 @@ pub(crate) fn entries(
     }
 }
 
-/// Writes a sentence from `[left, top]`, at most `width` wide.
+/// Writes a sentence from `[left, top]`, shortened to `width`.
 pub(crate) fn sentence(canvas: &mut Canvas, [left, top]: [usize; 2], width: usize, text: &str) {
     canvas.text([left, top], LETTERS, INK, &font::elided(LETTERS, text, width));
 }
 
-/// Returns the greatest width of an entry at which all fit into `room`.
+/// Returns the greatest width of an entry with which all entries fit into `room`.
 fn shared(room: usize, wanted: &[usize]) -> usize {
     let mut sorted = wanted.to_vec();
     sorted.sort_unstable();

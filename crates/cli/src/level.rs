@@ -1,4 +1,4 @@
-//! A picture of levels of a hierarchy: a scan under the balls about the samples of all nodes at one depth.
+//! A picture of levels of a hierarchy: a scan under the covering balls of all nodes at one depth.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Pose, Scan};
@@ -11,7 +11,7 @@ use crate::legend;
 use crate::picture::{scale_bar, scan_camera, splat};
 use crate::report;
 
-/// In fine pixels.
+/// Sizes in fine pixels.
 const PANEL: usize = 620 * FINE;
 const GAP: usize = 12 * FINE;
 const LINE: usize = legend::LINE;
@@ -21,19 +21,20 @@ const PANEL_GROUND: Colour = [238, 240, 243];
 const INK: Colour = [30, 34, 40];
 const OF_SCAN: Colour = [150, 156, 166];
 
-/// Of neighbouring nodes, told apart by eyes that do not see all colours.
+/// Colours of nodes, distinguishable by colour-blind readers.
 const OF_NODES: [Colour; 6] =
     [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [213, 94, 0]];
 
-/// How much of the scan a ball hides.
+/// Opacity of the balls over the scan.
 const OPACITY: f64 = 0.55;
 
-/// The dot at a sample, in fine pixels; half as wide where there are many.
+/// Width of the dot at a sample, in fine pixels. It is halved if there are more than `MANY` dots.
 const DOT: f64 = 9.0;
 const MANY: usize = 1000;
 
-/// `scan` once for each of `depths`, the root's being 0, under the balls that cover the nodes there, and
-/// leaves above it: each node has a colour, its samples are the dots, all its balls have its covering radius.
+/// Paints `scan` once for each of `depths`; the root has depth 0. The covering balls of the nodes
+/// at that depth, and of leaves above it, lie over the scan. Each node has a colour. Its samples
+/// are dots, and all its balls have its covering radius.
 #[must_use]
 pub fn level_picture(scan: &Scan, depths: &[u32]) -> Picture {
     let width = depths.len() * (PANEL + GAP) + GAP;
@@ -52,12 +53,12 @@ pub fn level_picture(scan: &Scan, depths: &[u32]) -> Picture {
     canvas.picture()
 }
 
-/// The covering radius of a node, in the units of the input.
+/// Returns the covering radius of a node, in the units of the input.
 fn radius(scan: &Scan, node: usize) -> f64 {
     f64::from(scan.slices().covering_radius(node)) * scan.frame().scale
 }
 
-/// The scan and the balls of `nodes`, with room for balls of radius `most`.
+/// Paints the scan and the balls of `nodes`, with a margin for balls of radius `most`.
 fn paint(canvas: &mut Canvas, scan: &Scan, nodes: &[usize], most: f64, area: Area) {
     let view = scan.at(&Pose::IDENTITY);
     let mut camera = scan_camera(&view, area);

@@ -1,4 +1,4 @@
-//! Marks over a painted view: titles, scale bars, places, arrows, frames.
+//! Marks over a painted view: titles, scale bars, marked places, arrows, frames.
 
 use nearmiss::geometry::nalgebra::Vector3;
 
@@ -10,20 +10,20 @@ pub(crate) const GROUND: Colour = [255, 255, 255];
 pub(crate) const PANEL_GROUND: Colour = [238, 240, 243];
 pub(crate) const INK: Colour = [30, 34, 40];
 
-/// Lines are drawn wider in white first, to stand out from what is behind them.
+/// Width of the white border on each side of a line, which sets it off from the background.
 pub(crate) const HALO: f64 = 3.0;
 
-/// Size of letters, see [`Canvas::text`].
+/// Size of letters; see [`Canvas::text`].
 const LETTERS: usize = 2 * FINE;
 
-/// Between letters and the border of their ground.
+/// Space between letters and the border of their background.
 const PAD: usize = 6 * FINE;
 
-/// From the border of a panel.
+/// Distance of titles and scale bars from the border of a panel.
 const MARGIN: usize = 8 * FINE;
 
-/// Writes `text` on a ground of its own with its upper left corner at `[left, top]`, moved into
-/// `area` where it would leave it, and returns that ground.
+/// Writes `text` on a background whose upper left corner is at `[left, top]`, moved into `area` if
+/// necessary. Returns the area of the background.
 pub(crate) fn label(canvas: &mut Canvas, area: Area, [left, top]: [f64; 2], text: &str) -> Area {
     let text = font::elided(LETTERS, text, area.width.saturating_sub(2 * PAD));
     let (width, height) = label_size(&text);
@@ -44,19 +44,19 @@ pub(crate) fn label(canvas: &mut Canvas, area: Area, [left, top]: [f64; 2], text
     ground
 }
 
-/// Returns width and height of the ground of a [`label`].
+/// Returns the width and height of the background of a [`label`].
 pub(crate) fn label_size(text: &str) -> (usize, usize) {
     (Canvas::text_width(LETTERS, text) + 2 * PAD, font::LINE * LETTERS + 2 * PAD)
 }
 
-/// Writes what a panel shows into its upper left corner.
+/// Writes the title of a panel into its upper left corner.
 pub(crate) fn title(canvas: &mut Canvas, area: Area, text: &str) {
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let corner = [area.left + MARGIN, area.top + MARGIN].map(|c| c as f64);
     label(canvas, area, corner, text);
 }
 
-/// Marks a place by a ring and four lines that lead to it.
+/// Marks a place by a ring and four lines that point to it.
 pub(crate) fn mark(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, size: f64) {
     let [x, y, _] = camera.project(point);
     let fine = 2.0 * size;
@@ -69,7 +69,7 @@ pub(crate) fn mark(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, si
     }
 }
 
-/// Draws an arrow from a place.
+/// Draws an arrow from the point `from` along the vector `along`.
 pub(crate) fn arrow(
     canvas: &mut Canvas,
     camera: &Camera,
@@ -89,8 +89,8 @@ pub(crate) fn arrow(
     }
 }
 
-/// Draws a square about what a close view shows, `reach` to every side of `point`. Returns `false`,
-/// and draws none, where it would be too small to be seen.
+/// Draws a square around the part that a close view shows, `reach` to every side of `point`.
+/// Returns `false` without drawing if the square would be too small to see.
 pub(crate) fn frame(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, reach: f64) -> bool {
     let [x, y, _] = camera.project(point);
     let half = camera.scale * reach;
@@ -107,13 +107,13 @@ pub(crate) fn frame(canvas: &mut Canvas, camera: &Camera, point: Vector3<f64>, r
     true
 }
 
-/// Draws a scale bar for lengths in units of the file.
+/// Draws a scale bar for lengths in the unit of the file.
 pub(crate) fn scale_bar(canvas: &mut Canvas, camera: &Camera) {
     scale_bar_in(canvas, camera, WorldUnit::OfFile);
 }
 
-/// Draws a scale bar into the lower left corner: a length of 1, 2 or 5 times a power of ten, a
-/// sixth to a third of the panel's height.
+/// Draws a scale bar into the lower left corner. Its length is 1, 2 or 5 times a power of ten, and
+/// an eighth to a third of the panel's height.
 pub(crate) fn scale_bar_in(canvas: &mut Canvas, camera: &Camera, unit: WorldUnit) {
     #[expect(clippy::cast_precision_loss, reason = "pixels")]
     let longest = camera.area.height as f64 / 3.0 / camera.scale;
@@ -126,7 +126,7 @@ pub(crate) fn scale_bar_in(canvas: &mut Canvas, camera: &Camera, unit: WorldUnit
         reason = "a third of the panel at most"
     )]
     let long = (length * camera.scale) as usize;
-    // On a ground of its own, whatever lies behind.
+    // A background makes the bar readable over anything.
     let Area { left, top, height, .. } = camera.area;
     let wide = Canvas::text_width(LETTERS, &text).max(long) + 2 * PAD;
     let high = font::LINE * LETTERS + 3 * PAD + BAR;

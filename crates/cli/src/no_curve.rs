@@ -1,4 +1,5 @@
-//! The sentence and the JSON of `curve` where no curve was found: what `collide` knows of the same poses.
+//! The report of `curve` if no curve was found: the answers of `collide` for the same poses, as a
+//! sentence and as JSON.
 
 use nearmiss::{
     Answer, Budget, CollideOptions, CollidePlan, Contact, Detail, Evidence, Pair, Placed, PlanError, Reason,
@@ -10,17 +11,18 @@ use crate::digits::{place, rough, rounded_down};
 use crate::report::{AnswerReport, word};
 use crate::sentence::world_radius;
 
-/// Answers about two scans between which no curve was found, each with its time in µs.
+/// Answers for two scans without a curve, each with its time in µs.
 #[derive(Debug)]
 pub(crate) struct NoCurve {
-    /// Of [`Semantics::Surface`]: a curve is of the surfaces alone.
+    /// The answer with [`Semantics::Surface`]: curves belong to surfaces only.
     surfaces: (Answer, f64),
-    /// Of [`Semantics::Obstacle`]: points that sample no surface may touch where no curve can be.
+    /// The answer with [`Semantics::Obstacle`]: points that sample no surface may touch where no
+    /// curve can be.
     obstacles: (Answer, f64),
 }
 
 impl NoCurve {
-    /// Asks `collide` of both semantics, each within `budget`.
+    /// Runs `collide` with both semantics, each within `budget`.
     pub(crate) fn ask([a, b]: [&Placed<'_>; 2], budget: &Budget) -> Result<Self, PlanError> {
         let mut scratch = Scratch::default();
         let mut ask = |semantics| {
@@ -38,13 +40,13 @@ impl NoCurve {
         Ok(Self { surfaces: ask(Semantics::Surface)?, obstacles: ask(Semantics::Obstacle)? })
     }
 
-    /// The work of both answers.
+    /// Returns the statistics of both answers.
     pub(crate) fn statistics(&self) -> [Statistics; 2] {
         [self.surfaces.0.statistics, self.obstacles.0.statistics]
     }
 
-    /// The verdict as `collide` writes it. A contact of the surfaces is a contact; otherwise that of the
-    /// obstacles.
+    /// Returns the verdict as `collide` writes it: "intersecting" if surfaces or obstacles touch,
+    /// or else the verdict of the obstacles.
     pub(crate) fn word(&self) -> &'static str {
         let (surfaces, obstacles) = (self.surfaces.0.verdict, self.obstacles.0.verdict);
         if surfaces.is_intersecting() || obstacles.is_intersecting() {
@@ -56,19 +58,20 @@ impl NoCurve {
         }
     }
 
-    /// Both answers for scripts: of the surfaces, of the obstacles.
+    /// Returns both answers for scripts: of the surfaces, then of the obstacles.
     pub(crate) fn reports(&self) -> [AnswerReport; 2] {
         [&self.surfaces, &self.obstacles].map(|(answer, micros)| AnswerReport::new(answer, None, *micros))
     }
 
-    /// Both answers for people.
+    /// Returns both answers as a sentence for people.
     pub(crate) fn sentence(&self, views: [&Placed<'_>; 2]) -> String {
         let [ra, rb] = views.map(world_radius);
         sentence([self.surfaces.0.verdict, self.obstacles.0.verdict], ra.min(rb) / 100.0)
     }
 }
 
-/// The verdicts of the surfaces and of the obstacles in words, with lengths to `unit`.
+/// Returns the verdicts of the surfaces and of the obstacles in words, with lengths rounded to
+/// `unit`.
 fn sentence([surfaces, obstacles]: [Verdict; 2], unit: f64) -> String {
     let at = |contact: Contact, evidence: Evidence| {
         (place(contact.point, unit), format!("within {} ({})", rough(contact.residual), word(evidence)))
@@ -113,7 +116,7 @@ fn sentence([surfaces, obstacles]: [Verdict; 2], unit: f64) -> String {
     }
 }
 
-/// The reason in words.
+/// Returns the reason in words.
 fn why(reason: Reason) -> &'static str {
     match reason {
         Reason::Budget { .. } => "the budget ran out first; try a greater --budget or --work",

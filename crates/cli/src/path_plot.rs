@@ -1,6 +1,6 @@
 //! An SVG plot of clearance and verdict along a path of poses.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::path::Path;
 
 use crate::digits::short;
@@ -63,36 +63,94 @@ impl PathPlot<'_> {
 
     fn draw(&self, entries: &[PathEntry]) -> String {
         let (label, columns) = columns(entries);
-        let [left, right, top, bottom] = AREA;
+        let axes = Axes::new(&columns, self.margin);
+        let [left, _, top, bottom] = AREA;
+        let [height, gap] = STRIP;
+        let mut drawing = Drawing::new();
+        let title = format!("Clearance between {} and {}", escaped(&self.names[0]), escaped(&self.names[1]));
+        drawing.put(format_args!("<text x=\"{left}\" y=\"22\" font-size=\"15\">{title}</text>"));
+        drawing.grid(&axes);
+        drawing.clearance(&axes, &columns);
+        drawing.margin(&axes, self.margin);
+        drawing.verdicts(&axes, &columns);
+        drawing.put(format_args!(
+            "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{FRAME}\"/>",
+            AREA[1] - left,
+            bottom - top
+        ));
+        let below = bottom + gap + height + 18.0;
+        for (end, anchor, at) in [(axes.first, "start", left), (axes.last, "end", AREA[1])] {
+            drawing.put(format_args!(
+                "<text x=\"{at}\" y=\"{below}\" text-anchor=\"{anchor}\">{label} {}</text>",
+                place(end)
+            ));
+        }
+        drawing.legend();
+        drawing.finish()
+    }
+}
+
+/// Where values are on the plot.
+#[derive(Debug)]
+struct Axes {
+    /// The ends of the horizontal axis.
+    first: f64,
+    last: f64,
+    /// The distance of ticks of the vertical axis, and their number.
+    step: f64,
+    ticks: u32,
+}
+
+impl Axes {
+    fn new(columns: &[Column], margin: f64) -> Self {
+        let highest = columns.iter().filter_map(|column| column.clearance).map(|[_, upper]| upper);
+        let (step, ticks) = ticks(highest.chain([margin]).fold(0.0, f64::max));
         let first = columns.first().map_or(0.0, |column| column.from);
         let last = columns.last().map_or(1.0, |column| column.to);
-        let span = if last > first { last - first } else { 1.0 };
-        let x = |place: f64| left + (right - left) * (place - first) / span;
-        let highest = columns.iter().filter_map(|column| column.clearance).map(|[_, upper]| upper);
-        let highest = highest.chain([self.margin]).fold(0.0, f64::max);
-        let (step, ticks) = ticks(highest);
-        let full = if highest > 0.0 { step * f64::from(ticks) } else { 1.0 };
-        let y = |length: f64| bottom - (bottom - top) * (length.max(0.0) / full).min(1.0);
+        Self { first, last, step, ticks }
+    }
 
-        let mut svg = format!(
+    fn x(&self, place: f64) -> f64 {
+        let span = if self.last > self.first { self.last - self.first } else { 1.0 };
+        AREA[0] + (AREA[1] - AREA[0]) * (place - self.first) / span
+    }
+
+    fn y(&self, length: f64) -> f64 {
+        let share = length.max(0.0) / (self.step * f64::from(self.ticks));
+        AREA[3] - (AREA[3] - AREA[2]) * share.min(1.0)
+    }
+}
+
+/// An SVG in the making.
+#[derive(Debug)]
+struct Drawing(String);
+
+impl Drawing {
+    fn new() -> Self {
+        Self(format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"system-ui, \
              'DejaVu Sans', sans-serif\" font-size=\"13\" fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" \
              fill=\"#fff\"/>\n",
             SIZE[0], SIZE[1]
-        );
-        let mut put = |text: &str| {
-            svg.push_str(text);
-            svg.push('\n');
-        };
-        put(&format!(
-            "<text x=\"{left}\" y=\"22\" font-size=\"15\">Clearance between {} and {}</text>",
-            escaped(&self.names[0]),
-            escaped(&self.names[1])
-        ));
-        for tick in 0..=ticks {
-            let length = step * f64::from(tick);
-            let level = y(length);
-            put(&format!(
+        ))
+    }
+
+    fn put(&mut self, element: impl Display) {
+        let _ = writeln!(self.0, "{element}");
+    }
+
+    fn finish(mut self) -> String {
+        self.put("</svg>");
+        self.0
+    }
+
+    /// Draws the ticks of the vertical axis.
+    fn grid(&mut self, axes: &Axes) {
+        let [left, right, ..] = AREA;
+        for tick in 0..=axes.ticks {
+            let length = axes.step * f64::from(tick);
+            let level = axes.y(length);
+            self.put(format_args!(
                 "<line x1=\"{left}\" y1=\"{level:.1}\" x2=\"{right}\" y2=\"{level:.1}\" stroke=\"#ddd\"/>\
                  <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
                 left - 8.0,
@@ -100,91 +158,84 @@ impl PathPlot<'_> {
                 short(length)
             ));
         }
-        // Upper bounds from left to right, then lower bounds back.
+    }
+
+    /// Draws the range between the bounds of the clearance, and its upper bound as a line.
+    fn clearance(&mut self, axes: &Axes, columns: &[Column]) {
         for run in columns.chunk_by(|one, next| one.clearance.is_some() && next.clearance.is_some()) {
-            let known: Vec<(f64, [f64; 2])> =
-                run.iter().filter_map(|c| Some((0.5 * (c.from + c.to), c.clearance?))).collect();
-            let line = |k: usize| {
-                known.iter().fold(String::new(), |mut text, (place, bounds)| {
-                    let _ = write!(text, "{:.1},{:.1} ", x(*place), y(bounds[k]));
-                    text
+            let corners = |k: usize| {
+                run.iter().filter_map(move |column| {
+                    let middle = 0.5 * (column.from + column.to);
+                    Some(format!("{:.1},{:.1}", axes.x(middle), axes.y(column.clearance?[k])))
                 })
             };
-            let back: Vec<String> = line(0).split(' ').rev().map(str::to_owned).collect();
-            put(&format!(
-                "<polygon points=\"{}{}\" fill=\"{CLEARANCE}\" fill-opacity=\"0.22\"/>\
-                 <polyline points=\"{}\" fill=\"none\" stroke=\"{CLEARANCE}\" stroke-width=\"1.5\"/>",
-                line(1),
-                back.join(" ").trim_start(),
-                line(1)
+            let upper: Vec<String> = corners(1).collect();
+            let mut lower: Vec<String> = corners(0).collect();
+            lower.reverse();
+            let (upper, lower) = (upper.join(" "), lower.join(" "));
+            self.put(format_args!(
+                "<polygon points=\"{upper} {lower}\" fill=\"{CLEARANCE}\" fill-opacity=\"0.22\"/>\
+                 <polyline points=\"{upper}\" fill=\"none\" stroke=\"{CLEARANCE}\" stroke-width=\"1.5\"/>"
             ));
         }
-        if self.margin > 0.0 {
-            let level = y(self.margin);
-            put(&format!(
+    }
+
+    /// Draws the margin as a dashed line, if there is one.
+    fn margin(&mut self, axes: &Axes, margin: f64) {
+        if margin > 0.0 {
+            let [left, right, ..] = AREA;
+            let level = axes.y(margin);
+            self.put(format_args!(
                 "<line x1=\"{left}\" y1=\"{level:.1}\" x2=\"{right}\" y2=\"{level:.1}\" stroke=\"{MARGIN}\" \
                  stroke-dasharray=\"6 4\"/><text x=\"{right}\" y=\"{:.1}\" text-anchor=\"end\" \
                  fill=\"{MARGIN}\">margin {}</text>",
                 level - 5.0,
-                short(self.margin)
+                short(margin)
             ));
         }
+    }
+
+    /// Draws the strip of verdicts. A run of equal ones ends half way to the next run.
+    fn verdicts(&mut self, axes: &Axes, columns: &[Column]) {
         let [height, gap] = STRIP;
-        let mut start = left;
-        let mut columns_left = &columns[..];
+        let mut start = AREA[0];
+        let mut rest = columns;
         for run in columns.chunk_by(|one, next| one.verdict == next.verdict) {
-            columns_left = &columns_left[run.len()..];
-            // A run ends half way to the next one.
-            let end = match (run.last(), columns_left.first()) {
-                (Some(own), Some(next)) => x(0.5 * (own.to + next.from)),
-                _ => right,
+            rest = &rest[run.len()..];
+            let end = match (run.last(), rest.first()) {
+                (Some(own), Some(next)) => axes.x(0.5 * (own.to + next.from)),
+                _ => AREA[1],
             };
-            put(&format!(
+            self.put(format_args!(
                 "<rect x=\"{start:.2}\" y=\"{:.1}\" width=\"{:.2}\" height=\"{height}\" fill=\"{}\"/>",
-                bottom + gap,
+                AREA[3] + gap,
                 (end - start).max(1.0),
                 colour(run[0].verdict)
             ));
             start = end;
         }
-        put(&format!(
-            "<rect x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"{FRAME}\"/>",
-            right - left,
-            bottom - top
-        ));
-        let below = bottom + gap + height + 18.0;
-        put(&format!(
-            "<text x=\"{left}\" y=\"{below}\">{label} {}</text><text x=\"{right}\" y=\"{below}\" \
-             text-anchor=\"end\">{label} {}</text>",
-            place(first),
-            place(last)
-        ));
-        let mut at = left;
-        for (verdict, word) in [
-            (PathVerdict::Separated, "apart"),
-            (PathVerdict::Intersecting, "touch"),
-            (PathVerdict::Undecided, "undecided"),
-        ] {
-            put(&format!(
-                "<rect x=\"{at}\" y=\"{}\" width=\"12\" height=\"12\" fill=\"{}\"/><text x=\"{}\" \
-                 y=\"{}\">{word}</text>",
+    }
+
+    fn legend(&mut self) {
+        let [apart, touch, undecided] =
+            [PathVerdict::Separated, PathVerdict::Intersecting, PathVerdict::Undecided].map(colour);
+        let entries = [
+            (apart, 1.0, "apart"),
+            (touch, 1.0, "touch"),
+            (undecided, 1.0, "undecided"),
+            (CLEARANCE, 0.5, "clearance, between its bounds; lengths in world units"),
+        ];
+        let mut left = AREA[0];
+        for (colour, opacity, meaning) in entries {
+            self.put(format_args!(
+                "<rect x=\"{left}\" y=\"{}\" width=\"12\" height=\"12\" fill=\"{colour}\" \
+                 fill-opacity=\"{opacity}\"/><text x=\"{}\" y=\"{}\">{meaning}</text>",
                 SIZE[1] - 30.0,
-                colour(verdict),
-                at + 18.0,
+                left + 18.0,
                 SIZE[1] - 19.0
             ));
-            at += 110.0;
+            left += 110.0;
         }
-        put(&format!(
-            "<rect x=\"{at}\" y=\"{}\" width=\"12\" height=\"12\" fill=\"{CLEARANCE}\" \
-             fill-opacity=\"0.5\"/><text x=\"{}\" y=\"{}\">clearance, between its bounds; lengths in world \
-             units</text>",
-            SIZE[1] - 30.0,
-            at + 18.0,
-            SIZE[1] - 19.0
-        ));
-        svg.push_str("</svg>\n");
-        svg
     }
 }
 

@@ -16,7 +16,7 @@ use crate::viewpoint::{Upright, ViewArgs, scale_of};
 pub(crate) use crate::marks::{GROUND, HALO, INK, PANEL_GROUND, scale_bar};
 pub(crate) use crate::viewpoint::{across, directions, sample, scan_camera};
 
-/// In fine pixels.
+/// Sizes in fine pixels.
 pub(crate) const PANEL: usize = 780 * FINE;
 pub(crate) const GAP: usize = 12 * FINE;
 pub(crate) const LEGEND: usize = 2 * legend::LINE + 2 * FINE;
@@ -27,24 +27,26 @@ pub(crate) const OF_B: Colour = [240, 140, 46];
 /// Half the width of the close view, in local sampling radii.
 const CLOSE: f64 = 12.0;
 
-/// Half the width of that view at most, in half diagonals of the smaller scan.
+/// The greatest half width of the close view, in half diagonals of the smaller scan.
 const AROUND: f64 = 1.5;
 
-/// Where points are shown, the two that count are seen from this much nearer.
+/// Factor of the half width if points are shown, for a nearer view of the two points of the
+/// contact.
 const NEARER: f64 = 0.4;
 
-/// What lies this near the cutting plane is painted darker, as a share of that half width.
+/// Points this near to the cutting plane are painted darker, as a share of the half width.
 const CUT: f64 = 0.045;
 
-/// In the whole view no disc is larger than this, in fine pixels: far returns of a LiDAR would hide
-/// the rest.
+/// The greatest radius of a disc in the whole view, in fine pixels. Far returns of a LiDAR would
+/// otherwise hide the rest.
 pub(crate) const LARGEST: f64 = 14.0;
 
-/// A scan whose extent is less than this share of the other's is seen through it, with this opacity.
+/// If the extent of a scan is less than this share of the other's, its hidden parts are shown with
+/// this opacity.
 const SMALL: f64 = 0.5;
 const OPACITY: f64 = 0.6;
 
-/// Refuses a name that promises another format than the one written.
+/// Rejects a file name whose extension is not that of a PNG.
 pub(crate) fn check_name(path: &Path) -> Result<(), CliError> {
     match path.extension() {
         Some(extension) if !extension.eq_ignore_ascii_case("png") => Err(CliError::Usage(format!(
@@ -55,7 +57,7 @@ pub(crate) fn check_name(path: &Path) -> Result<(), CliError> {
     }
 }
 
-/// What a legend calls the scans.
+/// Returns the names of the scans in a legend.
 pub(crate) fn names(paths: [&Path; 2]) -> [String; 2] {
     let mut letters = ["A", "B"].into_iter();
     paths.map(|path| {
@@ -64,27 +66,28 @@ pub(crate) fn names(paths: [&Path; 2]) -> [String; 2] {
     })
 }
 
-/// Both scans as they lie in the world; where they meet, beside that, a close view along the line in which
-/// the surfaces cut each other, the near half taken away, with the witness and both normals.
+/// Paints both scans in the world and, if they touch, a close view of the contact. The close view
+/// looks along the line of intersection, with the near half cut away, and shows the witness and
+/// both normals.
 #[must_use]
 pub fn contact_picture(a: &Placed<'_>, b: &Placed<'_>, answer: &Answer) -> Picture {
     paint([a, b], answer, &Style { names: ["A", "B"].map(Into::into), ..Style::default() })
 }
 
-/// How scans are shown.
+/// The style in which scans are shown.
 #[derive(Debug, Default)]
 pub(crate) struct Style {
     /// The names of both scans.
     pub(crate) names: [String; 2],
-    /// Points instead of surfaces.
+    /// `true` to show points instead of surfaces.
     pub(crate) points: bool,
-    /// From where they are seen.
+    /// The viewpoint.
     pub(crate) view: ViewArgs,
     /// The unit of lengths.
     pub(crate) unit: WorldUnit,
 }
 
-/// [`contact_picture`] in a style.
+/// Paints a [`contact_picture`] in a style.
 pub(crate) fn paint(views: [&Placed<'_>; 2], answer: &Answer, style: &Style) -> Picture {
     let mut canvas = Canvas::new(2 * PANEL + 3 * GAP, PANEL + LEGEND + 2 * GAP, GROUND);
     let contact = match answer.verdict {
@@ -129,7 +132,7 @@ pub(crate) fn paint(views: [&Placed<'_>; 2], answer: &Answer, style: &Style) -> 
     canvas.picture()
 }
 
-/// What the close view of a contact shows.
+/// Describes the close view of a contact.
 fn close_told(points: bool) -> &'static str {
     if points {
         "The close view shows the two points whose balls meet, and the line between them."
@@ -138,8 +141,8 @@ fn close_told(points: bool) -> &'static str {
     }
 }
 
-/// Paints both scans by `paint`, which is given 0 for a and 1 for b. Of a scan that is much smaller
-/// than the other, the hidden parts are seen faintly.
+/// Paints both scans by calling `paint` with 0 for a and 1 for b. If one scan is much smaller than
+/// the other, its hidden parts are painted faintly.
 pub(crate) fn paint_both(
     canvas: &mut Canvas,
     area: Area,
@@ -163,7 +166,7 @@ fn half_diagonal(view: &Placed<'_>) -> f64 {
     half.norm() * view.placed().scale() / view.scan().frame().scale
 }
 
-/// The disc of the `i`-th stored point in the world.
+/// Returns the disc of the `i`-th stored point in the world.
 pub(crate) fn splat(view: &Placed<'_>, i: usize) -> Splat {
     let scan = view.scan();
     Splat {
@@ -173,8 +176,8 @@ pub(crate) fn splat(view: &Placed<'_>, i: usize) -> Splat {
     }
 }
 
-/// Paints what stands for the `i`-th stored point in the obstacle: a disc, or a ball. Neither is larger than
-/// `largest`, in fine pixels, nor a ball too small to be seen.
+/// Paints the `i`-th stored point of the obstacle as a disc or a ball, with a radius of at most
+/// `largest` fine pixels. Balls have a radius of at least `SEEN` fine pixels.
 pub(crate) fn obstacle(
     canvas: &mut Canvas,
     camera: &Camera,
@@ -193,25 +196,25 @@ pub(crate) fn obstacle(
     }
 }
 
-/// No ball is smaller, in fine pixels.
+/// The least radius of a ball, in fine pixels.
 const SEEN: f64 = 2.0;
 
 /// Radii of points in fine pixels.
 const WHOLE_DOT: f64 = 2.5;
 const CLOSE_DOT: f64 = 9.0;
 
-/// A point in place of a disc, facing the viewer.
+/// Returns a dot in place of a disc, facing the viewer.
 pub(crate) fn dot(splat: &Splat, camera: &Camera, pixels: f64) -> Splat {
     Splat { normal: camera.axes[2], radius: pixels / camera.scale, ..*splat }
 }
 
-/// What the close view shows.
+/// The close view of a contact.
 struct Close {
     point: Vector3<f64>,
     normals: [Vector3<f64>; 2],
     /// Half the width of the view.
     reach: f64,
-    /// The two points nearest to it, where points are shown.
+    /// The two points of the contact, if points are shown.
     pair: Option<[Vector3<f64>; 2]>,
     upright: Option<Upright>,
 }
@@ -226,7 +229,7 @@ impl Close {
         };
         let radius = |k: usize| f64::from(views[k].scan().radii()[indices[k]]) * views[k].placed().scale();
         let pair = style.points.then(|| [0, 1].map(|k| Vector3::from(views[k].point(indices[k]))));
-        // A scan that is small beside the spacing of the other fills the view.
+        // A scan that is small compared with the spacing of the other fills the view.
         let small = half_diagonal(views[0]).min(half_diagonal(views[1]));
         let least = (CLOSE * radius(0).min(radius(1))).max(AROUND * small);
         let reach = (CLOSE * radius(0).max(radius(1))).min(least);
@@ -234,7 +237,8 @@ impl Close {
         Self { point: contact.point.into(), normals, reach, pair, upright: style.view.upright(views) }
     }
 
-    /// The direction of the line in which the surfaces cut each other, or any along both.
+    /// Returns the direction of the line of intersection. If the surfaces are nearly parallel,
+    /// returns a direction along both.
     fn chord(&self) -> Vector3<f64> {
         let [na, nb] = self.normals;
         let chord = na.cross(&nb);
@@ -243,8 +247,8 @@ impl Close {
         if is_from_below { -chord } else { chord }
     }
 
-    /// Obliquely along the chord, so that the cut is seen as a line and the surfaces behind it as
-    /// surfaces. The normals point up, unless the picture stands upright.
+    /// Returns a camera that looks obliquely along the chord. The cut is seen as a line, and the
+    /// surfaces behind it as surfaces. The normals point up unless the picture is upright.
     fn camera(&self, area: Area) -> Camera {
         let chord = self.chord();
         let scale = scale_of(area, self.reach);
@@ -306,7 +310,8 @@ pub(crate) fn stored_index(view: &Placed<'_>, id: PointId) -> usize {
     view.scan().source().iter().position(|&s| s == id.0).unwrap_or_default()
 }
 
-/// How much of the close view is hidden behind other points, seen from `toward`: about 0 to 1.
+/// Estimates how much of the close view is hidden by other points, seen from `toward`: 0 to about
+/// 1.
 fn hidden(close: &Close, points: &[Vector3<f64>], toward: Vector3<f64>) -> f64 {
     let radius = 0.4 * close.reach;
     let before = points.iter().filter(|p| {
@@ -319,7 +324,7 @@ fn hidden(close: &Close, points: &[Vector3<f64>], toward: Vector3<f64>) -> f64 {
     count / (count + 4.0)
 }
 
-/// Writes the names of both scans, each with its colour, and below them a sentence.
+/// Writes the names of both scans with their colours, and a sentence below them.
 pub(crate) fn legend(canvas: &mut Canvas, told: &str, names: &[String; 2]) {
     let [left, top] = [GAP + 4 * FINE, PANEL + 2 * GAP + 4 * FINE];
     let width = 2 * PANEL + GAP - 4 * FINE;

@@ -11,7 +11,6 @@ use crate::console::{Console, Results, now};
 use crate::digits::count;
 use crate::error::CliError;
 use crate::estimate::check_sampling;
-use crate::export::refused;
 use crate::memory::MemoryArgs;
 use crate::{input, output};
 
@@ -73,7 +72,7 @@ pub(crate) fn run(args: &SampleArgs) -> Result<(), CliError> {
     let points =
         sample(&mesh, &options).map_err(|cause| CliError::Sample { path: args.input.clone(), cause })?;
     output::replace(&args.output, |out| {
-        PlyPoints::double(&points).write(out).map_err(|error| refused(&args.output, error))
+        PlyPoints::double(&points).write(out).map_err(CliError::writing_ply(&args.output))
     })?;
     drop(bar);
     let report = Report {

@@ -1,4 +1,4 @@
-//! From where pictures are taken: the options that say so, and the choice where they do not.
+//! The viewpoint of pictures: options for it, and the choice of a default.
 
 use std::str::FromStr;
 
@@ -10,7 +10,7 @@ use nearmiss::surface::symmetric_eigen;
 
 use crate::canvas::{Area, Camera};
 
-/// Options of pictures of scans: which way is up, and from where they are seen.
+/// Options of pictures of scans: the axis that points up, and the viewpoint.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct ViewArgs {
     /// Axis that points up in the picture: x, y, z, -x, -y or -z
@@ -43,9 +43,9 @@ pub struct ViewArgs {
 /// A direction towards the viewer, in degrees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Angles {
-    /// About the axis that points up, anticlockwise as seen from above.
+    /// Angle about the axis that points up, anticlockwise as seen from above.
     pub azimuth: f64,
-    /// Above the horizon, from -90 to 90.
+    /// Angle above the horizon, from -90 to 90.
     pub elevation: f64,
 }
 
@@ -64,7 +64,7 @@ impl FromStr for Angles {
     }
 }
 
-/// A right-handed frame: two level directions and the one that points up.
+/// A right-handed frame: two level directions, and the direction that points up.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Upright([Vector3<f64>; 3]);
 
@@ -94,23 +94,24 @@ impl Upright {
     }
 }
 
-/// Elevations that are chosen for upright pictures, as sines, and the one that is liked best.
+/// The range of elevations for upright pictures, as sines, and the preferred one.
 const ELEVATIONS: std::ops::Range<f64> = 0.2..0.8;
 const LIKED: f64 = 0.5;
 
-/// Up, where no axis is known to be.
+/// The direction taken as up if no axis is known to point up.
 const ABOUT_UP: [f64; 3] = [0.0, 0.7, 0.7];
 
 impl ViewArgs {
-    /// Returns the frame in which the picture stands upright, or `None` if any way up will do.
+    /// Returns the frame of an upright picture, or `None` if any orientation will do.
     pub(crate) fn upright(&self, views: [&Placed<'_>; 2]) -> Option<Upright> {
         let by_default = || (self.view.is_some() || has_level_floors(views)).then_some(Up::Z);
         self.up.or_else(by_default).map(Upright::new)
     }
 
-    /// Returns a camera that sees both scans whole, but for outliers, and the places `shown`. A
-    /// direction that is not given is chosen: what matters is hidden least, as `hides` says of
-    /// points and a direction towards the viewer, and the scans lie beside each other.
+    /// Returns a camera that shows both scans without outliers, and the places `shown`. If no
+    /// direction is given, the camera chooses one with little hidden and the scans beside each
+    /// other. `hides` estimates how much is hidden by the given points in a direction towards the
+    /// viewer.
     pub(crate) fn camera(
         &self,
         views: [&Placed<'_>; 2],
@@ -135,8 +136,8 @@ impl ViewArgs {
         fitted(axes, views, shown, area)
     }
 
-    /// Returns a camera that sees `reach` to every side of `centre`, from where `cost` is least
-    /// unless a direction is given.
+    /// Returns a camera that shows `reach` to every side of `centre`. If no direction is given,
+    /// `cost` is minimised.
     pub(crate) fn close_camera(
         &self,
         views: [&Placed<'_>; 2],
@@ -154,7 +155,7 @@ impl ViewArgs {
         Camera { axes, centre, scale: scale_of(area, reach), area }
     }
 
-    /// Returns the axes of an upright camera, or `None` if any way up will do.
+    /// Returns the axes of an upright camera, or `None` if any orientation will do.
     fn axes(
         &self,
         views: [&Placed<'_>; 2],
@@ -172,23 +173,25 @@ impl ViewArgs {
     }
 }
 
-/// Returns the pixels of a unit of length if `reach` is half as wide as the area.
+/// Returns the fine pixels per unit of length if the smaller side of the area shows `2 * reach`.
 #[expect(clippy::cast_precision_loss, reason = "pixels")]
 pub(crate) fn scale_of(area: Area, reach: f64) -> f64 {
     0.5 * area.width.min(area.height) as f64 / reach
 }
 
-/// How much a direction looks from below, where no axis is known to be up.
+/// Returns the sine of the angle by which a direction looks from below, or 0 if it looks from
+/// above, with [`ABOUT_UP`] as up.
 fn below(toward: &Vector3<f64>) -> f64 {
     (-toward.dot(&Vector3::from(ABOUT_UP))).max(0.0)
 }
 
-/// This share of a scan's points at either end of an axis may lie outside the picture, if more than
-/// this share of the picture would be spent on them.
+/// Outliers: `OUTLYING` is the share of a scan's points at either end of an axis that may lie
+/// outside the picture. They do so if the picture would otherwise spend more than `SPENT` of its
+/// range on them.
 const OUTLYING: f64 = 0.003;
 const SPENT: f64 = 0.25;
 
-/// Returns a camera with these axes in which both scans are seen, but for outliers, and all places `shown`.
+/// Returns a camera with these axes that shows both scans without outliers, and all places `shown`.
 fn fitted(axes: [Vector3<f64>; 3], views: [&Placed<'_>; 2], shown: &[Vector3<f64>], area: Area) -> Camera {
     let mut camera = Camera { axes, centre: Vector3::zeros(), scale: 1.0, area };
     let across = |p: &Vector3<f64>, k: usize| axes[k].dot(p);
@@ -206,7 +209,7 @@ fn fitted(axes: [Vector3<f64>; 3], views: [&Placed<'_>; 2], shown: &[Vector3<f64
     camera
 }
 
-/// Returns the range of some values, without outliers if these take up too much of it.
+/// Returns the range of the values, without outliers if they take up too much of it.
 fn usual(mut values: Vec<f64>) -> [f64; 2] {
     values.sort_unstable_by(f64::total_cmp);
     let [Some(&low), Some(&high)] = [values.first(), values.last()] else {
@@ -225,12 +228,14 @@ fn usual(mut values: Vec<f64>) -> [f64; 2] {
     if inner[1] - inner[0] < (1.0 - SPENT) * (high - low) { inner } else { [low, high] }
 }
 
-/// Normals with at least this component along z are those of floors and ceilings. Of evenly spread
-/// normals 3 % are; of rooms, buildings and streets 12 to 50 %, of single objects 2 to 8 %.
+/// Floors and ceilings: normals count as theirs if the component along z is at least `LEVEL`. The
+/// share is 3 % for evenly spread normals, 12 to 50 % in rooms, buildings and streets, and 2 to 8 %
+/// for single objects.
 const LEVEL: f64 = 0.97;
 const LEVEL_SHARE: f64 = 0.1;
 
-/// Returns `true` if the larger scan has level floors by its normals and is not highest along z.
+/// Returns `true` if the normals of the larger scan show level floors and its height is not its
+/// greatest extent.
 fn has_level_floors(views: [&Placed<'_>; 2]) -> bool {
     let sides = views.map(|view| extents(&points_of(view).collect::<Vec<_>>()));
     let size = |sides: [f64; 3]| sides.iter().map(|side| side * side).sum::<f64>();
@@ -254,7 +259,7 @@ fn extents(points: &[Vector3<f64>]) -> [f64; 3] {
     })
 }
 
-/// Points of a scan that are looked at to choose a view.
+/// The greatest number of points of a scan that are sampled to choose a view.
 const SAMPLE: usize = 20_000;
 
 fn stride(view: &Placed<'_>) -> usize {
@@ -265,12 +270,13 @@ fn points_of<'a>(view: &'a Placed<'_>) -> impl Iterator<Item = Vector3<f64>> + '
     (0..view.scan().len()).step_by(stride(view)).map(|i| Vector3::from(view.point(i)))
 }
 
-/// Returns some points of both scans.
+/// Returns a sample of the points of both scans.
 pub(crate) fn sample(views: [&Placed<'_>; 2]) -> Vec<Vector3<f64>> {
     views.into_iter().flat_map(points_of).collect()
 }
 
-/// Returns a view of both scans with no wish but that what matters be seen, as `hides` says.
+/// Returns a camera for both scans, with a direction in which little is hidden by the estimate
+/// `hides`.
 pub(crate) fn whole_camera(
     views: [&Placed<'_>; 2],
     area: Area,
@@ -279,13 +285,13 @@ pub(crate) fn whole_camera(
     ViewArgs::default().camera(views, area, &[], hides)
 }
 
-/// Returns a view of one scan.
+/// Returns a camera for one scan.
 pub(crate) fn scan_camera(view: &Placed<'_>, area: Area) -> Camera {
     whole_camera([view, view], area, |_, _| 0.0)
 }
 
-/// The directions of greatest and of second extent, and the unit direction from one scan's middle
-/// to the other's, or zero.
+/// Returns the directions of the greatest and the second extent, and the unit vector from the
+/// centre of the first scan to that of the second, or zero if they coincide.
 fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> ([Vector3<f64>; 2], Vector3<f64>) {
     #[expect(clippy::cast_precision_loss, reason = "a count")]
     let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
@@ -302,7 +308,7 @@ fn extent(points: &[Vector3<f64>], views: [&Placed<'_>; 2]) -> ([Vector3<f64>; 2
     ([long, wide].map(Vector3::from), apart)
 }
 
-/// Returns some unit direction at right angles to `v`.
+/// Returns a unit vector perpendicular to `v`.
 pub(crate) fn across(v: Vector3<f64>) -> Vector3<f64> {
     let least = v.iamin();
     let axis = Vector3::from_fn(|k, _| if k == least { 1.0 } else { 0.0 });
@@ -332,7 +338,7 @@ mod tests {
         Scan::build(&PointCloud::from_positions(points).unwrap(), &BuildOptions::default()).unwrap()
     }
 
-    /// Floor and two walls, `height` high.
+    /// Returns a room: a floor and two walls, `height` high.
     fn room(height: u32) -> Scan {
         let grid = |m: u32, n: u32| (0..m).flat_map(move |i| (0..n).map(move |j| [i, j].map(f64::from)));
         let floor = grid(40, 30).map(|[x, y]| [x, y, 0.0]);
@@ -419,7 +425,7 @@ mod tests {
         let on_edge: Vec<[f64; 3]> =
             (0..900_u32).map(|i| [f64::from(i % 30), 0.0, 0.5 * f64::from(i / 30)]).collect();
         assert!(!is_upright(&scan(&on_edge)), "no floor");
-        // A small thing in a room does not count.
+        // A small object in a room does not change the result.
         let (room, thing) = (room(12), scan(&on_edge));
         let small = Pose::from_row_major(
             &[0.1, 0.0, 0.0, 9.0, 0.0, 0.1, 0.0, 9.0, 0.0, 0.0, 0.1, 3.0, 0.0, 0.0, 0.0, 1.0],

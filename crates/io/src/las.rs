@@ -20,7 +20,7 @@ use crate::columns::{Holds, Row};
 #[cfg(not(feature = "laz"))]
 use crate::error::Fault;
 use crate::input::{Input, Stop};
-use crate::out::Lattice;
+use crate::out::ScaleOffset;
 use crate::points::Points;
 use crate::selection::Selection;
 use header::Header;
@@ -35,9 +35,9 @@ pub(crate) fn glance(head: &[u8]) -> Option<(u64, Option<Aabb>)> {
 }
 
 /// Returns the scale and offset of the coordinates.
-pub(crate) fn lattice(input: Input<'_>) -> Option<Lattice> {
+pub(crate) fn lattice(input: Input<'_>) -> Option<ScaleOffset> {
     let Header { scale, offset, .. } = Header::parse(&input.head(header::LONGEST).ok()?).ok()?;
-    Some(Lattice { scale, offset })
+    Some(ScaleOffset { scale, offset })
 }
 
 /// Returns `true` if the file is COPC, of which a region or a level of detail can be read alone.

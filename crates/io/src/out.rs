@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use crate::columns::Holds;
 use crate::points::Points;
-pub use survey::{Lattice, OutError, Survey};
+pub use survey::{OutError, ScaleOffset, Survey};
 
 /// A format that points can be written in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

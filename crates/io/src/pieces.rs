@@ -13,7 +13,7 @@ use nearmiss_geometry::{Aabb, TriangleMesh};
 use crate::error::ReadError;
 use crate::format::Format;
 use crate::input::Input;
-use crate::out::Lattice;
+use crate::out::ScaleOffset;
 use crate::points::Points;
 use crate::read::{Start, check_file, parse_as, stream};
 use crate::rows::{Blocks, Encoding, Layout};
@@ -139,7 +139,7 @@ impl PointPieces {
 
     /// Returns the scale and offset of the coordinates of a LAS file.
     #[must_use]
-    pub fn lattice(&self) -> Option<Lattice> {
+    pub fn lattice(&self) -> Option<ScaleOffset> {
         match &self.source {
             Source::Stream { file, format: Format::Las, .. } => las::lattice(Input::File(file)),
             _ => None,

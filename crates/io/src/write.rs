@@ -9,7 +9,7 @@ use crate::text::{counted, plain};
 /// Error of writing points.
 #[derive(Debug, Error)]
 #[non_exhaustive]
-pub enum WriteError {
+pub enum PlyError {
     /// The operating system reported an error.
     #[error("cannot write the PLY file ({}); check the space left on the disk and try again", plain(cause))]
     Io {
@@ -43,7 +43,7 @@ pub enum WriteError {
     },
 }
 
-impl From<io::Error> for WriteError {
+impl From<io::Error> for PlyError {
     fn from(cause: io::Error) -> Self {
         Self::Io { cause }
     }
@@ -169,7 +169,7 @@ impl<'a> PlyPoints<'a> {
     /// Fails before anything is written if the number of normals, colours, source indices or values
     /// of a column differs from the number of points, or if an edge or triangle refers to a missing
     /// point. Fails if the output fails.
-    pub fn write(&self, out: &mut impl Write) -> Result<(), WriteError> {
+    pub fn write(&self, out: &mut impl Write) -> Result<(), PlyError> {
         self.check()?;
         let mut out = BufWriter::with_capacity(1 << 16, out);
         self.header(&mut out)?;
@@ -209,7 +209,7 @@ impl<'a> PlyPoints<'a> {
         }
     }
 
-    fn check(&self) -> Result<(), WriteError> {
+    fn check(&self) -> Result<(), PlyError> {
         let points = self.len();
         for (what, given) in [
             ("normals", self.normals.map(<[_]>::len)),
@@ -217,11 +217,11 @@ impl<'a> PlyPoints<'a> {
             ("source indices", self.source.map(<[_]>::len)),
         ] {
             if let Some(given) = given.filter(|&given| given != points) {
-                return Err(WriteError::Count { what, given, points });
+                return Err(PlyError::Count { what, given, points });
             }
         }
         if let Some(column) = self.columns.iter().find(|column| column.len() != points) {
-            return Err(WriteError::Count { what: "values of a column", given: column.len(), points });
+            return Err(PlyError::Count { what: "values of a column", given: column.len(), points });
         }
         let edges = self.edges.iter().map(<[u32; 2]>::as_slice);
         let faces = self.triangles.iter().map(<[u32; 3]>::as_slice);
@@ -229,7 +229,7 @@ impl<'a> PlyPoints<'a> {
         for (element, (index, ends)) in edges.chain(faces.enumerate().map(|f| ("face", f))) {
             let missing = |&&end: &&u32| i32::try_from(end).is_err() || end as usize >= points;
             if let Some(&point) = ends.iter().find(missing) {
-                return Err(WriteError::NoSuchPoint { element, index, point, points });
+                return Err(PlyError::NoSuchPoint { element, index, point, points });
             }
         }
         Ok(())

@@ -318,7 +318,7 @@ impl Scan {
 
     /// Reads a saved scan into memory.
     ///
-    /// As [`Scan::open`].
+    /// # Errors
     /// As [`Scan::open`].
     pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Self, LoadError> {
         Self::load(&File::read(path, check)?, check)

@@ -1,14 +1,17 @@
-//! Clash lists: all places where two scans meet, or come nearer to each other than a clearance, each once.
+//! Clash lists: every place where two scans meet, or come nearer to each other than a clearance,
+//! listed once.
 //!
-//! One search finds a contact of every pair of leaves that meets. A second one, with the clearance as its
-//! margin, finds one of every pair of leaves that comes nearer. Contacts of the first are *hard*; those of the
-//! second, but for leaves that meet, are *near*. Hard contacts are grouped into hard clashes. Near contacts
-//! that are linked to hard ones, directly or by others, surround these; the rest is grouped into clearance
-//! clashes. So hard clashes do not depend on the clearance.
+//! A first search finds one contact for each pair of leaves that meets. A second search, with the
+//! clearance as its margin, finds one contact for each pair of leaves that comes nearer than the
+//! clearance. Contacts of the first search are *hard*. Contacts of the second search are *near*
+//! unless their leaves meet. Hard contacts are grouped into hard clashes. Near contacts that are
+//! linked to a hard contact, directly or through others, are the surroundings of a hard clash. All
+//! other near contacts are grouped into clearance clashes. Hard clashes therefore do not depend on
+//! the clearance.
 //!
-//! A near contact is the first one found of two leaves, not the nearest. So the nearest points of the same
-//! leaves bound the distance of a clearance clash from above, and their enclosures or the balls about their
-//! points from below.
+//! A near contact is the first one found for two leaves, not the nearest. The distance of a
+//! clearance clash is therefore bounded from above by the nearest points of the same leaves. It is
+//! bounded from below by the enclosures of these leaves, or by the balls about their points.
 
 mod components;
 mod group;
@@ -31,41 +34,43 @@ use crate::question::{Pair, Scratch};
 use measure::{NearContacts, Nearness, nearness};
 use stored::{leaves, stored};
 
-/// What is asked. Plain values; [`ClashPlan::new`] validates them. Lengths are in the world.
+/// Options of a clash list, as plain values; [`ClashPlan::new`] validates them. Lengths are in
+/// world units.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ClashOptions {
-    /// What it means to meet. Default: obstacles.
+    /// The meaning of the scans. Default: obstacles.
     pub semantics: Semantics,
-    /// What comes nearer than this is a clash as well. Default: 0, contact alone.
+    /// Places nearer than this are listed as well. Default: 0, contacts only.
     pub clearance: f64,
-    /// Contacts at most this far from each other belong to one clash. None, the default:
-    /// [`ClashPlan::link`] chooses.
+    /// Contacts at most this far from each other belong to one clash. With `None`, the default,
+    /// [`ClashPlan::link`] chooses the length.
     pub link: Option<f64>,
-    /// By which distances surfaces are defined. None, the default: as both scans were prepared.
+    /// The distances that define the surfaces. Default: `None`, those that both scans were prepared
+    /// for.
     pub metric: Option<Metric>,
 }
 
 impl ClashOptions {
-    /// The same options with these semantics.
+    /// Returns the options with these semantics.
     #[must_use]
     pub const fn with_semantics(self, semantics: Semantics) -> Self {
         Self { semantics, ..self }
     }
 
-    /// The same options with this clearance.
+    /// Returns the options with this clearance.
     #[must_use]
     pub const fn with_clearance(self, clearance: f64) -> Self {
         Self { clearance, ..self }
     }
 
-    /// The same options with this link length.
+    /// Returns the options with this link length.
     #[must_use]
     pub const fn with_link(self, link: f64) -> Self {
         Self { link: Some(link), ..self }
     }
 
-    /// The same options by this metric.
+    /// Returns the options with this metric.
     #[must_use]
     pub const fn with_metric(self, metric: Metric) -> Self {
         Self { metric: Some(metric), ..self }
@@ -76,24 +81,24 @@ impl ClashOptions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClashPlan {
     touching: CollidePlan,
-    /// With a clearance above zero.
+    /// The search within the clearance, if that is above zero.
     near: Option<CollidePlan>,
     link: Option<f64>,
 }
 
-/// The default link length in sampling radii of the coarser scan. A leaf of sixteen points is about four of
-/// these wide, and there is one contact of each pair of leaves: two of these lengths tear the contacts along
-/// one curve of intersection apart, three hardly do, and six join curves that are well apart (dragons of 23 and
-/// 100 thousand points).
+/// The default link length, in sampling radii of the coarser scan. A leaf of sixteen points is
+/// about four of these wide, and there is one contact for each pair of leaves. In tests with
+/// dragons of 23 and 100 thousand points, 2 split the contacts along one curve of intersection, 3
+/// hardly did, and 6 joined curves that are well apart.
 const LINK: f64 = 4.0;
 
 impl ClashPlan {
     /// Validates `options` for two scans.
     ///
     /// # Errors
-    /// [`PlanError::Radius`], [`PlanError::Margin`] and [`PlanError::Link`] for what is no length;
-    /// [`PlanError::Metric`] and [`PlanError::Metrics`] for scans whose surfaces are not defined as it is
-    /// asked, or not alike.
+    /// [`PlanError::Radius`], [`PlanError::Margin`] and [`PlanError::Link`] for an invalid length.
+    /// [`PlanError::Metric`] and [`PlanError::Metrics`] if the metrics of the scans differ from the
+    /// requested one or from each other.
     pub fn new(options: &ClashOptions, a: &PointHierarchy, b: &PointHierarchy) -> Result<Self, PlanError> {
         if let Some(link) = options.link.filter(|&link| !(link >= 0.0 && link.is_finite())) {
             return Err(PlanError::Link(link));
@@ -113,13 +118,13 @@ impl ClashPlan {
         self.touching.options()
     }
 
-    /// The clearance, in the world.
+    /// The clearance, in world units.
     #[must_use]
     pub fn clearance(&self) -> f64 {
         self.near.map_or(0.0, |near| near.options().margin)
     }
 
-    /// The link length for two placed scans, in the world: the one that was asked for, else
+    /// The link length for two placed scans, in world units: that of the options, or else
     /// [`default_link`].
     #[must_use]
     pub fn link(&self, views: [&Placed<'_>; 2]) -> f64 {
@@ -127,67 +132,70 @@ impl ClashPlan {
     }
 }
 
-/// The default link length of two placed scans, in the world: four times the greater sampling radius.
+/// The default link length of two placed scans, in world units: four times the greater sampling
+/// radius.
 #[must_use]
 pub fn default_link(views: [&Placed<'_>; 2]) -> f64 {
     LINK * views.map(Placed::sampling_radius).into_iter().fold(0.0, f64::max)
 }
 
-/// Whether scans meet in a clash.
+/// The kinds of clashes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ClashKind {
-    /// They do.
+    /// The scans meet.
     Hard,
-    /// They come nearer than the clearance, and contact was found nowhere in it.
+    /// The scans come nearer than the clearance, and no contact was found there.
     Clearance,
 }
 
 /// One place where two scans meet or come too near.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clash {
-    /// Which of both.
+    /// The kind of the clash.
     pub kind: ClashKind,
-    /// Its contacts, as indices into [`Clashes::contacts`]: of hard clashes the hard ones alone.
+    /// The contacts, as indices into [`Clashes::contacts`]. Hard clashes hold hard contacts only.
     pub group: ContactGroup,
-    /// Of hard clashes, the near contacts that surround it: those linked to it, directly or by others, and to
-    /// no hard clash nearer to them. Indices as above; empty for others.
+    /// The near contacts around a hard clash, as indices into [`Clashes::contacts`]. They are
+    /// linked to the clash, directly or through others, and no hard clash is nearer to them. Empty
+    /// for clearance clashes.
     pub surroundings: Vec<usize>,
-    /// The scans are no nearer to each other than this in any of its pairs of leaves: proven. Zero in a hard
-    /// clash.
+    /// Proven lower bound of the distance of the scans over the pairs of leaves of this clash. Zero
+    /// in a hard clash.
     pub lower: f64,
-    /// They come as near as this. Zero in a hard clash.
+    /// Upper bound of that distance. Zero in a hard clash.
     pub upper: f64,
-    /// Of [`Self::upper`]. Certified: two measured points, or the balls about them, are that near.
-    /// Estimated: tangent discs are.
+    /// The evidence for [`Self::upper`]. Certified: two measured points, or the balls about them,
+    /// are that near. Estimated: tangent discs are.
     pub evidence: Evidence,
-    /// How deep one scan is in the other. `None` always: no search tells it yet.
+    /// The penetration depth. Always `None`: no search computes it yet.
     pub depth: Option<f64>,
 }
 
 /// All clashes of two scans.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clashes {
-    /// Hard clashes first, among them those with the greatest box diagonal, then those with most contacts,
-    /// then those found first.
+    /// The clashes: hard ones first, then by greatest box diagonal, then by most contacts, then in
+    /// the order in which they were found.
     pub clashes: Vec<Clash>,
-    /// The contacts that they are made of, in the order of the searches: hard ones, then near ones.
+    /// The contacts of all clashes in the order of the searches: hard ones, then near ones.
     pub contacts: Vec<Contact>,
     /// The number of hard contacts.
     pub hard: usize,
-    /// The link length, in the world.
+    /// The link length, in world units.
     pub link: f64,
-    /// Whether these are all: the budget lasted.
+    /// `true` if the searches ended within the budget, so that no clash is missing.
     pub complete: bool,
-    /// The answers of the searches, for contact and, with a clearance above zero, for what comes nearer.
+    /// The answers of the search for contacts and, with a clearance above zero, of the search
+    /// within the clearance.
     pub answers: (Answer, Option<Answer>),
 }
 
 impl Pair<'_> {
-    /// Lists all places where the scans meet or, with a clearance, come nearer than that.
+    /// Lists every place where the scans meet or, with a clearance, come nearer than it.
     ///
-    /// Costs two searches for [all contacts](Self::contacts), of which that within a great clearance takes
-    /// longer, and n log n steps to group n contacts. Each search may spend the whole budget. Allocates.
-    /// Deterministic, as long as the budget has no deadline.
+    /// Costs two searches for [all contacts](Self::contacts), and n log n steps to group n
+    /// contacts. The search within a great clearance takes the longer of both. Each search may
+    /// spend the whole budget. Allocates. Deterministic unless the budget has a deadline.
     #[must_use]
     pub fn clashes(&self, plan: &ClashPlan, scratch: &mut Scratch) -> Clashes {
         let views = self.scans().each_ref();

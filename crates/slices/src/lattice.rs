@@ -13,7 +13,7 @@ const TOLERANCE: f64 = 0.01;
 /// gap that it can pass at all, provided that the spacing is a pixel or a whole part of it. They
 /// depend on the map and the avatar alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lattice {
+pub struct StepGrid {
     /// The place of column 0 and row 0, across in the map's coordinates.
     pub origin: [f64; 2],
     /// Distance between neighbours along an axis.
@@ -22,7 +22,7 @@ pub struct Lattice {
     pub counts: [u64; 2],
 }
 
-impl Lattice {
+impl StepGrid {
     /// Returns the lattice of an avatar over a map, with this spacing, which must be above zero.
     #[must_use]
     pub fn new(grid: &Grid, avatar: &Avatar, spacing: f64) -> Self {

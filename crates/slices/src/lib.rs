@@ -46,7 +46,7 @@ pub use cache::{CacheCounts, CacheOptions, SliceCache};
 pub use error::SliceError;
 pub use floors::{Storey, storey_of};
 pub use grid::{Block, Grid, LEVELS};
-pub use lattice::Lattice;
+pub use lattice::StepGrid;
 pub use map::{About, SliceMap, Unloaded};
 pub use object::ObjectError;
 pub use options::{Obstacle, Pixel, SliceOptions, SlicePlan};

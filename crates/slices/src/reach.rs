@@ -10,7 +10,7 @@ use nearmiss_geometry::Aabb;
 
 use crate::avatar::Avatar;
 use crate::floors::{Storey, storey_of};
-use crate::lattice::Lattice;
+use crate::lattice::StepGrid;
 use crate::map::SliceMap;
 use crate::standing::Standing;
 use crate::steps::Steps;
@@ -22,7 +22,7 @@ use crate::{Grid, Up};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reach {
     up: Up,
-    lattice: Lattice,
+    lattice: StepGrid,
     /// Column, row and height, sorted.
     places: Vec<([u32; 2], f64)>,
 }
@@ -39,7 +39,7 @@ pub struct Covered {
 impl Reach {
     /// Finds the reach of a walker that stands somewhere.
     ///
-    /// The places are those of the [`Lattice`] whose spacing is the avatar's step, at the heights
+    /// The places are those of the [`StepGrid`] whose spacing is the avatar's step, at the heights
     /// at which the avatar comes to them. From the start the avatar walks to the corners of its
     /// cell, then from each place to its eight neighbours, by [`Walker::step`]. With `falls` it
     /// also goes where it falls and lands on something; without, only where something carries it at
@@ -67,7 +67,7 @@ impl Reach {
 
     /// The lattice of the places.
     #[must_use]
-    pub fn lattice(&self) -> &Lattice {
+    pub fn lattice(&self) -> &StepGrid {
         &self.lattice
     }
 

@@ -70,7 +70,7 @@ impl Route {
     /// Finds a short route between two places of the caller's coordinates, both within a climb of a
     /// place to stand.
     ///
-    /// The graph is that of [`Reach`](crate::Reach): the places of the [`Lattice`](crate::Lattice)
+    /// The graph is that of [`Reach`](crate::Reach): the places of the [`StepGrid`](crate::StepGrid)
     /// and their eight neighbours, start and goal joined to the corners of their cells, and to each
     /// other if they share one; every edge is walked by the walker itself. A* finds the shortest
     /// path, by its length across. It is then smoothed where the walker confirms a shortcut, so

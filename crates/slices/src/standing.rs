@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::avatar::Avatar;
 use crate::grid::LEVELS;
-use crate::lattice::Lattice;
+use crate::lattice::StepGrid;
 use crate::map::{SliceMap, Unloaded};
 use crate::query::Floor;
 use crate::walk::Walker;
@@ -116,7 +116,7 @@ impl Avatar {
     /// Finds the place nearest to `near`, in the caller's coordinates, where the avatar can stand;
     /// `None` if there is none.
     ///
-    /// Looked at are all heights of `near` itself and of the places of the [`Lattice`] with the
+    /// Looked at are all heights of `near` itself and of the places of the [`StepGrid`] with the
     /// spacing of a pixel, for bases beyond 64 pixels of a 32nd of their lesser side in whole
     /// pixels, ring by ring, until no further ring can be nearer. A place of them is one if a
     /// walker that is put there stays there ([`Walker::new`]). Takes microseconds for each place
@@ -132,7 +132,7 @@ impl Avatar {
         let [x, y, z] = grid.up.to_map(near);
         let spacing = grid.pixel
             * (self.options().base[0].min(self.options().base[1]) / COARSE / grid.pixel).floor().max(1.0);
-        let lattice = Lattice::new(grid, self, spacing);
+        let lattice = StepGrid::new(grid, self, spacing);
         let mut best: Option<([f64; 3], f64)> = None;
         let mut heights = Vec::new();
         let mut look = |place: [f64; 2], best: &mut Option<([f64; 3], f64)>| {

@@ -4,7 +4,7 @@
 //! A node is a state of a [`Walker`]: its place and its footing, on which the next step depends. An
 //! edge is simulated by the walker itself, so each one can be walked.
 
-use crate::lattice::Lattice;
+use crate::lattice::StepGrid;
 use crate::map::{SliceMap, Unloaded};
 use crate::walk::Walker;
 use crate::walk_error::WalkError;
@@ -55,7 +55,7 @@ pub(crate) struct Steps<'a> {
     map: &'a SliceMap,
     avatar: Avatar,
     /// Where nodes may be.
-    pub(crate) lattice: Lattice,
+    pub(crate) lattice: StepGrid,
     falls: bool,
     nodes: Vec<Node>,
     /// The first node of each cell, tile by tile; tiles without nodes take no memory.
@@ -68,7 +68,7 @@ impl<'a> Steps<'a> {
     /// edge may lead over a fall.
     pub(crate) fn new(map: &'a SliceMap, avatar: Avatar, falls: bool) -> Result<Self, WalkError> {
         let step = avatar.stride().1;
-        let lattice = Lattice::new(map.grid(), &avatar, step);
+        let lattice = StepGrid::new(map.grid(), &avatar, step);
         let [columns, rows] = lattice.counts.map(|count| count.div_ceil(u64::from(TILE)));
         let tiles = columns.saturating_mul(rows);
         let most = usize::try_from(tiles).ok().filter(|_| tiles <= MOST_TILES && columns <= MOST_TILES);

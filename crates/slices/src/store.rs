@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nearmiss_lanes::parallel::map_each;
-use nearmiss_store::{Check, Fault, File, OpenError, WriteError};
+use nearmiss_store::{Check, ContainerFault, File, OpenError, WriteError};
 use thiserror::Error;
 
 use crate::encode::decode;
@@ -107,7 +107,7 @@ pub enum StoreError {
 /// remedies that do not serve.
 fn of_map(cause: &OpenError, unfit: &[&str]) -> String {
     let what = match &cause.fault {
-        Fault::NotAContainer { .. } => "is no file of a slice map".to_owned(),
+        ContainerFault::NotAContainer { .. } => "is no file of a slice map".to_owned(),
         fault => match fault.to_string().rsplit_once("; ") {
             Some((what, remedy)) if unfit.iter().any(|word| remedy.contains(word)) => what.to_owned(),
             _ => return cause.to_string(),

@@ -10,7 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nearmiss_lanes::parallel::map_each;
-use nearmiss_store::{Check, Fault, File, WriteError, Writer};
+use nearmiss_store::{Check, ContainerFault, File, WriteError, Writer};
 
 use crate::build::SliceBuilder;
 use crate::encode::encode;
@@ -229,8 +229,12 @@ fn check(folder: &Path) -> Result<(), StoreError> {
     let foreign = || StoreError::Foreign { path: folder.to_owned() };
     let index = File::read(folder.join(INDEX_NAME), Check::Structure);
     match index.and_then(|file| file.expect(INDEX.0, 0..=u32::MAX)).map_err(|error| error.fault) {
-        Err(Fault::Io { source }) if source.kind() == io::ErrorKind::NotFound => {}
-        Err(Fault::NotAFile { .. } | Fault::NotAContainer { .. } | Fault::Kind { .. }) => {
+        Err(ContainerFault::Io { source }) if source.kind() == io::ErrorKind::NotFound => {}
+        Err(
+            ContainerFault::NotAFile { .. }
+            | ContainerFault::NotAContainer { .. }
+            | ContainerFault::Kind { .. },
+        ) => {
             return Err(foreign());
         }
         _ => return Ok(()),
@@ -286,7 +290,9 @@ fn checksum_of(name: &str) -> Option<u64> {
 fn is_image(path: &Path) -> bool {
     match File::read(path, Check::Structure) {
         Ok(file) => file.kind() == IMAGE.0,
-        Err(error) => matches!(error.fault, Fault::Io { source } if source.kind() == io::ErrorKind::NotFound),
+        Err(error) => {
+            matches!(error.fault, ContainerFault::Io { source } if source.kind() == io::ErrorKind::NotFound)
+        }
     }
 }
 

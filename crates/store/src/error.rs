@@ -18,7 +18,7 @@ pub struct OpenError {
     /// The file, or the name given to [`OpenError::with_path`]; `None` for bytes in memory.
     pub path: Option<PathBuf>,
     /// The fault.
-    pub fault: Fault,
+    pub fault: ContainerFault,
 }
 
 impl OpenError {
@@ -49,7 +49,7 @@ impl Error for OpenError {
 /// A fault of a container. Offsets are in bytes from the start of the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Fault {
+pub enum ContainerFault {
     /// The operating system reported an error: no such file, permission denied, or a failing disk.
     #[error("{}", io_words(source))]
     Io {
@@ -315,7 +315,7 @@ pub enum Fault {
     },
 }
 
-impl From<io::Error> for Fault {
+impl From<io::Error> for ContainerFault {
     fn from(source: io::Error) -> Self {
         Self::Io { source }
     }

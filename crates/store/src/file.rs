@@ -12,7 +12,7 @@ use serde::de::DeserializeOwned;
 
 use crate::array::Array;
 use crate::bytes::{Bytes, fill};
-use crate::error::{Fault, OpenError};
+use crate::error::{ContainerFault, OpenError};
 use crate::header::{HEADER_LEN, Header};
 use crate::id::SectionId;
 use crate::section::{Section, Table, element_size};
@@ -60,7 +60,7 @@ impl File {
     /// Returns [`OpenError`] if `path` is not a file, cannot be opened, or fails a check.
     pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Self, OpenError> {
         Self::from_path(path.as_ref(), check, |file, length| {
-            map::map(file).or_else(|_| Bytes::read(file, length)).map_err(Fault::from)
+            map::map(file).or_else(|_| Bytes::read(file, length)).map_err(ContainerFault::from)
         })
     }
 
@@ -73,7 +73,9 @@ impl File {
     /// Returns [`OpenError`] if `path` is not a file, cannot be read, exceeds the memory, or fails
     /// a check.
     pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Self, OpenError> {
-        Self::from_path(path.as_ref(), check, |file, length| Bytes::read(file, length).map_err(Fault::from))
+        Self::from_path(path.as_ref(), check, |file, length| {
+            Bytes::read(file, length).map_err(ContainerFault::from)
+        })
     }
 
     /// Opens a container in memory, such as an asset from an archive, without copying it.
@@ -92,13 +94,13 @@ impl File {
     fn from_path(
         path: &Path,
         check: Check,
-        load: impl FnOnce(&mut fs::File, u64) -> Result<Bytes, Fault>,
+        load: impl FnOnce(&mut fs::File, u64) -> Result<Bytes, ContainerFault>,
     ) -> Result<Self, OpenError> {
         let attempt = || {
             // Checked before opening, since opening a pipe blocks until its other end is opened.
             let kind = fs::metadata(path)?;
             if !kind.is_file() {
-                return Err(Fault::NotAFile { directory: kind.is_dir() });
+                return Err(ContainerFault::NotAFile { directory: kind.is_dir() });
             }
             let mut file = fs::File::open(path)?;
             let length = file.metadata()?.len();
@@ -112,7 +114,7 @@ impl File {
         attempt().map_err(|fault| OpenError { path: Some(path.to_owned()), fault })
     }
 
-    fn assemble(bytes: Bytes, path: Option<Arc<Path>>, check: Check) -> Result<Self, Fault> {
+    fn assemble(bytes: Bytes, path: Option<Arc<Path>>, check: Check) -> Result<Self, ContainerFault> {
         let whole = bytes.as_slice();
         let header = Header::parse(whole, whole.len() as u64)?;
         let table = Table::parse(&header, whole)?;
@@ -126,7 +128,7 @@ impl File {
     /// [`Check::Full`] that [`Check::Structure`] leaves out. Reads the whole file once.
     ///
     /// # Errors
-    /// Returns [`Fault::Checksum`] for the first section that differs, or [`Fault::Padding`] for
+    /// Returns [`ContainerFault::Checksum`] for the first section that differs, or [`ContainerFault::Padding`] for
     /// the first byte.
     pub fn verify(&self) -> Result<(), OpenError> {
         self.table.verify(self.bytes.as_slice()).map_err(|fault| self.error(fault))
@@ -135,13 +137,13 @@ impl File {
     /// Checks the kind and the version of the content.
     ///
     /// # Errors
-    /// Returns [`Fault::Kind`] or [`Fault::Version`].
+    /// Returns [`ContainerFault::Kind`] or [`ContainerFault::Version`].
     pub fn expect(&self, kind: [u8; 4], versions: RangeInclusive<u32>) -> Result<(), OpenError> {
         if self.kind() != kind {
-            return Err(self.error(Fault::Kind { found: self.kind(), expected: kind }));
+            return Err(self.error(ContainerFault::Kind { found: self.kind(), expected: kind }));
         }
         if !versions.contains(&self.version()) {
-            return Err(self.error(Fault::Version { found: self.version(), supported: versions }));
+            return Err(self.error(ContainerFault::Version { found: self.version(), supported: versions }));
         }
         Ok(())
     }
@@ -154,14 +156,14 @@ impl File {
     /// does not compile.
     ///
     /// # Errors
-    /// Returns [`Fault::MissingSection`], or [`Fault::WrongElementSize`] if the elements differ in
+    /// Returns [`ContainerFault::MissingSection`], or [`ContainerFault::WrongElementSize`] if the elements differ in
     /// size from `T`.
     pub fn array<T: Pod>(&self, tag: [u8; 4], part: u32) -> Result<Array<T>, OpenError> {
         let section = self.find(SectionId { tag, part })?;
         let (expected, found) = (element_size::<T>(), section.element_size);
         if found != expected {
             let (section, offset) = (section.id, section.offset);
-            return Err(self.error(Fault::WrongElementSize { section, offset, expected, found }));
+            return Err(self.error(ContainerFault::WrongElementSize { section, offset, expected, found }));
         }
         Ok(Array::in_place(self.bytes.clone(), section.range()))
     }
@@ -173,8 +175,8 @@ impl File {
     /// bytes, and the value must use all of them.
     ///
     /// # Errors
-    /// Returns [`Fault::MissingSection`] if there are no metadata. Returns [`Fault::Metadata`],
-    /// [`Fault::MetadataTrailing`] or [`Fault::MetadataTooLarge`] if they do not decode to an `M`.
+    /// Returns [`ContainerFault::MissingSection`] if there are no metadata. Returns [`ContainerFault::Metadata`],
+    /// [`ContainerFault::MetadataTrailing`] or [`ContainerFault::MetadataTooLarge`] if they do not decode to an `M`.
     pub fn metadata<M: DeserializeOwned>(&self) -> Result<M, OpenError> {
         let section = self.find(SectionId::META)?;
         let bytes = &self.bytes.as_slice()[section.range()];
@@ -219,10 +221,10 @@ impl File {
     }
 
     fn find(&self, id: SectionId) -> Result<&Section, OpenError> {
-        self.table.find(id).ok_or_else(|| self.error(Fault::MissingSection { section: id }))
+        self.table.find(id).ok_or_else(|| self.error(ContainerFault::MissingSection { section: id }))
     }
 
-    fn error(&self, fault: Fault) -> OpenError {
+    fn error(&self, fault: ContainerFault) -> OpenError {
         OpenError { path: self.path().map(PathBuf::from), fault }
     }
 }

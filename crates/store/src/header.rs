@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::error::Fault;
+use crate::error::ContainerFault;
 use crate::sniff::Looks;
 
 /// The layout number that this crate writes and reads. It defines the header, the table and the
@@ -72,54 +72,54 @@ impl Header {
 
     /// Reads and checks the header of a file of `found` bytes. `head` is the whole file, or at
     /// least its first 64 bytes.
-    pub(crate) fn parse(head: &[u8], found: u64) -> Result<Self, Fault> {
+    pub(crate) fn parse(head: &[u8], found: u64) -> Result<Self, ContainerFault> {
         let start = &head[..head.len().min(MAGIC.len())];
         if start.is_empty() {
-            return Err(Fault::Empty);
+            return Err(ContainerFault::Empty);
         }
         if !MAGIC.starts_with(start) {
             return Err(if start.iter().eq(MAGIC.iter().rev()) {
-                Fault::ByteOrder
+                ContainerFault::ByteOrder
             } else {
-                Fault::NotAContainer { looks: Looks::of(head) }
+                ContainerFault::NotAContainer { looks: Looks::of(head) }
             });
         }
         let Some(bytes) = head.get(..HEADER_LEN) else {
-            return Err(Fault::Truncated { expected: HEADER_LEN as u64, found });
+            return Err(ContainerFault::Truncated { expected: HEADER_LEN as u64, found });
         };
         let header: Self = bytemuck::pod_read_unaligned(bytes);
         if header.layout == LAYOUT.swap_bytes() {
-            return Err(Fault::ByteOrder);
+            return Err(ContainerFault::ByteOrder);
         }
         // The layout is checked before the checksum, because another layout may have the checksum
         // elsewhere.
         if header.layout != LAYOUT {
-            return Err(Fault::Layout { found: header.layout, supported: LAYOUT });
+            return Err(ContainerFault::Layout { found: header.layout, supported: LAYOUT });
         }
         header.check(found)?;
         Ok(header)
     }
 
     /// Checks all fields except magic and layout.
-    fn check(&self, found: u64) -> Result<(), Fault> {
+    fn check(&self, found: u64) -> Result<(), ContainerFault> {
         let computed = self.seal();
         if computed != self.checksum {
-            return Err(Fault::HeaderChecksum { stored: self.checksum, computed });
+            return Err(ContainerFault::HeaderChecksum { stored: self.checksum, computed });
         }
         if self.reserved != [0; 16] {
-            return Err(Fault::Padding { offset: std::mem::offset_of!(Self, reserved) as u64 });
+            return Err(ContainerFault::Padding { offset: std::mem::offset_of!(Self, reserved) as u64 });
         }
         if found < self.length {
-            return Err(Fault::Truncated { expected: self.length, found });
+            return Err(ContainerFault::Truncated { expected: self.length, found });
         }
         if found > self.length {
-            return Err(Fault::TrailingBytes { expected: self.length, found });
+            return Err(ContainerFault::TrailingBytes { expected: self.length, found });
         }
         if !self.length.is_multiple_of(ALIGN as u64) {
-            return Err(Fault::RaggedLength { length: self.length });
+            return Err(ContainerFault::RaggedLength { length: self.length });
         }
         if self.table_end() > self.length {
-            return Err(Fault::TableOutOfBounds {
+            return Err(ContainerFault::TableOutOfBounds {
                 count: self.count,
                 end: self.table_end(),
                 length: self.length,

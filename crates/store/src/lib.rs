@@ -36,7 +36,7 @@ mod words;
 pub use array::Array;
 pub use atomic::replace_file;
 pub use bytes::Bytes;
-pub use error::{Fault, OpenError, WriteError, WriteStep};
+pub use error::{ContainerFault, OpenError, WriteError, WriteStep};
 pub use file::{Check, File};
 pub use flaw::{Flaw, LoadError};
 pub use header::LAYOUT;

@@ -7,7 +7,7 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::error::{Fault, WriteError};
+use crate::error::{ContainerFault, WriteError};
 
 /// Maximum length of the metadata section in bytes: 64 KiB. It is for numbers and names. Data that
 /// grow with the input belong in a section.
@@ -27,15 +27,22 @@ pub(crate) fn encode(value: &impl Serialize) -> Result<Vec<u8>, WriteError> {
 }
 
 /// Decodes the section at `offset`. Bytes left over are an error.
-pub(crate) fn decode<M: DeserializeOwned>(bytes: &[u8], offset: u64) -> Result<M, Fault> {
+pub(crate) fn decode<M: DeserializeOwned>(bytes: &[u8], offset: u64) -> Result<M, ContainerFault> {
     if bytes.len() > METADATA_LIMIT {
-        return Err(Fault::MetadataTooLarge { offset, length: bytes.len() as u64, limit: METADATA_LIMIT });
+        return Err(ContainerFault::MetadataTooLarge {
+            offset,
+            length: bytes.len() as u64,
+            limit: METADATA_LIMIT,
+        });
     }
     let config = bincode::config::standard().with_limit::<CLAIM_LIMIT>();
     let (value, used) = bincode::serde::decode_from_slice(bytes, config)
-        .map_err(|source| Fault::Metadata { offset, source: Box::new(source) })?;
+        .map_err(|source| ContainerFault::Metadata { offset, source: Box::new(source) })?;
     if used != bytes.len() {
-        return Err(Fault::MetadataTrailing { offset: offset + used as u64, count: bytes.len() - used });
+        return Err(ContainerFault::MetadataTrailing {
+            offset: offset + used as u64,
+            count: bytes.len() - used,
+        });
     }
     Ok(value)
 }
@@ -57,7 +64,7 @@ mod tests {
         let value = vec![1_u8; METADATA_LIMIT];
         assert!(matches!(encode(&value), Err(WriteError::MetadataTooLarge { .. })));
         let bytes = vec![0; METADATA_LIMIT + 1];
-        assert!(matches!(decode::<u8>(&bytes, 64), Err(Fault::MetadataTooLarge { offset: 64, .. })));
+        assert!(matches!(decode::<u8>(&bytes, 64), Err(ContainerFault::MetadataTooLarge { offset: 64, .. })));
     }
 
     #[test]
@@ -65,10 +72,13 @@ mod tests {
         let mut bytes = encode(&("name", 3_u32)).unwrap();
         bytes.push(0);
         let trailing = decode::<(String, u32)>(&bytes, 100).unwrap_err();
-        assert!(matches!(trailing, Fault::MetadataTrailing { offset: 106, count: 1 }), "{trailing:?}");
+        assert!(
+            matches!(trailing, ContainerFault::MetadataTrailing { offset: 106, count: 1 }),
+            "{trailing:?}"
+        );
         // 253 precedes a u64: the length of a string of 2^63 bytes.
         let huge = [253, 0, 0, 0, 0, 0, 0, 0, 0x80];
-        assert!(matches!(decode::<String>(&huge, 0), Err(Fault::Metadata { .. })));
-        assert!(matches!(decode::<Vec<u64>>(&huge, 0), Err(Fault::Metadata { .. })));
+        assert!(matches!(decode::<String>(&huge, 0), Err(ContainerFault::Metadata { .. })));
+        assert!(matches!(decode::<Vec<u64>>(&huge, 0), Err(ContainerFault::Metadata { .. })));
     }
 }

@@ -11,7 +11,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::error::Fault;
+use crate::error::ContainerFault;
 use crate::header::{ALIGN, ENTRY_LEN, HEADER_LEN, Header, align_up};
 use crate::id::SectionId;
 
@@ -50,22 +50,22 @@ impl Section {
 
     /// Checks a row of the table. The file has `limit` bytes, and the section must start at
     /// `expected`.
-    fn check(&self, expected: u64, limit: u64) -> Result<(), Fault> {
+    fn check(&self, expected: u64, limit: u64) -> Result<(), ContainerFault> {
         let Self { id: section, offset, length, element_size, .. } = *self;
         if element_size == 0 || !length.is_multiple_of(u64::from(element_size)) {
-            return Err(Fault::ElementSize { section, element_size, length });
+            return Err(ContainerFault::ElementSize { section, element_size, length });
         }
         if !offset.is_multiple_of(ALIGN as u64) {
-            return Err(Fault::Misaligned { section, offset });
+            return Err(ContainerFault::Misaligned { section, offset });
         }
         if offset.checked_add(length).is_none_or(|end| end > limit) {
-            return Err(Fault::OutOfBounds { section, offset, length, limit });
+            return Err(ContainerFault::OutOfBounds { section, offset, length, limit });
         }
         if offset < expected {
-            return Err(Fault::Overlapping { section, offset, taken: expected });
+            return Err(ContainerFault::Overlapping { section, offset, taken: expected });
         }
         if offset > expected {
-            return Err(Fault::Unclaimed { offset: expected, end: offset });
+            return Err(ContainerFault::Unclaimed { offset: expected, end: offset });
         }
         Ok(())
     }
@@ -115,13 +115,13 @@ impl Table {
     /// length.
     ///
     /// Reads no byte behind the table. Takes O(n log n) time for n sections.
-    pub(crate) fn parse(header: &Header, bytes: &[u8]) -> Result<Self, Fault> {
+    pub(crate) fn parse(header: &Header, bytes: &[u8]) -> Result<Self, ContainerFault> {
         let limit = header.length;
         let end = header.table_end();
         let rows = &bytes[span(HEADER_LEN as u64, end)];
         let computed = xxh3_64(rows);
         if computed != header.table_checksum {
-            return Err(Fault::TableChecksum { stored: header.table_checksum, computed });
+            return Err(ContainerFault::TableChecksum { stored: header.table_checksum, computed });
         }
 
         let mut table = Self { sections: Vec::new(), positions: BTreeMap::new(), end };
@@ -130,18 +130,20 @@ impl Table {
             let entry: Entry = bytemuck::pod_read_unaligned(row);
             if entry.reserved != 0 {
                 let row = HEADER_LEN + position * size_of::<Entry>();
-                return Err(Fault::Padding { offset: (row + std::mem::offset_of!(Entry, reserved)) as u64 });
+                return Err(ContainerFault::Padding {
+                    offset: (row + std::mem::offset_of!(Entry, reserved)) as u64,
+                });
             }
             let section = Section::from(entry);
             section.check(expected, limit)?;
             expected = align_up(section.end());
             if table.positions.insert(section.id, position).is_some() {
-                return Err(Fault::DuplicateSection { section: section.id });
+                return Err(ContainerFault::DuplicateSection { section: section.id });
             }
             table.sections.push(section);
         }
         if expected != limit {
-            return Err(Fault::Unclaimed { offset: expected, end: limit });
+            return Err(ContainerFault::Unclaimed { offset: expected, end: limit });
         }
         Ok(table)
     }
@@ -151,13 +153,13 @@ impl Table {
     }
 
     /// Checks the checksum of every section, and zeros in the padding. Reads the whole file once.
-    pub(crate) fn verify(&self, bytes: &[u8]) -> Result<(), Fault> {
+    pub(crate) fn verify(&self, bytes: &[u8]) -> Result<(), ContainerFault> {
         check_padding(bytes, self.end)?;
         for section in &self.sections {
             let computed = xxh3_64(&bytes[section.range()]);
             if computed != section.checksum {
                 let (section, offset, stored) = (section.id, section.offset, section.checksum);
-                return Err(Fault::Checksum { section, offset, stored, computed });
+                return Err(ContainerFault::Checksum { section, offset, stored, computed });
             }
             check_padding(bytes, section.end())?;
         }
@@ -166,10 +168,10 @@ impl Table {
 }
 
 /// Checks for zeros from `offset` up to the next multiple of 64.
-fn check_padding(bytes: &[u8], offset: u64) -> Result<(), Fault> {
+fn check_padding(bytes: &[u8], offset: u64) -> Result<(), ContainerFault> {
     let padding = &bytes[span(offset, align_up(offset))];
     match padding.iter().zip(offset..).find(|&(&byte, _)| byte != 0) {
-        Some((_, offset)) => Err(Fault::Padding { offset }),
+        Some((_, offset)) => Err(ContainerFault::Padding { offset }),
         None => Ok(()),
     }
 }

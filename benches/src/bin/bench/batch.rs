@@ -1,6 +1,7 @@
-//! Many poses of a pair on several threads, and the broad phase of a world of many scans, as Markdown.
+//! Many poses of a pair on several threads, and the broad phase of a world of many scans, as
+//! Markdown.
 //!
-//! Times are the least of some runs.
+//! Each time is the least of several runs.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -21,10 +22,11 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy, BvhWorkspace};
 /// Distances of a sweep.
 const DISTANCES: usize = 13;
 
-/// The radius of a scaled object is about 1; bodies lie so far apart that each is near a handful of others.
+/// Bodies per unit of volume. A scaled object has a radius of about 1, so each body is near a
+/// handful of others.
 const BODIES_A_VOLUME: f64 = 0.125;
 
-/// Poses of a batch that has to end early, and how often it is asked.
+/// Poses of a batch that a deadline ends early, and the number of runs.
 const SHORT_BATCH: usize = 13_000;
 const REPEATS: usize = 1000;
 
@@ -39,16 +41,16 @@ pub(crate) struct Options {
     /// Bodies of the world
     #[arg(long, value_name = "N", default_value_t = 1000)]
     bodies: usize,
-    /// Runs, the fastest of which counts
+    /// Runs; the fastest one counts
     #[arg(long, value_name = "N", default_value_t = 3)]
     runs: usize,
-    /// Numbers of threads
+    /// Thread counts
     #[arg(long, value_name = "N", default_values_t = [1, 2])]
     threads: Vec<usize>,
 }
 
 impl Options {
-    /// The result of the last of some runs, and the time of the fastest.
+    /// Runs `work` several times; returns the last result and the shortest time.
     fn fastest<T>(&self, mut work: impl FnMut() -> T) -> (T, Duration) {
         let (mut result, mut least) = timed(&mut work);
         for _ in 1..self.runs {
@@ -69,7 +71,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     world(&object.name, &scan, &plan, options)
 }
 
-/// The poses of a sweep, in a single list.
+/// Measures the poses of a sweep as one batch.
 fn many_poses(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) -> Result<(), Failure> {
     let sweep = poses::sweep(options.poses.div_ceil(DISTANCES), 1, 0);
     let poses: Vec<[Pose; 2]> = sweep.into_iter().flatten().map(|b| [Pose::IDENTITY, b]).collect();
@@ -107,7 +109,7 @@ fn many_poses(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) ->
     Ok(())
 }
 
-/// How much later than asked for a batch ends, on as many threads as there are.
+/// Measures how far a batch overruns its deadline, with all threads.
 fn deadlines(scan: &Scan, plan: &CollidePlan) {
     println!("| deadline of {SHORT_BATCH} poses | answered | too late by: median | p99 | worst |");
     println!("| --- | --: | --: | --: | --: |");
@@ -134,7 +136,7 @@ fn deadlines(scan: &Scan, plan: &CollidePlan) {
     println!();
 }
 
-/// Whether two scans meet in each pair of poses.
+/// Answers the collision query of each pair of poses.
 fn collide_all(
     [a, b]: [&Scan; 2],
     poses: &[[Pose; 2]],
@@ -148,7 +150,7 @@ fn collide_all(
     });
 }
 
-/// Bodies in a cube, some of them moving.
+/// Measures bodies in a cube, some of which move.
 fn world(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) -> Result<(), Failure> {
     let rng = &mut rng(3);
     let half = 0.5 * (count(options.bodies) / BODIES_A_VOLUME).cbrt();
@@ -223,7 +225,7 @@ fn world(name: &str, scan: &Scan, plan: &CollidePlan, options: &Options) -> Resu
     Ok(())
 }
 
-/// How many pairs of boxes overlap.
+/// The number of pairs of boxes that overlap.
 fn brute_force(boxes: &[Aabb]) -> usize {
     let overlap = |a: &Aabb, b: &Aabb| (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k]);
     let of_one = |i: usize| boxes[..i].iter().filter(|other| overlap(&boxes[i], other)).count();

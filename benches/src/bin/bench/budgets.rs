@@ -1,7 +1,8 @@
-//! Budgets against wrong answers: the same leaf test in every order.
+//! Wrong answers by budget: the same leaf test in every order.
 //!
-//! The answer is the best effort, what is likelier where the budget ended the search; it is held against the
-//! meshes, or, where an object has none, against the search to the end. Poses are within 10 r of first touch.
+//! If the budget ends the search, the best effort (the likelier verdict) counts. It is compared
+//! with the meshes or, if an object has none, with the unlimited search. Poses are within 10 r of
+//! first touch.
 
 use std::time::Duration;
 
@@ -14,7 +15,7 @@ use nearmiss_benches::rivals::ours::Ours;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
 
-/// Units of work; an evaluation of f′ counts as one as well.
+/// Units of work. An evaluation of f′ counts as one unit too.
 const WORK: [u64; 9] = [1, 4, 16, 32, 64, 128, 256, 1024, 4096];
 
 /// Times, in microseconds.
@@ -28,7 +29,7 @@ pub(crate) struct Arguments {
     /// Poses near contact
     #[arg(long, value_name = "N", default_value_t = 1000)]
     near: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 3)]
     seed: u64,
 }

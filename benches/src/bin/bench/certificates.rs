@@ -1,9 +1,9 @@
 //! Certified separations of small shapes in random poses, against the exact distance.
 //!
-//! A ball is put at random beside a shape of each family. Its exact surface meets the shape's when the
-//! distance of its centre from the shape is at most its radius; less than that is the depth. It fails if a
-//! separation deeper than 0.3 r is certified, or a certified gap is larger than the exact one by more than
-//! 0.3 r.
+//! A ball is placed at random beside a shape of each family. Their exact surfaces intersect if the
+//! distance of the ball's centre from the shape is at most its radius; the difference is the depth.
+//! The program fails if a separation deeper than 0.3 r is certified, or a certified gap exceeds the
+//! exact one by more than 0.3 r.
 
 use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Detail, Evidence, Pair, PointCloud, Pose, Scan, Scratch,
@@ -14,10 +14,11 @@ use nearmiss_testdata::arbitrary::{point_in, rng, rotation, unit_vector};
 use nearmiss_testdata::shapes::{Form, Sampling, Shape, bars, bowl, cuboid, patch, plates, scorer_radius};
 use nearmiss_testdata::shapes::{shells, sphere, step, torus};
 
-/// Of the ball, whose curvature the shapes' samples resolve as they do their own.
+/// Radius of the ball. Its samples resolve its curvature as well as the shapes' samples resolve
+/// theirs.
 const BALL: f64 = 0.4;
 
-/// Certificates and verdicts where the gap, in r, is at least so much.
+/// Lower limits of the gap, in r, of the rows of the table.
 const EDGES: [f64; 9] = [f64::NEG_INFINITY, -1.0, -0.3, 0.0, 1.0, 2.0, 3.0, 4.0, 6.0];
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -51,7 +52,7 @@ pub(crate) struct Arguments {
     /// Poses of the ball, over all families
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     poses: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -77,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Asks `count` poses of one family; how many certificates are false.
+/// Queries `count` poses of one family; returns the number of false certificates.
 fn one_family(name: &str, form: Form, count: usize, seed: u64, rows: &mut [Row]) -> Result<u64, Failure> {
     let mut random = rng(seed);
     let sample = |form: Form, n: u32| {
@@ -96,7 +97,7 @@ fn one_family(name: &str, form: Form, count: usize, seed: u64, rows: &mut [Row])
         let centre = if i % 4 == 0 {
             point_in(&mut random, 1.3 * size + BALL)
         } else {
-            // About a sample, from deep inside the ball to 8 r beside it.
+            // Around a sample: from deep inside the ball to 8 r beside it.
             let sample = shape.points[i % shape.points.len()];
             let along = unit_vector(&mut random);
             let away = BALL + r * (2.5 + 5.5 * point_in(&mut random, 1.0)[0]);

@@ -1,9 +1,9 @@
-//! The clearance of an object that moves through a scan: bounds, the nearest points, and what each answer
-//! takes.
+//! The clearance of an object that moves through a scan: bounds, the nearest points, and the time
+//! of each answer.
 //!
-//! The object's centre goes straight from one place to the other while it turns about a fixed axis. At each
-//! step the distance is asked with and the verdict with certified evidence, and hinted by the step before;
-//! the exact distance of the nearest points is the truth that no upper bound may exceed.
+//! The centre of the object moves in a straight line while the object turns about a fixed axis.
+//! Each step queries the distance, and a certified verdict with the hint of the previous step. No
+//! upper bound may exceed the exact distance of the nearest points.
 
 use std::fs;
 use std::path::PathBuf;
@@ -26,22 +26,22 @@ pub(crate) struct Arguments {
     scan: String,
     /// The object that moves
     object: String,
-    /// Where the centre of the object starts
+    /// Start of the object's centre
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     from: [f64; 3],
-    /// Where it ends
+    /// End of the object's centre
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     to: [f64; 3],
-    /// The longest side that the object is scaled to; by default it keeps its own
+    /// The longest side that the object is scaled to; by default it keeps its size
     #[arg(long, value_name = "S")]
     size: Option<f64>,
     /// Steps on the path
     #[arg(long, value_name = "N", default_value_t = 200)]
     steps: usize,
-    /// By how much the object turns on the way
+    /// The angle by which the object turns on the path
     #[arg(long, value_name = "DEGREES", default_value_t = 180.0, allow_negative_numbers = true)]
     turn: f64,
-    /// Where to write a figure
+    /// File to write a figure to
     #[arg(long, value_name = "OUT.svg")]
     image: Option<PathBuf>,
 }
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The coordinates of a place.
+/// Parses the coordinates of a point.
 fn place(text: &str) -> Result<[f64; 3], String> {
     let numbers = text.split(',').map(str::parse).collect::<Result<Vec<f64>, _>>();
     match numbers.as_deref() {
@@ -80,7 +80,7 @@ fn place(text: &str) -> Result<[f64; 3], String> {
     }
 }
 
-/// Places on the path, with what was found there.
+/// Values over the position on the path.
 type Curve = Vec<[f64; 2]>;
 
 /// The bounds, times and verdicts along a path.
@@ -88,15 +88,15 @@ type Curve = Vec<[f64; 2]>;
 struct Found {
     lower: Curve,
     upper: Curve,
-    /// Of the nearest points.
+    /// Distance of the nearest points.
     nearest: Curve,
-    /// Microseconds of a distance.
+    /// Microseconds of a distance query.
     distances: Curve,
     /// Microseconds of a hinted verdict.
     verdicts: Curve,
     touching: usize,
     certified: usize,
-    /// Bounds above the distance of the nearest points.
+    /// Upper bounds that exceed the distance of the nearest points.
     wrong: usize,
 }
 

@@ -1,10 +1,14 @@
-//! What samples and sphere coverings are worth: how tight, how right, what they exclude.
+//! Samples and sphere coverings: tightness, correctness, and the share of node pairs that they
+//! prune.
 //!
-//! Of each level of each object, over some of its nodes: the covering radius beside the one that the paper's
-//! growth alone ends with; the volume of the balls over that of the hulls and of the enclosures; the sampling
-//! radius as it is stored, as it is on projected surface points, and by eq. 10. Then a million (`--points`)
-//! surface points against the coverings of their leaves and all nodes above; and how many pairs of nodes,
-//! whose boxes overlap, coverings exclude. It fails if a surface point is outside.
+//! For some nodes of each level of each object it measures the following. The covering radius is
+//! compared with the radius that the paper's growth ends with. The volume of the balls is compared
+//! with that of the hulls and of the enclosures. The stored sampling radius is compared with its
+//! value on projected surface points and by eq. 10.
+//!
+//! Then a million (`--points`) surface points are tested against the coverings of their leaves and
+//! all ancestors. The last table counts the node pairs with overlapping boxes that coverings prune.
+//! The program fails if a surface point lies outside.
 
 use std::hint::black_box;
 
@@ -29,25 +33,25 @@ pub(crate) struct Arguments {
     effort: Effort,
 }
 
-/// How much is drawn.
+/// Numbers of samples, points, nodes and poses to measure.
 #[derive(Debug, Clone, Copy, clap::Args)]
 struct Effort {
     /// Samples of a node
     #[arg(long, value_name = "N", default_value_t = BuildOptions::default().samples)]
     samples: u32,
-    /// Surface points that are held against the coverings
+    /// Surface points that are tested against the coverings
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     points: usize,
-    /// Nodes of a level that are measured
+    /// Nodes to measure per level
     #[arg(long, value_name = "N", default_value_t = 24)]
     nodes: usize,
-    /// Places drawn for the volumes of a node
+    /// Random points for the volumes of a node
     #[arg(long, value_name = "N", default_value_t = 4000)]
     draws: usize,
     /// Poses at each distance of the sweep
     #[arg(long, value_name = "N", default_value_t = 4)]
     poses: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -85,8 +89,9 @@ fn bytes(scan: &Scan) {
     );
 }
 
-/// Projects random places near the scan; how many of those that are surface are in no ball of some node that
-/// has their nearest point, and for each node how far the furthest is from its samples.
+/// Projects random points near the scan onto the surface. Returns the number of nodes with a
+/// surface point outside their balls, and for each node the greatest distance of its surface points
+/// from its samples. A surface point belongs to the nodes that contain its nearest scan point.
 fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Failure> {
     let slices = scan.slices();
     let tree: ImmutableKdTree<f64, 3> = {
@@ -127,7 +132,7 @@ fn surface_points(scan: &Scan, effort: Effort) -> Result<(usize, Vec<f64>), Fail
     Ok((outside, radii))
 }
 
-/// For each node its depth.
+/// The depth of each node.
 fn depths(slices: &Slices<'_>) -> Vec<usize> {
     let mut depths = vec![0; slices.tree.topology().len()];
     let topology = slices.tree.topology();
@@ -189,12 +194,12 @@ fn levels(scan: &Scan, effort: Effort, projected: &[f64]) {
     }
 }
 
-/// Pairs of nodes whose boxes overlap, and what coverings say of them.
+/// Counts of node pairs with overlapping boxes: all of them, and those that coverings prune.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pairs {
     inner: [usize; 2],
     leaves: [usize; 2],
-    /// Not even their enclosures part them; with the surface excluded.
+    /// Pairs with overlapping enclosures, and those of them that coverings of the surface prune.
     enclosed: [usize; 2],
 }
 
@@ -202,14 +207,14 @@ struct Descent<'a> {
     a: Slices<'a>,
     b: Slices<'a>,
     motion: Relative,
-    /// Whether what coverings part is left out.
+    /// `true` if pairs that coverings prune are not descended into.
     excludes: bool,
     pairs: Pairs,
     seen: Vec<NodePair>,
 }
 
 impl Descent<'_> {
-    /// Both nodes of each pair whose boxes meet are replaced by their children.
+    /// Visits the pairs of nodes with overlapping boxes; the children of both nodes replace a pair.
     fn run(&mut self) {
         let mut open = vec![NodePair::ROOTS];
         while let Some(pair) = open.pop() {

@@ -1,9 +1,9 @@
-//! What the curves of pairs of objects cost, by spacing; beside it, finding the contacts that they start
-//! from, and the rival that follows no curve: Newton's method from every contact, which gives points in no
-//! order.
+//! The cost of curves of intersection of pairs of objects, by spacing. Beside it the search for the
+//! contacts that the curves start from, and a rival that follows no curve: Newton's method from
+//! every contact, which gives points in no order.
 //!
-//! Objects come in pairs, each scaled to a longest side of 2, the second of a pair turned a little and
-//! shifted along x.
+//! Objects come in pairs, each scaled to a longest side of 2. The second of a pair is turned a
+//! little and shifted along x.
 
 use nearmiss::surface::meet;
 use nearmiss::{
@@ -14,7 +14,7 @@ use nearmiss_benches::clock::{nanoseconds, processor_time, timed};
 use nearmiss_benches::object::Object;
 use nearmiss_benches::{Failure, machine};
 
-/// Spacings, in lesser sampling radii.
+/// Spacings, in units of the smaller sampling radius.
 const SPACINGS: [f64; 4] = [8.0, 2.0, 1.0, 0.25];
 
 #[derive(Debug, clap::Args)]
@@ -22,10 +22,10 @@ pub(crate) struct Arguments {
     /// Pairs of objects
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
-    /// By how much the second of a pair is shifted along x
+    /// Shift of the second object of a pair along x
     #[arg(long, value_name = "X", default_value_t = 0.25, allow_negative_numbers = true)]
     shift: f64,
-    /// Passes, the least time of which counts
+    /// Passes; the least time counts
     #[arg(long, value_name = "N", default_value_t = 50)]
     passes: u32,
 }
@@ -104,7 +104,7 @@ fn measure(pair: &str, [a, b]: &[Placed<'_>; 2], passes: u32) -> Result<(), Fail
     Ok(())
 }
 
-/// The least time of some passes, and the processor time of one, in milliseconds.
+/// The least time of several passes and the processor time per pass, both in milliseconds.
 fn time(passes: u32, mut work: impl FnMut()) -> String {
     let start = processor_time();
     let least = (0..passes).map(|_| nanoseconds(timed(&mut work).1) / 1e6).fold(f64::INFINITY, f64::min);

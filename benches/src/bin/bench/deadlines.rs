@@ -1,8 +1,7 @@
-//! How late queries with a deadline come back, beside a loop that does nothing but look at the clock until
-//! then.
+//! Overruns of queries with a deadline, beside a loop that only reads the clock until then.
 //!
-//! The spin and the queries take turns, so that both have the same machine. Only queries that a deadline
-//! ended count.
+//! The loop and the queries take turns, so both run under the same load. Only queries that a
+//! deadline ended count.
 
 use std::time::{Duration, Instant};
 
@@ -18,13 +17,13 @@ use nearmiss_benches::{Failure, machine, poses};
 /// Deadlines, in microseconds from the start of the query.
 const MICROS: [u64; 6] = [20, 50, 100, 200, 500, 1000];
 
-/// Runs of which the least stretch counts.
+/// Runs per pose; the least stretch counts.
 const REPEATS: usize = 5;
 
-/// Poses that are run so.
+/// Poses whose stretch is measured.
 const STRETCHED: usize = 100;
 
-/// Time for either run: longer ones meet the machine in each.
+/// Time limit of a run of the loop or of a query. It is short, so that other load meets both alike.
 const LONG: Duration = Duration::from_millis(1);
 
 #[derive(Debug, clap::Args)]
@@ -32,10 +31,10 @@ pub(crate) struct Arguments {
     /// Object to measure: a file, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(default_value = "dragon-23k")]
     object: String,
-    /// Queries of a row of the table
+    /// Queries per row of the table
     #[arg(long, value_name = "N", default_value_t = 4000)]
     queries: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 4)]
     seed: u64,
 }
@@ -115,7 +114,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The longest time that a query does not look at the clock, in microseconds.
+/// The longest time between two clock reads of a query, in microseconds.
 fn stretch(scan: &Scan, plan: &CollidePlan, pose: &Pose) -> f64 {
     let mut scratch = Scratch::default();
     let ask = |scratch: &mut Scratch| {
@@ -134,7 +133,7 @@ fn flat(method: Method) -> Method {
     }
 }
 
-/// Microseconds since an instant, negative before it.
+/// Microseconds since an instant; negative if the instant is in the future.
 fn micros_since(then: Instant) -> f64 {
     let now = now();
     let late = now.saturating_duration_since(then).as_secs_f64();

@@ -1,7 +1,7 @@
-//! How far two copies of an object are apart, over the poses of the sweep: what that costs, and what it
-//! tells. Beside it the rival: the nearest point of one copy for each point of the other, by kiddo.
+//! Distance of two copies of an object over the poses of the sweep: time, bounds and work. The
+//! rival is kiddo's search for the nearest point of one copy for each point of the other.
 //!
-//! Times are the least of three askings of a pose, not one after the other.
+//! Each time is the least of three queries of a pose, which do not follow each other directly.
 
 use std::hint::black_box;
 
@@ -14,7 +14,7 @@ use nearmiss_benches::rivals::kiddo::PointScan;
 use nearmiss_benches::sample::{Sample, count};
 use nearmiss_benches::{Failure, machine, poses};
 
-/// Times a pose is asked.
+/// Queries per pose.
 const ASKINGS: usize = 3;
 
 #[derive(Debug, clap::Args)]
@@ -25,19 +25,19 @@ pub(crate) struct Options {
     /// Poses at each distance
     #[arg(long, value_name = "N", default_value_t = 200)]
     per_distance: usize,
-    /// Passes, each over poses of its own
+    /// Passes, each with new poses
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u64,
-    /// Poses at each distance that the rival is asked about
+    /// Poses at each distance for the rival
     #[arg(long, value_name = "N", default_value_t = 2)]
     rival_poses: usize,
-    /// The index of the first distance
+    /// Index of the first distance
     #[arg(long, value_name = "I", default_value_t = 0)]
     from: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Threads that prepare the scan; 0 means all
+    /// Threads that preprocess the scan; 0 means all
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
 }
@@ -78,7 +78,7 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The poses of each distance, asked in turn.
+/// Queries the poses of each distance in turn.
 fn columns(options: &Options, per_distance: usize, mut ask: impl FnMut(&Pose) -> Distance) -> Vec<Column> {
     let mut columns: Vec<Column> = Vec::new();
     columns.resize_with(poses::DISTANCES, Column::default);

@@ -1,6 +1,7 @@
-//! Solvers of the symmetric 3×3 eigenproblem: time, and errors over families of matrices, as one table.
+//! Solvers of the symmetric 3×3 eigenproblem: time, and errors over families of matrices, as one
+//! table.
 //!
-//! Every repeat asks each solver once, in turn, so that what else the machine does meets all of them.
+//! Every repeat runs each solver once, in turn, so that other load affects all of them.
 
 use std::hint::black_box;
 
@@ -11,24 +12,24 @@ use nearmiss_benches::sample::{count, quantile};
 use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::matrices::{Family, orthogonality_error, residual};
 
-/// Problems timed together: with their answers they fit the first cache.
+/// Problems timed together. With their results they fit into the L1 cache.
 const TOGETHER: usize = 192;
 
-/// Passes over them in one measurement.
+/// Passes over the problems per measurement.
 const PASSES: u32 = 10;
 
-/// Points of a real neighbourhood, its own included.
+/// Points of a real neighbourhood, including the point itself.
 const NEAR: usize = 20;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// The object whose neighbourhoods are solved for
+    /// The object whose neighbourhoods give the matrices
     #[arg(default_value = "dragon-5k")]
     object: String,
-    /// Repeats, the median of which counts
+    /// Repeats; the median counts
     #[arg(long, value_name = "N", default_value_t = 201)]
     repeats: usize,
-    /// Matrices of a family
+    /// Matrices per family
     #[arg(long, value_name = "N", default_value_t = 20_000)]
     count: u32,
 }
@@ -64,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Median nanoseconds a problem of each solver.
+/// Median nanoseconds per problem, for each solver.
 fn times(solvers: &mut [Box<dyn Contender>], matrices: &[[f64; 6]], repeats: usize) -> Vec<f64> {
     let matrices = &matrices[..matrices.len().min(TOGETHER)];
     for solver in solvers.iter_mut() {
@@ -90,7 +91,7 @@ fn times(solvers: &mut [Box<dyn Contender>], matrices: &[[f64; 6]], repeats: usi
         .collect()
 }
 
-/// Prints a row of worst errors.
+/// Prints a table row of the worst errors.
 fn errors(what: &str, matrices: &[[f64; 6]], solvers: &mut [Box<dyn Contender>]) {
     let cells = solvers.iter_mut().map(|solver| {
         solver.take(matrices);

@@ -1,5 +1,5 @@
-//! What one evaluation of f costs: at a leaf, and anywhere, by instruction set; beside it kiddo's search for
-//! as many nearest points as are added up.
+//! The cost of one evaluation of f, at a leaf and anywhere, by instruction set. Beside it kiddo's
+//! search for as many nearest points as are summed.
 
 use std::hint::black_box;
 use std::num::NonZero;
@@ -15,19 +15,20 @@ use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{point_in, rng};
 
-/// Places in a run.
+/// Evaluations in a run.
 const PLACES: usize = 1 << 14;
 
-/// Places that are timed together.
+/// Evaluations that are timed together.
 const STRETCH: usize = 256;
 
-/// Evaluations at places about one point, as a projection asks them.
+/// Evaluations around one point, as in a projection.
 const TOGETHER: usize = 8;
 
-/// A place and the stored point it is about.
+/// A stored point and a position near it.
 type Place = (usize, [f64; 3]);
 
-/// `TOGETHER` places about each of some points spread over the scan, within half the local radius of them.
+/// `TOGETHER` positions around each of some points spread over the scan, within half their local
+/// radius.
 fn places(scan: &Scan) -> Vec<Place> {
     let rng = &mut rng(1);
     let step = 7919 % scan.len();
@@ -43,8 +44,8 @@ fn places(scan: &Scan) -> Vec<Place> {
         .collect()
 }
 
-/// Mean ns a place: of each stretch of places the least of `runs` times, which no other work on the machine
-/// makes longer.
+/// Mean nanoseconds per evaluation. For each stretch the least of `runs` times counts, which
+/// removes most of the load of other programs.
 fn time(places: &[Place], runs: usize, mut ask: impl FnMut(&Place) -> f64) -> f64 {
     let stretches: Vec<&[Place]> = places.chunks(STRETCH).collect();
     let mut least = vec![f64::INFINITY; stretches.len()];
@@ -58,7 +59,7 @@ fn time(places: &[Place], runs: usize, mut ask: impl FnMut(&Place) -> f64) -> f6
     least.into_iter().sum::<f64>() * 1e9 / count(places.len())
 }
 
-/// The instruction sets that can be chosen here, the best first.
+/// The instruction sets available here, the best first.
 fn levels() -> Vec<(&'static str, Level)> {
     let best = Level::new();
     let mut levels = vec![("best", best)];
@@ -73,7 +74,7 @@ fn levels() -> Vec<(&'static str, Level)> {
     levels
 }
 
-/// How many balls of a group hold `x`.
+/// The number of points of a group whose support contains `x`.
 fn heard(group: &PointBlock, x: [f64; 3]) -> usize {
     let distance_sq =
         |i: usize| (0..3).map(|k| (f64::from(group.position[k][i]) - x[k]).powi(2)).sum::<f64>();
@@ -83,7 +84,7 @@ fn heard(group: &PointBlock, x: [f64; 3]) -> usize {
 fn measure(object: &Object, runs: usize) -> Result<(), Failure> {
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     let near = places(&scan);
-    // As a stranger would ask: none near the one before.
+    // Independent queries: no position is near the previous one.
     let mut apart: Vec<Place> = near.iter().step_by(TOGETHER).copied().collect();
     apart.extend(near.iter().skip(3).step_by(TOGETHER));
     let mut scratch = GatherScratch::default();
@@ -136,7 +137,7 @@ pub(crate) struct Arguments {
     /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(value_name = "OBJECT", default_values = ["dragon-5k", "dragon-23k"])]
     objects: Vec<String>,
-    /// Runs, the fastest of which counts
+    /// Runs; the fastest one counts
     #[arg(long, value_name = "N", default_value_t = 21)]
     runs: usize,
 }

@@ -1,4 +1,4 @@
-//! What follows from proximity graphs: oriented normals, close pairs, coarser levels, the geodesic kernel.
+//! Results of proximity graphs: oriented normals, close pairs, coarser levels, the geodesic kernel.
 //! Speed, size and accuracy.
 
 use std::hint::black_box;
@@ -18,7 +18,7 @@ use nearmiss_testdata::arbitrary::{point_in, rng};
 use nearmiss_testdata::oracle::{Signs, falls, winding};
 use nearmiss_testdata::shapes::{Order, Sampling, plates};
 
-/// The least time of `runs` of `work`, in seconds, and what it returned last.
+/// Runs `work` `runs` times; returns its last result and its least time in seconds.
 fn least<T>(runs: usize, mut work: impl FnMut() -> T) -> (T, f64) {
     let (mut result, mut best) = timed(&mut work);
     for _ in 1..runs {
@@ -36,7 +36,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Sums of the normals of the faces about each vertex.
+/// Sums of the normals of the faces around each vertex.
 fn vertex_normals(mesh: &TriangleMesh) -> Vec<[f64; 3]> {
     let mut normals = vec![[0.0; 3]; mesh.vertices().len()];
     for corners in mesh.triangles() {
@@ -52,7 +52,7 @@ fn vertex_normals(mesh: &TriangleMesh) -> Vec<[f64; 3]> {
     normals
 }
 
-/// Orients the normals, and compares them with the mesh where there is one.
+/// Orients the normals and compares them with the mesh, if there is one.
 fn orientation(object: &Object, scan: &Scan, graph: &PointGraph, runs: usize) {
     let ((normals, found), time) = least(runs, || {
         let mut normals = scan.normals().to_vec();
@@ -74,8 +74,8 @@ fn orientation(object: &Object, scan: &Scan, graph: &PointGraph, runs: usize) {
     }
 }
 
-/// Counts normals that point into the mesh, and those that lean to the other side than its faces about the
-/// vertex do in sum.
+/// Counts normals that point into the mesh, and normals opposed to the sum of the face normals
+/// around their vertex.
 fn against(mesh: &TriangleMesh, scan: &Scan, normals: &[[f32; 3]], confidence: &[u8]) {
     let mut at_vertices = vec![[0.0; 3]; mesh.vertices().len()];
     for (normal, &source) in normals.iter().zip(scan.source()) {
@@ -134,7 +134,7 @@ fn close_pairs(scan: &Scan, graph: &PointGraph, runs: usize) {
     }
 }
 
-/// Paths to the furthest that are heard, and how far the stored distances are from theirs.
+/// Measures paths to the furthest close point of each point, and the error of the stored distances.
 fn paths_of(pairs: &ClosePairs, network: Network<'_>, runs: usize) {
     let ends: Vec<([u32; 2], f32)> = (0..pairs.len())
         .step_by(pairs.len() / 4096 + 1)
@@ -159,7 +159,7 @@ fn paths_of(pairs: &ClosePairs, network: Network<'_>, runs: usize) {
     );
 }
 
-/// Builds the levels, and compares distances with those that a search of the whole finds.
+/// Builds the levels and compares their distances with those of a search of the whole graph.
 fn levels(scan: &Scan, graph: &PointGraph, runs: usize, pairs: usize) {
     let n = scan.len();
     let lengths = edge_lengths(graph.edges(), scan.positions());
@@ -206,7 +206,7 @@ fn levels(scan: &Scan, graph: &PointGraph, runs: usize, pairs: usize) {
     );
 }
 
-/// One evaluation near points of the scan, with either kernel.
+/// Measures one evaluation near points of the scan, with either kernel.
 fn kernels(scan: &Scan, graph: &PointGraph, runs: usize) {
     let lengths = edge_lengths(graph.edges(), scan.positions());
     let pairs = ClosePairs::build(Network::new(graph.edges(), &lengths), &horizons(scan), Paths::Rebuilt);
@@ -257,7 +257,8 @@ fn measure(object: &Object, runs: usize, pairs: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How far the sheets that a kernel shows are from the plates, in bandwidths, and how many places show one.
+/// Distances of the recovered sheets from the plates, in bandwidths, and the number of projections
+/// that reach one.
 #[derive(Debug, Clone, Copy, Default)]
 struct Recovered {
     off: f64,
@@ -265,7 +266,7 @@ struct Recovered {
 }
 
 impl Recovered {
-    /// Projects onto the surface from a place on a plate.
+    /// Projects a point of a plate onto the recovered surface.
     fn add(&mut self, start: [f64; 3], at: impl FnMut([f64; 3]) -> Evaluation, h: f64) {
         let mut at = at;
         let foot = project(start, &mut at);
@@ -276,7 +277,8 @@ impl Recovered {
     }
 }
 
-/// Two parallel plates, evenly and randomly sampled, at `gap` bandwidths: what both kernels make of them.
+/// Reconstructs two parallel plates, evenly or randomly sampled, `gap` bandwidths apart, with both
+/// kernels.
 fn two_plates(gap: f64, order: Order) -> Result<[Recovered; 2], Failure> {
     const SPACING: f64 = 0.05;
     let sample = |distance: f64| {
@@ -329,13 +331,13 @@ pub(crate) struct Arguments {
     /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(value_name = "OBJECT", default_values = ["dragon-5k", "dragon-23k"])]
     objects: Vec<String>,
-    /// Runs, the fastest of which counts
+    /// Runs; the fastest one counts
     #[arg(long, value_name = "N", default_value_t = 3)]
     runs: usize,
     /// Pairs of points whose distances are compared
     #[arg(long, value_name = "N", default_value_t = 200)]
     pairs: usize,
-    /// Show what both kernels make of two sheets instead
+    /// Compare both kernels on two parallel plates instead
     #[arg(long)]
     plates: bool,
 }

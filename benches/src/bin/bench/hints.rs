@@ -1,4 +1,4 @@
-//! What hints are worth: small motions near contact, each pose asked with a hint and without.
+//! Benefit of hints: small motions near contact, each pose queried with a hint and without.
 
 use nearmiss::{
     BuildOptions, CollideOptions, CollidePlan, Detail, Evidence, Pair, PairHint, Pose, Scan, Scratch,
@@ -9,7 +9,7 @@ use nearmiss_benches::sample::{Sample, count};
 use nearmiss_benches::{Failure, machine, poses};
 use nearmiss_testdata::arbitrary::{rng, unit_vector};
 
-/// Steps of a walk, in r: shift and turn together move the furthest point about so far.
+/// Steps of a walk, in r: translation and rotation together move the furthest point by about this.
 const STEPS: [f64; 5] = [0.01, 0.1, 0.3, 1.0, 3.0];
 
 #[derive(Debug, clap::Args)]
@@ -20,10 +20,10 @@ pub(crate) struct Arguments {
     /// Walks from poses near contact
     #[arg(long, value_name = "N", default_value_t = 200)]
     walks: usize,
-    /// Steps of a walk
+    /// Steps per walk
     #[arg(long, value_name = "N", default_value_t = 60)]
     steps: u32,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 5)]
     seed: u64,
 }
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Times by whether the scans meet, cold and hinted.
+/// Times for intersecting and for separate poses, cold and hinted.
 #[derive(Debug, Default)]
 struct Walked {
     times: [[Sample; 2]; 2],
@@ -78,7 +78,7 @@ impl Walked {
         let (mut hint, mut cold, mut warm) = (PairHint::default(), Scratch::default(), Scratch::default());
         let from = start.translation();
         for i in 0..steps {
-            // Half of the step is a turn, which moves points one unit away.
+            // Half of the step is a rotation, which moves points at distance one by that much.
             let way = 0.5 * step * f64::from(i);
             let turned = Pose::from_axis_angle(heading, way).after(&start.with_translation([0.0; 3]));
             let pose = turned.with_translation([0, 1, 2].map(|k| from[k] + heading[k] * way));

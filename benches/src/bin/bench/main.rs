@@ -58,9 +58,9 @@ enum Command {
     Geodesics(geodesics::Arguments),
     /// Time that hints save in small motions near contact
     Hints(hints::Arguments),
-    /// How fast files of points are read
+    /// The speed of reading point files
     Reading(reading::Options),
-    /// How useful answers about real scans are
+    /// Decided and certified shares on real scans
     Scans(scans::Options),
     /// Spheres, capsules and boxes against the points of a scan
     Shapes(shapes::Arguments),

@@ -1,5 +1,5 @@
-//! How fast files are read: in pieces, with a check that coordinates are finite, without the removal of
-//! duplicates; and whole, with it.
+//! The speed of reading files: in pieces, with a check for finite coordinates and without removal
+//! of duplicates, and whole, with removal.
 
 use std::path::PathBuf;
 
@@ -12,12 +12,12 @@ pub(crate) struct Options {
     /// Files of points
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// How often each is read; the shortest time counts
+    /// Reads per file; the shortest time counts
     #[arg(long, value_name = "N", default_value_t = 3)]
     runs: u32,
 }
 
-/// Bytes that are read at a time.
+/// Bytes per read.
 const BLOCK: usize = 1 << 20;
 
 pub(crate) fn run(options: &Options) -> Result<(), Failure> {
@@ -47,7 +47,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How many points there are, and how many of them are finite.
+/// The number of points, and how many of them are finite.
 fn in_pieces(file: &PathBuf) -> Result<(u64, u64), Failure> {
     let (mut points, mut finite) = (0, 0);
     match read_in_pieces(file, None, BLOCK)? {

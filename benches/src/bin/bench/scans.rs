@@ -1,10 +1,11 @@
-//! How useful answers about real scans are: an object at random poses in a room, a LiDAR frame, a facade.
+//! Decided and certified shares on real scans: an object at random poses in a room, a LiDAR frame,
+//! a façade.
 //!
-//! The object, 1/25 of a scan's diagonal long unless told otherwise, is placed at random within the scan's
-//! bounds. Truth is the exact distance of the nearest two points. Everything is measured in *local spacings*:
-//! the greater of the distances from either of these two points to its sixth distinct neighbour in its own
-//! scan, times the pose's scale. Each pose is asked once for a verdict with certified evidence and once for
-//! the distance, in passes of their own.
+//! The object is placed at random within the scan's bounds; by default it is 1/25 of the scan's
+//! diagonal long. The truth is the exact distance of the nearest two points. Lengths are given in
+//! *local spacings*. The local spacing is the greater of the distances from either of these two
+//! points to its sixth distinct neighbour in its own scan, times the scale of the pose. Each pose
+//! is queried once for a certified verdict and once for the distance, in separate passes.
 
 use std::hint::black_box;
 
@@ -21,7 +22,7 @@ use nearmiss_benches::{Failure, machine};
 use nearmiss_testdata::arbitrary::{rng, rotation, unit_vector};
 use rand::RngExt;
 
-/// From this many local spacings on a separation is to be certified.
+/// Separations of at least this many local spacings should be certified.
 const FAR: f64 = 6.0;
 
 /// The object's longest side over the scan's diagonal.
@@ -41,7 +42,7 @@ pub(crate) struct Options {
     /// Poses of the object
     #[arg(long, value_name = "N", default_value_t = 150)]
     poses: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// The reach that the scan is built with; by default it is estimated
@@ -53,7 +54,7 @@ pub(crate) struct Options {
     /// Hinted steps from each pose
     #[arg(long, value_name = "N", default_value_t = 200)]
     steps: usize,
-    /// Name the poses that fall short
+    /// List the poses with uncertified separations, loose bounds or distant contacts
     #[arg(long)]
     listed: bool,
 }
@@ -72,9 +73,9 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
 /// The truth about a pose, by brute force.
 struct Truth {
     pose: Pose,
-    /// Of the nearest two points.
+    /// Distance of the nearest two points.
     distance: f64,
-    /// The local spacing there.
+    /// The local spacing at these points.
     spacing: f64,
 }
 
@@ -113,7 +114,7 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
         let mut ask = || timed(|| black_box(Pair::new(va, *black_box(&vb)).distance(&plan, &mut scratch)));
         let (found, time) = ask();
         distances.push(nanoseconds(time));
-        // As a planner asks about nearly the same pose: what it looks at is in the cache.
+        // A planner queries nearly the same pose again, so its data is in the cache.
         again.push((0..2).map(|_| nanoseconds(ask().1)).fold(f64::INFINITY, f64::min));
         count_distance(&found, truth, &mut score);
         if options.listed && truth.distance >= FAR * truth.spacing && found.lower < 0.5 * truth.distance {
@@ -149,7 +150,7 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Asks for a verdict in every pose; returns the times of those that are far from contact.
+/// Queries the verdict of every pose; returns the times of the poses far from contact.
 fn verdicts(
     [a, b]: [&Scan; 2],
     truths: &[Truth],
@@ -201,7 +202,7 @@ fn count_distance(found: &Distance, truth: &Truth, score: &mut Score) {
     score.upper_above += usize::from(found.upper > truth.distance + rounding);
 }
 
-/// Random poses of the object, with the exact distances of points.
+/// Random poses of the object with the exact distances of the points.
 fn truths(
     scan: &PointCloud,
     body: &PointCloud,
@@ -224,8 +225,8 @@ fn truths(
     Ok(truths.collect())
 }
 
-/// The mean time of a question with a hint, the object moving in steps of `--step` from those poses that are
-/// clear.
+/// The mean time of a hinted query while the object moves in steps of `--step` from the clear
+/// poses.
 fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Result<f64, Failure> {
     let asked = CollideOptions::default().with_evidence(Evidence::Certified).with_detail(Detail::Verdict);
     let plan = CollidePlan::new(&asked, a, b)?;
@@ -237,7 +238,7 @@ fn hinted_step(a: &Scan, b: &Scan, truths: &[Truth], options: &Options) -> Resul
         let from: [f64; 3] = pose.translation();
         let most = truth.distance - FAR * truth.spacing;
         for step in 0..options.steps {
-            // To and fro, so that the object stays clear.
+            // Back and forth, so that the object stays clear.
             let far = options.step * count(step);
             let along = if most > 0.0 { most - (far % (2.0 * most) - most).abs() } else { 0.0 };
             pose = pose.with_translation([0, 1, 2].map(|k| from[k] + way[k] * along));

@@ -1,9 +1,9 @@
-//! Spheres, capsules and boxes against the points of a scan: nanoseconds a query, ours and rivals' on the
-//! same shapes, each asked once in a pass.
+//! Spheres, capsules and boxes against the points of a scan: nanoseconds per query of ours and of
+//! the rivals, with the same shapes, each queried once per pass.
 //!
-//! Three sets of shapes, whose radius is a multiple of r: about places drawn in the bounding box, at most 3 r
-//! from a point of the surface, and at most 10 r. The rivals: a plain grid with cells of the sphere's radius,
-//! made for it, and kiddo, asked for the nearest point within the radius.
+//! There are three sets of shapes, whose radius is a multiple of r: positions drawn in the bounding
+//! box, at most 3 r from a surface point, and at most 10 r. The rivals are a plain grid whose cells
+//! have the sphere's radius, and kiddo's search for a point within the radius.
 
 use std::hint::black_box;
 
@@ -22,16 +22,16 @@ pub(crate) struct Arguments {
     /// Objects to measure: files, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(required = true, value_name = "OBJECT")]
     objects: Vec<String>,
-    /// Shapes of each kind in a set
+    /// Shapes of each kind per set
     #[arg(long, value_name = "N", default_value_t = 200_000)]
     count: usize,
-    /// Passes, the least time of which counts
+    /// Passes; the least time counts
     #[arg(long, value_name = "N", default_value_t = 7)]
     passes: u32,
     /// The radius of a shape, in r
     #[arg(long, value_name = "R", default_value_t = 1.0)]
     radius: f64,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -109,7 +109,7 @@ fn measure(object: &Object, (number, passes, radius, seed): (usize, u32, f64, u6
     Ok(())
 }
 
-/// Shapes of each kind about the same places.
+/// Shapes of each kind at the same positions.
 struct Drawn {
     centres: Vec<[f64; 3]>,
     spheres: Vec<Shape>,
@@ -117,7 +117,7 @@ struct Drawn {
     boxes: Vec<Shape>,
 }
 
-/// At most `away` r from a point, or in the bounding box.
+/// Draws positions at most `away` r from a point or, without `away`, in the bounding box.
 fn draw(object: &Object, (number, radius, seed): (usize, f64, u64), away: Option<f64>) -> Drawn {
     let rng = &mut rng(seed);
     let bounds = object.cloud.bounds();
@@ -149,7 +149,7 @@ fn draw(object: &Object, (number, radius, seed): (usize, f64, u64), away: Option
     Drawn { centres, spheres, capsules, boxes }
 }
 
-/// The least time of some passes, and what the last one found.
+/// The least time of several passes, and the count of the last one.
 fn least(passes: u32, mut pass: impl FnMut() -> usize) -> (f64, usize) {
     let mut best = (f64::INFINITY, 0);
     for _ in 0..passes {

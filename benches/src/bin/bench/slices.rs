@@ -1,7 +1,7 @@
-//! Slice maps: points a second of building, boxes against a map, avatars stepping, slices loaded; beside them
-//! parry's voxels and a kd-tree on the same points.
+//! Slice maps: points built per second, boxes against a map, steps of avatars, slices loaded.
+//! Beside them parry's voxels and a kd-tree on the same points.
 //!
-//! A scan is a file, z up, or `house` for the generated one.
+//! A scan is a file with z up, or `house` for the generated one.
 
 use std::hint::black_box;
 
@@ -22,15 +22,15 @@ use parry3d::shape::Voxels;
 use rand::seq::SliceRandom;
 use rand::{Rng, RngExt};
 
-/// Who is asked for: 0.6 × 0.6 × 1.8.
+/// Size of the avatar.
 const BODY: [f64; 3] = [0.6, 0.6, 1.8];
 
-/// Frames of avatars that are timed.
+/// Frames that are timed.
 const FRAMES: usize = 240;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Asked {
-    /// Scans to measure: files, or `house` for a generated one
+    /// Scans to measure: files, or `house` for the generated one
     #[arg(value_name = "SCAN", default_values = ["house"])]
     scans: Vec<String>,
     /// Points of the generated house
@@ -39,16 +39,16 @@ pub(crate) struct Asked {
     /// The side of a pixel, in the units of the scan
     #[arg(long, value_name = "T", default_value_t = 0.05)]
     pixel: f64,
-    /// Boxes that the map is asked about
+    /// Boxes that are tested against the map
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     queries: usize,
-    /// Avatars that step
+    /// Avatars
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     avatars: usize,
-    /// Passes, the least time of which counts
+    /// Passes; the least time counts
     #[arg(long, value_name = "N", default_value_t = 7)]
     passes: u32,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
@@ -89,7 +89,7 @@ fn built(cloud: &PointCloud, options: &SliceOptions) -> Result<SliceMap, Failure
     Ok(builder.finish())
 }
 
-/// The least time of some passes, in nanoseconds, and what the last one made.
+/// The least time of several passes, in nanoseconds, and the last result.
 fn least<T>(passes: u32, mut pass: impl FnMut() -> T) -> (f64, T) {
     let (mut made, time) = timed(&mut pass);
     let mut best = nanoseconds(time);
@@ -131,7 +131,7 @@ fn building(cloud: &PointCloud, asked: &Asked) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The whole of building, and adding the points alone, in nanoseconds.
+/// The time of building, and of adding the points alone, in nanoseconds.
 fn times(plan: &SlicePlan, passes: u32, add: impl Fn(&mut SliceBuilder)) -> [f64; 2] {
     let mut best = [f64::INFINITY; 2];
     for _ in 0..passes {
@@ -153,7 +153,7 @@ fn vector(p: [f64; 3]) -> Vector {
     Vector::new(x, y, z)
 }
 
-/// How much of the floors is taken for an obstacle, by both rules.
+/// Prints the share of floor pixels that count as obstacles, by both rules.
 fn floors(cloud: &PointCloud, map: &SliceMap) -> Result<(), Failure> {
     println!(
         "Pixels of floor, {:.4} of noise estimated: surface all around at the same height, and nothing above for a metre.\n",
@@ -175,9 +175,9 @@ fn floors(cloud: &PointCloud, map: &SliceMap) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Pixels of floor, and those of them that are obstacles. Of floor are pixels with tops in at least twelve of
-/// the 24 around them, in their own slice, half of which are within a pixel's side of theirs, and with
-/// nothing above the nine around for a metre.
+/// The number of floor pixels, and of those that count as obstacles. A floor pixel has tops in at
+/// least twelve of the 24 pixels around it in the same slice, half of them within a pixel's side of
+/// its own. Nothing lies above the nine pixels around it for a metre.
 fn false_obstacles(map: &SliceMap) -> Result<[usize; 2], Failure> {
     let grid = map.grid();
     let [width, depth, slices] = grid.counts;
@@ -212,7 +212,7 @@ fn false_obstacles(map: &SliceMap) -> Result<[usize; 2], Failure> {
     Ok(counts)
 }
 
-/// A place on the ground of the map, and a height.
+/// A random point of the map's ground, at a given height.
 fn place(rng: &mut impl Rng, bounds: &Aabb, height: f64) -> [f64; 3] {
     let top = [bounds.max[0], bounds.max[1], (bounds.max[2] - height).max(bounds.min[2] + 1e-3)];
     [0, 1, 2].map(|k| rng.random_range(bounds.min[k]..top[k]))
@@ -237,7 +237,7 @@ fn boxes(cloud: &PointCloud, map: &SliceMap, asked: &Asked) -> Result<(), Failur
         all.map(|found| found.pixels).sum::<u64>()
     });
 
-    // The same lattice, so the same answers.
+    // The same lattice, hence the same answers.
     let shifted = |p: [f64; 3]| vector([0, 1, 2].map(|k| p[k] - grid.origin[k]));
     let points: Vec<Vector> = (0..cloud.len()).map(|i| shifted(cloud.point(i))).collect();
     let voxels = Voxels::from_points(vector([grid.pixel, grid.pixel, grid.slice_height]), &points);
@@ -251,8 +251,8 @@ fn boxes(cloud: &PointCloud, map: &SliceMap, asked: &Asked) -> Result<(), Failur
     });
     drop(voxels);
 
-    // Heights by three: the box becomes a cube, and its points those within half a side by the greatest
-    // coordinate.
+    // Heights are scaled so that the box becomes a cube. Its points are those within half a side in
+    // the maximum norm.
     let squeezed = |p: [f64; 3]| {
         let Vector { x, y, z } = vector([0, 1, 2].map(|k| p[k] * BODY[0] / BODY[k]));
         [x, y, z]
@@ -300,7 +300,7 @@ fn avatars(map: &SliceMap, asked: &Asked) -> Result<(), Failure> {
     let mut walkers: Vec<Walker> = Vec::new();
     while walkers.len() < asked.avatars {
         let start = place(rng, &bounds, BODY[2]);
-        // Those who find a floor.
+        // Only walkers that find a floor.
         walkers.extend(Walker::new(avatar, map, start).ok().filter(|walker| !walker.is_falling()));
     }
     let targets: Vec<[f64; 2]> = walkers

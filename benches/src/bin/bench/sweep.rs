@@ -1,6 +1,6 @@
-//! The sweep of measured queries, ours and rivals' in the same run, as Markdown.
+//! The sweep: times of ours and of the rivals in the same run, as Markdown.
 //!
-//! An object is a file of points, with or without a mesh, or one that `Object::read` knows by name.
+//! An object is a file of points, with or without a mesh, or a name that `Object::read` knows.
 
 use nearmiss::{
     BuildOptions, CollideOptions, Detail, Evidence, GraphOptions, Metric, Order, PointKind, Scan,
@@ -23,37 +23,37 @@ pub(crate) struct Options {
     /// Poses at each distance
     #[arg(long, value_name = "N", default_value_t = 1000)]
     per_distance: usize,
-    /// Passes, each over poses of its own
+    /// Passes, each with new poses
     #[arg(long, value_name = "N", default_value_t = 1)]
     passes: u64,
     /// Poses near contact
     #[arg(long, value_name = "N", default_value_t = 1000)]
     near: usize,
-    /// A rival that is asked beside; may be given many times
+    /// A rival to measure beside; repeatable
     #[arg(long = "rival", value_name = "NAME", value_parser = rivals::NAMES)]
     rivals: Vec<String>,
-    /// Ask also for a witness
+    /// Also measure queries for a witness
     #[arg(long)]
     witness: bool,
-    /// Ask also for certified evidence
+    /// Also measure queries for certified evidence
     #[arg(long)]
     certified: bool,
-    /// Ask also by each instruction set there is
+    /// Also measure each available instruction set
     #[arg(long)]
     levels: bool,
-    /// Ask also with nothing left in the caches
+    /// Also measure with cold caches
     #[arg(long)]
     evicted: bool,
-    /// Which pairs of nodes are looked at first
+    /// The order in which node pairs are visited
     #[arg(long, value_parser = asked::orders())]
     order: Option<Order>,
-    /// The kernel; with `geodesic` the same object prepared for it is asked beside
+    /// The kernel; `geodesic` adds the object prepared for the geodesic kernel
     #[arg(long, default_value = "euclidean", value_parser = asked::kernels())]
     kernel: Metric,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Threads that prepare the scan; 0 means all
+    /// Threads that preprocess the scan; 0 means all
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
 }
@@ -131,10 +131,10 @@ fn measure(source: &str, options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// From this angle on a normal has turned, in degrees.
+/// Angle in degrees from which a normal counts as turned.
 const TURNED: f32 = 5.0;
 
-/// The scan for the geodesic kernel; tells what that took, and how much came of it.
+/// Prepares the scan for the geodesic kernel; prints the time and the results.
 fn for_geodesic(object: &Object, scan: &Scan) -> Result<Scan, Failure> {
     let scan = scan.clone().with_graph(&object.cloud, &GraphOptions::default(), None)?;
     let (along, time) = timed(|| scan.clone().with_geodesic_kernel());

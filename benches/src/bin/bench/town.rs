@@ -1,5 +1,5 @@
-//! A town as an aircraft scans it: terrain, roofs and walls, strip by strip; as many points as wanted,
-//! written piece by piece.
+//! A town as scanned from an aircraft: terrain, roofs and walls, strip by strip. It has as many
+//! points as wanted and is written piece by piece.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -11,9 +11,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// File to write: LAS, LAZ, PLY, PCD, XYZ or NPY, by its name
+    /// File to write; its name tells the format: LAS, LAZ, PLY, PCD, XYZ or NPY
     file: PathBuf,
-    /// How many points
+    /// Number of points
     #[arg(long, value_name = "N", default_value_t = 100_000_000)]
     points: u64,
     /// Seed of the noise
@@ -21,26 +21,26 @@ pub(crate) struct Options {
     seed: u64,
 }
 
-/// Points a square metre of ground.
+/// Points per square metre of ground.
 const DENSITY: f64 = 100.0;
 
 /// Width of a strip.
 const STRIP: f64 = 40.0;
 
-/// From building to building, and edges of their footprints.
+/// Spacing of the buildings, and the edge of their footprints.
 const LOT: f64 = 40.0;
 const HOUSE: f64 = 18.0;
 
 /// Share of the points over a house that lie on its walls.
 const WALLS: f64 = 0.5;
 
-/// Standard deviation of the noise, about.
+/// Approximate standard deviation of the noise.
 const NOISE: f64 = 0.015;
 
-/// Where the corner of the town lies, so that coordinates are as large as those of surveys.
+/// Corner of the town, as far from the origin as coordinates of surveys are.
 const CORNER: [f64; 3] = [412_000.0, 5_318_000.0, 420.0];
 
-/// Points that are made together.
+/// Points that are generated together.
 const PIECE: u64 = 1 << 16;
 
 pub(crate) fn run(options: &Options) -> Result<(), Failure> {
@@ -57,7 +57,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Makes the points, a piece at a time, always the same.
+/// Generates the points piece by piece. They are the same on every run.
 #[expect(clippy::cast_precision_loss, reason = "counts of points")]
 fn each(options: &Options, mut take: impl FnMut(&Points) -> Result<(), Failure>) -> Result<(), Failure> {
     let side = (options.points as f64 / DENSITY).sqrt();
@@ -79,7 +79,7 @@ fn each(options: &Options, mut take: impl FnMut(&Points) -> Result<(), Failure>)
     Ok(())
 }
 
-/// A point over a place of the ground, and its class.
+/// A point above a ground position, and its class.
 fn point([x, y]: [f64; 2], random: &mut Xoshiro256PlusPlus) -> ([f64; 3], u8) {
     let mut noise =
         || NOISE * (random.random::<f64>() + random.random::<f64>() + random.random::<f64>() - 1.5);

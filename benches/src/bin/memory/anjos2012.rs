@@ -1,6 +1,6 @@
-//! Tables 1 to 3 and Figs 5 and 6 of dos Anjos, Pereira & Oliveira 2012 (S4) for comparable scenes, with the
-//! paper's figures beside, what §4 says of round columns, and how high a box fits up a real staircase:
-//! `anjos2012.md` and SVGs in a folder.
+//! Tables 1 to 3 and Figs 5 and 6 of dos Anjos, Pereira & Oliveira 2012 for comparable scenes,
+//! beside the paper's figures, as `anjos2012.md` and SVGs in a folder. It also measures the round
+//! columns of §4 and the height of a box that fits up a real staircase.
 //!
 //! Without the folder of scenes a generated house stands in for them.
 
@@ -21,14 +21,14 @@ use nearmiss_testdata::house::{house, triangles};
 
 use crate::ALLOCATOR;
 
-/// How many slices the paper's Fig. 5 has in memory.
+/// Slices that the paper's Fig. 5 keeps in memory.
 const LOADED: usize = 6;
 
-/// Times are the least of so many.
+/// Passes; the least time counts.
 const PASSES: usize = 5;
 
-/// A scene, what of the paper it stands for, and what the paper has for that: points given and sampled,
-/// seconds, MB.
+/// A scene, the paper's scene that it stands for, and the paper's figures for that: given and
+/// sampled points, seconds, MB.
 struct Scene {
     name: &'static str,
     file: &'static str,
@@ -177,7 +177,7 @@ fn row(text: &mut String, scene: &Scene, source: &Source, folder: &Path) -> Resu
     Ok(())
 }
 
-/// Image-based against a tree of points.
+/// Writes the comparison of slice maps with a tree of points.
 fn table_3(text: &mut String, walked: &Walked, folder: &Path) -> Result<(), Failure> {
     let options = SliceOptions::default().with_pixel(Pixel::Count(PIXELS));
     let place = folder.join("walked");

@@ -1,4 +1,4 @@
-//! What proximity graphs cost, and what they look like.
+//! The cost and the shape of proximity graphs.
 
 use std::hint::black_box;
 
@@ -14,7 +14,7 @@ use nearmiss_benches::{Failure, machine};
 
 use crate::ALLOCATOR;
 
-/// Prints the least time of `runs` of `work`, in nanoseconds a point.
+/// Prints the least time of `runs` of `work`, in nanoseconds per point.
 fn measure<T>(what: &str, points: usize, runs: usize, mut work: impl FnMut() -> T) -> T {
     let (mut result, mut best) = timed(&mut work);
     for _ in 1..runs {
@@ -25,7 +25,7 @@ fn measure<T>(what: &str, points: usize, runs: usize, mut work: impl FnMut() -> 
     result
 }
 
-/// The nearest six of every point, on one thread.
+/// Measures the six nearest neighbours of every point, on one thread.
 fn neighbours(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
     const COUNT: usize = 6;
     let n = positions.len();
@@ -60,7 +60,7 @@ fn neighbours(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Building the graph on one thread, two, and so on.
+/// Measures the construction of the graph on one thread, two, and so on.
 fn speed(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
     println!("\n| threads | points/s | peak bytes a point |\n| --: | --: | --: |");
     let mut threads = 1;
@@ -82,7 +82,7 @@ fn speed(positions: &[[f32; 3]], runs: usize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The shape of the graph, by pruning.
+/// Prints statistics of the graph, by pruning.
 fn looks(positions: &[[f32; 3]]) -> Result<(), Failure> {
     println!("\n| pruning | degree | virtual % | components | in the largest % | border % | bytes a point |");
     println!("| --- | --: | --: | --: | --: | --: | --: |");
@@ -109,10 +109,10 @@ fn looks(positions: &[[f32; 3]]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// How many updates a row of the table averages.
+/// Updates that a row of the table averages.
 const UPDATES: usize = 1000;
 
-/// A row of the table of updates.
+/// Prints a row of the table of updates.
 fn row(
     size: u32,
     what: &str,
@@ -135,7 +135,7 @@ fn row(
     Ok(())
 }
 
-/// The time and extent of one update, on surfaces of increasing size.
+/// Measures the time and extent of one update, on surfaces of increasing size.
 fn updates() -> Result<(), Failure> {
     println!("{}\n", machine::description());
     println!(
@@ -145,7 +145,7 @@ fn updates() -> Result<(), Failure> {
         let size = 10_u32.pow(exponent);
         let object = Object::read(&format!("bumpy:{}", size as usize + UPDATES))?;
         let hierarchy = PointHierarchy::build(&object.cloud, &BuildOptions::default())?;
-        // Those left out come from all over the surface.
+        // The points left out come from all over the surface.
         let (mut there, mut spare) = (Vec::new(), Vec::new());
         let every = object.cloud.len() / UPDATES;
         for (i, &p) in hierarchy.positions().iter().enumerate() {
@@ -175,10 +175,10 @@ pub(crate) struct Arguments {
     /// Object to measure: a file, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(default_value = "bumpy:1000000")]
     object: String,
-    /// Runs, the fastest of which counts
+    /// Runs; the fastest one counts
     #[arg(long, value_name = "N", default_value_t = 3)]
     runs: usize,
-    /// Measure instead what it costs to insert, move and remove one point among 10³ to 10⁶
+    /// Measure instead the insertion, move and removal of one point among 10³ to 10⁶
     #[arg(long)]
     updates: bool,
 }

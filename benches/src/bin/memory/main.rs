@@ -1,5 +1,5 @@
-//! Measurements of memory beside time. They are a program of their own because its allocator counts, which
-//! would cost other measurements time.
+//! Measurements of memory and time. They are a separate program because its allocator counts, which
+//! would slow other measurements down.
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program for people")]
 
 mod anjos2012;
@@ -14,7 +14,7 @@ use nearmiss_benches::figures::FigureOptions;
 #[global_allocator]
 static ALLOCATOR: Counting = Counting::new();
 
-/// Measurements of memory beside time.
+/// Measurements of memory and time.
 #[derive(Debug, Parser)]
 struct Arguments {
     #[command(subcommand)]
@@ -27,7 +27,7 @@ enum Command {
     Anjos2012(FigureOptions),
     /// Proximity graphs: building time, shape, updates
     Graph(graph::Arguments),
-    /// Preparing, saving and opening a large scan: time and memory
+    /// Preprocessing, saving and opening a large scan: time and memory
     Preparation(preparation::Arguments),
 }
 

@@ -1,7 +1,7 @@
-//! What it costs to prepare a large scan, with rivals beside.
+//! The cost of preprocessing a large scan, with rivals beside.
 //!
-//! Memory is what the allocator handed out, the most that was live at once, above what was live before: the
-//! input, which is there in any case, is not counted. Pages that a mapped file needs are not the allocator's.
+//! Memory is the peak of the allocated bytes above those live before the work; the input is not
+//! counted. Pages of mapped files are not counted, because they do not come from the allocator.
 
 use std::path::PathBuf;
 
@@ -15,18 +15,18 @@ use nearmiss_benches::{Failure, machine};
 
 use crate::ALLOCATOR;
 
-/// A file that is removed when nobody needs it any more.
+/// A temporary file, removed on drop.
 struct Scratch(PathBuf);
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // Nobody is left to tell if that fails.
+        // Nothing can report a failure here.
         let _ = std::fs::remove_file(&self.0);
     }
 }
 
-/// Prints the median time of `runs` of `work` with peak and rest of memory in bytes a point; returns its last
-/// result.
+/// Prints the median time of `runs` of `work`, with peak and remaining memory in bytes per point;
+/// returns the last result.
 fn measure<T>(
     what: &str,
     points: usize,
@@ -61,10 +61,10 @@ pub(crate) struct Arguments {
     /// Object to measure: a file, `dragon-5k`, `dragon-23k` or `bumpy:POINTS`
     #[arg(default_value = "bumpy:1000000")]
     object: String,
-    /// Runs, the median of which counts
+    /// Runs; the median counts
     #[arg(long, value_name = "N", default_value_t = 3)]
     runs: usize,
-    /// Numbers of threads; 0 means all
+    /// Thread counts; 0 means all
     #[arg(long, value_name = "N", default_values_t = [1, 0])]
     threads: Vec<usize>,
 }

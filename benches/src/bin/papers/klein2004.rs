@@ -1,7 +1,8 @@
-//! Table 1 and Figs 8–12 of Klein & Zachmann 2004 on today's machine: `klein2004.md` and SVGs in a folder.
+//! Table 1 and Figs 8–12 of Klein & Zachmann 2004 on today's machine: `klein2004.md` and SVGs in a
+//! folder.
 //!
-//! Without the folder of objects, the dragon that comes with the tests stands in for them; the artificial
-//! models are made.
+//! Without the folder of objects, the dragon that the tests ship stands in for them. The artificial
+//! models are generated.
 
 use std::fmt::Write;
 use std::time::Duration;
@@ -27,10 +28,11 @@ use nearmiss_benches::{Failure, machine};
 /// Points of the paper's grid.
 const GRID: u32 = 197_315;
 
-/// Poses that are asked again and again, as the paper does.
+/// Poses that are queried repeatedly, as in the paper.
 const REPEATED: usize = 200;
 
-/// Passes over all poses, of which a question counts its faster: other programs run too.
+/// Passes over all poses; the faster time of a query counts, which reduces the effect of other
+/// load.
 const PASSES: usize = 2;
 
 /// Shares of an object's points in Fig. 8.
@@ -40,7 +42,7 @@ const SHARES: [usize; 4] = [8, 4, 2, 1];
 pub(crate) struct Options {
     #[command(flatten)]
     figures: FigureOptions,
-    /// The time that a query aims at in the time-critical mode
+    /// The target time of a query in the time-critical mode
     #[arg(long, value_name = "MICROSECONDS", default_value_t = 200)]
     target: u64,
 }
@@ -141,7 +143,7 @@ fn figure_8<'a>(
         let cloud = nearmiss::PointCloud::from_positions(&bumpy_sphere(n))?;
         one.push([f64::from(n), 1e3 * build_seconds(&cloud)?]);
     }
-    // The same time for each point and level as at the first size.
+    // The same time per point and level as at the first size.
     let first = one[0];
     let scale = first[1] / (first[0] * first[0].log2());
     let expected = one.iter().map(|p| [p[0], scale * p[0] * p[0].log2()]).collect();
@@ -170,14 +172,14 @@ fn figure_8<'a>(
     options.figures.save("figure-8.svg", &panels)
 }
 
-/// An object under all ways to ask.
+/// An object measured with all methods.
 struct Measured {
     name: String,
     has_mesh: bool,
     /// Ours; the paper's leaf test and order.
     ours: Course,
     papers: Course,
-    /// The sweep mean of ours over poses that repeat.
+    /// The sweep mean of ours over repeated poses.
     repeated: f64,
 }
 
@@ -201,7 +203,8 @@ fn measure(object: &Object, options: &Options) -> Result<Measured, Failure> {
     })
 }
 
-/// The average over all distances of mean microseconds, each distance's poses three times in a row.
+/// The average over all distances of mean microseconds, with the poses of a distance queried three
+/// times in a row.
 fn again_and_again(scan: &Scan, poses: &[Vec<Pose>; DISTANCES]) -> Result<f64, Failure> {
     let mut ours = Ours::new(scan, &verdict())?;
     let means = poses.each_ref().map(|poses| {
@@ -219,8 +222,8 @@ fn verdict() -> CollideOptions {
     CollideOptions::default().with_detail(Detail::Verdict)
 }
 
-/// Random test points at leaves (§5.3), pairs in the order of sample points on either side (§5.2), coverings
-/// (§5.1).
+/// The paper's options: random test points at leaves (§5.3), pairs ordered by sample points on
+/// either side (§5.2), coverings (§5.1).
 fn as_in_the_paper() -> CollideOptions {
     verdict().with_method(Method::Sampling(Sampling::default())).with_order(Order::Sides).with_coverings(true)
 }
@@ -232,7 +235,7 @@ fn course(scan: &Scan, options: &CollideOptions, questions: &Questions) -> Resul
     Ok(Course::run(questions, PASSES, |pose| Pair::new(a, scan.at(pose)).collide(&plan, &mut scratch)))
 }
 
-/// Times and differences over distance, one figure.
+/// Writes a figure of times and differences over distance.
 fn courses_of(
     text: &mut String,
     options: &Options,
@@ -290,7 +293,7 @@ fn courses_of(
     options.figures.save(&file, &panels)
 }
 
-/// A column for each line, a row for each distance.
+/// A table with a column per line and a row per distance.
 fn by_distance<'a>(
     text: &mut String,
     what: &str,
@@ -310,7 +313,7 @@ fn by_distance<'a>(
     Ok(())
 }
 
-/// The time-critical mode against the other, by the paper's leaf test.
+/// Compares the time-critical mode with the unlimited one, with the paper's leaf test.
 fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<(), Failure> {
     eprintln!("Fig. 12: {}", object.name);
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
@@ -352,7 +355,7 @@ fn figure_12(text: &mut String, options: &Options, object: &Object) -> Result<()
         };
         both.iter().map(line).collect::<Vec<_>>()
     };
-    // Not means: what other programs take while one waits for the clock would be in them.
+    // Not means, which would include the load of other programs while a query reads the clock.
     let mut times = lines(&Course::median_times);
     let level = target.as_secs_f64() * 1e6;
     times.push(Line {

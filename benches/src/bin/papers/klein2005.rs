@@ -1,6 +1,7 @@
-//! Figs 7 and 9 to 11 of Klein & Zachmann 2005 on today's machine: `klein2005.md` and SVGs in a folder.
+//! Figs 7 and 9 to 11 of Klein & Zachmann 2005 on today's machine: `klein2005.md` and SVGs in a
+//! folder.
 //!
-//! Without the folder of objects, the dragon that comes with the tests stands in for them.
+//! Without the folder of objects, the dragon that the tests ship stands in for them.
 
 use std::fmt::Write;
 use std::hint::black_box;
@@ -21,20 +22,20 @@ use nearmiss_benches::{Failure, machine};
 /// The paper's sampling density.
 const POINTS: u32 = 200;
 
-/// At most so many of the rival's test points (§5.2).
+/// Upper limit of the rival's test points (§5.2).
 const CAP: u32 = 500;
 
-/// Surfels of the densities of Fig. 7.
+/// Numbers of surfels for Fig. 7.
 const SURFELS: [u32; 10] = [2, 4, 7, 12, 20, 29, 45, 80, 160, 320];
 
-/// Distances of Fig. 9: 0 to 1.5.
+/// The number of distances in Fig. 9: 0 to 1.5.
 const WITHIN: usize = 7;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     #[command(flatten)]
     figures: FigureOptions,
-    /// Points of the largest cloud of Fig. 9; by default 3,000,000, or 30,000 with --quick
+    /// Points of the largest cloud of Fig. 9; by default 3,000,000, or 30,000 with `--quick`
     #[arg(long, value_name = "N")]
     points: Option<u32>,
 }
@@ -75,7 +76,7 @@ pub(crate) fn run(options: &Options) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The scan with its graph.
+/// Prepares the scan with its graph.
 fn prepared(object: &Object) -> Result<Scan, Failure> {
     let scan = Scan::build(&object.cloud, &BuildOptions::default())?;
     Ok(scan.with_graph(&object.cloud, &GraphOptions::default(), None)?)
@@ -85,13 +86,14 @@ fn verdict(method: Method) -> CollideOptions {
     CollideOptions::default().with_detail(Detail::Verdict).with_method(method)
 }
 
-/// Without hierarchy, by brackets alone as in the paper, or with approaches too.
+/// The interpolation search without hierarchy, by brackets alone as in the paper or, with
+/// `approaches`, by approaches too.
 fn interpolation(surfels: u32, approaches: bool) -> Interpolation {
     let search = Interpolation::default().with_flat(true).with_surfels(SurfelSize::Count(surfels));
     if approaches { search } else { search.with_approaches(0) }
 }
 
-/// One way to ask about one scan.
+/// A method applied to one scan.
 struct Asking<'a> {
     scan: &'a Scan,
     plan: CollidePlan,
@@ -118,13 +120,14 @@ struct Tally {
     evaluations: u64,
     steps: u64,
     hits: usize,
-    /// Hits of the traversal that were not found, and those found that are none of it.
+    /// Intersections of the traversal that the method missed, and intersections that it found
+    /// beyond them.
     missed: usize,
     extra: usize,
 }
 
 impl Tally {
-    /// Asks about all poses, each twice, of which the faster counts.
+    /// Queries all poses twice; the faster time counts.
     fn over(asking: &mut Asking<'_>, poses: &[Pose], truth: &[bool]) -> Self {
         let mut tally = Self::default();
         for (pose, &hit) in poses.iter().zip(truth) {
@@ -166,13 +169,13 @@ impl Tally {
         self.steps as f64 / count(self.asked.max(1))
     }
 
-    /// Of all tests, in percent.
+    /// Errors in percent of all tests.
     fn error(&self) -> f64 {
         100.0 * count(self.missed + self.extra) / count(self.asked.max(1))
     }
 }
 
-/// The answers of the traversal for all poses.
+/// The verdicts of the traversal for all poses.
 fn truths(scan: &Scan, poses: &[Vec<Pose>; DISTANCES]) -> Result<[Vec<bool>; DISTANCES], Failure> {
     let mut traversal = Asking::new(scan, Method::Traversal)?;
     Ok(poses
@@ -180,7 +183,7 @@ fn truths(scan: &Scan, poses: &[Vec<Pose>; DISTANCES]) -> Result<[Vec<bool>; DIS
         .map(|poses| poses.iter().map(|pose| traversal.ask(pose).verdict.is_intersecting()).collect()))
 }
 
-/// Errors over the number of drawn points.
+/// Writes the errors over the number of drawn points.
 fn figure_7(text: &mut String, options: &Options, asked: &[(String, Scan)]) -> Result<(), Failure> {
     text.push_str("\n## Fig. 7: errors over the number of drawn points\n\n![](figure-7.svg)\n\n");
     text.push_str(
@@ -223,7 +226,7 @@ fn figure_7(text: &mut String, options: &Options, asked: &[(String, Scan)]) -> R
     options.figures.save("figure-7.svg", &[panel])
 }
 
-/// Times and evaluations over distance, against test points.
+/// Writes times and evaluations over distance, against random test points.
 fn figures_10_and_11(text: &mut String, options: &Options, asked: &[(String, Scan)]) -> Result<(), Failure> {
     text.push_str(
         "\n## Figs 10 and 11: times and evaluations of f over distance\n\n![](figure-10-11.svg)\n\n",
@@ -290,7 +293,7 @@ fn figures_10_and_11(text: &mut String, options: &Options, asked: &[(String, Sca
     options.figures.save("figure-10-11.svg", &panels)
 }
 
-/// All intersections over the density of one shape.
+/// Writes the time to find all intersections over the density of one shape.
 fn figure_9(text: &mut String, options: &Options) -> Result<(), Failure> {
     text.push_str("\n## Fig. 9: all intersections over density\n\n![](figure-9.svg)\n\n");
     writeln!(

@@ -1,8 +1,8 @@
 //! Verdicts near contact against the exact test of the mesh, for objects without a truth set.
 //!
-//! A pose counts as outside the band when the mesh's answer stays the same under shifts by 1.05 r in each of
-//! 26 directions: then neither a contact nor a gap is shallower than that. Objects are scaled as in the
-//! sweep. The check fails if a verdict outside the band is wrong or missing.
+//! A pose is outside the band if the mesh's answer stays the same under shifts by 1.05 r in each of
+//! 26 directions: then neither a contact nor a gap is shallower than that. Objects are scaled as in
+//! the sweep. The check fails if a verdict outside the band is wrong or missing.
 
 use nearmiss::{BuildOptions, CollideOptions, CollidePlan, Pair, Pose, Scan, Scratch, Verdict};
 use nearmiss_benches::object::Object;
@@ -10,7 +10,7 @@ use nearmiss_benches::poses::{NearPose, near};
 use nearmiss_benches::rivals::{Method, rival};
 use nearmiss_benches::{Failure, machine};
 
-/// A little more than the band, so that rounding of r decides nothing.
+/// Slightly more than the band, so that rounding of r changes no result.
 const SHIFT: f64 = 1.05;
 
 #[derive(Debug, clap::Args)]
@@ -21,12 +21,12 @@ pub(crate) struct Arguments {
     /// Poses near contact
     #[arg(long, value_name = "N", default_value_t = 1500)]
     poses: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 7)]
     seed: u64,
 }
 
-/// Returns whether the check passes.
+/// Returns `true` if the check passes.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     println!("{}", machine::description());
     println!(
@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     Ok(faults == 0)
 }
 
-/// Prints a line for one object; returns how many verdicts outside the band are wrong or missing.
+/// Prints a line for one object; returns the number of wrong or missing verdicts outside the band.
 fn compare(source: &str, count: usize, seed: u64) -> Result<u32, Failure> {
     let object = Object::read(source)?.scaled()?;
     let Some(mut mesh) = rival("parry", &object)? else {
@@ -76,7 +76,8 @@ fn compare(source: &str, count: usize, seed: u64) -> Result<u32, Failure> {
     Ok(hits + misses + undecided)
 }
 
-/// Whether the mesh's answer stays `truth` when the second copy is shifted by `length` any of 26 ways.
+/// Returns `true` if the mesh's answer stays `truth` for shifts of the second copy by `length` in
+/// 26 directions.
 fn is_steady(mesh: &mut dyn Method, pose: &Pose, truth: bool, length: f64) -> bool {
     let steps = [-1.0, 0.0, 1.0_f64];
     let directions = steps.iter().flat_map(|&x| steps.iter().flat_map(move |&y| steps.map(|z| [x, y, z])));

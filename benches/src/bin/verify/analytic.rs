@@ -1,7 +1,7 @@
 //! Scores verdicts on the shapes with known answers, by family and noise.
 //!
-//! The check fails if a verdict outside the band is wrong or missing, `Ambiguous` on thin pairs apart, which
-//! may be one in twenty of them.
+//! The check fails if a verdict outside the band is wrong or missing. `Ambiguous` is allowed for
+//! one in twenty of the separate thin pairs.
 
 use std::collections::BTreeMap;
 
@@ -51,17 +51,17 @@ pub(crate) struct Arguments {
     /// Repeats of every pair
     #[arg(long, value_name = "N", default_value_t = 3)]
     repeats: u32,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// List every verdict outside the band that is wrong or missing
+    /// List every wrong or missing verdict outside the band
     #[arg(long)]
     list: bool,
     #[command(flatten)]
     asking: Asking,
 }
 
-/// Returns whether the check passes.
+/// Returns `true` if the check passes.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let &Arguments { repeats, seed, list, asking } = arguments;
     let options = asking.options();

@@ -1,4 +1,4 @@
-//! Answers, compared with those on record.
+//! Compares answers with those on record.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,15 +8,15 @@ use nearmiss_benches::guard::{answers, cases};
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
-    /// Ask also about the scans in this folder
+    /// Also check the scans in this folder
     #[arg(long, value_name = "FOLDER")]
     data: Option<PathBuf>,
-    /// Write the record anew
+    /// Rewrite the record
     #[arg(long)]
     record: bool,
 }
 
-/// Returns whether no answer is worse than that on record.
+/// Returns `true` if no answer is worse than that on record.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let mut all = cases::shipped()?;
     if let Some(folder) = &arguments.data {

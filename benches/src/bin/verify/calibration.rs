@@ -1,11 +1,11 @@
-//! Whether likelihoods are: how often scans meet where a budget ended the search, by decile of the likelihood
-//! that was answered.
+//! Calibration of likelihoods: the frequency of contact where a budget ended the search, by decile
+//! of the likelihood.
 //!
-//! An object is asked about against itself. `SCAN+OBJECT` asks about an object in a scan, a twenty-fifth of
-//! its diagonal long.
+//! An object is queried against itself. `SCAN+OBJECT` queries an object in a scan, scaled to a
+//! twenty-fifth of the scan's diagonal.
 //!
-//! The check fails if a decile with a hundred answers or more is off by more than 0.15, or the Brier score of
-//! all answers is not below that of the best constant.
+//! The check fails if a decile with a hundred answers or more is off by more than 0.15, or if the
+//! Brier score of all answers is not below that of the best constant.
 
 use nearmiss::{BuildOptions, Pose, Reason, Scan, Verdict};
 use nearmiss_benches::asked::{Asking, Limits};
@@ -14,19 +14,19 @@ use nearmiss_benches::rivals::ours::Ours;
 use nearmiss_benches::sample::count;
 use nearmiss_benches::{Failure, machine, questions};
 
-/// Node pairs and evaluations after which a search is ended.
+/// Budgets, in node pairs and evaluations.
 const BUDGETS: [u64; 8] = [1, 4, 8, 16, 32, 64, 128, 256];
 
-/// An object's longest side over the diagonal of the scan that it is in.
+/// The object's longest side over the diagonal of the scan around it.
 const SHARE: f64 = 0.04;
 
-/// Fewer answers in a decile say little.
+/// Least answers of a decile that counts.
 const ENOUGH: usize = 100;
 
-/// By how much the frequency of a decile may differ from the mean of its likelihoods.
+/// Greatest difference of the frequency of a decile from its mean likelihood.
 const TOLERANCE: f64 = 0.15;
 
-/// Likelihoods, and whether the scans meet.
+/// Likelihoods, each with `true` if the scans meet.
 #[derive(Debug, Clone, Default)]
 struct Answers(Vec<(f64, bool)>);
 
@@ -40,7 +40,7 @@ impl Answers {
         count(self.0.iter().filter(|(_, meets)| *meets).count()) / count(self.0.len().max(1))
     }
 
-    /// Those whose likelihood is in the `i`-th tenth.
+    /// The answers with a likelihood in the `i`-th tenth.
     fn decile(&self, i: usize) -> Self {
         let of = |p: f64| (0..9).rev().find(|&k| p >= 0.1 * count(k + 1)).map_or(0, |k| k + 1);
         Self(self.0.iter().filter(|(p, _)| of(*p) == i).copied().collect())
@@ -50,7 +50,7 @@ impl Answers {
         self.0.iter().map(|(p, _)| p).sum::<f64>() / count(self.0.len().max(1))
     }
 
-    /// The greatest difference of any decile with enough answers.
+    /// The greatest difference over the deciles with enough answers.
     fn worst(&self) -> f64 {
         let deciles = (0..10).map(|i| self.decile(i)).filter(|decile| decile.0.len() >= ENOUGH);
         deciles.map(|decile| (decile.mean() - decile.frequency()).abs()).fold(0.0, f64::max)
@@ -68,14 +68,14 @@ pub(crate) struct Arguments {
     /// Poses at each distance of the sweep
     #[arg(long, value_name = "N", default_value_t = 80)]
     swept: usize,
-    /// The seed of all that is random
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", default_value_t = 2)]
     seed: u64,
     #[command(flatten)]
     asking: Asking,
 }
 
-/// Returns whether the check passes.
+/// Returns `true` if the check passes.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let &Arguments { ref objects, near, swept, seed, asking } = arguments;
     let options = asking.options();

@@ -1,4 +1,4 @@
-//! Counts of instructions, compared with those on record.
+//! Compares instruction counts with those on record.
 
 use std::fs;
 use std::path::Path;
@@ -6,14 +6,14 @@ use std::path::Path;
 use nearmiss_benches::Failure;
 use nearmiss_benches::guard::counts::{self, Scenario};
 
-/// Of more instructions than this share of those on record is told as a fault.
+/// Greatest ratio of a count to that on record which passes.
 const MOST: f64 = 1.03;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Arguments {
     /// Only these scenarios
     scenarios: Vec<String>,
-    /// Write the record anew
+    /// Rewrite the record
     #[arg(long)]
     record: bool,
     /// Run these scenarios, for valgrind to count
@@ -21,7 +21,7 @@ pub(crate) struct Arguments {
     run: bool,
 }
 
-/// Returns whether no scenario takes many more instructions than on record.
+/// Returns `true` if no scenario exceeds its count on record by too much.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     if arguments.run {
         for name in &arguments.scenarios {

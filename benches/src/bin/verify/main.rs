@@ -1,7 +1,7 @@
-//! Checks of what nearmiss answers, and of what that takes.
+//! Checks of the answers of nearmiss, and of their cost.
 //!
-//! The status is 1 if a check fails. `verify --quick` runs every check that needs no data beyond the
-//! repository's, as CI does.
+//! The status is 1 if a check fails. `verify --quick` runs every check that needs no data beyond
+//! the repository's, as CI does.
 #![expect(clippy::print_stdout, reason = "a program for people")]
 
 mod agreement;
@@ -16,9 +16,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use nearmiss_benches::{Failure, guard};
 
-/// Checks of what nearmiss answers, and of what that takes.
+/// Checks of the answers of nearmiss, and of their cost.
 ///
-/// An object is a file, or `dragon-5k`, `dragon-23k` (shipped with the tests), or `bumpy:POINTS` (generated).
+/// An object is a file, or `dragon-5k`, `dragon-23k` (shipped with the tests), or `bumpy:POINTS`
+/// (generated).
 #[derive(Debug, Parser)]
 #[command(arg_required_else_help = true, args_conflicts_with_subcommands = true)]
 struct Arguments {
@@ -37,7 +38,7 @@ enum Command {
     Analytic(analytic::Arguments),
     /// Answers, against those on record: verdicts, evidence, distances, curves, shapes
     Answers(answers::Arguments),
-    /// Likelihoods, against how often scans meet where a budget ended the search
+    /// Likelihoods, against the frequency of contact where a budget ended the search
     Calibration(calibration::Arguments),
     /// Counts of instructions, by valgrind, against those on record
     Counts(counts::Arguments),
@@ -45,7 +46,7 @@ enum Command {
     Truth(truth::Arguments),
 }
 
-/// The checks of `--quick`, as the words that run them.
+/// The arguments of the checks that `--quick` runs.
 const QUICK: [&[&str]; 5] = [
     &["answers"],
     &["counts"],
@@ -62,7 +63,7 @@ fn main() -> Result<ExitCode, Failure> {
     Ok(if is_clean { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Runs one check; returns whether it passes.
+/// Runs one check; returns `true` if it passes.
 fn run(command: &Command) -> Result<bool, Failure> {
     match command {
         Command::Agreement(arguments) => agreement::run(arguments),
@@ -74,7 +75,7 @@ fn run(command: &Command) -> Result<bool, Failure> {
     }
 }
 
-/// Runs the checks of `--quick`; returns whether all pass.
+/// Runs the checks of `--quick`; returns `true` if all pass.
 fn quick() -> Result<bool, Failure> {
     let mut is_clean = true;
     for words in QUICK {

@@ -2,9 +2,10 @@
 //!
 //! Under a budget the best effort is scored.
 //!
-//! The check fails if a verdict outside the band |gap| ≤ r is wrong or missing, or a deep separation is
-//! certified; with `--certified`, which asks for certificates, also if fewer than 95 % of separations from 6
-//! r on are certified. A rival is judged by every pose, for a mesh knows what points do not.
+//! The check fails if a verdict outside the band |gap| ≤ r is wrong or missing, or a deep
+//! separation is certified. With `--certified`, which asks for certificates, it also fails if fewer
+//! than 95 % of the separations of at least 6 r are certified. A rival must be right on every pose,
+//! because a mesh has no band of uncertainty.
 
 use std::path::PathBuf;
 
@@ -23,13 +24,13 @@ use nearmiss_benches::truth::{self, Question};
 pub(crate) struct Arguments {
     /// The scan, which is compared with itself
     cloud: String,
-    /// Poses with exact answers, a line of JSON each
+    /// Poses with exact answers, one JSON object per line
     #[arg(value_name = "POSES.jsonl")]
     poses: PathBuf,
-    /// A rival that is scored beside; may be given many times
+    /// A rival to score beside; repeatable
     #[arg(long = "rival", value_name = "NAME", value_parser = rivals::NAMES)]
     rivals: Vec<String>,
-    /// Threads that prepare the scan; 0 means all
+    /// Threads that preprocess the scan; 0 means all
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
     #[command(flatten)]
@@ -38,7 +39,7 @@ pub(crate) struct Arguments {
     limits: Limits,
 }
 
-/// Returns whether the check passes.
+/// Returns `true` if the check passes.
 pub(crate) fn run(arguments: &Arguments) -> Result<bool, Failure> {
     let asked = arguments.asking.options();
     let object = Object::read(&arguments.cloud)?;
@@ -88,7 +89,7 @@ fn score(ours: &mut Ours<'_>, questions: &[Question], r: f64) -> Score {
     score
 }
 
-/// How many answers differ from the truth, anywhere.
+/// The number of answers that differ from the truth, inside the band or not.
 fn disagreements(rival: &mut dyn Method, questions: &[Question], r: f64) -> usize {
     let mut times = Sample::default();
     println!("\n{}", rival.name());

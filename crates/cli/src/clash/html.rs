@@ -1,4 +1,4 @@
-//! A clash list as one page: summary, overview, table, and a picture of each clash, all in one file.
+//! A clash list as one HTML file: summary, overview, table, and a picture of each clash.
 
 use std::io::{self, Write};
 
@@ -27,7 +27,8 @@ footer{margin-top:2em;color:#5a6270;font-size:.9em}
 @media print{th{cursor:auto}figure{break-inside:avoid}}
 ";
 
-/// A click on a header sorts by it, a second one the other way; equal rows keep their order.
+/// Sorts the table by the header that is clicked, and in reverse at a second click. Equal rows keep
+/// their order.
 const SCRIPT: &str = "\
 for(const th of document.querySelectorAll('th'))th.onclick=()=>{
 const up=th.getAttribute('aria-sort')!=='ascending',k=th.cellIndex,body=document.querySelector('tbody');
@@ -37,7 +38,7 @@ for(const h of th.parentNode.cells)h.removeAttribute('aria-sort');
 th.setAttribute('aria-sort',up?'ascending':'descending');body.append(...rows)};
 ";
 
-/// Writes the page. The same list gives the same bytes.
+/// Writes the page. Deterministic: the same list gives the same bytes.
 pub(crate) fn write(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) -> io::Result<()> {
     let [a, b] = list.inputs.map(|path| {
         escaped(&path.file_name().map_or_else(|| path.to_string_lossy(), |name| name.to_string_lossy()))
@@ -134,7 +135,7 @@ fn figures(list: &List<'_>, pictures: &Pictures, out: &mut impl Write) -> io::Re
     writeln!(out, "</div>")
 }
 
-/// A picture in the page itself; `told`, escaped, is read where it cannot be seen.
+/// Embeds a picture in the page. `told`, escaped already, is its alternative text.
 fn image(picture: &Picture, told: &str, out: &mut impl Write) -> io::Result<()> {
     let (width, height) = picture.size();
     let mut png = Vec::new();
@@ -146,7 +147,7 @@ fn image(picture: &Picture, told: &str, out: &mut impl Write) -> io::Result<()> 
     )
 }
 
-/// Text as HTML, also in quoted attributes.
+/// Escapes text for HTML, also within quoted attributes.
 fn escaped(text: &str) -> String {
     let mut html = String::with_capacity(text.len());
     for letter in text.chars() {

@@ -1,4 +1,4 @@
-//! A clash list, and what it is of.
+//! A clash list with its inputs and plan, and its reports for scripts.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ use serde::Serialize;
 use crate::report::word;
 use crate::sentence::unit;
 
-/// A clash list, and what it is of.
+/// A clash list with its inputs and plan.
 pub(crate) struct List<'a> {
     pub(crate) inputs: [&'a Path; 2],
     pub(crate) views: [&'a Placed<'a>; 2],
-    /// Points are compared, and no surfaces.
+    /// `true` if balls about the points are compared instead of surfaces.
     pub(crate) of_points: bool,
     pub(crate) plan: &'a ClashPlan,
     pub(crate) found: &'a Clashes,
@@ -23,7 +23,7 @@ impl List<'_> {
         self.found.clashes.iter().filter(|clash| clash.kind == kind).count()
     }
 
-    /// Lengths are told to this.
+    /// The unit to which lengths are rounded.
     pub(crate) fn unit(&self) -> f64 {
         unit(self.views)
     }
@@ -46,11 +46,11 @@ pub(crate) struct ClashReport {
     pub(crate) upper: f64,
     pub(crate) evidence: &'static str,
     pub(crate) contacts: usize,
-    /// Near contacts around a hard clash.
+    /// The number of near contacts around a hard clash.
     pub(crate) surroundings: usize,
-    /// Null: no search tells yet how deep one scan is in the other.
+    /// The penetration depth. Always null: no search computes it yet.
     pub(crate) depth: Option<f64>,
-    /// The contact with the least residual.
+    /// The place of the contact with the least residual.
     pub(crate) point: [f64; 3],
     residual: f64,
     pub(crate) source_a: u32,

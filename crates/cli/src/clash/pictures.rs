@@ -1,4 +1,4 @@
-//! Pictures of clashes: all of them on both scans, and each from near.
+//! Pictures of clashes: an overview of all, and a close view of each.
 
 use nearmiss::geometry::nalgebra::Vector3;
 use nearmiss::{Aabb, Clash, ClashKind, Placed};
@@ -17,30 +17,33 @@ use crate::viewpoint::whole_camera;
 const OVERVIEW: [usize; 2] = [1120 * FINE, 700 * FINE];
 const CLOSE: [usize; 2] = [420 * FINE, 320 * FINE];
 
-/// Colours of contacts, and of their numbers' ground.
+/// Colours of contacts, and of the background of their numbers.
 const OF_HARD: Colour = [196, 22, 42];
 const OF_CLEARANCE: Colour = [126, 60, 160];
 
-/// The radius of points where no surfaces are compared, and of the dots at contacts, in fine pixels.
+/// Radii in fine pixels: of points if no surfaces are compared, and of the dots at contacts.
 const POINT: f64 = 3.0;
 const CONTACT: f64 = 4.5;
 
-/// The close view shows at least so many local radii to either side, and so much of the smaller scan.
+/// Least half height of the close view: in local radii, and as a share of the diagonal of the
+/// smaller scan.
 const RADII: f64 = 12.0;
 const OF_SMALLER: f64 = 0.12;
 
-/// A scan is cut open in the overview if its box is so many times larger than the other's.
+/// A scan is cut open in the overview if the diagonal of its box exceeds this multiple of the
+/// other's.
 const LARGER: f64 = 3.0;
 
-/// The surroundings of the smaller scan are so many times as high as its diagonal is long, and are shown if
-/// that makes it so many times larger.
+/// Height of the view of the smaller scan's surroundings, in diagonals of that scan. The view is
+/// made if it magnifies the overview by more than `LOST`.
 const AROUND: f64 = 1.6;
 const LOST: f64 = 3.0;
 
-/// Points of a chunk lie together, for the order of the points is that of the tree.
+/// Stored points per chunk. Points that follow each other are near each other, because they are
+/// stored in the order of the tree.
 const CHUNK: usize = 512;
 
-/// Points of a scan, and contacts, that are looked at to choose a direction.
+/// The number of points of a scan, and of contacts, that are sampled to choose a direction.
 const LOOKED_AT: usize = 1200;
 const TARGETS: usize = 24;
 
@@ -50,11 +53,11 @@ pub(crate) struct Pictures {
     pub(crate) overview: Picture,
     /// The surroundings of the smaller scan, if it is lost in the overview.
     pub(crate) surroundings: Option<Picture>,
-    /// Of the first clashes.
+    /// Close views of the first clashes.
     pub(crate) close: Vec<Picture>,
 }
 
-/// Paints the overview and the first `count` clashes; the bar advances with each.
+/// Paints the overview and the first `count` clashes, and advances `bar` for each.
 pub(crate) fn paint(list: &List<'_>, count: usize, bar: &Bar) -> Pictures {
     let whole = Overview::new(list);
     let overview = whole.paint(list, count, &whole.camera);
@@ -69,13 +72,13 @@ pub(crate) fn paint(list: &List<'_>, count: usize, bar: &Bar) -> Pictures {
     Pictures { overview, surroundings, close: close.collect() }
 }
 
-/// How both scans are shown. Of a scan that is much larger than the other, what lies before that one is left
-/// out, as the roof of a doll's house.
+/// The overview of both scans. If one scan is much larger than the other, its part in front of the
+/// smaller one is left out, like the front of a doll's house.
 struct Overview {
     camera: Camera,
-    /// What is about the scan that is much smaller.
+    /// The camera for the surroundings of the smaller scan, if the other is much larger.
     nearer: Option<Camera>,
-    /// What of either scan lies nearer to the viewer than this, along the view, is left out.
+    /// For each scan, the greatest coordinate towards the viewer at which points are painted.
     cuts: [f64; 2],
 }
 
@@ -93,7 +96,7 @@ impl Overview {
         let targets = thinned(&centres, TARGETS);
         let camera = whole_camera(list.views, area, |points, toward| {
             if is_open {
-                // From above, as buildings are looked into.
+                // Prefer a view from above, as into a building.
                 return 3.0 * (1.0 - toward.dot(&Vector3::new(0.0, -0.35, 0.94)));
             }
             4.0 * hidden(&targets, points, *toward, [0.1 * size, 0.05 * size])
@@ -110,7 +113,7 @@ impl Overview {
         Self { camera, nearer: Some(nearer).filter(|nearer| nearer.scale > LOST * camera.scale), cuts }
     }
 
-    /// Both scans with the numbers of the first clashes, and dots at the others.
+    /// Paints both scans with the numbers of the first clashes, and dots at the others.
     fn paint(&self, list: &List<'_>, numbered: usize, camera: &Camera) -> Picture {
         let Area { width, height, .. } = camera.area;
         let mut canvas = Canvas::new(width, height, GROUND);
@@ -118,7 +121,7 @@ impl Overview {
         for ((view, colour), cut) in list.views.into_iter().zip([OF_A, OF_B]).zip(self.cuts) {
             let front = |i: usize| camera.axes[2].dot(&Vector3::from(view.point(i)));
             for i in (0..view.scan().len()).filter(|&i| front(i) <= cut) {
-                point(list, &mut canvas, camera, view, i, colour, LARGEST);
+                point(list, &mut canvas, camera, (view, i), colour, LARGEST);
             }
         }
         scale_bar(&mut canvas, camera);
@@ -126,7 +129,7 @@ impl Overview {
         for clash in clashes.iter().skip(numbered) {
             contact_dot(&mut canvas, camera, clash.group.centre().into(), colour_of(clash));
         }
-        // The first clash comes last, on top.
+        // The first clash is painted last, so that it is on top.
         for (i, clash) in clashes.iter().enumerate().take(numbered).rev() {
             label(&mut canvas, camera, clash.group.centre().into(), i + 1, colour_of(clash));
         }
@@ -134,13 +137,12 @@ impl Overview {
     }
 }
 
-/// One stored point as it is compared.
+/// Paints one stored point as it is compared: as a dot, or as part of the obstacle.
 fn point(
     list: &List<'_>,
     canvas: &mut Canvas,
     camera: &Camera,
-    view: &Placed<'_>,
-    i: usize,
+    (view, i): (&Placed<'_>, usize),
     colour: Colour,
     largest: f64,
 ) {
@@ -164,7 +166,7 @@ fn contact_dot(canvas: &mut Canvas, camera: &Camera, place: Vector3<f64>, colour
     canvas.line(camera.area, [[x, y]; 2], 2.0 * CONTACT, colour);
 }
 
-/// A number on a round ground at a place.
+/// Writes a number on a round background at a place.
 fn label(canvas: &mut Canvas, camera: &Camera, place: Vector3<f64>, number: usize, colour: Colour) {
     let (text, size) = (number.to_string(), 2 * FINE);
     let [x, y, _] = camera.project(place);
@@ -178,7 +180,7 @@ fn label(canvas: &mut Canvas, camera: &Camera, place: Vector3<f64>, number: usiz
     canvas.text(corner, size, GROUND, &text);
 }
 
-/// The bounds of a placed scan in the world: of the corners of its own bounds.
+/// Returns the bounds of a placed scan in the world, from the corners of its own bounds.
 fn bounds(view: &Placed<'_>) -> Aabb {
     let frame = view.scan().frame();
     let to_stored = |p: [f64; 3]| [0, 1, 2].map(|k| (p[k] - frame.origin[k]) / frame.scale);
@@ -189,13 +191,13 @@ fn diagonal(bounds: &Aabb) -> f64 {
     2.0 * Vector3::from(bounds.half_extents()).norm()
 }
 
-/// At most `most` of some places, evenly by their order.
+/// Returns at most `most` of the places, evenly spaced in their order.
 fn thinned(places: &[Vector3<f64>], most: usize) -> Vec<Vector3<f64>> {
     places.iter().step_by(places.len().div_ceil(most).max(1)).copied().collect()
 }
 
-/// How much lies before the targets, seen from `toward`: about 0 to 1. Counts what is further before one than
-/// `from` and beside it by less than `beside`.
+/// Estimates how much of the targets is hidden, seen from `toward`: 0 to about 1. A point counts if
+/// it is more than `from` in front of a target and less than `beside` from its line of sight.
 fn hidden(
     targets: &[Vector3<f64>],
     points: &[Vector3<f64>],
@@ -217,7 +219,7 @@ fn hidden(
     targets.iter().map(of_target).sum::<f64>() / count
 }
 
-/// Boxes about stored points that follow each other.
+/// Bounding boxes of chunks of consecutive stored points.
 struct Chunks(Vec<Aabb>);
 
 impl Chunks {
@@ -230,7 +232,7 @@ impl Chunks {
         )
     }
 
-    /// The stored points within a radius of a place.
+    /// Returns the stored points within a radius of a place.
     fn within(&self, view: &Placed<'_>, centre: Vector3<f64>, radius: f64) -> Vec<usize> {
         let near = |bounds: &Aabb| {
             let beyond =
@@ -246,7 +248,7 @@ impl Chunks {
 /// A close view of a clash.
 struct Close {
     camera: Camera,
-    /// The stored points that are shown of either scan.
+    /// The stored points of each scan that are shown.
     shown: [Vec<usize>; 2],
     contacts: Vec<Vector3<f64>>,
 }
@@ -275,10 +277,10 @@ impl Close {
             let some = shown[k].iter().step_by(stride).map(|&i| Vector3::from(list.views[k].point(i)));
             some.collect::<Vec<_>>()
         });
-        // Neither the contacts should be hidden, nor the smaller scan by the larger one.
+        // Avoid directions in which contacts are hidden, or the smaller scan by the larger one.
         let (targets, body) = (thinned(&contacts, TARGETS), thinned(&looked_at[smaller], TARGETS));
         let normal = nearest.normals.map_or_else(Vector3::zeros, |normals| normals[1 - smaller].into());
-        // A gap is seen along the surfaces, a cut obliquely.
+        // Look at a gap along the surfaces, and at a cut obliquely.
         let oblique = if clash.kind == ClashKind::Hard { 0.4 } else { 0.1 };
         let cost = |toward: &Vector3<f64>| {
             let below = (-toward.dot(&Vector3::new(0.0, 0.5, 0.8))).max(0.0);
@@ -291,7 +293,7 @@ impl Close {
             of_contacts + 2.0 * of_body + 0.4 * turned + 0.25 * below + 0.1 * steep
         };
         let toward = directions().min_by(|p, q| cost(p).total_cmp(&cost(q))).unwrap_or_else(Vector3::z);
-        // Upright, as far as that can be told: z is up, unless it is looked along.
+        // Upright if possible: z points up unless the view is along z.
         let axis = if toward.z.abs() < 0.97 { Vector3::z() } else { Vector3::y() };
         let up = (axis - toward * toward.dot(&axis)).normalize();
         let [width, height] = CLOSE;
@@ -308,7 +310,7 @@ impl Close {
         canvas.fill(self.camera.area, PANEL_GROUND);
         for ((view, shown), colour) in list.views.into_iter().zip(&self.shown).zip([OF_A, OF_B]) {
             for &i in shown {
-                point(list, &mut canvas, &self.camera, view, i, colour, f64::INFINITY);
+                point(list, &mut canvas, &self.camera, (view, i), colour, f64::INFINITY);
             }
         }
         scale_bar(&mut canvas, &self.camera);

@@ -1,4 +1,4 @@
-//! A clash list as JSON, as a table for spreadsheets, and for people.
+//! A clash list as JSON, as CSV, and as a table for people.
 
 use std::io::{self, Write};
 
@@ -10,22 +10,22 @@ use crate::contacts::clash_count;
 use crate::digits::{place, rough, rounded_down, short};
 use crate::sentence::{bracket, why};
 
-/// The list as a whole, for scripts.
+/// A summary of the whole list, for scripts.
 #[derive(Debug, Serialize)]
 pub(crate) struct Summary {
     clashes: usize,
     hard: usize,
-    /// Places nearer than the clearance and without contact.
+    /// The number of clearance clashes.
     clearance: usize,
     contacts: usize,
-    /// Those within the clearance, beside the hard ones.
+    /// The number of near contacts.
     near_contacts: usize,
     clearance_distance: f64,
     /// Contacts up to this far apart are in one clash.
     link: f64,
     verdict: &'static str,
     reason: Option<&'static str>,
-    /// Whether these are all.
+    /// `true` if no clash is missing.
     complete: bool,
     micros: f64,
 }
@@ -65,7 +65,7 @@ fn reason_word(reason: Reason) -> Option<&'static str> {
     }
 }
 
-/// A header line and a line for each clash, lengths in world units, every digit kept.
+/// Writes a header line and a line for each clash, with lengths in world units and all digits.
 pub(crate) fn write_csv(list: &List<'_>, out: &mut impl Write) -> io::Result<()> {
     let [a, b] = list.inputs.map(|path| field(&path.to_string_lossy()));
     writeln!(
@@ -84,13 +84,13 @@ pub(crate) fn write_csv(list: &List<'_>, out: &mut impl Write) -> io::Result<()>
     Ok(())
 }
 
-/// Text as a field: quoted, and nothing that a spreadsheet would take for a formula.
+/// Quotes text as a CSV field that no spreadsheet takes for a formula.
 fn field(text: &str) -> String {
     let guard = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { "'" } else { "" };
     format!("\"{guard}{}\"", text.replace('"', "\"\""))
 }
 
-/// The first clashes of the list as a table in columns, its header first; nothing where there are none.
+/// Returns the first clashes as a table with a header; empty if there are no clashes.
 pub(crate) fn lines(list: &List<'_>, most: usize) -> Vec<String> {
     if list.found.clashes.is_empty() {
         return Vec::new();
@@ -116,7 +116,7 @@ fn more(left: usize) -> String {
     format!("{left} more")
 }
 
-/// A clash in words, a cell each: number, kind, centre, size, distance, contacts.
+/// Returns the cells of a clash: number, kind, centre, size, distance, contacts.
 pub(crate) fn cells(list: &List<'_>, clash: &ClashReport) -> [String; 6] {
     let [x, y, z] = clash.size.map(short);
     [
@@ -129,7 +129,7 @@ pub(crate) fn cells(list: &List<'_>, clash: &ClashReport) -> [String; 6] {
     ]
 }
 
-/// The distance of a clash: the lower bound is rounded down.
+/// Returns the distance of a clash in words, with the lower bound rounded down.
 fn distance(list: &List<'_>, clash: &ClashReport) -> String {
     let upper = short(clash.upper);
     match clash.kind {
@@ -140,7 +140,7 @@ fn distance(list: &List<'_>, clash: &ClashReport) -> String {
     }
 }
 
-/// The whole list in a sentence or two. Without clashes, `distance` tells how far the scans are apart.
+/// Sums up the list in a sentence or two. Without clashes, `distance` is the distance of the scans.
 pub(crate) fn sentence(list: &List<'_>, distance: Option<&Distance>) -> String {
     let (hard, near) = (list.count(ClashKind::Hard), list.count(ClashKind::Clearance));
     let clearance = list.plan.clearance();

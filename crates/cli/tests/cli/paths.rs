@@ -33,11 +33,14 @@ fn joined(numbers: &[f64], divider: &str) -> String {
     numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(divider)
 }
 
+/// Writes the `i`-th pose, a translation and a quaternion, as a line.
+type Line<'a> = &'a dyn Fn(usize, &[f64; 3], &[f64; 4]) -> String;
+
 #[test]
 fn every_format_of_poses_gives_the_same_answers() {
     let place = ball();
     let matrix = |t: &[f64; 3], q: &[f64; 4]| Pose::new(*t, *q).to_row_major();
-    let file = |header: &str, line: &dyn Fn(usize, &[f64; 3], &[f64; 4]) -> String| {
+    let file = |header: &str, line: Line<'_>| {
         let lines =
             quaternions().iter().enumerate().map(|(i, (t, q))| line(i, t, q) + "\n").collect::<String>();
         format!("{header}{lines}")

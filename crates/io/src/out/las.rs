@@ -4,7 +4,7 @@ use std::io::{Seek, Write};
 
 use laz::{LasZipCompressor, LazVlr, LazVlrBuilder};
 
-use super::survey::{Lattice, OutError, Survey};
+use super::survey::{OutError, ScaleOffset, Survey};
 use crate::points::Points;
 
 /// Length of the header in bytes.
@@ -22,7 +22,7 @@ const ONLY_RETURN: u8 = 0x11;
 /// A writer of LAS and LAZ.
 pub(super) struct LasWriter<W: Write + Seek + Send + Sync + 'static> {
     out: Out<W>,
-    lattice: Lattice,
+    lattice: ScaleOffset,
     has_colours: bool,
 }
 
@@ -115,7 +115,7 @@ impl<W: Write + Seek + Send + Sync + 'static> LasWriter<W> {
 }
 
 /// Builds the header. `packed` is the length of the laszip record, if the file is compressed.
-fn header(survey: &Survey, format: u8, lattice: Lattice, packed: Option<usize>) -> Vec<u8> {
+fn header(survey: &Survey, format: u8, lattice: ScaleOffset, packed: Option<usize>) -> Vec<u8> {
     let mut bytes = vec![0; usize::from(HEADER)];
     let mut put = |at: usize, value: &[u8]| bytes[at..at + value.len()].copy_from_slice(value);
     put(0, b"LASF");

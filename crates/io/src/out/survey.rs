@@ -12,7 +12,7 @@ use crate::text::plain;
 
 /// The scale and offset of LAS: coordinates are `offset + n * scale` for 32-bit integers `n`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lattice {
+pub struct ScaleOffset {
     /// Step size along each axis, in the units of the file.
     pub scale: [f64; 3],
     /// Origin of the steps, in the units of the file.
@@ -30,7 +30,7 @@ pub struct Survey {
     intensities: [f32; 2],
     /// `true` if every intensity is a whole number of 16 bits.
     is_whole: bool,
-    lattice: Option<Lattice>,
+    lattice: Option<ScaleOffset>,
 }
 
 impl Default for Survey {
@@ -71,7 +71,7 @@ impl Survey {
 
     /// Sets the lattice of the coordinates, usually that of the input.
     #[must_use]
-    pub fn with_lattice(self, lattice: Option<Lattice>) -> Self {
+    pub fn with_lattice(self, lattice: Option<ScaleOffset>) -> Self {
         Self { lattice, ..self }
     }
 
@@ -90,19 +90,19 @@ impl Survey {
     /// Returns the lattice for LAS: that of [`Self::with_lattice`] if given. Otherwise the step is
     /// the least power of ten of which 100 million cover the greatest extent.
     #[must_use]
-    pub fn lattice(&self) -> Lattice {
+    pub fn lattice(&self) -> ScaleOffset {
         self.lattice.unwrap_or_else(|| {
             let extent = (0..3).map(|k| self.bounds.max[k] - self.bounds.min[k]).fold(0.0, f64::max);
             let step = if extent > 0.0 { 10_f64.powf((extent * 1e-8).log10().ceil()) } else { 1e-6 };
             let start = |k: usize| if self.points > 0 { self.bounds.min[k].floor() } else { 0.0 };
-            Lattice { scale: [step; 3], offset: [start(0), start(1), start(2)] }
+            ScaleOffset { scale: [step; 3], offset: [start(0), start(1), start(2)] }
         })
     }
 
     /// Returns the number of decimals that write coordinates exactly, if the lattice has decimal
     /// steps.
     pub(super) fn decimals(&self) -> Option<usize> {
-        let Lattice { scale, offset } = self.lattice?;
+        let ScaleOffset { scale, offset } = self.lattice?;
         (0..=9_u8)
             .find(|&n| {
                 let whole =

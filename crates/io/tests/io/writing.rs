@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use nearmiss_io::{Lattice, OutError, OutputFormat, PointWriter, Points, Survey, read_bytes};
+use nearmiss_io::{OutError, OutputFormat, PointWriter, Points, ScaleOffset, Survey, read_bytes};
 
 use nearmiss_testdata::files::{foreign, model};
 
@@ -15,7 +15,7 @@ const FORMATS: [OutputFormat; 6] = [
     OutputFormat::Npy,
 ];
 
-fn written(points: &Points, format: OutputFormat, lattice: Option<Lattice>) -> Result<Vec<u8>, OutError> {
+fn written(points: &Points, format: OutputFormat, lattice: Option<ScaleOffset>) -> Result<Vec<u8>, OutError> {
     let mut survey = Survey::default();
     survey.add(points);
     let mut writer = PointWriter::new(Cursor::new(Vec::new()), format, &survey.with_lattice(lattice))?;
@@ -64,7 +64,7 @@ fn every_format_gives_back_what_it_was_given() {
 
 #[test]
 fn las_keeps_the_steps_of_its_input() {
-    let lattice = Lattice { scale: [0.125, 0.25, 0.125], offset: [4_000_000.0, -500_000.0, 0.0] };
+    let lattice = ScaleOffset { scale: [0.125, 0.25, 0.125], offset: [4_000_000.0, -500_000.0, 0.0] };
     let exact = foreign::far_points();
     for format in [OutputFormat::Las, OutputFormat::Laz] {
         let points = Points::of_positions(exact.clone());
@@ -81,7 +81,7 @@ fn las_keeps_the_steps_of_its_input() {
 #[test]
 fn coordinates_that_las_cannot_count_are_refused() {
     let points = Points::of_positions(vec![[0.0; 3], [1e9, 0.0, 0.0]]);
-    let fine = Lattice { scale: [1e-3; 3], offset: [0.0; 3] };
+    let fine = ScaleOffset { scale: [1e-3; 3], offset: [0.0; 3] };
     let refused = written(&points, OutputFormat::Laz, Some(fine)).unwrap_err();
     assert!(matches!(refused, OutError::TooWide { .. }), "{refused}");
     assert!(written(&points, OutputFormat::Laz, None).is_ok(), "with steps of its own");

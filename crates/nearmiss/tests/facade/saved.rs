@@ -1,7 +1,7 @@
 //! A saved scan equals the original. Files of earlier releases open, or the error names their
 //! version.
 use nearmiss::graph::ClosePairs;
-use nearmiss::store::Fault;
+use nearmiss::store::ContainerFault;
 use nearmiss::{
     BuildOptions, Check, GraphOptions, Pair, Paths, PointCloud, Pose, Scan, Scratch, Status, SurfaceGraph,
 };
@@ -160,12 +160,12 @@ fn another_version_is_refused_by_name() {
     writer.write_to(&mut bytes).unwrap();
     let refused = Scan::from_bytes(bytes, Check::Full).unwrap_err();
     let nearmiss::LoadError::Open(refused) = refused else { panic!("{refused}") };
-    assert!(matches!(refused.fault, Fault::Version { found: 999, .. }), "{refused}");
+    assert!(matches!(refused.fault, ContainerFault::Version { found: 999, .. }), "{refused}");
     let mut bytes = Vec::new();
     nearmiss::store::Writer::new(*b"MAPS", 1).write_to(&mut bytes).unwrap();
     let refused = Scan::from_bytes(bytes, Check::Full).unwrap_err();
     assert!(
-        matches!(refused, nearmiss::LoadError::Open(e) if matches!(e.fault, Fault::Kind { .. })),
+        matches!(refused, nearmiss::LoadError::Open(e) if matches!(e.fault, ContainerFault::Kind { .. })),
         "a map is no scan"
     );
 }

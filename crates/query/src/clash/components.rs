@@ -1,14 +1,16 @@
-//! Connected components of places: two places are joined when their distance is at most a link length.
+//! Connected components of places. Two places are joined if their distance is at most a link
+//! length.
 //!
-//! A tree of boxes halves the places, and pairs of its nodes are compared from the root down. A pair is
-//! dropped when its boxes are further apart than a link, or when both nodes lie in one component already. It
-//! is joined as a whole when no two of its places can be further apart than a link. Otherwise its halves are
-//! compared. Differences, quotients and sums round monotonically, so a box decides exactly as each of its
-//! pairs of places would: the components are those of all pairs, at any scale.
+//! A tree of boxes halves the places, and pairs of its nodes are compared from the root down. A
+//! pair is dropped if its boxes are further apart than a link, or if both nodes are in one
+//! component already. It is joined as a whole if no two of its places can be further apart than a
+//! link. Otherwise its halves are compared. Differences, quotients and sums round monotonically, so
+//! a box decides exactly as each of its pairs of places would. The components are therefore equal
+//! to those found by comparing all pairs, at any scale.
 
 use nearmiss_geometry::Aabb;
 
-/// A node with at most so many places is compared place by place.
+/// The places of a node with at most this many are compared one by one.
 const LEAF: usize = 8;
 
 /// Returns the number of the component of each place, counted from 0 in the order of their first places.
@@ -16,8 +18,9 @@ const LEAF: usize = 8;
 /// Two places whose distance is at most `link` are in one component; `link` 0 joins equal places alone. A
 /// place with a coordinate that is not finite is a component of its own.
 ///
-/// Takes n log n steps for places that are spread out or close together, and memory for two numbers and a
-/// box per place. The components do not depend on the order of the places, their numbers do.
+/// Takes n log n steps if the places are spread out or close together, and memory for two numbers
+/// and a box per place. The order of the places changes the numbers of the components but not the
+/// components.
 #[must_use]
 pub fn components(places: &[[f64; 3]], link: f64) -> Vec<usize> {
     let mut order: Vec<usize> =
@@ -43,14 +46,15 @@ pub fn components(places: &[[f64; 3]], link: f64) -> Vec<usize> {
     numbers
 }
 
-/// Places that follow each other in the order of the tree.
+/// A range of places in the order of the tree, with their box.
 struct Node {
     start: usize,
     end: usize,
     bounds: Aabb,
-    /// Its second half; the first half is the node that follows this one. `None` for a leaf.
+    /// The child with the second half of the places; the child with the first half is the next
+    /// node. `None` for a leaf.
     second: Option<usize>,
-    /// All places are known to be in one component.
+    /// `true` if all places are known to be in one component.
     is_one: bool,
 }
 
@@ -58,12 +62,14 @@ struct Joining<'a> {
     places: &'a [[f64; 3]],
     link: f64,
     nodes: Vec<Node>,
-    /// Each leads to an earlier place of the component, that of the first to itself.
+    /// Union-find parent of each place: an earlier place of the same component, or the place itself
+    /// if it is the first.
     parents: Vec<usize>,
 }
 
 impl Joining<'_> {
-    /// Appends the nodes of the places in `order`, of which the first is number `start` of all.
+    /// Appends the subtree of the places in `order`, the first of which has position `start` in the
+    /// order of all places.
     fn grow(&mut self, order: &mut [usize], start: usize) {
         let bounds = Aabb::of(order.iter().map(|&i| self.places[i]));
         let own = self.nodes.len();
@@ -83,7 +89,7 @@ impl Joining<'_> {
         self.grow(&mut order[middle..], start + middle);
     }
 
-    /// Joins the places of two nodes, or of one, that are within a link.
+    /// Joins all places of nodes `a` and `b` (which may be equal) that are at most a link apart.
     fn join(&mut self, order: &[usize], a: usize, b: usize) {
         if self.is_one(order, a)
             && (a == b
@@ -150,7 +156,7 @@ impl Joining<'_> {
         self.nodes[node].is_one = true;
     }
 
-    /// Returns `true` if all places of a node are in one component. An answer that is `true` is kept.
+    /// Returns `true` if all places of a node are in one component, and caches that result.
     fn is_one(&mut self, order: &[usize], node: usize) -> bool {
         let Node { start, end, second, is_one, .. } = self.nodes[node];
         let all = is_one
@@ -166,13 +172,13 @@ impl Joining<'_> {
         all
     }
 
-    /// Joins the components of two places; the earlier root stays one.
+    /// Joins the components of two places; the earlier root stays the root.
     fn link_places(&mut self, i: usize, j: usize) {
         let (i, j) = (self.root(i), self.root(j));
         self.parents[i.max(j)] = i.min(j);
     }
 
-    /// The first place of the component of place `i`, with the way to it halved.
+    /// Returns the first place of the component of place `i`, and halves the path to it.
     fn root(&mut self, mut i: usize) -> usize {
         while self.parents[i] != i {
             self.parents[i] = self.parents[self.parents[i]];
@@ -182,8 +188,8 @@ impl Joining<'_> {
     }
 }
 
-/// Returns `true` if a vector of these absolute components is no longer than `link`: in units of it, so that
-/// neither squares of great lengths nor those of small ones are lost.
+/// Returns `true` if a vector with these absolute components is at most `link` long. Divides by
+/// `link` first, so that squares neither overflow nor underflow.
 fn within(apart: [f64; 3], link: f64) -> bool {
     if link > 0.0 {
         let [x, y, z] = apart.map(|d| d / link);
@@ -199,7 +205,7 @@ mod tests {
 
     use super::*;
 
-    /// All pairs.
+    /// Finds the components by comparing all pairs of places.
     fn twin(places: &[[f64; 3]], link: f64) -> Vec<usize> {
         let mut numbers = vec![usize::MAX; places.len()];
         let mut count = 0;

@@ -1,4 +1,4 @@
-//! Contacts that belong together.
+//! Groups of linked contacts.
 
 use std::cmp::Ordering;
 
@@ -7,21 +7,22 @@ use nearmiss_geometry::Aabb;
 use crate::ask::answer::Contact;
 use crate::clash::components::components;
 
-/// A connected component of contacts: each is at most a link length from another one of the group, unless it
-/// is the only one.
+/// A connected component of contacts. Each contact is at most a link length from another one of the
+/// group, unless it is the only one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactGroup {
     /// The contacts, as indices into the list that was grouped, in ascending order. Never empty.
     pub contacts: Vec<usize>,
-    /// The box about their places, in the world.
+    /// The bounding box of the places of the contacts, in world units.
     pub bounds: Aabb,
-    /// The contact with the least residual; of equal ones the first.
+    /// The index of the contact with the least residual; the first of equal ones.
     pub nearest: usize,
 }
 
 impl ContactGroup {
-    /// Groups contacts whose places are linked, directly or by others, by distances of at most `link`. Groups
-    /// come in the order of their first contacts. Costs what [`components`] costs.
+    /// Groups contacts whose places are linked, directly or through others, by distances of at most
+    /// `link`. The groups are in the order of their first contacts. Costs as much as
+    /// [`components`].
     #[must_use]
     pub fn all(contacts: &[Contact], link: f64) -> Vec<Self> {
         let places: Vec<[f64; 3]> = contacts.iter().map(|contact| contact.point).collect();
@@ -41,26 +42,26 @@ impl ContactGroup {
         groups
     }
 
-    /// The middle of the box about the places.
+    /// The centre of the bounding box.
     #[must_use]
     pub fn centre(&self) -> [f64; 3] {
         self.bounds.centre()
     }
 
-    /// The edge lengths of the box about the places.
+    /// The edge lengths of the bounding box.
     #[must_use]
     pub fn size(&self) -> [f64; 3] {
         self.bounds.half_extents().map(|half| 2.0 * half)
     }
 
-    /// The length of the diagonal of that box.
+    /// The length of the diagonal of the bounding box.
     #[must_use]
     pub fn diagonal(&self) -> f64 {
         self.size().into_iter().fold(0.0, f64::hypot)
     }
 
-    /// The order of clash lists: the greater box diagonal first, then more contacts, then the group that was
-    /// found first.
+    /// Compares two groups in the order of clash lists: by greatest box diagonal, then by most
+    /// contacts, then in the order in which they were found.
     #[must_use]
     pub fn by_size(&self, other: &Self) -> Ordering {
         (other.diagonal().total_cmp(&self.diagonal()))

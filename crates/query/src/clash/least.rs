@@ -1,4 +1,4 @@
-//! How near the points of two leaves come to each other, and how near what they stand for can come.
+//! Bounds of the distance of two leaves.
 
 use nearmiss_hierarchy::NodePair;
 use nearmiss_surface::Metric;
@@ -7,12 +7,13 @@ use crate::ask::options::{CollidePlan, Semantics};
 use crate::leaf::nearest_points::{PointPair, nearest};
 use crate::pair::scan_pair::ScanPair;
 
-/// Bounds of the distance of two leaves, in the world.
+/// Bounds of the distance of two leaves, in world units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Least {
-    /// Proven, zero or more.
+    /// Proven lower bound, at least zero.
     pub(crate) lower: f64,
-    /// That of the two nearest points, less their balls; less than zero where these overlap.
+    /// Distance of the two nearest points, less the radii of their balls. Negative if the balls
+    /// overlap.
     pub(crate) upper: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Near contacts: which surround hard clashes, and how near the scans come in all others.
+//! Near contacts: the surroundings of hard clashes, and the distances of clearance clashes.
 
 use fearless_simd::Level;
 use rstar::RTree;
@@ -13,16 +13,18 @@ use crate::pair::meter::Meter;
 use crate::pair::placed::Placed;
 use crate::pair::scan_pair::{ScanPair, relative};
 
-/// Contacts linked to hard ones, and the others.
+/// Near contacts, divided into those linked to hard contacts and all others.
 pub(crate) struct NearContacts {
-    /// Of each hard group, the near contacts that surround it, in ascending order.
+    /// For each hard group, the near contacts around it, in ascending order.
     pub(crate) surroundings: Vec<Vec<usize>>,
-    /// The groups of contacts that no hard contact is linked to, in the order of their first contacts.
+    /// The groups of the near contacts that are not linked to a hard contact, in the order of their
+    /// first contacts.
     pub(crate) misses: Vec<ContactGroup>,
 }
 
 impl NearContacts {
-    /// Of `contacts`, those before `hard_count` are hard, and these are grouped into `hard` already.
+    /// Divides the near contacts. The first `hard_count` of `contacts` are hard, and `hard` holds
+    /// their groups.
     pub(crate) fn new(contacts: &[Contact], hard_count: usize, hard: &[ContactGroup], link: f64) -> Self {
         let of_groups = hard.iter().enumerate().flat_map(|(number, group)| {
             group.contacts.iter().map(move |&i| GeomWithData::new(contacts[i].point, number))
@@ -31,7 +33,7 @@ impl NearContacts {
         let mut surroundings = vec![Vec::new(); hard.len()];
         let mut misses = Vec::new();
         for group in ContactGroup::all(contacts, link) {
-            // Indices ascend: where the first contact is not hard, none is.
+            // Indices ascend: if the first contact is not hard, none is.
             if group.contacts[0] >= hard_count {
                 misses.push(group);
                 continue;
@@ -47,16 +49,17 @@ impl NearContacts {
     }
 }
 
-/// Bounds of the distance of two scans where they come near each other.
+/// Bounds of the distance of two scans within one clearance clash.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Nearness {
     pub(crate) lower: f64,
     pub(crate) upper: f64,
-    /// Of the upper bound.
+    /// The evidence for the upper bound.
     pub(crate) evidence: Evidence,
 }
 
-/// The nearness of each group of `contacts`, which are of stored `points`, over the pairs of leaves with these.
+/// Returns the bounds for each group of `contacts`, over the pairs of leaves that hold the stored
+/// `points` of these contacts.
 pub(crate) fn nearness(
     views: [&Placed<'_>; 2],
     plan: &CollidePlan,
@@ -73,7 +76,8 @@ pub(crate) fn nearness(
     let semantics = plan.options().semantics;
     let pair = ScanPair::new(views, slices.each_ref(), relative, meter, (level, semantics.part()));
     let proves_upper = !matches!(semantics, Semantics::Surface);
-    // The distance of the places that a contact lies between; residuals are halves of it, balls included.
+    // The distance of the two places of a contact, less their balls. A residual is half the
+    // distance with the balls.
     let between = |i: usize| {
         let balls = match semantics {
             Semantics::Thickened(radius) => 2.0 * radius,

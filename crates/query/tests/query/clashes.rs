@@ -1,4 +1,5 @@
-//! Clash lists: components of all contacts against brute force, clearances on shapes with known distances.
+//! Clash lists: the components of all contacts compared with brute force, and clearances of shapes
+//! with known distances.
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
@@ -18,7 +19,8 @@ fn list(a: &Placed<'_>, b: &Placed<'_>, options: &ClashOptions) -> Clashes {
     Pair::new(*a, *b).clashes(&plan, &mut Scratch::default())
 }
 
-/// The components of contacts, by comparing each with each, in the order of their first contacts.
+/// Returns the components of contacts, found by comparing all pairs, in the order of their first
+/// contacts.
 fn components(contacts: &[Contact], link: f64) -> Vec<Vec<usize>> {
     let distance = |i: usize, j: usize| {
         let (p, q): ([f64; 3], [f64; 3]) = (contacts[i].point, contacts[j].point);
@@ -56,7 +58,7 @@ fn sorted(mut lists: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
     lists
 }
 
-/// A square of `n` × `n` points, 0.1 apart, at height `z`.
+/// Returns a square of `n` × `n` points, 0.1 apart, at height `z`.
 fn square(n: u32, z: f64) -> Vec<[f64; 3]> {
     (0..n * n).map(|i| [f64::from(i % n) * 0.1, f64::from(i / n) * 0.1, z]).collect()
 }
@@ -92,7 +94,7 @@ fn clashes_are_components_of_all_contacts() {
             assert_eq!(groups(&hard, ClashKind::Hard), components(&hard.contacts, link), "{kind:?} {n}");
             several += u32::from(hard.clashes.len() > 1);
 
-            // A clearance changes no hard clash, and each near contact is somewhere.
+            // A clearance changes no hard clash, and each near contact is in some clash.
             let near = list(&va, &vb, &options.with_clearance(0.2 * size));
             assert_eq!(groups(&near, ClashKind::Hard), groups(&hard, ClashKind::Hard), "{kind:?} {n}");
             let all = components(&near.contacts, link);

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use nearmiss_slices::{
-    Avatar, AvatarOptions, Back, Ended, Lattice, Misplaced, Pixel, Reach, Route, RouteError, SliceMap,
-    SliceOptions, StartError, Up, WalkError, Walker, storey_of,
+    Avatar, AvatarOptions, Back, Ended, Misplaced, Pixel, Reach, Route, RouteError, SliceMap, SliceOptions,
+    StartError, StepGrid, Up, WalkError, Walker, storey_of,
 };
 use nearmiss_testdata::arbitrary::rng;
 use nearmiss_testdata::house::{STAIRS, STOREY, house, scanned};
@@ -74,7 +74,7 @@ fn naive_straight(map: &SliceMap, mut walker: Walker, to: [f64; 2], falls: bool)
 /// States of the walker by column and row, with how far each is from the start.
 struct Naive<'a> {
     map: &'a SliceMap,
-    lattice: Lattice,
+    lattice: StepGrid,
     falls: bool,
     found: BTreeMap<[i64; 2], Vec<(Walker, f64)>>,
 }
@@ -93,7 +93,7 @@ impl<'a> Naive<'a> {
     }
 
     /// Goes over all edges until nothing gets shorter: Bellman and Ford.
-    fn new(map: &'a SliceMap, start: &Walker, lattice: Lattice, falls: bool) -> Self {
+    fn new(map: &'a SliceMap, start: &Walker, lattice: StepGrid, falls: bool) -> Self {
         let mut naive = Self { map, lattice, falls, found: BTreeMap::new() };
         let from = map.grid().up.to_map(start.position(map.grid()));
         let [column, row] = naive.cell(from);
@@ -182,7 +182,7 @@ fn reach_is_what_a_naive_fill_finds() {
     for seed in 0..16 {
         let up = [Up::Z, Up::Y, Up::NegX, Up::X][usize::try_from(seed).unwrap() % 4];
         let map = random_map(seed, up);
-        let lattice = Lattice::new(map.grid(), &avatar(), PIXEL);
+        let lattice = StepGrid::new(map.grid(), &avatar(), PIXEL);
         for (_, start) in standing(&map, seed, 2) {
             let sizes = [false, true].map(|falls| {
                 let reach = Reach::new(&map, &start, falls).unwrap();
@@ -210,7 +210,7 @@ fn routes_are_shortest_and_are_walked_without_a_stop() {
     for seed in 100..130 {
         let up = [Up::Z, Up::NegY, Up::X][usize::try_from(seed).unwrap() % 3];
         let (map, falls) = (random_map(seed, up), seed % 4 == 3);
-        let lattice = Lattice::new(map.grid(), &avatar(), PIXEL);
+        let lattice = StepGrid::new(map.grid(), &avatar(), PIXEL);
         let places = standing(&map, seed, 5);
         let (from, start) = places[0];
         let naive = Naive::new(&map, &start, lattice, falls);
@@ -266,7 +266,7 @@ fn walked(map: &SliceMap, route: &Route, falls: bool, told: &str) -> [f64; 3] {
 /// Looks at every height of every place.
 fn nearest_naive(map: &SliceMap, near: [f64; 3]) -> Option<f64> {
     let grid = map.grid();
-    let lattice = Lattice::new(grid, &avatar(), grid.pixel);
+    let lattice = StepGrid::new(grid, &avatar(), grid.pixel);
     let [x, y, z] = grid.up.to_map(near);
     let cells =
         (0..lattice.counts[1]).flat_map(|row| (0..lattice.counts[0]).map(move |column| [column, row]));

@@ -1,7 +1,7 @@
 //! Forged tables: the checksums of header and table match, the contents are wrong.
 
 use crate::sample::{Content, put, repair};
-use nearmiss_store::{Check, Fault, File, Writer};
+use nearmiss_store::{Check, ContainerFault, File, Writer};
 
 /// Byte offsets of the fields of table row `row`.
 const fn tag(row: usize) -> usize {
@@ -18,7 +18,7 @@ const fn element_size(row: usize) -> usize {
 }
 
 /// Applies `change` to a valid file, repairs the checksums, and returns the fault of opening it.
-fn attack(change: impl Fn(&mut Vec<u8>)) -> Fault {
+fn attack(change: impl Fn(&mut Vec<u8>)) -> ContainerFault {
     let mut bytes = Content::small().bytes();
     change(&mut bytes);
     repair(&mut bytes);
@@ -45,17 +45,20 @@ fn sections_beyond_the_file_are_refused() {
     let file_end = Content::small().bytes().len() as u64;
     for beyond in [file_end + 64, 1 << 40, 1 << 63, u64::MAX - 63] {
         let found = attack(|bytes| put(bytes, offset(2), beyond));
-        assert!(matches!(found, Fault::OutOfBounds { offset, .. } if offset == beyond), "{found:?}");
+        assert!(matches!(found, ContainerFault::OutOfBounds { offset, .. } if offset == beyond), "{found:?}");
     }
     for long in [file_end, 1 << 40, (u64::MAX / 12) * 12, 1 << 63] {
         let found = attack(|bytes| put(bytes, length(1), long / 12 * 12));
-        assert!(matches!(found, Fault::OutOfBounds { .. }), "{found:?}");
+        assert!(matches!(found, ContainerFault::OutOfBounds { .. }), "{found:?}");
     }
     let both = attack(|bytes| {
         put(bytes, offset(3), u64::MAX - 63);
         put(bytes, length(3), 128);
     });
-    assert!(matches!(both, Fault::OutOfBounds { .. }), "the sum wraps round to a good value: {both:?}");
+    assert!(
+        matches!(both, ContainerFault::OutOfBounds { .. }),
+        "the sum wraps round to a good value: {both:?}"
+    );
 }
 
 #[test]
@@ -64,11 +67,11 @@ fn overlapping_and_wandering_sections_are_refused() {
         let first = number(bytes, offset(1));
         put(bytes, offset(2), first);
     });
-    assert!(matches!(same, Fault::Overlapping { .. }), "{same:?}");
+    assert!(matches!(same, ContainerFault::Overlapping { .. }), "{same:?}");
     for inside in [0, 64, 128, 256] {
         let found = attack(|bytes| put(bytes, offset(1), inside));
         assert!(
-            matches!(found, Fault::Overlapping { offset, .. } if offset == inside),
+            matches!(found, ContainerFault::Overlapping { offset, .. } if offset == inside),
             "header or table: {found:?}"
         );
     }
@@ -77,10 +80,10 @@ fn overlapping_and_wandering_sections_are_refused() {
         put(bytes, offset(1), b);
         put(bytes, offset(2), a);
     });
-    assert!(matches!(swapped, Fault::Unclaimed { .. }), "{swapped:?}");
+    assert!(matches!(swapped, ContainerFault::Unclaimed { .. }), "{swapped:?}");
     // 65 flags take two units of 64 bytes. 32 flags take one, so the second belongs to no section.
     let hidden = attack(|bytes| put(bytes, length(5), 32));
-    assert!(matches!(hidden, Fault::Unclaimed { .. }), "{hidden:?}");
+    assert!(matches!(hidden, ContainerFault::Unclaimed { .. }), "{hidden:?}");
 }
 
 #[test]
@@ -90,7 +93,7 @@ fn misaligned_sections_are_refused() {
             let honest = number(bytes, offset(2));
             put(bytes, offset(2), honest + by);
         });
-        assert!(matches!(found, Fault::Misaligned { .. }), "{found:?}");
+        assert!(matches!(found, ContainerFault::Misaligned { .. }), "{found:?}");
     }
 }
 
@@ -100,27 +103,30 @@ fn element_sizes_that_do_not_divide_are_refused() {
         let found =
             attack(|bytes| bytes[element_size(1)..element_size(1) + 4].copy_from_slice(&size.to_le_bytes()));
         assert!(
-            matches!(found, Fault::ElementSize { element_size, .. } if element_size == size),
+            matches!(found, ContainerFault::ElementSize { element_size, .. } if element_size == size),
             "{found:?}"
         );
     }
     // An empty section of zero-sized elements is rejected too.
     let found = attack(|bytes| bytes[element_size(4)..element_size(4) + 4].fill(0));
-    assert!(matches!(found, Fault::ElementSize { element_size: 0, length: 0, .. }), "{found:?}");
+    assert!(matches!(found, ContainerFault::ElementSize { element_size: 0, length: 0, .. }), "{found:?}");
 }
 
 #[test]
 fn counts_that_the_file_cannot_hold_are_refused() {
     for count in [40_u32, 1 << 20, u32::MAX] {
         let found = attack(|bytes| bytes[20..24].copy_from_slice(&count.to_le_bytes()));
-        assert!(matches!(found, Fault::TableOutOfBounds { count: c, .. } if c == count), "{found:?}");
+        assert!(
+            matches!(found, ContainerFault::TableOutOfBounds { count: c, .. } if c == count),
+            "{found:?}"
+        );
     }
     let fewer = attack(|bytes| bytes[20] = 5);
-    assert!(matches!(fewer, Fault::Unclaimed { .. }), "{fewer:?}");
+    assert!(matches!(fewer, ContainerFault::Unclaimed { .. }), "{fewer:?}");
     let none = attack(|bytes| bytes[20] = 0);
-    assert!(matches!(none, Fault::Unclaimed { .. }), "{none:?}");
+    assert!(matches!(none, ContainerFault::Unclaimed { .. }), "{none:?}");
     let more = attack(|bytes| bytes[20] = 7);
-    assert!(matches!(more, Fault::Overlapping { .. }), "the table grew into the metadata: {more:?}");
+    assert!(matches!(more, ContainerFault::Overlapping { .. }), "the table grew into the metadata: {more:?}");
 }
 
 #[test]
@@ -129,37 +135,42 @@ fn lengths_that_lie_are_refused() {
     for stated in [honest + 64, u64::MAX, 1 << 50] {
         let found = attack(|bytes| put(bytes, 24, stated));
         assert!(
-            matches!(found, Fault::Truncated { expected, found } if expected == stated && found == honest)
+            matches!(found, ContainerFault::Truncated { expected, found } if expected == stated && found == honest)
         );
     }
     for stated in [0, 64, honest - 64] {
         let found = attack(|bytes| put(bytes, 24, stated));
-        assert!(matches!(found, Fault::TrailingBytes { expected, .. } if expected == stated), "{found:?}");
+        assert!(
+            matches!(found, ContainerFault::TrailingBytes { expected, .. } if expected == stated),
+            "{found:?}"
+        );
     }
     let ragged = attack(|bytes| {
         bytes.truncate(bytes.len() - 3);
         let stated = bytes.len() as u64;
         put(bytes, 24, stated);
     });
-    assert!(matches!(ragged, Fault::RaggedLength { .. }), "{ragged:?}");
+    assert!(matches!(ragged, ContainerFault::RaggedLength { .. }), "{ragged:?}");
     let appended = attack(|bytes| {
         bytes.resize(bytes.len() + 64, 0);
         let stated = bytes.len() as u64;
         put(bytes, 24, stated);
     });
-    assert!(matches!(appended, Fault::Unclaimed { offset, end } if (offset, end) == (honest, honest + 64)));
+    assert!(
+        matches!(appended, ContainerFault::Unclaimed { offset, end } if (offset, end) == (honest, honest + 64))
+    );
 }
 
 #[test]
 fn names_listed_twice_and_reserved_bytes_are_refused() {
     let twice = attack(|bytes| bytes.copy_within(tag(3)..tag(3) + 8, tag(4)));
-    assert!(matches!(twice, Fault::DuplicateSection { .. }), "{twice:?}");
+    assert!(matches!(twice, ContainerFault::DuplicateSection { .. }), "{twice:?}");
     for at in 40..56 {
         let found = attack(|bytes| bytes[at] = 1);
-        assert!(matches!(found, Fault::Padding { offset: 40 }), "{found:?}");
+        assert!(matches!(found, ContainerFault::Padding { offset: 40 }), "{found:?}");
     }
     let found = attack(|bytes| bytes[tag(2) + 28] = 1);
-    assert!(matches!(found, Fault::Padding { offset: 172 }), "{found:?}");
+    assert!(matches!(found, ContainerFault::Padding { offset: 172 }), "{found:?}");
 }
 
 #[test]
@@ -174,7 +185,7 @@ fn hostile_metadata_cost_nothing() {
         repair(&mut file);
         let file = File::from_bytes(file, Check::Full).unwrap();
         let error = file.metadata::<crate::sample::About>().unwrap_err();
-        assert!(matches!(error.fault, Fault::Metadata { .. }), "{error}");
+        assert!(matches!(error.fault, ContainerFault::Metadata { .. }), "{error}");
         assert!(file.metadata::<(Vec<u128>, String)>().is_err());
     }
 }

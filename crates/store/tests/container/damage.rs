@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use crate::sample::{Content, Random, put, repair, use_all};
-use nearmiss_store::{Check, Fault, File, Looks};
+use nearmiss_store::{Check, ContainerFault, File, Looks};
 
-fn fault(bytes: Vec<u8>, check: Check) -> Fault {
+fn fault(bytes: Vec<u8>, check: Check) -> ContainerFault {
     let error = File::from_bytes(bytes, check).expect_err("ought to be refused");
     assert!(error.path.is_none());
     error.fault
@@ -21,11 +21,11 @@ fn every_change_of_a_single_byte_is_refused() {
             bytes[at] ^= change;
             let found = fault(bytes, Check::Full);
             let expected = match at {
-                0..8 => matches!(found, Fault::NotAContainer { .. }),
-                8..12 => matches!(found, Fault::Layout { supported: 1, .. }),
-                12..64 => matches!(found, Fault::HeaderChecksum { .. }),
-                64..304 => matches!(found, Fault::TableChecksum { .. }),
-                _ => matches!(found, Fault::Checksum { .. } | Fault::Padding { .. }),
+                0..8 => matches!(found, ContainerFault::NotAContainer { .. }),
+                8..12 => matches!(found, ContainerFault::Layout { supported: 1, .. }),
+                12..64 => matches!(found, ContainerFault::HeaderChecksum { .. }),
+                64..304 => matches!(found, ContainerFault::TableChecksum { .. }),
+                _ => matches!(found, ContainerFault::Checksum { .. } | ContainerFault::Padding { .. }),
             };
             assert!(expected, "byte {at} changed by {change:#x}: {found:?}");
             refused += 1;
@@ -47,7 +47,9 @@ fn a_checksum_that_fails_names_its_section_and_a_padding_byte_its_place() {
         for at in start..start + length {
             let mut bytes = good.clone();
             bytes[at] ^= 4;
-            let Fault::Checksum { section: id, offset, stored, computed } = fault(bytes, Check::Full) else {
+            let ContainerFault::Checksum { section: id, offset, stored, computed } =
+                fault(bytes, Check::Full)
+            else {
                 panic!("byte {at} is of {}", section.id)
             };
             assert_eq!((id, offset, stored), (section.id, section.offset, section.checksum));
@@ -59,7 +61,10 @@ fn a_checksum_that_fails_names_its_section_and_a_padding_byte_its_place() {
         let mut bytes = good.clone();
         bytes[at] = 1;
         let found = fault(bytes, Check::Full);
-        assert!(matches!(found, Fault::Padding { offset } if offset == at as u64), "byte {at}: {found:?}");
+        assert!(
+            matches!(found, ContainerFault::Padding { offset } if offset == at as u64),
+            "byte {at}: {found:?}"
+        );
     }
 }
 
@@ -72,7 +77,10 @@ fn what_structure_lets_pass_verify_finds() {
         let file = File::from_bytes(bytes, Check::Structure).unwrap();
         use_all(&file);
         let found = file.verify().expect_err("a changed byte").fault;
-        assert!(matches!(found, Fault::Checksum { .. } | Fault::Padding { .. }), "byte {at}: {found:?}");
+        assert!(
+            matches!(found, ContainerFault::Checksum { .. } | ContainerFault::Padding { .. }),
+            "byte {at}: {found:?}"
+        );
     }
 }
 
@@ -80,19 +88,19 @@ fn what_structure_lets_pass_verify_finds() {
 fn every_truncation_and_every_extension_is_refused() {
     let good = Content::small().bytes();
     for check in [Check::Full, Check::Structure] {
-        assert!(matches!(fault(Vec::new(), check), Fault::Empty));
+        assert!(matches!(fault(Vec::new(), check), ContainerFault::Empty));
         for length in 1..good.len() {
             let expected = if length < 64 { 64 } else { good.len() } as u64;
             let found = fault(good[..length].to_vec(), check);
             assert!(
-                matches!(found, Fault::Truncated { expected: e, found: f } if e == expected && f == length as u64),
+                matches!(found, ContainerFault::Truncated { expected: e, found: f } if e == expected && f == length as u64),
                 "{length} bytes: {found:?}"
             );
         }
         for more in [1, 63, 64, 1000] {
             let mut bytes = good.clone();
             bytes.resize(good.len() + more, 0);
-            assert!(matches!(fault(bytes, check), Fault::TrailingBytes { .. }));
+            assert!(matches!(fault(bytes, check), ContainerFault::TrailingBytes { .. }));
         }
     }
 }
@@ -108,9 +116,9 @@ fn truncated_files_are_refused_from_disk_too() {
         for error in errors.map(|result| result.expect_err("ought to be refused")) {
             assert_eq!(error.path.as_deref(), Some(path.as_path()));
             let expected = if length == 0 {
-                matches!(error.fault, Fault::Empty)
+                matches!(error.fault, ContainerFault::Empty)
             } else {
-                matches!(error.fault, Fault::Truncated { found, .. } if found == length as u64)
+                matches!(error.fault, ContainerFault::Truncated { found, .. } if found == length as u64)
             };
             assert!(expected, "{length} bytes: {error}");
         }
@@ -175,9 +183,9 @@ fn files_of_other_kinds_are_named() {
     ] {
         let found = fault(start.to_vec(), Check::Full);
         if start == b"\x8E" {
-            assert!(matches!(found, Fault::Truncated { expected: 64, found: 1 }), "{found:?}");
+            assert!(matches!(found, ContainerFault::Truncated { expected: 64, found: 1 }), "{found:?}");
         } else {
-            assert!(matches!(found, Fault::NotAContainer { looks: l } if l == looks), "{found:?}");
+            assert!(matches!(found, ContainerFault::NotAContainer { looks: l } if l == looks), "{found:?}");
         }
     }
 }
@@ -187,12 +195,12 @@ fn the_other_byte_order_and_other_layouts_are_recognised() {
     let good = Content::small().bytes();
     let mut swapped = good.clone();
     swapped[..8].reverse();
-    assert!(matches!(fault(swapped, Check::Full), Fault::ByteOrder));
+    assert!(matches!(fault(swapped, Check::Full), ContainerFault::ByteOrder));
     let mut newer = good;
     newer[8] = 2;
     repair(&mut newer);
     let found = fault(newer, Check::Full);
-    assert!(matches!(found, Fault::Layout { found: 2, supported: 1 }));
+    assert!(matches!(found, ContainerFault::Layout { found: 2, supported: 1 }));
     assert!(found.to_string().ends_with("update the program"), "{found}");
 }
 
@@ -206,17 +214,20 @@ fn what_is_not_a_file_is_refused_by_name() {
         };
         let error = load(&missing).unwrap_err();
         assert!(
-            matches!(&error.fault, Fault::Io { source } if source.kind() == std::io::ErrorKind::NotFound)
+            matches!(&error.fault, ContainerFault::Io { source } if source.kind() == std::io::ErrorKind::NotFound)
         );
         assert_eq!(error.to_string(), format!("{}: no such file; check the path", missing.display()));
         assert!(
             std::error::Error::source(&error).is_some(),
             "the system's words are one step down the chain"
         );
-        assert!(matches!(load(folder.path()).unwrap_err().fault, Fault::NotAFile { directory: true }));
+        assert!(matches!(
+            load(folder.path()).unwrap_err().fault,
+            ContainerFault::NotAFile { directory: true }
+        ));
         if cfg!(unix) {
             let device = load(Path::new("/dev/zero")).unwrap_err();
-            assert!(matches!(device.fault, Fault::NotAFile { directory: false }), "{device}");
+            assert!(matches!(device.fault, ContainerFault::NotAFile { directory: false }), "{device}");
         }
     }
 }

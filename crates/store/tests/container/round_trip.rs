@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::sample::{About, Content, KIND, Node};
-use nearmiss_store::{Check, Fault, File, SectionId, WriteError, Writer};
+use nearmiss_store::{Check, ContainerFault, File, SectionId, WriteError, Writer};
 
 #[test]
 fn every_way_in_gives_the_same_content() {
@@ -124,7 +124,7 @@ fn a_container_without_sections_is_one_header() {
     assert!(file.sections().is_empty());
     assert!(matches!(
         file.metadata::<u8>().unwrap_err().fault,
-        Fault::MissingSection { section: SectionId { tag: [b'M', b'E', b'T', b'A'], part: 0 } }
+        ContainerFault::MissingSection { section: SectionId { tag: [b'M', b'E', b'T', b'A'], part: 0 } }
     ));
 }
 
@@ -132,30 +132,39 @@ fn a_container_without_sections_is_one_header() {
 fn asking_for_what_is_not_there_says_so() {
     let file = File::from_bytes(Content::small().bytes(), Check::Full).unwrap();
     let missing = file.array::<u8>(*b"NONE", 2).unwrap_err().with_path("town.zip/scan.nm");
-    assert!(matches!(missing.fault, Fault::MissingSection { .. }));
+    assert!(matches!(missing.fault, ContainerFault::MissingSection { .. }));
     assert_eq!(
         missing.to_string(),
         "town.zip/scan.nm: section NONE/2 is missing; prepare it again with `preprocess`"
     );
 
     let wrong = file.array::<[f32; 4]>(*b"POSN", 0).unwrap_err();
-    assert!(matches!(wrong.fault, Fault::WrongElementSize { expected: 16, found: 12, .. }), "{wrong}");
+    assert!(
+        matches!(wrong.fault, ContainerFault::WrongElementSize { expected: 16, found: 12, .. }),
+        "{wrong}"
+    );
     assert_eq!(file.array::<Node>(*b"POSN", 0).unwrap().len(), 7, "only the size is stored, as documented");
 
     let kind = file.expect(*b"SLIC", 1..=9).unwrap_err();
-    assert!(matches!(kind.fault, Fault::Kind { found: KIND, expected: [b'S', b'L', b'I', b'C'] }), "{kind}");
+    assert!(
+        matches!(kind.fault, ContainerFault::Kind { found: KIND, expected: [b'S', b'L', b'I', b'C'] }),
+        "{kind}"
+    );
     for (supported, advice) in
         [(1..=2, "versions 1 to 2, got version 3; update"), (4..=4, "version 4, got version 3; prepare")]
     {
         let version = file.expect(KIND, supported).unwrap_err();
-        assert!(matches!(version.fault, Fault::Version { found: 3, .. }));
+        assert!(matches!(version.fault, ContainerFault::Version { found: 3, .. }));
         assert!(version.to_string().contains(advice), "{version}");
     }
     assert!(matches!(
         file.metadata::<[[u64; 32]; 4]>().unwrap_err().fault,
-        Fault::Metadata { offset: 320, .. }
+        ContainerFault::Metadata { offset: 320, .. }
     ));
-    assert!(matches!(file.metadata::<u8>().unwrap_err().fault, Fault::MetadataTrailing { offset: 321, .. }));
+    assert!(matches!(
+        file.metadata::<u8>().unwrap_err().fault,
+        ContainerFault::MetadataTrailing { offset: 321, .. }
+    ));
 }
 
 #[test]

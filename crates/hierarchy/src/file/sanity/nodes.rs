@@ -19,8 +19,9 @@ use crate::tree::wide::Siblings;
 /// box.
 const ASKEW: f32 = 1e-3;
 
-/// How far rounding may make a child extend beyond its parent, relative to their coordinates: both
-/// boxes were grown by 2e-6 of their own, and the comparison rounds as much again.
+/// Greatest extent of a child beyond its parent that rounding explains, relative to their
+/// coordinates. Both boxes were enlarged by 2e-6 of their own coordinates, and the comparison
+/// rounds as much again.
 const STICKS_OUT: f32 = 8e-6;
 
 /// The count of numbers in a box.

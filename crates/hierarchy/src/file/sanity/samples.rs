@@ -14,7 +14,7 @@ use crate::scan::build::PointHierarchy;
 /// Allowance for the rounding of a mean of radii.
 const MEAN: f32 = 1.0 + 1e-5;
 
-/// Of the samples of a node's children, every fourth is tested against its covering; testing all
+/// Stride of the samples of a node's children that are tested against its covering. Testing all
 /// would take as long as the rest of the checks.
 const STEP: usize = 4;
 

@@ -3,7 +3,7 @@
 
 use std::io;
 
-use nearmiss::store::{Fault, File, WriteError, WriteStep};
+use nearmiss::store::{ContainerFault, File, WriteError, WriteStep};
 use nearmiss::{BuildOptions, Check, GraphOptions, LoadError, PointCloud, Scan};
 use nearmiss_testdata::arbitrary::{self, CloudKind};
 
@@ -39,8 +39,8 @@ fn a_scan_cut_anywhere_is_refused_even_if_its_header_owns_up() {
         for refused in refusals(&cut) {
             let LoadError::Open(refused) = refused else { panic!("cut after {end}: {refused}") };
             let told = match refused.fault {
-                Fault::Empty => end == 0,
-                Fault::Truncated { found, .. } => found == end as u64,
+                ContainerFault::Empty => end == 0,
+                ContainerFault::Truncated { found, .. } => found == end as u64,
                 _ => false,
             };
             assert!(told, "cut after {end}: {refused}");
@@ -68,7 +68,7 @@ fn a_file_of_a_machine_of_the_other_byte_order_is_named_as_such() {
         }
         for refused in refusals(&other) {
             let LoadError::Open(refused) = refused else { panic!("{refused}") };
-            assert!(matches!(refused.fault, Fault::ByteOrder), "{swapped:?}: {refused}");
+            assert!(matches!(refused.fault, ContainerFault::ByteOrder), "{swapped:?}: {refused}");
             assert!(refused.to_string().contains("big-endian machine; prepare it again"), "{refused}");
         }
     }
