@@ -1,7 +1,7 @@
 //! An allocator that counts its calls, the live bytes and their peak.
 //!
-//! A program or test that needs the counts declares `#[global_allocator] static ALLOCATOR: Counting
-//! = Counting::new();`.
+//! A program or test that needs the counts declares
+//! `#[global_allocator] static ALLOCATOR: Counting = Counting::new();`.
 
 #![expect(unsafe_code, reason = "a global allocator cannot be written without")]
 

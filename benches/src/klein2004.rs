@@ -1,9 +1,9 @@
 //! The table and the plots of Klein & Zachmann 2004, §6: measurements and objects.
 //!
-//! The paper's objects are not available in their sizes, so others stand in for them; without a
-//! folder of objects, it is the dragon that the tests ship. The paper's two artificial models are
-//! generated: a lattice of crossing bars of 197,000 points, which is not a manifold, and spheres
-//! that do not touch.
+//! The paper's objects are not available in their sizes, so others stand in for them. Without a
+//! folder of objects, the dragon that the tests ship replaces them. The paper's two artificial
+//! models are generated: a lattice of crossing bars of 197,000 points, which is not a manifold, and
+//! spheres that do not touch.
 
 pub mod course;
 pub mod hierarchy;
@@ -27,7 +27,7 @@ const OBJECTS: [&str; 4] = [
     "deforming/elephant-gallop/frame_0001.ply",
 ];
 
-/// One object in several sizes.
+/// An object in several sizes.
 const SIZES: [&str; 4] = ["dragon-5k", "dragon-23k", "truth/dragon70k.ply", "objects/dragon-100k.ply"];
 
 /// Reads the objects, with or without a mesh, scaled for the sweep.
@@ -53,7 +53,7 @@ pub fn objects(folder: Option<&Path>) -> Result<Vec<Object>, Failure> {
     Ok(found)
 }
 
-/// One object in all available sizes.
+/// An object in all available sizes.
 ///
 /// # Errors
 /// As [`objects`].

@@ -27,7 +27,7 @@ const BAND: f64 = 0.999;
 /// Separations with a gap below this many r must not be certified, inside the band or not.
 const DEEP: f64 = -0.3;
 
-/// Of the separations from this many r on, at least [`CERTIFIED_SHARE`] must be certified.
+/// Gap in r from which at least [`CERTIFIED_SHARE`] of the separations must be certified.
 const CLEAR: f64 = 6.0;
 
 /// See [`CLEAR`].

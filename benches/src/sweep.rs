@@ -21,7 +21,7 @@ const WARM_UP: usize = 20;
 /// Times, hits and costs of one method at one distance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Column {
-    /// One time per query, in nanoseconds.
+    /// The time of each query, in nanoseconds.
     pub times: Sample,
     /// Number of poses that the method reports as intersecting.
     pub hits: usize,

@@ -11,10 +11,10 @@ use nearmiss::{
 use super::cases::{Case, Question};
 use crate::Failure;
 
-/// One in this many questions is also asked for curves and shapes.
+/// Interval of the questions that are also asked for curves and shapes.
 const ONE_OF: usize = 10;
 
-/// Digits behind the first that numbers are written with.
+/// Decimal places of the numbers of a record, in scientific notation.
 const DIGITS: usize = 8;
 
 /// Relative difference that rounding to [`DIGITS`] can cause.

@@ -19,7 +19,7 @@ const IN_ROOM: usize = 150;
 /// Length of that object's longest side, as a share of the scan's diagonal.
 const SHARE: f64 = 0.04;
 
-/// One in this many poses of a truth set is asked.
+/// Interval at which the poses of a truth set are sampled.
 const ONE_OF: usize = 8;
 
 /// Two scans, each with a pose.

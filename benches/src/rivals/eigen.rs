@@ -29,7 +29,7 @@ pub trait Contender {
     fn answers(&self) -> Vec<Option<Answer>>;
 }
 
-/// One solved problem.
+/// A solved problem.
 #[derive(Debug, Clone, Copy)]
 pub enum Answer {
     /// Three eigenpairs.

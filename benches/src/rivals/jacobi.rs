@@ -42,7 +42,7 @@ pub fn jacobi([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> Eigen3 {
     Eigen3 { values: order.map(|i| a[i][i] * largest), vectors }
 }
 
-/// One Jacobi rotation that makes `a[p][q]` zero; `v` holds the eigenvectors in its rows.
+/// A Jacobi rotation that makes `a[p][q]` zero; `v` holds the eigenvectors in its rows.
 fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     let off = a[p][q];
     if off.abs() < NEGLIGIBLE {

@@ -31,7 +31,7 @@ pub struct ClashArgs {
     pub pair: PairArgs,
     /// Distances that define the surfaces; by default those that the scans were prepared for
     ///
-    /// Raw inputs are prepared for it, by default for straight distances.
+    /// Raw inputs are prepared for the kernel, by default for straight distances.
     #[arg(long, value_enum, conflicts_with = "thickened")]
     pub kernel: Option<KernelName>,
     /// The meaning of the scans

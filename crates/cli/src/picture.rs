@@ -310,8 +310,7 @@ pub(crate) fn stored_index(view: &Placed<'_>, id: PointId) -> usize {
     view.scan().source().iter().position(|&s| s == id.0).unwrap_or_default()
 }
 
-/// Estimates how much of the close view is hidden by other points, seen from `toward`: 0 to about
-/// 1.
+/// Estimates how much of the close view other points hide, seen from `toward`: 0 to about 1.
 fn hidden(close: &Close, points: &[Vector3<f64>], toward: Vector3<f64>) -> f64 {
     let radius = 0.4 * close.reach;
     let before = points.iter().filter(|p| {

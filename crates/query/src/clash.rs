@@ -148,7 +148,7 @@ pub enum ClashKind {
     Clearance,
 }
 
-/// One place where two scans meet or come too near.
+/// A place where two scans meet or come too near.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clash {
     /// The kind of the clash.

@@ -1,4 +1,4 @@
-//! The avatar: a box with a height that it climbs at once and a length of step.
+//! The avatar: a box with a climb and a length of step.
 
 use nearmiss_geometry::Aabb;
 use serde::{Deserialize, Serialize};
@@ -6,19 +6,19 @@ use serde::{Deserialize, Serialize};
 use crate::Grid;
 use crate::walk_error::WalkError;
 
-/// Who walks: lengths in the caller's units. Plain numbers, checked by [`Avatar::new`].
+/// Lengths of an avatar, in the caller's units. Plain numbers, checked by [`Avatar::new`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct AvatarOptions {
-    /// Of the box, along the two axes across in the caller's order. Default: 0.4 each.
+    /// Sides of the box along the two horizontal axes, in the caller's order. Default: 0.4 each.
     pub base: [f64; 2],
-    /// Of the box. Default: 1.6: on stairs a box stands on the highest step under it, a quarter of a metre
-    /// higher than whoever it stands for.
+    /// Height of the box. Default: 1.6. On stairs a box stands on the highest step under it, a
+    /// quarter of a metre higher than a person would, so the box is lower than a person.
     pub height: f64,
-    /// How far it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
+    /// Height that it climbs at once, and falls in a step. Default: 0.35, two steps of a staircase.
     pub climb: f64,
-    /// How far it moves in a step, at most the lesser side of its base: then bases at both ends meet, and it
-    /// steps over nothing. Default: 0.05.
+    /// Distance that it moves in a step. Limited to the lesser side of its base, so that the bases
+    /// at both ends meet and it steps over nothing. Default: 0.05.
     pub step: f64,
 }
 
@@ -29,26 +29,26 @@ impl Default for AvatarOptions {
 }
 
 impl AvatarOptions {
-    /// The same avatar with a box of this base and height.
+    /// Sets the base and the height of the box.
     #[must_use]
     pub const fn with_box(self, base: [f64; 2], height: f64) -> Self {
         Self { base, height, ..self }
     }
 
-    /// The same avatar that climbs so far.
+    /// Sets the height of a climb.
     #[must_use]
     pub const fn with_climb(self, climb: f64) -> Self {
         Self { climb, ..self }
     }
 
-    /// The same avatar with steps of this length.
+    /// Sets the length of a step.
     #[must_use]
     pub const fn with_step(self, step: f64) -> Self {
         Self { step, ..self }
     }
 }
 
-/// Somebody with a size that makes sense.
+/// A validated avatar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Avatar {
     options: AvatarOptions,
@@ -58,7 +58,8 @@ impl Avatar {
     /// Checks the lengths.
     ///
     /// # Errors
-    /// Names the one that makes no sense.
+    /// If a length is not positive and finite, or the climb is not below the height; the error
+    /// names the length.
     pub fn new(options: &AvatarOptions) -> Result<Self, WalkError> {
         let AvatarOptions { base: [width, depth], height, climb, step } = *options;
         let all = [
@@ -79,13 +80,13 @@ impl Avatar {
         Ok(Self { options: *options })
     }
 
-    /// Its lengths.
+    /// Returns its lengths.
     #[must_use]
     pub fn options(&self) -> &AvatarOptions {
         &self.options
     }
 
-    /// The greatest number of pixels of a map that lie under its base.
+    /// Returns the greatest number of pixels of a map under its base.
     pub(crate) fn most_pixels(&self, grid: &Grid) -> u64 {
         let base = grid.up.across(self.options.base);
         let along = |k: usize| {
@@ -96,14 +97,14 @@ impl Avatar {
         along(0) * along(1)
     }
 
-    /// How far it moves in a step, and what makes it so.
+    /// Returns the distance that it moves in a step, and the name of the length that limits it.
     pub(crate) fn stride(&self) -> (&'static str, f64) {
         let AvatarOptions { base: [width, depth], step, .. } = self.options;
         let base = width.min(depth);
         if step <= base { ("a step", step) } else { ("an avatar's base", base) }
     }
 
-    /// Its box, in the caller's coordinates, when its feet stand on this place.
+    /// Returns its box when its feet are at this place, all in the caller's coordinates.
     #[must_use]
     pub fn bounds(&self, grid: &Grid, feet: [f64; 3]) -> Aabb {
         let [x, y, z] = grid.up.to_map(feet);
@@ -112,10 +113,10 @@ impl Avatar {
         Aabb::of(corners.map(|corner| grid.up.from_map(corner)))
     }
 
-    /// The greatest number of slices that a step can need.
+    /// Returns the greatest number of slices that a step can need.
     #[must_use]
     pub fn slices(&self, grid: &Grid) -> u32 {
-        // Down as far as it falls, up from the greatest climb to the head, and both ends.
+        // Down by a fall, up by the greatest climb to the head, and the slices of both ends.
         let AvatarOptions { height, climb, .. } = self.options;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
         let slices = ((height + 2.0 * climb) / grid.slice_height).ceil() as u32;

@@ -1,12 +1,13 @@
-//! A bit a pixel, and a bit a tile of pixels over it.
+//! Bitmaps with one bit a pixel, or one bit a tile of pixels.
 
 use std::ops::RangeInclusive;
 
-/// Side of a tile in pixels, a power of two from eight on, so that the pixels of a byte are in one. An
-/// avatar's base meets three by three; the bits of all tiles of a map fit a cache.
+/// Side of a tile in pixels; a power of two of at least eight, so that the pixels of a byte share a
+/// tile. An avatar's base meets three by three tiles, and the bits of all tiles of a map fit a
+/// cache.
 const TILE: u32 = 8;
 
-/// Bits of a rectangle of pixels, each row from a word of its own, so that a run of pixels is tested 64 at a
+/// A bitmap of a rectangle. Each row starts at a new word, so a run of pixels is tested 64 at a
 /// time.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Bits {
@@ -15,23 +16,23 @@ pub(crate) struct Bits {
 }
 
 impl Bits {
-    /// No bit set.
+    /// Creates a bitmap with no bit set.
     pub(crate) fn new(width: u32, height: u32) -> Self {
         let stride = (width as usize).div_ceil(64);
         Self { words: vec![0; stride * height as usize], stride }
     }
 
-    /// Bytes that so many take.
+    /// Returns the bytes of a bitmap of this many pixels.
     pub(crate) fn bytes_of(width: u32, height: u32) -> usize {
         8 * (width as usize).div_ceil(64) * height as usize
     }
 
-    /// Bytes that their tiles take.
+    /// Returns the bytes of a bitmap of the tiles of this many pixels.
     pub(crate) fn bytes_of_tiles(width: u32, height: u32) -> usize {
         Self::bytes_of(width.div_ceil(TILE), height.div_ceil(TILE))
     }
 
-    /// As tiles of so many pixels.
+    /// Creates a bitmap of the tiles of this many pixels.
     pub(crate) fn of_tiles(width: u32, height: u32) -> Self {
         Self::new(width.div_ceil(TILE), height.div_ceil(TILE))
     }
@@ -47,17 +48,17 @@ impl Bits {
         self.set(column / TILE as usize, row / TILE as usize);
     }
 
-    /// Sets those of the `word`-th 64 bits of a row that are set in `bits`.
+    /// Sets the bits of `bits` in the `word`-th 64 bits of a row.
     #[inline]
     pub(crate) fn set_word(&mut self, word: usize, row: usize, bits: u64) {
         self.words[row * self.stride + word] |= bits;
     }
 
-    /// Sets the tiles of those of the `word`-th 64 pixels of a row that are set in `bits`.
+    /// Sets the tiles of the pixels of `bits` in the `word`-th 64 pixels of a row.
     #[inline]
     pub(crate) fn set_tiles(&mut self, word: usize, row: usize, bits: u64) {
         let tiles = filled_of_eight(bits.to_le_bytes());
-        // Eight of them a word, so never over the end of one.
+        // A word has eight tiles, so they never cross the end of a word of tiles.
         let first = word * 64 / TILE as usize;
         self.words[row / TILE as usize * self.stride + first / 64] |= tiles << (first % 64);
     }
@@ -67,37 +68,37 @@ impl Bits {
         self.words[row as usize * self.stride + column as usize / 64] >> (column % 64) & 1 == 1
     }
 
-    /// All words, row by row.
+    /// Returns all words, row by row.
     pub(crate) fn words(&self) -> &[u64] {
         &self.words
     }
 
-    /// The words of a row.
+    /// Returns the words of a row.
     #[inline]
     pub(crate) fn row(&self, row: u32) -> &[u64] {
         &self.words[row as usize * self.stride..(row as usize + 1) * self.stride]
     }
 
-    /// How many bits are set.
+    /// Returns the number of set bits.
     pub(crate) fn count_all(&self) -> u64 {
         self.words.iter().map(|word| u64::from(word.count_ones())).sum()
     }
 
-    /// Whether any of these bits, which are there, is set.
+    /// Returns `true` if any of these bits is set. They must be within the bitmap.
     #[inline]
     pub(crate) fn any(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> bool {
         let (run, block) = (Run::new(columns), self.block(rows));
         block.chunks_exact(self.stride).any(|row| run.any(row))
     }
 
-    /// [`Bits::any`] of the tiles that these pixels are in.
+    /// Returns `true` if the tile of any of these pixels is set.
     #[inline]
     pub(crate) fn any_tile(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> bool {
         let tiles = |range: &RangeInclusive<u32>| range.start() / TILE..=range.end() / TILE;
         self.any(&tiles(columns), &tiles(rows))
     }
 
-    /// How many of these bits, which are there, are set.
+    /// Returns the number of set bits among these. They must be within the bitmap.
     pub(crate) fn count(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> u64 {
         let (run, block) = (Run::new(columns), self.block(rows));
         block
@@ -111,19 +112,20 @@ impl Bits {
     }
 }
 
-/// Which of eight bytes are not 0, a bit each.
+/// Returns one bit for each of eight bytes: set if the byte is not 0.
 #[inline]
 pub(crate) fn filled_of_eight(bytes: [u8; 8]) -> u64 {
-    /// Of each byte all bits but the highest.
+    /// All bits but the highest of each byte.
     const LOW: u64 = 0x7f7f_7f7f_7f7f_7f7f;
     let bytes = u64::from_le_bytes(bytes);
-    // The highest bit of a byte is set if any is: the sum reaches it, and never beyond.
+    // The sum sets the highest bit of a byte if any of its other bits is set, and never carries
+    // out.
     let filled = ((((bytes & LOW) + LOW) | bytes) & !LOW) >> 7;
     // Bit 8i times 2^(56 - 7i) is bit 56 + i; all other products are distinct bits below 56, or overflow.
     filled.wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
-/// A run of columns: words, and which bits of the first and the last belong to it.
+/// A run of columns: the words of a row, and masks for the first and the last.
 #[derive(Debug, Clone)]
 pub(crate) struct Run {
     first: usize,
@@ -144,12 +146,12 @@ impl Run {
         }
     }
 
-    /// Numbers of its words.
+    /// Returns the indices of its words.
     pub(crate) fn range(&self) -> RangeInclusive<usize> {
         self.first..=self.last
     }
 
-    /// Which bits of its `i`-th word, counted in the row, belong to it.
+    /// Returns the mask of its bits in the `i`-th word of a row.
     #[inline]
     pub(crate) fn mask(&self, i: usize) -> u64 {
         let from = if i == self.first { self.from } else { u64::MAX };
@@ -157,7 +159,7 @@ impl Run {
         from & to
     }
 
-    /// Its words in a row of bits, without those that do not belong to it.
+    /// Returns its words in a row of bits, masked.
     #[inline]
     fn words<'a>(&'a self, row: &'a [u64]) -> impl Iterator<Item = u64> + 'a {
         self.range().map(|i| row[i] & self.mask(i))

@@ -1,7 +1,8 @@
-//! Points into voxels: of each the lowest and the highest level, which no order of the points changes.
+//! From points to voxels: the lowest and the highest level of each voxel, whatever the order of the
+//! points.
 //!
-//! A block of points at a time is sorted by the part of the map that they lie in; then every part is filled
-//! by one thread. So nothing is shared between threads, and what is written lies close together.
+//! Each block of points is sorted by the part of the map that contains them; then each part is
+//! filled by one thread. So threads share no data, and writes are local.
 
 use std::convert::Infallible;
 
@@ -17,26 +18,27 @@ use crate::options::{Obstacle, SlicePlan};
 use crate::slice::Slice;
 use crate::{Grid, SliceMap, finish};
 
-/// Points that a thread sorts at a time: they and what becomes of them fit its cache.
+/// Points that a thread sorts at a time; they and their entries fit its cache.
 const BLOCK: usize = 1 << 15;
 
-/// The stage of the work that ends when all points are in.
+/// The stage of the work that ends when all points are added.
 const STAGE: &str = "voxels";
 
-/// Samples of a mesh that are kept before they are poured into the map.
+/// Samples of a mesh that are collected before they are added to the map.
 const BATCH: usize = BLOCK * BLOCKS;
 
-/// Slices that are finished together; their cells are then let go of.
+/// Slices that are finished together; their cells are freed afterwards.
 const WAVE: usize = 16;
 
-/// Takes points in any number of pieces and makes a map of them.
+/// Builds a map from points in any number of pieces.
 ///
-/// Takes 2 bytes a voxel until it is done, touched only where points are, and some 20 MB to sort in. The map
-/// depends on the points alone, not on their order, their pieces, the number of threads or the workspace.
+/// Needs 2 bytes a voxel until it is done, paged in only where points are, and some 20 MB to sort.
+/// The map depends on the points alone, not on their order, their pieces, the number of threads or
+/// the workspace.
 #[derive(Debug)]
 pub struct SliceBuilder {
     plan: SlicePlan,
-    /// A layer a slice.
+    /// One layer for each slice.
     layers: Vec<Layer>,
     points: u64,
     left_out: u64,
@@ -44,19 +46,20 @@ pub struct SliceBuilder {
 }
 
 impl SliceBuilder {
-    /// A map without points.
+    /// Creates a builder without points.
     ///
     /// # Errors
-    /// When the system gives no memory.
+    /// If memory cannot be allocated.
     pub fn new(plan: &SlicePlan) -> Result<Self, SliceError> {
         Self::new_in(plan, &Workspace::in_memory())
     }
 
-    /// A map without points whose voxels lie in a workspace, so that they may exceed memory; or, if
-    /// [`Self::is_filled`], one with all of its points, that a process which has ended has left there.
+    /// Creates a builder without points whose voxels are in a workspace, so that they may exceed
+    /// memory. If the workspace holds the finished work of an earlier process, all points are in
+    /// already ([`Self::is_filled`]).
     ///
     /// # Errors
-    /// When the workspace gives no memory, or no space on the disk.
+    /// If the workspace cannot allocate memory or disk space.
     pub fn new_in(plan: &SlicePlan, work: &Workspace) -> Result<Self, SliceError> {
         let stage = work.stage(STAGE);
         let filled: Option<[u64; 2]> = stage.done();
@@ -67,26 +70,28 @@ impl SliceBuilder {
         Ok(Self { plan: *plan, layers, points, left_out, is_filled: filled.is_some() })
     }
 
-    /// Returns `true` if all points are in: [`Self::keep`] has said so, in this process or an earlier one.
+    /// Returns `true` if all points are in, as recorded by [`Self::keep`] in this process or an
+    /// earlier one.
     #[must_use]
     pub fn is_filled(&self) -> bool {
         self.is_filled
     }
 
-    /// Says that all points are in, so that the next process need not add them again if this one ends.
+    /// Records that all points are in, so that a later process need not add them again if this one
+    /// ends.
     ///
     /// # Errors
-    /// When the workspace's folder cannot be written.
+    /// If the workspace's folder cannot be written.
     pub fn keep(&mut self, work: &Workspace) -> Result<(), SliceError> {
         work.stage(STAGE).close(&[self.points, self.left_out])?;
         self.is_filled = true;
         Ok(())
     }
 
-    /// Adds points given in the caller's coordinates. Those outside the bounds of the plan, and those with a
-    /// coordinate that is not a number, are left out and counted.
+    /// Adds points in the caller's coordinates. Points outside the bounds of the plan, and points
+    /// with a NaN coordinate, are left out and counted.
     ///
-    /// Some ten nanoseconds a point and thread.
+    /// Takes some ten nanoseconds a point and thread.
     pub fn add(&mut self, points: &[[f64; 3]]) {
         let up = self.plan.grid().up;
         self.left_out += self.pour(points, |p| up.to_map(*p));
@@ -98,11 +103,11 @@ impl SliceBuilder {
         self.left_out += self.pour(cloud.positions(), |p| up.to_map(frame.to_world(*p)));
     }
 
-    /// Adds a mesh by samples of its own making: every voxel that its surface passes gets the lowest and the
-    /// highest point of the surface in it, up to rounding. Tells how many samples that took.
+    /// Adds a mesh by sampling it: every voxel that its surface passes gets the lowest and the
+    /// highest point of the surface in it, up to rounding. Returns the number of samples.
     ///
-    /// Of a triangle that reaches beyond the bounds of the plan the part inside is added; of one with a
-    /// corner that is not finite, nothing. Each such triangle counts as one left out.
+    /// Only the part of a triangle within the bounds of the plan is added. Triangles with a corner
+    /// that is not finite are left out. Each triangle that is left out in part or whole is counted.
     pub fn add_mesh(&mut self, mesh: &TriangleMesh) -> u64 {
         let Grid { up, origin, pixel, slice_height, counts } = *self.plan.grid();
         let lattice = Lattice { origin, sides: [pixel, pixel, slice_height], counts };
@@ -124,7 +129,7 @@ impl SliceBuilder {
         self.points - before
     }
 
-    /// Tells how many of the points are outside.
+    /// Adds points. Returns the number of points outside the map.
     fn pour<P: Sync>(&mut self, points: &[P], to_map: impl Fn(&P) -> [f64; 3] + Sync + Send) -> u64 {
         let grid = *self.plan.grid();
         let parts = grid.area().div_ceil(PART);
@@ -148,14 +153,14 @@ impl SliceBuilder {
         points.len() as u64 - added
     }
 
-    /// How many points are in, samples of meshes among them; and how many points, or triangles at least a
-    /// part of which, were left out.
+    /// Returns the number of points in the map, samples of meshes included, and the number of
+    /// points or triangles that were left out in part or whole.
     #[must_use]
     pub fn counts(&self) -> [u64; 2] {
         [self.points, self.left_out]
     }
 
-    /// The map.
+    /// Builds the map.
     #[must_use]
     pub fn finish(self) -> SliceMap {
         let index = self.index();
@@ -168,7 +173,7 @@ impl SliceBuilder {
         SliceMap::of_slices(index, slices)
     }
 
-    /// The index of the map. Goes over all voxels if noise is to be estimated.
+    /// Returns the index of the map. Visits all voxels if noise is to be estimated.
     pub(crate) fn index(&self) -> Index {
         let grid = *self.plan.grid();
         let rule = self.plan.obstacle();
@@ -180,7 +185,7 @@ impl SliceBuilder {
         Index { grid, about: About { rule, share, noise, points: self.points, left_out: self.left_out } }
     }
 
-    /// Hands out the slices of the map, lowest first, some at a time, until the first error.
+    /// Passes the slices of the map to `take`, lowest first, some at a time, until the first error.
     pub(crate) fn each<E>(
         self,
         index: Index,
@@ -191,22 +196,22 @@ impl SliceBuilder {
         finish::each(&index.grid, &mut layers, finish::most_levels(index.about.share), together, take)
     }
 
-    /// How many slices may be made at a time.
+    /// Returns the number of slices that may be made at a time.
     pub(crate) fn together(&self) -> usize {
         self.plan.together().min(WAVE)
     }
 }
 
-/// Points of a block by the part of the map that they are in.
+/// The points of a block, sorted by the part of the map that contains them.
 struct Sorted {
-    /// Where each part's entries begin, and where the last ends.
+    /// Start of each part's entries, and the end of the last.
     starts: Vec<u32>,
     /// Cell in the part, and level.
     entries: Vec<(u16, u8)>,
 }
 
 impl Sorted {
-    /// Sorts by counting. `parts` are those of a slice.
+    /// Sorts points by counting. `parts` is the number of parts of a slice.
     fn new<P>(grid: &Grid, parts: usize, points: &[P], to_map: impl Fn(&P) -> [f64; 3]) -> Self {
         let mut starts = vec![0_u32; parts * grid.counts[2] as usize + 1];
         let mut found: Vec<(u32, u16, u8)> = Vec::with_capacity(points.len());

@@ -1,8 +1,8 @@
-//! So many slices in memory, loaded as an avatar needs them.
+//! A bounded cache of slices, loaded as an avatar needs them.
 //!
-//! S4, §3.1: new slices are loaded until there are n; from then on each takes the place of the one furthest
-//! from the avatar. Beside that a thread of its own loads what comes next in the direction of movement (the
-//! paper's figures are without one).
+//! Slices are loaded until there are n; from then on each new slice replaces the one furthest from
+//! the avatar (Anjos et al. 2012, §3.1). In addition, a separate thread loads the next slices in
+//! the direction of movement; the paper's figures are without it.
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -16,14 +16,14 @@ use crate::route::Building;
 use crate::slice::Slice;
 use crate::store::{SliceFolder, StoreError};
 
-/// How slices are kept.
+/// Options of a [`SliceCache`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct CacheOptions {
-    /// n: how many slices are kept in memory. Raised to what is needed at once. Default: 16, as in S4's Fig.
-    /// 6.
+    /// n, the number of slices kept in memory. Raised to the number needed at once. Default: 16, as
+    /// in Anjos et al. 2012, Fig. 6.
     pub slices: u32,
-    /// Whether a thread loads ahead. Default: yes.
+    /// Loads slices ahead on a separate thread. Default: `true`.
     pub prefetch: bool,
 }
 
@@ -34,55 +34,55 @@ impl Default for CacheOptions {
 }
 
 impl CacheOptions {
-    /// The same with so many slices.
+    /// Sets the number of slices.
     #[must_use]
     pub const fn with_slices(self, slices: u32) -> Self {
         Self { slices, ..self }
     }
 
-    /// The same with or without loading ahead.
+    /// Enables or disables loading ahead.
     #[must_use]
     pub const fn with_prefetch(self, prefetch: bool) -> Self {
         Self { prefetch, ..self }
     }
 }
 
-/// What a cache has done.
+/// Counters of a cache.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CacheCounts {
-    /// Slices wanted that were there, or on their way since an earlier step.
+    /// Requested slices that were in the cache, or on their way since an earlier step.
     pub hits: u64,
-    /// Slices wanted that nobody had asked for.
+    /// Requested slices that were not in the cache and not on their way.
     pub misses: u64,
-    /// How often somebody had to wait for the disk. Depends on how fast that is, unlike the others.
+    /// Number of requests that waited for the disk. Unlike the other counters, it depends on the
+    /// speed of the disk.
     pub stalls: u64,
 }
 
-/// Some slices of a folder in memory, and a thread that loads others.
+/// A cache of slices of a folder, with a thread that loads ahead.
 ///
-/// Which slices are kept follows from what was wanted, in order, never from how fast the disk is: a slice has
-/// its place from when it is asked for.
+/// The kept slices depend on the order of requests alone, never on the speed of the disk: a slice
+/// has its place from the moment when it is requested.
 #[derive(Debug)]
 pub struct SliceCache {
     folder: SliceFolder,
     map: SliceMap,
-    /// Which slices have a place, in no order; those not yet on the map are on their way.
+    /// The slices that have a place, in no order; slices not yet on the map are on their way.
     kept: Vec<u32>,
     capacity: usize,
-    /// Where the feet were when they last were a slice's height from where they had been.
+    /// Reference height of the feet; replaced when they are a slice's height away from it.
     feet: Option<f64>,
-    /// Whether they went up to there, if they have gone anywhere.
+    /// `true` if the feet last moved up; `None` before any movement.
     is_rising: Option<bool>,
     counts: CacheCounts,
     loader: Option<Loader>,
 }
 
 impl SliceCache {
-    /// A cache without slices. `span` is how many are needed at once
-    /// ([`Avatar::slices`](crate::Avatar::slices)): fewer are never kept.
+    /// Creates an empty cache. `span` is the number of slices needed at once
+    /// ([`Avatar::slices`](crate::Avatar::slices)); the capacity is never less.
     #[must_use]
     pub fn new(folder: &SliceFolder, options: &CacheOptions, span: u32) -> Self {
-        // No more than there are.
         let most = folder.grid().counts[2].max(1);
         let capacity = options.slices.max(span).clamp(1, most) as usize;
         let loader = options.prefetch.then(|| Loader::start(folder.clone()));
@@ -98,29 +98,30 @@ impl SliceCache {
         }
     }
 
-    /// How many slices are kept at most; more than asked for where an avatar needs more at once.
+    /// Returns the greatest number of kept slices. It exceeds the requested number if an avatar
+    /// needs more at once.
     #[must_use]
     pub fn capacity(&self) -> usize {
         self.capacity
     }
 
-    /// What it has done so far.
+    /// Returns the counters so far.
     #[must_use]
     pub fn counts(&self) -> CacheCounts {
         self.counts
     }
 
-    /// The map, of which the loaded slices can be asked.
+    /// Returns the map. Only its loaded slices can be queried.
     #[must_use]
     pub fn map(&self) -> &SliceMap {
         &self.map
     }
 
-    /// Sees to it that these slices are loaded, for feet at this height of the map's coordinates, and asks
-    /// for those that come next.
+    /// Loads these slices if they are missing, and requests the next ones in the direction of
+    /// movement. `feet` is the height of the feet in the map's coordinates.
     ///
     /// # Errors
-    /// Names the file of a slice that cannot be loaded.
+    /// If a slice cannot be loaded; the error names its file.
     pub fn want(&mut self, slices: RangeInclusive<u32>, feet: f64) -> Result<&SliceMap, StoreError> {
         while let Some(arrived) = self.loader.as_ref().and_then(Loader::arrived) {
             self.receive(arrived);
@@ -144,10 +145,10 @@ impl SliceCache {
         Ok(&self.map)
     }
 
-    /// Loads a slice that has a place, if it is not there yet. Tells whether that took any waiting.
+    /// Loads a slice that has a place if it has not arrived. Returns `true` if it had to be loaded.
     ///
-    /// A thread that has begun to load it may have to wait for a processor longer than loading takes, so
-    /// nobody waits for it.
+    /// Does not wait for the thread: a thread that has begun to load the slice may wait for a
+    /// processor longer than loading takes.
     fn complete(&mut self, slice: u32) -> Result<bool, StoreError> {
         if self.map.slice(slice).is_ok() {
             return Ok(false);
@@ -163,8 +164,8 @@ impl SliceCache {
         Ok(true)
     }
 
-    /// Takes in what the thread has loaded, unless it is there already or its place has gone to another. What
-    /// cannot be loaded is told when it is wanted.
+    /// Stores a slice that the thread has loaded, unless it is present already or has lost its
+    /// place. An error is reported when the slice is requested.
     fn receive(&mut self, (slice, image): (u32, Result<Slice, StoreError>)) {
         if let Ok(image) = image
             && self.kept.contains(&slice)
@@ -174,7 +175,7 @@ impl SliceCache {
         }
     }
 
-    /// Asks the thread for a slice no more.
+    /// Withdraws the request for a slice.
     fn forget(&self, slice: u32) {
         if let Some(loader) = &self.loader {
             loader.withdraw(slice);
@@ -182,15 +183,15 @@ impl SliceCache {
     }
 
     fn put(&mut self, slice: u32, image: Slice) {
-        // What is the same image already takes no memory again.
+        // Equal images share memory.
         let checksums = self.folder.checksums();
         let same = self.kept.iter().filter(|s| checksums[**s as usize] == checksums[slice as usize]);
         let known = same.filter_map(|s| self.map.slices()[*s as usize].clone()).next();
         self.map.put(slice, Some(known.unwrap_or_else(|| Arc::new(image))));
     }
 
-    /// Takes the place of the slice furthest from the middle of those wanted, if all places are taken, but of
-    /// none in `spared`. Tells whether there is room.
+    /// Evicts the slice furthest from the middle of those wanted if the cache is full, but none in
+    /// `spared`. Returns `true` if there is a free place.
     fn make_room(&mut self, wanted: &RangeInclusive<u32>, spared: &RangeInclusive<u32>) -> bool {
         if self.kept.len() < self.capacity {
             return true;
@@ -207,11 +208,11 @@ impl SliceCache {
         furthest.is_some()
     }
 
-    /// Asks for slices beyond those wanted, on the side the avatar moves to: half of those that there is room
-    /// for, as it may turn round.
+    /// Requests slices beyond those wanted, on the side that the avatar moves to. They get half of
+    /// the free places, since the avatar may turn round.
     fn ask_ahead(&mut self, slices: &RangeInclusive<u32>, feet: f64) {
         let before = *self.feet.get_or_insert(feet);
-        // Unevenness of a floor is no movement.
+        // The unevenness of a floor does not count as movement.
         if (feet - before).abs() >= self.map.grid().slice_height {
             self.is_rising = Some(feet > before);
             self.feet = Some(feet);
@@ -256,13 +257,13 @@ impl Building for SliceCache {
 #[derive(Debug)]
 struct Loader {
     wanted: Arc<Mutex<VecDeque<u32>>>,
-    /// One for each slice that is asked for.
+    /// One message for each requested slice.
     calls: Sender<()>,
     loaded: Receiver<(u32, Result<Slice, StoreError>)>,
 }
 
 impl Loader {
-    /// None where no thread can be started: then nothing is loaded ahead.
+    /// Starts the thread. Returns `None` if that fails; then nothing is loaded ahead.
     fn start(folder: SliceFolder) -> Option<Self> {
         let wanted = Arc::new(Mutex::new(VecDeque::new()));
         let (calls, requests) = channel::<()>();
@@ -270,7 +271,7 @@ impl Loader {
         let queue = Arc::clone(&wanted);
         let load = move || {
             while requests.recv().is_ok() {
-                // What was withdrawn leaves a request without a slice.
+                // A withdrawn slice leaves a message without a slice.
                 let next = locked(&queue).pop_front();
                 if next.is_some_and(|slice| answers.send((slice, folder.load(slice))).is_err()) {
                     return;
@@ -286,7 +287,7 @@ impl Loader {
         self.calls.send(()).is_ok()
     }
 
-    /// Asks for a slice no more; too late if it is being loaded.
+    /// Withdraws the request for a slice, unless it is being loaded already.
     fn withdraw(&self, slice: u32) {
         locked(&self.wanted).retain(|waiting| *waiting != slice);
     }
@@ -296,7 +297,7 @@ impl Loader {
     }
 }
 
-/// A queue of numbers is whole whatever became of a thread.
+/// Locks the queue. A queue of numbers stays valid even if a thread panicked.
 fn locked(queue: &Mutex<VecDeque<u32>>) -> MutexGuard<'_, VecDeque<u32>> {
     queue.lock().unwrap_or_else(PoisonError::into_inner)
 }

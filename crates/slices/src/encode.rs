@@ -1,19 +1,20 @@
-//! A slice in few bytes: what is in memory, but for words of 64 pixels in which nothing is, compressed.
+//! Compressed encoding of a slice: its memory layout without the empty words of 64 pixels.
 //!
-//! Four bytes, the number of words in which something is; then, as one LZ4 block, a bit a pixel (row by row,
-//! each from a byte of its own); of every such word 64 tops, then 32 bytes of bottoms, then 8 of obstacles,
-//! each all words together; beyond the end of a row zeros. So nothing is put together pixel by pixel, and
-//! what repeats from row to row LZ4 finds.
+//! Layout: four bytes with the number of occupied words, then one LZ4 block. The block holds one
+//! bit a pixel, row by row, each row starting at a byte. After that it holds 64 tops of each
+//! occupied word, then 32 bytes of bottoms of each, then 8 bytes of obstacle bits of each. Lanes
+//! beyond the end of a row are zero. This layout needs no work per pixel, and LZ4 finds repetition
+//! between rows.
 
 use crate::slice::{Canvas, Slice, Word};
 
 /// Bytes of a word: tops, bottoms, obstacles.
 const WORD: usize = 64 + 32 + 8;
 
-/// LZ4 makes at most so many bytes of one: that is what a byte more adds to the length of a match.
+/// Greatest expansion of LZ4: each further byte of a match length adds this many bytes.
 const LZ4_MOST: usize = 255;
 
-/// The bytes of a slice.
+/// Encodes a slice.
 pub(crate) fn encode(slice: &Slice) -> Vec<u8> {
     let row_bytes = (slice.width() as usize).div_ceil(8);
     let (mut bits, mut tops, mut bottoms, mut obstacles) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -33,7 +34,7 @@ pub(crate) fn encode(slice: &Slice) -> Vec<u8> {
     bytes
 }
 
-/// The slice of this size that these bytes are; none if they are those of no slice.
+/// Decodes a slice of this size. Returns `None` if the bytes are not a valid slice.
 pub(crate) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Option<Slice> {
     let (count, packed) = bytes.split_first_chunk()?;
     let count = u32::from_le_bytes(*count) as usize;
@@ -43,7 +44,7 @@ pub(crate) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Option<Slice> {
         return None;
     }
     let length = row_bytes * rows + WORD * count;
-    // Refused before memory is asked for.
+    // Rejected before memory is allocated.
     if length / LZ4_MOST > packed.len() {
         return None;
     }
@@ -79,7 +80,7 @@ mod tests {
     use super::*;
     use crate::slice::Content;
 
-    /// Pixels of many kinds: rows that end within a word, floors, lone pixels, all that a top can be.
+    /// Random pixels, with rows that end within a word, and every possible top.
     fn slice(width: u32, height: u32) -> Slice {
         let mut state = 7_u32;
         let mut random = || {
@@ -126,7 +127,7 @@ mod tests {
             for flip in [1, 0x80, 0xff] {
                 let mut damaged = bytes.clone();
                 damaged[i] ^= flip;
-                // A few bits of LZ4 say nothing.
+                // A few bits of LZ4 are unused.
                 let other = decode(&damaged, size).filter(|other| *other != given);
                 others += usize::from(other.is_some());
                 assert!(other.is_none_or(|other| other.checksum() != given.checksum()), "byte {i}");
@@ -134,7 +135,7 @@ mod tests {
         }
         assert!(others > 100, "only {others} kinds of damage reach the checksum");
         assert!(decode(&bytes, [64, 5]).is_none() && decode(&bytes, [0, 0]).is_none());
-        // More than any machine has.
+        // More memory than any machine has.
         assert!(decode(&[0xff; 1000], [u32::MAX; 2]).is_none());
     }
 }

@@ -1,13 +1,15 @@
-//! From what voxels have seen to slices: which are obstacles, how high the floors are, how noisy the points.
+//! From filled voxels to slices: obstacles, heights of floors, and the noise of the points.
 //!
-//! S4, Fig. 2, marks a point that lies more than ε from the one seen last, so the order of points decides,
-//! and it overwrites the height that it still has to compare with. Here a voxel is an obstacle if its highest
-//! point lies more than ε σ above its lowest, whatever the order.
+//! Anjos et al. 2012, Fig. 2, marks a point that is more than ε from the previous one, so the
+//! result depends on the order of points; it also overwrites the height that it compares with next.
+//! Here a voxel is an obstacle if its highest point is more than ε σ above its lowest, in any
+//! order.
 //!
-//! A surface that crosses from a slice into the next is one surface: where the gap between the highest point
-//! of a voxel and the lowest of the one above is at most ε σ, both are obstacles if together they span more
-//! than ε σ; if not, they are one floor. Either voxel keeps its own highest level, so a floor that is looked
-//! up in the lower slice has the height of a point.
+//! A surface that crosses from one slice into the next is one surface. The gap between the highest
+//! point of a voxel and the lowest of the voxel above decides: if it is at most ε σ, both are
+//! obstacles if together they span more than ε σ, otherwise they are one floor. Each voxel keeps
+//! its own highest level, so a floor that is looked up in the lower slice has the height of a
+//! point.
 
 use nearmiss_lanes::parallel::map_each;
 
@@ -16,30 +18,32 @@ use crate::grid::LEVELS;
 use crate::layer::{Layer, Seen};
 use crate::slice::{Canvas, Content, Slice};
 
-/// Of the spans of level voxels this share is no greater than the noise: enough that few floors become
-/// obstacles, and not so much that what stands on them decides.
+/// Quantile of the spans of level voxels that is taken as noise: high enough that few floors become
+/// obstacles, low enough that objects on the floor do not decide.
 const QUANTILE: f64 = 0.95;
 
-/// Fewer level voxels than this say nothing about noise.
+/// Least number of level voxels for an estimate of the noise.
 const LEAST: u64 = 100;
 
-/// Runs of layers whose spans are counted apart: enough for any number of threads, few where layers are many
-/// and thin.
+/// Runs of layers whose spans are counted separately: enough for any number of threads, and few if
+/// there are many thin layers.
 const RUNS: usize = 256;
 
-/// The greatest number of levels that a floor may span, for ε. Rounding of a tangent must not decide, hence
-/// the small addition.
+/// Returns the greatest number of levels that a floor may span, for ε. The small addition keeps
+/// rounding of a tangent from deciding.
 pub(crate) fn most_levels(share: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
     let most = (share * f64::from(LEVELS) + 1e-6).floor().min(f64::from(2 * LEVELS)) as i32;
     most
 }
 
-/// How far points of a level floor spread upwards in a pixel: the 0.95-quantile of the spans of voxels with
-/// surface to all four sides, opposite neighbours of which differ by at most half a pixel's side in height.
-/// The span of a voxel itself plays no part in the choice. 0 where there are too few.
+/// Estimates how far the points of a level floor spread upwards within a pixel: the 0.95-quantile
+/// of the spans of level voxels, 0 if there are too few of them. A voxel is level if all four
+/// neighbours are occupied and opposite neighbours differ by at most half a pixel's side in height.
+/// The voxel's own span plays no part in the choice.
 ///
-/// Voxels with something right below or above are left out: they may hold half a floor.
+/// Voxels with an occupied voxel directly below or above are left out: they may hold only half of a
+/// floor.
 pub(crate) fn noise(grid: &Grid, layers: &[Layer]) -> f64 {
     let layers: Vec<Seen<'_>> = layers.iter().map(Layer::seen).collect();
     let width = grid.counts[0] as usize;
@@ -92,7 +96,8 @@ pub(crate) fn noise(grid: &Grid, layers: &[Layer]) -> f64 {
     f64::from(levels) / f64::from(LEVELS) * grid.slice_height
 }
 
-/// Hands out the slices, lowest first, `together` at a time, until the first error; takes the cells away.
+/// Passes the slices to `take`, lowest first, `together` at a time, until the first error. Frees
+/// the cells on the way.
 pub(crate) fn each<E>(
     grid: &Grid,
     layers: &mut [Layer],
@@ -104,7 +109,7 @@ pub(crate) fn each<E>(
     while first < layers.len() {
         let end = layers.len().min(first + together.max(1));
         take(map_each(end - first, |i| slice(grid, layers, first + i, most)))?;
-        // The last of them is still needed by the one above.
+        // The slice above still needs the last one.
         layers[first.saturating_sub(1)..end - 1].fill_with(Layer::empty);
         first = end;
     }
@@ -129,7 +134,8 @@ fn slice(grid: &Grid, layers: &[Layer], s: usize, most: i32) -> Slice {
     canvas.finish()
 }
 
-/// What a voxel that spans these levels holds, given what lies right below and above.
+/// Returns the content of a voxel that spans these levels, given the spans directly below and
+/// above.
 fn judge([low, high]: [i32; 2], down: Option<[i32; 2]>, up: Option<[i32; 2]>, most: i32) -> Content {
     /// Levels from one slice to the next.
     const SLICE: i32 = 255;
@@ -163,7 +169,7 @@ mod tests {
         assert_eq!(judged([250, 253], None, Some([0, 4])), (253, false), "its own height");
         assert_eq!(judged([242, 244], None, Some([0, 4])), (244, false), "never the border of the slices");
         assert_eq!(judged([0, 4], Some([250, 253]), None), (4, false));
-        // Too steep together: a wall cut by the border of its slices.
+        // Too steep together: a wall cut by the border of two slices.
         assert_eq!(judged([240, 253], None, Some([0, 10])), (253, true));
         assert_eq!(judged([0, 10], Some([240, 253]), None), (10, true));
         // Far apart: a floor and something that hangs over it.

@@ -1,4 +1,4 @@
-//! Where pixels and slices lie.
+//! The grid of pixels and slices.
 
 use std::ops::RangeInclusive;
 
@@ -7,19 +7,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::Up;
 
-/// Heights in a slice are told apart in so many steps: with empty, what a byte holds.
+/// Number of levels of height in a slice; with a value for empty, they fill a byte.
 pub const LEVELS: u32 = 255;
 
-/// In levels, 2^53: beyond all maps, whose slices a `u32` counts.
+/// Limit of levels, 2^53: beyond all maps, since a `u32` counts slices.
 const FARTHEST: f64 = 9_007_199_254_740_992.0;
 
-/// The lattice of a map: pixels of side t, slices of height σ, counted from a corner.
+/// The lattice of a map: pixels of side t and slices of height σ, counted from a corner.
 ///
-/// A place p of the map's coordinates ([`Up::to_map`]) lies in column ⌊(p₀ − o₀)/t⌋, row ⌊(p₁ − o₁)/t⌋ and
-/// slice s = ⌊(p₂ − o₂)/σ⌋, at level ⌊255·((p₂ − o₂)/σ − s)⌋, in double precision.
+/// A place p of the map's coordinates ([`Up::to_map`]) is in column ⌊(p₀ − o₀)/t⌋, row ⌊(p₁ −
+/// o₁)/t⌋ and slice s = ⌊(p₂ − o₂)/σ⌋, at level ⌊255·((p₂ − o₂)/σ − s)⌋, in double precision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
-    /// Which way is up.
+    /// The axis that points up.
     pub up: Up,
     /// o, the corner of the first voxel, in the map's coordinates.
     pub origin: [f64; 3],
@@ -31,7 +31,7 @@ pub struct Grid {
     pub counts: [u32; 3],
 }
 
-/// A place in the lattice.
+/// A voxel of the lattice, and a level in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Voxel {
     pub(crate) slice: usize,
@@ -41,7 +41,7 @@ pub(crate) struct Voxel {
     pub(crate) level: u8,
 }
 
-/// Voxels from one to another, both included.
+/// A block of voxels, ends included.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Block {
     /// Columns.
@@ -53,7 +53,7 @@ pub struct Block {
 }
 
 impl Grid {
-    /// Pixels of a slice.
+    /// Returns the number of pixels of a slice.
     #[must_use]
     pub fn area(&self) -> usize {
         self.counts[0] as usize * self.counts[1] as usize
@@ -63,7 +63,8 @@ impl Grid {
         if axis == 2 { self.slice_height } else { self.pixel }
     }
 
-    /// The voxel of a place of the map's coordinates; none outside, nor for what is not a number.
+    /// Returns the voxel of a place of the map's coordinates. Returns `None` outside the map, and
+    /// for NaN.
     #[inline]
     pub(crate) fn voxel(&self, p: [f64; 3]) -> Option<Voxel> {
         let q = [0, 1, 2].map(|k| (p[k] - self.origin[k]) / self.size(k));
@@ -86,13 +87,13 @@ impl Grid {
         Some(Voxel { slice: slice as usize, pixel, level: level.min(254) })
     }
 
-    /// Which columns (`axis` 0), rows (1) or slices (2) the closed interval meets, as far as they are on the
-    /// map.
+    /// Returns the columns (`axis` 0), rows (1) or slices (2) of the map that the closed interval
+    /// meets.
     #[must_use]
     pub fn range(&self, axis: usize, [low, high]: [f64; 2]) -> Option<RangeInclusive<u32>> {
         let [from, to] = [low, high].map(|x| ((x - self.origin[axis]) / self.size(axis)).floor());
         let last = f64::from(self.counts[axis]) - 1.0;
-        // Written so that what is not a number gives none.
+        // The form of the condition also rejects NaN.
         if !(from <= to && from <= last && to >= 0.0) {
             return None;
         }
@@ -105,22 +106,22 @@ impl Grid {
         Some(from..=to)
     }
 
-    /// The voxels that a closed box of the map's coordinates meets, as far as they are on the map.
+    /// Returns the voxels of the map that a closed box of the map's coordinates meets.
     #[must_use]
     pub fn block(&self, min: [f64; 3], max: [f64; 3]) -> Option<Block> {
         let range = |axis: usize| self.range(axis, [min[axis], max[axis]]);
         Some(Block { columns: range(0)?, rows: range(1)?, slices: range(2)? })
     }
 
-    /// Height of the map's coordinates in the middle of a level of a slice.
+    /// Returns the height of the middle of a level of a slice, in the map's coordinates.
     #[must_use]
     pub fn height(&self, slice: u32, level: u8) -> f64 {
         let share = (f64::from(level) + 0.5) / f64::from(LEVELS);
         self.origin[2] + (f64::from(slice) + share) * self.slice_height
     }
 
-    /// The greatest level, counted through all slices, whose height is at most `height`; negative below the
-    /// map. Far from it, that of a nearer height, so that levels can be added.
+    /// Returns the greatest level, counted through all slices, whose height is at most `height`;
+    /// negative below the map. Clamped to ±2^53, so that levels can be added.
     #[must_use]
     pub(crate) fn level_at(&self, height: f64) -> i64 {
         let level = (height - self.origin[2]) / self.slice_height * f64::from(LEVELS) - 0.5;
@@ -129,7 +130,7 @@ impl Grid {
         level
     }
 
-    /// The slice that a height of the map's coordinates lies in, which may be below the map or above it.
+    /// Returns the slice of a height of the map's coordinates, which may be below or above the map.
     #[must_use]
     pub(crate) fn slice_at(&self, height: f64) -> i64 {
         #[expect(clippy::cast_possible_truncation, reason = "the cast saturates")]
@@ -137,14 +138,14 @@ impl Grid {
         slice
     }
 
-    /// Bounds of all voxels, in the caller's coordinates.
+    /// Returns the bounds of all voxels, in the caller's coordinates.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
         let end = [0, 1, 2].map(|k| self.origin[k] + f64::from(self.counts[k]) * self.size(k));
         Aabb::of([self.origin, end].map(|corner| self.up.from_map(corner)))
     }
 
-    /// Middle of a pixel, in the map's coordinates.
+    /// Returns the centre of a pixel, in the map's coordinates.
     #[must_use]
     pub fn middle(&self, column: u32, row: u32) -> [f64; 2] {
         [(0, column), (1, row)].map(|(k, i)| self.origin[k] + (f64::from(i) + 0.5) * self.pixel)

@@ -1,59 +1,62 @@
-//! What the voxels of a slice have seen while a map is built.
+//! The voxels of a slice while a map is built.
 
 use std::ops::Range;
 
 use nearmiss_store::{Room, Stage, WorkError};
 
-/// Blocks that are sorted before the map is filled from them; any number gives the same map.
+/// Number of blocks that are sorted before they are added to the map. The map does not depend on
+/// it.
 pub(crate) const BLOCKS: usize = 16;
 
-/// Cells of a part of a slice: as many as fit a cache, so that one large floor keeps several threads busy.
+/// Cells of a part of a slice: few enough for a cache, so that one large floor keeps several
+/// threads busy.
 pub(crate) const PART: usize = 1 << 16;
 
-/// What a voxel has seen: 255 less the lowest level in the high byte, the highest level plus one in the low
-/// byte; 0 if nothing. So either byte only ever grows, and memory that is zero is a map without points.
+/// The levels of a voxel: 255 minus the lowest level in the high byte, the highest level plus one
+/// in the low byte; 0 if empty. Both bytes only grow, and zeroed memory is a map without points.
 pub(crate) type Cell = u16;
 
-/// What the voxels of a slice have seen.
+/// The voxels of a slice.
 #[derive(Debug)]
 pub(crate) struct Layer {
-    /// A cell a pixel.
+    /// One cell for each pixel.
     cells: Room<Cell>,
-    /// A bit a cell, whether it has seen something: most have not.
+    /// One bit for each cell, set if it is occupied; most are not.
     filled: Room<u64>,
 }
 
 impl Layer {
-    /// The layer of slice `s`: one that has seen nothing, or what an ended run has left of it.
+    /// Creates the layer of slice `s`: empty, or with the data that an earlier run left in the
+    /// workspace.
     pub(crate) fn new(stage: &Stage<'_>, s: u32, area: usize) -> Result<Self, WorkError> {
         let cells = stage.room(&format!("cells-{s}"), area)?;
         let filled = stage.room(&format!("bits-{s}"), area.div_ceil(64))?;
         Ok(Self { cells, filled })
     }
 
-    /// One without cells.
+    /// Creates a layer without cells.
     pub(crate) fn empty() -> Self {
         Self { cells: Vec::new().into(), filled: Vec::new().into() }
     }
 
-    /// Bytes that one of so many pixels takes.
+    /// Returns the bytes of a layer of this many pixels.
     pub(crate) fn bytes_of(area: usize) -> usize {
         size_of::<Self>() + area * size_of::<Cell>() + area.div_ceil(64) * size_of::<u64>()
     }
 
-    /// Its cells, for reading.
+    /// Returns a read-only view of its cells.
     pub(crate) fn seen(&self) -> Seen<'_> {
         Seen { cells: &self.cells, filled: &self.filled }
     }
 
-    /// Parts of [`PART`] cells, with their bits.
+    /// Splits the layer into parts of [`PART`] cells, with their bits.
     pub(crate) fn parts(&mut self) -> Vec<Part<'_>> {
         let parts = self.cells.chunks_mut(PART).zip(self.filled.chunks_mut(PART / 64));
         parts.map(|(cells, filled)| Part { cells, filled }).collect()
     }
 }
 
-/// The cells of a layer, for reading.
+/// A read-only view of the cells of a layer.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen<'a> {
     cells: &'a [Cell],
@@ -61,7 +64,7 @@ pub(crate) struct Seen<'a> {
 }
 
 impl<'a> Seen<'a> {
-    /// Which of these cells have seen something.
+    /// Returns the occupied cells in a range.
     pub(crate) fn filled(self, range: Range<usize>) -> impl Iterator<Item = usize> + use<'a> {
         let words = range.start / 64..range.end.div_ceil(64);
         let bits = words.flat_map(move |i| {
@@ -72,14 +75,14 @@ impl<'a> Seen<'a> {
         bits.filter(move |i| range.contains(i))
     }
 
-    /// Returns `true` if a cell has seen something.
+    /// Returns `true` if a cell is occupied.
     #[inline]
     pub(crate) fn is_filled(self, i: usize) -> bool {
         self.filled[i / 64] >> (i % 64) & 1 == 1
     }
 
-    /// Lowest and highest level of a cell; none if it has seen nothing, for which its bit is enough: the bits
-    /// of a layer fit a cache.
+    /// Returns the lowest and the highest level of a cell; `None` if it is empty. Empty cells need
+    /// only their bit, and the bits of a layer fit a cache.
     #[inline]
     pub(crate) fn span(self, i: usize) -> Option<[i32; 2]> {
         let seen = || self.cells[i];
@@ -94,7 +97,7 @@ pub(crate) struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// Most points of a voxel change nothing.
+    /// Adds a point at this level to a cell.
     #[inline]
     pub(crate) fn see(&mut self, cell: u16, level: u8) {
         let (cell, [low, high]) = (usize::from(cell), [u16::from(255 - level), u16::from(level) + 1]);

@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-// In reading order: where things lie, one image, from points to a map.
+// In reading order: the grid, one image, from points to a map.
 mod grid;
 mod up;
 
@@ -15,7 +15,7 @@ mod layer;
 mod map;
 mod options;
 
-// What is asked of it.
+// Queries and walks.
 mod object;
 mod query;
 
@@ -25,7 +25,7 @@ mod route;
 mod walk;
 mod walk_error;
 
-// Where an avatar can be, and how it gets there.
+// Places where an avatar can stand, reach and routes.
 mod floors;
 mod lattice;
 mod reach;
@@ -34,7 +34,7 @@ mod smooth;
 mod standing;
 mod steps;
 
-// On disk, and from there as it is needed.
+// Maps on disk, and loading on demand.
 mod cache;
 mod encode;
 mod store;

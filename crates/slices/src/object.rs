@@ -1,5 +1,5 @@
-//! A map against a map: objects of the scene as slices of their own (S4, §5), turned about the axis that
-//! points up.
+//! Collision of two maps: objects of the scene as slices of their own (Anjos et al. 2012, §5),
+//! rotated about the axis that points up.
 
 use nearmiss_geometry::Pose;
 use thiserror::Error;
@@ -7,10 +7,10 @@ use thiserror::Error;
 use crate::map::{SliceMap, Unloaded};
 use crate::query::{Floor, Floors, Occupancy};
 
-/// How far the object's axis may be off the building's: rounding of a rotation given in decimals.
+/// Greatest deviation of the object's axis from the building's, for rotations rounded to decimals.
 const UPRIGHT: f64 = 1e-6;
 
-/// Why a map is not held against another.
+/// The reason why two maps cannot be compared.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ObjectError {
@@ -19,29 +19,30 @@ pub enum ObjectError {
         "the pose tilts the object's axis by {degrees} degrees; turn it about the axis that points up only"
     )]
     Tilted {
-        /// Between the axis as posed and the building's.
+        /// Angle between the posed axis and the building's.
         degrees: f64,
     },
-    /// A slice that is needed is not loaded.
+    /// A required slice is not loaded.
     #[error(transparent)]
     Unloaded(#[from] Unloaded),
 }
 
-/// An object's coordinates into the building's: a turn about the axis that points up, a scale, a shift.
+/// The map from an object's coordinates to the building's: a rotation about the axis that points
+/// up, a scale and a translation.
 struct Upright {
-    /// Cosine and sine of the turn.
+    /// Cosine and sine of the rotation.
     turn: [f64; 2],
     scale: f64,
     shift: [f64; 3],
 }
 
 impl Upright {
-    /// The pose between the coordinates of two maps, if it tilts nothing.
+    /// Returns the transformation for a pose of the object. Fails if the pose tilts the object.
     fn new(building: &SliceMap, object: &SliceMap, pose: &Pose) -> Result<Self, ObjectError> {
         let (of, to) = (object.grid().up, building.grid().up);
         let turned = |v: [f64; 3]| to.to_map(pose.rotate(of.from_map(v)));
         let up = turned([0.0, 0.0, 1.0]);
-        // Written so that what is not a number is refused.
+        // The form of the condition also rejects NaN.
         if !(up[0].abs() <= UPRIGHT && up[1].abs() <= UPRIGHT && up[2] > 0.0) {
             let degrees = up[2].clamp(-1.0, 1.0).acos().to_degrees();
             return Err(ObjectError::Tilted { degrees });
@@ -61,15 +62,16 @@ impl Upright {
 }
 
 impl SliceMap {
-    /// What an object's own map meets of this one, posed object → building.
+    /// Tests this map against an object's own map, with the pose object → building.
     ///
-    /// Each of the object's pixels that holds something is a box, turned with the object: as broad and deep
-    /// as a pixel of it and as high as a slice. It meets every pixel of the building that it overlaps or
-    /// touches. `pixels` counts those of the object that meet something. The floor is taken under the middles
-    /// of the object's columns, below its lowest slice that holds something.
+    /// Each occupied pixel of the object is a box that turns with the object, as wide as the
+    /// object's pixel and as high as its slice. It collides with every occupied pixel of the
+    /// building that it overlaps or touches. `pixels` counts the object's pixels that collide. The
+    /// floor is looked up below the centres of the object's columns, starting at the bottom of its
+    /// lowest occupied slice.
     ///
     /// # Errors
-    /// When the pose tilts the object, or a slice that is needed is not loaded.
+    /// If the pose tilts the object, or a required slice is not loaded.
     pub fn meets(&self, object: &Self, pose: &Pose, floor: Floor) -> Result<Occupancy, ObjectError> {
         let upright = Upright::new(self, object, pose)?;
         let grid = object.grid();
@@ -112,7 +114,8 @@ impl SliceMap {
         Ok(found)
     }
 
-    /// Whether an upright box with a square base, turned, meets something, and whether that is an obstacle.
+    /// Tests a rotated upright box with a square base. Returns `None` if it meets nothing,
+    /// `Some(true)` if it meets an obstacle, `Some(false)` otherwise.
     fn turned_box(
         &self,
         centre: [f64; 2],
@@ -126,7 +129,7 @@ impl SliceMap {
         let min = [centre[0] - reach, centre[1] - reach, low];
         let max = [centre[0] + reach, centre[1] + reach, high];
         let Some(block) = grid.block(min, max) else { return Ok(None) };
-        // Along the sides of the turned square both squares reach so far together.
+        // The sum of both squares' half extents along the sides of the rotated square.
         let apart = half + 0.5 * grid.pixel * breadth;
         let mut met = None;
         for row in block.rows.clone() {

@@ -20,13 +20,13 @@ use crate::walk_error::WalkError;
 pub struct FoundRoute {
     /// The route.
     pub route: Route,
-    /// Its length across.
+    /// Its horizontal length.
     pub length: f64,
-    /// Length across of the shortest path on the lattice, of which the route is a smoothed one.
+    /// Horizontal length of the shortest path on the lattice, before smoothing.
     pub lattice_length: f64,
     /// The place where the feet end, in the caller's coordinates.
     pub end: [f64; 3],
-    /// Number of states of the walker that were looked at.
+    /// Number of explored states of the walker.
     pub visited: usize,
 }
 
@@ -70,18 +70,19 @@ impl Route {
     /// Finds a short route between two places of the caller's coordinates, both within a climb of a
     /// place to stand.
     ///
-    /// The graph is that of [`Reach`](crate::Reach): the places of the [`StepGrid`](crate::StepGrid)
-    /// and their eight neighbours, start and goal joined to the corners of their cells, and to each
-    /// other if they share one; every edge is walked by the walker itself. A* finds the shortest
-    /// path, by its length across. It is then smoothed where the walker confirms a shortcut, so
-    /// `length ≤ lattice_length`. With `falls` the avatar may fall on its way.
+    /// The graph is that of [`Reach`](crate::Reach): the places of the
+    /// [`StepGrid`](crate::StepGrid) and their eight neighbours. Start and goal are joined to the
+    /// corners of their cells, and to each other if they share a cell. Every edge is simulated by
+    /// the walker. A* finds the path with the least horizontal length. The path is then smoothed
+    /// where the walker confirms a shortcut, so `length ≤ lattice_length`. With `falls` the avatar
+    /// may fall on its way.
     ///
-    /// Looks at no more places than [`Reach::new`](crate::Reach::new), and at all of them if there
-    /// is no route.
+    /// Explores no more places than [`Reach::new`](crate::Reach::new), and all of them if there is
+    /// no route.
     ///
     /// # Errors
-    /// When the avatar cannot stand at the start or at the goal, the goal is out of reach, there
-    /// are more than 2^26 places, or a slice is not loaded.
+    /// If the avatar cannot stand at the start or at the goal, the goal is out of reach, there are
+    /// more than 2^26 places, or a slice is not loaded.
     pub fn find(
         map: &SliceMap,
         avatar: &Avatar,
@@ -117,12 +118,12 @@ impl Route {
 /// The absence of a node before.
 const NONE: u32 = u32::MAX;
 
-/// What is known of a node.
+/// The shortest path found to a node so far.
 #[derive(Debug, Clone, Copy)]
 struct Known {
     /// Length of the shortest path to it.
     length: f64,
-    /// The node before it; none if that is the start.
+    /// The node before it; `NONE` if that is the start.
     before: u32,
 }
 
@@ -136,17 +137,18 @@ struct End {
 /// A node to explore, or the goal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Open {
-    /// Length to it and the straight line from there to the goal.
+    /// Length of the path to it plus the straight line from there to the goal.
     whole: f64,
     length: f64,
-    /// None for the goal.
+    /// `NONE` for the goal.
     node: u32,
 }
 
 impl Eq for Open {}
 
 impl Ord for Open {
-    /// The shortest is the greatest; of several that which is nearest to the goal, then the first.
+    /// The shortest path is the greatest. Ties go to the node nearest to the goal, then to the
+    /// first.
     fn cmp(&self, other: &Self) -> Ordering {
         let by_whole = other.whole.total_cmp(&self.whole).then(self.length.total_cmp(&other.length));
         by_whole.then(other.node.cmp(&self.node))
@@ -163,7 +165,7 @@ struct Search<'a> {
     steps: Steps<'a>,
     start: Walker,
     goal: Walker,
-    /// A node for each of the graph's.
+    /// One entry for each node of the graph.
     known: Vec<Known>,
     open: BinaryHeap<Open>,
     end: Option<End>,
@@ -181,13 +183,13 @@ impl<'a> Search<'a> {
         Ok(Self { steps, start: *start, goal, known, open, end: None, edges, doorsteps })
     }
 
-    /// Explores the graph until the goal is the nearest of all that is open, or nothing is.
+    /// Explores the graph until the goal is the nearest open node, or no node is open.
     fn run(&mut self) -> Result<(), WalkError> {
         let mut edges = std::mem::take(&mut self.edges);
         let start = self.start;
         self.steps.enter(&start, &mut edges)?;
         let [x, y, _] = start.place();
-        // Both in one cell.
+        // Start and goal share a cell.
         if self.steps.lattice.corners([x, y]).eq(self.doorsteps.iter().copied()) {
             self.try_goal(&start, 0.0, NONE)?;
         }
@@ -196,7 +198,7 @@ impl<'a> Search<'a> {
             if node == NONE {
                 break;
             }
-            // A shorter path to it was found since.
+            // A shorter path to the node was found since.
             if length > self.known[node as usize].length {
                 continue;
             }
@@ -226,7 +228,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Goes to the goal if the walker gets there, on the same storey: within a climb of its height.
+    /// Records an edge to the goal if the walker arrives there on the same storey, that is within a
+    /// climb of the goal's height.
     fn try_goal(&mut self, walker: &Walker, so_far: f64, before: u32) -> Result<(), WalkError> {
         let [x, y, z] = self.goal.place();
         let Some(arrived) = self.steps.straight(walker, [x, y])? else { return Ok(()) };
@@ -245,7 +248,7 @@ impl<'a> Search<'a> {
         (u - x).hypot(v - y)
     }
 
-    /// The states at the start, at every node of the shortest path, and at the goal.
+    /// Returns the states at the start, at every node of the shortest path, and at the goal.
     fn path(&self, end: &End) -> Vec<Walker> {
         let mut path = vec![end.walker];
         let mut node = end.known.before;
@@ -258,8 +261,8 @@ impl<'a> Search<'a> {
         path
     }
 
-    /// The place within reach that is nearest to the goal, in the map's coordinates, and its
-    /// distance.
+    /// Returns the place within reach that is nearest to the goal, in the map's coordinates, and
+    /// its distance.
     fn nearest(&self) -> ([f64; 3], f64) {
         let [x, y, z] = self.goal.place();
         let away = |p: [f64; 3]| (p[0] - x).hypot(p[1] - y).hypot(p[2] - z);

@@ -1,4 +1,4 @@
-//! One image: which pixels hold something, how high, and whether it is an obstacle.
+//! One image: the occupied pixels, their heights, and the obstacles among them.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -7,50 +7,51 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::bits::{Bits, filled_of_eight};
 
-/// A layer of voxels. A pixel takes 1¾ bytes, whatever it holds; the bits of a row take whole words of 64.
+/// A layer of voxels. A pixel takes 1¾ bytes, occupied or not; the bits of a row take whole words
+/// of 64.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Slice {
     width: u32,
     height: u32,
     occupied: Bits,
-    /// Tiles with something in them.
+    /// Tiles with an occupied pixel.
     tiles: Bits,
     /// Set only where occupied.
     obstacle: Bits,
-    /// Level of the highest point plus one, 0 where nothing is.
+    /// Level of the highest point plus one; 0 if empty.
     tops: Vec<u8>,
-    /// Level of the lowest point, divided by 16, in half a byte a pixel; 0 where nothing is.
+    /// Level of the lowest point divided by 16, in half a byte a pixel; 0 if empty.
     bottoms: Vec<u8>,
     checksum: u64,
 }
 
-/// What a pixel holds.
+/// The content of an occupied pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Content {
     /// Level of the highest point.
     pub top: u8,
-    /// A level that no point is below, at most 15 below the lowest point.
+    /// A lower bound of the levels of the points, at most 15 below the lowest point.
     pub bottom: u8,
-    /// Whether it is an obstacle.
+    /// `true` if it is an obstacle.
     pub is_obstacle: bool,
 }
 
 impl Content {
-    /// Levels that one step of a bottom spans.
+    /// Resolution of a bottom, in levels.
     pub(crate) const STEP: u8 = 16;
 }
 
-/// Sixty-four pixels side by side; beyond the end of a row nothing is.
+/// Sixty-four adjacent pixels; pixels beyond the end of a row are empty.
 #[derive(Debug)]
 pub(crate) struct Word {
-    /// As in a slice.
+    /// Encoded as in a slice.
     pub(crate) tops: [u8; 64],
     pub(crate) bottoms: [u8; 32],
     pub(crate) obstacles: u64,
 }
 
 impl Word {
-    /// Whether exactly these pixels have tops, and none but them is an obstacle.
+    /// Returns `true` if exactly the occupied pixels have tops, and no other pixel is an obstacle.
     #[inline]
     pub(crate) fn is_sound(&self, occupied: u64) -> bool {
         let eights = self.tops.as_chunks().0.iter().map(|eight| filled_of_eight(*eight));
@@ -93,7 +94,8 @@ impl Canvas {
             (content.bottom / Content::STEP) << (4 * (column % 2));
     }
 
-    /// Sets the `word`-th 64 pixels of a row, all empty, of which those of `occupied` hold something.
+    /// Sets the `word`-th 64 pixels of a row, which must be empty. `occupied` are the occupied
+    /// ones.
     #[inline]
     pub(crate) fn set_word(&mut self, word: usize, row: usize, occupied: u64, pixels: &Word) {
         let Self(slice) = self;
@@ -106,7 +108,7 @@ impl Canvas {
         bottoms.copy_from_slice(&pixels.bottoms[..bottoms.len()]);
     }
 
-    /// The slice.
+    /// Returns the slice.
     pub(crate) fn finish(self) -> Slice {
         let Self(mut slice) = self;
         slice.checksum = slice.hash();
@@ -115,8 +117,8 @@ impl Canvas {
 }
 
 impl Slice {
-    /// Of what is there alone: most of a slice is empty. Words side by side with something in them are taken
-    /// together.
+    /// Hashes the occupied words alone, since most of a slice is empty. Adjacent occupied words are
+    /// hashed together.
     fn hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(cast_slice(&[self.width, self.height]));
@@ -139,7 +141,7 @@ impl Slice {
         hash.digest()
     }
 
-    /// Where the `word`-th 64 pixels of a row are among tops and bottoms.
+    /// Returns the ranges of the `word`-th 64 pixels of a row in `tops` and `bottoms`.
     #[inline]
     fn places(&self, word: usize, row: usize) -> [Range<usize>; 2] {
         let width = self.width as usize;
@@ -148,7 +150,7 @@ impl Slice {
         [tops + from..tops + to, bottoms + from / 2..bottoms + to.div_ceil(2)]
     }
 
-    /// The `word`-th 64 pixels of a row.
+    /// Returns the `word`-th 64 pixels of a row.
     pub(crate) fn word(&self, word: usize, row: usize) -> Word {
         let [tops, bottoms] = self.places(word, row);
         let (tops, bottoms) = (&self.tops[tops], &self.bottoms[bottoms]);
@@ -159,46 +161,47 @@ impl Slice {
         pixels
     }
 
-    /// Columns.
+    /// The number of columns.
     #[must_use]
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows.
+    /// The number of rows.
     #[must_use]
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// xxh3-64 of all it holds: two slices of one checksum are the same image.
+    /// The xxh3-64 checksum of the content. Slices with the same checksum are taken to be the same
+    /// image.
     #[must_use]
     pub fn checksum(&self) -> u64 {
         self.checksum
     }
 
-    /// Bytes in memory.
+    /// Returns the bytes in memory.
     #[must_use]
     pub fn bytes(&self) -> usize {
         Self::bytes_of(self.width, self.height)
     }
 
-    /// Bytes that an image of this size takes.
+    /// Returns the bytes of an image of this size.
     pub(crate) fn bytes_of(width: u32, height: u32) -> usize {
         let bits = 2 * Bits::bytes_of(width, height) + Bits::bytes_of_tiles(width, height);
         (width as usize + halves(width as usize)) * height as usize + bits
     }
 
-    /// How many pixels hold something, and how many of them are obstacles.
+    /// Returns the number of occupied pixels, and of obstacles among them.
     #[must_use]
     pub fn counts(&self) -> [u64; 2] {
         [self.occupied.count_all(), self.obstacle.count_all()]
     }
 
-    /// What a pixel holds; none if nothing is there.
+    /// Returns the content of a pixel; `None` if it is empty.
     ///
     /// # Panics
-    /// When there is no such pixel.
+    /// If there is no such pixel.
     #[inline]
     #[must_use]
     pub fn pixel(&self, column: u32, row: u32) -> Option<Content> {
@@ -209,9 +212,9 @@ impl Slice {
         Some(Content { top, bottom: half * Content::STEP, is_obstacle })
     }
 
-    /// The image as the paper encodes it, red green blue a pixel, the last row first: red is the height in
-    /// the slice, green is full where something is, blue is full for obstacles and a tenth for floor; black
-    /// is empty (S4, Fig. 2).
+    /// Returns the image as in Anjos et al. 2012, Fig. 2: red, green and blue bytes of each pixel,
+    /// the last row first. Red is the height in the slice. Green is full in occupied pixels. Blue
+    /// is full for obstacles and a tenth for floor. Empty pixels are black.
     #[must_use]
     pub fn rgb(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(3 * self.tops.len());
@@ -226,18 +229,19 @@ impl Slice {
         bytes
     }
 
-    /// Which pixels hold something.
+    /// Returns the bitmap of occupied pixels.
     pub(crate) fn occupied(&self) -> &Bits {
         &self.occupied
     }
 
-    /// Whether anything is in these pixels, which are on the image.
+    /// Returns `true` if any of these pixels is occupied. They must be on the image.
     #[inline]
     pub(crate) fn any(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> bool {
         self.tiles.any_tile(columns, rows) && self.occupied.any(columns, rows)
     }
 
-    /// How many of these pixels, which are on the image, hold something, and how many are obstacles.
+    /// Returns the number of occupied pixels among these, and of obstacles. They must be on the
+    /// image.
     pub(crate) fn count(&self, columns: &RangeInclusive<u32>, rows: &RangeInclusive<u32>) -> [u64; 2] {
         if !self.tiles.any_tile(columns, rows) {
             return [0; 2];
@@ -245,27 +249,27 @@ impl Slice {
         [&self.occupied, &self.obstacle].map(|bits| bits.count(columns, rows))
     }
 
-    /// Tops of a run of pixels of a row.
+    /// Returns the tops of a run of pixels of a row.
     #[inline]
     pub(crate) fn row(&self, columns: &RangeInclusive<u32>, row: u32) -> &[u8] {
         let first = row as usize * self.width as usize;
         &self.tops[first + *columns.start() as usize..=first + *columns.end() as usize]
     }
 
-    /// Whether a pixel of this row is an obstacle.
+    /// Returns `true` if a pixel is an obstacle.
     #[inline]
     pub(crate) fn is_obstacle(&self, column: u32, row: u32) -> bool {
         self.obstacle.is_set(column, row)
     }
 
-    /// Whether any of these pixels of a row, on the image, is an obstacle.
+    /// Returns `true` if any of these pixels of a row is an obstacle. They must be on the image.
     #[inline]
     pub(crate) fn any_obstacle(&self, columns: &RangeInclusive<u32>, row: u32) -> bool {
         self.obstacle.any(columns, &(row..=row))
     }
 }
 
-/// Bytes of a row of half bytes.
+/// Returns the bytes of a row of half bytes.
 const fn halves(width: usize) -> usize {
     width.div_ceil(2)
 }

@@ -8,12 +8,12 @@ use crate::walk::Walker;
 const MOST_PASSES: usize = 12;
 const LEAST_GAIN: f64 = 1e-3;
 
-/// Replaces parts of a path by straight lines. `path` has the states of a walker at corners, each
-/// of which it walks to straight from the one before; so does the result.
+/// Replaces parts of a path by straight lines. `path` has the states of a walker at the corners,
+/// each reached by walking straight from the one before. So has the result.
 ///
-/// A shortcut is taken if the walker walks it to the very same state, so all that follows stays
-/// walkable. Each pass tries lines from a corner to every step of the path, twice as far each time,
-/// then halves; passes end when they gain little.
+/// A shortcut is taken if the walker arrives in the very same state, so the rest stays walkable.
+/// Each pass searches for the farthest shortcut from a corner, first doubling the distance along
+/// the path, then bisecting. Passes end when they gain little.
 pub(crate) fn smoothed(map: &SliceMap, path: Vec<Walker>, falls: bool) -> Result<Vec<Walker>, Unloaded> {
     let mut path = path;
     for _ in 0..MOST_PASSES {
@@ -26,7 +26,7 @@ pub(crate) fn smoothed(map: &SliceMap, path: Vec<Walker>, falls: bool) -> Result
     Ok(path)
 }
 
-/// Length across of a path.
+/// Returns the horizontal length of a path.
 pub(crate) fn length(path: &[Walker]) -> f64 {
     path.windows(2).map(|pair| away(&pair[0], &pair[1])).sum()
 }
@@ -45,7 +45,7 @@ fn pulled(map: &SliceMap, path: &[Walker], falls: bool) -> Result<Vec<Walker>, U
     };
     let (mut here, mut pulled) = (0, vec![first]);
     while here < last {
-        // On the way to the next corner the walker goes on as it did.
+        // The line to the next corner is part of the path, so it is walkable.
         let next = corners[corners.partition_point(|corner| *corner <= here)];
         let (mut near, mut far) = (next, last + 1);
         let mut ahead = 2 * (next - here);
@@ -68,8 +68,8 @@ fn pulled(map: &SliceMap, path: &[Walker], falls: bool) -> Result<Vec<Walker>, U
     Ok(pulled)
 }
 
-/// The states of a walker after every step of a path at which it stands, and which of them are
-/// corners.
+/// Returns the states of a walker after every step of a path at which it stands, and the indices of
+/// the corners among them.
 fn trail(map: &SliceMap, path: &[Walker], falls: bool) -> Result<(Vec<Walker>, Vec<usize>), Unloaded> {
     let mut trail: Vec<Walker> = path.first().copied().into_iter().collect();
     let mut corners = Vec::new();

@@ -1,4 +1,4 @@
-//! Places where an avatar can stand, and the nearest of them.
+//! Search for places where an avatar can stand.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -14,7 +14,7 @@ use crate::query::Floor;
 use crate::walk::Walker;
 use crate::walk_error::WalkError;
 
-/// Places that are looked at lie no farther apart than a pixel, or than this part of the base.
+/// The searched places are a pixel apart, or this fraction of the base if that is more.
 const COARSE: f64 = 32.0;
 
 /// A place where an avatar can stand.
@@ -22,14 +22,14 @@ const COARSE: f64 = 32.0;
 pub struct Standing {
     /// The place of the feet, in the caller's coordinates.
     pub position: [f64; 3],
-    /// Its distance from the place that was asked for.
+    /// Its distance from the given place.
     pub distance: f64,
 }
 
 /// The reason why an avatar cannot stand at a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Misplaced {
-    /// The base lies off the map.
+    /// The base is outside the map.
     OffMap,
     /// An obstacle is in the box of the avatar.
     Obstacle,
@@ -57,9 +57,9 @@ pub enum StartError {
     /// The avatar cannot stand there.
     #[error("{place:?} {cause}; {}", told(nearest.as_ref()))]
     Misplaced {
-        /// The place that was asked for, in the caller's coordinates.
+        /// The given place, in the caller's coordinates.
         place: [f64; 3],
-        /// Why not.
+        /// The reason.
         cause: Misplaced,
         /// The nearest place where the avatar can stand; `None` if there is none on the map.
         nearest: Option<Standing>,
@@ -86,19 +86,19 @@ fn told(nearest: Option<&Standing>) -> String {
 
 impl Avatar {
     /// Puts the avatar's feet at a place of the caller's coordinates, as [`Walker::new`] does, but
-    /// only where something carries it within a climb of that height.
+    /// only where something supports it within a climb of that height.
     ///
     /// # Errors
-    /// Names the nearest place where the avatar can stand ([`Avatar::nearest_standing`]) if there
-    /// is no room, nothing to stand on, or no map. Fails if the place is not finite or a slice is
-    /// not loaded.
+    /// If there is no free space, no support, or no map at the place; the error names the nearest
+    /// place where the avatar can stand ([`Avatar::nearest_standing`]). Also if the place is not
+    /// finite or a slice is not loaded.
     pub fn placed(&self, map: &SliceMap, place: [f64; 3]) -> Result<Walker, StartError> {
         let cause = match Walker::new(*self, map, place) {
             Ok(walker) if !walker.is_falling() => return Ok(walker),
             Ok(_) if self.is_off(map, place) => Misplaced::OffMap,
             Ok(_) => Misplaced::Airborne,
             Err(WalkError::Blocked { .. }) => {
-                // What lies below a climb is stepped on.
+                // Anything below a climb can be stepped on, so it does not count.
                 let up = map.grid().up;
                 let Aabb { min, max } = self.bounds(map.grid(), place);
                 let [[x, y, z], [u, v, w]] = [min, max].map(|corner| up.to_map(corner));
@@ -116,14 +116,14 @@ impl Avatar {
     /// Finds the place nearest to `near`, in the caller's coordinates, where the avatar can stand;
     /// `None` if there is none.
     ///
-    /// Looked at are all heights of `near` itself and of the places of the [`StepGrid`] with the
-    /// spacing of a pixel, for bases beyond 64 pixels of a 32nd of their lesser side in whole
-    /// pixels, ring by ring, until no further ring can be nearer. A place of them is one if a
-    /// walker that is put there stays there ([`Walker::new`]). Takes microseconds for each place
-    /// that is nearer than the one found; seconds for a large map with none.
+    /// Searches all heights of `near` itself and of the places of a [`StepGrid`] ring by ring,
+    /// until no further ring can be nearer. The spacing of the places is a pixel; for bases wider
+    /// than 64 pixels it is a 32nd of their lesser side, in whole pixels. An avatar can stand at a
+    /// place if a walker that is put there stays there ([`Walker::new`]). Takes microseconds for
+    /// each place that is nearer than the result; seconds for a large map with no result.
     ///
     /// # Errors
-    /// When `near` is not finite, or a slice is not loaded.
+    /// If `near` is not finite, or a slice is not loaded.
     pub fn nearest_standing(&self, map: &SliceMap, near: [f64; 3]) -> Result<Option<Standing>, WalkError> {
         if !near.iter().all(|x| x.is_finite()) {
             return Err(WalkError::NotFinite { index: 0 });
@@ -156,9 +156,9 @@ impl Avatar {
         let last = lattice.counts.map(|count| u32::try_from(count - 1).unwrap_or(u32::MAX));
         let rings = (0..2).map(|k| centre[k].max(last[k] - centre[k])).max().unwrap_or(0);
         for ring in 0..=rings {
-            // A place of the ring is so far from the centre, which rounds `near`, or what of it is
-            // on the map. The way from there to `near` outside leads away from all places, so
-            // squares add up.
+            // `inner` is the distance of the ring from the centre, which is `near` rounded to the
+            // lattice and clamped to the map. If `near` is outside, the way from the centre to
+            // `near` leads away from all places, so the squares of the distances add up.
             let inner = (f64::from(ring) - 1.0).max(0.0) * spacing;
             let least = if off > spacing { inner.hypot(off - spacing) } else { inner };
             if best.is_some_and(|(_, found)| least >= found) {
@@ -171,8 +171,8 @@ impl Avatar {
         Ok(best.map(|(place, distance)| Standing { position: grid.up.from_map(place), distance }))
     }
 
-    /// Collects the heights, in the map's coordinates, at which the avatar can stand at a place
-    /// across, lowest first.
+    /// Collects the heights at which the avatar can stand at a horizontal place, lowest first, all
+    /// in the map's coordinates.
     pub(crate) fn standing_heights(
         &self,
         map: &SliceMap,
@@ -196,7 +196,8 @@ impl Avatar {
             }
             for level in (0..=254_u8).rev().filter(|level| tops[usize::from(*level)]) {
                 let height = grid.height(s, level);
-                // What lies within a climb below something carries nobody: the walker climbs that.
+                // A surface within a climb below another supports nothing: the walker climbs the
+                // upper one.
                 let is_clear = above.is_none_or(|above| above - height > 0.999 * climb);
                 above = Some(height);
                 if is_clear && self.rests(map, [place[0], place[1], height])? {
@@ -217,7 +218,7 @@ impl Avatar {
         }
     }
 
-    /// Returns the columns and rows under the base at a place across, in the map's coordinates.
+    /// Returns the columns and rows under the base at a horizontal place, in the map's coordinates.
     fn base(&self, map: &SliceMap, place: [f64; 2]) -> Option<[RangeInclusive<u32>; 2]> {
         let half = map.grid().up.across(self.options().base).map(|side| 0.5 * side);
         let range = |k: usize| map.grid().range(k, [place[k] - half[k], place[k] + half[k]]);

@@ -1,4 +1,4 @@
-//! Which way is up, and what lies across.
+//! The axis that points up, and the two horizontal axes.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,10 +6,10 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The direction that slices are stacked along.
+/// The axis that slices are stacked along.
 ///
-/// A map works in coordinates of its own: two across, then the one up, turned from the caller's without
-/// mirroring.
+/// A map has coordinates of its own: two horizontal ones, then the one that points up. They are a
+/// rotation of the caller's, without mirroring.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Up {
     /// x grows upwards.
@@ -27,17 +27,17 @@ pub enum Up {
     NegZ,
 }
 
-/// Not a direction.
+/// The text names no axis.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("`{given}` is no axis; known are x, y, z, -x, -y and -z")]
 pub struct UnknownAxis {
-    /// What was given.
+    /// The text.
     pub given: String,
 }
 
 impl Up {
-    /// The caller's axes that become the map's first, second and third, and whether the third is turned
-    /// round.
+    /// Returns the caller's axes that become the map's first, second and third, and whether the
+    /// third is negated.
     const fn order(self) -> ([usize; 3], bool) {
         match self {
             Self::X => ([1, 2, 0], false),
@@ -49,7 +49,8 @@ impl Up {
         }
     }
 
-    /// A place or direction of the caller in the map's coordinates: across, across, up.
+    /// Converts a place or direction from the caller's coordinates to the map's: horizontal,
+    /// horizontal, up.
     #[inline]
     #[must_use]
     pub fn to_map(self, p: [f64; 3]) -> [f64; 3] {
@@ -57,7 +58,8 @@ impl Up {
         [p[a], p[b], if turned { -p[c] } else { p[c] }]
     }
 
-    /// The inverse of [`Up::to_map`].
+    /// Converts a place or direction from the map's coordinates to the caller's: the inverse of
+    /// [`Up::to_map`].
     #[must_use]
     pub fn from_map(self, p: [f64; 3]) -> [f64; 3] {
         let ([a, b, c], turned) = self.order();
@@ -66,13 +68,14 @@ impl Up {
         q
     }
 
-    /// The caller's coordinate along the axis at this height of the map.
+    /// Returns the caller's coordinate along the axis at this height of the map.
     #[must_use]
     pub fn coordinate(self, height: f64) -> f64 {
         if self.order().1 { -height } else { height }
     }
 
-    /// The two coordinates of the map that these two of the caller are, given in the caller's order x, y, z.
+    /// Converts two horizontal coordinates from the caller's order x, y, z to the map's order. Its
+    /// own inverse.
     #[must_use]
     pub fn across(self, [p, q]: [f64; 2]) -> [f64; 2] {
         let ([a, b, _], _) = self.order();
@@ -128,7 +131,7 @@ mod tests {
             assert_eq!(cross, c, "{name}: x × y = z");
             let axis = up.from_map([0.0, 0.0, 1.0]);
             assert!((up.coordinate(4.0) - axis.iter().sum::<f64>() * 4.0).abs() < 1e-15, "{name}");
-            // Of the caller's coordinates those not along the axis, in order.
+            // The caller's coordinates without the one along the axis, in order.
             let level: Vec<f64> = (0..3).filter(|&k| axis[k] == 0.0).map(|k| p[k]).collect();
             let [u, v, _] = up.to_map(p);
             assert_eq!(up.across([level[0], level[1]]), [u, v], "{name}");

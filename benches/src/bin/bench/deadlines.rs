@@ -23,7 +23,7 @@ const REPEATS: usize = 5;
 /// Poses whose stretch is measured.
 const STRETCHED: usize = 100;
 
-/// Time limit of a run of the loop or of a query. It is short, so that other load meets both alike.
+/// Deadline of a run whose stretch is measured. Longer runs would always be interrupted by other load.
 const LONG: Duration = Duration::from_millis(1);
 
 #[derive(Debug, clap::Args)]

@@ -46,13 +46,13 @@ enum Command {
     Coverings(coverings::Arguments),
     /// Curves of intersection of pairs of objects, by spacing
     Curves(curves::Arguments),
-    /// How late queries with a deadline end
+    /// Overruns of queries with a deadline
     Deadlines(deadlines::Arguments),
     /// Distances of two copies of an object, over the poses of the sweep
     Distances(distances::Options),
     /// Solvers of the symmetric 3×3 eigenproblem: time and errors
     Eigen(eigen::Arguments),
-    /// One evaluation of f, at a leaf and anywhere, by instruction set
+    /// The cost of one evaluation of f, at a leaf and anywhere, by instruction set
     Evaluation(evaluation::Arguments),
     /// Results of proximity graphs: normals, close pairs, levels, the geodesic kernel
     Geodesics(geodesics::Arguments),

@@ -10,7 +10,7 @@ use nearmiss_benches::Failure;
 use nearmiss_benches::asked::Asking;
 use nearmiss_testdata::pairs::{self, SetOptions, analytic_set};
 
-/// One in this many thin pairs may be `Ambiguous`.
+/// Thin pairs for each one that may be `Ambiguous`.
 const THIN_ALLOWANCE: usize = 20;
 
 /// Counts of one family at one level of noise.

@@ -13,10 +13,11 @@ use nearmiss_geometry::Aabb;
 /// The places of a node with at most this many are compared one by one.
 const LEAF: usize = 8;
 
-/// Returns the number of the component of each place, counted from 0 in the order of their first places.
+/// Returns the number of the component of each place, counted from 0 in the order of their first
+/// places.
 ///
-/// Two places whose distance is at most `link` are in one component; `link` 0 joins equal places alone. A
-/// place with a coordinate that is not finite is a component of its own.
+/// Two places whose distance is at most `link` are in one component; `link` 0 joins equal places
+/// only. A place with a coordinate that is not finite is a component of its own.
 ///
 /// Takes n log n steps if the places are spread out or close together, and memory for two numbers
 /// and a box per place. The order of the places changes the numbers of the components but not the

@@ -1,5 +1,6 @@
-//! Clash lists: the components of all contacts compared with brute force, and clearances of shapes
-//! with known distances.
+//! Clash lists: contact components against brute force, clearances of shapes with known distances.
+use std::collections::BTreeSet;
+
 use nearmiss_geometry::{PointCloud, Pose};
 use nearmiss_hierarchy::{BuildOptions, PointHierarchy};
 use nearmiss_query::{
@@ -105,6 +106,14 @@ fn clashes_are_components_of_all_contacts() {
             let mut told: Vec<usize> = lists.copied().collect();
             told.sort_unstable();
             assert!(told.into_iter().eq(0..near.contacts.len()), "{kind:?} {n}: each contact once");
+            let leaf = |scan: &PointHierarchy, id: u32| {
+                let stored = scan.source().iter().position(|&source| source == id).unwrap();
+                (0..).find(|&leaf| scan.topology().points_of_leaf(leaf).contains(&stored))
+            };
+            let pair = |c: &Contact| [leaf(&a, c.sources[0].0), leaf(&b, c.sources[1].0)];
+            let (touching, others) = near.contacts.split_at(near.hard);
+            let touching: BTreeSet<_> = touching.iter().map(pair).collect();
+            assert!(others.iter().all(|c| !touching.contains(&pair(c))), "{kind:?} {n}: leaves that meet");
             surrounded += near.clashes.iter().filter(|clash| !clash.surroundings.is_empty()).count();
             misses += without.len();
             for clash in &near.clashes {
@@ -147,7 +156,7 @@ fn two_feet_on_a_floor_are_two_clashes_and_one_above_it_is_a_clearance_clash() {
     let misses = of_kind(&near, ClashKind::Clearance);
     assert_eq!((near.clashes.len(), misses.len()), (3, 1), "{:?}", near.clashes);
     assert!((misses[0].group.centre()[0] - 5.0).abs() < 0.1, "{:?}", misses[0]);
-    // The lowest row of the sheet is 0.45 above the floor; its discs may reach a local radius lower.
+    // The lowest row of the sheet is 0.45 above the floor; its discs may reach a radius lower.
     assert!(misses[0].lower < 0.45 && misses[0].upper > 0.25, "{:?}", misses[0]);
     assert!(misses[0].upper < 0.46 && misses[0].lower > 0.1, "{:?}", misses[0]);
     assert_eq!(list(&a, &b, &ClashOptions::default().with_clearance(0.2)).clashes.len(), 2, "too far off");
