@@ -32,7 +32,7 @@ pub struct TriangleDistance {
 /// coordinates from normal equations.
 ///
 /// # Cost
-/// About 0.3 µs.
+/// About 1 µs, or 1.5 µs if the triangles meet.
 ///
 /// ```
 /// use nearmiss_mesh::triangle_distance;

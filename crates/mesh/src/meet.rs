@@ -26,9 +26,10 @@ pub type Corners = [[f64; 3]; 3];
 /// coordinates leave open are computed with integers of 512 or 6400 bits.
 ///
 /// # Cost
-/// 10 to 60 ns where the filter settles all signs, and about 100 ns for each sign that it leaves open. An open
-/// sign of coordinates outside the range takes about 1 µs, or about 50 µs if their bits span more than
-/// 160 places.
+/// On one core of a 2020s server: 6 ns if the boxes are apart, 50 to 130 ns if the filter settles all
+/// signs, 100 to 250 ns for neighbours in a mesh, and about 100 ns for each other sign that the filter
+/// leaves open. An open sign of coordinates outside the range takes about 1 µs, or about 50 µs if their
+/// bits span more than 160 places.
 ///
 /// ```
 /// use nearmiss_mesh::triangles_meet;
@@ -58,6 +59,7 @@ pub(crate) enum Arrangement {
     Flat,
 }
 
+#[inline]
 pub(crate) fn arrangement(a: &Corners, b: &Corners) -> Arrangement {
     if !boxes_meet(a, b) {
         return Arrangement::Apart;
