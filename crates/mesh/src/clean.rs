@@ -4,7 +4,7 @@ use nearmiss_geometry::TriangleMesh;
 use thiserror::Error;
 
 use crate::flat::has_area;
-use crate::meet::Corners;
+use crate::triangle::Corners;
 use crate::weld;
 
 /// Options of [`CleanMesh`].

@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
-use crate::meet::Corners;
 use crate::orientation::{PlaneSides, area_sign, line_weights, plane_weights, volume_sign, weighted};
+use crate::triangle::Corners;
 
 /// The convex hull of the corners of a triangle: a triangle, a segment or a point. Unused corners
 /// repeat the last one.
@@ -32,7 +32,9 @@ impl Hull {
 }
 
 fn lexicographic(a: &[f64; 3], b: &[f64; 3]) -> Ordering {
-    a.partial_cmp(b).unwrap_or(Ordering::Equal)
+    // Adding 0 turns -0 into 0, which is equal but ordered differently.
+    let compare = |k: usize| (a[k] + 0.0).total_cmp(&(b[k] + 0.0));
+    compare(0).then_with(|| compare(1)).then_with(|| compare(2))
 }
 
 /// A point without one of its coordinates.

@@ -4,9 +4,7 @@ use std::cmp::Ordering;
 
 use crate::flat;
 use crate::orientation::{PlaneSides, volume_sign};
-
-/// The corners of a triangle. Corners may coincide or lie on a line.
-pub type Corners = [[f64; 3]; 3];
+use crate::triangle::Corners;
 
 /// Returns `true` if two closed triangles share a point: touching in a corner or along an edge counts.
 ///

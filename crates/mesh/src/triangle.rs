@@ -1,5 +1,8 @@
 //! A triangle with its longest side below, in rows.
 
+/// The corners of a triangle. Corners may coincide or lie on a line.
+pub type Corners = [[f64; 3]; 3];
+
 /// Corners, and the frame in which its longest side lies along the first axis and its tip above.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Triangle {
