@@ -4,7 +4,7 @@
 //! bound does not settle the sign, the adaptive expansions of Shewchuk 1997 do (crate `robust`).
 //! They are exact unless a product underflows or overflows: with coordinates that are 0 or of
 //! magnitude [`LEAST`] to [`MOST`] neither happens. Other finite coordinates go to integers of
-//! fixed width, which take some 50 µs a sign and are exact always.
+//! fixed width, which take up to 35 µs a sign and are exact always.
 
 use std::cmp::Ordering;
 
@@ -14,17 +14,15 @@ use crate::triangle::between;
 use crate::wide::{ANY, MEDIUM, MEDIUM_SPAN, SMALL, SMALL_SPAN, Wide, lowest_bit};
 
 /// 2^-250. All bits of such numbers are at or above 2^-302, so each product of three differences is
-/// a
-/// multiple of 2^-906, and the least error bound of the expansions, 2^-104 times that, is normal.
+/// a multiple of 2^-906, and the least error bound of the expansions, 2^-104 times that, is normal.
 const LEAST: f64 = f64::from_bits((1023 - 250) << 52);
 
 /// 2^300. Volumes stay below 2^906.
 const MOST: f64 = f64::from_bits((1023 + 300) << 52);
 
 /// Eight units of rounding (2^-53). Shewchuk 1997 proves 7 + 56 · 2^-53 of them for volumes and 3 +
-/// 16 · 2^-53
-/// for areas, relative to the sum of the magnitudes of the products; the rest covers the rounding
-/// of the bound.
+/// 16 · 2^-53 for areas, relative to the sum of the magnitudes of the products; the rest covers the
+/// rounding of the bound.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Covers underflow: a product is off by at most 2^-1075, which is far below this times
@@ -166,8 +164,7 @@ fn exact_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Ordering {
 }
 
 /// Returns `true` if two points are equal, or all points share a coordinate: then they have no
-/// volume, or
-/// no area. This is common in meshes: neighbours share corners, and walls are aligned.
+/// volume, or no area. This is common in meshes: neighbours share corners, and walls are aligned.
 fn plainly_flat<const D: usize>(points: &[[f64; D]]) -> bool {
     let aligned = (0..D).any(|k| points.iter().all(|p| p[k] == points[0][k]));
     aligned || points.iter().enumerate().any(|(i, p)| points[..i].contains(p))

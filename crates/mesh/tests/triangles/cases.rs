@@ -37,7 +37,8 @@ pub(crate) fn lattice_pair(rng: &mut Random) -> [Corners; 2] {
     [a, b]
 }
 
-/// Places that are not representable, on corners, edges and faces of a random triangle up to rounding.
+/// Places that are not representable, on corners, edges and faces of a random triangle up to
+/// rounding.
 pub(crate) fn nearly_touching(rng: &mut Random) -> [Corners; 2] {
     let size = [1.0, 1e6, 1e-6][rng.random_range(0..3)];
     let shift = [0.0, 1.0, 1e6, 1e-6][rng.random_range(0..4)];

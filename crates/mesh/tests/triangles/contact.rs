@@ -8,7 +8,8 @@ use super::exact::distance_to;
 /// Units of rounding by which a contact may miss the triangles.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// Contacts are finite, in both triangles up to rounding, and there if and only if the triangles meet.
+/// Contacts are finite, in both triangles up to rounding, and there if and only if the triangles
+/// meet.
 fn checked(pair: &[Corners; 2]) -> Option<TriangleContact> {
     let [a, b] = pair;
     let contact = triangle_contact(a, b);
