@@ -1,4 +1,5 @@
-//! Two triangles: the exact test beside the rounded one of the hand-written traversal and parry's, contacts, distances.
+//! Two triangles: the exact test beside the rounded one of the hand-written traversal and parry's,
+//! contacts, distances.
 
 use std::hint::black_box;
 
@@ -68,7 +69,9 @@ fn triangles(criterion: &mut Criterion) {
         });
         #[expect(clippy::cast_possible_truncation, reason = "parry's triangles are single precision")]
         let single = |t: &Corners| {
-            let [a, b, c] = t.map(|p| parry3d::math::Vector::from(p.map(|x| x as f32)));
+            #[expect(clippy::cast_possible_truncation, reason = "parry's precision")]
+            let single = |x: f64| x as f32;
+            let [a, b, c] = t.map(|p| parry3d::math::Vector::from(p.map(single)));
             Triangle::new(a, b, c)
         };
         let singles: Vec<[Triangle; 2]> =

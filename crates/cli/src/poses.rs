@@ -31,11 +31,12 @@ pub struct PosesArgs {
     pub a: PathBuf,
     /// Scan that is turned and moved
     pub b: PathBuf,
-    /// Thirteen distances of the centres, from 0 to 1.5 times the longest side of a, with random rotations and
-    /// directions
+    /// Make poses at thirteen distances of the centres, from 0 to 1.5 times the longest side of a
+    ///
+    /// Rotations and directions are random.
     #[arg(long)]
     pub sweep: bool,
-    /// Shifts by up to 10 r from first contact, half of them apart
+    /// Make poses shifted by up to 10 r from first contact, half of them apart
     ///
     /// r is the larger sampling radius. Two scans are in contact here when two of their points are r/2 apart;
     /// where that happens is found by bisection, not by `collide`.

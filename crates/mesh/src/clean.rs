@@ -4,15 +4,15 @@ use nearmiss_geometry::TriangleMesh;
 use thiserror::Error;
 
 use crate::flat::has_area;
-use crate::meet::Corners;
+use crate::triangle::Corners;
 use crate::weld;
 
 /// Options of [`CleanMesh`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct CleanOptions {
-    /// Greatest distance over which vertices are welded, in the units of the vertices. 0, the default,
-    /// welds vertices with equal coordinates only.
+    /// Greatest distance over which vertices are welded, in the units of the vertices. 0, the
+    /// default, welds vertices with equal coordinates only.
     pub weld: f64,
 }
 
@@ -122,18 +122,18 @@ impl CleanMesh {
     /// Cleans vertices and triangles that refer to them.
     ///
     /// Vertices are welded first: equal ones become the one with the lowest index. With a weld
-    /// distance above 0, each vertex in turn is replaced by the nearest vertex kept before it if that is
-    /// within the distance, up to rounding. So no vertex moves farther than the distance, and kept
-    /// vertices are farther apart than it. Then degenerate triangles are dropped, then duplicates
-    /// except the first, then unused vertices. A mesh may end up empty.
+    /// distance above 0, each vertex in turn is replaced by the nearest vertex kept before it if
+    /// that is within the distance, up to rounding. So no vertex moves farther than the distance,
+    /// and kept vertices are farther apart than it. Then degenerate triangles are dropped, then
+    /// duplicates except the first, then unused vertices. A mesh may end up empty.
     ///
     /// # Cost
     /// O(n log n) in time for n vertices and triangles, O(n) in memory.
     ///
     /// # Errors
-    /// If a vertex, also an unused one, has a coordinate that is NaN or infinite, if a triangle refers to a
-    /// vertex that does not exist, if the weld distance is negative or not finite, or if there are more
-    /// than 2^32 − 1 vertices or triangles.
+    /// If a vertex, also an unused one, has a coordinate that is NaN or infinite, if a triangle
+    /// refers to a vertex that does not exist, if the weld distance is negative or not finite, or
+    /// if there are more than 2^32 − 1 vertices or triangles.
     pub fn from_parts(
         vertices: &[[f64; 3]],
         triangles: &[[u32; 3]],

@@ -1,8 +1,7 @@
 //! Distance of two triangles, with the nearest points.
 
 use crate::contact::triangle_contact;
-use crate::meet::Corners;
-use crate::triangle::{between, cross, dot, length};
+use crate::triangle::{Corners, between, cross, dot, length};
 
 /// The distance of two triangles and the points between which it was measured, from
 /// [`triangle_distance`].
@@ -10,29 +9,29 @@ use crate::triangle::{between, cross, dot, length};
 pub struct TriangleDistance {
     /// The distance, in the units of the corners. 0 if and only if the triangles meet.
     pub distance: f64,
-    /// A nearest point of each triangle. Both are the same if the triangles meet. Where several pairs of
-    /// points are equally near, one of them is returned.
+    /// A nearest point of each triangle. Both are the same if the triangles meet. Where several
+    /// pairs of points are equally near, one of them is returned.
     pub points: [[f64; 3]; 2],
 }
 
 /// Returns the distance of two triangles and two nearest points.
 ///
 /// Whether the distance is 0 is decided exactly, as by [`triangles_meet`](crate::triangles_meet); a
-/// distance greater than 0 is never rounded to 0. Otherwise the error is below 1e-12 of the greatest
-/// difference of coordinates among the six corners (1e-14 in practice), also for needles and for
-/// triangles without area. The points are rounded to `f64` in the frame of the corners: far from the
-/// origin, the distance is more accurate than the points. For finite corners the result is finite;
-/// a distance that exceeds `f64::MAX` is returned as `f64::MAX`.
+/// distance greater than 0 is never rounded to 0. Otherwise the error is below 1e-12 of the
+/// greatest difference of coordinates among the six corners (1e-14 in practice), also for needles
+/// and for triangles without area. The points are rounded to `f64` in the frame of the corners: far
+/// from the origin, the distance is more accurate than the points. For finite corners the result is
+/// finite; a distance that exceeds `f64::MAX` is returned as `f64::MAX`.
 ///
 /// # Method
-/// Two nearest points are a corner and a point of an edge, two points inside edges, or a corner and a
-/// point inside a face (Ericson 2005, sections 5.1.2, 5.1.5, 5.1.9). All 33 pairs of features are tried. Their
-/// formulas are replaced by ones that stay accurate for needles: lines by the cross product of their
-/// directions, faces by an orthonormal frame along the longest edge instead of barycentric
-/// coordinates from normal equations.
+/// Two nearest points are a corner and a point of an edge, two points inside edges, or a corner and
+/// a point inside a face (Ericson 2005, sections 5.1.2, 5.1.5, 5.1.9). All 33 pairs of features are
+/// tried. Their formulas are replaced by ones that stay accurate for needles: lines by the cross
+/// product of their directions, faces by an orthonormal frame along the longest edge instead of
+/// barycentric coordinates from normal equations.
 ///
 /// # Cost
-/// About 0.3 µs.
+/// About 1 µs, or 1.5 µs if the triangles meet.
 ///
 /// ```
 /// use nearmiss_mesh::triangle_distance;
@@ -68,7 +67,8 @@ pub fn triangle_distance(a: &Corners, b: &Corners) -> TriangleDistance {
     TriangleDistance { distance, points: [combined(a, of_a), combined(b, of_b)] }
 }
 
-/// Both triangles relative to a corner, in units of a power of two in which no coordinate exceeds 2.
+/// Both triangles relative to a corner, in units of a power of two in which no coordinate exceeds
+/// 2.
 struct Local {
     corners: [Corners; 2],
     exponent: i32,
@@ -144,8 +144,8 @@ impl Face {
         let (edge, side) = (between(a, b), between(a, c));
         let base = length(edge);
         let along = edge.map(|x| x / base);
-        // Corners are projected in the same two steps (modified Gram-Schmidt), which is accurate for
-        // needles even though their `away` is not quite perpendicular to `along`.
+        // Corners are projected in the same two steps (modified Gram-Schmidt), which is accurate
+        // for needles even though their `away` is not quite perpendicular to `along`.
         let foot = dot(side, along);
         let away = minus(side, along, foot);
         let height = length(away);

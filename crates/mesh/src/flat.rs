@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
-use crate::meet::Corners;
 use crate::orientation::{PlaneSides, area_sign, line_weights, plane_weights, volume_sign, weighted};
+use crate::triangle::Corners;
 
 /// The convex hull of the corners of a triangle: a triangle, a segment or a point. Unused corners
 /// repeat the last one.
@@ -32,7 +32,9 @@ impl Hull {
 }
 
 fn lexicographic(a: &[f64; 3], b: &[f64; 3]) -> Ordering {
-    a.partial_cmp(b).unwrap_or(Ordering::Equal)
+    // Adding 0 turns -0 into 0, which is equal but ordered differently.
+    let compare = |k: usize| (a[k] + 0.0).total_cmp(&(b[k] + 0.0));
+    compare(0).then_with(|| compare(1)).then_with(|| compare(2))
 }
 
 /// A point without one of its coordinates.
@@ -53,12 +55,14 @@ pub(crate) fn has_area(triangle: &Corners) -> bool {
     axis_with_area(triangle).is_some()
 }
 
-/// Returns `true` if the triangles share a point. At least one has no area, or both lie in one plane.
+/// Returns `true` if the triangles share a point. At least one has no area, or both lie in one
+/// plane.
 pub(crate) fn meet(a: &Corners, b: &Corners) -> bool {
     first_common(a, b).is_some()
 }
 
-/// The two corners farthest apart of what the triangles have in common, and the mean of all its corners.
+/// The two corners farthest apart of what the triangles have in common, and the mean of all its
+/// corners.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FlatContact {
     pub(crate) ends: [[f64; 3]; 2],
@@ -136,8 +140,8 @@ fn pierces(triangle: &Hull, segment: &Hull) -> bool {
     turns.iter().all(|t| t.is_ge()) || turns.iter().all(|t| t.is_le())
 }
 
-/// Two convex polygons in a coordinate plane, with the side of each corner of one with respect to each
-/// edge of the other: `Greater` is inside, for triangles.
+/// Two convex polygons in a coordinate plane, with the side of each corner of one with respect to
+/// each edge of the other: `Greater` is inside, for triangles.
 struct Projection<'a> {
     hulls: [&'a Hull; 2],
     flat: [[[f64; 2]; 3]; 2],

@@ -17,5 +17,6 @@ pub use clean::{CleanError, CleanMesh, CleanOptions, CleanReport};
 pub use contact::{TriangleContact, triangle_contact, unit_normal};
 pub use distance::{TriangleDistance, triangle_distance};
 pub use lattice::{Lattice, lattice_samples};
-pub use meet::{Corners, triangles_meet};
+pub use meet::triangles_meet;
 pub use sample::{SampleError, SampleOptions, SampleSize, sample};
+pub use triangle::Corners;

@@ -4,31 +4,31 @@ use std::cmp::Ordering;
 
 use crate::flat;
 use crate::orientation::{PlaneSides, volume_sign};
+use crate::triangle::Corners;
 
-/// The corners of a triangle. Corners may coincide or lie on a line.
-pub type Corners = [[f64; 3]; 3];
-
-/// Returns `true` if two closed triangles share a point: touching in a corner or along an edge counts.
+/// Returns `true` if two closed triangles share a point: touching in a corner or along an edge
+/// counts.
 ///
 /// The answer is exact for all finite coordinates, including needles, triangles in one plane, and
 /// triangles without area, which are treated as the segment or point that they are. It does not
-/// depend on the order of the corners or of the triangles. With coordinates that are NaN or infinite
-/// the answer has no meaning, but the function does not panic.
+/// depend on the order of the corners or of the triangles. With coordinates that are NaN or
+/// infinite the answer has no meaning, but the function does not panic.
 ///
 /// # Method
-/// The boxes of the triangles are compared first. Then come the sides of the corners of each triangle
-/// with respect to the plane of the other, and two volumes that compare the segments in which the
-/// triangles meet the common line of their planes (Guigue & Devillers 2003, section 4). Triangles in
-/// one plane are compared in the coordinate plane in which they have area. All of these are signs of
-/// determinants. A floating-point filter settles most of them; expansions with as many digits as
+/// The boxes of the triangles are compared first. Then come the sides of the corners of each
+/// triangle with respect to the plane of the other, and two volumes that compare the segments in
+/// which the triangles meet the common line of their planes (Guigue & Devillers 2003). Triangles in
+/// one plane are compared in the coordinate plane in which they have area. All of these are signs
+/// of determinants. A floating-point filter settles most of them; expansions with as many digits as
 /// needed (Shewchuk 1997) settle the others. Coordinates other than 0 with magnitudes outside
-/// 2^-250 to 2^300 (about 5e-76 to 2e90) would let expansions underflow or overflow; signs that such
-/// coordinates leave open are computed with integers of 512 or 6400 bits.
+/// 2^-250 to 2^300 (about 5e-76 to 2e90) would let expansions underflow or overflow; signs that
+/// such coordinates leave open are computed with integers of 256, 512 or 6400 bits.
 ///
 /// # Cost
-/// 10 to 60 ns where the filter settles all signs, and about 100 ns for each sign that it leaves open. An open
-/// sign of coordinates outside the range takes about 1 µs, or about 50 µs if their bits span more than
-/// 160 places.
+/// On one core of a 2020s server: 6 ns if the boxes are apart, 50 to 130 ns if the filter settles
+/// all signs, 100 to 250 ns for neighbours in a mesh, and about 100 ns for each other sign that the
+/// filter leaves open. An open sign of coordinates outside the range takes about 0.5 µs, or about
+/// 35 µs if their bits span more than 160 places.
 ///
 /// ```
 /// use nearmiss_mesh::triangles_meet;
@@ -51,13 +51,14 @@ pub fn triangles_meet(a: &Corners, b: &Corners) -> bool {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Arrangement {
     Apart,
-    /// They meet, and both have areas in different planes. The corners are reordered: the first of each
-    /// triangle does not lie below the plane of the other, the other two do not lie above it.
+    /// They meet, and both have areas in different planes. The corners are reordered: the first of
+    /// each triangle does not lie below the plane of the other, the other two do not lie above it.
     Crossing(Corners, Corners),
     /// They lie in one plane, or one of them has no area. They may or may not meet.
     Flat,
 }
 
+#[inline]
 pub(crate) fn arrangement(a: &Corners, b: &Corners) -> Arrangement {
     if !boxes_meet(a, b) {
         return Arrangement::Apart;
@@ -92,9 +93,9 @@ fn boxes_meet(a: &Corners, b: &Corners) -> bool {
     })
 }
 
-/// The corner that lies alone on its side of a plane, and whether that is the upper side. The other two
-/// may lie in the plane, or the corner itself if both others are strictly on one side. `None` if all
-/// three lie in the plane.
+/// The corner that lies alone on its side of a plane, and whether that is the upper side. The other
+/// two may lie in the plane, or the corner itself if both others are strictly on one side. `None`
+/// if all three lie in the plane.
 #[inline]
 fn apex(sides: [Ordering; 3]) -> Option<(usize, bool)> {
     let [a, b, c] = sides.map(|side| usize::from(side.is_gt()) + usize::from(side.is_ge()));

@@ -1,5 +1,8 @@
 //! A triangle in the frame of its longest side, and its sampling in rows.
 
+/// The corners of a triangle. Corners may coincide or lie on a line.
+pub type Corners = [[f64; 3]; 3];
+
 /// A triangle in a frame whose first axis runs along the longest side, the base. The tip is above
 /// the base.
 #[derive(Debug, Clone, Copy)]
@@ -83,18 +86,22 @@ fn whole(last: f64) -> impl Iterator<Item = f64> {
     std::iter::successors(Some(0.0), |i| Some(i + 1.0)).take_while(move |i| *i <= last)
 }
 
+#[inline]
 pub(crate) fn between(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| b[k] - a[k])
 }
 
+#[inline]
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline]
 pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline]
 pub(crate) fn length(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }

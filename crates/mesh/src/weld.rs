@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-/// Cells are no smaller than this share of the greatest coordinate, so that their numbers are exact.
+/// Cells are no smaller than this share of the greatest coordinate, so that their numbers are
+/// exact.
 const LEAST_CELL: f64 = 1.0 / 1_099_511_627_776.0;
 
 /// For each vertex, the vertex that replaces it: of equal vertices, the one with the lowest index.
@@ -26,8 +27,8 @@ pub(crate) fn equal(vertices: &[[f64; 3]]) -> Vec<u32> {
     replacements
 }
 
-/// For each vertex, the vertex that replaces it: in the order of indices, each vertex is replaced by
-/// the nearest vertex kept before it if that is at most `tolerance` away, and kept otherwise.
+/// For each vertex, the vertex that replaces it: in the order of indices, each vertex is replaced
+/// by the nearest vertex kept before it if that is at most `tolerance` away, and kept otherwise.
 pub(crate) fn within(vertices: &[[f64; 3]], tolerance: f64) -> Vec<u32> {
     let largest = vertices.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let side = (2.0 * tolerance).max(largest * LEAST_CELL);

@@ -128,8 +128,8 @@ impl File {
     /// [`Check::Full`] that [`Check::Structure`] leaves out. Reads the whole file once.
     ///
     /// # Errors
-    /// Returns [`ContainerFault::Checksum`] for the first section that differs, or [`ContainerFault::Padding`] for
-    /// the first byte.
+    /// Returns [`ContainerFault::Checksum`] for the first section that differs, or
+    /// [`ContainerFault::Padding`] for the first byte.
     pub fn verify(&self) -> Result<(), OpenError> {
         self.table.verify(self.bytes.as_slice()).map_err(|fault| self.error(fault))
     }
@@ -156,8 +156,8 @@ impl File {
     /// does not compile.
     ///
     /// # Errors
-    /// Returns [`ContainerFault::MissingSection`], or [`ContainerFault::WrongElementSize`] if the elements differ in
-    /// size from `T`.
+    /// Returns [`ContainerFault::MissingSection`], or [`ContainerFault::WrongElementSize`] if the
+    /// elements differ in size from `T`.
     pub fn array<T: Pod>(&self, tag: [u8; 4], part: u32) -> Result<Array<T>, OpenError> {
         let section = self.find(SectionId { tag, part })?;
         let (expected, found) = (element_size::<T>(), section.element_size);
@@ -175,8 +175,9 @@ impl File {
     /// bytes, and the value must use all of them.
     ///
     /// # Errors
-    /// Returns [`ContainerFault::MissingSection`] if there are no metadata. Returns [`ContainerFault::Metadata`],
-    /// [`ContainerFault::MetadataTrailing`] or [`ContainerFault::MetadataTooLarge`] if they do not decode to an `M`.
+    /// Returns [`ContainerFault::MissingSection`] if there are no metadata. Returns
+    /// [`ContainerFault::Metadata`], [`ContainerFault::MetadataTrailing`] or
+    /// [`ContainerFault::MetadataTooLarge`] if they do not decode to an `M`.
     pub fn metadata<M: DeserializeOwned>(&self) -> Result<M, OpenError> {
         let section = self.find(SectionId::META)?;
         let bytes = &self.bytes.as_slice()[section.range()];

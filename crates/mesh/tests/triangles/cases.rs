@@ -37,7 +37,8 @@ pub(crate) fn lattice_pair(rng: &mut Random) -> [Corners; 2] {
     [a, b]
 }
 
-/// Places that are not representable, on corners, edges and faces of a random triangle up to rounding.
+/// Places that are not representable, on corners, edges and faces of a random triangle up to
+/// rounding.
 pub(crate) fn nearly_touching(rng: &mut Random) -> [Corners; 2] {
     let size = [1.0, 1e6, 1e-6][rng.random_range(0..3)];
     let shift = [0.0, 1.0, 1e6, 1e-6][rng.random_range(0..4)];
@@ -91,4 +92,11 @@ pub(crate) fn extent(pair: &[Corners; 2]) -> f64 {
 /// x · 2^`exponent`; exact if the result is representable.
 pub(crate) fn power_scaled(x: f64, exponent: i32) -> f64 {
     x * 2.0_f64.powi(exponent / 2) * 2.0_f64.powi(exponent - exponent / 2)
+}
+
+/// Sorts points by their coordinates.
+pub(crate) fn sorted<const N: usize>(mut points: [[f64; 3]; N]) -> [[f64; 3]; N] {
+    let order = |a: &f64, b: &f64| (a + 0.0).total_cmp(&(b + 0.0));
+    points.sort_by(|a, b| order(&a[0], &b[0]).then(order(&a[1], &b[1])).then(order(&a[2], &b[2])));
+    points
 }

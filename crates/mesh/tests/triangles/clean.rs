@@ -6,7 +6,7 @@ use nearmiss_geometry::TriangleMesh;
 use nearmiss_mesh::{CleanError, CleanMesh, CleanOptions, Corners};
 use rand::RngExt;
 
-use super::cases::{on_lattice, random};
+use super::cases::{on_lattice, random, sorted};
 
 /// A soup of random triangles on a lattice, some degenerate or repeated, with shared vertices.
 fn soup(seed: u64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
@@ -65,11 +65,7 @@ fn clean_meshes_are_clean() {
             if weld == 0.0 {
                 assert!(report.unused_vertices > 0 && !mesh.triangles().is_empty(), "{report:?}");
                 let dropped = |i: &u32| mesh.sources().binary_search(i).is_err();
-                let key = |i: u32| {
-                    let mut corners = triangles[i as usize].map(|v| vertices[v as usize]);
-                    corners.sort_by(|a, b| a.partial_cmp(b).unwrap());
-                    corners
-                };
+                let key = |i: u32| sorted(triangles[i as usize].map(|v| vertices[v as usize]));
                 // Every dropped triangle has no area or is one that was kept before.
                 for i in (0..200).filter(dropped) {
                     let mut kept = mesh.sources().iter().take_while(|&&s| s < i);

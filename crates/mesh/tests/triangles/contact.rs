@@ -2,13 +2,14 @@
 
 use nearmiss_mesh::{Corners, TriangleContact, triangle_contact, triangles_meet, unit_normal};
 
-use super::cases::{Random, extent, lattice_pair, magnitude, nearly_touching, random};
+use super::cases::{Random, extent, lattice_pair, magnitude, nearly_touching, random, sorted};
 use super::exact::distance_to;
 
 /// Units of rounding by which a contact may miss the triangles.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// Contacts are finite, in both triangles up to rounding, and there if and only if the triangles meet.
+/// Contacts are finite, in both triangles up to rounding, and there if and only if the triangles
+/// meet.
 fn checked(pair: &[Corners; 2]) -> Option<TriangleContact> {
     let [a, b] = pair;
     let contact = triangle_contact(a, b);
@@ -99,8 +100,7 @@ fn a_crossing_is_the_segment_it_is() {
     let floor = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
     let wall = [[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, -3.0, 1.0]];
     let contact = triangle_contact(&floor, &wall).unwrap();
-    let mut ends = contact.ends;
-    ends.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    let ends = sorted(contact.ends);
     // On the floor, the wall reaches from y = -1 to y = 1; the floor starts at 0.
     assert_eq!(ends, [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]);
     assert_eq!(contact.point, [1.0, 0.5, 0.0]);

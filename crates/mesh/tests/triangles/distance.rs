@@ -54,7 +54,8 @@ fn distances_of_nearly_touching_triangles_are_accurate() {
     assert!(worst < 1e-14, "{worst}");
 }
 
-/// Needles as thin as 1e-16 of their length, nearly parallel edges and planes, at gaps of all sizes.
+/// Needles as thin as 1e-16 of their length, nearly parallel edges and planes, at gaps of all
+/// sizes.
 #[test]
 fn distances_of_needles_are_accurate() {
     let worst = worst_error(2_500, 24, |rng| {
@@ -89,7 +90,8 @@ fn distances_are_those_of_dense_samples() {
         let all = of_a.iter().flat_map(|p| of_b.iter().map(move |q| square(p, q)));
         let sampled = all.fold(f64::INFINITY, f64::min).sqrt();
         let found = triangle_distance(&a, &b).distance;
-        // Within a step along each of two edges, which are shorter than √3, of every point is a sample.
+        // Within a step along each of two edges, which are shorter than √3, of every point is a
+        // sample.
         let spacing = 2.0 * 2.0 * 3.0_f64.sqrt() / f64::from(steps);
         assert!(found <= sampled + 1e-15 && sampled <= found + spacing, "{a:?} {b:?} {found} {sampled}");
     }

@@ -1,9 +1,9 @@
 //! Naive twins in exact arithmetic, by the convex hull of all differences of corners.
 //!
-//! Two convex sets meet if and only if the origin is a difference of their points, and their distance is
-//! that of the origin from the differences. The differences of two triangles are the convex hull of the
-//! nine differences of corners. By Carathéodory's theorem, the origin lies in the hull if and only if it
-//! lies in a simplex of at most four of the nine points.
+//! Two convex sets meet if and only if the origin is a difference of their points, and their
+//! distance is that of the origin from the differences. The differences of two triangles are the
+//! convex hull of the nine differences of corners. By Carathéodory's theorem, the origin lies in
+//! the hull if and only if it lies in a simplex of at most four of the nine points.
 
 use nearmiss_mesh::Corners;
 use num_bigint::BigInt;
